@@ -104,6 +104,7 @@ setup(
     packages=find_packages(include=[NAME, f"{NAME}.*"]),
     package_data={
         NAME: ["py.typed"],
+        f"{NAME}.applications.ergonomics": ["*.html"],
         f"{NAME}.estimation.cost": ["*.json"],
         f"{NAME}.estimation.filtering": ["*.json"],
         f"{NAME}.ros": ["*.csv"],
@@ -119,6 +120,7 @@ setup(
     # The upper bound is the next version that may break the interface: a major one, but a minor
     # one of rosbags, whose interface still changes.
     install_requires=[
+        "jinja2>=3.1,<4",
         "joblib>=1.3,<2",
         "lz4>=4.3,<5",
         "matplotlib>=3.8,<4",

@@ -22,7 +22,6 @@ from cardbox_tracker.errors import CardboxError
 # Part of the names of temporary files, which can remain after a crash.
 _MARK = ".unfinished-"
 _STEM_LENGTH = 100
-_MOST_LINKS = 40
 
 
 class UnreadableFileError(CardboxError):
@@ -165,19 +164,15 @@ def check_writable(path: str | os.PathLike[str]) -> None:
     Raises:
         CardboxError: ``path`` or its folder cannot be written.
     """
+    if is_written_in_place(path):
+        return
     try:
-        if is_written_in_place(path):
-            return
-        target = resolved(path)
-        os.stat(target.parent)
-        with contextlib.suppress(FileNotFoundError):
-            os.stat(target)
+        with contextlib.suppress(FileNotFoundError, NotADirectoryError):
+            os.stat(path)  # its name may be too long
     except OSError as error:
         raise _refused(Path(path), error) from None
-    if not target.parent.is_dir():
-        raise _refused(target, "Not a directory")
-    if not os.access(target.parent, os.W_OK | os.X_OK):
-        raise _refused(target, "Permission denied")
+    with claimed_name(resolved(path), is_folder=False):
+        pass
 
 
 def is_written_in_place(path: str | os.PathLike[str]) -> bool:
@@ -193,21 +188,16 @@ def is_written_in_place(path: str | os.PathLike[str]) -> bool:
     if stat.S_ISBLK(mode) or stat.S_ISSOCK(mode):
         what = "a disk" if stat.S_ISBLK(mode) else "a socket"
         raise CardboxError(f"cannot write {os.fspath(path)}: it is {what}; give the name of a file")
-    return stat.S_ISFIFO(mode) or stat.S_ISCHR(mode) or _descriptor_behind(path) is not None
+    return stat.S_ISFIFO(mode) or stat.S_ISCHR(mode) or _descriptor(path) is not None
 
 
-def _descriptor_behind(path: str | os.PathLike[str]) -> str | None:
-    """Return the name in /proc of the open file behind ``path``, such as /dev/stdout."""
-    here = os.path.abspath(path)
-    for _ in range(_MOST_LINKS):
-        folder, name = os.path.split(here)
-        folder = os.path.realpath(folder)
-        if re.fullmatch(r"/proc/\d+/(task/\d+/)?fd", folder):
-            return f"{folder}/{name}"
-        if not os.path.islink(here):
-            return None
-        here = os.path.normpath(os.path.join(folder, os.readlink(here)))
-    return None
+def _descriptor(path: str | os.PathLike[str]) -> int | None:
+    """Return the number of this process's open file that ``path`` names, such as /dev/stdout."""
+    names = r"/dev/std(out|err)|/(?:dev|proc/self)/fd/(\d+)"
+    found = re.fullmatch(names, os.path.abspath(path))
+    if found is None:
+        return None
+    return int(found[2]) if found[2] else ("out", "err").index(found[1]) + 1
 
 
 @contextmanager
@@ -229,11 +219,10 @@ def _copied_to(target: Path) -> Iterator[Path]:
 
 def _open(target: Path) -> int:
     """Open for writing without creating or truncating the file."""
-    name = _descriptor_behind(target)
-    own = f"/proc/{os.getpid()}/fd/"
-    if name is not None and name.startswith(own):
+    number = _descriptor(target)
+    if number is not None:
         # A duplicate shares the offset, so that later output does not overwrite this one.
-        return os.dup(int(name.removeprefix(own)))
+        return os.dup(number)
     return os.open(target, os.O_WRONLY | os.O_APPEND)
 
 
@@ -270,10 +259,9 @@ def _remove(path: Path) -> None:
         path.unlink(missing_ok=True)
 
 
-def _refused(target: Path, error: OSError | str) -> CardboxError:
-    reason = error if isinstance(error, str) else error.strerror
+def _refused(target: Path, error: OSError) -> CardboxError:
     return CardboxError(
-        f"cannot write {target}: {reason}; choose a folder that exists and is writable"
+        f"cannot write {target}: {error.strerror}; choose a folder that exists and is writable"
     )
 
 

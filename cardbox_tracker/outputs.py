@@ -21,10 +21,10 @@ from cardbox_tracker.body.skeleton import (
     NECK_NAMES,
     PLACE_NAMES,
 )
-from cardbox_tracker.drawing.markers import MarkerShape, marker_shapes
 from cardbox_tracker.estimation.estimate import Estimate
 from cardbox_tracker.estimation.tracker import Tracker
 from cardbox_tracker.keypoint_status import KeypointStates, keypoint_states
+from cardbox_tracker.markers import MarkerShape, marker_shapes
 
 
 class JointValues(NamedTuple):

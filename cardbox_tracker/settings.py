@@ -189,13 +189,19 @@ def changed(instance: T, given: Mapping[str, Any], where: str = "") -> T:
 
 
 def nested(values: Mapping[str, Any]) -> dict[str, Any]:
-    """Return values by dotted names, such as ``whole_body.effort``, as nested mappings."""
+    """Return values by dotted names, such as ``whole_body.effort``, as nested mappings.
+
+    Raises:
+        ValueError: a name is given a value, and settings below it, too.
+    """
     result: dict[str, Any] = {}
     for dotted, value in values.items():
         *outer, name = dotted.split(".")
         inner = result
         for part in outer:
             inner = inner.setdefault(part, {})
+            if not isinstance(inner, dict):
+                raise ValueError(f"{part} is {inner!r}; expected names and values below it")
         inner[name] = value
     return result
 

@@ -30,12 +30,6 @@ def test_the_pages_have_the_order_of_the_tables(conf: dict[str, Any]) -> None:
     )
 
 
-def test_the_sections_are_tutorial_how_to_reference_explanation(conf: dict[str, Any]) -> None:
-    found = conf["order"]((DOCS / "README.md").read_text(encoding="utf-8"))
-    captions = [line.split(": ")[1] for line in found.splitlines() if line.startswith(":caption")]
-    assert captions[:4] == ["Tutorial", "How to", "Reference", "Explanation"]
-
-
 def test_every_page_is_in_the_order(conf: dict[str, Any]) -> None:
     listed = {DOCS / "README.md"}
     for page in (DOCS / "README.md", DOCS / "research" / "README.md"):

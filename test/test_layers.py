@@ -24,15 +24,13 @@ LAYERS: tuple[tuple[str, ...], ...] = (
     ("vision",),
     ("detection",),
     ("estimation",),
-    ("ergonomics", "exporting", "retargeting"),
-    ("drawing",),
-    ("keypoint_status",),
+    ("keypoint_status", "markers"),
     ("outputs",),
     ("tracking_report",),
     ("recordings",),
     ("simulation",),
     ("evaluation",),
-    ("viewing",),
+    ("applications",),
     ("ros",),
     ("demo",),
     ("commands",),
@@ -40,6 +38,7 @@ LAYERS: tuple[tuple[str, ...], ...] = (
 )
 # The layers inside a folder; what is not named may use all of them.
 INSIDE: dict[str, tuple[tuple[str, ...], ...]] = {
+    "applications": (("drawing",), ("ergonomics", "exporting", "retargeting", "viewing")),
     "estimation": (("cost",), ("config", "filtering"), ("initialization",)),
     "ros": (("runtime", "messages"), ("nodes",)),
 }
@@ -126,8 +125,8 @@ def test_an_upward_import_would_be_found(tmp_path: Path) -> None:
     for name, text in (
         ("body/low.py", "def late():\n    from cardbox_tracker.ros import high\n"),
         ("ros/high.py", "import cardbox_tracker.body.low\n"),
-        ("ergonomics/a.py", "from cardbox_tracker.exporting import b\n"),
-        ("exporting/b.py", ""),
+        ("keypoint_status/a.py", "from cardbox_tracker.markers import b\n"),
+        ("markers/b.py", ""),
         ("estimation/cost/c.py", "from cardbox_tracker.estimation.filtering.d import x\n"),
         ("estimation/filtering/d.py", "x = 1\n"),
     ):
@@ -136,7 +135,7 @@ def test_an_upward_import_would_be_found(tmp_path: Path) -> None:
         path.write_text(text)
     assert upward(tmp_path) == [
         "body.low -> ros.high",
-        "ergonomics.a -> exporting.b",
+        "keypoint_status.a -> markers.b",
         "estimation.cost.c -> estimation.filtering.d",
     ]
     known = modules(tmp_path)

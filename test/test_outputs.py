@@ -14,15 +14,8 @@ from hypothesis import strategies as st
 from cardbox_tracker.body.kinematics import pose
 from cardbox_tracker.body.model import BodyModel
 from cardbox_tracker.body.posture import reference_posture
-from cardbox_tracker.body.skeleton import JOINT_NAMES
-from cardbox_tracker.estimation.estimate import (
-    LOST,
-    NO_PERSON,
-    TRACKING,
-    UNCERTAIN,
-    Estimate,
-    KeypointState,
-)
+from cardbox_tracker.body.skeleton import JOINT_NAMES, KeypointState
+from cardbox_tracker.estimation.estimate import LOST, NO_PERSON, TRACKING, UNCERTAIN, Estimate
 from cardbox_tracker.estimation.tracker import Tracker
 from cardbox_tracker.outputs import (
     METRICS,

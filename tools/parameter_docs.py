@@ -111,8 +111,9 @@ def _settings_section() -> list[str]:
     """Return the lines about the settings of the core that a file can give."""
     lines = [
         *("", "## Settings of the tracker in a file", ""),
-        "The option `--settings` of `cardbox track` and the parameter `settings_file` of the",
-        "tracker take a YAML file with any of these; each part before a dot is a level of its own:",
+        "`cardbox track` takes any of these as `--set NAME=VALUE`. Its option `--settings` and the",
+        "parameter `settings_file` of the tracker take a YAML file, in which each part before a",
+        "dot is a level of its own:",
         "",
         *("```yaml", "whole_body:", "  effort: 0.5", "  cost:", "    yaw_deg: 20.0", "```", ""),
         "`torso`, `arm`, `strategy`, `cycles`, `average` and `torso_beside_arms` are of the preset",

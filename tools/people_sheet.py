@@ -17,9 +17,9 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from cardbox_tracker.applications.drawing.overlay import draw_overlay
 from cardbox_tracker.body.model import BodyModel
 from cardbox_tracker.detection.image_points import POINT_NAMES
-from cardbox_tracker.drawing.overlay import draw_overlay
 from cardbox_tracker.errors import CardboxError
 from cardbox_tracker.estimation.config import default_preset
 from cardbox_tracker.estimation.estimate import Estimate

@@ -8,8 +8,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from cardbox_tracker.applications.drawing.overlay import draw_overlay
 from cardbox_tracker.body.model import BodyModel
-from cardbox_tracker.drawing.overlay import draw_overlay
 from cardbox_tracker.estimation.estimate import Estimate
 from cardbox_tracker.vision.camera import Camera
 

@@ -18,6 +18,10 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from cardbox_tracker.applications.retargeting.config import RetargetConfig
+from cardbox_tracker.applications.retargeting.hand import HandFollower
+from cardbox_tracker.applications.retargeting.retargeter import Retargeter
+from cardbox_tracker.applications.retargeting.robot import Robot, load_robot
 from cardbox_tracker.body.model import BodyModel
 from cardbox_tracker.body.sizes import FloatArray
 from cardbox_tracker.estimation.config import PRESETS, TrackerConfig
@@ -27,10 +31,6 @@ from cardbox_tracker.evaluation.marks import replaced
 from cardbox_tracker.evaluation.recorded.angles import comparable, true_postures
 from cardbox_tracker.evaluation.recorded.session import RecordedSession, load_session
 from cardbox_tracker.evaluation.recorded.tracking import track_session
-from cardbox_tracker.retargeting.config import RetargetConfig
-from cardbox_tracker.retargeting.hand import HandFollower
-from cardbox_tracker.retargeting.retargeter import Retargeter
-from cardbox_tracker.retargeting.robot import Robot, load_robot
 
 ROOT = Path(__file__).resolve().parents[1]
 DOCUMENT, ROBOT = ROOT / "docs" / "retargeting.md", ROOT / "config" / "example_arm.urdf"

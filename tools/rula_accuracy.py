@@ -16,17 +16,18 @@ from pathlib import Path
 
 import numpy as np
 
-from cardbox_tracker.body.model import BodyModel
-from cardbox_tracker.body.sizes import FloatArray
-from cardbox_tracker.ergonomics.config import RulaConfig
-from cardbox_tracker.ergonomics.distribution import (
+from cardbox_tracker.applications.ergonomics.config import RulaConfig
+from cardbox_tracker.applications.ergonomics.rula import (
+    ABOVE,
+    HIGHEST,
     SAMPLES,
+    ScoreArray,
     ScoreDistribution,
+    rula_scores,
     score_distribution,
 )
-from cardbox_tracker.ergonomics.recording import ABOVE
-from cardbox_tracker.ergonomics.rula import rula_scores
-from cardbox_tracker.ergonomics.tables import HIGHEST, ScoreArray
+from cardbox_tracker.body.model import BodyModel
+from cardbox_tracker.body.sizes import FloatArray
 from cardbox_tracker.estimation.config import PRESETS, TrackerConfig
 from cardbox_tracker.estimation.estimate import Estimate
 from cardbox_tracker.estimation.sampling import normal_postures

@@ -16,9 +16,9 @@ from pathlib import Path
 import cv2
 import numpy as np
 
+from cardbox_tracker.applications.drawing.guidance import Guide
+from cardbox_tracker.applications.drawing.overlay import ImageArray, draw_overlay
 from cardbox_tracker.body.posture import REFERENCE_NAMES
-from cardbox_tracker.drawing.guide import Guide
-from cardbox_tracker.drawing.overlay import ImageArray, draw_overlay
 from cardbox_tracker.errors import CardboxError
 from cardbox_tracker.estimation.config import PRESETS
 from cardbox_tracker.estimation.initialization.config import InitializationConfig

@@ -101,6 +101,19 @@ class Tilt(NamedTuple):
     sin_pitch: float
 
 
+class Boned(Protocol):
+    """What kernels need to know of a person: the attributes of :class:`Bones`."""
+
+    @property
+    def parts(self) -> FloatArray: ...  # noqa: D102
+    @property
+    def girdle(self) -> FloatArray: ...  # noqa: D102
+    @property
+    def place(self) -> Place: ...  # noqa: D102
+    @property
+    def camera(self) -> Pitched: ...  # noqa: D102
+
+
 class Bones(NamedTuple):
     """A person in a place before a camera; kernels get a plain tuple.
 
@@ -628,12 +641,9 @@ def _arm_twists(
             twists[SHOULDER_FLEXION, k] += ca * sf * along
 
 
-@inlined_allocation
-def state_twists(state: FloatArray, of: Bones, twists: FloatArray) -> None:
-    """Write the twists (14, 6) of the values of ``state`` (14,), in the optical frame.
-
-    ``of`` may be anything with the attributes of :class:`Bones`.
-    """
+@kernel
+def state_twists(state: FloatArray, of: Boned, twists: FloatArray) -> None:
+    """Write the twists (14, 6) of the values of ``state`` (14,), in the optical frame."""
     rotation, hip, arm = np.empty((3, 3)), np.empty(3), new_arm()
     state_pose(state, of.place, of.camera, rotation, hip)
     _trunk_twists(state, of.camera, rotation, hip, twists)
@@ -645,12 +655,9 @@ def state_twists(state: FloatArray, of: Bones, twists: FloatArray) -> None:
         _arm_twists(angles, side_of(k), of.girdle, arm.joints, rotation, here)
 
 
-@inlined_allocation
-def keypoints(state: FloatArray, of: Bones, points: FloatArray) -> None:
-    """Write the keypoints (6, 3) of ``state`` (14,) in the optical frame, metres.
-
-    ``of`` may be anything with the attributes of :class:`Bones`.
-    """
+@kernel
+def keypoints(state: FloatArray, of: Boned, points: FloatArray) -> None:
+    """Write the keypoints (6, 3) of ``state`` (14,) in the optical frame, metres."""
     rotation, hip, arm = np.empty((3, 3)), np.empty(3), new_arm()
     state_pose(state, of.place, of.camera, rotation, hip)
     for k in range(2):

@@ -69,6 +69,8 @@ class Group(StrEnum):
     """Fixed, until something sees it: the hands at the wrists, for example."""
 
 
+_POSTURE, _PLACE, _NECK, _CLAVICLES, _NOTHING = Group
+
 SHOULDER_RISE = 0.077
 """Rise of a shoulder joint per radian of elevation of its arm, in shoulder breadths."""
 RISE_FROM_RAD = math.radians(30.0)
@@ -136,29 +138,29 @@ _NO_RANGE = 0.0, 0.0
 # Joints of one side, without its name; the directions are those of the left side.
 _ARM: tuple[Joint, ...] = (
     Joint(
-        *("clavicle_elevation", Group.CLAVICLES, "torso_roll", PRISMATIC),
+        *("clavicle_elevation", _CLAVICLES, "torso_roll", PRISMATIC),
         *((0.0, -RISE_INWARDS, RISE_UPWARDS), (0.0, 0.15), "clavicle", "clavicle"),
         lambda parts: (0.0, parts.shoulder_aside_m, parts.shoulder_height_m),
     ),
     Joint(
-        *("shoulder_abduction", Group.POSTURE, "clavicle_elevation", REVOLUTE),
+        *("shoulder_abduction", _POSTURE, "clavicle_elevation", REVOLUTE),
         *(X, _deg(-45, 180), "y_shoulder", "shoulder_link"),
     ),
     Joint(
-        *("shoulder_flexion", Group.POSTURE, "shoulder_abduction", REVOLUTE),
+        *("shoulder_flexion", _POSTURE, "shoulder_abduction", REVOLUTE),
         *(_BACK_Y, _deg(-60, 90), "p_shoulder", "upper_arm"),
     ),
     Joint(
-        *("elbow_abduction", Group.POSTURE, "shoulder_flexion", REVOLUTE),
+        *("elbow_abduction", _POSTURE, "shoulder_flexion", REVOLUTE),
         *(X, _deg(-150, 150), "r_shoulder", "elbow_link"),
         lambda parts: (0.0, 0.0, parts.upper_arm.bottom_m),
     ),
     Joint(
-        *("elbow_flexion", Group.POSTURE, "elbow_abduction", REVOLUTE),
+        *("elbow_flexion", _POSTURE, "elbow_abduction", REVOLUTE),
         *(_BACK_Y, _deg(-10, 95), "elbow", "forearm"),
     ),
     Joint(
-        *("wrist", Group.NOTHING, "elbow_flexion", FIXED, X, _NO_RANGE, "wrist", "hand"),
+        *("wrist", _NOTHING, "elbow_flexion", FIXED, X, _NO_RANGE, "wrist", "hand"),
         lambda parts: (0.0, 0.0, parts.forearm.bottom_m),
     ),
 )
@@ -192,28 +194,19 @@ def _of_side(joint: Joint, name: str, side: float) -> Joint:
 
 
 SKELETON: tuple[Joint, ...] = (
-    Joint("torso_y", Group.POSTURE, "torso_z", PRISMATIC, Y, (-3.0, 3.0), "body"),
-    Joint(
-        *("torso_roll", Group.POSTURE, "torso_pitch", REVOLUTE),
-        *(X, _deg(-45, 45), "r_waist", "torso"),
-    ),
-    Joint("torso_pitch", Group.POSTURE, "torso_yaw", REVOLUTE, Y, _deg(-25, 90), "waist"),
-    Joint("torso_yaw", Group.POSTURE, "torso_y", REVOLUTE, Z, _deg(-100, 100), "y_waist"),
-    *_arms(Group.POSTURE),
-    Joint("torso_x", Group.PLACE, "", PRISMATIC, X, (-math.inf, math.inf), "x_body"),
+    Joint("torso_y", _POSTURE, "torso_z", PRISMATIC, Y, (-3.0, 3.0), "body"),
+    Joint("torso_roll", _POSTURE, "torso_pitch", REVOLUTE, X, _deg(-45, 45), "r_waist", "torso"),
+    Joint("torso_pitch", _POSTURE, "torso_yaw", REVOLUTE, Y, _deg(-25, 90), "waist"),
+    Joint("torso_yaw", _POSTURE, "torso_y", REVOLUTE, Z, _deg(-100, 100), "y_waist"),
+    *_arms(_POSTURE),
+    Joint("torso_x", _PLACE, "", PRISMATIC, X, (-math.inf, math.inf), "x_body"),
     # Between sitting on a low stool and standing on tiptoe.
-    Joint("torso_z", Group.PLACE, "torso_x", PRISMATIC, Z, (-0.6, 0.3), "z_body"),
-    Joint(
-        *("neck_yaw", Group.NECK, "torso_roll", REVOLUTE),
-        *(Z, _deg(-80, 80), "y_head", "", neck_pivot_m),
-    ),
-    Joint("neck_pitch", Group.NECK, "neck_yaw", REVOLUTE, Y, _deg(-60, 60), "p_head"),
-    *_arms(Group.CLAVICLES),
-    Joint(
-        *("neck", Group.NOTHING, "neck_pitch", FIXED),
-        *(X, _NO_RANGE, "head", "head", head_from_pivot_m),
-    ),
-    *_arms(Group.NOTHING),
+    Joint("torso_z", _PLACE, "torso_x", PRISMATIC, Z, (-0.6, 0.3), "z_body"),
+    Joint("neck_yaw", _NECK, "torso_roll", REVOLUTE, Z, _deg(-80, 80), "y_head", "", neck_pivot_m),
+    Joint("neck_pitch", _NECK, "neck_yaw", REVOLUTE, Y, _deg(-60, 60), "p_head"),
+    *_arms(_CLAVICLES),
+    Joint("neck", _NOTHING, "neck_pitch", FIXED, X, _NO_RANGE, "head", "head", head_from_pivot_m),
+    *_arms(_NOTHING),
 )
 """All joints; the movable ones in the order of joint states, to which new ones are appended."""
 

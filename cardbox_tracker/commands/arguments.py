@@ -1,23 +1,25 @@
-"""Argument types and options of several subcommands."""
+"""Argument types and options that several subcommands have, and the check of their outputs."""
 
 from __future__ import annotations
 
 import argparse
 import math
+import os
 import sys
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import fields
 from itertools import chain
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from cardbox_tracker.errors import CardboxError
+from cardbox_tracker.files import check_writable, is_written_in_place
+from cardbox_tracker.settings import settings_of
 
 if TYPE_CHECKING:
-    from cardbox_tracker.recordings.detector import Detector
-    from cardbox_tracker.recordings.point_table import PointTable
-    from cardbox_tracker.recordings.recording import Segmentation
     from cardbox_tracker.recordings.silhouettes import TimeSpan
 
+T = TypeVar("T")
 
 REFERENCES = {
     "front": "faces the camera, arms hanging 20 degrees away from the body",
@@ -27,147 +29,74 @@ REFERENCES = {
 """Reference postures by name, with the description for the person."""
 
 
-def add_retired(parser: argparse.ArgumentParser, flag: str, instead: str) -> None:
-    """Refuse the option ``flag`` of a former version; ``instead`` says what to do or expect."""
-
-    class Refuse(argparse.Action):
-        def __call__(self, parser: argparse.ArgumentParser, *_: object) -> None:
-            parser.error(f"{flag} was removed: {instead}")
-
-    parser.add_argument(flag, action=Refuse, nargs="?", help=argparse.SUPPRESS)
-
-
-def add_recording(
-    parser: argparse.ArgumentParser, required: bool = True, only_bags: bool = True
-) -> None:
-    """Add the recording to read and the span in which its background is learned.
-
-    The span may be missing unless there are ``only_bags``.
-    """
-    bag = "rosbag2 folder or file"
-    parser.add_argument(
-        "recording",
-        type=Path,
-        nargs=None if required else "?",
-        metavar="BAG" if only_bags else "RECORDING",
-        help=bag if only_bags else f"{bag}, video, or folder of JPEG or PNG images",
-    )
-    parser.add_argument(
-        "--background",
-        type=span,
-        required=only_bags,
-        default=None,
-        metavar="T0:T1",
-        help="seconds during which nobody is in view",
-    )
-
-
-def add_depth(parser: argparse.ArgumentParser) -> None:
-    """Add ``--depth`` and ``--within``, which may stand for ``--background``."""
-    parser.add_argument(
-        "--depth",
-        default=None,
-        metavar="TOPIC",
-        help="depth images (16UC1, 32FC1 or compressedDepth) that cover the same view as the first "
-        "of --cameras; 'stereo' measures depth in the first two of them, a rectified pair, left "
-        "first",
-    )
-    parser.add_argument(
-        "--within",
-        type=float,
-        default=None,
-        metavar="M",
-        help="in place of --background: limit of the depth in the images of --depth, metres; "
-        "choose it between the person and the wall",
-    )
-
-
-def add_detector(parser: argparse.ArgumentParser) -> None:
-    """Add ``--silhouettes`` and ``--detector``."""
-    parser.add_argument(
-        "--silhouettes",
-        choices=("background", "detector", "person_in_view"),
-        default=None,
-        help="source of the silhouettes: the difference from the scene of --background; the mask "
-        "of a person detector ('cardbox detector --install'); or the difference from a scene that "
-        "is learned around the person, who must step aside at some time. With neither --background "
-        "nor --within, the mask is the default with --detector mediapipe, and person_in_view for "
-        "videos and images",
-    )
-    parser.add_argument(
-        "--detector",
-        default=None,
-        metavar="mediapipe|FILE.csv",
-        help="also use 2D points of the person's joints: those of MediaPipe's networks ('cardbox "
-        "detector --install'), or a table that any detector has written (docs/detectors.md)",
-    )
-
-
-def silhouettes_of(options: argparse.Namespace) -> Segmentation:
-    """Return the source of the silhouettes.
+def span(text: str) -> TimeSpan:
+    """Parse a span ``T0:T1``, seconds from the start of the recording.
 
     Raises:
-        CardboxError: none or several are given, or the detector is not installed.
+        argparse.ArgumentTypeError: the text is not two times, the first before the second.
     """
-    from cardbox_tracker.recordings.depth_silhouettes import Within
-    from cardbox_tracker.recordings.detector import MEDIAPIPE, Detector
-    from cardbox_tracker.recordings.open_images import is_bag
-    from cardbox_tracker.recordings.person_in_view import PersonInView
-    from cardbox_tracker.recordings.recording import STEREO
+    from cardbox_tracker.recordings.silhouettes import TimeSpan
 
-    given = (options.background is not None) + (options.within is not None)
-    chosen = options.silhouettes
-    if chosen is None and not given and options.detector == MEDIAPIPE:
-        chosen = "detector"
-    elif chosen is None and not given and not is_bag(options.recording):
-        chosen = "person_in_view"
-    if chosen in ("detector", "person_in_view"):
-        if given:
-            raise CardboxError(
-                f"--silhouettes {chosen} takes the place of --background and --within: leave them "
-                "out"
+    try:
+        return TimeSpan.parse(text)
+    except ValueError:
+        raise argparse.ArgumentTypeError(
+            "expected T0:T1, seconds from the start of the recording with T0 before T1, "
+            f"got {text!r}"
+        ) from None
+
+
+def time(text: str) -> float:
+    """Parse a time in seconds from the start of the recording.
+
+    Raises:
+        argparse.ArgumentTypeError: the text is no finite number, or it is negative.
+    """
+    value = _number(text)
+    if not 0.0 <= value < math.inf:
+        raise argparse.ArgumentTypeError(
+            f"expected seconds from the start of the recording, got {text!r}"
+        )
+    return value
+
+
+def at_least(lowest: int) -> Callable[[str], int]:
+    """Return a parser of whole numbers of ``lowest`` or more, which raises ArgumentTypeError."""
+
+    def parse(text: str) -> int:
+        try:
+            value = int(text)
+        except ValueError:
+            value = lowest - 1
+        if value < lowest:
+            raise argparse.ArgumentTypeError(
+                f"expected a whole number of {lowest} or more, got {text!r}"
             )
-        return Detector.installed() if chosen == "detector" else PersonInView()
-    if given != 1:
-        raise CardboxError(
-            "expected either --background T0:T1, seconds during which nobody is in view, --within "
-            "M with depth images, or --silhouettes detector or person_in_view, which need neither"
-        )
-    if options.within is None:
-        span: TimeSpan = options.background
-        return span
-    if options.depth in (None, STEREO):
-        raise CardboxError("--within needs the topic of depth images: give --depth TOPIC")
-    return Within(options.depth, options.within)
+        return value
+
+    return parse
 
 
-def points_of(options: argparse.Namespace) -> Detector | PointTable | None:
-    """Return the source of the 2D points that ``--detector`` names; None without the option.
+def between(lowest: float, highest: float) -> Callable[[str], float]:
+    """Return a parser of numbers in a range, 0 excluded if it is the lowest."""
+    least = "a number above" if lowest == 0.0 else "a number from"
 
-    Raises:
-        CardboxError: see :func:`points_named`.
-    """
-    return None if options.detector is None else points_named(options.detector)
+    def parse(text: str) -> float:
+        value = _number(text)
+        if not lowest <= value <= highest or lowest == 0.0 == value:
+            raise argparse.ArgumentTypeError(
+                f"expected {least} {lowest:g} to {highest:g}, got {text!r}"
+            )
+        return value
+
+    return parse
 
 
-def points_named(name: str) -> Detector | PointTable:
-    """Return the source of 2D points of a name: the detector's, or the path of a table.
-
-    Raises:
-        CardboxError: the detector is not installed, or there is no such table.
-    """
-    from cardbox_tracker.recordings.detector import MEDIAPIPE, Detector
-    from cardbox_tracker.recordings.point_table import PointTable
-
-    if name == MEDIAPIPE:
-        return Detector.installed()
-    path = Path(name)
-    if not path.is_file():
-        raise CardboxError(
-            f"--detector is {name!r}; expected {MEDIAPIPE}, or the file of a table of points "
-            "(docs/detectors.md)"
-        )
-    return PointTable(path)
+def _number(text: str) -> float:
+    try:
+        return float(text)
+    except ValueError:
+        return math.nan
 
 
 def add_references(parser: argparse.ArgumentParser) -> None:
@@ -190,40 +119,14 @@ def add_references(parser: argparse.ArgumentParser) -> None:
     )
 
 
-def print_remarks(*remarks: Iterable[str]) -> None:
-    """Print remarks on a recording on the standard error."""
-    for remark in chain(*remarks):
-        print(f"cardbox: {remark}", file=sys.stderr)
-
-
-def add_cameras(parser: argparse.ArgumentParser) -> None:
-    """Add ``--cameras`` and ``--extrinsics``."""
-    parser.add_argument(
-        "--cameras",
-        nargs="+",
-        default=[],
-        metavar="NAMESPACE",
-        help="cameras of the recording that see the person, such as cam0 cam1, the one that the "
-        "person faced first; with one name, that camera alone; not needed if there is only one",
-    )
-    parser.add_argument(
-        "--extrinsics",
-        type=Path,
-        default=None,
-        metavar="FILE",
-        help="where further cameras stand, from Kalibr (YAML) or aniposelib (TOML); not needed "
-        "for a rectified pair or with /tf_static in the recording",
-    )
-
-
-def add_preset(parser: argparse.ArgumentParser, default: str) -> None:
+def add_preset(parser: argparse.ArgumentParser) -> None:
     """Add ``--preset``, a name of ``estimation.config.PRESETS``."""
     from cardbox_tracker.estimation.config import PRESETS
 
     parser.add_argument(
         "--preset",
         choices=PRESETS,
-        default=default,
+        default="default",
         help="tracker settings: paper is Table I of the paper, default tracks best",
     )
 
@@ -257,52 +160,115 @@ def add_camera_pitch(parser: argparse.ArgumentParser, found: str = "") -> None:
     )
 
 
-def span(text: str) -> TimeSpan:
-    """Parse a span ``T0:T1``, seconds from the start of the recording.
+def add_settings(parser: argparse.ArgumentParser, kind: Any, title: str) -> None:
+    """Add an option for each setting of the dataclass ``kind``, below the heading ``title``.
 
-    Raises:
-        argparse.ArgumentTypeError: the text is not two times, the first before the second.
+    A switch is off by default.
     """
-    from cardbox_tracker.recordings.silhouettes import TimeSpan
-
-    try:
-        return TimeSpan.parse(text)
-    except ValueError:
-        raise argparse.ArgumentTypeError(
-            "expected T0:T1, seconds from the start of the recording with T0 before T1, "
-            f"got {text!r}"
-        ) from None
-
-
-def time(text: str) -> float:
-    """Parse a time in seconds from the start of the recording.
-
-    Raises:
-        argparse.ArgumentTypeError: the text is no finite number, or it is negative.
-    """
-    try:
-        value = float(text)
-    except ValueError:
-        value = math.nan
-    if not 0.0 <= value < math.inf:
-        raise argparse.ArgumentTypeError(
-            f"expected seconds from the start of the recording, got {text!r}"
+    group = parser.add_argument_group(title)
+    defaults = {entry.name: entry.default for entry in fields(kind)}
+    for name, setting in settings_of(kind).items():
+        flag, default = f"--{name.replace('_', '-')}", defaults[name]
+        text = setting.description.replace("%", "%%")
+        if isinstance(default, bool):
+            group.add_argument(flag, action="store_true", help=text)
+            continue
+        unit = f" [{setting.unit}]" if setting.unit else ""
+        if setting.choices:
+            group.add_argument(flag, choices=setting.choices, default=default, help=text)
+            continue
+        allowed = f"; {setting.range_text}" if setting.range_text else ""
+        group.add_argument(
+            flag, type=type(default), default=default, metavar="N", help=f"{text}{unit}{allowed}"
         )
-    return value
 
 
-def at_least(lowest: int) -> Callable[[str], int]:
-    """Return a parser of whole numbers of ``lowest`` or more, which raises ArgumentTypeError."""
+def settings_from(options: argparse.Namespace, kind: type[T]) -> T:
+    """Return the settings of the dataclass ``kind`` from the options of :func:`add_settings`.
 
-    def parse(text: str) -> int:
-        try:
-            value = int(text)
-        except ValueError:
-            value = lowest - 1
-        if value < lowest:
-            raise argparse.ArgumentTypeError(
-                f"expected a whole number of {lowest} or more, got {text!r}"
-            )
-        return value
+    Raises:
+        CardboxError: a value is out of its range.
+    """
+    try:
+        return kind(**{name: getattr(options, name) for name in settings_of(kind)})
+    except ValueError as error:
+        name, _, rest = str(error).partition(" ")
+        raise CardboxError(f"--{name.replace('_', '-')} {rest}") from None
 
-    return parse
+
+def add_force(parser: argparse.ArgumentParser) -> None:
+    """Add ``--force``."""
+    parser.add_argument(
+        "--force", action="store_true", help="replace results that exist; without it, refuse"
+    )
+
+
+def check_outputs(
+    outputs: Iterable[Path | None],
+    force: bool,
+    inputs: Sequence[Path | None] = (),
+    results: Iterable[Path | None] = (),
+) -> None:
+    """Refuse outputs that cannot be written or would overwrite something, before any work is done.
+
+    Args:
+        outputs: files to write; None is ignored, here and below.
+        force: whether files that exist may be replaced.
+        inputs: files and recordings that are read, which are never replaced.
+        results: files and folders that other code writes; only ``force`` and ``inputs`` are
+            checked.
+
+    Raises:
+        CardboxError: an output exists, is an input, is named twice, or cannot be written.
+    """
+    files = [path for path in outputs if path is not None]
+    every = [*files, *(path for path in results if path is not None)]
+    for number, path in enumerate(every):
+        for other in every[:number]:
+            is_same = path.absolute() == other.absolute() or _is_same(path, other)
+            if is_same and not is_written_in_place(path):
+                raise CardboxError(f"{path} is given for two outputs; give each a name of its own")
+        for read in _files_of(inputs):
+            if _is_same(path, read):
+                raise CardboxError(f"cannot write {path}: it is read, as {read}; give another name")
+    for path in files:
+        check_writable(path)
+    for path in every:
+        if not force and _is_something(path):
+            raise CardboxError(f"{path} exists; choose another name, or give --force to replace it")
+
+
+def _is_something(path: Path) -> bool:
+    """Return whether there is a file, or a folder with content, that would be lost."""
+    if path.is_dir():
+        return any(path.iterdir())
+    return path.exists() and not is_written_in_place(path)
+
+
+def _files_of(inputs: Iterable[Path | None]) -> Iterator[Path]:
+    for path in inputs:
+        if path is None:
+            continue
+        yield path
+        if path.is_dir():
+            # The recording of a session is in a subfolder.
+            yield from path.glob("*")
+            yield from (path / "bag").glob("*")
+
+
+def _is_same(path: Path, other: Path) -> bool:
+    try:
+        return os.path.samefile(path, other)
+    except OSError:
+        return False
+
+
+def body_beside(table: Path) -> Path:
+    """Return the file beside a table of ``cardbox track --stature`` with the body that it used."""
+    return table.with_name(f"{table.stem}.body.yaml")
+
+
+def print_remarks(*remarks: Iterable[str]) -> None:
+    """Print remarks on a recording on the standard error."""
+    for remark in chain(*remarks):
+        print(f"cardbox: {remark}", file=sys.stderr)

@@ -18,11 +18,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> None:
-    """Measure, write the results and print a short table.
-
-    Raises:
-        CardboxError: there is no checkout, or the results cannot be written.
-    """
+    """Measure, write the results and print a short table."""
     benchmark = from_checkout("benchmarks.run", "benchmark")
     print(benchmark.short_table(benchmark.run_benchmark(options.json, options.report)))
     print(f"wrote {options.json}" + (f" and {options.report}" if options.report else ""))

@@ -6,8 +6,7 @@ import argparse
 import math
 from pathlib import Path
 
-from cardbox_tracker.commands.arguments import add_camera_pitch
-from cardbox_tracker.commands.output_paths import add_force, check_outputs
+from cardbox_tracker.commands.arguments import add_camera_pitch, add_force, check_outputs
 
 NAME = "body"
 HELP = "make a body model from a person's stature, without a recording"
@@ -25,7 +24,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--distance",
         type=float,
-        default=None,
         metavar="M",
         help="from the camera to the person, metres along the floor; without it, it is found from "
         "the first silhouette, to about a fifth",
@@ -33,7 +31,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--shoulder-breadth",
         type=float,
-        default=None,
         metavar="M",
         help="between the shoulder joints, metres; by default it is fitted to the first "
         "silhouette, like all other breadths",
@@ -41,7 +38,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--hip-height",
         type=float,
-        default=None,
         metavar="M",
         help="of the middle of the hips above the camera's centre, metres, negative below it; "
         "by default it is fitted to the first silhouette",
@@ -54,11 +50,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> None:
-    """Write the body model and print its sizes.
-
-    Raises:
-        CardboxError: a number is impossible, or the model exists or cannot be written.
-    """
+    """Write the body model and print its sizes."""
     from cardbox_tracker.body.model_file import save_body_model
     from cardbox_tracker.body.proportions import body_from_proportions
 

@@ -7,13 +7,14 @@ import math
 from pathlib import Path
 
 from cardbox_tracker.commands.arguments import (
+    REFERENCES,
     add_camera_pitch,
-    add_recording,
+    add_force,
     add_references,
     add_seed,
+    check_outputs,
     span,
 )
-from cardbox_tracker.commands.output_paths import add_force, check_outputs
 
 NAME = "calibrate-extrinsics"
 HELP = "find where several cameras stand, from the person in a recording, without a board"
@@ -21,7 +22,16 @@ HELP = "find where several cameras stand, from the person in a recording, withou
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of ``cardbox calibrate-extrinsics``."""
-    add_recording(parser)
+    parser.add_argument(
+        "recording", type=Path, metavar="BAG", help="rosbag2 folder or file of all cameras"
+    )
+    parser.add_argument(
+        "--background",
+        type=span,
+        required=True,
+        metavar="T0:T1",
+        help="seconds during which nobody is in view",
+    )
     parser.add_argument(
         "--cameras",
         nargs="+",
@@ -60,12 +70,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> None:
-    """Estimate the extrinsics, write them and print their uncertainty.
-
-    Raises:
-        CardboxError: the recording or a span cannot be used, no pose fits, or the file cannot be
-            written.
-    """
+    """Estimate the extrinsics, write them and print their uncertainty."""
     from cardbox_tracker.body.model import BodyModel
     from cardbox_tracker.estimation.initialization.config import InitializationConfig
     from cardbox_tracker.progress import progress_bar
@@ -82,7 +87,7 @@ def run(options: argparse.Namespace) -> None:
         side_turn=options.side_turn,
         seed=options.seed,
     )
-    references = {name: getattr(options, name) for name in ("front", "side", "arms")}
+    references = {name: getattr(options, name) for name in REFERENCES}
     with progress_bar("calibrate") as show:
         result = calibrate_recording(
             options.recording,

@@ -16,12 +16,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> None:
-    """Call the service and print its answer.
-
-    Raises:
-        RosMissingError: rclpy is not installed.
-        CardboxError: the service is missing, or its answer reports a failure.
-    """
+    """Call the service and print its answer."""
     try:
         from cardbox_tracker.ros.runtime.call import call_service
     except ImportError as error:

@@ -16,18 +16,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--output", type=Path, default=Path("demo_output"), metavar="DIR", help="folder of results"
     )
-    add_preset(parser, "default")
+    add_preset(parser)
     add_camera_count(parser, "several see the person together, with the preset default")
     add_seed(parser, "the recording and the filters")
 
 
 def run(options: argparse.Namespace) -> None:
-    """Record, measure and track a synthetic person through the nodes; write the results.
-
-    Raises:
-        CardboxError: the results cannot be written, ROS is missing, a node failed, or the preset
-            is not for several cameras.
-    """
+    """Record, measure and track a synthetic person through the nodes; write the results."""
     from cardbox_tracker.demo.run import run_demo
 
     run_demo(options.output, options.preset, options.seed, options.cameras)

@@ -27,11 +27,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> None:
-    """Install the files if asked to, load both networks, and print their places.
-
-    Raises:
-        CardboxError: the files cannot be had or are damaged, or LiteRT is not installed.
-    """
+    """Install the files if asked to, load both networks, and print their places."""
     from cardbox_tracker.detection.model_files import install_models, installed_models
     from cardbox_tracker.detection.pose_network import PoseNetwork
 

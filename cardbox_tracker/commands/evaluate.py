@@ -9,9 +9,15 @@ import argparse
 import os
 from pathlib import Path
 
-from cardbox_tracker.commands.arguments import add_preset, add_seed, at_least, points_named
+from cardbox_tracker.commands.arguments import (
+    add_force,
+    add_preset,
+    add_seed,
+    at_least,
+    check_outputs,
+)
 from cardbox_tracker.commands.checkout import from_checkout
-from cardbox_tracker.commands.output_paths import add_force, check_outputs
+from cardbox_tracker.commands.request import points_named
 
 NAME = "evaluate"
 HELP = (
@@ -35,7 +41,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--session",
         type=Path,
-        default=None,
         metavar="DIR",
         help="a recording with ground_truth.json instead of synthetic ones",
     )
@@ -43,7 +48,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--sessions",
         type=Path,
         nargs="+",
-        default=None,
         metavar="DIR",
         help="recorded sessions (bag/, ground_truth.json) to track and compare, instead of the "
         "paper's experiments; whoever takes the reference postures in a session is measured first",
@@ -52,7 +56,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--silhouettes",
         nargs="+",
         choices=("background", "detector"),
-        default=None,
         help="with --sessions: sources of the silhouettes, one run for each; by default the empty "
         "scene of a session, or else the masks of the detector",
     )
@@ -75,11 +78,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         action="store_true",
         help="with --sessions: also count the recoveries from disturbances",
     )
-    add_preset(parser, "default")
+    add_preset(parser)
     parser.add_argument(
         "--jobs",
         type=at_least(1),
-        default=None,
         metavar="N",
         help="number of processes; one per core by default",
     )
@@ -88,12 +90,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> None:
-    """Run the experiments and write report, plots and numbers.
-
-    Raises:
-        CardboxError: a session cannot be read, the results cannot be written, or there are no
-            experiments because this is not a checkout.
-    """
+    """Run the experiments and write report, plots and numbers."""
     jobs = options.jobs or len(os.sched_getaffinity(0))
     if options.sessions:
         _sessions(options, jobs)

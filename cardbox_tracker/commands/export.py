@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from cardbox_tracker.commands.output_paths import add_force, body_beside, check_outputs
+from cardbox_tracker.commands.arguments import add_force, body_beside, check_outputs
 from cardbox_tracker.errors import CardboxError
 
 NAME = "export"
@@ -14,7 +14,7 @@ HELP = "write results as TRC, BVH or C3D, or as joint angles of the ISB"
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of ``cardbox export``."""
-    from cardbox_tracker.exporting.formats import FORMATS
+    from cardbox_tracker.applications.exporting.formats import FORMATS
 
     parser.add_argument(
         "results",
@@ -32,7 +32,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--output",
         type=Path,
-        default=None,
         metavar="FILE",
         help="file to write; by default it has the name of the results and is in the current "
         "folder",
@@ -40,7 +39,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--model",
         type=Path,
-        default=None,
         metavar="MODEL.yaml",
         help="the person with whom the results were tracked, which bvh needs; trc and c3d take "
         "the pitch of the camera from it, and get markers at hips and neck. A bag contains it, and "
@@ -50,17 +48,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> None:
-    """Read the results and write the file.
-
-    Raises:
-        CardboxError: the results or the model cannot be read or do not belong together, a library
-            is missing, or the file cannot be written.
-    """
+    """Read the results and write the file."""
+    from cardbox_tracker.applications.exporting.formats import FORMATS
+    from cardbox_tracker.applications.exporting.motion_reader import read_motion
+    from cardbox_tracker.applications.exporting.placed import images_of_body
     from cardbox_tracker.body.model_file import load_body_model
     from cardbox_tracker.estimation.estimate import UNCERTAIN
-    from cardbox_tracker.exporting.formats import FORMATS
-    from cardbox_tracker.exporting.placed import images_of_body
-    from cardbox_tracker.recordings.motion_reader import read_motion
 
     chosen = FORMATS[options.to]
     output = options.output or Path(options.results.resolve().stem + chosen.suffix)

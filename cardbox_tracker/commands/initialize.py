@@ -4,23 +4,25 @@ from __future__ import annotations
 
 import argparse
 import math
+from dataclasses import replace
 from pathlib import Path
 
 from cardbox_tracker.commands.arguments import (
     REFERENCES,
     add_camera_pitch,
-    add_cameras,
-    add_depth,
-    add_detector,
-    add_recording,
+    add_force,
     add_references,
     add_seed,
+    check_outputs,
     print_remarks,
-    silhouettes_of,
 )
-from cardbox_tracker.commands.camera_arguments import add_camera, detector_among, pitch_of
-from cardbox_tracker.commands.output_paths import add_force, check_outputs
-from cardbox_tracker.errors import CardboxError
+from cardbox_tracker.commands.request import (
+    Problems,
+    add_recording,
+    inputs_of,
+    recording_request,
+)
+from cardbox_tracker.commands.tracking import placed
 
 NAME = "initialize"
 HELP = "measure the person in a recording"
@@ -31,20 +33,15 @@ _GUESSED_M = 2.0
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of ``cardbox initialize``."""
-    add_recording(parser, only_bags=False)
-    add_cameras(parser)
-    add_depth(parser)
-    add_detector(parser)
+    add_recording(parser)
     add_references(parser)
     parser.add_argument(
         "--distance",
         type=float,
-        default=None,
         metavar="M",
         help="from the camera to the person, metres along the floor; all sizes are proportional "
         "to it; not needed with --depth, or with two or more --cameras, which measure it",
     )
-    add_camera(parser)
     add_camera_pitch(parser, "0; found in the --front images where a detector finds silhouettes")
     add_seed(parser, "the hypotheses")
     parser.add_argument(
@@ -54,12 +51,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> None:
-    """Measure the person, write the body model and print its sizes.
-
-    Raises:
-        CardboxError: the recording cannot be read, its references show wrong postures or give no
-            body, or the model cannot be written.
-    """
+    """Measure the person, write the body model and print its sizes."""
     from cardbox_tracker.body.model import BodyModel
     from cardbox_tracker.body.model_file import save_body_model
     from cardbox_tracker.estimation.initialization.config import InitializationConfig
@@ -70,46 +62,39 @@ def run(options: argparse.Namespace) -> None:
         initialize_from_recording,
         initialize_with_depth,
     )
-    from cardbox_tracker.recordings.recording import open_recording
 
-    pitch_rad = math.radians(options.camera_pitch_deg or 0.0)
-    # The body model refuses an impossible distance or pitch by name, before they are used.
-    if options.distance is None and options.depth is None and len(options.cameras) < 2:
-        raise CardboxError(
-            "the distance of the person cannot be measured with one camera; give --distance M, "
-            "--depth TOPIC, or two --cameras"
-        )
-    distance_m = _GUESSED_M if options.distance is None else options.distance
-    BodyModel.of(distance_m=distance_m, camera_pitch_rad=pitch_rad)
-    points = None if options.detector is None else Path(options.detector)
-    inputs = options.recording, options.extrinsics, options.calibration, points
-    check_outputs((options.output,), options.force, inputs=inputs)
-    if None not in (options.depth, options.distance) and options.within is None:
-        raise CardboxError(
+    problems = Problems(options.recording)
+    # The silhouettes alone are measured.
+    recording = replace(recording_request(options, problems), points=None)
+    is_given = options.distance is not None
+    if not is_given and options.depth is None and len(options.cameras) < 2:
+        problems.miss("--distance M or --depth TOPIC or two --cameras", "one camera has no scale")
+    if is_given and options.depth is not None and options.within is None:
+        problems.add(
             "--depth and --distance both give the distance of the person; leave one of them out, "
             "or give --within M in place of --background"
         )
+    distance_m = options.distance if is_given else _GUESSED_M
+    pitch_rad = math.radians(options.camera_pitch_deg or 0.0)
+    # The body model refuses an impossible distance or pitch by name.
+    problems.caught(
+        lambda: BodyModel.of(distance_m=distance_m, camera_pitch_rad=pitch_rad), BodyModel()
+    )
+    problems.check()
+    check_outputs((options.output,), options.force, inputs_of(options))
     spans = {name: getattr(options, name) for name in REFERENCES}
-    silhouettes = silhouettes_of(options)
-    pitch_rad, camera = pitch_of(options, detector_among(silhouettes), spans["front"])
+    if options.camera_pitch_deg is None:
+        pitch_rad, recording = placed(recording, spans["front"])
     config = InitializationConfig(
         distance_m=distance_m,
         camera_pitch_rad=pitch_rad,
         side_turn=options.side_turn,
         seed=options.seed,
     )
-    with (
-        open_recording(
-            options.recording,
-            silhouettes,
-            options.cameras,
-            options.extrinsics,
-            options.depth if options.distance is None else None,
-            camera=camera,
-        ) as source,
-        progress_bar("initialize") as show,
-    ):
-        if options.distance is not None:
+    if is_given:
+        recording = replace(recording, depth=None)
+    with recording.open() as source, progress_bar("initialize") as show:
+        if is_given:
             result = initialize_from_recording(source.first, spans, config, show)
         elif source.measures_depth:
             result = initialize_with_depth(source, spans, config, show)

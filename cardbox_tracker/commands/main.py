@@ -7,6 +7,7 @@ import os
 import signal
 import sys
 from collections.abc import Container, Sequence
+from typing import Protocol
 
 from cardbox_tracker import __version__, interrupts
 from cardbox_tracker.commands import (
@@ -26,8 +27,32 @@ from cardbox_tracker.commands import (
     urdf,
     view,
 )
-from cardbox_tracker.commands.command import Command
 from cardbox_tracker.errors import CardboxError
+
+
+class Command(Protocol):
+    """A subcommand; each is a module of this folder with these four names.
+
+    Slow imports are inside ``add_arguments`` and ``run``, so that ``cardbox --help`` is fast.
+
+    Attributes:
+        NAME: name that is typed after ``cardbox``.
+        HELP: one line for ``cardbox --help``, without a capital letter or a full stop.
+    """
+
+    NAME: str
+    HELP: str
+
+    def add_arguments(self, parser: argparse.ArgumentParser) -> None:
+        """Add the arguments of the subcommand to its ``parser``."""
+
+    def run(self, options: argparse.Namespace) -> None:
+        """Do the work and print the result.
+
+        Raises:
+            CardboxError: the user can correct the cause; ``cardbox`` prints the text and returns 1.
+        """
+
 
 # The order is that of 'cardbox --help'.
 COMMANDS: tuple[Command, ...] = (
@@ -154,7 +179,7 @@ class _Formatter(argparse.RawDescriptionHelpFormatter):
 
     def _get_help_string(self, action: argparse.Action) -> str | None:
         default = action.default
-        if default is None or default is False or default == argparse.SUPPRESS:
+        if default is None or default is False or default in ([], argparse.SUPPRESS):
             return action.help
         return f"{action.help} (default: %(default)s)"
 

@@ -6,8 +6,7 @@ import argparse
 from collections import Counter
 from pathlib import Path
 
-from cardbox_tracker.commands.output_paths import add_force, check_outputs
-from cardbox_tracker.commands.settings_arguments import add_settings, settings_from
+from cardbox_tracker.commands.arguments import add_force, add_settings, check_outputs, settings_from
 
 NAME = "retarget"
 HELP = "move a robot arm, given by its URDF, as the measured person moves theirs"
@@ -15,7 +14,7 @@ HELP = "move a robot arm, given by its URDF, as the measured person moves theirs
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of ``cardbox retarget``."""
-    from cardbox_tracker.retargeting.config import RetargetConfig
+    from cardbox_tracker.applications.retargeting.config import RetargetConfig
 
     parser.add_argument(
         "results", type=Path, metavar="RESULTS", help="bag of results, of 'cardbox track --bag'"
@@ -24,28 +23,24 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--map",
         type=Path,
-        default=None,
         metavar="MAP.yaml",
         help="which joint moves which, as in config/example_joint_map.yaml; without it the robot's "
         "hand follows the person's by inverse kinematics",
     )
     parser.add_argument(
         "--hand",
-        default=None,
         metavar="LINK",
         help="the robot's hand; without it, the link with the most joints before it",
     )
     parser.add_argument(
         "--csv",
         type=Path,
-        default=None,
         metavar="OUT.csv",
         help="table of the robot's joints and their velocities",
     )
     parser.add_argument(
         "--bag",
         type=Path,
-        default=None,
         metavar="OUT",
         help="the results with the robot beside the person, for 'cardbox view'",
     )
@@ -54,15 +49,15 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> None:
-    """Retarget a recording to the robot and write the results.
-
-    Raises:
-        CardboxError: the bag, the robot or the map cannot be read, or a result cannot be written.
-    """
+    """Retarget a recording to the robot and write the results."""
+    from cardbox_tracker.applications.retargeting.config import RetargetConfig
+    from cardbox_tracker.applications.retargeting.recording import (
+        retarget_bag,
+        write_bag,
+        write_csv,
+    )
+    from cardbox_tracker.applications.retargeting.retargeter import make_retargeter
     from cardbox_tracker.recordings.bag_reader import BagReader
-    from cardbox_tracker.recordings.retarget import retarget_bag, write_bag, write_csv
-    from cardbox_tracker.retargeting.config import RetargetConfig
-    from cardbox_tracker.retargeting.setup import make_retargeter
 
     check_outputs(
         (options.csv,),

@@ -9,17 +9,16 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from cardbox_tracker import __version__
-from cardbox_tracker.commands.output_paths import add_force, check_outputs
-from cardbox_tracker.commands.settings_arguments import add_settings, settings_from
-from cardbox_tracker.commands.tracking import add_inputs, inputs_of, track_inputs
+from cardbox_tracker.commands.arguments import add_force, add_settings, check_outputs, settings_from
+from cardbox_tracker.commands.request import add_tracking, tracking_request
+from cardbox_tracker.commands.tracking import track
 from cardbox_tracker.errors import CardboxError
 
 if TYPE_CHECKING:
+    from cardbox_tracker.applications.ergonomics.config import RulaConfig
+    from cardbox_tracker.applications.ergonomics.recording import MomentImages, RulaRow
+    from cardbox_tracker.applications.ergonomics.report import PageContent
     from cardbox_tracker.body.model import BodyModel
-    from cardbox_tracker.ergonomics.config import RulaConfig
-    from cardbox_tracker.ergonomics.page import PageContent
-    from cardbox_tracker.ergonomics.recording import RulaRow
-    from cardbox_tracker.recordings.moment_images import MomentImages
 
 NAME = "rula"
 HELP = "score the strain on arms, neck and trunk in a recording (RULA)"
@@ -32,30 +31,25 @@ _LEAST_CLOCK_S = 1e9
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of ``cardbox rula``."""
-    from cardbox_tracker.ergonomics.config import RulaConfig
+    from cardbox_tracker.applications.ergonomics.config import RulaConfig
 
-    add_inputs(parser)
+    add_tracking(parser)
     parser.add_argument(
         "--csv",
         type=Path,
-        default=None,
         metavar="OUT.csv",
         help="table to write, one row per image: the expected score and the chance of each",
     )
-    parser.add_argument(
-        "--plot", type=Path, default=None, metavar="OUT.png", help="draw the scores over time"
-    )
+    parser.add_argument("--plot", type=Path, metavar="OUT.png", help="draw the scores over time")
     parser.add_argument(
         "--shares",
         type=Path,
-        default=None,
         metavar="SHARES.csv",
         help="write the time at each score of each part",
     )
     parser.add_argument(
         "--html",
         type=Path,
-        default=None,
         metavar="OUT.html",
         help="write one page that prints: scores, shares of time, and the worst moments",
     )
@@ -66,39 +60,35 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="images of the worst moments in --html: with the head of the tracked person made "
         "unrecognizable, as they are, or none",
     )
-    parser.add_argument(
-        "--title", default=None, metavar="TEXT", help="heading of --html, such as the task"
-    )
+    parser.add_argument("--title", metavar="TEXT", help="heading of --html, such as the task")
     add_force(parser)
     add_settings(parser, RulaConfig, "the task and the limits that the paper leaves open")
 
 
 def run(options: argparse.Namespace) -> None:
-    """Track the person, score every image, and print times, part scores and declared inputs.
-
-    Raises:
-        CardboxError: the recording or the body model cannot be read, a setting is out of range, an
-            option has no effect, or a result cannot be written.
-    """
-    from cardbox_tracker.ergonomics.config import RulaConfig
-    from cardbox_tracker.ergonomics.page import write_page
-    from cardbox_tracker.ergonomics.plot import plot_scores
-    from cardbox_tracker.ergonomics.recording import summarize, write_csv
-    from cardbox_tracker.ergonomics.report import report_lines
-    from cardbox_tracker.ergonomics.shares import score_shares, write_shares
-    from cardbox_tracker.recordings.moment_images import MomentImages
-    from cardbox_tracker.recordings.rula import RulaObserver
+    """Track the person, score every image, and print times, part scores and declared inputs."""
+    from cardbox_tracker.applications.ergonomics.config import RulaConfig
+    from cardbox_tracker.applications.ergonomics.recording import (
+        MomentImages,
+        RulaObserver,
+        score_shares,
+        summarize,
+        write_csv,
+        write_shares,
+    )
+    from cardbox_tracker.applications.ergonomics.report import plot_scores, report_lines, write_page
 
     if options.html is None and (options.title is not None or options.images != IMAGES[0]):
         raise CardboxError("--images and --title change the page of --html; give --html OUT.html")
     outputs = (options.csv, options.plot, options.shares, options.html)
-    check_outputs(outputs, options.force, inputs=inputs_of(options))
+    request = tracking_request(options)
+    check_outputs(outputs, options.force, inputs=request.inputs)
     config = settings_from(options, RulaConfig)
     images = None
     if options.html is not None and options.images != NO_IMAGES:
         images = MomentImages(is_head_hidden=options.images == HIDDEN_HEAD)
     observer = RulaObserver(config, options.seed, images)
-    summary = track_inputs(options, observers=(observer,))
+    summary = track(request, observers=(observer,))
     rows = observer.rows
     shares = score_shares(rows, config)
     if options.csv is not None:
@@ -123,7 +113,7 @@ def _content(
     body: BodyModel | None,
     images: MomentImages | None,
 ) -> PageContent:
-    from cardbox_tracker.ergonomics.page import PageContent
+    from cardbox_tracker.applications.ergonomics.report import PageContent
 
     name = options.recording.resolve().name
     person = f"stature {options.stature} m" if options.model is None else options.model.name

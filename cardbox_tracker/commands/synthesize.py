@@ -5,8 +5,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from cardbox_tracker.commands.arguments import add_camera_count, add_seed
-from cardbox_tracker.commands.output_paths import add_force, check_outputs
+from cardbox_tracker.commands.arguments import add_camera_count, add_force, add_seed, check_outputs
 
 NAME = "synthesize"
 HELP = "record a synthetic person, with ground truth"
@@ -40,11 +39,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> None:
-    """Write the recording.
-
-    Raises:
-        CardboxError: the motion is unknown, or the recording cannot be written.
-    """
+    """Write the recording."""
     from cardbox_tracker.progress import progress_bar
     from cardbox_tracker.simulation.session import SessionFormat, synthesize_session
 

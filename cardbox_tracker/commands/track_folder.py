@@ -1,31 +1,111 @@
-"""``cardbox track FOLDER``: all recordings of a folder, in parallel processes."""
+"""``cardbox track FOLDER``: all recordings of a folder, in parallel processes.
+
+The summary of the results, ``_summary.csv``, has a row for each recording, with a digest of all
+that determines its results. By it an interrupted run goes on, and only what changed is done again.
+"""
 
 from __future__ import annotations
 
 import argparse
+import csv
 import errno
+import hashlib
 import io
+import os
 import shutil
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import redirect_stderr, redirect_stdout
+from dataclasses import fields, is_dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple
+from typing import Any, NamedTuple
 
+import cv2
+import numba
+import numpy as np
+
+import cardbox_tracker
 from cardbox_tracker import interrupts
-from cardbox_tracker.commands.recording_options import options_of
-from cardbox_tracker.commands.tracking import ResultFiles, check_person, track_inputs
+from cardbox_tracker.commands.arguments import body_beside
+from cardbox_tracker.commands.request import (
+    TrackFiles,
+    TrackingRequest,
+    tracking_request,
+    with_own_options,
+)
+from cardbox_tracker.commands.tracking import track
 from cardbox_tracker.errors import CardboxError
-from cardbox_tracker.files import claimed_name
+from cardbox_tracker.estimation.precompile import compile_all
+from cardbox_tracker.files import claimed_name, write_table
+from cardbox_tracker.processes import cores, results_of
 from cardbox_tracker.progress import SharedProgress, progress_bar, told
+from cardbox_tracker.recordings.folder import SUMMARY, recordings_in
+from cardbox_tracker.recordings.result_table import check_table
+from cardbox_tracker.recordings.track import TrackSummary
 
-if TYPE_CHECKING:
-    from cardbox_tracker.commands.folder_summary import Row
-
-FORMATS = ("csv", "parquet", "mp4", "bag")
+TABLES = ("csv", "parquet")
+FORMATS = (*TABLES, "mp4", "bag")
 """Results of a recording: a table in one of two formats, a video, a bag."""
-_TABLES = FORMATS[:2]
-_BODY = ".body.yaml"
+TRACKED, FAILED = "tracked", "failed"
+
+_BODY = body_beside(Path("NAME.csv")).name.removeprefix("NAME")
+# Most names of recordings in a line; the table has all.
+_MOST_NAMES = 10
+_SOURCES = ("*.py", "*.json", "*.npz")
+
+
+class Row(NamedTuple):
+    """The row of one recording in the summary; all values are texts, empty where unknown.
+
+    Attributes:
+        recording: its name.
+        status: ``TRACKED`` or ``FAILED``.
+        images: number of images.
+        images_tracked: number of images with a posture.
+        images_uncertain: number of images whose posture may be wrong.
+        mean_cost_px: mean cost over the tracked images.
+        mean_iou: mean overlap over the tracked images.
+        reason: reason of a failure.
+        inputs: see :func:`digest_of_inputs`.
+    """
+
+    recording: str
+    status: str
+    images: str = ""
+    images_tracked: str = ""
+    images_uncertain: str = ""
+    mean_cost_px: str = ""
+    mean_iou: str = ""
+    reason: str = ""
+    inputs: str = ""
+
+    @classmethod
+    def tracked(cls, recording: str, summary: TrackSummary, inputs: str) -> Row:
+        """Return the row of a tracked recording."""
+        is_seen = summary.frames_tracked > 0
+        return cls(
+            recording,
+            TRACKED,
+            str(summary.frames),
+            str(summary.frames_tracked),
+            str(summary.frames_uncertain),
+            f"{summary.mean_cost_px:.1f}" if is_seen else "",
+            f"{summary.mean_iou:.4f}" if is_seen else "",
+            inputs=inputs,
+        )
+
+    @classmethod
+    def failed(cls, recording: str, error: Exception) -> Row:
+        """Return the row of a recording that cannot be tracked, with the reason in one line."""
+        reason = " ".join(str(error).split())
+        if isinstance(error, OSError):
+            reason = f"{type(error).__name__}: {reason}"
+        elif not isinstance(error, CardboxError):
+            reason = (
+                f"unexpected {type(error).__name__}: {reason}; 'cardbox track' with this recording "
+                "shows more"
+            )
+        return cls(recording, FAILED, reason=reason)
 
 
 class Job(NamedTuple):
@@ -33,27 +113,17 @@ class Job(NamedTuple):
 
     Attributes:
         name: see :func:`~.recordings.folder.recordings_in`.
-        options: its options.
-        inputs: see :func:`~.folder_summary.digest_of_inputs`.
-        files: results to write, in a folder of the job's own.
+        request: what is tracked; its results are in a folder of the job's own.
+        inputs: see :func:`digest_of_inputs`.
         progress: the common progress.
         number: number of the job in the common progress.
     """
 
     name: str
-    options: argparse.Namespace
+    request: TrackingRequest
     inputs: str
-    files: ResultFiles = ResultFiles()
     progress: SharedProgress | None = None
     number: int = 0
-
-
-class Outcome(NamedTuple):
-    """A finished job: its row, and the lines that it printed."""
-
-    job: Job
-    row: Row
-    lines: list[str]
 
 
 def track_folder(options: argparse.Namespace) -> None:
@@ -62,52 +132,42 @@ def track_folder(options: argparse.Namespace) -> None:
     Raises:
         CardboxError: the results cannot be written, or recordings failed; the text names them.
     """
-    from cardbox_tracker.commands.folder_summary import (
-        FAILED,
-        read_rows,
-        text_of,
-        text_of_failures,
-        write_rows,
-    )
-    from cardbox_tracker.recordings.folder import SUMMARY, recordings_in
-
     folder = options.recording
     output = options.output or Path(f"{folder.resolve().name}_tracked")
     recordings = recordings_in(folder, output)
-    formats = _formats(options.formats)
+    formats = _formats(options.formats or ())
     _check_output(output, folder, recordings, options.force)
-    before = read_rows(output / SUMMARY)
+    before = _read_rows(output / SUMMARY)
     jobs, rows = _jobs(options, recordings, formats)
-    _check_reasons(rows, len(recordings))
+    reasons = list(_reasons(rows.values(), recordings))
+    if len(rows) == len(recordings) > 1 and len(reasons) == 1:
+        raise CardboxError(f"{reasons[0][1]} (the same for all {len(rows)} recordings)")
     if not options.force:
-        kept = [job for job in jobs if _is_finished(job, before, output, formats)]
-        jobs = [job for job in jobs if job not in kept]
-        rows |= {job.name: before[job.name] for job in kept}
+        kept = {job.name for job in jobs if _is_finished(job, before, output, formats)}
+        jobs = [job for job in jobs if job.name not in kept]
+        rows |= {name: before[name] for name in kept}
         if kept:
             print(f"{len(kept)} of {len(recordings)} recordings are finished; --force does again")
     remarks = _track_all(jobs, rows, output, formats, options.jobs)
-    for name, row in rows.items():
+    for row in rows.values():
         if row.status == FAILED:
-            _remove(output, name)
-    write_rows(output / SUMMARY, rows.values())
-    in_order: list[Row] = sorted(rows.values())
+            _remove(output, row.recording)
+    _write_rows(output / SUMMARY, rows.values())
     for name, lines in sorted(remarks.items()):
         for line in lines:
             print(f"{name}: {line.removeprefix('cardbox: ')}", file=sys.stderr)
-    print(*text_of(in_order), sep="\n")
+    print(*_table(sorted(rows.values())), sep="\n")
     print(f"wrote {output}, with this table as {SUMMARY}")
-    failed = sum(row.status == FAILED for row in in_order)
+    failed = sum(row.status == FAILED for row in rows.values())
     if failed:
-        reasons = "".join(f"\n  {line}" for line in text_of_failures(in_order, recordings))
-        raise CardboxError(f"{failed} of {len(rows)} recordings failed{reasons}")
+        lines = [f"\n  {names}: {reason}" for names, reason in _reasons(rows.values(), recordings)]
+        raise CardboxError(f"{failed} of {len(rows)} recordings failed{''.join(lines)}")
 
 
-def _formats(given: Sequence[str] | None) -> tuple[str, ...]:
+def _formats(given: Sequence[str]) -> tuple[str, ...]:
     """Return the formats in the order of ``FORMATS``, with a table among them."""
-    from cardbox_tracker.recordings.result_table import check_table
-
-    chosen = set(given or ()) | (set() if set(given or ()) & set(_TABLES) else {"csv"})
-    if chosen.issuperset(_TABLES):
+    chosen = {*given} if {*given} & {*TABLES} else {*given, "csv"}
+    if chosen.issuperset(TABLES):
         raise CardboxError("--formats has csv and parquet; give one of the two")
     formats = tuple(name for name in FORMATS if name in chosen)
     check_table(Path(f"table.{formats[0]}"))
@@ -116,8 +176,6 @@ def _formats(given: Sequence[str] | None) -> tuple[str, ...]:
 
 def _check_output(output: Path, folder: Path, recordings: Mapping[str, Path], force: bool) -> None:
     """Make the folder of the results, unless it has something else in it."""
-    from cardbox_tracker.recordings.folder import SUMMARY
-
     for read in (folder, *recordings.values()):
         is_inside = read != folder and read.resolve() in output.resolve().parents
         if is_inside or output.resolve() == read.resolve():
@@ -140,36 +198,20 @@ def _jobs(
     options: argparse.Namespace, recordings: Mapping[str, Path], formats: Sequence[str]
 ) -> tuple[list[Job], dict[str, Row]]:
     """Return a job for each recording, and the rows of those whose options are wrong."""
-    from cardbox_tracker.commands.folder_summary import (
-        FAILED,
-        Row,
-        digest_of_inputs,
-        digest_of_program,
-    )
-
     program = digest_of_program()
     jobs, rows = [], {}
     for name, path in recordings.items():
         try:
-            own = options_of(options, options.recording, name)
+            own = with_own_options(options, options.recording, name)
             own.recording = path
-            check_person(own)
-            jobs.append(Job(name, own, digest_of_inputs(own, formats, program)))
+            request = replace(tracking_request(own), force=True)
+            jobs.append(Job(name, request, digest_of_inputs(request, formats, program)))
         except (CardboxError, OSError) as error:
-            rows[name] = Row(name, FAILED, reason=_one_line(error))
+            rows[name] = Row.failed(name, error)
     return jobs, rows
 
 
-def _check_reasons(rows: Mapping[str, Row], count: int) -> None:
-    """Refuse options that are wrong for the same reason in each of several recordings."""
-    reasons = {row.reason for row in rows.values()}
-    if len(rows) == count > 1 and len(reasons) == 1:
-        raise CardboxError(f"{reasons.pop()} (the same for all {count} recordings)")
-
-
 def _is_finished(job: Job, before: Mapping[str, Row], output: Path, formats: Sequence[str]) -> bool:
-    from cardbox_tracker.commands.folder_summary import TRACKED
-
     row = before.get(job.name)
     if row is None or row.status != TRACKED or row.inputs != job.inputs:
         return False
@@ -184,13 +226,8 @@ def _track_all(
     processes: int | None,
 ) -> dict[str, list[str]]:
     """Track, and add each row to ``rows`` and to the summary; return printed lines by name."""
-    from cardbox_tracker.commands.folder_summary import TRACKED, write_rows
-    from cardbox_tracker.estimation.precompile import compile_all
-    from cardbox_tracker.processes import cores, results_of
-    from cardbox_tracker.recordings.folder import SUMMARY
-
     # Rows of former settings go first, because their results are replaced one by one.
-    write_rows(output / SUMMARY, rows.values())
+    _write_rows(output / SUMMARY, rows.values())
     remarks: dict[str, list[str]] = {}
     if not jobs:
         return remarks
@@ -198,11 +235,12 @@ def _track_all(
     with claimed_name(output / "work", is_folder=True) as work, progress_bar("track") as show:
         if count > 1:
             # Else each process would compile.
-            compile_all(sorted({job.options.preset for job in jobs}))
+            compile_all(sorted({job.request.preset for job in jobs}))
         progress = SharedProgress(work / "progress", len(jobs))
         progress.start()
         prepared = [
-            _prepared(job, number, work, formats, progress) for number, job in _by_size(jobs)
+            _prepared(job, number, work, formats, progress)
+            for number, job in enumerate(sorted(jobs, key=_size, reverse=True))
         ]
         with (
             told(lambda _: show(progress.fraction()), "", every_s=1.0),
@@ -214,20 +252,14 @@ def _track_all(
                     if row.status == TRACKED:
                         _publish(job, output)
                     rows[job.name], remarks[job.name] = row, lines
-                    write_rows(output / SUMMARY, rows.values())
+                    _write_rows(output / SUMMARY, rows.values())
         show(1.0)
     return remarks
 
 
-def _by_size(jobs: Sequence[Job]) -> list[tuple[int, Job]]:
-    """Return the jobs with their numbers, the largest first, so that none is left at the end."""
-
-    def size(job: Job) -> int:
-        path = job.options.recording
-        files = path.rglob("*") if path.is_dir() else [path]
-        return sum(file.stat().st_size for file in files if file.is_file())
-
-    return list(enumerate(sorted(jobs, key=size, reverse=True)))
+def _size(job: Job) -> int:
+    """Return the bytes of a recording: the largest is tracked first, so that none is left last."""
+    return sum(file.stat().st_size for file in _files_of(job.request.recording.path))
 
 
 def _prepared(
@@ -237,38 +269,26 @@ def _prepared(
     place = work / str(number) / Path(job.name).name
     place.parent.mkdir()
     paths = {ending: place.with_name(f"{place.name}.{ending}") for ending in formats}
-    table = next(paths[ending] for ending in _TABLES if ending in paths)
-    body = None if job.options.stature is None else place.with_name(f"{place.name}{_BODY}")
-    files = ResultFiles(table, paths.get("mp4"), paths.get("bag"), body)
-    return job._replace(files=files, progress=progress, number=number)
+    table = next(paths[ending] for ending in TABLES if ending in paths)
+    body = None if job.request.person.model else place.with_name(f"{place.name}{_BODY}")
+    files = TrackFiles(table, paths.get("mp4"), paths.get("bag"), body)
+    request = replace(job.request, files=files)
+    return job._replace(request=request, progress=progress, number=number)
 
 
-def track_job(job: Job) -> Outcome:
-    """Track one recording on one thread; a failure is part of the outcome."""
-    import cv2
-
-    from cardbox_tracker.commands.folder_summary import FAILED, Row
-
+def track_job(job: Job) -> tuple[Job, Row, list[str]]:
+    """Track one recording on one thread; return its row, also of a failure, and printed lines."""
     cv2.setNumThreads(1)
     show = job.progress.of_task(job.number) if job.progress else lambda _: None
     printed = io.StringIO()
     try:
         with redirect_stdout(printed), redirect_stderr(printed):
-            summary = track_inputs(job.options, job.files, force=True, show=show)
-        row = Row.tracked(job.name, summary, job.inputs)
-    except (CardboxError, OSError) as error:
-        row = Row(job.name, FAILED, reason=_one_line(error))
+            row = Row.tracked(job.name, track(job.request, show=show), job.inputs)
     except Exception as error:
         # A fault of the program in one recording must not stop a hundred others.
-        reason = f"unexpected {_one_line(error)}; 'cardbox track' with this recording shows more"
-        row = Row(job.name, FAILED, reason=reason)
+        row = Row.failed(job.name, error)
     show(1.0)
-    return Outcome(job, row, printed.getvalue().splitlines())
-
-
-def _one_line(error: Exception) -> str:
-    text = " ".join(str(error).split())
-    return text if isinstance(error, CardboxError) else f"{type(error).__name__}: {text}"
+    return job, row, printed.getvalue().splitlines()
 
 
 def _publish(job: Job, output: Path) -> None:
@@ -276,8 +296,8 @@ def _publish(job: Job, output: Path) -> None:
     _remove(output, job.name)
     place = (output / job.name).parent
     place.mkdir(parents=True, exist_ok=True)
-    for path in filter(None, job.files):
-        if path.exists():
+    for path in job.request.files:
+        if path is not None and path.exists():
             path.rename(place / path.name)
 
 
@@ -294,3 +314,116 @@ def _remove(output: Path, name: str) -> None:
             # A name that is too long for a file has no results.
             if error.errno != errno.ENAMETOOLONG:
                 raise
+
+
+def _read_rows(path: Path) -> dict[str, Row]:
+    """Return the rows of a summary by the names of the recordings; none if there is no summary.
+
+    Raises:
+        CardboxError: the file is no summary.
+    """
+    if not path.exists():
+        return {}
+    try:
+        with path.open(newline="", encoding="utf-8") as file:
+            header, *cells = csv.reader(file)
+        if tuple(header) != Row._fields:
+            raise ValueError("it has other columns")
+        rows = [Row(*row) for row in cells]
+    except (OSError, ValueError, TypeError) as error:
+        raise CardboxError(
+            f"{path} is no summary of tracked recordings ({error}); remove it, or give another "
+            "--output"
+        ) from None
+    return {row.recording: row for row in rows}
+
+
+def _write_rows(path: Path, rows: Iterable[Row]) -> None:
+    write_table(path, Row._fields, sorted(rows))
+
+
+def _table(rows: Sequence[Row]) -> Iterator[str]:
+    """Yield the lines of a table for people."""
+    width = max(len(row.recording) for row in rows)
+    yield f"{'':{width}}  images  tracked  uncertain  mean IoU"
+    for row in rows:
+        if row.status == FAILED:
+            yield f"{row.recording:{width}}  failed"
+        else:
+            yield (
+                f"{row.recording:{width}}  {row.images:>6}  {row.images_tracked:>7}  "
+                f"{row.images_uncertain:>9}  {row.mean_iou:>8}"
+            )
+
+
+def _reasons(rows: Iterable[Row], paths: Mapping[str, Path]) -> Iterator[tuple[str, str]]:
+    """Yield the recordings that failed for one reason, and the reason.
+
+    Reasons that differ only in the path of the recording are one, and it has the first one's.
+
+    Args:
+        rows: all rows.
+        paths: each recording's path by its name.
+    """
+    reasons: dict[str, list[Row]] = {}
+    for row in sorted(rows):
+        if row.status == FAILED:
+            common = row.reason.replace(str(paths[row.recording]), "")
+            reasons.setdefault(common, []).append(row)
+    for failed in reasons.values():
+        listed = ", ".join(row.recording for row in failed[:_MOST_NAMES])
+        more = f" and {len(failed) - _MOST_NAMES} more" if len(failed) > _MOST_NAMES else ""
+        yield f"{listed}{more}", failed[0].reason
+
+
+def digest_of_inputs(request: TrackingRequest, formats: Sequence[str], program: str) -> str:
+    """Return a digest of all that determines the results of a recording.
+
+    The recording counts by the names, sizes and times of its files, other files by their content.
+
+    Args:
+        request: what is tracked.
+        formats: formats of its results.
+        program: see :func:`digest_of_program`.
+    """
+    path = request.recording.path
+    asked = replace(request, recording=replace(request.recording, path=Path()), inputs=())
+    digest = hashlib.sha256(f"{program} {formats}".encode())
+    for value in _values(replace(asked, files=TrackFiles())):
+        is_file = isinstance(value, Path) and value.is_file()
+        digest.update(b"\0" + (value.read_bytes() if is_file else repr(value).encode()))
+    for file in _files_of(path):
+        found = file.stat()
+        # Names inside of a recording may be no UTF-8.
+        digest.update(b"\0" + os.fsencode(file.name))
+        digest.update(f" {found.st_size} {found.st_mtime_ns}".encode())
+    return digest.hexdigest()[:32]
+
+
+def _values(part: Any) -> Iterator[Any]:
+    """Yield the values in a request, and the types of its parts."""
+    if is_dataclass(part) and not isinstance(part, type):
+        yield type(part).__name__
+        for entry in fields(part):
+            yield from _values(getattr(part, entry.name))
+    elif isinstance(part, tuple):
+        yield type(part).__name__
+        for one in part:
+            yield from _values(one)
+    else:
+        yield part
+
+
+def _files_of(recording: Path) -> list[Path]:
+    if not recording.is_dir():
+        return [recording]
+    return sorted(path for path in recording.rglob("*") if path.is_file())
+
+
+def digest_of_program() -> str:
+    """Return a digest of the package's files and of the versions of its numerical libraries."""
+    folder = Path(cardbox_tracker.__file__).parent
+    digest = hashlib.sha256(f"{np.__version__} {cv2.__version__} {numba.__version__}".encode())
+    for path in sorted(path for pattern in _SOURCES for path in folder.rglob(pattern)):
+        digest.update(f"{path.relative_to(folder)}\0".encode() + path.read_bytes())
+    return digest.hexdigest()

@@ -1,202 +1,141 @@
-"""Tracking of one recording with the options of a subcommand."""
+"""Tracking of one recording, for the subcommands that track."""
 
 from __future__ import annotations
 
-import argparse
-from collections.abc import Callable
-from contextlib import nullcontext
-from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple
+import math
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack
+from dataclasses import replace
+from typing import TYPE_CHECKING
 
-from cardbox_tracker.commands.arguments import (
-    add_cameras,
-    add_depth,
-    add_detector,
-    add_preset,
-    add_recording,
-    add_retired,
-    add_seed,
-    points_of,
-    print_remarks,
-    silhouettes_of,
-)
-from cardbox_tracker.commands.camera_arguments import (
-    add_camera,
-    camera_of,
-    detector_among,
-    pitch_of,
-)
-from cardbox_tracker.commands.person_arguments import (
-    COMES_WITHIN_S,
-    STANDING_S,
-    add_person,
-    measured_person,
-    person_of_stature,
-    start_of,
-)
-from cardbox_tracker.commands.settings_arguments import (
-    add_tracker_settings,
-    with_tracker_settings,
-)
-from cardbox_tracker.errors import CardboxError
+from cardbox_tracker.commands.arguments import print_remarks
 
 if TYPE_CHECKING:
-    from cardbox_tracker.estimation.config import TrackerConfig
+    from cardbox_tracker.commands.request import RecordingRequest, TrackingRequest
+    from cardbox_tracker.recordings.recording import Recording
+    from cardbox_tracker.recordings.silhouettes import TimeSpan
     from cardbox_tracker.recordings.track import Observer, TrackSummary
 
-
-class ResultFiles(NamedTuple):
-    """Files to write for a recording; None for one that is not wanted.
-
-    Attributes:
-        table: one row for each image, CSV or Parquet.
-        video: overlay video.
-        bag: folder of a bag with the topics of the tracker.
-        body: the body at the end of the recording.
-    """
-
-    table: Path | None = None
-    video: Path | None = None
-    bag: Path | None = None
-    body: Path | None = None
+_STANDING_S = 1.0
+"""Time for which a person of a given stature stands upright at the start, seconds."""
+_COMES_WITHIN_S = 30.0
+"""Time after the start within which a person of a given stature is sought, seconds."""
 
 
-_NO_FILES = ResultFiles()
-
-
-def add_inputs(
-    parser: argparse.ArgumentParser, needs_recording: bool = True, needs_person: bool = True
-) -> None:
-    """Add the arguments for the recording, the person and the settings.
-
-    Without ``needs_recording`` the recording may be missing; without ``needs_person`` the person.
-    """
-    add_recording(parser, needs_recording, only_bags=False)
-    add_cameras(parser)
-    add_depth(parser)
-    add_detector(parser)
-    add_camera(parser)
-    add_person(parser, needs_person)
-    add_preset(parser, "default")
-    add_tracker_settings(parser)
-    add_retired(parser, "--refine-sizes", "breadths stay as they were measured")
-    add_seed(parser, "the filters")
-
-
-def check_person(options: argparse.Namespace) -> None:
-    """Check that the options say who is tracked.
-
-    Raises:
-        CardboxError: neither ``--model`` nor ``--stature`` is given.
-    """
-    if options.model is None and options.stature is None:
-        raise CardboxError("one of the arguments --model --stature is required")
-
-
-def inputs_of(options: argparse.Namespace) -> tuple[Path | None, ...]:
-    """Return the files that the arguments of :func:`add_inputs` name."""
-    files = options.recording, options.model, options.extrinsics, options.settings
-    # The detector may also be a word, which names no file.
-    detector = Path(options.detector) if options.detector else None
-    return *files, options.calibration, detector
-
-
-def track_inputs(
-    options: argparse.Namespace,
-    files: ResultFiles = _NO_FILES,
-    force: bool = False,
+def track(
+    request: TrackingRequest,
     observers: tuple[Observer, ...] = (),
     show: Callable[[float], None] | None = None,
 ) -> TrackSummary:
-    """Track the recording of :func:`add_inputs`, print remarks and return the summary.
+    """Track a recording, print remarks and return the summary.
 
     Args:
-        options: arguments of :func:`add_inputs`.
-        files: results to write.
-        force: whether an existing bag is replaced.
+        request: what is tracked, and the results to write.
         observers: called after each image.
         show: receives the finished fraction, 0 to 1; if None, there are a progress bar and a line
             with the summary.
 
     Raises:
-        CardboxError: the recording or the body model cannot be read, a setting is out of range, or
-            a result cannot be written.
+        CardboxError: the recording cannot be read, or a result cannot be written.
     """
     from cardbox_tracker.body.model_file import save_body_model
     from cardbox_tracker.progress import progress_bar
-    from cardbox_tracker.recordings.recording import open_recording
-    from cardbox_tracker.recordings.result_bag import result_bag
     from cardbox_tracker.recordings.silhouettes import TimeSpan
-    from cardbox_tracker.recordings.track import TrackFiles, track_recording
+    from cardbox_tracker.recordings.track import track_recording
 
-    start_s = start_of(options)
-    # Mistakes in the numbers are reported before the recording is read.
-    is_measured = options.stature is None
-    body = measured_person(options) if is_measured else person_of_stature(options)
-    config = _config(options)
-    is_more = len(options.cameras) > 1 or options.depth is not None
-    if is_more and not config.has_several_views:
-        raise CardboxError(
-            "--preset paper uses the silhouette of one camera; give --preset default with several "
-            "cameras or with --depth"
-        )
-    silhouettes, points = silhouettes_of(options), points_of(options)
-    camera = camera_of(options)
-    if not is_measured:
-        standing = TimeSpan(start_s, start_s + STANDING_S)
-        detector = detector_among(silhouettes, points)
+    recording, person, body = request.recording, request.person, request.person.body
+    start_s = person.start_s
+    if person.model is not None and body.doubt:
+        print(f"{person.model}: {body.doubt}")
+    if not person.is_pitch_given:
+        standing = TimeSpan(start_s, start_s + _STANDING_S)
         # The person may come later.
-        pitch_rad, camera = pitch_of(options, detector, standing, start_s + COMES_WITHIN_S)
-        body = person_of_stature(options, pitch_rad)
-    with open_recording(
-        options.recording,
-        silhouettes,
-        options.cameras,
-        options.extrinsics,
-        options.depth,
-        points,
-        camera,
-    ) as source:
+        pitch_rad, recording = placed(recording, standing, start_s + _COMES_WITHIN_S)
+        body = body.with_values(camera_pitch_rad=pitch_rad)
+    with recording.open() as source:
         total_s = max(1e-9, source.first.duration_s - start_s)
-        with (
-            result_bag(files.bag, source.first.frame_id, force) as record,
-            nullcontext(show) if show else progress_bar("track") as advance,
-        ):
+        with ExitStack() as stack:
+            observers = (*_writers(request, source, stack), *observers)
+            advance = show or stack.enter_context(progress_bar("track"))
             summary = track_recording(
                 source,
                 body,
-                config,
-                options.seed,
+                request.config,
+                request.seed,
                 start_s,
-                TrackFiles(files.table, files.video),
-                observers=(
-                    record,
-                    *observers,
-                    lambda frame, *_: advance((frame.time_s - start_s) / total_s),
-                ),
+                request.files.table,
+                (*observers, lambda frame, *_: advance((frame.time_s - start_s) / total_s)),
             )
         remarks = source.first.remarks
     if show is None:
-        _print(summary)
+        uncertain = summary.frames_uncertain
+        doubt = f" ({uncertain} of them uncertain)" if uncertain else ""
+        print(
+            f"tracked {summary.frames_tracked} of {summary.frames} images{doubt}, "
+            f"mean cost {summary.mean_cost_px:.0f} px, mean IoU {summary.mean_iou:.3f}"
+        )
     print_remarks(remarks, summary.remarks)
-    if files.body is not None and summary.body is not None:
-        save_body_model(summary.body, files.body)
+    if request.files.body is not None and summary.body is not None:
+        save_body_model(summary.body, request.files.body)
     return summary
 
 
-def _print(summary: TrackSummary) -> None:
-    doubt = f" ({summary.frames_uncertain} of them uncertain)" if summary.frames_uncertain else ""
-    print(
-        f"tracked {summary.frames_tracked} of {summary.frames} images{doubt}, "
-        f"mean cost {summary.mean_cost_px:.0f} px, mean IoU {summary.mean_iou:.3f}"
-    )
+def _writers(request: TrackingRequest, source: Recording, stack: ExitStack) -> Iterator[Observer]:
+    """Yield what writes bag and video; they appear when ``stack`` is closed without an error."""
+    from cardbox_tracker.applications.drawing.overlay import draw_sharp_overlay
+    from cardbox_tracker.applications.drawing.video import overlay_video
+    from cardbox_tracker.recordings.result_bag import result_bag
+
+    bag, video = request.files.bag, request.files.video
+    if video is not None:
+        yield stack.enter_context(overlay_video(video, source))
+    if bag is not None:
+        frame_id = source.first.frame_id
+        yield stack.enter_context(result_bag(bag, frame_id, request.force, draw_sharp_overlay))
 
 
-def _config(options: argparse.Namespace) -> TrackerConfig:
-    """Return the preset changed by the options."""
-    from cardbox_tracker.estimation.config import PRESETS
+def placed(
+    recording: RecordingRequest, span: TimeSpan, until_s: float = 0.0
+) -> tuple[float, RecordingRequest]:
+    """Return the camera's pitch, rad, and the recording with the camera's roll, unless it is given.
 
-    config = PRESETS[options.preset]()
-    if options.depth is not None:
-        config = config.with_depth()
-    return with_tracker_settings(config, options)
+    Both are found from the person who stands upright in ``span``, or later up to ``until_s``, if
+    the recording is read with a detector; else the pitch is 0. A remark says what was found.
+
+    Raises:
+        CardboxError: the recording cannot be read, or the detector cannot be loaded.
+    """
+    from cardbox_tracker.recordings.standing import camera_of_standing
+
+    detector, camera = recording.detector, recording.camera
+    if detector is None:
+        return 0.0, recording
+    name = recording.cameras[0] if recording.cameras else None
+    standing = camera_of_standing(recording.path, detector, span, camera, name, until_s)
+    advice = "give --camera-pitch-deg if it is known"
+    if standing is None:
+        searched = span._replace(end_s=max(span.end_s, until_s))
+        print_remarks(
+            [
+                f"nobody stands upright at {searched} s, so the camera's pitch is taken as 0; "
+                f"{advice}"
+            ]
+        )
+        return 0.0, recording
+    found, span = standing
+    degrees = math.degrees(found.pitch_rad)
+    remarks = [
+        f"camera pitch {abs(degrees):.0f} degrees {'down' if degrees >= 0 else 'up'} (standard "
+        f"deviation {math.degrees(found.pitch_stddev_rad):.0f}), found from the person standing "
+        f"upright at {span} s; {advice}"
+        if found.is_pitch_found
+        else f"the camera's pitch does not show without the feet and is taken as 0; {advice}"
+    ]
+    if found.roll_rad and camera.roll_rad is None and len(recording.cameras) < 2:
+        remarks.append(
+            f"camera roll {math.degrees(found.roll_rad):.1f} degrees, found in the same way: the "
+            "images are turned back; give --camera-roll-deg 0 to leave them as they are"
+        )
+        recording = replace(recording, camera=replace(camera, roll_rad=found.roll_rad))
+    print_remarks(remarks)
+    return found.pitch_rad, recording

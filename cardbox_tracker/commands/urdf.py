@@ -21,11 +21,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> None:
-    """Print the URDF.
-
-    Raises:
-        CardboxError: the body model cannot be read.
-    """
+    """Print the URDF."""
     from cardbox_tracker.body.model_file import load_body_model
     from cardbox_tracker.body.urdf import urdf_from_body
 

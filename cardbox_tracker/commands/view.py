@@ -9,14 +9,20 @@ from contextlib import ExitStack, suppress
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from cardbox_tracker.commands.output_paths import add_force, check_outputs
-from cardbox_tracker.commands.tracking import add_inputs, inputs_of, track_inputs
+from cardbox_tracker.commands.arguments import add_force, check_outputs
+from cardbox_tracker.commands.request import (
+    OptionsError,
+    TrackingRequest,
+    add_tracking,
+    inputs_of,
+    tracking_request,
+)
+from cardbox_tracker.commands.tracking import track
 from cardbox_tracker.errors import CardboxError, RosMissingError
 
 if TYPE_CHECKING:
+    from cardbox_tracker.applications.viewing.scene import Scene
     from cardbox_tracker.evaluation.truth import TrueFrame
-    from cardbox_tracker.viewing.feed import Feed
-    from cardbox_tracker.viewing.scene import Scene
 
 NAME = "view"
 HELP = "show results in a viewer: image, body in 3D, plots, error, a slider for the time"
@@ -26,52 +32,43 @@ _TRUTH = "ground_truth.json"
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of ``cardbox view``."""
     parser.add_argument("--live", action="store_true", help="show the results of the running nodes")
-    parser.add_argument(
-        "--save", type=Path, default=None, metavar="FILE.rrd", help="write a file for the viewer"
-    )
+    parser.add_argument("--save", type=Path, metavar="FILE.rrd", help="write a file for the viewer")
     parser.add_argument(
         "--web", action="store_true", help="serve the viewer to a browser on this computer"
     )
     parser.add_argument(
         "--truth",
         type=Path,
-        default=None,
         metavar="FILE",
         help=f"{_TRUTH} of the recording, to plot the error; not needed if it lies beside BAG",
     )
     parser.add_argument(
         "--beside",
         type=Path,
-        default=None,
         metavar="RESULTS",
         help="second bag of results of the same recording, such as with other settings, to show "
         "beside the first",
     )
-    add_inputs(parser, needs_recording=False, needs_person=False)
+    add_tracking(parser, needs_recording=False)
     add_force(parser)
 
 
 def run(options: argparse.Namespace) -> None:
-    """Show a bag of results, a recording that is tracked meanwhile, or the running nodes.
-
-    Raises:
-        CardboxError: rerun-sdk is not installed, or the input cannot be read.
-    """
+    """Show a bag of results, a recording that is tracked meanwhile, or the running nodes."""
     if options.live == (options.recording is not None):
         raise CardboxError("expected either BAG or --live")
     inputs = *inputs_of(options), options.truth, options.beside
     check_outputs((options.save,), options.force, inputs=inputs)
     # A wrong input is reported before a missing library or display.
     results = [] if options.live else _results_of(options)
+    request = None if options.live or results else _request_of(options)
     if options.beside is not None and not results:
         raise CardboxError(
             "--beside needs a bag of results as BAG; 'cardbox track --bag' writes one"
         )
-    from cardbox_tracker.viewing.feed import Feed
-    from cardbox_tracker.viewing.layout import columns, layout
-    from cardbox_tracker.viewing.library import recording
-    from cardbox_tracker.viewing.same_images import check_same_images
-    from cardbox_tracker.viewing.scene import Scene
+    from cardbox_tracker.applications.viewing.scene import Scene, columns, layout
+    from cardbox_tracker.applications.viewing.sources import check_same_images
+    from cardbox_tracker.applications.viewing.viewer import recording
 
     first_ns = check_same_images(*results) if len(results) > 1 else None
     truth = None if options.live else _truth_of(options, results)
@@ -82,11 +79,11 @@ def run(options: argparse.Namespace) -> None:
             print(f"open {address} in a browser; Ctrl-C ends", flush=True)
         if options.live:
             _show_nodes(Scene(stream))
-        elif not results:
-            count = _track(options, Feed(Scene(stream), truth))
+        elif request is not None:
+            count = _track(request, Scene(stream, truth=truth))
             print(f"shown: {count} images with a posture", flush=True)
-        feeds = [Feed(Scene(stream, column, first_ns), truth) for column in shown[: len(results)]]
-        for column, count in zip(shown, _show_results(results, feeds), strict=False):
+        scenes = [Scene(stream, column, first_ns, truth) for column in shown[: len(results)]]
+        for column, count in zip(shown, _show_results(results, scenes), strict=False):
             print(column.named(f"shown: {count} images with a posture"), flush=True)
         if options.web and not options.live:
             stream.flush()
@@ -109,7 +106,7 @@ def _results_of(options: argparse.Namespace) -> list[Path]:
     """Return the bags of results to show; none if the recording is to be tracked.
 
     Raises:
-        CardboxError: the recording cannot be read, or options are missing.
+        CardboxError: the recording cannot be read.
     """
     from cardbox_tracker.recordings.bag_reader import BagReader
     from cardbox_tracker.recordings.open_images import is_bag
@@ -119,13 +116,22 @@ def _results_of(options: argparse.Namespace) -> list[Path]:
         with BagReader(options.recording) as bag:
             if has_results(bag):
                 return [path for path in (options.recording, options.beside) if path is not None]
-    missing = [] if options.stature is not None else _missing(options)
-    if missing:
+    return []
+
+
+def _request_of(options: argparse.Namespace) -> TrackingRequest:
+    """Return what is tracked in a recording without results.
+
+    Raises:
+        CardboxError: options are missing or wrong.
+    """
+    try:
+        return tracking_request(options)
+    except OptionsError as error:
         raise CardboxError(
             f"{options.recording} has no results to show; give a bag of 'cardbox track --bag', or "
-            f"--{', --'.join(missing)} as for 'cardbox track', to track it now"
-        )
-    return []
+            f"the options of 'cardbox track', to track it now: {error}"
+        ) from None
 
 
 def _names_of(results: Sequence[Path]) -> list[str]:
@@ -145,8 +151,8 @@ def _truth_of(
     Raises:
         CardboxError: the ground truth cannot be read, or is given for other images.
     """
+    from cardbox_tracker.applications.viewing.sources import image_stamps
     from cardbox_tracker.evaluation.truth import load_ground_truth
-    from cardbox_tracker.viewing.same_images import image_stamps
 
     path = options.truth or _truth_beside(options.recording)
     if path is None:
@@ -162,37 +168,27 @@ def _truth_of(
     return None
 
 
-def _show_results(paths: Sequence[Path], feeds: Sequence[Feed]) -> list[int]:
+def _show_results(paths: Sequence[Path], scenes: Sequence[Scene]) -> list[int]:
     """Show the results in bags; return the number of images with a posture of each."""
+    from cardbox_tracker.applications.viewing.sources import show_together
     from cardbox_tracker.progress import progress_bar
     from cardbox_tracker.recordings.bag_reader import BagReader
-    from cardbox_tracker.viewing.result_bag import show_together
 
     if not paths:
         return []
     with ExitStack() as stack:
         bags = [stack.enter_context(BagReader(path)) for path in paths]
         show = stack.enter_context(progress_bar("view"))
-        return show_together(list(zip(bags, feeds, strict=False)), show)
+        return show_together(list(zip(bags, scenes, strict=False)), show)
 
 
-def _track(options: argparse.Namespace, feed: Feed) -> int:
-    """Track the recording and show it; return the number of images with a posture."""
-    from cardbox_tracker.viewing.tracking import ShownTracking
+def _track(request: TrackingRequest, scene: Scene) -> int:
+    """Track a recording and show it; return the number of images with a posture."""
+    from cardbox_tracker.applications.viewing.sources import ShownTracking
 
-    shown = ShownTracking(feed)
-    track_inputs(options, observers=(shown,))
+    shown = ShownTracking(scene)
+    track(request, observers=(shown,))
     return shown.count
-
-
-def _missing(options: argparse.Namespace) -> list[str]:
-    """Return the names of the options that tracking needs."""
-    from cardbox_tracker.recordings.open_images import is_bag
-
-    sources = options.within, options.silhouettes, options.detector
-    is_empty_needed = is_bag(options.recording) and sources == (None, None, None)
-    needed = ("model", "start", *(["background"] if is_empty_needed else []))
-    return [name for name in needed if getattr(options, name) is None]
 
 
 def _truth_beside(bag: Path) -> Path | None:

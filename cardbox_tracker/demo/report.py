@@ -10,12 +10,12 @@ from pathlib import Path
 import matplotlib
 import numpy as np
 
+from cardbox_tracker.applications.drawing.overlay import draw_overlay
+from cardbox_tracker.applications.drawing.video import video_file
 from cardbox_tracker.body.model import BodyModel
 from cardbox_tracker.body.model_file import save_body_model
 from cardbox_tracker.body.skeleton import JOINT_NAMES
 from cardbox_tracker.demo.result import DemoResult
-from cardbox_tracker.drawing.overlay import draw_overlay
-from cardbox_tracker.drawing.video import video_file
 from cardbox_tracker.estimation.config import PRESETS
 from cardbox_tracker.estimation.cost.compiled import CompiledSilhouette
 from cardbox_tracker.estimation.estimate import TRACKING, UNCERTAIN, Estimate

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from cardbox_tracker.drawing.markers import MarkerShape, Rgba
+from cardbox_tracker.markers import MarkerShape, Rgba
 from cardbox_tracker.outputs import Markers
 from cardbox_tracker.recordings.bag_writer import BagWriter
 

@@ -23,19 +23,31 @@ class GivenCamera:
     Attributes:
         fov_deg: field of view across the width of the image as it is shown, degrees.
         calibration: file of camera_calibration, in place of the field of view.
-        roll_rad: how far the camera is turned clockwise about its axis, seen from behind it.
+        roll_rad: how far the camera is turned clockwise about its axis, seen from behind it; the
+            images are turned back.
         fps: images a second, in place of the rate that the recording states.
     """
 
     fov_deg: float | None = None
     calibration: Path | None = None
-    roll_rad: float = 0.0
+    roll_rad: float | None = None
     fps: float | None = None
 
     @property
     def is_calibrated(self) -> bool:
         """Whether field of view or calibration is given."""
         return self.fov_deg is not None or self.calibration is not None
+
+    def check(self) -> None:
+        """Check what is given, as far as it can be without the images.
+
+        Raises:
+            CameraError: the calibration cannot be read, or the field of view is impossible.
+        """
+        if self.calibration is not None:
+            load_calibration(self.calibration)
+        elif self.fov_deg is not None:
+            Calibration.of_fov(4, 3, self.fov_deg)
 
     def calibrated(self, path: Path, width: int, height: int, frame_id: str = "") -> Calibration:
         """Return the calibration of images of ``width`` x ``height`` px in the recording ``path``.

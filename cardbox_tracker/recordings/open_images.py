@@ -11,6 +11,7 @@ from cardbox_tracker.recordings.given_camera import GivenCamera
 from cardbox_tracker.recordings.image_folder import SUFFIXES, ImageFolder, image_files
 from cardbox_tracker.recordings.image_recording import ImageRecording
 from cardbox_tracker.recordings.video_reader import FORMATS, VideoReader
+from cardbox_tracker.recordings.video_reader import SUFFIXES as VIDEO_SUFFIXES
 
 
 def is_bag(path: Path) -> bool:
@@ -20,6 +21,22 @@ def is_bag(path: Path) -> bool:
     if any((folder / "metadata.yaml").exists() for folder in (path, path / "bag")):
         return True
     return any(file.suffix in FILE_ENDINGS for file in path.iterdir())
+
+
+def check_exists(path: Path) -> None:
+    """Raise BagError unless there is a file or folder of that path."""
+    if not path.exists():
+        raise BagError(
+            f"there is no recording {path}; give a rosbag2 folder or file, a video ({FORMATS}), or "
+            "a folder of images"
+        )
+
+
+def is_film(path: Path) -> bool:
+    """Return whether a path is a video or a folder of images, which do not tell their camera."""
+    if path.is_dir():
+        return not is_bag(path) and bool(image_files(path))
+    return path.is_file() and path.suffix.lower() in VIDEO_SUFFIXES
 
 
 def open_images(path: str | os.PathLike[str], camera: GivenCamera | None = None) -> ImageRecording:
@@ -44,11 +61,7 @@ def open_images(path: str | os.PathLike[str], camera: GivenCamera | None = None)
             f"{path} is not a rosbag2 recording (it has no metadata.yaml), and it has no JPEG or "
             "PNG images; give a bag, a video, or a folder of images"
         )
-    if not path.exists():
-        raise BagError(
-            f"there is no recording {path}; give a rosbag2 folder or file, a video ({FORMATS}), or "
-            "a folder of images"
-        )
+    check_exists(path)
     if not path.is_file():
         raise BagError(f"{path} is a pipe or a device; give a recording: a bag, a video or images")
     if path.suffix.lower() in SUFFIXES:

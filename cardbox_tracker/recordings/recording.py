@@ -185,20 +185,8 @@ def open_recording(
             read.
     """
     names = camera_names(cameras)
-    if depth is not None and not cameras:
-        raise CardboxError("--depth needs --cameras: the camera whose depth it is, first")
-    if isinstance(background, Within) and len(names) > 1:
-        raise CardboxError(
-            "depth images can cut out the person for one camera only; several cameras need "
-            "--background"
-        )
-    if len(names) > 1 and camera is not None and camera != GivenCamera():
-        raise CardboxError(
-            "--fov, --calibration and --camera-roll-deg describe one camera; the recording of "
-            "several cameras needs a CameraInfo of each"
-        )
-    if (depth is not None or isinstance(background, Within)) and not is_bag(Path(path)):
-        raise CardboxError(f"depth images are read from a rosbag2, which {os.fspath(path)} is not")
+    for fault in input_faults(path, background, names, depth, camera):
+        raise CardboxError(fault)
     with ExitStack() as stack:
         # A reader has one position, and the cameras are read in parallel.
         bags = [stack.enter_context(open_images(path, camera)) for _ in names or ("",)]
@@ -208,6 +196,31 @@ def open_recording(
             for bag, name in zip(bags, names or (None,), strict=True)
         ]
         yield Recording(names or ("",), sources, found, depth)
+
+
+def input_faults(
+    path: str | os.PathLike[str],
+    background: Segmentation,
+    cameras: Sequence[str],
+    depth: str | None,
+    camera: GivenCamera | None,
+) -> Iterator[str]:
+    """Yield what does not go together in arguments of :func:`open_recording`."""
+    if depth is not None and not cameras:
+        yield "--depth needs --cameras: the camera whose depth it is, first"
+    if isinstance(background, Within) and len(cameras) > 1:
+        yield (
+            "depth images can cut out the person for one camera only; several cameras need "
+            "--background"
+        )
+    is_given = camera is not None and (camera.is_calibrated or camera.roll_rad or camera.fps)
+    if len(cameras) > 1 and is_given:
+        yield (
+            "--fov, --calibration, --camera-roll-deg and --fps describe one camera; the recording "
+            "of several cameras needs a CameraInfo of each"
+        )
+    if (depth is not None or isinstance(background, Within)) and not is_bag(Path(path)):
+        yield f"depth images are read from a rosbag2, which {os.fspath(path)} is not"
 
 
 def _extrinsics_in(

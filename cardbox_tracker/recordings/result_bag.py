@@ -5,14 +5,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
 
 from cardbox_tracker.body.model import BodyModel
 from cardbox_tracker.body.model_file import dumps_body_model
 from cardbox_tracker.body.urdf import urdf_from_body
-from cardbox_tracker.drawing.overlay import draw_overlay, readable_scale
 from cardbox_tracker.estimation.estimate import Estimate
 from cardbox_tracker.estimation.tracker import Tracker
 from cardbox_tracker.keypoint_status import CHANCE_KEY, LEVELS, KeypointStates, chance_text
@@ -32,6 +34,9 @@ from cardbox_tracker.recordings.bag_writer import BagWriter
 from cardbox_tracker.recordings.silhouettes import RecordedFrame
 from cardbox_tracker.recordings.track import Observer
 
+Draw = Callable[[NDArray[np.uint8], Estimate, Tracker], NDArray[np.uint8]]
+"""Draws an estimate over the picture (H, W, ...) of the first camera; returns bgr."""
+
 _LATCHED = ("/body_model", "/robot_description")
 
 
@@ -47,25 +52,29 @@ def result_writer(path: Path, overwrite: bool = False) -> BagWriter:
 
 
 @contextmanager
-def result_bag(path: Path | None, frame_id: str, overwrite: bool = False) -> Iterator[Observer]:
-    """Context of an observer that writes the outputs of each image to a bag, if it has a path.
+def result_bag(
+    path: Path, frame_id: str, overwrite: bool = False, draw: Draw | None = None
+) -> Iterator[Observer]:
+    """Context of an observer that writes the outputs of each image to a bag.
 
-    The bag appears on exit; after an error there is none. With ``overwrite`` a recording of that
-    name is replaced.
+    The bag appears on exit; after an error there is none.
+
+    Args:
+        path: folder to write.
+        frame_id: optical frame of the first camera.
+        overwrite: replace a recording of that name.
+        draw: makes the pictures of ``/overlay``; None for none.
 
     Raises:
         BagError: ``path`` exists and may not be replaced.
     """
-    if path is None:
-        yield lambda *_: None
-        return
     with result_writer(path, overwrite) as writer:
-        yield _ResultBag(writer, frame_id)
+        yield _ResultBag(writer, frame_id, draw)
 
 
 class _ResultBag:
-    def __init__(self, bag: BagWriter, frame_id: str) -> None:
-        self._bag, self._frame_id = bag, frame_id
+    def __init__(self, bag: BagWriter, frame_id: str, draw: Draw | None) -> None:
+        self._bag, self._frame_id, self._draw = bag, frame_id, draw
         self._transforms = BagTransforms(bag)
         self._described: BodyModel | None = None
         self._outputs = OutputStream()
@@ -82,11 +91,9 @@ class _ResultBag:
         self._described = body
         bag.write_image("/silhouette", stamp, optical, frame.silhouette, "mono8")
         bag.write_camera_info("/silhouette/camera_info", stamp, optical, camera)
-        # Repeated pixels compress well, and lines and text over them are sharp.
-        scale = readable_scale(frame.picture)
-        picture = frame.picture.repeat(scale, axis=0).repeat(scale, axis=1)
-        overlay = draw_overlay(picture, body, camera, estimate)
-        bag.write_image("/overlay", stamp, optical, overlay, "bgr8")
+        if self._draw is not None:
+            overlay = self._draw(frame.picture, estimate, tracker)
+            bag.write_image("/overlay", stamp, optical, overlay, "bgr8")
         for output, value in self._outputs.values(stamp, estimate, tracker):
             _write_value(bag, f"/{output.topic}", stamp, optical, value)
         joints = joint_values(estimate)

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from typing import Any, NamedTuple
+from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -11,15 +11,17 @@ from cardbox_tracker.body.model import BodyModel
 from cardbox_tracker.body.model_file import loads_body_model
 from cardbox_tracker.body.sizes import FloatArray
 from cardbox_tracker.errors import BagError
-from cardbox_tracker.estimation.estimate import TRACKING, UNCERTAIN
-from cardbox_tracker.outputs import JointValues, neck_from, posture_from
+from cardbox_tracker.estimation.estimate import NO_PERSON, TRACKING, UNCERTAIN
+from cardbox_tracker.outputs import JointValues, neck_from, place_from, posture_from
 from cardbox_tracker.recordings.bag_reader import BagReader, stamp_ns_of
 
 MODEL = "/body_model"
 _STATE, _JOINTS, _STDDEV = "/tracking_state", "/joint_states", "/joint_states_stddev"
+_KEYPOINTS = "/keypoints"
 
 
-class Result(NamedTuple):
+@dataclass(frozen=True)
+class Result:
     """The tracker's result for one image.
 
     Attributes:
@@ -30,6 +32,8 @@ class Result(NamedTuple):
             there is no estimate.
         stddev: standard deviations, without the neck where it is not known, (12,) or (14,); None
             if they are not known.
+        place_m: ``torso_x`` and ``torso_z``, (2,); None if the bag has none.
+        keypoints_m: (n, 3), metres in the optical frame of the first camera; None without any.
     """
 
     stamp_ns: int
@@ -37,6 +41,8 @@ class Result(NamedTuple):
     body: BodyModel | None = None
     posture: FloatArray | None = None
     stddev: FloatArray | None = None
+    place_m: FloatArray | None = None
+    keypoints_m: FloatArray | None = None
 
 
 def has_results(bag: BagReader) -> bool:
@@ -70,55 +76,59 @@ def points_of(message: Any) -> FloatArray:
     return np.array(points, np.float64).reshape(-1, 3)
 
 
-def read_results(bag: BagReader) -> Iterator[Result]:
-    """Yield the result of each image in order.
+def read_results(bag: BagReader) -> list[Result]:
+    """Return the results of the images in order of their stamps; the last one of each stamp.
 
     Raises:
         BagError: the bag has no results of the tracker, or is damaged.
     """
     space = namespace_of(bag)
-    topics = [space + name for name in (MODEL, _STATE, _JOINTS, _STDDEV)]
-    reader = _Results(space)
+    topics = [space + name for name in (MODEL, _STATE, _JOINTS, _STDDEV, _KEYPOINTS)]
+    found = _Results()
     for message in bag.messages([topic for topic in topics if topic in bag.topics]):
         content = bag.deserialize(message)
         try:
-            found = reader.take(message.topic, message.time_ns, content)
+            found.take(message.topic.removeprefix(space), message.time_ns, content)
         except (AttributeError, TypeError, ValueError) as error:
             # The message type is defined by the recording and may lack fields.
             where = f"{message.topic} of {bag.path}"
             raise BagError(f"{where} has a damaged message: {error}; record it again") from None
-        if found is not None:
-            yield found
+    return [one for _, one in sorted(found.by_stamp.items())]
 
 
 class _Results:
-    """Joins the joint states and the deviations of one image, which have the same stamp."""
+    """Joins the messages of each image, of which joints, deviations and points have its stamp."""
 
-    def __init__(self, space: str) -> None:
-        self._space = space
-        self._state = ""
+    def __init__(self) -> None:
+        self._state = NO_PERSON
         self._body: BodyModel | None = None
-        self._joints: Result | None = None
+        self.by_stamp: dict[int, Result] = {}
 
-    def take(self, topic: str, time_ns: int, message: Any) -> Result | None:
-        """Return the result that a message completes."""
-        name = topic.removeprefix(self._space)
+    def take(self, name: str, time_ns: int, message: Any) -> None:
         if name == MODEL:
-            self._body = loads_body_model(str(message.data), source=topic)
+            self._body = loads_body_model(str(message.data), source=name)
         elif name == _STATE:
             self._state = str(message.data)
             if self._state not in (TRACKING, UNCERTAIN):
-                return Result(time_ns, self._state, self._body)
+                self.by_stamp[time_ns] = Result(time_ns, self._state, self._body)
         elif name == _JOINTS:
-            posture = _posture_and_neck(message)
-            self._joints = Result(stamp_ns_of(message), self._state, self._body, posture)
-        elif self._joints is not None and self._joints.stamp_ns == stamp_ns_of(message):
-            return self._joints._replace(stddev=_posture_and_neck(message))
-        return None
+            stamp_ns, joints = stamp_ns_of(message), joints_of(message)
+            self.by_stamp[stamp_ns] = Result(
+                stamp_ns,
+                self._state,
+                self._body,
+                _with_neck(joints),
+                place_m=place_from(joints),
+            )
+        elif (found := self.by_stamp.get(stamp_ns_of(message))) is not None:
+            if name == _KEYPOINTS:
+                found = replace(found, keypoints_m=points_of(message))
+            else:
+                found = replace(found, stddev=_with_neck(joints_of(message)))
+            self.by_stamp[found.stamp_ns] = found
 
 
-def _posture_and_neck(message: Any) -> FloatArray:
+def _with_neck(joints: JointValues) -> FloatArray:
     """Return the joints of the posture, and of the neck if they are there, (12,) or (14,)."""
-    joints = joints_of(message)
     posture, neck = posture_from(joints), neck_from(joints)
     return posture if neck is None else np.concatenate([posture, neck])

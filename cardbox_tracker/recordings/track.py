@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from contextlib import ExitStack
+from contextlib import nullcontext
 from dataclasses import dataclass
 from pathlib import Path
-from typing import NamedTuple
 
 import numpy as np
 
@@ -15,28 +14,12 @@ from cardbox_tracker.errors import CardboxError
 from cardbox_tracker.estimation.config import TrackerConfig
 from cardbox_tracker.estimation.estimate import UNCERTAIN, Estimate
 from cardbox_tracker.estimation.tracker import Tracker
-from cardbox_tracker.recordings.overlay_video import overlay_video
 from cardbox_tracker.recordings.recording import Recording
 from cardbox_tracker.recordings.result_table import result_table
 from cardbox_tracker.recordings.silhouettes import RecordedFrame
 
 Observer = Callable[[RecordedFrame, Estimate, Tracker], None]
 """Callback that receives each image with its estimate and the tracker."""
-
-
-class TrackFiles(NamedTuple):
-    """Files to write; None for one that is not wanted.
-
-    Attributes:
-        table: one row for each image, see :func:`~.result_table.result_table`.
-        video: overlay video, at the rate and the resolution of the recording.
-    """
-
-    table: Path | None = None
-    video: Path | None = None
-
-
-_NO_FILES = TrackFiles()
 
 
 @dataclass(frozen=True)
@@ -68,7 +51,7 @@ def track_recording(
     config: TrackerConfig,
     seed: int,
     start_s: float,
-    files: TrackFiles = _NO_FILES,
+    table: Path | None = None,
     observers: tuple[Observer, ...] = (),
 ) -> TrackSummary:
     """Track every image from ``start_s`` on.
@@ -80,7 +63,7 @@ def track_recording(
         seed: random seed; the same recording and seed give the same bytes.
         start_s: seconds from the recording's start at which the person stands in the front
             reference posture.
-        files: files to write; the table is written atomically.
+        table: file to write with a row for each image, see :func:`~.result_table.result_table`.
         observers: called after each image, such as a progress bar or a bag writer.
 
     Raises:
@@ -91,13 +74,9 @@ def track_recording(
     costs: list[int] = []
     ious: list[float] = []
     frames = frames_uncertain = 0
-    with ExitStack() as stack:
-        add_row = None
-        if files.table is not None:
-            add_row = stack.enter_context(result_table(files.table, recording.first.has_points))
-        if files.video is not None:
-            video = stack.enter_context(overlay_video(files.video, recording))
-            observers = (video, *observers)
+    with (
+        nullcontext() if table is None else result_table(table, recording.first.has_points)
+    ) as add_row:
         for taken in recording.frames(start_s):
             estimate, frame = tracker.track(taken.observations), taken.first
             frames += 1

@@ -1,13 +1,29 @@
-"""Mistakes of 'cardbox initialize': each is told in words, and nothing appears."""
+"""'cardbox initialize', 'body' and 'calibrate-extrinsics': results and error messages."""
 
 from __future__ import annotations
 
+import csv
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
+import numpy as np
 import pytest
 
+from cardbox_tracker.body.model_file import load_body_model
+from cardbox_tracker.body.skeleton import KEYPOINT_NAMES
+from cardbox_tracker.evaluation.truth import load_ground_truth
+from cardbox_tracker.recordings.bag_reader import BagReader
+from cardbox_tracker.recordings.bag_writer import BagWriter
+from cardbox_tracker.simulation.session import SessionFormat, synthesize_session
+
 SPAN = "expected T0:T1, seconds from the start of the recording"
+SPANS = {
+    "--background": "0:3.9",
+    "--front": "6.8:8.2",
+    "--side": "9.8:11.2",
+    "--arms": "12.8:14.2",
+}
 
 
 @pytest.mark.parametrize(
@@ -60,14 +76,146 @@ def test_references_taken_for_each_other_are_named(
 def test_a_missing_output_folder_is_told_before_the_recording_is_read(
     tmp_path: Path, spans: dict[str, str], cardbox: Callable
 ) -> None:
+    unread = tmp_path / "unread.mcap"
+    unread.touch()
     options = spans | {"--distance": "2", "--output": f"{tmp_path / 'none' / 'body.yaml'}"}
-    done = cardbox("initialize", "no_bag", *(f"{n}={text}" for n, text in options.items()))
+    done = cardbox("initialize", unread, *(f"{n}={text}" for n, text in options.items()))
     done.assert_refused("initialize", "No such file or directory; choose a folder")
 
 
 def test_one_camera_needs_the_distance(
     tmp_path: Path, spans: dict[str, str], cardbox: Callable
 ) -> None:
+    unread = tmp_path / "unread.mcap"
+    unread.touch()
     options = spans | {"--output": f"{tmp_path / 'body.yaml'}", "--cameras": "left"}
-    done = cardbox("initialize", "no_bag", *(f"{n}={text}" for n, text in options.items()))
-    done.assert_refused("initialize", "give --distance M, --depth TOPIC, or two --cameras")
+    done = cardbox("initialize", unread, *(f"{n}={text}" for n, text in options.items()))
+    expected = "unread.mcap needs --distance M or --depth TOPIC or two --cameras ("
+    done.assert_refused("initialize", expected)
+    del options["--background"]
+    done = cardbox("initialize", unread, *(f"{n}={text}" for n, text in options.items()))
+    done.assert_refused("initialize", "unread.mcap needs --background T0:T1 or", "and --distance M")
+
+
+def test_somebody_is_tracked_without_reference_postures(
+    cardbox: Callable[..., Any], files: Path, tmp_path: Path
+) -> None:
+    model, table = tmp_path / "me.yaml", tmp_path / "me.csv"
+    done = cardbox("body", "--stature", 1.72, "--distance", 2, "--output", model)
+    assert done.code == 0, done.err
+    assert "not measured" in done.out
+    assert load_body_model(model).source == "proportions"
+    given = ("--background", "0:3.9", "--start", 15.6, "--csv", table)
+    done = cardbox("track", files / "session", "--model", model, *given)
+    assert done.code == 0, done.err
+    assert "me.yaml: sizes from the proportions" in done.out
+    with table.open(encoding="utf-8") as file:
+        states = [row["state"] for row in csv.DictReader(file)]
+    assert states.count("tracking") > 0.8 * len(states)
+
+
+@pytest.mark.parametrize(
+    ("words", "text"),
+    [
+        (("--stature", 180), "stature is 180 m; expected 1.1 to 2.2 m (is it given in centimetres"),
+        (("--stature", 1.8, "--distance", 0.1), "distance_m is 0.1 m"),
+        (("--stature", 1.8, "--shoulder-breadth", 38), "shoulder_breadth is 38 m"),
+    ],
+)
+def test_impossible_numbers_are_refused(
+    cardbox: Callable[..., Any], tmp_path: Path, words: tuple[object, ...], text: str
+) -> None:
+    done = cardbox("body", *words, "--output", tmp_path / "me.yaml")
+    done.assert_refused("body", text)
+    assert not (tmp_path / "me.yaml").exists()
+
+
+def test_a_model_that_exists_is_kept_without_force(
+    cardbox: Callable[..., Any], tmp_path: Path
+) -> None:
+    model = tmp_path / "me.yaml"
+    words = ("body", "--stature", 1.8, "--output", model)
+    assert cardbox(*words).code == 0
+    written = model.read_bytes()
+    cardbox(*words[:2], 1.7, *words[3:]).assert_refused("body", "me.yaml exists")
+    assert model.read_bytes() == written
+    assert cardbox(*words, "--force").code == 0
+
+
+@pytest.fixture(scope="module")
+def session(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("cameras") / "session"
+    synthesize_session(folder, "bow", form=SessionFormat(5.0, cameras=2))
+    return folder
+
+
+def words(options: dict[str, str]) -> list[str]:
+    return [f"{name}={value}" for name, value in options.items()]
+
+
+def test_a_synthetic_recording_is_measured_and_tracked(
+    session: Path, tmp_path: Path, cardbox: Callable
+) -> None:
+    model, table = tmp_path / "person.yaml", tmp_path / "angles.csv"
+    cameras = ("--cameras", "cam0", "cam1", f"--extrinsics={session / 'extrinsics.yaml'}")
+    done = cardbox("initialize", session, *cameras, *words(SPANS), f"--output={model}")
+    assert done.code == 0, done.err
+    # The second camera measured it.
+    assert load_body_model(model).placement.distance_m == pytest.approx(2.0, abs=0.1)
+    done = cardbox(
+        *("track", session, *cameras, "--background=0:3.9", f"--model={model}"),
+        *("--start=15.6", f"--csv={table}"),
+    )
+    assert done.code == 0, done.err
+    assert "extrinsics" not in done.err
+    truth = load_ground_truth(session / "ground_truth.json")
+    errors = []
+    with table.open(encoding="utf-8") as file:
+        for row in csv.DictReader(file):
+            frame = truth.frames[int(row["stamp_ns"])]
+            found = [[float(row[f"{name}_{axis}"]) for axis in "xyz"] for name in KEYPOINT_NAMES]
+            errors.append(np.linalg.norm(np.array(found) - frame.keypoints_m, axis=1).mean())
+    assert len(errors) > 30
+    assert np.mean(errors) < 0.06
+
+
+def test_depth_images_measure_how_far_away_the_person_is(
+    session: Path, tmp_path: Path, cardbox: Callable
+) -> None:
+    recording, model = tmp_path / "ranged", tmp_path / "person.yaml"
+    # Chest and face of somebody whose hips are 2 m away.
+    depth = np.full((240, 320), 1900, np.uint16)
+    with BagReader(session) as old, BagWriter(recording) as new:
+        for message in old.messages():
+            new.write_raw(message.topic, message.msgtype, message.raw, message.time_ns)
+        for image in old.images(old.image_topic("cam0")):
+            new.write_image("/cam0/depth", image.stamp_ns, "cam0", depth, "16UC1")
+    given = ("--cameras", "cam0", "--depth=/cam0/depth", *words(SPANS), f"--output={model}")
+    done = cardbox("initialize", recording, *given)
+    assert done.code == 0, done.err
+    assert load_body_model(model).placement.distance_m == pytest.approx(2.0, abs=0.06)
+    empty = words(SPANS | {"--arms": "0:0.05"})
+    done = cardbox("initialize", recording, *given[:3], *empty, f"--output={tmp_path / 'no.yaml'}")
+    done.assert_refused("initialize", "reference 'arms'")
+
+
+@pytest.mark.parametrize(
+    ("changed", "expected"),
+    [
+        (("--cameras", "cam0"), "expected two to 4 different namespaces"),
+        (("--cameras", "cam0", "cam0"), "the cameras are cam0, cam0; expected two to 4"),
+        (("--motion=9:3",), "--motion: expected T0:T1"),
+        (("--distance=0",), "distance_m is 0 m; expected 0.3 to 20 m"),
+        (("--output=FOLDER/extrinsics.yaml",), "extrinsics.yaml: it is read, as"),
+    ],
+)
+def test_mistakes_of_calibrate_extrinsics(
+    session: Path, tmp_path: Path, cardbox: Callable, changed: tuple[str, ...], expected: str
+) -> None:
+    output = tmp_path / "extrinsics.yaml"
+    options = words(SPANS | {"--distance": "2", "--motion": "15:20", "--output": f"{output}"})
+    given = ("--cameras", "cam0", "cam1", *options)
+    changes = [word.replace("FOLDER", str(session)) for word in changed]
+    done = cardbox("calibrate-extrinsics", session, *given, *changes)
+    done.assert_refused("calibrate-extrinsics", expected)
+    assert not output.exists()

@@ -12,21 +12,17 @@ from pathlib import Path
 import pytest
 
 from cardbox_tracker import __version__
+from cardbox_tracker.commands import call as command
+from cardbox_tracker.commands import checkout
 from cardbox_tracker.commands import main as main_module
+from cardbox_tracker.commands.checkout import from_checkout
 from cardbox_tracker.commands.main import COMMANDS, RETIRED, build_parser
+from cardbox_tracker.errors import CardboxError
 
 ROOT = Path(__file__).resolve().parents[2]
 NAMES = [command.NAME for command in COMMANDS]
 # Modules beside the subcommands.
-SHARED = {
-    "folder_summary",
-    "recording_options",
-    "track_folder",
-    "tracking",
-    *("output_paths", "__init__", "arguments", "checkout", "command", "main"),
-    *("camera_arguments", "person_arguments"),
-    "settings_arguments",
-}
+SHARED = {"__init__", "main", "arguments", "request", "tracking", "track_folder", "checkout"}
 
 
 def parsers() -> dict[str, argparse.ArgumentParser]:
@@ -182,7 +178,8 @@ def test_the_course_of_the_readme(
     assert "upper_arm_length" in done.out
     assert f"wrote {model}" in done.out
     words = ("track", files / "session", *given[:2], "--model", model, "--start", "15.6")
-    done = cardbox(*words, "--csv", table, "--bag", bag, "--preset", "paper", "--particles", 50)
+    fewer = ("--set", "torso.particles=50", "--set", "arm.particles=50")
+    done = cardbox(*words, "--csv", table, "--bag", bag, "--preset", "paper", *fewer)
     assert done.code == 0
     rows = table.read_text().count("\n") - 1
     assert done.out.startswith(f"tracked {rows} of {rows} images, mean cost ")
@@ -190,3 +187,114 @@ def test_the_course_of_the_readme(
     done = cardbox("urdf", model)
     assert done.code == 0
     assert "<robot" in done.out
+
+
+WITHOUT_ROS = """
+import sys
+for name in ("rclpy", "std_msgs", "std_srvs", "sensor_msgs", "geometry_msgs"):
+    sys.modules[name] = None  # an import of it fails, as where ROS is not installed
+from cardbox_tracker.commands.main import main
+sys.exit(main(sys.argv[1:]))
+"""
+
+
+def without_ros(*words: object) -> subprocess.CompletedProcess[str]:
+    command = [sys.executable, "-c", WITHOUT_ROS, *map(str, words)]
+    return subprocess.run(command, capture_output=True, text=True, cwd=ROOT, check=False)
+
+
+def test_recordings_need_no_ros(files: Path, tmp_path: Path) -> None:
+    table = tmp_path / "person.csv"
+    options = ("--background", "0:3.9", "--model", files / "person.yaml", "--start", "22")
+    done = without_ros("track", files / "session", *options, "--csv", table)
+    assert done.returncode == 0, done.stderr
+    assert table.read_text().startswith("stamp,state,torso_y,")
+
+
+def test_what_needs_ros_says_so() -> None:
+    done = without_ros("call", "initializer/initialize")
+    assert done.returncode == 1
+    assert "Traceback" not in done.stderr
+    assert "ROS 2 is not installed" in done.stderr.splitlines()[-1]
+
+
+@pytest.mark.parametrize(
+    ("statuses", "printed"),
+    [
+        (["measuring", "measured"], "measuring\nmeasured\n"),
+        (["playing"], "playing\nmeasured\n"),
+        ([], "measured\n"),
+    ],
+)
+def test_an_answer_that_was_the_last_status_is_printed_once(
+    statuses: list[str],
+    printed: str,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    pytest.importorskip("rclpy", reason="rclpy is not installed")
+    from cardbox_tracker.ros.runtime import call
+
+    def answered(service: str, say: Callable[[str], None]) -> str:
+        for status in statuses:
+            say(status)
+        return "measured"
+
+    monkeypatch.setattr(call, "call_service", answered)
+    command.run(argparse.Namespace(service="initializer/initialize"))
+    assert capsys.readouterr().out == printed
+
+
+@pytest.fixture
+def installed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A package that does not lie in a checkout, run from a folder elsewhere."""
+    monkeypatch.setattr(checkout, "_PACKAGE", tmp_path / "site-packages" / "cardbox_tracker")
+    monkeypatch.setattr(sys, "path", list(sys.path))
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+@pytest.mark.parametrize(
+    ("words", "target"),
+    [
+        (("benchmark", "--json", "b.json"), "make benchmark"),
+        (("evaluate", "--runs", "2", "--output", "out"), "make experiments"),
+    ],
+)
+def test_without_a_checkout_the_make_target_is_named(
+    words: tuple[str, ...], target: str, installed: Path, cardbox: Callable
+) -> None:
+    cardbox(*words).assert_refused(words[0], target)
+    assert list(installed.iterdir()) == []
+
+
+def test_the_checkout_is_found_from_a_folder_inside(
+    installed: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    folder = installed / "checkout" / "docs"
+    for name in ("docs", "cardbox_tracker", "of_a_checkout"):
+        (installed / "checkout" / name).mkdir(parents=True)
+    (installed / "checkout" / "of_a_checkout" / "__init__.py").touch()
+    (installed / "checkout" / "of_a_checkout" / "run.py").write_text("ANSWER = 42\n")
+    monkeypatch.chdir(folder)
+    assert from_checkout("of_a_checkout.run", "nothing").ANSWER == 42
+
+
+def test_a_missing_library_is_named(installed: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (installed / "cardbox_tracker").mkdir()
+    (installed / "needs_more").mkdir()
+    (installed / "needs_more" / "__init__.py").write_text("import no_such_library\n")
+    with pytest.raises(CardboxError, match=r"no_such_library.*pip install \."):
+        from_checkout("needs_more", "nothing")
+
+
+def test_beside_the_package_it_is_found_from_anywhere(tmp_path: Path) -> None:
+    program = (
+        f"import sys; sys.path.insert(0, {str(ROOT)!r})\n"
+        "from cardbox_tracker.commands.checkout import from_checkout\n"
+        "print(from_checkout('benchmarks.report', 'benchmark').COMMAND)"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", program], capture_output=True, text=True, cwd=tmp_path, check=True
+    )
+    assert done.stdout == "make benchmark\n"

@@ -42,7 +42,7 @@ def test_a_recording_is_scored(files: Path, tmp_path: Path, cardbox: Callable) -
     done = cardbox(*words, *pages, "--images", "none", "--force")
     assert done.code == 0, done.err
     assert (table.read_bytes(), shares.read_bytes()) == first
-    assert "data:image" not in page.read_text(encoding="utf-8")
+    assert "data:image/jpeg" not in page.read_text(encoding="utf-8")
     only = tmp_path / "only.html"
     done = cardbox("rula", *options(files), "--html", only, "--title", "Packing")
     assert done.code == 0, done.err

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import argparse
 import csv
 import os
 import re
@@ -15,13 +14,12 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-import cv2
-import numpy as np
 import pytest
 
 from cardbox_tracker.commands import track_folder
-from cardbox_tracker.commands.folder_summary import digest_of_inputs
-from cardbox_tracker.commands.tracking import ResultFiles
+from cardbox_tracker.commands.main import build_parser
+from cardbox_tracker.commands.request import TrackingRequest, tracking_request
+from cardbox_tracker.commands.track_folder import digest_of_inputs
 from cardbox_tracker.errors import CardboxError
 from cardbox_tracker.recordings.folder import SUMMARY
 from cardbox_tracker.recordings.track import TrackSummary
@@ -94,13 +92,11 @@ class Tracked:
         self.names: list[str] = []
         self.errors: dict[str, BaseException] = {}
 
-    def __call__(
-        self, options: argparse.Namespace, files: ResultFiles, force: bool, show: Any
-    ) -> TrackSummary:
-        name = options.recording.stem
+    def __call__(self, request: TrackingRequest, show: Any) -> TrackSummary:
+        name = request.recording.path.stem
         self.names.append(name)
-        for path in filter(None, files):
-            path.write_text(f"{name} with effort {options.effort}")
+        for path in filter(None, request.files or ()):
+            path.write_text(f"{name} with effort {request.config.whole_body.effort}")
         if name in self.errors:
             raise self.errors[name]
         show(0.5)
@@ -111,7 +107,7 @@ class Tracked:
 @pytest.fixture
 def tracked(monkeypatch: pytest.MonkeyPatch) -> Tracked:
     tracking = Tracked()
-    monkeypatch.setattr(track_folder, "track_inputs", tracking)
+    monkeypatch.setattr(track_folder, "track", tracking)
     return tracking
 
 
@@ -127,7 +123,7 @@ def track(files: Path, tmp_path: Path, cardbox: Callable, tracked: Tracked) -> C
     def run(*more: object, code: int = 0) -> list[str]:
         tracked.names.clear()
         given = ("--model", folder / "person.yaml", "--background=0:3.9", "--start=15.6")
-        output = ("--output", tmp_path / "out", "--jobs=1")
+        output = ("--fov=60", "--output", tmp_path / "out", "--jobs=1")
         done = cardbox("track", folder, *given, *output, *more)
         assert done.code == code, done.err
         run.done = done  # type: ignore[attr-defined]
@@ -163,6 +159,12 @@ def test_changes_are_done_again(track: Callable, tmp_path: Path) -> None:
     assert track() == ["a"]
     (films / "d.mp4").write_text("d")
     assert track() == ["d"]
+    # The same settings, given otherwise, are the same request.
+    (films / "settings.yaml").write_text("whole_body:\n  effort: 0.5\n")
+    (films / "c.options").write_text("--settings settings.yaml")
+    assert track() == []
+    (films / "c.options").write_text("--settings settings.yaml --set lost_frames=9")
+    assert track() == ["c"]
     text = (films / "person.yaml").read_text()
     (films / "person.yaml").write_text(text + "\n# measured again\n")
     assert track() == ["a", "b", "c", "d"]
@@ -172,7 +174,7 @@ def test_a_failure_is_named_and_tried_again(
     track: Callable, tracked: Tracked, tmp_path: Path
 ) -> None:
     track()
-    tracked.errors = {"a": CardboxError("no image lies\nhere"), "b": ZeroDivisionError("by zero")}
+    tracked.errors = {"a": CardboxError("no image\nlies here"), "b": ZeroDivisionError("by zero")}
     assert track("--effort=2", code=1) == ["a", "b", "c"]
     assert "2 of 3 recordings failed\n  a: no image lies here\n" in track.done.err
     assert "  b: unexpected ZeroDivisionError: by zero; 'cardbox track'" in track.done.err
@@ -192,36 +194,31 @@ def test_mistakes_in_the_options_of_one_do_not_stop_the_others(
     assert "b.options" in track.done.err
 
 
-def test_an_option_that_all_recordings_lack_is_named_once(
-    files: Path, tmp_path: Path, cardbox: Callable, tracked: Tracked
+def test_options_that_all_recordings_lack_are_named_once(
+    tmp_path: Path, cardbox: Callable, tracked: Tracked
 ) -> None:
-    for name in "abc":
-        (tmp_path / f"{name}.mp4").write_text(name)
+    for number in range(12):
+        (tmp_path / f"film_{number:02}.mp4").write_text("film")
     done = cardbox("track", tmp_path, "--background=0:3.9", "--output", tmp_path / "out")
-    done.assert_refused("track", "arguments --model --stature is required (the same for all 3")
+    needed = "needs --fov DEG or --calibration FILE, and --stature M or --model FILE"
+    done.assert_refused("track", needed, "(the same for all 12 recordings)")
     assert done.err.count("--stature") == 1
     assert tracked.names == []
 
 
-def test_a_field_of_view_that_all_films_lack_is_named_once(
-    files: Path, tmp_path: Path, cardbox: Callable
+def test_a_failure_of_many_recordings_is_named_once(
+    track: Callable, tracked: Tracked, tmp_path: Path
 ) -> None:
-    """The camera is known to be missing only when a film is opened, in a process of its own."""
-    films = tmp_path / "films"
-    films.mkdir()
-    for number in range(12):
-        code = cv2.VideoWriter.fourcc(*"mp4v")
-        film = cv2.VideoWriter(str(films / f"film_{number:02}.mp4"), code, 15.0, (64, 48))
-        for _ in range(20):
-            film.write(np.zeros((48, 64, 3), np.uint8))
-        film.release()
-    given = ("--stature=1.7", "--background=0:1", "--jobs=1", "--output", tmp_path / "out")
-    done = cardbox("track", films, *given)
-    assert done.code == 1
-    assert done.err.count("does not tell the camera's field of view") == 1
-    assert "12 of 12 recordings failed\n  film_00, film_01" in done.err
-    assert f"film_09 and 2 more: {films / 'film_00.mp4'} does not tell" in done.err
-    assert all("field of view" in row["reason"] for row in rows(tmp_path / "out").values())
+    names = [f"film_{number:02}" for number in range(12)]
+    for name in names:
+        path = tmp_path / "films" / f"{name}.mp4"
+        path.write_text(name)
+        tracked.errors[name] = CardboxError(f"{path} is\nbroken")
+    assert track(code=1) == ["a", "b", "c", *names]
+    assert "12 of 15 recordings failed\n  film_00, film_01" in track.done.err
+    assert f"film_09 and 2 more: {tmp_path / 'films' / names[0]}.mp4 is broken" in track.done.err
+    assert track.done.err.count("broken") == 1
+    assert all(rows(tmp_path / "out")[name]["reason"].endswith("is broken") for name in names)
 
 
 def test_an_interrupted_run_leaves_nothing_half_done(
@@ -278,9 +275,9 @@ def test_the_person_may_be_in_the_files_alone(
     for name in "ab":
         (tmp_path / f"{name}.mp4").write_text(name)
     (tmp_path / "a.options").write_text("--stature 1.7")
-    done = cardbox("track", tmp_path, "--output", tmp_path / "out", "--jobs=1")
+    done = cardbox("track", tmp_path, "--fov=60", "--output", tmp_path / "out", "--jobs=1")
     assert (done.code, tracked.names) == (1, ["a"])
-    assert "  b: one of the arguments --model --stature is required" in done.err
+    assert f"  b: {tmp_path / 'b.mp4'} needs --stature M or --model FILE" in done.err
     assert sorted(results(tmp_path / "out")) == [SUMMARY, "a.body.yaml", "a.csv"]
 
 
@@ -316,11 +313,11 @@ def test_results_of_a_name_too_long_for_a_file_are_not_there(tmp_path: Path) -> 
 def test_files_of_a_recording_may_have_any_name(tmp_path: Path) -> None:
     folder = tmp_path / "images"
     folder.mkdir()
-    given = {"background": (0.0, 1.0), "within": None, "silhouettes": None, "detector": None}
-    options = argparse.Namespace(recording=folder, points=None, **given)
-    before = digest_of_inputs(options, ("csv",), "program")
+    given = ("--stature=1.7", "--background=0:1")
+    request = tracking_request(build_parser(["track"]).parse_args(["track", str(folder), *given]))
+    before = digest_of_inputs(request, ("csv",), "program")
     try:
         Path(os.fsdecode(os.fsencode(folder) + b"/\xff.png")).touch()
     except OSError:
         pytest.skip("this file system has UTF-8 names only")
-    assert digest_of_inputs(options, ("csv",), "program") != before
+    assert digest_of_inputs(request, ("csv",), "program") != before

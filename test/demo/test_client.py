@@ -14,9 +14,10 @@ pytest.importorskip("rclpy", reason="rclpy is not installed")
 from rclpy.serialization import serialize_message
 
 from cardbox_tracker.body.model import BodyModel
+from cardbox_tracker.body.skeleton import JOINT_STATE_NAMES
 from cardbox_tracker.body.urdf import urdf_from_body
 from cardbox_tracker.demo.client import Client, topics_of
-from cardbox_tracker.outputs import JOINT_STATE_NAMES, OUTPUTS
+from cardbox_tracker.outputs import OUTPUTS
 from cardbox_tracker.recordings.result_bag import result_writer
 
 NAMES = (

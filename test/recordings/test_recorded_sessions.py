@@ -12,7 +12,7 @@ import pytest
 from cardbox_tracker.body.model_file import load_body_model
 from cardbox_tracker.body.skeleton import KEYPOINT_NAMES
 from cardbox_tracker.commands.main import main
-from cardbox_tracker.estimation.filtering.keypoint_states import UNCERTAIN_FROM
+from cardbox_tracker.estimation.filtering.doubt import UNCERTAIN_FROM
 from cardbox_tracker.estimation.initialization.config import InitializationResult
 from cardbox_tracker.estimation.initialization.measure import initialize_body
 from cardbox_tracker.evaluation.truth import load_ground_truth, tracking_error

@@ -10,11 +10,12 @@ import numpy as np
 import pytest
 import yaml
 
+from cardbox_tracker.applications.drawing.overlay import draw_sharp_overlay
 from cardbox_tracker.estimation.config import default_preset
 from cardbox_tracker.recordings.recording import Recording
 from cardbox_tracker.recordings.result_bag import result_bag
 from cardbox_tracker.recordings.silhouettes import SilhouetteSource
-from cardbox_tracker.recordings.track import TrackFiles, TrackSummary, track_recording
+from cardbox_tracker.recordings.track import TrackSummary, track_recording
 
 # As ROS 2 Jazzy's own message packages have them.
 TYPES = {
@@ -38,16 +39,13 @@ def results(
     recording: Any, source: SilhouetteSource, tmp_path_factory: pytest.TempPathFactory
 ) -> tuple[Path, TrackSummary]:
     folder = tmp_path_factory.mktemp("results")
-    with result_bag(folder / "bag", source.frame_id) as bag:
+    with result_bag(folder / "bag", source.frame_id, draw=draw_sharp_overlay) as bag:
         summary = track_recording(
-            *(
-                Recording([""], [source]),
-                recording.body,
-                default_preset(),
-                0,
-                0.0,
-                TrackFiles(folder / "person.csv"),
-            ),
+            Recording([""], [source]),
+            recording.body,
+            default_preset(),
+            0,
+            0.0,
             observers=(bag,),
         )
     return folder / "bag", summary

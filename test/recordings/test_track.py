@@ -12,23 +12,28 @@ import cv2
 import numpy as np
 import pytest
 
+from cardbox_tracker.applications.drawing.video import overlay_video
 from cardbox_tracker.body.kinematics import pose
 from cardbox_tracker.body.model_file import loads_body_model
-from cardbox_tracker.body.skeleton import JOINT_NAMES, KEYPOINT_NAMES, PLACE_NAMES
+from cardbox_tracker.body.skeleton import (
+    JOINT_NAMES,
+    JOINT_STATE_NAMES,
+    KEYPOINT_NAMES,
+    PLACE_NAMES,
+)
 from cardbox_tracker.body.urdf import LinkTransforms
 from cardbox_tracker.errors import BagError, CardboxError
 from cardbox_tracker.estimation.config import default_preset
 from cardbox_tracker.estimation.estimate import Estimate
 from cardbox_tracker.estimation.initialization.config import InitializationConfig
 from cardbox_tracker.estimation.tracker import Tracker
-from cardbox_tracker.outputs import JOINT_STATE_NAMES
 from cardbox_tracker.recordings.bag_reader import BagReader
 from cardbox_tracker.recordings.initialize import describe, initialize_from_recording
 from cardbox_tracker.recordings.recording import Recording
 from cardbox_tracker.recordings.result_bag import result_bag
 from cardbox_tracker.recordings.result_table import columns
 from cardbox_tracker.recordings.silhouettes import SilhouetteSource, TimeSpan
-from cardbox_tracker.recordings.track import TrackFiles, TrackSummary, track_recording
+from cardbox_tracker.recordings.track import TrackSummary, track_recording
 
 CONFIG = default_preset()
 
@@ -37,9 +42,8 @@ def track(
     recording: Any, source: SilhouetteSource, path: Path, seed: int = 0, **rest: Any
 ) -> TrackSummary:
     start_s = rest.pop("start_s", recording.start_s())
-    files = TrackFiles(path, rest.pop("video", None))
     return track_recording(
-        Recording([""], [source]), recording.body, CONFIG, seed, start_s, files, **rest
+        Recording([""], [source]), recording.body, CONFIG, seed, start_s, path, **rest
     )
 
 
@@ -223,7 +227,8 @@ def test_observers_see_every_image(
 def test_the_video_has_every_image(
     recording: Any, source: SilhouetteSource, tmp_path: Path
 ) -> None:
-    summary = track(recording, source, tmp_path / "person.csv", video=tmp_path / "person.mp4")
+    with overlay_video(tmp_path / "person.mp4", Recording([""], [source])) as film:
+        summary = track(recording, source, tmp_path / "person.csv", observers=(film,))
     video = cv2.VideoCapture(str(tmp_path / "person.mp4"))
     count = 0
     while (image := video.read()[1]) is not None:
@@ -233,15 +238,6 @@ def test_the_video_has_every_image(
         count += 1
     assert count == summary.frames
     assert sorted(os.listdir(tmp_path)) == ["person.csv", "person.mp4"]
-
-
-@pytest.mark.parametrize("name", ["person.txt", "missing/person.mp4"])
-def test_a_video_that_cannot_be_written_is_refused_and_leaves_nothing(
-    recording: Any, source: SilhouetteSource, tmp_path: Path, name: str
-) -> None:
-    with pytest.raises(CardboxError, match="cannot write"):
-        track(recording, source, tmp_path / "person.csv", video=tmp_path / name)
-    assert os.listdir(tmp_path) == []
 
 
 def test_the_bag_of_results_holds_what_the_tracker_would_publish(
@@ -324,11 +320,3 @@ def test_after_an_error_no_bag_is_left(recording: Any, tmp_path: Path) -> None:
     ):
         raise RuntimeError("half way")
     assert os.listdir(tmp_path) == []
-
-
-def test_without_a_path_there_is_no_bag(
-    recording: Any, source: SilhouetteSource, tmp_path: Path
-) -> None:
-    with result_bag(None, source.frame_id) as results:
-        track(recording, source, tmp_path / "person.csv", observers=(results,))
-    assert os.listdir(tmp_path) == ["person.csv"]

@@ -27,11 +27,11 @@ from cardbox_tracker.estimation.config import PRESETS
 from cardbox_tracker.estimation.cost.compiled import CompiledSilhouette
 from cardbox_tracker.estimation.cost.depth import Depth
 from cardbox_tracker.estimation.cost.inner_cue import InnerCue
+from cardbox_tracker.estimation.cost.outline import signed_distances
 from cardbox_tracker.estimation.cost.outline_distances import SeenOutline, comparing
 from cardbox_tracker.estimation.cost.terms import Frame
 from cardbox_tracker.estimation.cost.whole_body import WholeBodyCost
 from cardbox_tracker.estimation.cost.whole_body_config import WholeBodyCostConfig
-from cardbox_tracker.estimation.filtering.outline_fit import signed_distances
 from cardbox_tracker.estimation.observation import Observation
 from cardbox_tracker.estimation.person_region import PersonRegion
 from cardbox_tracker.estimation.precompile import quickest

@@ -10,6 +10,8 @@ from typing import Any
 import numpy as np
 import pytest
 
+from cardbox_tracker.applications.retargeting.joint_map import load_joint_map
+from cardbox_tracker.applications.retargeting.robot import load_robot
 from cardbox_tracker.body.model_file import load_body_model
 from cardbox_tracker.detection.model_files import install_models
 from cardbox_tracker.errors import CardboxError
@@ -20,8 +22,6 @@ from cardbox_tracker.recordings.given_camera import GivenCamera
 from cardbox_tracker.recordings.image_folder import ImageFolder
 from cardbox_tracker.recordings.point_table import PointTable
 from cardbox_tracker.recordings.video_reader import VideoReader
-from cardbox_tracker.retargeting.joint_map import load_joint_map
-from cardbox_tracker.retargeting.robot import load_robot
 from cardbox_tracker.vision.background_file import load_background
 from cardbox_tracker.vision.calibration_file import load_calibration
 from cardbox_tracker.vision.camera import Calibration

@@ -14,7 +14,7 @@ from sensor_msgs.msg import CameraInfo, Image  # noqa: E402
 from std_msgs.msg import Bool, Header, String  # noqa: E402
 from std_srvs.srv import Trigger  # noqa: E402
 
-from cardbox_tracker.drawing.guidance import FIT_BGR  # noqa: E402
+from cardbox_tracker.applications.drawing.guidance import FIT_BGR  # noqa: E402
 from cardbox_tracker.ros.messages.conversions import camera_info_message, image_message  # noqa: E402
 from cardbox_tracker.ros.messages.measurement import mean_iou_of  # noqa: E402
 from cardbox_tracker.ros.runtime import qos  # noqa: E402

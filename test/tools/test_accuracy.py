@@ -12,16 +12,16 @@ from typing import Any
 import numpy as np
 import pytest
 
+from cardbox_tracker.applications.ergonomics.config import RulaConfig
+from cardbox_tracker.applications.ergonomics.rula import ScoreDistribution
+from cardbox_tracker.applications.retargeting.config import RetargetConfig
+from cardbox_tracker.applications.retargeting.robot import load_robot
 from cardbox_tracker.body.kinematics import pose
 from cardbox_tracker.body.posture import reference_posture
 from cardbox_tracker.body.proportions import body_from_proportions
-from cardbox_tracker.ergonomics.config import RulaConfig
-from cardbox_tracker.ergonomics.distribution import ScoreDistribution
 from cardbox_tracker.estimation.config import default_preset
 from cardbox_tracker.estimation.estimate import LOST, TRACKING, Estimate
 from cardbox_tracker.evaluation.recorded.angles import true_postures
-from cardbox_tracker.retargeting.config import RetargetConfig
-from cardbox_tracker.retargeting.robot import load_robot
 from cardbox_tracker.simulation.session import session_camera
 from tools import retarget_accuracy, rula_accuracy
 

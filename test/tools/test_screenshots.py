@@ -8,8 +8,8 @@ import cv2
 import numpy as np
 import pytest
 
-from cardbox_tracker.drawing.guidance import FIT_BGR
-from cardbox_tracker.drawing.overlay import OUTLINE_BGR
+from cardbox_tracker.applications.drawing.guidance import FIT_BGR
+from cardbox_tracker.applications.drawing.overlay import OUTLINE_BGR
 from cardbox_tracker.errors import CardboxError
 from tools.screenshots import write_screenshots
 

@@ -15,9 +15,9 @@ from std_msgs.msg import ColorRGBA, Header, String
 from visualization_msgs.msg import Marker, MarkerArray
 
 from cardbox_tracker.body.sizes import FloatArray
-from cardbox_tracker.drawing.markers import MarkerShape, Rgba
 from cardbox_tracker.errors import CardboxError, NotFiniteError
 from cardbox_tracker.keypoint_status import CHANCE_KEY, LEVELS, KeypointStates, chance_text
+from cardbox_tracker.markers import MarkerShape, Rgba
 from cardbox_tracker.outputs import (
     JointValues,
     Markers,

@@ -16,11 +16,11 @@ from sensor_msgs.msg import CameraInfo, Image
 from std_msgs.msg import Bool, String
 from std_srvs.srv import Trigger
 
+from cardbox_tracker.applications.drawing.guidance import Guide
 from cardbox_tracker.body.model import BodyModel
 from cardbox_tracker.body.model_file import dumps_body_model
 from cardbox_tracker.body.posture import REFERENCE_NAMES
 from cardbox_tracker.body.urdf import urdf_from_body
-from cardbox_tracker.drawing.guide import Guide
 from cardbox_tracker.errors import CardboxError, InitializationError
 from cardbox_tracker.estimation.initialization.cancellation import Cancellation
 from cardbox_tracker.estimation.initialization.guidance import (

@@ -13,14 +13,13 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64MultiArray, Header, String
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
+from cardbox_tracker.applications.retargeting.config import RetargetConfig
+from cardbox_tracker.applications.retargeting.retargeter import MOVING, Command, make_retargeter
 from cardbox_tracker.body.model import BodyModel
 from cardbox_tracker.body.model_file import loads_body_model
 from cardbox_tracker.errors import CardboxError
 from cardbox_tracker.estimation.estimate import TRACKING
 from cardbox_tracker.files import user_path
-from cardbox_tracker.retargeting.config import RetargetConfig
-from cardbox_tracker.retargeting.retargeter import MOVING, Command
-from cardbox_tracker.retargeting.setup import make_retargeter
 from cardbox_tracker.ros.messages import conversions
 from cardbox_tracker.ros.messages.results import posture_and_neck_of
 from cardbox_tracker.ros.runtime import qos

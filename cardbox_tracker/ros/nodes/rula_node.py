@@ -12,19 +12,19 @@ from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float32, Float32MultiArray, MultiArrayDimension, MultiArrayLayout, String
 
-from cardbox_tracker.body.model import BodyModel
-from cardbox_tracker.body.model_file import loads_body_model
-from cardbox_tracker.ergonomics.config import RulaConfig
-from cardbox_tracker.ergonomics.distribution import (
+from cardbox_tracker.applications.ergonomics.config import RulaConfig
+from cardbox_tracker.applications.ergonomics.rula import (
+    ABOVE,
+    ACTION_LEVELS,
     SAMPLES,
     ScoreDistribution,
     expected,
     neck_samples,
+    part_values,
     score_distribution,
 )
-from cardbox_tracker.ergonomics.recording import ABOVE
-from cardbox_tracker.ergonomics.report import part_values
-from cardbox_tracker.ergonomics.tables import ACTION_LEVELS
+from cardbox_tracker.body.model import BodyModel
+from cardbox_tracker.body.model_file import loads_body_model
 from cardbox_tracker.estimation.sampling import normal_postures
 from cardbox_tracker.ros.messages import conversions
 from cardbox_tracker.ros.messages.results import neck_of, posture_of

@@ -7,7 +7,7 @@ from typing import Any
 from sensor_msgs.msg import Image
 from std_msgs.msg import Bool
 
-from cardbox_tracker.drawing.overlay import draw_camera_overlay, draw_message
+from cardbox_tracker.applications.drawing.overlay import draw_camera_overlay, draw_message
 from cardbox_tracker.estimation.estimate import Estimate
 from cardbox_tracker.estimation.tracker import Tracker
 from cardbox_tracker.outputs import Output, OutputStream, outputs

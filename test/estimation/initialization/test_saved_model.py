@@ -51,8 +51,15 @@ def test_a_file_that_can_only_be_read_is_used_with_a_warning(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     save_body_model(BODY, tmp_path / "model.yaml")
-    # Root may write everywhere.
-    monkeypatch.setattr("cardbox_tracker.files.os.access", lambda *_: False)
+    opened = os.open
+
+    def refuse(path: str, flags: int, *rest: int) -> int:
+        # Root may write everywhere.
+        if flags & os.O_CREAT:
+            raise PermissionError(13, "Permission denied")
+        return opened(path, flags, *rest)
+
+    monkeypatch.setattr("os.open", refuse)
     saved = SavedModel(str(tmp_path / "model.yaml"))
     assert saved.body == BODY
     assert "Permission denied" in saved.warning and "will not be saved" in saved.warning

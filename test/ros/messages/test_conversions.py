@@ -17,9 +17,9 @@ from cardbox_tracker.body.cardbox import cardbox_patches
 from cardbox_tracker.body.model import BodyModel
 from cardbox_tracker.body.posture import reference_posture
 from cardbox_tracker.body.skeleton import JOINT_NAMES, KeypointState
-from cardbox_tracker.drawing.markers import MarkerShape, marker_shapes
 from cardbox_tracker.errors import CameraError, EncodingError, NotFiniteError
 from cardbox_tracker.keypoint_status import KeypointStates
+from cardbox_tracker.markers import MarkerShape, marker_shapes
 from cardbox_tracker.outputs import OUTPUTS, JointValues, Markers, Points, Text
 from cardbox_tracker.ros.messages import conversions, results
 from cardbox_tracker.vision.camera import Calibration, Camera

@@ -1,0 +1,332 @@
+"""Draws the model over an image: parts, outline, skeleton and fit; or hides the head in it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from cardbox_tracker.body.cardbox import PATCH_NAMES, cardbox_patches, patches_at
+from cardbox_tracker.body.kinematics import (
+    PosedBodies,
+    gaze_m,
+    pose,
+)
+from cardbox_tracker.body.model import BodyModel
+from cardbox_tracker.body.parts import body_parts
+from cardbox_tracker.body.posture import PLACE, POSTURE
+from cardbox_tracker.body.sizes import FloatArray
+from cardbox_tracker.body.skeleton import KeypointState
+from cardbox_tracker.detection.image_points import POINT_INDEX, ImagePoints
+from cardbox_tracker.estimation.estimate import Estimate
+from cardbox_tracker.estimation.tracker import Tracker
+from cardbox_tracker.vision.camera import Camera
+from cardbox_tracker.vision.rasterisation import clip_near, in_front
+
+ImageArray = NDArray[np.uint8]
+
+OUTLINE_BGR = (60, 220, 60)
+SKELETON_BGR = (0, 140, 255)
+GAZE_BGR = (255, 230, 60)
+JOINT_BGR = (255, 255, 255)
+TEXT_BGR = (255, 255, 255)
+# Colours of the markers and of the URDF: torso, left, right.
+_PART_BGR = {"left": (102, 179, 51), "right": (51, 115, 217)}
+_TORSO_BGR = (191, 115, 64)
+_FILL = 0.4
+UNCERTAIN_BGR = (40, 170, 255)
+_STATE_BGR = {
+    "tracking": (120, 255, 120),
+    "uncertain": UNCERTAIN_BGR,
+    "lost": (90, 110, 255),
+}
+_BONE_BGR = {
+    KeypointState.UNCERTAIN: (0, 230, 255),
+    KeypointState.LOST: (60, 60, 255),
+    KeypointState.HIDDEN: (200, 200, 200),
+}
+
+_SHIFT, _OUTLINE_SHIFT = 4, 1
+# Lines and text are readable from this size of the longer side on.
+_READABLE_PX = 640
+
+_HEAD = [PATCH_NAMES.index("head_frontal"), PATCH_NAMES.index("head_sagittal")]
+_FACE = [POINT_INDEX[name] for name in ("nose", "left_eye", "right_eye", "left_ear", "right_ear")]
+# Share of the head's size that is added on each side, since the model's head does not nod.
+_MARGIN = 0.5
+# Coarse pixels across the region, about three of which cover the face.
+_BLOCKS = 6
+
+
+def draw_overlay(
+    image: ImageArray, body: BodyModel, camera: Camera, estimate: Estimate, scale: int = 1
+) -> ImageArray:
+    """Return a colour image with the model of ``estimate`` drawn over it.
+
+    Args:
+        image: (H, W) grey or silhouette, or (H, W, 3) bgr, of the camera's size.
+        body: the measured person.
+        camera: camera at the working resolution, with the pitch of the body model.
+        estimate: the estimate to draw; without a posture only its state is written, and if the
+            posture may be wrong, outline and state are amber.
+        scale: enlargement of the result, so that thin lines and text stay readable.
+
+    Returns:
+        (scale H, scale W, 3) bgr.
+    """
+    canvas = enlarged(image, scale)
+    text = estimate.state.replace("_", " ")
+    if estimate.posture is not None:
+        view = camera.scaled(*canvas.shape[1::-1])
+        outline = UNCERTAIN_BGR if estimate.state == "uncertain" else OUTLINE_BGR
+        there = estimate.placed(body)
+        draw_model(canvas, there, view, estimate.posture, outline, estimate.keypoint_states)
+        if estimate.neck is not None:
+            posed = pose(there, estimate.posture)
+            _draw_gaze(canvas, view, gaze_m(body_parts(there.sizes), posed, estimate.neck))
+        text += f"  IoU {estimate.iou:.2f}  {estimate.cost_px} px"
+    _draw_text(canvas, text, _STATE_BGR.get(estimate.state, TEXT_BGR))
+    return canvas
+
+
+def draw_camera_overlay(
+    picture: ImageArray, number: int, estimate: Estimate, tracker: Tracker
+) -> ImageArray:
+    """Return a picture with the model over it; that of a further camera is turned upright.
+
+    A small picture is enlarged by a whole factor, so that lines and text are readable.
+
+    Args:
+        picture: (H, W) grey or (H, W, 3) bgr, of the camera.
+        number: of the camera; 0 is the first one.
+        estimate: what ``tracker`` found at that time.
+        tracker: it knows the person and the cameras.
+    """
+    scale = _readable_scale(picture)
+    if number == 0:
+        return draw_overlay(picture, tracker.body, tracker.camera, estimate, scale)
+    view = tracker.views[number - 1]
+    if estimate.posture is not None:
+        place_m = np.zeros(2) if estimate.offset_m is None else estimate.offset_m
+        state = view.states(np.concatenate([estimate.posture, place_m]))
+        estimate = replace(estimate, posture=state[POSTURE], offset_m=state[PLACE])
+    return draw_overlay(view.upright(picture), view.body, view.camera, estimate, scale)
+
+
+def draw_sharp_overlay(picture: ImageArray, estimate: Estimate, tracker: Tracker) -> ImageArray:
+    """Return the first camera's picture with the model over it, for a bag.
+
+    A small picture is enlarged by repeated pixels, which compress well under sharp lines and text.
+    """
+    scale = _readable_scale(picture)
+    large = picture.repeat(scale, axis=0).repeat(scale, axis=1)
+    return draw_overlay(large, tracker.body, tracker.camera, estimate)
+
+
+def draw_message(image: ImageArray, text: str) -> ImageArray:
+    """Return a bgr image with ``text`` over ``image`` (H, W) or (H, W, 3), enlarged if small."""
+    canvas = enlarged(image, _readable_scale(image))
+    _draw_text(canvas, text)
+    return canvas
+
+
+def draw_model(
+    canvas: ImageArray,
+    body: BodyModel,
+    camera: Camera,
+    posture: FloatArray,
+    outline_bgr: tuple[int, int, int] = OUTLINE_BGR,
+    states: Sequence[KeypointState] | None = None,
+) -> None:
+    """Draw the parts of ``posture`` (12,) into ``canvas`` (H, W, 3), in place.
+
+    Patches are tinted by side, and their common outline is drawn in ``outline_bgr``. With
+    ``states`` of the keypoints, bones to uncertain ones are yellow, to lost ones red, and to hidden
+    ones dashed.
+    """
+    frames = pose(body, posture)
+    patches = patches_at(body, frames)
+    tint = canvas.copy()
+    # The torso is drawn first, so that an arm in front of it stays visible.
+    parts = sorted(_polygons(camera, patches), key=lambda part: part[0] in _PART_BGR)
+    for name, polygon in parts:
+        colour = _PART_BGR.get(name, _TORSO_BGR)
+        cv2.fillConvexPoly(tint, _subpixels(polygon), colour, cv2.LINE_AA, _SHIFT)
+    cv2.addWeighted(tint, _FILL, canvas, 1.0 - _FILL, 0.0, canvas)
+    thickness = max(1, round(camera.width / 400))
+    draw_outline(canvas, camera, patches, outline_bgr, thickness)
+    _draw_skeleton(canvas, frames, camera, thickness, states)
+
+
+def draw_outline(
+    canvas: ImageArray,
+    camera: Camera,
+    patches: FloatArray,
+    colour: tuple[int, int, int],
+    thickness: int,
+) -> None:
+    """Draw the common outline of ``patches`` (15, 4, 3), ``thickness`` px wide, in place."""
+    fine = camera.scaled(*(size << _OUTLINE_SHIFT for size in (camera.width, camera.height)))
+    model = np.zeros((fine.height, fine.width), np.uint8)
+    for _, polygon in _polygons(fine, patches):
+        cv2.fillConvexPoly(model, _subpixels(polygon), 255, cv2.LINE_8, _SHIFT)
+    # A patch seen edge-on is a thin line that does not show the extent of the part.
+    whisker = max(3, fine.width // 128)
+    opened = cv2.morphologyEx(model, cv2.MORPH_OPEN, np.ones((whisker, whisker), np.uint8))
+    found, _ = cv2.findContours(opened, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
+    outlines = [np.asarray(cv2.approxPolyDP(one, 1.0, True), np.int32) for one in found]
+    cv2.polylines(canvas, outlines, True, colour, thickness, cv2.LINE_AA, _OUTLINE_SHIFT)
+
+
+def _draw_skeleton(
+    canvas: ImageArray,
+    frames: PosedBodies,
+    camera: Camera,
+    thickness: int,
+    states: Sequence[KeypointState] | None,
+) -> None:
+    arms = list(states or [KeypointState.TRACKED] * 6)
+    trunk = [KeypointState.TRACKED] * 3
+    chains = [
+        ([frames.hip, frames.neck, frames.head], trunk),
+        ([frames.neck, *frames.left[:3]], [KeypointState.TRACKED, *arms[:3]]),
+        ([frames.neck, *frames.right[:3]], [KeypointState.TRACKED, *arms[3:]]),
+    ]
+    joints = []
+    for chain, reached in chains:
+        pixels = pixels_of(camera, np.array(chain))
+        if pixels is None:
+            continue
+        for begin, end, state in zip(pixels[:-1], pixels[1:], reached[1:], strict=True):
+            _draw_bone(canvas, begin, end, state, thickness + 1)
+        joints.extend(_subpixels(pixels).tolist())
+    for colour, rim in (((0, 0, 0), 1), (JOINT_BGR, 0)):
+        radius = (thickness + 1 + rim) << _SHIFT
+        for joint in joints:
+            cv2.circle(canvas, joint, radius, colour, -1, cv2.LINE_AA, _SHIFT)
+
+
+def _draw_bone(
+    canvas: ImageArray, begin: FloatArray, end: FloatArray, state: KeypointState, thickness: int
+) -> None:
+    """Draw a line between two pixels, with dashes if the keypoint at its end is hidden."""
+    colour = _BONE_BGR.get(state, SKELETON_BGR)
+    parts = [(0.0, 1.0)]
+    if state is KeypointState.HIDDEN:
+        dashes = max(2, round(float(np.linalg.norm(end - begin)) / (6 * thickness)))
+        parts = [(number / dashes, (number + 0.5) / dashes) for number in range(dashes)]
+    for shares in parts:
+        line = _subpixels(np.array([begin + share * (end - begin) for share in shares]))
+        cv2.polylines(canvas, [line], False, colour, thickness, cv2.LINE_AA, _SHIFT)
+
+
+def _draw_gaze(canvas: ImageArray, camera: Camera, line_m: FloatArray) -> None:
+    """Draw a line (2, 3), metres in the reference frame, with a dot at its end."""
+    ends = pixels_of(camera, line_m)
+    if ends is None:
+        return
+    pixels, thickness = _subpixels(ends), max(1, round(camera.width / 400))
+    cv2.polylines(canvas, [pixels], False, GAZE_BGR, thickness + 1, cv2.LINE_AA, _SHIFT)
+    radius = (thickness + 1) << _SHIFT
+    cv2.circle(canvas, pixels[1].tolist(), radius, GAZE_BGR, -1, cv2.LINE_AA, _SHIFT)
+
+
+def _draw_text(canvas: ImageArray, text: str, colour: tuple[int, int, int] = TEXT_BGR) -> None:
+    """Write ``text`` into the upper left corner of ``canvas``, in place."""
+    scale = canvas.shape[1] / 700
+    font, size, thickness = cv2.FONT_HERSHEY_SIMPLEX, 0.75 * scale, max(1, round(1.5 * scale))
+    (width, height), below = cv2.getTextSize(text, font, size, thickness)
+    margin = round(8 * scale)
+    left, bottom = margin, margin + height
+    # A dark background makes the text readable before any wall.
+    corner = (left + width + margin // 2, bottom + below)
+    cv2.rectangle(
+        canvas, (left - margin // 2, bottom - height - margin // 2), corner, (0, 0, 0), -1
+    )
+    cv2.putText(canvas, text, (left, bottom), font, size, colour, thickness, cv2.LINE_AA)
+
+
+def pixels_of(camera: Camera, points_m: FloatArray) -> FloatArray | None:
+    """Return pixels (n, 2) of points (n, 3), m in the reference frame; None if one is behind."""
+    points = camera.reference_to_optical(points_m)
+    return camera.project(points) if in_front(points).all() else None
+
+
+def _polygons(camera: Camera, patches: FloatArray) -> Iterator[tuple[str, FloatArray]]:
+    """Yield the side (left, right or another word) and the pixels (n, 2) of each visible patch."""
+    optical = camera.reference_to_optical(patches)
+    for name, corners in zip(PATCH_NAMES, optical, strict=True):
+        polygon = clip_near(corners)
+        if len(polygon) > 2:
+            yield name.split("_")[0], camera.project(polygon)
+
+
+def _readable_scale(image: ImageArray) -> int:
+    """Return the whole factor from which lines and text over ``image`` (H, W, ...) are readable."""
+    longer_px = int(max(image.shape[:2]))
+    return -(-_READABLE_PX // longer_px)
+
+
+def enlarged(image: ImageArray, scale: int) -> ImageArray:
+    """Return an enlarged bgr copy, (scale H, scale W, 3), of an image (H, W) or (H, W, 3)."""
+    height, width = image.shape[:2]
+    size = (scale * width, scale * height)
+    bgr = image if image.ndim == 3 else cv2.cvtColor(image, cv2.COLOR_GRAY2BGR)
+    return np.array(cv2.resize(bgr, size, interpolation=cv2.INTER_LINEAR), np.uint8)
+
+
+def _subpixels(pixels: FloatArray) -> NDArray[np.int32]:
+    """Return pixel coordinates in OpenCV's fixed-point format with ``_SHIFT`` fractional bits."""
+    clipped = np.clip(pixels, -30_000, 30_000)
+    return np.asarray(np.round(clipped * (1 << _SHIFT)), dtype=np.int32)
+
+
+def with_hidden_head(
+    image: ImageArray,
+    body: BodyModel,
+    camera: Camera,
+    estimate: Estimate,
+    points: ImagePoints | None = None,
+) -> ImageArray:
+    """Return a copy of ``image`` in which coarse pixels make the head unrecognizable.
+
+    Args:
+        image: (H, W) or (H, W, 3), of the camera's size.
+        body: the measured person.
+        camera: with the pitch of the body model.
+        estimate: an estimate; without a posture, or with the head behind the camera, the whole
+            image becomes coarse.
+        points: of a detector in this image; those of the face are covered, too.
+    """
+    hidden = image.copy()
+    part = hidden[_head_region(body, camera, estimate, points)]
+    if part.size:
+        high, wide = part.shape[:2]
+        blocks = (_BLOCKS, max(1, round(_BLOCKS * high / wide)))
+        coarse = cv2.resize(part, blocks, interpolation=cv2.INTER_AREA)
+        part[:] = cv2.resize(coarse, (wide, high), interpolation=cv2.INTER_NEAREST)
+    return hidden
+
+
+def _head_region(
+    body: BodyModel, camera: Camera, estimate: Estimate, points: ImagePoints | None
+) -> tuple[slice, slice]:
+    """Return rows and columns of the head with its margin; the whole image if it is unknown."""
+    if estimate.posture is None:
+        return np.s_[:, :]
+    patches = cardbox_patches(estimate.placed(body), estimate.posture)[_HEAD]
+    visible = [clip_near(corners) for corners in camera.reference_to_optical(patches)]
+    corners: list[FloatArray] = [camera.project(polygon) for polygon in visible if len(polygon)]
+    if not corners:
+        return np.s_[:, :]
+    head = np.concatenate(corners)
+    margin = _MARGIN * np.ptp(head, axis=0).max()
+    if points is not None:
+        face = points.px[_FACE]
+        head = np.concatenate([head, face[np.isfinite(face).all(axis=1)]])
+    low, high = np.trunc(head.min(axis=0) - margin), np.ceil(head.max(axis=0) + margin)
+    (left, top), (right, bottom) = np.maximum((low, high), 0).astype(int).tolist()
+    return np.s_[top:bottom, left:right]

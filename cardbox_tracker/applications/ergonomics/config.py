@@ -1,0 +1,152 @@
+"""Settings of RULA: inputs that an outline does not show, and limits that the paper leaves open."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+from typing import NamedTuple
+
+from cardbox_tracker.settings import Settings, setting, settings_of
+
+MEASURED, DECLARED, MIXED = "measured", "declared", "mixed"
+"""Origins of a part score; tables and the grand score are mixed."""
+NOT_SEEN = "declared, not seen"
+
+_DECLARED = "declared, since it is not measured"
+
+
+@dataclass(frozen=True)
+class RulaConfig(Settings):
+    """Settings of the score: inputs that describe the task, then limits of angles.
+
+    Raises:
+        ValueError: a value is out of its range; the text names it.
+    """
+
+    neck: int = setting(
+        1,
+        "score of the neck: 1 for 0 to 10 degrees of flexion, 2 to 20, 3 beyond, 4 in extension; 1 "
+        "more each if twisted, bent aside; declared for images without points of a face",
+        limits=(1, 6),
+    )
+    wrist: int = setting(
+        1,
+        "score of the wrists: 1 neutral, 2 to 15 degrees, 3 beyond; 1 more if bent aside; "
+        f"{_DECLARED}",
+        limits=(1, 4),
+    )
+    wrist_twist: int = setting(
+        1, f"1 in the middle of the range, 2 at or near its end; {_DECLARED}", limits=(1, 2)
+    )
+    legs: int = setting(
+        1, f"1 if legs and feet are supported and balanced, else 2; {_DECLARED}", limits=(1, 2)
+    )
+    arm_muscle_use: int = setting(
+        0, "1 if the arms' posture is held for a minute or repeated 4 times in one", limits=(0, 1)
+    )
+    arm_load: int = setting(
+        0,
+        "load on the arms: 0 below 2 kg now and then, 1 for 2 to 10 kg now and then, 2 for 2 to 10 "
+        "kg held or repeated, 3 beyond or with shocks",
+        limits=(0, 3),
+    )
+    body_muscle_use: int = setting(0, "as arm_muscle_use, of neck, trunk and legs", limits=(0, 1))
+    body_load: int = setting(0, "as arm_load, of neck, trunk and legs", limits=(0, 3))
+    shoulders_raised: bool = setting(False, f"the shoulders are raised; {_DECLARED}")
+    arms_supported: bool = setting(
+        False, f"the arms are supported, or the person leans; {_DECLARED}"
+    )
+    trunk_twisted: bool = setting(
+        False,
+        "the trunk is twisted against the hips; declared, since torso_yaw is where the whole "
+        "person faces",
+    )
+    abducted_deg: float = setting(
+        30.0,
+        "an upper arm this far to the side counts as abducted; the paper names no angle",
+        unit="deg",
+        limits=(5.0, 90.0),
+    )
+    outwards_deg: float = setting(
+        30.0,
+        "a forearm that points this far to the outside works out to the side of the body; the "
+        "paper names no angle",
+        unit="deg",
+        limits=(5.0, 90.0),
+    )
+    side_bent_deg: float = setting(
+        10.0,
+        "a trunk this far to a side counts as bent; the paper names no angle",
+        unit="deg",
+        limits=(1.0, 45.0),
+    )
+    neck_extended_deg: float = setting(
+        10.0,
+        "a neck bent backwards by more than this is in extension, score 4; the paper has 0, which "
+        "is within the error of the measurement",
+        unit="deg",
+        limits=(0.0, 45.0),
+    )
+    neck_twisted_deg: float = setting(
+        20.0,
+        "a head turned this far against the trunk twists the neck; the paper names no angle",
+        unit="deg",
+        limits=(5.0, 80.0),
+    )
+    upright_deg: float = setting(
+        10.0,
+        "a trunk bowed less than this is upright, score 1; the paper has 0, which nobody keeps and "
+        "no outline shows",
+        unit="deg",
+        limits=(0.0, 20.0),
+    )
+
+
+DECLARED_PARTS = {"wrist": 4, "wrist_twist": 2, "legs": 2}
+"""Highest score of each part that no image shows."""
+
+_INPUTS = (
+    *("neck", "wrist", "wrist_twist", "legs", "arm_load", "arm_muscle_use"),
+    *("body_load", "body_muscle_use", "shoulders_raised", "arms_supported", "trunk_twisted"),
+)
+
+
+class Declared(NamedTuple):
+    """A declared input.
+
+    Attributes:
+        name: of the setting.
+        value: a score, or ``yes`` or ``no``.
+        is_default: whether it is the value that holds without a declaration.
+        description: its meaning.
+    """
+
+    name: str
+    value: str
+    is_default: bool
+    description: str
+
+    @property
+    def words(self) -> str:
+        """Name and value."""
+        return f"{self.name.replace('_', ' ')} {self.value}"
+
+    def __str__(self) -> str:
+        """Return name and value, and whether it is the default."""
+        return f"{self.words} (default)" if self.is_default else self.words
+
+
+def declared(config: RulaConfig, is_neck_measured: bool = False) -> tuple[Declared, ...]:
+    """Return the inputs that are declared; the neck is none of them while it is measured."""
+    known, defaults = settings_of(RulaConfig), {one.name: one.default for one in fields(config)}
+    found = []
+    for name in _INPUTS[is_neck_measured:]:
+        value = getattr(config, name)
+        text = str(value) if type(value) is int else ("no", "yes")[value]
+        found.append(Declared(name, text, value == defaults[name], known[name].description))
+    return tuple(found)
+
+
+def limits(config: RulaConfig) -> dict[str, str]:
+    """Return the limits of angles by name, degrees."""
+    names = [name for name in settings_of(RulaConfig) if name not in _INPUTS]
+    return {name.removesuffix("_deg"): f"{getattr(config, name):g}" for name in names}

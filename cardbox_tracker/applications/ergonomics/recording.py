@@ -1,0 +1,297 @@
+"""RULA of a recording: a row for each image, the time at each score, the worst moments."""
+
+from __future__ import annotations
+
+import heapq
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import NamedTuple
+
+import cv2
+import numpy as np
+
+from cardbox_tracker.applications.drawing.overlay import draw_overlay, with_hidden_head
+from cardbox_tracker.applications.ergonomics.config import (
+    DECLARED,
+    DECLARED_PARTS,
+    MEASURED,
+    MIXED,
+    RulaConfig,
+)
+from cardbox_tracker.applications.ergonomics.rula import (
+    ABOVE,
+    ACTION_LEVELS,
+    HIGHEST,
+    PARTS,
+    SAMPLES,
+    ScoreDistribution,
+    expected,
+    neck_samples,
+    score_distribution,
+)
+from cardbox_tracker.body.sizes import FloatArray
+from cardbox_tracker.estimation.estimate import UNCERTAIN, Estimate
+from cardbox_tracker.estimation.tracker import Tracker
+from cardbox_tracker.files import write_table
+from cardbox_tracker.recordings.silhouettes import RecordedFrame
+
+CSV_HEADER = (
+    *("stamp_ns", "state", "score", "likeliest", f"chance_above_{ABOVE}"),
+    *(f"chance_{score}" for score in range(1, HIGHEST + 1)),
+    *("left_score", "right_score"),
+    *(part.name for part in PARTS),
+    "neck_from",
+)
+SHARES_HEADER = ("part", "source", "score", "time_s", "share")
+
+MOST_MOMENTS, GAP_S = 6, 3.0
+"""Number of worst moments, and the least time between two of them, s."""
+LONGEST_STEP = 3.0
+"""An image counts until the next one, for at most this multiple of the usual interval."""
+MOST_IMAGES = 1200
+"""Images that are kept. Each worst moment excludes the images within ``GAP_S``, so this suffices
+for up to 39 images a second; about 40 MB."""
+
+# A separate random stream leaves the tracker's random numbers unchanged.
+_STREAM = 0x52756C61
+_WIDTH_PX, _QUALITY = 640, 80
+
+
+@dataclass(frozen=True)
+class RulaRow:
+    """One image.
+
+    Attributes:
+        stamp_ns: stamp of the image.
+        state: of the tracker.
+        scores: its scores; None without a posture.
+        time_s: seconds from the recording's start.
+        is_neck_measured: whether the neck's score is measured; otherwise it is declared.
+    """
+
+    stamp_ns: int
+    state: str
+    scores: ScoreDistribution | None
+    time_s: float
+    is_neck_measured: bool = False
+
+    @property
+    def worst(self) -> float:
+        """Expected score; 0 for an image that is no candidate for the worst moments."""
+        return 0.0 if self.scores is None or self.state == UNCERTAIN else self.scores.mean
+
+
+class MomentImages:
+    """The images of the highest scores, with the model drawn over them."""
+
+    def __init__(self, is_head_hidden: bool = True, most: int = MOST_IMAGES) -> None:
+        """Keep up to ``most`` images; ``is_head_hidden`` makes the heads unrecognizable."""
+        self.is_head_hidden = is_head_hidden
+        self._most = most
+        # The lowest score comes first, and of equal scores the latest image.
+        self._kept: list[tuple[float, int, bytes]] = []
+
+    def add(self, row: RulaRow, frame: RecordedFrame, estimate: Estimate, tracker: Tracker) -> None:
+        """Keep the image of ``row`` if its score is among the highest."""
+        rank = row.worst, -row.stamp_ns
+        if not row.worst or (len(self._kept) == self._most and rank < self._kept[0][:2]):
+            return
+        picture, camera, body = frame.picture, tracker.camera, tracker.body
+        if self.is_head_hidden:
+            picture = with_hidden_head(picture, body, camera, estimate, frame.points)
+        scale = max(1, round(_WIDTH_PX / picture.shape[1]))
+        canvas = draw_overlay(picture, body, camera, estimate, scale)
+        _, jpeg = cv2.imencode(".jpg", canvas, [cv2.IMWRITE_JPEG_QUALITY, _QUALITY])
+        heapq.heappush(self._kept, (*rank, jpeg.tobytes()))
+        if len(self._kept) > self._most:
+            heapq.heappop(self._kept)
+
+    def by_stamp(self) -> dict[int, bytes]:
+        """Return the images as JPEG by their stamps."""
+        return {-negative_ns: jpeg for _, negative_ns, jpeg in self._kept}
+
+
+class RulaObserver:
+    """Observer of :func:`~cardbox_tracker.recordings.track.track_recording` that scores each image.
+
+    Attributes:
+        rows: one row an image, in order.
+    """
+
+    def __init__(self, config: RulaConfig, seed: int, images: MomentImages | None = None) -> None:
+        """Seed the random numbers; the same images and ``seed`` give the same rows.
+
+        Args:
+            config: settings of the score.
+            seed: random seed.
+            images: keeps the images of high scores; None if none are wanted.
+        """
+        self._config, self._images = config, images
+        self._rng = np.random.default_rng([seed, _STREAM])
+        self.rows: list[RulaRow] = []
+
+    def __call__(self, frame: RecordedFrame, estimate: Estimate, tracker: Tracker) -> None:
+        """Append the row of one image, scored for samples of its posterior."""
+        scores = necks = None
+        if estimate.posture is not None:
+            postures = tracker.sample(estimate, SAMPLES, self._rng)
+            if estimate.neck is not None and estimate.neck_stddev is not None:
+                necks = neck_samples(estimate.neck, estimate.neck_stddev, SAMPLES, self._rng)
+            scores = score_distribution(tracker.body, postures, self._config, necks)
+        row = RulaRow(frame.stamp_ns, estimate.state, scores, frame.time_s, necks is not None)
+        self.rows.append(row)
+        if self._images is not None:
+            self._images.add(row, frame, estimate, tracker)
+
+
+def worst_moments(
+    rows: Sequence[RulaRow], most: int = MOST_MOMENTS, gap_s: float = GAP_S
+) -> tuple[RulaRow, ...]:
+    """Return up to ``most`` images with the highest expected scores, ``gap_s`` or more apart.
+
+    The earlier one of equal scores comes first. Images without a posture do not count, nor those
+    whose posture may be wrong.
+    """
+    found: list[RulaRow] = []
+    for row in sorted(rows, key=lambda row: (-row.worst, row.stamp_ns)):
+        is_apart = all(abs(row.stamp_ns - one.stamp_ns) >= gap_s * 1e9 for one in found)
+        if len(found) < most and row.worst and is_apart:
+            found.append(row)
+    return tuple(found)
+
+
+@dataclass(frozen=True)
+class RulaSummary:
+    """Expected times, s.
+
+    Attributes:
+        measured_s: time with a posture.
+        above_s: time with a score above ``ABOVE``.
+        by_level_s: time at each of ``ACTION_LEVELS``.
+        mean: expected score over the measured time; nan without any.
+        uncertain_s: part of the measured time whose postures may be wrong.
+        neck_measured_s: part of the measured time with a measured neck.
+    """
+
+    measured_s: float
+    above_s: float
+    by_level_s: tuple[float, ...]
+    mean: float
+    uncertain_s: float
+    neck_measured_s: float
+
+    @property
+    def is_neck_always_measured(self) -> bool:
+        """Whether no image with a posture has a declared neck."""
+        return 0 < self.measured_s <= self.neck_measured_s + 1e-9
+
+
+def summarize(rows: Sequence[RulaRow]) -> RulaSummary:
+    """Return the expected time spent at each score."""
+    time_s = _time_at(rows, "grand", HIGHEST)
+    total_s = float(time_s.sum())
+    scored_s = durations_of(rows) * [row.scores is not None for row in rows]
+    return RulaSummary(
+        total_s,
+        float(time_s[ABOVE:].sum()),
+        tuple(float(time_s[low - 1 : high].sum()) for low, high, _ in ACTION_LEVELS),
+        expected(time_s / total_s) if total_s else float("nan"),
+        float(scored_s @ np.array([row.state == UNCERTAIN for row in rows], float)),
+        float(scored_s @ np.array([row.is_neck_measured for row in rows], float)),
+    )
+
+
+class ScoreShares(NamedTuple):
+    """Expected time at each score of a part.
+
+    Attributes:
+        name: of the part, as in the tables.
+        words: the same for people.
+        source: ``MEASURED``, ``DECLARED`` or ``MIXED``.
+        time_s: time (n,) at the scores 1 to n, s.
+    """
+
+    name: str
+    words: str
+    source: str
+    time_s: FloatArray
+
+    @property
+    def shares(self) -> FloatArray:
+        """Shares (n,) of the measured time; nan without any."""
+        total_s = float(self.time_s.sum())
+        return self.time_s / total_s if total_s else np.full(len(self.time_s), np.nan)
+
+    @property
+    def mean(self) -> float:
+        """Expected score; nan without any measured time."""
+        return expected(self.shares)
+
+
+def score_shares(rows: Sequence[RulaRow], config: RulaConfig) -> tuple[ScoreShares, ...]:
+    """Return the time at each score: the grand score, measured parts and tables, declared parts."""
+    grand_s = _time_at(rows, "grand", HIGHEST)
+    shares = [ScoreShares("grand", "grand score", MIXED, grand_s)]
+    necks = {row.is_neck_measured for row in rows if row.scores is not None} or {False}
+    neck = MIXED if len(necks) > 1 else (DECLARED, MEASURED)[necks.pop()]
+    for name, words, highest, _ in PARTS:
+        source = neck if name == "neck" else MIXED if "table" in name else MEASURED
+        time_s = _time_at(rows, name, highest)
+        shares.append(ScoreShares(name, words, source, time_s))
+    for name, highest in DECLARED_PARTS.items():
+        time_s = np.eye(highest)[getattr(config, name) - 1] * grand_s.sum()
+        shares.append(ScoreShares(name, name.replace("_", " "), DECLARED, time_s))
+    return tuple(shares)
+
+
+def durations_of(rows: Sequence[RulaRow]) -> FloatArray:
+    """Return the time (n,) that each image stands for, s."""
+    steps_s = np.diff([row.stamp_ns for row in rows]) / 1e9
+    usual_s = float(np.median(steps_s)) if len(steps_s) else 0.0
+    return np.append(np.clip(steps_s, 0.0, LONGEST_STEP * usual_s), usual_s)[: len(rows)]
+
+
+def _time_at(rows: Sequence[RulaRow], part: str, highest: int) -> FloatArray:
+    """Return the expected time (highest,) at each score of a part, or of the grand score, s."""
+    found = np.zeros((len(rows), highest))
+    for chances, row in zip(found, rows, strict=True):
+        if row.scores is not None:
+            chances[:] = row.scores.grand if part == "grand" else row.scores.parts[part]
+    return np.asarray(durations_of(rows) @ found)
+
+
+def write_shares(shares: Sequence[ScoreShares], path: Path) -> None:
+    """Write ``SHARES_HEADER`` and a row for each score of each part; unknown shares are empty.
+
+    Raises:
+        CardboxError: the file cannot be written.
+    """
+    rows = (
+        (one.name, one.source, str(score), f"{time_s:.3f}", "" if np.isnan(x) else f"{x:.4f}")
+        for one in shares
+        for score, (time_s, x) in enumerate(zip(one.time_s, one.shares, strict=True), 1)
+    )
+    write_table(path, SHARES_HEADER, rows)
+
+
+def write_csv(rows: Sequence[RulaRow], path: Path) -> None:
+    """Write ``CSV_HEADER`` and a row per image; unknown values are left empty.
+
+    Raises:
+        CardboxError: the file cannot be written.
+    """
+    write_table(path, CSV_HEADER, map(_fields, rows))
+
+
+def _fields(row: RulaRow) -> list[str]:
+    stamp, scores = str(row.stamp_ns), row.scores
+    if scores is None:
+        return [stamp, row.state, *[""] * (len(CSV_HEADER) - 2)]
+    of_parts = [scores.left, scores.right, *(scores.parts[part.name] for part in PARTS)]
+    values = (scores.chance_above(ABOVE), *scores.grand.tolist(), *map(expected, of_parts))
+    return [
+        *(stamp, row.state, f"{scores.mean:.3f}", str(scores.likeliest)),
+        *(f"{value:.3f}" for value in values),
+        MEASURED if row.is_neck_measured else DECLARED,
+    ]

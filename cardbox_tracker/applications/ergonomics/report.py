@@ -1,0 +1,219 @@
+"""The scores of a recording in words, as a plot, and as a page that needs no other file."""
+
+from __future__ import annotations
+
+import base64
+import io
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from cardbox_tracker.applications.ergonomics.config import NOT_SEEN, RulaConfig, declared, limits
+from cardbox_tracker.applications.ergonomics.recording import (
+    GAP_S,
+    LONGEST_STEP,
+    RulaRow,
+    RulaSummary,
+    ScoreShares,
+    durations_of,
+    score_shares,
+    summarize,
+    worst_moments,
+)
+from cardbox_tracker.applications.ergonomics.rula import (
+    ABOVE,
+    ACTION_LEVELS,
+    HIGHEST,
+    PARTS,
+    expected,
+)
+from cardbox_tracker.body.sizes import FloatArray
+from cardbox_tracker.estimation.estimate import UNCERTAIN
+from cardbox_tracker.files import atomic_path
+
+_ACTION_COLOURS = ("#d9ecd5", "#fdf1c4", "#fbd5ac", "#f2aaa0")
+_UNCERTAIN_COLOUR, _NOTHING_COLOUR, _LINE_COLOUR = "#e69f00", "#9a9a9a", "#1b4f8a"
+_LIGHTEST, _DARKEST = np.array([222, 235, 247]), np.array([8, 69, 148])
+# A smaller share is left out in words, and has no room for its score in a bar.
+_LEAST_SHARE, _LEAST_LABEL = 0.005, 0.06
+_DPI = 120
+
+
+def report_lines(
+    summary: RulaSummary, shares: Sequence[ScoreShares], config: RulaConfig
+) -> Iterator[str]:
+    """Yield the lines that ``cardbox rula`` prints; only the declared inputs without a posture."""
+    if summary.measured_s:
+        yield (
+            f"expected RULA score {summary.mean:.1f}; above {ABOVE} for {summary.above_s:.1f} of "
+            f"{summary.measured_s:.1f} s ({summary.above_s / summary.measured_s:.0%})"
+        )
+        for (low, high, meaning), time_s in zip(ACTION_LEVELS, summary.by_level_s, strict=True):
+            yield f"  {_span(low, high):<3} {time_s:6.1f} s  {meaning}"
+        if summary.uncertain_s:
+            yield f"  of these, {summary.uncertain_s:.1f} s have a posture that may be wrong"
+        yield "mean score of each part, and the share of the time at each score:"
+        for one in shares:
+            yield f"  {one.words:<16} {one.mean:.1f}  {one.source:<8}  {_share_words(one)}"
+    inputs = declared(config, summary.is_neck_always_measured)
+    for title, is_default in ((NOT_SEEN, False), (f"{NOT_SEEN}, with the default value", True)):
+        found = [one.words for one in inputs if one.is_default == is_default]
+        if found:
+            yield f"{title}: {', '.join(found)}"
+    if summary.neck_measured_s:
+        yield _neck_words(summary)
+
+
+@dataclass(frozen=True)
+class PageContent:
+    """Content of the page.
+
+    Attributes:
+        title: heading of the page.
+        facts: lines about recording, person and settings, by name.
+        config: settings of the score.
+        rows: one image each, in order.
+        images: JPEG of images by stamp; None if no images are wanted or given.
+        are_heads_hidden: whether heads in the images were made unrecognizable.
+    """
+
+    title: str
+    facts: Mapping[str, str]
+    config: RulaConfig
+    rows: Sequence[RulaRow]
+    images: Mapping[int, bytes] | None = None
+    are_heads_hidden: bool = True
+
+
+def write_page(content: PageContent, path: Path) -> None:
+    """Write the page, a single file of HTML without scripts, see ``page.html``.
+
+    Raises:
+        CardboxError: the file cannot be written.
+    """
+    import jinja2
+
+    rows, config, summary = content.rows, content.config, summarize(content.rows)
+    shares, moments = score_shares(rows, config), worst_moments(rows)
+    environment = jinja2.Environment(
+        autoescape=True, trim_blocks=True, lstrip_blocks=True, undefined=jinja2.StrictUndefined
+    )
+    environment.filters |= {"data": _data, "bar": _bar, "words": _share_words}
+    levels = zip(ACTION_LEVELS, _ACTION_COLOURS, summary.by_level_s, strict=True)
+    text = environment.from_string(
+        Path(__file__).with_name("page.html").read_text(encoding="utf-8")
+    ).render(
+        content=content,
+        summary=summary,
+        above=ABOVE,
+        gap_s=GAP_S,
+        levels=[(_span(low, high), what, *rest) for (low, high, what), *rest in levels],
+        plot=score_plot(rows, moments) if summary.measured_s else b"",
+        colours={"uncertain": _UNCERTAIN_COLOUR, "nothing": _NOTHING_COLOUR},
+        shares=shares,
+        inputs=declared(config, summary.is_neck_always_measured),
+        neck=_neck_words(summary) if summary.neck_measured_s else "",
+        left_out=sum(row.scores is not None and row.state == UNCERTAIN for row in rows),
+        moments=[(row, _moment_words(row)) for row in moments],
+        limits=limits(config),
+    )
+    with atomic_path(path) as temporary:
+        # Letters of broken file names become "?".
+        temporary.write_bytes(text.encode("utf-8", "replace"))
+
+
+def plot_scores(rows: Sequence[RulaRow], path: Path) -> None:
+    """Write the plot of :func:`score_plot`.
+
+    Raises:
+        CardboxError: the file cannot be written.
+    """
+    with atomic_path(path) as temporary:
+        temporary.write_bytes(score_plot(rows))
+
+
+def score_plot(rows: Sequence[RulaRow], moments: Sequence[RulaRow] = ()) -> bytes:
+    """Return the expected score over time, with its standard deviation, as PNG.
+
+    Args:
+        rows: one image each, in order; at least one.
+        moments: images to mark with numbers in their order.
+    """
+    from matplotlib.figure import Figure
+
+    time_s, durations_s = np.array([row.time_s for row in rows], float), durations_of(rows)
+    scores = np.arange(1, HIGHEST + 1)
+    chances = np.array(
+        [np.full(HIGHEST, np.nan) if row.scores is None else row.scores.grand for row in rows]
+    )
+    mean = chances @ scores
+    deviation = np.sqrt(np.maximum(chances @ scores**2 - mean**2, 0.0))
+
+    figure = Figure(figsize=(10.0, 3.2), dpi=_DPI, layout="constrained")
+    axes = figure.subplots()
+    for (low, high, _), colour in zip(ACTION_LEVELS, _ACTION_COLOURS, strict=True):
+        axes.axhspan(low - 0.5, high + 0.5, color=colour, linewidth=0)
+    # A line ends where no image follows for long.
+    gaps = np.flatnonzero(np.diff(time_s) > LONGEST_STEP * durations_s[-1]) + 1
+    x, y, dy = (np.insert(one, gaps, np.nan) for one in (time_s, mean, deviation))
+    axes.fill_between(x, y - dy, y + dy, color=_LINE_COLOUR, alpha=0.25, linewidth=0)
+    axes.plot(x, y, color=_LINE_COLOUR, linewidth=1.4)
+    for colour, is_marked in (
+        (_UNCERTAIN_COLOUR, [row.state == UNCERTAIN for row in rows]),
+        (_NOTHING_COLOUR, [row.scores is None for row in rows]),
+    ):
+        spans = [*zip(time_s[is_marked], durations_s[is_marked], strict=True)]
+        axes.broken_barh(spans, (0.5, 0.2), color=colour)
+    for number, row in enumerate(moments, 1):
+        at = (row.time_s, row.worst)
+        axes.plot(*at, "o", color=_LINE_COLOUR)
+        axes.annotate(str(number), at, (0, 5), textcoords="offset points", ha="center")
+    axes.set(xlabel="time [s]", ylabel="RULA score", yticks=scores, ylim=(0.5, HIGHEST + 0.5))
+    axes.margins(x=0.01)
+    png = io.BytesIO()
+    figure.savefig(png, format="png", metadata={"Software": None})
+    return png.getvalue()
+
+
+def _span(low: int, high: int) -> str:
+    return str(low) if low == high else f"{low}-{high}"
+
+
+def _share_words(shares: ScoreShares) -> str:
+    found = [(score, share) for score, share in enumerate(shares.shares, 1)]
+    return ", ".join(f"{score}: {share:.0%}" for score, share in found if share >= _LEAST_SHARE)
+
+
+def _neck_words(summary: RulaSummary) -> str:
+    if summary.is_neck_always_measured:
+        return "the neck was measured all the time"
+    return (
+        f"the neck was measured for {summary.neck_measured_s:.1f} of {summary.measured_s:.1f} s, "
+        "and counts as declared for the rest"
+    )
+
+
+def _moment_words(row: RulaRow) -> str:
+    parts = {} if row.scores is None else row.scores.parts
+    words = (f"{part.words} {expected(parts[part.name]):.1f}" for part in PARTS)
+    return f"score {row.worst:.1f} ({'; '.join(words)})"
+
+
+def _data(content: bytes) -> str:
+    return base64.b64encode(content).decode("ascii")
+
+
+def _bar(shares: FloatArray) -> Iterator[tuple[str, float, str, str]]:
+    """Yield label, width in per cent, background and colour of each share (n,), dark for high."""
+    for score, share in enumerate(shares.tolist(), 1):
+        depth = (score - 1) / max(1, len(shares) - 1)
+        rgb = np.round(_LIGHTEST + depth * (_DARKEST - _LIGHTEST)).astype(int)
+        label = str(score) if share >= _LEAST_LABEL else ""
+        yield (
+            label,
+            100 * share,
+            "#{:02x}{:02x}{:02x}".format(*rgb),
+            "#000" if depth <= 0.5 else "#fff",
+        )

@@ -1,0 +1,298 @@
+"""RULA scores of postures: angles give scores of the parts, tables combine these.
+
+L. McAtamney and E. N. Corlett, "RULA: a survey method for the investigation of work-related upper
+limb disorders", Applied Ergonomics 24(2), 1993, pages 91-99. The parts are scored as in its
+figures:
+
+- upper arm: angle from hanging along the trunk, in any direction: 1 to 20 degrees, 2 to 45 and for
+  more than 20 backwards, 3 to 90, 4 beyond; abducted adds 1;
+- lower arm: 1 for 60 to 100 degrees between it and the line of the upper arm, else 2; a hand beyond
+  the middle of the body, or a forearm that points outside, adds 1;
+- neck: 1 to 10 degrees of flexion against the trunk, 2 to 20, 3 beyond, 4 in extension; twisted
+  adds 1;
+- trunk: 1 upright, 2 to 20 degrees, 3 to 60, 4 beyond, forwards or backwards; bent aside adds 1.
+
+Wrists, legs, twist of the trunk, load and muscle use come from the settings, and the neck where its
+angles are not known. A neck that bends aside is not measured. All scores count from 1, so an index
+into a table or into chances is the score less one.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from types import MappingProxyType
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cardbox_tracker.applications.ergonomics.config import (
+    DECLARED,
+    DECLARED_PARTS,
+    MEASURED,
+    NOT_SEEN,
+    RulaConfig,
+    declared,
+)
+from cardbox_tracker.body.model import BodyModel
+from cardbox_tracker.body.parts import body_parts
+from cardbox_tracker.body.posture import LEFT_ARM, PITCH, RIGHT_ARM, ROLL
+from cardbox_tracker.body.sizes import FloatArray
+from cardbox_tracker.body.skeleton import NECK_LIMITS, arm_directions
+
+ScoreArray = NDArray[np.int64]
+
+SAMPLES = 500
+"""Samples of a distribution; the standard error of a probability of 0.5 is then 0.02."""
+
+
+def _table(rows: str, *shape: int) -> ScoreArray:
+    table = np.array(rows.split(), dtype=np.int64).reshape(shape)
+    table.setflags(write=False)
+    return table
+
+
+TABLE_A: ScoreArray = _table(
+    """
+    1 2  2 2  2 3  3 3    2 2  2 2  3 3  3 3    2 3  3 3  3 3  4 4
+    2 3  3 3  3 4  4 4    3 3  3 3  3 4  4 4    3 4  4 4  4 4  5 5
+    3 3  4 4  4 4  5 5    3 4  4 4  4 4  5 5    4 4  4 4  4 5  5 5
+    4 4  4 4  4 5  5 5    4 4  4 4  4 5  5 5    4 4  4 5  5 5  6 6
+    5 5  5 5  5 6  6 7    5 6  6 6  6 7  7 7    6 6  6 7  7 7  7 8
+    7 7  7 7  7 8  8 9    8 8  8 8  8 9  9 9    9 9  9 9  9 9  9 9
+    """,
+    *(6, 3, 4, 2),
+)
+"""Posture of one arm: upper arm (6), lower arm (3), wrist (4), wrist twist (2)."""
+
+TABLE_B: ScoreArray = _table(
+    """
+    1 3  2 3  3 4  5 5  6 6  7 7
+    2 3  2 3  4 5  5 5  6 7  7 7
+    3 3  3 4  4 5  5 6  6 7  7 7
+    5 5  5 6  6 7  7 7  7 7  8 8
+    7 7  7 7  7 8  8 8  8 8  8 8
+    8 8  8 8  8 8  8 9  9 9  9 9
+    """,
+    *(6, 6, 2),
+)
+"""Posture of the rest: neck (6), trunk (6), legs (2)."""
+
+TABLE_C: ScoreArray = _table(
+    """
+    1 2 3 3 4 5 5
+    2 2 3 4 4 5 5
+    3 3 3 4 4 5 6
+    3 3 3 4 5 6 6
+    4 4 4 5 6 7 7
+    4 4 5 6 6 7 7
+    5 5 6 6 7 7 7
+    5 5 6 7 7 7 7
+    """,
+    *(8, 7),
+)
+"""Grand score: wrist and arm (8 or more), neck, trunk and legs (7 or more)."""
+
+HIGHEST, ABOVE = 7, 5
+"""Highest grand score; score above which work has to be changed soon or at once."""
+
+ACTION_LEVELS: tuple[tuple[int, int, str], ...] = (
+    (1, 2, "acceptable unless it is held or repeated for long"),
+    (3, 4, "investigate further; changes may be required"),
+    (5, 6, "investigate and change soon"),
+    (7, 7, "investigate and change immediately"),
+)
+"""Lowest and highest grand score of each action level, and its meaning in the paper."""
+
+
+class ArmScores(NamedTuple):
+    """Scores (...) of one arm: its parts, ``TABLE_A``, and the grand score with this arm."""
+
+    upper_arm: ScoreArray
+    lower_arm: ScoreArray
+    table_a: ScoreArray
+    grand: ScoreArray
+
+
+class RulaScores(NamedTuple):
+    """Scores (...) of both arms and the trunk; ``grand`` is that of the worse arm, 1 to 7.
+
+    ``neck`` is that of the settings if the angles of the neck are not known. ``table_b`` is the
+    score of neck, trunk and legs without load and muscle use.
+    """
+
+    left: ArmScores
+    right: ArmScores
+    trunk: ScoreArray
+    grand: ScoreArray
+    neck: ScoreArray
+    table_b: ScoreArray
+
+
+class Part(NamedTuple):
+    """A part score: column of the tables, words, highest score, place among all scores."""
+
+    name: str
+    words: str
+    highest: int
+    of: Callable[[RulaScores], ScoreArray]
+
+
+PARTS: tuple[Part, ...] = (
+    Part("left_upper_arm", "upper arm, left", 6, lambda scores: scores.left.upper_arm),
+    Part("right_upper_arm", "upper arm, right", 6, lambda scores: scores.right.upper_arm),
+    Part("left_lower_arm", "lower arm, left", 3, lambda scores: scores.left.lower_arm),
+    Part("right_lower_arm", "lower arm, right", 3, lambda scores: scores.right.lower_arm),
+    Part("trunk", "trunk", 6, lambda scores: scores.trunk),
+    Part("neck", "neck", 6, lambda scores: scores.neck),
+    Part("left_table_a", "table A, left", 9, lambda scores: scores.left.table_a),
+    Part("right_table_a", "table A, right", 9, lambda scores: scores.right.table_a),
+    Part("table_b", "table B", 9, lambda scores: scores.table_b),
+)
+"""Table A rates upper arm, lower arm and wrist, table B neck, trunk and legs; both without load and
+muscle use."""
+
+
+class ScoreDistribution(NamedTuple):
+    """Chances (7,) of the grand scores 1 to 7; each array adds up to 1.
+
+    Attributes:
+        grand: chances for the worse arm.
+        left: chances for the left arm.
+        right: chances for the right arm.
+        parts: chances of the scores from 1 on of each of ``PARTS``, by its name; empty if they are
+            not known.
+    """
+
+    grand: FloatArray
+    left: FloatArray
+    right: FloatArray
+    parts: Mapping[str, FloatArray] = MappingProxyType({})
+
+    @property
+    def mean(self) -> float:
+        """Expected grand score."""
+        return expected(self.grand)
+
+    @property
+    def likeliest(self) -> int:
+        """Most probable grand score; the lowest of equally probable ones."""
+        return int(np.argmax(self.grand)) + 1
+
+    def chance_above(self, score: int) -> float:
+        """Return the chance that the grand score is higher than ``score``."""
+        return float(self.grand[score:].sum())
+
+
+def expected(chances: FloatArray) -> float:
+    """Return the expected score of the chances (n,) of the scores 1 to n."""
+    return float(chances @ np.arange(1, len(chances) + 1))
+
+
+def neck_samples(
+    neck: FloatArray, stddev: FloatArray, count: int, rng: np.random.Generator
+) -> FloatArray:
+    """Return normal samples (count, 2) of ``neck_yaw`` and ``neck_pitch``, rad, in their limits."""
+    drawn = neck + stddev * rng.standard_normal((count, len(neck)))
+    return np.asarray(np.clip(drawn, NECK_LIMITS[:, 0], NECK_LIMITS[:, 1]))
+
+
+def score_distribution(
+    body: BodyModel, postures: FloatArray, config: RulaConfig, necks: FloatArray | None = None
+) -> ScoreDistribution:
+    """Return the distribution of the scores, given equally likely postures (n, 12) of ``body``.
+
+    ``necks`` (n, 2) are the angles of the neck in each of them, rad; None if they are unknown.
+    """
+    scores = rula_scores(body, postures, config, necks)
+
+    def chances(found: ScoreArray, highest: int = HIGHEST) -> FloatArray:
+        return np.asarray(np.bincount(found, minlength=highest + 1)[1:] / len(found))
+
+    parts = {part.name: chances(part.of(scores), part.highest) for part in PARTS}
+    grand = chances(scores.grand), chances(scores.left.grand), chances(scores.right.grand)
+    return ScoreDistribution(*grand, parts)
+
+
+def rula_scores(
+    body: BodyModel, postures: FloatArray, config: RulaConfig, necks: FloatArray | None = None
+) -> RulaScores:
+    """Return the scores of postures of ``body``.
+
+    Args:
+        body: the person.
+        postures: shape (..., 12), rad and metres.
+        config: settings.
+        necks: ``neck_yaw`` and ``neck_pitch`` of each posture, (..., 2), rad; None if unknown.
+    """
+    d = np.asarray(postures, dtype=np.float64)
+    bow_deg, bend_deg = (np.abs(np.degrees(d[..., joint])) for joint in (PITCH, ROLL))
+    trunk = _steps(bow_deg, config.upright_deg, 20.0, 60.0) + (bend_deg > config.side_bent_deg)
+    trunk = trunk + config.trunk_twisted
+    neck = np.full(trunk.shape, config.neck) if necks is None else _neck(necks, config)
+    table_b = TABLE_B[neck - 1, trunk - 1, config.legs - 1]
+    rest = table_b + config.body_muscle_use + config.body_load
+    left = _arm(body, d[..., LEFT_ARM], 1.0, rest, config)
+    right = _arm(body, d[..., RIGHT_ARM], -1.0, rest, config)
+    return RulaScores(left, right, trunk, np.maximum(left.grand, right.grand), neck, table_b)
+
+
+def _neck(necks: FloatArray, config: RulaConfig) -> ScoreArray:
+    yaw_deg, pitch_deg = (np.degrees(necks[..., joint]) for joint in (0, 1))
+    flexed = _steps(pitch_deg, 10.0, 20.0)
+    score = np.where(pitch_deg < -config.neck_extended_deg, 4, flexed)
+    return np.asarray(score + (np.abs(yaw_deg) > config.neck_twisted_deg))
+
+
+def _arm(
+    body: BodyModel, angles: FloatArray, side: float, rest: ScoreArray, config: RulaConfig
+) -> ArmScores:
+    """Return the scores of arms (..., 4); ``side`` is +1 for left ones, -1 for right ones."""
+    upper, fore = arm_directions(angles, side)
+    # In the trunk's frame X points forwards, Y to the left, Z up.
+    aside_deg, fore_aside_deg = (
+        np.degrees(np.arcsin(np.clip(side * limb[..., 1], -1.0, 1.0))) for limb in (upper, fore)
+    )
+    raised_deg = np.degrees(np.arccos(np.clip(-upper[..., 2], -1.0, 1.0)))
+    is_backwards = (-upper[..., 0] > np.abs(upper[..., 1])) & (raised_deg > 20.0)
+    score = np.where(is_backwards, 2, _steps(raised_deg, 20.0, 45.0, 90.0))
+    score = score + (aside_deg > config.abducted_deg)
+    upper_arm = np.clip(score + config.shoulders_raised - config.arms_supported, 1, 6)
+
+    parts = body_parts(body.sizes)
+    hand_m = parts.shoulder_aside_m + side * (
+        parts.upper_arm.height_m * upper[..., 1] + parts.forearm.height_m * fore[..., 1]
+    )
+    bent_deg = np.degrees(np.arccos(np.clip((upper * fore).sum(axis=-1), -1.0, 1.0)))
+    is_away = (hand_m < 0.0) | (fore_aside_deg > config.outwards_deg)
+    lower_arm = np.where((bent_deg >= 60.0) & (bent_deg <= 100.0), 1, 2) + is_away
+
+    table_a = TABLE_A[upper_arm - 1, lower_arm - 1, config.wrist - 1, config.wrist_twist - 1]
+    arm = table_a + config.arm_muscle_use + config.arm_load
+    return ArmScores(upper_arm, lower_arm, table_a, grand_score(arm, rest))
+
+
+def grand_score(arm: ScoreArray, rest: ScoreArray) -> ScoreArray:
+    """Look up table C with the scores of arm and wrist, and of neck, trunk and legs."""
+    return np.asarray(TABLE_C[np.minimum(arm, 8) - 1, np.minimum(rest, 7) - 1])
+
+
+def _steps(angle_deg: FloatArray, *limits_deg: float) -> ScoreArray:
+    """Return 1 up to the first limit, and 1 more beyond each."""
+    return np.asarray(1 + np.searchsorted(limits_deg, angle_deg))
+
+
+def part_values(
+    scores: ScoreDistribution, config: RulaConfig, is_neck_measured: bool
+) -> dict[str, str]:
+    """Return the part scores of one image in words, and the inputs that were not seen."""
+    from_ = MEASURED if is_neck_measured else DECLARED
+    values = {
+        part.words + (f" ({from_})" if part.name == "neck" else ""): (
+            f"{expected(scores.parts[part.name]):.2f}"
+        )
+        for part in PARTS
+    }
+    for name in DECLARED_PARTS:
+        values[f"{name.replace('_', ' ')} ({DECLARED})"] = str(getattr(config, name))
+    return values | {NOT_SEEN: ", ".join(map(str, declared(config, is_neck_measured)))}

@@ -1,0 +1,140 @@
+"""Retargeting of single joints by a map from the person's angles to the robot's joints.
+
+    joints:
+      - {from: right_shoulder_flexion, to: shoulder_pitch, scale: -1.0, offset_deg: 0.0}
+      - {from: right_elbow_bend, to: elbow_pitch}
+      - {to: wrist_pitch, offset_deg: 10.0}
+
+Each row sets ``to = scale * from + offset``; the default scale is 1, the default offset 0. A row
+without ``from`` keeps a joint at its offset, because a controller may want all joints of an arm.
+
+Besides the joints of the posture and of the neck, each arm has two angles as most robot arms have
+them, ``SIDE_elbow_bend`` and ``SIDE_upper_arm_turn``: the elbow bends by the first, 0 if the arm is
+stretched, and the bent forearm points forwards, or outwards at a turn of a quarter.
+"""
+
+from __future__ import annotations
+
+import math
+import os
+from dataclasses import dataclass
+
+import numpy as np
+
+from cardbox_tracker.body.model import BodyModel
+from cardbox_tracker.body.posture import (
+    ELBOW_ABDUCTION,
+    ELBOW_FLEXION,
+    LEFT_ARM,
+    N_JOINTS,
+    RIGHT_ARM,
+)
+from cardbox_tracker.body.sizes import FloatArray
+from cardbox_tracker.body.skeleton import JOINT_NAMES, NECK_NAMES
+from cardbox_tracker.errors import CardboxError, quoted
+from cardbox_tracker.small_yaml import SmallYamlError, parse_small_yaml, read_small_text
+
+WITH_NECK: tuple[str, ...] = (*JOINT_NAMES, *NECK_NAMES)
+"""Order of a posture with the head, (14,)."""
+_ARMS = {"left": LEFT_ARM, "right": RIGHT_ARM}
+_ELBOW = {
+    f"{side}_{name}": tuple(f"{side}_elbow_{angle}" for angle in ("abduction", "flexion"))
+    for side in _ARMS
+    for name in ("upper_arm_turn", "elbow_bend")
+}
+ANGLES: tuple[str, ...] = (*WITH_NECK, *_ELBOW)
+"""Names that a joint map may have."""
+# The direction of a nearly stretched arm says nothing about its turn.
+_LEAST_BEND = math.radians(10.0)
+_KEYS = {"from", "to", "scale", "offset_deg"}
+
+
+def with_neck(posture: FloatArray, stddev: FloatArray, most_stddev_rad: float) -> FloatArray:
+    """Return a posture with the head, (14,), nan where the head is not known.
+
+    Args:
+        posture: d1..d12, with ``neck_yaw`` and ``neck_pitch`` if they are known, (12,) or (14,).
+        stddev: standard deviations in the same order, (12,) or (14,).
+        most_stddev_rad: largest deviation of a known angle, rad.
+    """
+    whole = np.full(len(WITH_NECK), np.nan)
+    whole[:N_JOINTS] = posture[:N_JOINTS]
+    if len(posture) == len(stddev) == len(WITH_NECK):
+        sure = stddev[N_JOINTS:] <= most_stddev_rad
+        whole[N_JOINTS:][sure] = posture[N_JOINTS:][sure]
+    return whole
+
+
+def angles_of(posture: FloatArray) -> dict[str, float]:
+    """Return the value of each of ``ANGLES`` in a posture (14,), rad or m; nan if unknown."""
+    found = dict(zip(WITH_NECK, posture.tolist(), strict=True))
+    for side, arm in _ARMS.items():
+        abduction, flexion = posture[arm][[ELBOW_ABDUCTION, ELBOW_FLEXION]].tolist()
+        forwards, outwards = math.sin(flexion), math.cos(flexion) * math.sin(abduction)
+        down = math.cos(flexion) * math.cos(abduction)
+        bend = math.atan2(math.hypot(forwards, outwards), down)
+        is_stretched = min(bend, math.pi - bend) < _LEAST_BEND
+        turn = math.nan if is_stretched else math.atan2(outwards, forwards)
+        found |= {f"{side}_elbow_bend": bend, f"{side}_upper_arm_turn": turn}
+    return found
+
+
+@dataclass(frozen=True)
+class JointMap:
+    """A :class:`~.retargeter.Method`: each of ``joints`` follows an angle of the person.
+
+    Attributes:
+        angles: one of ``ANGLES`` for each joint; None for a joint that stays.
+        joints: the robot's joints without repetition.
+        scale: (n,).
+        offset_rad: (n,).
+    """
+
+    angles: tuple[str | None, ...]
+    joints: tuple[str, ...]
+    scale: FloatArray
+    offset_rad: FloatArray
+
+    @property
+    def sources(self) -> tuple[str, ...]:
+        """Joints of the posture behind the angles; none for the neck."""
+        behind = (_ELBOW.get(angle, (angle,)) for angle in self.angles if angle)
+        return tuple(dict.fromkeys(j for joints in behind for j in joints if j in JOINT_NAMES))
+
+    def target(self, _: BodyModel, posture: FloatArray, now: FloatArray) -> FloatArray:
+        """See :class:`~.retargeter.Method`; a joint stays while its angle is unknown."""
+        known = angles_of(posture)
+        chosen = np.array([known[angle] if angle else 0.0 for angle in self.angles])
+        return np.where(np.isnan(chosen), now, self.scale * chosen + self.offset_rad)
+
+
+def load_joint_map(path: str | os.PathLike[str]) -> JointMap:
+    """Read a joint map from a YAML file.
+
+    Raises:
+        CardboxError: the file cannot be read, or is not a valid joint map.
+    """
+    try:
+        rows = parse_small_yaml(read_small_text(path))["joints"]
+        if not isinstance(rows, list) or not rows:
+            raise ValueError("'joints' is an empty list, or not a list")
+        for row in rows:
+            if not isinstance(row, dict) or not {"to"} <= set(row) <= _KEYS:
+                raise ValueError(
+                    f"{quoted(row)} needs 'to', and may have 'from', 'scale' and 'offset_deg'"
+                )
+            if row.get("from", ANGLES[0]) not in ANGLES:
+                raise ValueError(f"{quoted(row['from'])} is not one of {', '.join(ANGLES)}")
+        targets = tuple(str(row["to"]) for row in rows)
+        if len(set(targets)) < len(targets):
+            raise ValueError("a joint of the robot is in two rows")
+        scale = np.array([float(row.get("scale", 1.0)) for row in rows])
+        offset = np.array([math.radians(float(row.get("offset_deg", 0.0))) for row in rows])
+        if not (np.isfinite(scale).all() and np.isfinite(offset).all()):
+            raise ValueError("a scale or an offset is not a finite number")
+    except (SmallYamlError, KeyError, TypeError, ValueError) as error:
+        reason = " ".join(str(error).split())
+        raise CardboxError(
+            f"{path} is not a joint map: {reason}; see the example config/example_joint_map.yaml"
+        ) from None
+    return JointMap(tuple(row.get("from") for row in rows), targets, scale, offset)

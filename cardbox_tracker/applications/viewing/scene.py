@@ -1,0 +1,400 @@
+"""Logs the results of each image as entities of a Rerun recording, and arranges their views."""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cardbox_tracker.applications.viewing.viewer import rerun
+from cardbox_tracker.body.model import BodyModel
+from cardbox_tracker.body.model_file import loads_body_model
+from cardbox_tracker.body.sizes import FloatArray
+from cardbox_tracker.body.skeleton import (
+    CLAVICLE_NAMES,
+    JOINT_NAMES,
+    NECK_NAMES,
+    PLACE_NAMES,
+    UNITS,
+    KeypointState,
+)
+from cardbox_tracker.body.urdf import ROOT_LINK, urdf_from_body
+from cardbox_tracker.errors import CardboxError, cut
+from cardbox_tracker.evaluation.metrics import beside_shoulders
+from cardbox_tracker.evaluation.truth import TrueFrame
+from cardbox_tracker.outputs import JointValues
+from cardbox_tracker.vision.camera import Camera
+
+Rgb = tuple[int, int, int]
+
+_IMAGE, _JOINTS, _ERROR, _STATE = _FLAT = ("image", "joints", "error", "state")
+_ROOT_FRAME = f"person/{ROOT_LINK}"
+# Entity below a plot that contains the uncertainty of its joints.
+_SPREAD = "within_two_deviations"
+_GROUPS: dict[str, tuple[str, ...]] = {
+    "left_arm": tuple(name for name in JOINT_NAMES if name.startswith("left")),
+    "right_arm": tuple(name for name in JOINT_NAMES if name.startswith("right")),
+    "torso": tuple(name for name in JOINT_NAMES[1:] if name.startswith("torso")),
+    "head": NECK_NAMES,
+    "place": ("torso_y", *PLACE_NAMES),
+    "shoulders": CLAVICLE_NAMES,
+}
+"""Joints by plot: angles in degrees, place and rise of the shoulders in metres."""
+
+# The viewpoint is beside the camera and looks at a person two metres before it.
+_EYE_M, _TARGET_M = (0.1, -1.1, 0.5), (2.0, 0.35, -0.1)
+# A robot stands beside the person, at about the same distance, and faces the camera.
+_ROBOT_PLACE_M, _HALF_TURN = (2.0, 0.9, 0.0), (0.0, 0.0, 1.0, 0.0)
+
+_COLOURS: list[tuple[int, ...]] = [(66, 133, 244), (219, 68, 55), (15, 157, 88), (171, 71, 188)]
+_MEASURED_RGB, _TRUE_RGB = (255, 140, 0), (0, 200, 83)
+_STATE_RGB: dict[str, Rgb] = {
+    KeypointState.UNCERTAIN: (255, 230, 0),
+    KeypointState.LOST: (255, 60, 60),
+    KeypointState.HIDDEN: (160, 160, 160),
+}
+# Standard deviations of an interval with 90 % of the errors.
+_DEVIATIONS = 2.0
+_ARMS = ((0, 1, 2), (3, 4, 5))
+_RADIUS_M = 0.018
+# Letters have visible fringes at lower qualities.
+_JPEG_QUALITY = 92
+
+
+class Column(NamedTuple):
+    """One of the results that are shown beside each other.
+
+    Attributes:
+        prefix: before its entities and frames: a word and a slash, or empty.
+        name: of the result, in titles and legends; empty if it is shown alone.
+        is_pale: whether its plots are pale, to distinguish them from those of another result.
+    """
+
+    prefix: str = ""
+    name: str = ""
+    is_pale: bool = False
+
+    def named(self, text: str) -> str:
+        """Return ``text`` with the name of the result before it."""
+        return f"{self.name} {text}".strip()
+
+    def geometry(self, robot: str) -> str:
+        """Return the entity of the shapes of ``person`` or a robot, which must be a single word."""
+        return f"{self.prefix}{robot}".replace("/", "_")
+
+
+ALONE = Column()
+"""A result that is shown alone."""
+
+
+def columns(names: Sequence[str]) -> tuple[Column, ...]:
+    """Return the columns of two named results, or that of a single one."""
+    if len(names) < 2:
+        return (ALONE,)
+    first, second = names
+    return Column("first/", first), Column("second/", second, is_pale=True)
+
+
+def layout(
+    shown: Sequence[Column] = (ALONE,), has_truth: bool = False, is_live: bool = False
+) -> Any:
+    """Return the blueprint of the views.
+
+    Args:
+        shown: one or two results. Two have their joints in the same plots, without uncertainty.
+        has_truth: whether there is a view of the errors.
+        is_live: whether the viewer follows the newest result; otherwise it plays from the start.
+
+    Raises:
+        CardboxError: rerun-sdk is not installed.
+    """
+    views = rerun().blueprint
+    # The heights of plots with joints, errors and states.
+    error, shares = ([_plot(shown, _ERROR, "error [cm]")], [2]) if has_truth else ([], [])
+    units = ("deg", "deg", "deg", "deg", "m", "m")
+    plots = [
+        _plot(shown, f"{_JOINTS}/{name}", f"{name.replace('_', ' ')} [{unit}]")
+        for name, unit in zip(_GROUPS, units, strict=True)
+    ]
+    states = views.TextLogView(
+        origin="/", contents=[f"+ /{one.prefix}{_STATE}" for one in shown], name="state"
+    )
+    right = views.Vertical(
+        *plots[:2],
+        views.Tabs(*plots[2:]),
+        *error,
+        states,
+        row_shares=[3, 3, 3, *shares, 2],
+    )
+    return views.Blueprint(
+        views.Horizontal(
+            *(_image_and_body(column) for column in shown),
+            right,
+            column_shares=[1.0] * len(shown) + [1.0 if len(shown) == 1 else 1.3],
+        ),
+        views.TimePanel(
+            timeline="time",
+            state="collapsed",
+            play_state="following" if is_live else "playing",
+        ),
+        collapse_panels=True,
+    )
+
+
+def _image_and_body(column: Column) -> Any:
+    """Return the image and the body of a result."""
+    views = rerun().blueprint
+    prefix = column.prefix
+    title = f"{column.name}: " if column.name else ""
+    return views.Vertical(
+        views.Spatial2DView(origin=f"{prefix}{_IMAGE}", name=f"{title}image"),
+        views.Spatial3DView(
+            origin="/",
+            contents=[
+                *(f"+ /{prefix}**", f"+ /{column.geometry('person')}/**"),
+                *(f"- /{prefix}{name}/**" for name in _FLAT),
+            ],
+            name=f"{title}measured body",
+            spatial_information=views.SpatialInformation(target_frame=f"{prefix}{_ROOT_FRAME}"),
+            eye_controls=views.EyeControls3D(
+                position=_EYE_M, look_target=_TARGET_M, eye_up=(0.0, 0.0, 1.0)
+            ),
+        ),
+    )
+
+
+def _plot(shown: Sequence[Column], entity: str, title: str) -> Any:
+    """Return the plot of an entity of all results; that of two has no room for uncertainty."""
+    views = rerun().blueprint
+    contents = [f"+ /{column.prefix}{entity}/**" for column in shown]
+    if len(shown) > 1:
+        contents += [f"- /{column.prefix}{entity}/{_SPREAD}/**" for column in shown]
+    legend = views.PlotLegend(corner=views.Corner2D.RightTop)
+    return views.TimeSeriesView(origin="/", contents=contents, name=title, plot_legend=legend)
+
+
+class Scene:
+    """Logs results to a Rerun stream, each with the stamp of its image, ns."""
+
+    def __init__(
+        self,
+        stream: Any,
+        column: Column = ALONE,
+        first_ns: int | None = None,
+        truth: Mapping[int, TrueFrame] | None = None,
+    ) -> None:
+        """Start an empty scene.
+
+        Args:
+            stream: a rerun.RecordingStream.
+            column: place of the result among those of the layout.
+            first_ns: stamp from which the time line counts, ns; None for that of the first image.
+            truth: true frames by stamp, to plot the error; None if they are not known.
+        """
+        self._rr = rerun()
+        self._stream, self._column, self._first_ns = stream, column, first_ns
+        self._truth = truth or {}
+        self._state = ""
+        self._styled: set[str] = set()
+        self._trees: dict[str, dict[str, Any]] = {}
+        self._body: BodyModel | None = None
+        # Joints and states of keypoints wait for what has the same stamp.
+        self._joints: tuple[int, JointValues] | None = None
+        self._states: tuple[int, Sequence[str]] | None = None
+
+    def model(self, text: str, source: str) -> None:
+        """Show the person of a body model, YAML text, from now on; ``source`` names it in errors.
+
+        Raises:
+            CardboxError: the text is no body model.
+        """
+        body = loads_body_model(text, source=source)
+        if body != self._body:
+            self._body = body
+            self._robot("person", urdf_from_body(body))
+
+    def robot(self, name: str, urdf: str) -> None:
+        """Show a robot beside the person; it faces the camera.
+
+        Raises:
+            CardboxError: the description cannot be read.
+        """
+        root = self._robot(name, urdf)
+        put = self._rr.Transform3D(
+            translation=_ROBOT_PLACE_M,
+            quaternion=self._rr.Quaternion(xyzw=_HALF_TURN),
+            parent_frame=self._column.prefix + _ROOT_FRAME,
+            child_frame=f"{self._column.prefix}{name}/{root}",
+        )
+        self._log(f"{name}/place", put, static=True)
+
+    def image(self, stamp_ns: int, bgr: NDArray[np.uint8]) -> None:
+        """Show an image (H, W, 3)."""
+        self._at(stamp_ns)
+        shown = self._rr.Image(bgr, color_model="BGR")
+        self._log(_IMAGE, shown.compress(jpeg_quality=_JPEG_QUALITY))
+
+    def state(self, stamp_ns: int, text: str) -> None:
+        """Log the tracking state if it has changed."""
+        self._at(stamp_ns)
+        if text != self._state:
+            self._log(_STATE, self._rr.TextLog(self._column.named(text)))
+        self._state = text
+
+    def joints(self, stamp_ns: int, joints: JointValues) -> None:
+        """Move the person, and plot the joints, rad and metres."""
+        self._joints = stamp_ns, joints
+        self.robot_joints(stamp_ns, "person", joints)
+        for name, value in _shown(joints).items():
+            group, number = _plot_of(name)
+            self._plot(f"{_JOINTS}/{group}/{name}", name, value, number, 2.0)
+
+    def deviations(self, stamp_ns: int, deviations: JointValues) -> None:
+        """Plot the standard deviations of the joints, which follow the joints."""
+        if self._joints is None or self._joints[0] != stamp_ns:
+            return
+        self._at(stamp_ns)
+        spread = _shown(deviations)
+        for name, value in _shown(self._joints[1]).items():
+            group, number = _plot_of(name)
+            for which, off in (("low", -_DEVIATIONS), ("high", _DEVIATIONS)):
+                reach = value + off * spread.get(name, 0.0)
+                entity = f"{_JOINTS}/{group}/{_SPREAD}/{name}/{which}"
+                self._plot(entity, f"{name} {which}", reach, number, 0.5)
+
+    def robot_joints(self, stamp_ns: int, robot: str, joints: JointValues) -> None:
+        """Move a robot that was shown before; unknown joints are ignored."""
+        self._at(stamp_ns)
+        known = self._trees.get(robot, {})
+        for name, value in zip(joints.names, joints.values.tolist(), strict=True):
+            if name in known:
+                turned = known[name].compute_transform(value, clamp=False)
+                self._log(f"{robot}/joints/{name}", turned)
+
+    def keypoint_states(self, stamp_ns: int, states: Sequence[str]) -> None:
+        """Take the states of the six keypoints, which precede the keypoints."""
+        self._states = stamp_ns, states
+
+    def keypoints(self, stamp_ns: int, points_m: FloatArray) -> None:
+        """Show keypoints (6, 3), metres in the optical frame, and plot their errors.
+
+        Uncertain joints are yellow, lost ones red and hidden ones grey. Other shapes are ignored.
+        """
+        if points_m.shape != (6, 3) or not np.isfinite(points_m).all():
+            return
+        self._at(stamp_ns)
+        is_known = self._states is not None and self._states[0] == stamp_ns
+        states = self._states[1] if self._states is not None and is_known else ()
+        joints = [_STATE_RGB.get(state, _MEASURED_RGB) for state in states]
+        self._arms("keypoints", points_m, _MEASURED_RGB, joints)
+        frame = self._truth.get(stamp_ns)
+        if frame is None:
+            return
+        self._arms("truth", frame.keypoints_m, _TRUE_RGB)
+        errors = errors_cm(points_m, frame.keypoints_m)
+        for number, (name, value) in enumerate(errors.items()):
+            self._plot(f"{_ERROR}/{name}", name, value, number, 2.0)
+
+    def _at(self, stamp_ns: int) -> None:
+        """Select the image that what follows belongs to."""
+        if self._first_ns is None:
+            self._first_ns = stamp_ns
+        self._stream.set_time("time", duration=(stamp_ns - self._first_ns) / 1e9)
+        self._stream.set_time("stamp", timestamp=np.datetime64(stamp_ns, "ns"))
+
+    def _robot(self, name: str, urdf: str) -> str:
+        """Log geometry and joints below ``name`` and return the root link.
+
+        Raises:
+            CardboxError: the description cannot be read.
+        """
+        with tempfile.TemporaryDirectory() as folder:
+            path = Path(folder) / f"{name}.urdf"
+            path.write_text(urdf, encoding="utf-8")
+            try:
+                tree = self._rr.urdf.UrdfTree.from_file_path(
+                    path,
+                    entity_path_prefix=self._column.geometry(name),
+                    frame_prefix=f"{self._column.prefix}{name}/",
+                    static_transform_entity_path=f"{self._column.prefix}{name}/links",
+                )
+                tree.log_urdf_to_recording(self._stream)
+            except Exception as error:
+                # The library does not wrap the errors of its parsers.
+                reason = cut(" ".join(str(error).split()))
+                raise CardboxError(f"the viewer cannot show the robot {name}: {reason}") from None
+        self._trees[name] = {
+            joint.name: joint for joint in tree.joints() if joint.joint_type != "fixed"
+        }
+        return str(tree.root_link().name)
+
+    def _arms(
+        self, entity: str, points_m: FloatArray, rgb: Rgb, joint_rgb: Sequence[Rgb] = ()
+    ) -> None:
+        if self._body is None:
+            return  # the camera's pitch is still unknown
+        points = level_points(points_m, self._body.camera_pose.pitch_rad)
+        strips = [points[list(arm)] for arm in _ARMS]
+        bones = self._rr.LineStrips3D(strips, colors=[rgb] * len(strips), radii=_RADIUS_M / 3)
+        joints = self._rr.Points3D(points, colors=list(joint_rgb) or rgb, radii=_RADIUS_M)
+        frame = self._column.prefix + _ROOT_FRAME
+        for name, shown in (("arms", bones), ("joints", joints)):
+            self._once(f"{entity}/{name}", self._rr.CoordinateFrame(frame))
+            self._log(f"{entity}/{name}", shown)
+
+    def _plot(self, entity: str, name: str, value: float, colour: int, width: float) -> None:
+        rgb = _COLOURS[colour % len(_COLOURS)]
+        if self._column.is_pale:
+            rgb = tuple((level + 255) // 2 for level in rgb)
+        named = self._column.named(name)
+        self._once(entity, self._rr.SeriesLines(colors=rgb, names=named, widths=width))
+        self._log(entity, self._rr.Scalars(value))
+
+    def _once(self, entity: str, what: Any) -> None:
+        """Log a constant entity once."""
+        if entity not in self._styled:
+            self._log(entity, what, static=True)
+        self._styled.add(entity)
+
+    def _log(self, entity: str, what: Any, static: bool = False) -> None:
+        self._stream.log(self._column.prefix + entity, what, static=static)
+
+
+def _shown(joints: JointValues) -> Mapping[str, float]:
+    """Return angles in degrees, and lengths in metres, by name."""
+    return {
+        name: value if UNITS.get(name) == "m" else float(np.degrees(value))
+        for name, value in zip(joints.names, joints.values.tolist(), strict=True)
+    }
+
+
+def errors_cm(points_m: FloatArray, truth_m: FloatArray) -> dict[str, float]:
+    """Return mean errors, cm, of keypoints (6, 3): with and without the error of the shoulders."""
+    difference = 100 * (points_m - truth_m)
+    return {
+        "absolute": float(np.linalg.norm(difference, axis=1).mean()),
+        "aligned": float(np.linalg.norm(beside_shoulders(difference), axis=1).mean()),
+    }
+
+
+def level_points(points_m: FloatArray, pitch_rad: float) -> FloatArray:
+    """Transform optical points (n, 3) to the level frame of the URDF's root: X ahead, Y left, Z up.
+
+    Args:
+        points_m: points in the optical frame, metres: x to the right, y down, z ahead.
+        pitch_rad: downward pitch of the camera.
+    """
+    camera = Camera(1, 1, 1.0, 1.0, 0.0, 0.0, pitch_rad)
+    return camera.optical_to_reference(points_m) * (-1.0, -1.0, 1.0)
+
+
+def _plot_of(joint: str) -> tuple[str, int]:
+    """Return the plot of a joint, and the joint's index in it."""
+    for group, joints in _GROUPS.items():
+        if joint in joints:
+            return group, joints.index(joint)
+    return "other", 0

@@ -1,0 +1,169 @@
+"""Shows results in a :class:`~.scene.Scene`: those in bags, or those of a running tracker."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from cardbox_tracker.applications.drawing.overlay import draw_camera_overlay
+from cardbox_tracker.applications.viewing.scene import Scene
+from cardbox_tracker.body.model_file import dumps_body_model
+from cardbox_tracker.errors import BagError, CardboxError
+from cardbox_tracker.estimation.estimate import Estimate
+from cardbox_tracker.estimation.tracker import Tracker
+from cardbox_tracker.outputs import joint_deviations, joint_values
+from cardbox_tracker.recordings.bag_reader import BagMessage, BagReader, stamp_ns_of
+from cardbox_tracker.recordings.result_reader import MODEL, joints_of, namespace_of, points_of
+from cardbox_tracker.recordings.silhouettes import RecordedFrame
+from cardbox_tracker.vision.encodings import decode_bgr, image_parts
+
+_ROBOT, _JOINTS, _OVERLAY = "/robot_description", "/joint_states", "/overlay"
+
+
+class ShownTracking:
+    """Observer of :func:`~cardbox_tracker.recordings.track.track_recording` that shows each image.
+
+    Attributes:
+        count: number of images with a posture.
+    """
+
+    def __init__(self, scene: Scene) -> None:
+        """Start with no images."""
+        self._scene = scene
+        self._described: object = None
+        self.count = 0
+
+    def __call__(self, frame: RecordedFrame, estimate: Estimate, tracker: Tracker) -> None:
+        """Show one image."""
+        scene, stamp_ns = self._scene, frame.stamp_ns
+        if tracker.body is not self._described:
+            scene.model(dumps_body_model(tracker.body), "the tracker")
+        self._described = tracker.body
+        scene.state(stamp_ns, estimate.state)
+        scene.image(stamp_ns, draw_camera_overlay(frame.picture, 0, estimate, tracker))
+        joints, deviations = joint_values(estimate), joint_deviations(estimate)
+        if joints is not None and deviations is not None:
+            self.count += 1
+            scene.joints(stamp_ns, joints)
+            scene.deviations(stamp_ns, deviations)
+        if estimate.keypoint_states is not None:
+            scene.keypoint_states(stamp_ns, estimate.keypoint_states)
+        if estimate.keypoints_m is not None:
+            scene.keypoints(stamp_ns, np.asarray(estimate.keypoints_m))
+
+
+def show_together(
+    results: Sequence[tuple[BagReader, Scene]], progress: Callable[[float], None] = lambda _: None
+) -> list[int]:
+    """Show bags of results of one recording at the same time, each in its scene.
+
+    A viewer that plays while it is sent the data has an image of each from the beginning on.
+
+    Args:
+        results: open recordings and their scenes.
+        progress: called with the finished fraction, 0 to 1.
+
+    Returns:
+        The number of images with joints of each.
+
+    Raises:
+        BagError: a bag has no results of the tracker, or is damaged.
+    """
+    counts = [0] * len(results)
+    running = {number: _shown(*one) for number, one in enumerate(results)}
+    finished = dict.fromkeys(running, 0.0)
+    while running:
+        number = min(running, key=finished.__getitem__)
+        try:
+            finished[number], has_joints = next(running[number])
+        except StopIteration:
+            del running[number]
+            continue
+        counts[number] += has_joints
+        progress(min(finished[one] for one in running))
+    return counts
+
+
+def _shown(bag: BagReader, scene: Scene) -> Iterator[tuple[float, bool]]:
+    """Show the messages; yield the finished fraction after each, and whether it had joints."""
+    space = namespace_of(bag)
+    handlers = _handlers(bag, scene, space)
+    total_s = max(bag.duration_s, 1e-9)
+    for message in bag.messages([topic for topic in bag.topics if topic in handlers]):
+        content = bag.deserialize(message)
+        try:
+            handlers[message.topic](message, content)
+        except (AttributeError, TypeError, ValueError) as error:
+            # A recording contains the definitions of its types.
+            raise BagError(
+                f"{message.topic} of {bag.path} has a malformed message: {error}; record it again"
+            ) from None
+        yield (message.time_ns - bag.start_ns) / 1e9 / total_s, message.topic == space + _JOINTS
+
+
+def _handlers(
+    bag: BagReader, scene: Scene, space: str
+) -> dict[str, Callable[[BagMessage, Any], None]]:
+    """Return the handlers of the topics of the tracker in ``space``, and of robots in others."""
+    handlers: dict[str, Callable[[BagMessage, Any], None]] = {
+        space + MODEL: lambda m, c: scene.model(str(c.data), f"{m.topic} of {bag.path}"),
+        space + "/tracking_state": lambda m, c: scene.state(m.time_ns, str(c.data)),
+        space + _JOINTS: lambda _, c: scene.joints(stamp_ns_of(c), joints_of(c)),
+        space + "/joint_states_stddev": lambda _, c: scene.deviations(stamp_ns_of(c), joints_of(c)),
+        space + "/keypoint_states": lambda _, c: scene.keypoint_states(
+            stamp_ns_of(c), [str(one.message) for one in c.status]
+        ),
+        space + "/keypoints": lambda _, c: scene.keypoints(stamp_ns_of(c), points_of(c)),
+        space + _OVERLAY: lambda _, c: scene.image(stamp_ns_of(c), decode_bgr(*image_parts(c))),
+    }
+    for topic in bag.topics:
+        if topic.endswith(_ROBOT) and topic != space + _ROBOT:
+            robot = topic.removesuffix(_ROBOT)
+            name = robot.strip("/").replace("/", "_") or "robot"
+            handlers[topic] = lambda _, c, name=name: scene.robot(name, str(c.data))  # type: ignore[misc]
+            handlers[robot + _JOINTS] = lambda _, c, name=name: scene.robot_joints(  # type: ignore[misc]
+                stamp_ns_of(c), name, joints_of(c)
+            )
+    return handlers
+
+
+def image_stamps(path: Path) -> list[int]:
+    """Return the stamps of the images in a bag of results, ns, ascending.
+
+    Without overlays these are the images with joints.
+
+    Raises:
+        BagError: the bag cannot be read, or has no results of the tracker.
+    """
+    with BagReader(path) as bag:
+        space = namespace_of(bag)
+        named = (space + _OVERLAY, space + _JOINTS)
+        topic = next((topic for topic in named if topic in bag.topics), None)
+        messages = [] if topic is None else bag.messages([topic])
+        return sorted({stamp_ns_of(bag.deserialize(message)) for message in messages})
+
+
+def check_same_images(first: Path, second: Path) -> int:
+    """Check by their stamps that the images of one bag of results are among those of the other.
+
+    Returns:
+        Stamp of the earliest image of both, ns.
+
+    Raises:
+        CardboxError: they have other stamps, or a bag cannot be read.
+    """
+    stamps = {path: set(image_stamps(path)) for path in (first, second)}
+    few, many = sorted(stamps, key=lambda path: len(stamps[path]))
+    others = len(stamps[few] - stamps[many])
+    remedy = "; give two results of the same recording"
+    if others == len(stamps[few]):
+        raise CardboxError(f"{first} and {second} have no image in common{remedy}")
+    if others:
+        raise CardboxError(
+            f"{others} of the {len(stamps[few])} images of {few} are not among those of {many}"
+            + remedy
+        )
+    return min(stamps[many])

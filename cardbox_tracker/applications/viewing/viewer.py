@@ -1,0 +1,170 @@
+"""Opens recordings of the optional library rerun-sdk: to a file, in a window or in a browser.
+
+The page of Rerun reports its use to its maker and loads fonts and news. A content security policy
+restricts the browser to this computer, so nothing of a session is sent out.
+"""
+
+from __future__ import annotations
+
+import errno
+import os
+import socket
+import sys
+import threading
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager, suppress
+from functools import partial
+from http.client import HTTPConnection, HTTPException
+from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
+from pathlib import Path
+from typing import Any
+from urllib.parse import quote
+
+from cardbox_tracker.errors import CardboxError
+from cardbox_tracker.files import atomic_path
+
+APPLICATION = "cardbox_tracker"
+THIS_COMPUTER, PORT = "127.0.0.1", 9090
+
+_POLICY = (
+    "default-src 'self' 'unsafe-inline' 'unsafe-eval' data: blob:; "
+    "connect-src 'self' data: blob: http://127.0.0.1:*"
+)
+_TIMEOUT_S = 10.0
+
+
+def rerun() -> Any:
+    """Return the module rerun.
+
+    Raises:
+        CardboxError: the library is not installed; the text gives the command.
+    """
+    try:
+        import rerun as module
+        import rerun.blueprint
+        import rerun.urdf
+    except ImportError as error:
+        raise CardboxError(
+            f"the viewer needs the library rerun-sdk ({error}); install it with "
+            "'pip install cardbox_tracker[view]' (170 MB)"
+        ) from None
+    return module
+
+
+@contextmanager
+def recording(blueprint: Any, save: Path | None, web: bool) -> Iterator[tuple[Any, str]]:
+    """Context of a stream to a file, to a browser, or by default to a window.
+
+    Args:
+        blueprint: arrangement of the views.
+        save: .rrd file, which is written atomically at the end.
+        web: serve the viewer to a browser while the context lasts.
+
+    Yields:
+        The stream, and the address for a browser, which is empty without ``web``.
+
+    Raises:
+        CardboxError: rerun-sdk is not installed, the file cannot be written, or neither a port nor
+            a window can be opened.
+    """
+    rr = rerun()
+    if save is None and not web and not _has_display():
+        raise CardboxError(
+            "there is no display for the viewer's window; give --web for a browser, or --save "
+            "FILE.rrd to look at it elsewhere with 'rerun FILE.rrd'"
+        )
+    with ExitStack() as stack:
+        # A constant name makes the recordings of one bag identical.
+        stream = rr.RecordingStream(APPLICATION, recording_id=APPLICATION)
+        path = None if save is None else stack.enter_context(atomic_path(save))
+        address = ""
+        try:
+            sinks: list[Any] = [] if path is None else [rr.FileSink(path)]
+            if web:
+                server = rr.GrpcServerSink(bind_ip=THIS_COMPUTER)
+                sinks.append(server)
+                page = stack.enter_context(web_page(rr))
+                address = f"{page}?url={quote(server.uri, safe='')}"
+            if sinks:
+                stream.set_sinks(*sinks, default_blueprint=blueprint)
+            else:
+                stream.spawn(default_blueprint=blueprint)
+        except (OSError, RuntimeError, ValueError) as error:
+            raise CardboxError(f"cannot open the viewer: {error}") from None
+        try:
+            yield stream, address
+        finally:
+            stream.flush()
+            stream.disconnect()
+
+
+def _has_display() -> bool:
+    is_x11 = sys.platform.startswith("linux")
+    return not is_x11 or any(os.environ.get(name) for name in ("DISPLAY", "WAYLAND_DISPLAY"))
+
+
+@contextmanager
+def web_page(rr: Any, port: int = PORT) -> Iterator[str]:
+    """Context of the viewer's page; gives its address.
+
+    Args:
+        rr: module rerun.
+        port: port of this computer; 0 takes any free one.
+
+    Raises:
+        OSError: the port is in use.
+    """
+    with socket.socket() as one:
+        one.bind((THIS_COMPUTER, 0))
+        files_port = one.getsockname()[1]
+    try:
+        server = ThreadingHTTPServer((THIS_COMPUTER, port), partial(_Page, files_port))
+    except OSError as error:
+        if error.errno != errno.EADDRINUSE:
+            raise
+        message = f"port {port} is in use; end the other 'cardbox view --web' or program there"
+        raise OSError(error.errno, message) from error
+    with server:
+        rr.serve_web_viewer(web_port=files_port, open_browser=False)
+        thread = threading.Thread(target=server.serve_forever, name="web page", daemon=True)
+        thread.start()
+        try:
+            yield f"http://localhost:{server.server_port}"
+        finally:
+            server.shutdown()
+            thread.join()
+
+
+class _Page(BaseHTTPRequestHandler):
+    """Passes files on from Rerun's own server, with the policy."""
+
+    def __init__(self, files_port: int, *of_server: Any) -> None:
+        self._files_port = files_port
+        super().__init__(*of_server)
+
+    def do_GET(self) -> None:
+        """Answer with the file."""
+        connection = HTTPConnection(THIS_COMPUTER, self._files_port, timeout=_TIMEOUT_S)
+        try:
+            connection.request("GET", self.path)
+            answer = connection.getresponse()
+            content = answer.read()
+        except (OSError, HTTPException) as error:
+            self.send_error(502, f"the viewer's files cannot be read: {error}")
+            return
+        finally:
+            connection.close()
+        self.send_response(answer.status)
+        for name in ("Content-Type", "Content-Encoding"):
+            value = answer.getheader(name)
+            if value is not None:
+                self.send_header(name, value)
+        self.send_header("Content-Length", str(len(content)))
+        self.send_header("Content-Security-Policy", _POLICY)
+        # A browser that closes its page ends the transfer.
+        with suppress(ConnectionError):
+            self.end_headers()
+            self.wfile.write(content)
+
+    def log_message(self, format: str, *args: object) -> None:
+        """Write nothing to the terminal for each request."""

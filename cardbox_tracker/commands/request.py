@@ -1,0 +1,662 @@
+"""The options of ``cardbox track`` and its relatives, read once into a frozen request.
+
+:func:`add_recording` and :func:`add_tracking` declare the options. :func:`recording_request` and
+:func:`tracking_request` read them; one error names all that are missing or contradict each other.
+Nothing below this folder knows options, only the request and its parts.
+"""
+
+from __future__ import annotations
+
+import argparse
+import copy
+import math
+import shlex
+from collections.abc import Callable, Iterable
+from contextlib import AbstractContextManager
+from dataclasses import dataclass
+from pathlib import Path, PurePosixPath
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Any, NamedTuple, NoReturn, TypeVar
+
+from cardbox_tracker.commands.arguments import (
+    add_camera_pitch,
+    add_preset,
+    add_seed,
+    between,
+    span,
+    time,
+)
+from cardbox_tracker.errors import CardboxError
+from cardbox_tracker.files import UnreadableFileError, read_regular
+from cardbox_tracker.settings import NoEffectError, nested, settings_of
+
+if TYPE_CHECKING:
+    from cardbox_tracker.body.model import BodyModel
+    from cardbox_tracker.estimation.config import TrackerConfig
+    from cardbox_tracker.recordings.detector import Detector
+    from cardbox_tracker.recordings.given_camera import GivenCamera
+    from cardbox_tracker.recordings.point_table import PointTable
+    from cardbox_tracker.recordings.recording import Recording, Segmentation
+    from cardbox_tracker.recordings.silhouettes import TimeSpan
+
+S = TypeVar("S")
+T = TypeVar("T")
+
+OPTIONS_ENDING = ".options"
+"""Ending of the files beside the recordings of a folder that have options for them."""
+RETIRED = MappingProxyType(
+    {
+        "--corrector": "results are no longer corrected by a network",
+        "--output-smoothing-s": "it smoothed corrected results, which there are no longer",
+        "--particles": "give --set torso.particles=N --set arm.particles=N",
+        "--refine-sizes": "breadths stay as they were measured",
+        "--strategy": "give --set strategy=NAME",
+    }
+)
+"""Options of former versions, with what to do or expect instead."""
+
+_MOST_ROLL_DEG, _MOST_FPS = 45.0, 1000.0
+_MOST_BYTES = 64 * 1024
+_EFFORT = "whole_body.effort"
+_FOV_HINT = (
+    "--fov is across the width of the image: webcams 60 to 78, phones 60 to 70 held sideways, 36 "
+    "to 43 upright"
+)
+# An option of a file takes the place of these, which do not go with it.
+_REPLACED = MappingProxyType(
+    {
+        "model": ("stature", "distance", "camera_pitch_deg"),
+        "stature": ("model",),
+        "background": ("within", "silhouettes"),
+        "within": ("background", "silhouettes"),
+        "silhouettes": ("background", "within"),
+        "fov": ("calibration",),
+        "calibration": ("fov",),
+    }
+)
+
+
+@dataclass(frozen=True)
+class RecordingRequest:
+    """A recording to read.
+
+    Attributes:
+        path: bag, video, or folder of images.
+        silhouettes: what tells the person from the scene.
+        points: source of the person's 2D points; None for no points.
+        cameras: namespaces, the first camera's first; empty if the recording has one camera.
+        extrinsics: file of the poses of further cameras.
+        depth: topic of depth images, or ``stereo``; None without depth.
+        camera: what the recording itself does not say about its camera.
+    """
+
+    path: Path
+    silhouettes: Segmentation
+    points: Detector | PointTable | None
+    cameras: tuple[str, ...]
+    extrinsics: Path | None
+    depth: str | None
+    camera: GivenCamera
+
+    @property
+    def detector(self) -> Detector | None:
+        """The detector among the sources of silhouettes and points; None without one."""
+        from cardbox_tracker.recordings.detector import Detector
+
+        sources = self.silhouettes, self.points
+        return next((source for source in sources if isinstance(source, Detector)), None)
+
+    def open(self) -> AbstractContextManager[Recording]:
+        """Return the context of the open recording.
+
+        Raises:
+            CardboxError: see :func:`~.recordings.recording.open_recording`.
+        """
+        from cardbox_tracker.recordings.recording import open_recording
+
+        return open_recording(
+            self.path,
+            self.silhouettes,
+            self.cameras,
+            self.extrinsics,
+            self.depth,
+            self.points,
+            self.camera,
+        )
+
+
+@dataclass(frozen=True)
+class PersonRequest:
+    """The person to track.
+
+    Attributes:
+        body: the person; the mean sizes of people of the given stature without ``model``.
+        model: the file of a measured person; None if only the stature is given.
+        start_s: seconds from the recording's start at which tracking starts.
+        is_pitch_given: whether ``body`` has the camera's pitch; else it is to be found from the
+            person who stands upright.
+    """
+
+    body: BodyModel
+    model: Path | None
+    start_s: float
+    is_pitch_given: bool
+
+
+class TrackFiles(NamedTuple):
+    """Files to write; None for one that is not wanted.
+
+    Attributes:
+        table: one row for each image, see :func:`~.recordings.result_table.result_table`.
+        video: overlay video, at the rate and the resolution of the recording.
+        bag: folder of a bag with the topics of the tracker.
+        body: the body at the end of the recording.
+    """
+
+    table: Path | None = None
+    video: Path | None = None
+    bag: Path | None = None
+    body: Path | None = None
+
+
+@dataclass(frozen=True)
+class TrackingRequest:
+    """A recording to track.
+
+    Attributes:
+        recording: what is read.
+        person: who is tracked.
+        preset: name of the settings that ``config`` changes.
+        config: settings of the tracker.
+        seed: random seed of the filters.
+        inputs: files and folders that are read, which no result may replace.
+        files: results to write.
+        force: whether an existing bag is replaced.
+    """
+
+    recording: RecordingRequest
+    person: PersonRequest
+    preset: str
+    config: TrackerConfig
+    seed: int
+    inputs: tuple[Path, ...]
+    files: TrackFiles = TrackFiles()
+    force: bool = False
+
+
+class OptionsError(CardboxError):
+    """Options are missing, wrong or contradict each other; the text names all of them."""
+
+
+class Problems:
+    """What is wrong with the options of a recording, collected for one error.
+
+    A function that finds a problem returns any value of its type, because the error follows.
+    """
+
+    def __init__(self, recording: Path, faults: Iterable[str] = ()) -> None:
+        """Begin with the ``faults`` that are known."""
+        self._recording = recording
+        self._missing: list[str] = []
+        self._hints: list[str] = []
+        self._faults = list(faults)
+
+    def miss(self, option: str, hint: str = "") -> None:
+        """Note that an ``option`` is missing; ``hint`` helps to choose its value."""
+        self._missing.append(option)
+        if hint:
+            self._hints.append(hint)
+
+    def add(self, fault: str) -> None:
+        """Note a fault."""
+        self._faults.append(fault)
+
+    def caught(self, function: Callable[[], T], otherwise: S) -> T | S:
+        """Return the result of a function; note its CardboxError and return ``otherwise``."""
+        try:
+            return function()
+        except CardboxError as error:
+            self.add(str(error))
+            return otherwise
+
+    def check(self) -> None:
+        """Raise OptionsError if there was a problem."""
+        faults = list(dict.fromkeys(self._faults))
+        if self._missing:
+            *most, last = self._missing
+            needed = f"{', '.join(most)}, and {last}" if most else last
+            hints = f" ({'; '.join(self._hints)})" if self._hints else ""
+            faults.insert(0, f"{self._recording} needs {needed}{hints}")
+        if faults:
+            raise OptionsError("; also, ".join(faults))
+
+
+def add_recording(parser: argparse.ArgumentParser, required: bool = True) -> None:
+    """Add the options for a recording of any kind, read by :func:`recording_request`."""
+    add = parser.add_argument
+    add(
+        "recording",
+        type=Path,
+        nargs=None if required else "?",
+        metavar="RECORDING",
+        help="rosbag2 folder or file, video, or folder of JPEG or PNG images",
+    )
+    add("--background", type=span, metavar="T0:T1", help="seconds during which nobody is in view")
+    add(
+        "--cameras",
+        nargs="+",
+        default=[],
+        metavar="NAMESPACE",
+        help="cameras of the recording that see the person, such as cam0 cam1, the one that the "
+        "person faced first; with one name, that camera alone; not needed if there is only one",
+    )
+    add(
+        "--extrinsics",
+        type=Path,
+        metavar="FILE",
+        help="where further cameras stand, from Kalibr (YAML) or aniposelib (TOML); not needed "
+        "for a rectified pair or with /tf_static in the recording",
+    )
+    add(
+        "--depth",
+        metavar="TOPIC",
+        help="depth images of the same view as the first of --cameras; 'stereo' measures depth in "
+        "the first two of them, a rectified pair, left first",
+    )
+    add(
+        "--within",
+        type=float,
+        metavar="M",
+        help="in place of --background: all that is nearer in the images of --depth, metres, is "
+        "the person",
+    )
+    add(
+        "--silhouettes",
+        choices=("background", "detector", "person_in_view"),
+        help="what tells the person from the scene: the empty scene of --background; the mask of a "
+        "person detector; or a scene that is learned around the person, who must step aside at "
+        "some time. With neither --background nor --within, the mask is the default with "
+        "--detector mediapipe, and person_in_view for videos and images",
+    )
+    add(
+        "--detector",
+        metavar="mediapipe|FILE.csv",
+        help="also use 2D points of the person's joints: those of MediaPipe's networks ('cardbox "
+        "detector --install'), or a table that any detector has written (docs/detectors.md)",
+    )
+    add(
+        "--fov",
+        type=float,
+        metavar="DEG",
+        help="field of view across the width of the image as it is shown: webcams 60 to 78, phones "
+        "60 to 70 held sideways and 36 to 43 upright; not for bags with CameraInfo",
+    )
+    add(
+        "--calibration",
+        type=Path,
+        metavar="FILE",
+        help="in place of --fov: YAML file of camera_calibration",
+    )
+    add(
+        "--camera-roll-deg",
+        type=between(-_MOST_ROLL_DEG, _MOST_ROLL_DEG),
+        metavar="R",
+        help="how far the camera is turned clockwise, seen from behind it; images are turned back",
+    )
+    add(
+        "--fps",
+        type=between(0.0, _MOST_FPS),
+        metavar="HZ",
+        help="images a second of a folder of images (default: 30), or of a video in slow motion",
+    )
+
+
+def add_tracking(parser: argparse.ArgumentParser, needs_recording: bool = True) -> None:
+    """Add the options for recording, person and settings, read by :func:`tracking_request`."""
+    from cardbox_tracker.estimation.filtering.whole_body_config import WholeBodyConfig
+
+    add_recording(parser, needs_recording)
+    add = parser.add_argument
+    add(
+        "--model",
+        type=Path,
+        metavar="MODEL.yaml",
+        help="the person, from 'cardbox initialize', the node initializer, or 'cardbox body'",
+    )
+    add(
+        "--stature",
+        type=float,
+        metavar="M",
+        help="in place of --model: height of the person, metres, crown to floor; sizes are the "
+        "mean ones of people of that stature",
+    )
+    add(
+        "--distance",
+        type=float,
+        metavar="M",
+        help="with --stature: from the camera to the person, metres along the floor; without it, "
+        "it is found from the first images",
+    )
+    add_camera_pitch(parser, "with --stature, found from the person who stands upright at --start")
+    add(
+        "--start",
+        type=time,
+        metavar="T",
+        help="second at which the person stands as for --front; tracking starts there. With "
+        "--stature, or a body of 'cardbox body', any posture will do (default with --stature: 0)",
+    )
+    add_preset(parser)
+    effort = settings_of(WholeBodyConfig)["effort"]
+    add(
+        "--effort",
+        type=float,
+        metavar="X",
+        help=f"{effort.description}; {effort.range_text}; for the preset default",
+    )
+    add(
+        "--set",
+        action=_AddSetting,
+        type=_setting,
+        metavar="NAME=VALUE",
+        help="another setting of the tracker by its name in docs/parameters.md, such as "
+        "lost_frames=10; may be given several times",
+    )
+    add(
+        "--settings",
+        type=Path,
+        metavar="FILE.yaml",
+        help="file of such settings; --set and --effort take precedence over it",
+    )
+    for flag in RETIRED:
+        add(flag, action=_Refuse, nargs="?", help=argparse.SUPPRESS)
+    add_seed(parser, "the filters")
+
+
+class _Refuse(argparse.Action):
+    """Refuses a retired option."""
+
+    def __call__(self, parser: argparse.ArgumentParser, *given: Any) -> NoReturn:
+        flag = given[-1]
+        parser.error(f"{flag} was removed: {RETIRED[flag]}")
+
+
+class _AddSetting(argparse.Action):
+    """Adds a setting to those given before, of which the last one of a name counts."""
+
+    def __call__(
+        self,
+        parser: argparse.ArgumentParser,
+        namespace: argparse.Namespace,
+        values: Any,
+        option_string: str | None = None,
+    ) -> None:
+        before = getattr(namespace, self.dest)
+        name, value = values
+        after = {**before, name: value} if isinstance(before, dict) else {name: value}
+        setattr(namespace, self.dest, after)
+
+
+def _setting(text: str) -> tuple[str, bool | int | float | str]:
+    """Parse ``NAME=VALUE``; a value is true or false, a number, or a text."""
+    name, equals, value = text.partition("=")
+    if not name or not equals:
+        raise argparse.ArgumentTypeError(
+            f"expected NAME=VALUE, such as lost_frames=10, got {text!r}"
+        )
+    if value in ("true", "false"):
+        return name, value == "true"
+    for kind in (int, float):
+        try:
+            return name, kind(value)
+        except ValueError:
+            continue
+    return name, value
+
+
+def recording_request(options: argparse.Namespace, problems: Problems) -> RecordingRequest:
+    """Return what the options of :func:`add_recording` ask for; note what is wrong with them."""
+    from cardbox_tracker.recordings.open_images import check_exists
+    from cardbox_tracker.recordings.recording import input_faults
+    from cardbox_tracker.vision.pairing import camera_names
+
+    path, depth = options.recording, options.depth
+    problems.caught(lambda: check_exists(path), None)
+    camera = _camera(options, problems)
+    silhouettes = _silhouettes(options, problems)
+    points: Detector | PointTable | None = None
+    if options.detector is not None:
+        points = problems.caught(lambda: points_named(options.detector), None)
+    names: tuple[str, ...] = ()
+    names = problems.caught(lambda: tuple(camera_names(options.cameras)), names)
+    for fault in input_faults(path, silhouettes, names, depth, camera):
+        problems.add(fault)
+    return RecordingRequest(path, silhouettes, points, names, options.extrinsics, depth, camera)
+
+
+def inputs_of(options: argparse.Namespace) -> tuple[Path, ...]:
+    """Return the files and folders that the options of a recording or of tracking name."""
+    names = "recording", "extrinsics", "calibration", "detector", "model", "settings"
+    given = (getattr(options, name, None) for name in names)
+    # A detector may also be a word, which names no file.
+    return tuple(Path(path) for path in given if path)
+
+
+def tracking_request(options: argparse.Namespace, faults: Iterable[str] = ()) -> TrackingRequest:
+    """Return what the options of :func:`add_tracking` ask for.
+
+    Args:
+        options: the options.
+        faults: what is wrong with other options.
+
+    Raises:
+        OptionsError: options are missing, wrong or contradict each other.
+    """
+    from cardbox_tracker.estimation.config import PRESETS
+
+    problems = Problems(options.recording, faults)
+    recording = recording_request(options, problems)
+    person = _person(options, problems)
+    preset = PRESETS[options.preset]()
+    is_more = len(options.cameras) > 1 or options.depth is not None
+    if is_more and not preset.has_several_views:
+        problems.add(
+            f"--preset {options.preset} uses the silhouette of one camera; give --preset default "
+            "with several cameras or with --depth"
+        )
+    config = problems.caught(lambda: _config(options, preset), preset)
+    problems.check()
+    return TrackingRequest(
+        recording, person, options.preset, config, options.seed, inputs_of(options)
+    )
+
+
+def _camera(options: argparse.Namespace, problems: Problems) -> GivenCamera:
+    from cardbox_tracker.recordings.given_camera import GivenCamera
+    from cardbox_tracker.recordings.open_images import is_film
+
+    roll_deg = options.camera_roll_deg
+    roll_rad = None if roll_deg is None else math.radians(roll_deg)
+    camera = GivenCamera(options.fov, options.calibration, roll_rad, options.fps)
+    if None not in (options.fov, options.calibration):
+        problems.add("--fov and --calibration both describe the lens: leave one of them out")
+    elif not camera.is_calibrated and is_film(options.recording):
+        problems.miss("--fov DEG or --calibration FILE", _FOV_HINT)
+    else:
+        problems.caught(camera.check, None)
+    return camera
+
+
+def _silhouettes(options: argparse.Namespace, problems: Problems) -> Segmentation:
+    """Return the source of the silhouettes that is given, or that fits the recording."""
+    from cardbox_tracker.recordings.depth_silhouettes import Within
+    from cardbox_tracker.recordings.detector import MEDIAPIPE, Detector
+    from cardbox_tracker.recordings.open_images import is_bag
+    from cardbox_tracker.recordings.person_in_view import PersonInView
+    from cardbox_tracker.recordings.recording import STEREO
+
+    chosen, within = options.silhouettes, options.within
+    background: TimeSpan | None = options.background
+    is_given = background is not None or within is not None
+    if chosen is None and not is_given and options.detector == MEDIAPIPE:
+        chosen = "detector"
+    elif chosen is None and not is_given and not is_bag(options.recording):
+        chosen = "person_in_view"
+    if chosen in ("detector", "person_in_view"):
+        if is_given:
+            problems.add(
+                f"--silhouettes {chosen} takes the place of --background and --within: leave them "
+                "out"
+            )
+        if chosen == "detector":
+            return problems.caught(Detector.installed, PersonInView())
+    elif not is_given:
+        problems.miss(
+            "--background T0:T1 or --within M or --silhouettes detector|person_in_view",
+            "nobody is in view from T0 to T1, seconds; all that is nearer than M metres in the "
+            "images of --depth is the person",
+        )
+    elif within is not None and (background is not None or chosen is not None):
+        other = "--background" if chosen is None else "--silhouettes background"
+        problems.add(f"{other} and --within exclude each other: leave one of them out")
+    elif background is not None:
+        return background
+    elif options.depth in (None, STEREO):
+        problems.add("--within needs the topic of depth images: give --depth TOPIC")
+    else:
+        return Within(options.depth, within)
+    return PersonInView()
+
+
+def points_named(name: str) -> Detector | PointTable:
+    """Return the source of 2D points of a name: the detector's, or the path of a table.
+
+    Raises:
+        CardboxError: the detector is not installed, or there is no such table.
+    """
+    from cardbox_tracker.recordings.detector import MEDIAPIPE, Detector
+    from cardbox_tracker.recordings.point_table import PointTable
+
+    if name == MEDIAPIPE:
+        return Detector.installed()
+    path = Path(name)
+    if not path.is_file():
+        raise CardboxError(
+            f"--detector is {name!r}; expected {MEDIAPIPE}, or the file of a table of points "
+            "(docs/detectors.md)"
+        )
+    return PointTable(path)
+
+
+def _person(options: argparse.Namespace, problems: Problems) -> PersonRequest:
+    from cardbox_tracker.body.model import BodyModel
+    from cardbox_tracker.body.model_file import load_body_model
+    from cardbox_tracker.body.proportions import body_from_proportions
+
+    pitch_deg, body = options.camera_pitch_deg, BodyModel()
+    if options.model is None and options.stature is None:
+        problems.miss("--stature M or --model FILE")
+    elif None not in (options.model, options.stature):
+        problems.add("--stature and --model both say who is tracked: leave one of them out")
+    elif options.stature is not None:
+        body = problems.caught(
+            lambda: body_from_proportions(
+                options.stature,
+                options.distance,
+                camera_pitch_rad=math.radians(pitch_deg or 0.0),
+            ),
+            body,
+        )
+    else:
+        for flag, value in (("--distance", options.distance), ("--camera-pitch-deg", pitch_deg)):
+            if value is not None:
+                problems.add(f"{flag} has no effect with --model, which contains it")
+        if options.start is None:
+            problems.miss("--start T", "with --model, the person stands as for --front at T")
+        body = problems.caught(lambda: load_body_model(options.model), body)
+    is_pitch_given = options.model is not None or pitch_deg is not None
+    return PersonRequest(body, options.model, options.start or 0.0, is_pitch_given)
+
+
+def _config(options: argparse.Namespace, preset: TrackerConfig) -> TrackerConfig:
+    """Return the preset changed by depth images, the file of settings, and the options.
+
+    Raises:
+        CardboxError: the file cannot be read, or a value is wrong or has no effect.
+    """
+    from cardbox_tracker.estimation.settings_file import read_settings
+
+    config = preset if options.depth is None else preset.with_depth()
+    if options.settings is not None:
+        config = read_settings(options.settings, config)
+    given = dict(options.set or {})
+    if options.effort is not None:
+        given[_EFFORT] = options.effort
+    try:
+        return config.changed(nested(given))
+    except NoEffectError as error:
+        instead = "--effort" if error.instead == _EFFORT else f"--set {error.instead}=VALUE"
+        name = error.name if error.name in (options.set or {}) else "--effort"
+        raise CardboxError(f"{name} has no effect {error.where}; use {instead}") from None
+    except ValueError as error:
+        raise CardboxError(str(error).replace(_EFFORT, "--effort")) from None
+
+
+def with_own_options(options: argparse.Namespace, folder: Path, name: str) -> argparse.Namespace:
+    """Return the options of one recording of ``folder``.
+
+    The file ``NAME.options`` beside a recording, or beside a folder of recordings, has options as
+    they are typed. They change those of the command line, and inner files those of outer ones.
+    Paths in a file begin at the folder of the file.
+
+    Args:
+        options: the command line.
+        folder: the folder of all recordings.
+        name: name of the recording, see :func:`~.recordings.folder.recordings_in`.
+
+    Raises:
+        CardboxError: a file cannot be read, or has options that tracking does not know.
+    """
+    found = copy.copy(options)
+    for part in reversed([PurePosixPath(name), *PurePosixPath(name).parents][:-1]):
+        path = folder / f"{part}{OPTIONS_ENDING}"
+        if not path.exists():
+            continue
+        given = _read_options(path)
+        for option in given:
+            vars(found).update(dict.fromkeys(_REPLACED.get(option, ())))
+        if "set" in given:
+            given["set"] = (found.set or {}) | given["set"]
+        vars(found).update(given)
+    return found
+
+
+def _read_options(path: Path) -> dict[str, Any]:
+    """Return the values of the options in a file, by their names in a namespace."""
+    try:
+        words = shlex.split(read_regular(path, _MOST_BYTES).decode(), comments=True)
+    except UnreadableFileError as error:
+        raise CardboxError(f"cannot read {path}: {error}") from None
+    except ValueError as error:  # no UTF-8, or a quotation mark without its second
+        raise CardboxError(
+            f"{path} has no options as they are typed: {error}; give options of 'cardbox track' in "
+            "UTF-8, such as --stature 1.75"
+        ) from None
+
+    class Parser(argparse.ArgumentParser):
+        def error(self, message: str) -> NoReturn:
+            raise CardboxError(f"{path}: {message}; give options of 'cardbox track'")
+
+    parser, absent = Parser(add_help=False, allow_abbrev=False), object()
+    add_tracking(parser, needs_recording=False)
+    values = argparse.Namespace(**dict.fromkeys(vars(parser.parse_args([])), absent))
+    parser.parse_args(words, values)
+    given = {name: value for name, value in vars(values).items() if value is not absent}
+    other = given.pop("recording", None)
+    if other is not None:
+        parser.error(f"unrecognized arguments: {other}")
+    for name, value in given.items():
+        if isinstance(value, Path):
+            given[name] = path.parent / value
+        elif name == "detector" and (path.parent / value).is_file():
+            given[name] = str(path.parent / value)
+    return given

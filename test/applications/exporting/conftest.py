@@ -1,0 +1,77 @@
+"""Motions of postures with raised shoulders, and a reader of BVH that is not ours."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from cardbox_tracker.applications.exporting.motion import Motion
+from cardbox_tracker.body.kinematics import pose
+from cardbox_tracker.body.model import BodyModel
+from cardbox_tracker.body.skeleton import rotation_x, rotation_y, rotation_z
+from cardbox_tracker.vision.camera import Camera
+
+STEP_NS = 100_000_000
+TURNS: dict[str, Callable[..., np.ndarray]] = {"X": rotation_x, "Y": rotation_y, "Z": rotation_z}
+
+
+def motion_of(states: np.ndarray, body: BodyModel, rises_m: tuple[float, float] = (0, 0)) -> Any:
+    """Return the motion of states (n, 14), 10 a second; rows of nan are gaps.
+
+    ``rises_m`` raise the left and right shoulder.
+    """
+    states = np.atleast_2d(np.asarray(states, float))
+    points = pose(body, states, clavicles_m=np.tile(rises_m, (len(states), 1))).keypoints_m
+    camera = Camera(1, 1, 1.0, 1.0, 0.0, 0.0, body.camera_pose.pitch_rad)
+    stamps = np.arange(len(states)) * STEP_NS
+    return Motion(
+        stamps,
+        stamps / 1e9,
+        tuple("lost" if np.isnan(row).any() else "tracking" for row in states),
+        states,
+        np.full((len(states), 2), np.nan),
+        camera.reference_to_optical(points),
+    )
+
+
+def joints_of_bvh(path: Path) -> dict[str, np.ndarray]:
+    """Return the places (n, 3) of the joints in the axes of the file, as the library reads it."""
+    bvh = pytest.importorskip("bvh", reason="bvh is not installed")
+    file = bvh.Bvh(path.read_text(encoding="utf-8"))
+    places: dict[str, np.ndarray] = {}
+    rotations: dict[str, np.ndarray] = {}
+    for name in file.get_joints_names():
+        place = np.tile(np.array(file.joint_offset(name)), (file.nframes, 1))
+        rotation = np.tile(np.eye(3), (file.nframes, 1, 1))
+        for channel in file.joint_channels(name):
+            values = [file.frame_joint_channel(i, name, channel) for i in range(file.nframes)]
+            if channel.endswith("position"):
+                place[:, "XYZ".index(channel[0])] += values
+            else:
+                rotation = rotation @ TURNS[channel[0]](np.radians(values))
+        parent = file.joint_parent(name)
+        if parent is not None:
+            place = places[parent.name] + np.einsum("nij,nj->ni", rotations[parent.name], place)
+            rotation = rotations[parent.name] @ rotation
+        places[name], rotations[name] = place, rotation
+    return places
+
+
+@pytest.fixture(name="motion_of")
+def _motion_of() -> Callable[..., Motion]:
+    return motion_of
+
+
+@pytest.fixture(name="joints_of_bvh")
+def _joints_of_bvh() -> Callable[[Path], dict[str, np.ndarray]]:
+    return joints_of_bvh
+
+
+@pytest.fixture(name="body", scope="session")
+def _body() -> BodyModel:
+    """A person before a camera that looks down by 0.2 rad."""
+    return BodyModel.of(distance_m=2.5, hip_height_m=-0.4, camera_pitch_rad=0.2)

@@ -1,0 +1,108 @@
+"""The skeleton as another reader sees it: bones, places and gaps."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
+
+from cardbox_tracker.applications.exporting.bvh import write_bvh
+from cardbox_tracker.applications.exporting.markers import markers_of
+from cardbox_tracker.body.model import BodyModel
+from cardbox_tracker.body.posture import state_limits
+from cardbox_tracker.errors import CardboxError
+
+LIMBS = ("Arm", "ForeArm", "Hand")
+JOINTS = [f"{side}{limb}" for side in ("Left", "Right") for limb in LIMBS]
+# From the axes of the file, left, up and to the camera, into those of the laboratory.
+TO_LABORATORY = np.array([(0, 0, 1), (0, 1, 0), (-1, 0, 0)])
+LIMITS = state_limits(2.5)
+shares = arrays(float, (3, 14), elements=st.floats(0, 1))
+
+
+@given(share=shares, left=st.floats(0.0, 0.073), right=st.floats(0.0, 0.073))
+@settings(max_examples=25, suppress_health_check=[HealthCheck.function_scoped_fixture])
+def test_joints_are_where_the_table_has_them(
+    share: np.ndarray,
+    left: float,
+    right: float,
+    motion_of: Callable,
+    joints_of_bvh: Callable,
+    body: BodyModel,
+    tmp_path: Path,
+) -> None:
+    states = LIMITS[:, 0] + share * (LIMITS[:, 1] - LIMITS[:, 0])
+    motion = motion_of(states, body, (left, right))
+    write_bvh(tmp_path / "a.bvh", motion, body)
+    found = joints_of_bvh(tmp_path / "a.bvh")
+    expected_m = markers_of(motion, body).points_m
+    for number, name in enumerate(JOINTS):
+        # A bone turns, where the clavicle of the model is displaced along a line.
+        assert found[name] @ TO_LABORATORY.T == pytest.approx(expected_m[:, number], abs=3.1e-3)
+    assert found["Hips"] @ TO_LABORATORY.T == pytest.approx(expected_m[:, 6], abs=1e-3)
+
+
+def test_a_lifted_shoulder_does_not_turn_the_arm(
+    motion_of: Callable, joints_of_bvh: Callable, body: BodyModel, tmp_path: Path
+) -> None:
+    write_bvh(tmp_path / "a.bvh", motion_of(np.zeros(14), body, (0.05, 0.03)), body)
+    found = joints_of_bvh(tmp_path / "a.bvh")
+    inner_m = (0.5 - 0.43) * body.size("shoulder_breadth")
+    for side, sign, rise_m in (("Left", 1, 0.05), ("Right", -1, 0.03)):
+        clavicle_m = 0.43 * body.size("shoulder_breadth")
+        raised = found[f"{side}Arm"] - found[f"{side}Shoulder"]
+        assert np.linalg.norm(raised[0]) == pytest.approx(clavicle_m, abs=1e-5)
+        expected = sign * (clavicle_m - np.sin(0.2) * rise_m), np.cos(0.2) * rise_m, 0.0
+        assert raised[0] == pytest.approx(np.array(expected), abs=3.1e-3)
+        assert found[f"{side}Shoulder"][0, 0] == pytest.approx(sign * inner_m, abs=1e-5)
+        down = found[f"{side}ForeArm"] - found[f"{side}Arm"]
+        assert down[0] == pytest.approx([0, -body.size("upper_arm_length"), 0], abs=1e-5)
+
+
+def test_bones_are_those_of_the_body_and_angles_those_of_the_table(
+    motion_of: Callable, joints_of_bvh: Callable, body: BodyModel, tmp_path: Path
+) -> None:
+    state = np.zeros(14)
+    state[[1, 2, 3, 5, 8, 10, 11]] = np.radians([5, 20, 30, 40, 50, 60, 70])
+    motion = replace(motion_of(state, body), neck=np.radians([[25.0, 15.0]]))
+    write_bvh(tmp_path / "a.bvh", motion, body)
+    bvh = pytest.importorskip("bvh", reason="bvh is not installed")
+    file = bvh.Bvh((tmp_path / "a.bvh").read_text(encoding="utf-8"))
+    assert file.joint_offset("LeftForeArm") == (0.0, -body.size("upper_arm_length"), 0.0)
+    assert file.joint_offset("RightHand") == (0.0, -body.size("forearm_length"), 0.0)
+    for joint, channel, degrees in (
+        *(("Hips", "Y", 30), ("Spine", "X", 20), ("Spine", "Z", 5)),
+        *(("Neck", "Y", 25), ("Neck", "X", 15), ("LeftArm", "X", -40), ("LeftArm", "Z", 0)),
+        *(("RightArm", "Z", -50), ("RightForeArm", "Z", -60), ("RightForeArm", "X", -70)),
+    ):
+        found = file.frame_joint_channel(0, joint, f"{channel}rotation")
+        assert found == pytest.approx(degrees, abs=1e-4), (joint, channel)
+    assert file.frame_time == pytest.approx(1.0)
+    places = joints_of_bvh(tmp_path / "a.bvh")
+    assert set(places) == {
+        *("Hips", "Spine", "Chest", "Neck", "Head", "LeftShoulder", "RightShoulder"),
+        *JOINTS,
+    }
+
+
+def test_gaps_repeat_the_posture_before(
+    motion_of: Callable, joints_of_bvh: Callable, body: BodyModel, tmp_path: Path
+) -> None:
+    gap, first, second = np.full(14, np.nan), np.zeros(14), np.full(14, 0.2)
+    write_bvh(tmp_path / "a.bvh", motion_of([gap, first, gap, second], body), body)
+    hands = joints_of_bvh(tmp_path / "a.bvh")["LeftHand"]
+    assert hands[0] == pytest.approx(hands[1])
+    assert hands[2] == pytest.approx(hands[1])
+    assert np.linalg.norm(hands[3] - hands[2]) > 0.1
+
+
+def test_the_body_is_needed(motion_of: Callable, body: BodyModel, tmp_path: Path) -> None:
+    with pytest.raises(CardboxError, match=r"give --model MODEL.yaml"):
+        write_bvh(tmp_path / "a.bvh", motion_of(np.zeros(14), body), None)
+    assert list(tmp_path.iterdir()) == []

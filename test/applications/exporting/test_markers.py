@@ -1,0 +1,126 @@
+"""Markers by hand, and files of them as other people's readers see them."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from cardbox_tracker.applications.exporting.markers import markers_of, write_c3d, write_trc
+from cardbox_tracker.applications.exporting.placed import images_of_body
+from cardbox_tracker.body.model import BodyModel
+from cardbox_tracker.errors import CardboxError
+
+GAP = np.full(14, np.nan)
+NAMES = ["LShoulder", "LElbow", "LHand", "RShoulder", "RElbow", "RHand", "Hip", "Neck"]
+
+
+def test_places_by_hand(motion_of: Callable) -> None:
+    """A person two metres before a level camera: torso 0.53 m, shoulders 0.05 m below its top."""
+    body = BodyModel.of(distance_m=2.0, hip_height_m=-0.5)
+    names, points_m = markers_of(motion_of(np.zeros(14), body), body)
+    assert list(names) == NAMES
+    assert points_m[0] == pytest.approx(
+        np.array(
+            [
+                *[(-2, -0.02, -0.18), (-2, -0.29, -0.18), (-2, -0.65, -0.18)],
+                *[(-2, -0.02, 0.18), (-2, -0.29, 0.18), (-2, -0.65, 0.18)],
+                *[(-2, -0.5, 0), (-2, 0.03, 0)],
+            ]
+        )
+    )
+
+
+def test_the_place_moves_all_markers(motion_of: Callable, body: BodyModel) -> None:
+    still, moved = np.zeros(14), np.zeros(14)
+    moved[[0, 12, 13]] = 0.3, 0.2, -0.1  # to the person's left, nearer, lower
+    points_m = markers_of(motion_of([still, moved], body), body).points_m
+    assert points_m[1] - points_m[0] == pytest.approx(np.tile([0.2, -0.1, -0.3], (8, 1)))
+
+
+def test_without_a_body_the_camera_is_level(motion_of: Callable, body: BodyModel) -> None:
+    motion = motion_of(np.zeros(14), body)
+    names, points_m = markers_of(motion, None)
+    x, y, z = motion.keypoints_m[0].T
+    assert list(names) == NAMES[:6]
+    assert points_m[0] == pytest.approx(np.stack([-z, -y, -x], axis=1))
+    upright = markers_of(motion, body).points_m[0]
+    assert upright[0, 0] == pytest.approx(upright[2, 0])
+    assert abs(points_m[0, 0, 0] - points_m[0, 2, 0]) > 0.1
+
+
+def test_another_body_is_refused(motion_of: Callable, body: BodyModel) -> None:
+    motion = motion_of(np.zeros((3, 14)), body, (0.05, 0.07))
+    same = images_of_body(motion, body)
+    assert same.is_seen.all()
+    longer = body.with_values(sizes=body.sizes * 1.02)
+    with pytest.raises(CardboxError, match=r"joints differ by 0\.0.* give the model"):
+        images_of_body(motion, longer)
+    with pytest.raises(CardboxError, match=r"joints differ by 0\.2"):
+        images_of_body(motion, body.with_values(distance_m=2.7))
+    raised = motion_of(np.zeros((3, 14)), body, (0.2, 0.0))
+    with pytest.raises(CardboxError, match=r"shoulders rise by 0\.2"):
+        images_of_body(raised, body)
+
+
+def test_images_of_an_earlier_fit_are_gaps(motion_of: Callable, body: BodyModel) -> None:
+    """The guess of the first image puts the person 0.2 m farther than the body that follows."""
+    motion = motion_of(np.zeros((3, 14)), body)
+    states = motion.states.copy()
+    states[0, 12] = 0.2
+    fitted = images_of_body(replace(motion, states=states), body)
+    assert fitted.is_seen.tolist() == [False, True, True]
+    assert np.isnan(markers_of(fitted, body).points_m[0]).all()
+
+
+def test_trc_by_hand(motion_of: Callable, tmp_path: Path) -> None:
+    body = BodyModel.of(distance_m=2.0, hip_height_m=-0.5)
+    motion = motion_of([np.zeros(14), GAP, np.zeros(14)], body)
+    write_trc(tmp_path / "a.trc", motion, body)
+    rows = [line.split("\t") for line in (tmp_path / "a.trc").read_text().split("\n")]
+    assert rows[0] == ["PathFileType", "4", "(X/Y/Z)", "a.trc"]
+    assert rows[1] == [
+        *("DataRate", "CameraRate", "NumFrames", "NumMarkers", "Units"),
+        *("OrigDataRate", "OrigDataStartFrame", "OrigNumFrames"),
+    ]
+    assert rows[2] == ["10", "10", "3", "8", "m", "10", "1", "3"]
+    assert rows[3][:5] == ["Frame#", "Time", "LShoulder", "", ""]
+    assert rows[4][:6] == ["", "", "X1", "Y1", "Z1", "X2"]
+    assert rows[6][:5] == ["1", "0.000000", "-2.000000", "-0.020000", "-0.180000"]
+    assert rows[7] == ["2", "0.100000", *[""] * 25]
+    assert rows[8][:2] == ["3", "0.200000"]
+    # A row ends in a tab, without which OpenSim misses the last cell of a gap.
+    assert {len(row) for row in (rows[4], *rows[6:9])} == {2 + 24 + 1}
+    assert rows[9:] == [[""]]
+
+
+@pytest.mark.filterwarnings("ignore:builtin type:DeprecationWarning")
+def test_ezc3d_reads_the_same_places(motion_of: Callable, body: BodyModel, tmp_path: Path) -> None:
+    ezc3d = pytest.importorskip("ezc3d", reason="ezc3d is not installed")
+    postures = np.random.default_rng(1).uniform(-0.3, 0.6, (5, 14))
+    postures[2] = GAP
+    motion = motion_of(postures, body, (0.05, 0.02))
+    write_c3d(tmp_path / "a.c3d", motion, body)
+    read = ezc3d.c3d(str(tmp_path / "a.c3d"))
+    about = read["parameters"]["POINT"]
+    assert about["LABELS"]["value"] == NAMES
+    assert (about["UNITS"]["value"], about["RATE"]["value"].tolist()) == (["mm"], [10.0])
+    points_m = np.moveaxis(read["data"]["points"][:3], (0, 1, 2), (2, 1, 0)) / 1000
+    expected_m = markers_of(motion, body).points_m
+    assert points_m == pytest.approx(expected_m, abs=1e-6, nan_ok=True)
+    residuals = read["data"]["meta_points"]["residuals"][0]
+    assert (residuals[:, 2] == -1).all()
+    assert (residuals[:, [0, 1, 3, 4]] == 0).all()
+
+
+def test_without_ezc3d_the_extra_is_named_and_nothing_is_left(
+    motion_of: Callable, body: BodyModel, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setitem(sys.modules, "ezc3d", None)
+    with pytest.raises(CardboxError, match=r"pip install cardbox_tracker\[export\].*--to trc"):
+        write_c3d(tmp_path / "a.c3d", motion_of(np.zeros(14), body), body)
+    assert list(tmp_path.iterdir()) == []

@@ -1,0 +1,192 @@
+"""Tables and bags of results as a motion, and mistakes in words."""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from cardbox_tracker.applications.exporting import motion_reader
+from cardbox_tracker.applications.exporting.motion import Motion
+from cardbox_tracker.applications.exporting.motion_reader import read_motion
+from cardbox_tracker.body.kinematics import pose
+from cardbox_tracker.body.model import BodyModel
+from cardbox_tracker.errors import CardboxError
+from cardbox_tracker.estimation.estimate import Estimate
+from cardbox_tracker.estimation.tracker import Tracker
+from cardbox_tracker.recordings.result_bag import result_bag
+from cardbox_tracker.recordings.result_table import columns, result_table
+from cardbox_tracker.recordings.silhouettes import RecordedFrame
+from cardbox_tracker.vision.camera import Camera
+
+BODY = BodyModel.of(hip_height_m=-0.51)
+CAMERA = Camera(64, 48, 66.0, 66.0, 31.5, 23.5)
+GREY = np.zeros((48, 64), np.uint8)
+
+
+def estimates() -> list[Estimate]:
+    """Results of five images, of which the second and fourth have no posture."""
+    postures = np.random.default_rng(2).uniform(-0.2, 0.5, (2, 12))
+    points = CAMERA.reference_to_optical(pose(BODY.rigid, postures).keypoints_m)
+    seen = Estimate("tracking", postures[0], np.full(12, 0.1), points[0], 10, 0.9)
+    moved = replace(
+        seen,
+        state="uncertain",
+        posture=postures[1],
+        keypoints_m=points[1],
+        offset_m=np.array([0.0, -0.05]),
+        offset_stddev_m=np.full(2, 0.1),
+        neck=np.array([0.0, 0.2]),
+        neck_stddev=np.full(2, 0.3),
+    )
+    return [seen, Estimate("lost"), moved, Estimate("no_person"), seen]
+
+
+def write_table(path: Path) -> Path:
+    with result_table(path, has_points=True) as add:
+        for number, estimate in enumerate(estimates()):
+            add(RecordedFrame(number * 10**8 + 7, 2 + number / 10, GREY, GREY), estimate)
+    return path
+
+
+def write_bag(path: Path) -> Path:
+    tracker = Tracker(BODY, CAMERA)
+    with result_bag(path, "camera") as add:
+        for number, estimate in enumerate(estimates()):
+            add(RecordedFrame(number * 10**8 + 7, number / 10, GREY, GREY), estimate, tracker)
+    return path
+
+
+def assert_is_what_was_written(motion: Motion) -> None:
+    written = estimates()
+    assert motion.stamp_ns.tolist() == [7 + i * 10**8 for i in range(5)]
+    assert motion.state == ("tracking", "lost", "uncertain", "no_person", "tracking")
+    assert motion.is_seen.tolist() == [True, False, True, False, True]
+    for number in (0, 2, 4):
+        one = written[number]
+        assert motion.states[number, :12] == pytest.approx(one.posture, abs=1e-6)
+        assert motion.keypoints_m[number] == pytest.approx(one.keypoints_m, abs=1e-6)
+    assert motion.states[2, 12:] == pytest.approx([0.0, -0.05])
+    assert motion.neck[2] == pytest.approx([0.0, 0.2])
+    assert np.isnan(motion.neck[[0, 4]]).all()
+    assert motion.rate_hz == 10.0
+
+
+@pytest.mark.parametrize("name", ["a.csv", "a.parquet"])
+def test_a_table_is_read_as_it_was_written(name: str, tmp_path: Path) -> None:
+    if name.endswith("parquet"):
+        pytest.importorskip("pyarrow", reason="pyarrow is not installed")
+    motion, body = read_motion(write_table(tmp_path / name))
+    assert_is_what_was_written(motion)
+    assert motion.time_s == pytest.approx([2.0, 2.1, 2.2, 2.3, 2.4])
+    assert body is None
+
+
+def test_a_bag_is_read_with_its_body(tmp_path: Path) -> None:
+    motion, body = read_motion(write_bag(tmp_path / "results"))
+    assert_is_what_was_written(motion)
+    assert motion.time_s == pytest.approx([0.0, 0.1, 0.2, 0.3, 0.4])
+    assert body is not None
+    assert body.sizes == pytest.approx(BODY.sizes)
+
+
+STAMP_NS = columns().index("stamp_ns")
+
+
+def without_column(rows: list[list[str]]) -> None:
+    for row in rows:
+        del row[11]
+
+
+def with_text(rows: list[list[str]]) -> None:
+    rows[3][5] = "much"
+
+
+def with_state(rows: list[list[str]]) -> None:
+    rows[1][1] = "sleeping"
+
+
+def with_empty_cell(rows: list[list[str]]) -> None:
+    rows[1][20] = ""
+
+
+def without_postures(rows: list[list[str]]) -> None:
+    for row in rows[1:]:
+        row[1] = "lost"
+
+
+@pytest.mark.parametrize(
+    ("change", "expected"),
+    [
+        (without_column, "has no column right_shoulder_flexion; give a table"),
+        (with_text, "image 3: .*much.*docs/results.md"),
+        (with_state, "image 1: .*sleeping"),
+        (with_empty_cell, "image 1: "),
+        (lambda rows: rows[2].__setitem__(STAMP_NS, str(10**30)), "the stamp is 1000"),
+        (lambda rows: rows[2].__setitem__(STAMP_NS, "-1"), "the stamp is -1"),
+        (lambda rows: rows.__delitem__(slice(1, None)), "no image with a posture"),
+        (without_postures, "no image with a posture"),
+    ],
+)
+def test_mistakes_in_a_table(
+    change: Callable[[list[list[str]]], None], expected: str, tmp_path: Path
+) -> None:
+    path = write_table(tmp_path / "a.csv")
+    with path.open(newline="", encoding="utf-8") as file:
+        rows = list(csv.reader(file))
+    change(rows)
+    with path.open("w", newline="", encoding="utf-8") as file:
+        csv.writer(file).writerows(rows)
+    with pytest.raises(CardboxError, match=expected):
+        read_motion(path)
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "expected"),
+    [
+        ("missing.csv", None, "there are no results"),
+        ("empty.csv", b"", "has no column stamp_ns"),
+        ("binary.csv", bytes(range(256)), "is not a table in UTF-8"),
+        ("text.parquet", b"no table", "cannot read .*text.parquet"),
+        ("zeros.csv", bytes(100), "has no column|is not a table"),
+    ],
+)
+def test_other_files(name: str, content: bytes | None, expected: str, tmp_path: Path) -> None:
+    if name.endswith("parquet"):
+        pytest.importorskip("pyarrow", reason="pyarrow is not installed")
+    if content is not None:
+        (tmp_path / name).write_bytes(content)
+    with pytest.raises(CardboxError, match=expected):
+        read_motion(tmp_path / name)
+
+
+def test_a_parquet_table_that_claims_too_many_rows_is_refused_before_they_are_built(
+    tmp_path: Path,
+) -> None:
+    arrow = pytest.importorskip("pyarrow", reason="pyarrow is not installed")
+    parquet = pytest.importorskip("pyarrow.parquet", reason="pyarrow is not installed")
+    nothing = arrow.nulls(3_000_001)
+    path = tmp_path / "bomb.parquet"
+    parquet.write_table(arrow.table({"stamp_ns": nothing}), path)
+    assert path.stat().st_size < 100_000
+    with pytest.raises(CardboxError, match="3000001 images"):
+        read_motion(path)
+
+
+def test_a_parquet_table_of_several_batches_is_read_whole(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    arrow = pytest.importorskip("pyarrow", reason="pyarrow is not installed")
+    parquet = pytest.importorskip("pyarrow.parquet", reason="pyarrow is not installed")
+    expected, _ = read_motion(write_table(tmp_path / "a.csv"))
+    with (tmp_path / "a.csv").open(newline="", encoding="utf-8") as file:
+        rows = list(csv.DictReader(file))
+    parquet.write_table(arrow.Table.from_pylist(rows), tmp_path / "a.parquet")
+    monkeypatch.setattr(motion_reader, "_BATCH", 2)
+    found, _ = read_motion(tmp_path / "a.parquet")
+    np.testing.assert_array_equal(found.stamp_ns, expected.stamp_ns)
+    np.testing.assert_array_equal(found.states, expected.states)

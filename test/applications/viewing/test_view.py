@@ -1,0 +1,388 @@
+"""'cardbox view' of a bag of results: what its file has is read back with the library."""
+
+from __future__ import annotations
+
+import re
+import sys
+import threading
+from collections import Counter
+from collections.abc import Iterator
+from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
+from pathlib import Path
+from typing import Any
+from urllib.error import HTTPError
+from urllib.request import urlopen
+
+import numpy as np
+import pytest
+
+from cardbox_tracker.applications.drawing.overlay import draw_sharp_overlay
+from cardbox_tracker.applications.viewing.sources import show_together
+from cardbox_tracker.applications.viewing.viewer import THIS_COMPUTER, web_page
+from cardbox_tracker.body.kinematics import pose
+from cardbox_tracker.body.model import BodyModel
+from cardbox_tracker.body.model_file import save_body_model
+from cardbox_tracker.body.posture import reference_posture
+from cardbox_tracker.body.urdf import urdf_from_body
+from cardbox_tracker.commands.main import main
+from cardbox_tracker.estimation.estimate import LOST, TRACKING, Estimate
+from cardbox_tracker.estimation.tracker import Tracker
+from cardbox_tracker.recordings.bag_reader import BagReader
+from cardbox_tracker.recordings.bag_writer import BagWriter
+from cardbox_tracker.recordings.result_bag import result_bag
+from cardbox_tracker.recordings.silhouettes import RecordedFrame
+from cardbox_tracker.simulation.motions import wave
+from cardbox_tracker.simulation.session import SessionFormat, synthesize_session
+from cardbox_tracker.vision.camera import Camera
+
+BODY = BodyModel.of(hip_height_m=-0.51)
+CAMERA = Camera(64, 48, 66.0, 66.0, 31.5, 23.5)
+IMAGES = 5
+
+
+def write_results(path: Path, first: int = 0, seed: int = 0, later_ns: int = 0) -> Path:
+    """Write a bag as 'cardbox track --bag' does: images from ``first`` on, of the noise ``seed``.
+
+    The person of another seed is seen by a camera whose pictures have other noise.
+    """
+    tracker = Tracker(BODY, CAMERA)
+    noise = np.random.default_rng(seed).integers(0, 256, (IMAGES + 1, 48, 64), np.uint8)
+    with result_bag(path, "camera", draw=draw_sharp_overlay) as bag:
+        for i in range(first, IMAGES + 1):
+            posture = wave(i / 5.0)
+            points = CAMERA.reference_to_optical(pose(BODY.rigid, posture).keypoints_m)
+            estimate = Estimate(TRACKING, posture, np.full(12, 0.1), points, 10, 0.9)
+            frame = RecordedFrame(i * 10**8 + later_ns, i / 10, noise[i], noise[i])
+            bag(frame, estimate if i < IMAGES else Estimate(LOST), tracker)
+    return path
+
+
+@pytest.fixture
+def results(tmp_path: Path) -> Path:
+    """Results for all images; the person is lost in the last one."""
+    return write_results(tmp_path / "results")
+
+
+def view(*words: object) -> int:
+    return main(["view", *map(str, words)])
+
+
+def rows_of(path: Path) -> Counter[str]:
+    """Rows of every entity in a file, static ones left out."""
+    chunk = pytest.importorskip("rerun.chunk", reason="rerun-sdk is not installed")
+    rows: Counter[str] = Counter()
+    for one in chunk.RrdReader(path).stream():
+        rows[str(one.entity_path).strip("/")] += 0 if one.is_static else one.num_rows
+    return rows
+
+
+def test_every_image_is_in_the_file(results: Path, tmp_path: Path) -> None:
+    pytest.importorskip("rerun", reason="rerun-sdk is not installed")
+    assert view(results, "--save", tmp_path / "view.rrd") == 0
+    rows = rows_of(tmp_path / "view.rrd")
+    assert rows["image"] == IMAGES + 1
+    assert rows["state"] == 2  # tracking, then lost
+    assert rows["keypoints/joints"] == IMAGES
+    for joint in ("left_elbow_flexion", "right_shoulder_abduction"):
+        assert rows[f"person/joints/{joint}"] == IMAGES
+        arm = joint.split("_")[0]
+        assert rows[f"joints/{arm}_arm/{joint}"] == IMAGES
+        for side in ("low", "high"):
+            spread = f"joints/{arm}_arm/within_two_deviations/{joint}/{side}"
+            assert rows[spread] == IMAGES
+    assert rows["joints/place/torso_y"] == IMAGES
+    # The body's boxes are there, once and for all.
+    assert any("left_forearm" in entity for entity in rows)
+    assert not any(entity.startswith("error") for entity in rows)
+
+
+def test_the_truth_of_other_images_is_refused_or_ignored(
+    results: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    pytest.importorskip("rerun", reason="rerun-sdk is not installed")
+    synthesize_session(tmp_path / "other", "bow", form=SessionFormat(2.0, 64, 48))
+    truth = tmp_path / "other" / "ground_truth.json"
+    assert view(results, "--truth", truth, "--save", tmp_path / "v.rrd") == 1
+    assert "has no true frame for an image of" in capsys.readouterr().err
+    # Nobody gave the one that lies beside the results.
+    truth.rename(tmp_path / "ground_truth.json")
+    assert view(results, "--save", tmp_path / "v.rrd") == 0
+    assert not any(entity.startswith("error") for entity in rows_of(tmp_path / "v.rrd"))
+
+
+def titles(part: Any) -> list[str]:
+    """Return the titles of all views of a blueprint."""
+    container = pytest.importorskip("rerun.blueprint").Container
+
+    if isinstance(part, container):
+        return [title for inner in part.contents for title in titles(inner)]
+    return [part.name]
+
+
+@pytest.mark.parametrize("has_truth", [False, True])
+def test_the_view_of_errors_is_there_only_with_a_truth(has_truth: bool) -> None:
+    pytest.importorskip("rerun", reason="rerun-sdk is not installed")
+    from cardbox_tracker.applications.viewing.scene import layout
+
+    found = titles(layout(has_truth=has_truth).root_container)
+    assert ("error [cm]" in found) == has_truth
+    assert {"image", "measured body", "left arm [deg]", "state"} <= set(found)
+
+
+def test_recordings_play_from_the_start_and_nodes_are_followed() -> None:
+    pytest.importorskip("rerun", reason="rerun-sdk is not installed")
+    from cardbox_tracker.applications.viewing.scene import layout
+
+    assert layout().time_panel.play_state == "playing"
+    assert layout(is_live=True).time_panel.play_state == "following"
+
+
+def test_two_results_have_a_column_each_and_one_time_line(tmp_path: Path) -> None:
+    chunk = pytest.importorskip("rerun.chunk", reason="rerun-sdk is not installed")
+    from cardbox_tracker.applications.viewing.scene import columns, layout
+
+    # The second one was tracked from a later image on.
+    first, second = write_results(tmp_path / "a"), write_results(tmp_path / "b", first=2)
+    out = tmp_path / "v.rrd"
+    assert view(second, "--beside", first, "--save", out) == 0
+    rows = rows_of(out)
+    assert rows["first/image"] == IMAGES - 1
+    assert rows["second/image"] == IMAGES + 1
+    for entity in ("keypoints/joints", "person/joints/left_elbow_flexion"):
+        assert (rows[f"first/{entity}"], rows[f"second/{entity}"]) == (IMAGES - 2, IMAGES)
+    assert {"first_person", "second_person"} <= {entity.split("/")[0] for entity in rows}
+    starts_s: dict[str, float] = {}
+    for one in chunk.RrdReader(out).stream():
+        if (entity := str(one.entity_path)).endswith("/image"):
+            start_s = min(one.to_record_batch()["time"].to_pylist()).total_seconds()
+            starts_s[entity] = min(start_s, starts_s.get(entity, start_s))
+    assert starts_s == pytest.approx({"/first/image": 0.2, "/second/image": 0.0})
+    found = titles(layout(columns(("b", "a"))).root_container)
+    assert [title for title in found if ":" in title] == [
+        *("b: image", "b: measured body", "a: image", "a: measured body"),
+    ]
+
+
+def test_two_results_are_sent_at_the_same_time(tmp_path: Path) -> None:
+    """A browser plays what has arrived, so the second result must not wait for the first."""
+    paths = write_results(tmp_path / "a"), write_results(tmp_path / "b")
+    sent: list[int] = []
+    fractions: list[float] = []
+
+    class Receiver:
+        def __init__(self, number: int) -> None:
+            self.number = number
+
+        def __getattr__(self, name: str) -> Any:
+            def receive(*_: Any) -> None:
+                if name == "image":
+                    sent.append(self.number)
+
+            return receive
+
+    with BagReader(paths[0]) as first, BagReader(paths[1]) as second:
+        results: Any = [(first, Receiver(0)), (second, Receiver(1))]
+        assert show_together(results, fractions.append) == [IMAGES, IMAGES]
+    assert sorted(sent) == [0] * (IMAGES + 1) + [1] * (IMAGES + 1)
+    ahead = np.cumsum([1 if number else -1 for number in sent])
+    assert np.abs(ahead).max() <= 2
+    assert fractions == sorted(fractions)
+
+
+@pytest.mark.parametrize(
+    ("other", "expected"),
+    [
+        ({"later_ns": 1}, "have no image in common"),
+        ({"later_ns": 10**8}, r"1 of the 6 images of \S+ are not among those of"),
+    ],
+)
+def test_results_of_other_images_are_not_compared(
+    results: Path,
+    tmp_path: Path,
+    other: dict[str, int],
+    expected: str,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    pytest.importorskip("rerun", reason="rerun-sdk is not installed")
+    beside = write_results(tmp_path / "other", **other)
+    assert view(results, "--beside", beside, "--save", tmp_path / "v.rrd") == 1
+    said = capsys.readouterr().err
+    assert re.search(expected, said)
+    assert "give two results of the same recording" in said
+    assert not (tmp_path / "v.rrd").exists()
+
+
+def test_names_of_results_differ() -> None:
+    from cardbox_tracker.commands.view import _names_of
+
+    assert _names_of([]) == []
+    assert _names_of([Path("/x/one"), Path("/x/two")]) == ["one", "two"]
+    assert _names_of([Path("/x/one/results"), Path("/x/two/results")]) == [
+        "one/results",
+        "two/results",
+    ]
+
+
+def test_a_robot_of_its_own_namespace_is_shown(tmp_path: Path) -> None:
+    pytest.importorskip("rerun", reason="rerun-sdk is not installed")
+    names = ("torso_yaw", "elbow")
+    with BagWriter(tmp_path / "bag", "mcap") as bag:
+        save_body_model(BODY, tmp_path / "person.yaml")
+        bag.write_string("/body_model", 1, (tmp_path / "person.yaml").read_text())
+        bag.write_string("/arm/robot_description", 1, urdf_from_body(BODY))
+        for i in range(1, 4):
+            bag.write_joint_state("/arm/joint_states", i, "", names, np.array([0.1, 0.2]))
+    assert view(tmp_path / "bag", "--save", tmp_path / "v.rrd") == 0
+    rows = rows_of(tmp_path / "v.rrd")
+    assert rows["arm/joints/torso_yaw"] == 3
+    assert "arm/joints/elbow" not in rows
+
+
+def test_errors_are_those_of_the_keypoints() -> None:
+    scene = pytest.importorskip("cardbox_tracker.applications.viewing.scene")
+    truth = CAMERA.reference_to_optical(pose(BODY.rigid, reference_posture("front")).keypoints_m)
+    moved = truth + np.array([0.0, 0.0, 0.1])
+    assert scene.errors_cm(moved, truth) == pytest.approx({"absolute": 10.0, "aligned": 0.0})
+    moved[2, 1] += 0.06
+    assert scene.errors_cm(moved, truth)["aligned"] == pytest.approx(1.0)
+
+
+@pytest.mark.parametrize("pitch_rad", [0.0, 0.3])
+def test_points_stand_where_the_urdf_has_the_person(pitch_rad: float) -> None:
+    scene = pytest.importorskip("cardbox_tracker.applications.viewing.scene")
+    body = BODY.with_values(camera_pitch_rad=pitch_rad)
+    camera = CAMERA.with_pitch(pitch_rad)
+    reference = pose(body.rigid, reference_posture("front")).keypoints_m
+    level = scene.level_points(camera.reference_to_optical(reference), pitch_rad)
+    # The reference frame faces the camera; the root of the URDF looks the same way as it.
+    np.testing.assert_allclose(level, reference * (-1.0, -1.0, 1.0), atol=1e-12)
+
+
+Refusal = tuple[tuple[str, ...], str]
+REFUSALS: list[Refusal] = [
+    ((), "expected either BAG or --live"),
+    (("BAG", "--live"), "expected either BAG or --live"),
+    (("BAG", "--save", "FOLDER/missing/v.rrd"), "No such file or directory"),
+    (("BAG", "--beside", "FOLDER/missing"), "there is no recording"),
+    (("--live", "--beside", "BAG"), "--beside needs a bag of results"),
+]
+
+
+@pytest.mark.parametrize(("words", "expected"), REFUSALS)
+def test_mistakes_are_told(
+    results: Path, words: tuple[str, ...], expected: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    given = [w.replace("BAG", str(results)).replace("FOLDER", str(results.parent)) for w in words]
+    assert view(*given) == 1
+    assert expected in capsys.readouterr().err
+
+
+def test_images_alone_are_tracked_or_refused(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    pytest.importorskip("rerun", reason="rerun-sdk is not installed")
+    synthesize_session(tmp_path / "session", "bow", form=SessionFormat(4.0, 160, 120))
+    save_body_model(BODY, tmp_path / "person.yaml")
+    out = tmp_path / "v.rrd"
+    assert view(tmp_path / "session", "--start", "22", "--save", out) == 1
+    assert "--model" in capsys.readouterr().err
+    assert not out.exists()
+    rest = ("--background", "0:3.9", "--model", tmp_path / "person.yaml", "--start", "22")
+    assert view(tmp_path / "session", *rest, "--save", out) == 0
+    rows = rows_of(out)
+    assert rows["image"] >= rows["keypoints/joints"] > 0
+    # The truth lies beside the recording.
+    assert rows["error/absolute"] == rows["truth/joints"] == rows["keypoints/joints"]
+
+
+def test_without_a_display_the_other_ways_are_named(
+    results: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    pytest.importorskip("rerun", reason="rerun-sdk is not installed")
+    monkeypatch.setattr("cardbox_tracker.applications.viewing.viewer._has_display", lambda: False)
+    assert view(results) == 1
+    assert "--save FILE.rrd" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("words", "expected"),
+    [
+        (("nope",), r"there is no recording nope"),
+        (("BAG", "--truth", "nope.json"), r"nope\.json"),
+    ],
+)
+def test_a_missing_file_is_named_before_a_missing_library(
+    results: Path,
+    words: tuple[str, ...],
+    expected: str,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    monkeypatch.setitem(sys.modules, "rerun", None)
+    assert view(*(word.replace("BAG", str(results)) for word in words)) == 1
+    said = capsys.readouterr().err
+    assert re.search(expected, said) and "rerun" not in said
+
+
+def test_without_the_library_its_extra_is_named(
+    results: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setitem(sys.modules, "rerun", None)
+    assert view(results, "--save", results.parent / "v.rrd") == 1
+    assert "pip install cardbox_tracker[view]" in capsys.readouterr().err
+    assert not (results.parent / "v.rrd").exists()
+
+
+class Files(BaseHTTPRequestHandler):
+    """Stands for the server of Rerun."""
+
+    def do_GET(self) -> None:
+        self.send_response(200 if self.path == "/viewer.js" else 404)
+        self.send_header("Content-Type", "text/javascript")
+        self.end_headers()
+        self.wfile.write(b"1 + 1")
+
+    def log_message(self, format: str, *args: object) -> None: ...
+
+
+class Library:
+    """Stands for the module rerun."""
+
+    def serve_web_viewer(self, *, web_port: int, open_browser: bool) -> None:
+        assert not open_browser
+        self.server = ThreadingHTTPServer((THIS_COMPUTER, web_port), Files)
+        threading.Thread(target=self.server.serve_forever, daemon=True).start()
+
+
+@pytest.fixture
+def library() -> Iterator[Library]:
+    found = Library()
+    yield found
+    found.server.server_close()
+
+
+def test_files_are_passed_on_with_a_policy(library: Library) -> None:
+    with web_page(library, port=0) as address:
+        with urlopen(f"{address}/viewer.js") as answer:
+            assert answer.read() == b"1 + 1"
+            assert answer.headers["Content-Type"] == "text/javascript"
+            allowed = answer.headers["Content-Security-Policy"]
+        with pytest.raises(HTTPError, match="404"):
+            urlopen(f"{address}/other")
+        library.server.shutdown()
+        library.server.server_close()
+        with pytest.raises(HTTPError, match="502"):
+            urlopen(f"{address}/viewer.js")
+    hosts = {word for word in allowed.replace(";", "").split() if "//" in word}
+    assert hosts == {"http://127.0.0.1:*"}
+    assert "*" not in allowed.split()
+
+
+def test_a_port_in_use_is_an_error(library: Library) -> None:
+    with web_page(library, port=0) as address:
+        port = int(address.rpartition(":")[2])
+        with (
+            pytest.raises(OSError, match=f"port {port} is in use; end"),
+            web_page(Library(), port=port),
+        ):
+            pass

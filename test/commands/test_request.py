@@ -1,0 +1,255 @@
+"""The request that the options make, how wrong ones are reported, and options in files."""
+
+from __future__ import annotations
+
+import argparse
+from dataclasses import FrozenInstanceError
+from itertools import chain, combinations
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+
+from cardbox_tracker.body.model import BodyModel
+from cardbox_tracker.body.model_file import save_body_model
+from cardbox_tracker.commands.main import build_parser
+from cardbox_tracker.commands.request import (
+    OptionsError,
+    TrackingRequest,
+    tracking_request,
+    with_own_options,
+)
+from cardbox_tracker.errors import CardboxError
+from cardbox_tracker.recordings.given_camera import GivenCamera
+from cardbox_tracker.recordings.person_in_view import PersonInView
+from cardbox_tracker.recordings.point_table import PointTable
+from cardbox_tracker.recordings.silhouettes import TimeSpan
+
+
+@pytest.fixture
+def film(tmp_path: Path) -> Path:
+    """A film, and beside it a bag (in name), a measured person and a table of points."""
+    (tmp_path / "film.mp4").touch()
+    (tmp_path / "bag.mcap").touch()
+    (tmp_path / "points.csv").touch()
+    save_body_model(BodyModel.of(hip_height_m=-0.51), tmp_path / "me.yaml")
+    return tmp_path / "film.mp4"
+
+
+def line(recording: object, *words: object) -> argparse.Namespace:
+    return build_parser(["track"]).parse_args(["track", *map(str, (recording, *words))])
+
+
+def asked(recording: object, *words: object) -> TrackingRequest:
+    return tracking_request(line(recording, *words))
+
+
+def refused(recording: object, *words: object) -> str:
+    with pytest.raises(OptionsError) as caught:
+        asked(recording, *words)
+    return str(caught.value)
+
+
+def test_a_request_has_what_the_options_ask_for(film: Path) -> None:
+    folder = film.parent
+    given = ("--model", folder / "me.yaml", "--start", 2, "--background", "0:1.5", "--fov", 60)
+    more = ("--detector", folder / "points.csv", "--camera-roll-deg", 0, "--fps", 12)
+    request = asked(film, *given, *more, "--effort", 2, "--seed", 7)
+    recording, person = request.recording, request.person
+    assert recording.path == film
+    assert recording.silhouettes == TimeSpan(0.0, 1.5)
+    assert recording.points == PointTable(folder / "points.csv")
+    assert recording.detector is None
+    assert recording.camera == GivenCamera(60.0, None, 0.0, 12.0)
+    assert (person.model, person.start_s, person.is_pitch_given) == (folder / "me.yaml", 2, True)
+    assert person.body.placement.hip_height_m == -0.51
+    assert (request.config.whole_body.effort, request.seed) == (2.0, 7)
+    assert set(request.inputs) == {film, folder / "me.yaml", folder / "points.csv"}
+    with pytest.raises(FrozenInstanceError):
+        request.seed = 8  # type: ignore[misc]
+
+
+def test_a_stature_leaves_the_rest_to_be_found(film: Path) -> None:
+    request = asked(film, "--stature", 1.8, "--fov", 60)
+    assert isinstance(request.recording.silhouettes, PersonInView)
+    assert request.recording.camera.roll_rad is None
+    assert request.person.start_s == 0.0
+    assert not request.person.is_pitch_given
+    assert "distance_m" in request.person.body.unknown
+    request = asked(film, "--stature", 1.8, "--fov", 60, "--camera-pitch-deg", 10)
+    assert request.person.is_pitch_given
+    assert request.person.body.camera_pose.pitch_rad == pytest.approx(np.radians(10.0))
+
+
+NEEDED = {
+    "--fov DEG or --calibration FILE": ("--fov", "60"),
+    "--background T0:T1 or --within M": ("--background", "0:1"),
+    "--stature M or --model FILE": ("--stature", "1.7"),
+}
+SUBSETS = list(chain.from_iterable(combinations(NEEDED, n) for n in range(len(NEEDED))))
+
+
+@pytest.mark.parametrize("given", SUBSETS)
+@pytest.mark.parametrize("name", ["film.mp4", "bag.mcap"])
+def test_all_that_is_missing_is_named_at_once(
+    name: str, given: tuple[str, ...], film: Path
+) -> None:
+    # Each kind of recording does without one of the options.
+    unneeded = list(NEEDED)[0 if name == "bag.mcap" else 1]
+    missing = [option for option in NEEDED if option not in (*given, unneeded)]
+    words = [word for option in given for word in NEEDED[option]]
+    if not missing:
+        assert asked(film.with_name(name), *words).person.model is None
+        return
+    told = refused(film.with_name(name), *words)
+    assert f"{name} needs {', and '.join(missing)}" in told.replace(
+        " or --silhouettes detector|person_in_view", ""
+    )
+    assert not any(option in told for option in NEEDED if option not in missing)
+
+
+def test_a_model_needs_the_start(film: Path) -> None:
+    told = refused(film, "--model", film.with_name("me.yaml"))
+    assert "film.mp4 needs --fov DEG or --calibration FILE, and --start T (" in told
+
+
+@pytest.mark.parametrize(
+    ("words", "expected"),
+    [
+        (("--fov=60", "--calibration=a.yaml"), ["--fov and --calibration both"]),
+        (("--stature=1.7", "--model=a.yaml"), ["--stature and --model both", "needs --fov"]),
+        (("--model=me.yaml", "--distance=2", "--camera-pitch-deg=3"), ["--distance", "--camera-p"]),
+        (("--background=0:1", "--within=2"), ["--background and --within exclude"]),
+        (("--silhouettes=background", "--within=2"), ["--silhouettes background and --within"]),
+        (("--silhouettes=person_in_view", "--within=2"), ["takes the place of --background"]),
+        (("--stature=300", "--distance=0", "--detector=x"), ["stature is 300", "'x'; expected"]),
+        (("--depth=/d",), ["--depth needs --cameras", "read from a rosbag2, which"]),
+        (("--cameras", "a", "b", "--fps=3"), ["describe one camera"]),
+        (("--cameras", "a", "a", "--fov=0"), ["are a, a; expected", "field of view is 0"]),
+        (("--preset=paper", "--cameras", "a", "b"), ["--preset paper uses"]),
+        (("--effort=9", "--calibration=no.yaml"), ["--effort is 9", "no.yaml: No such file"]),
+        (("--set", "foo=1", "--stature=9"), ["'foo' is no setting", "stature is 9 m"]),
+    ],
+)
+def test_all_that_is_wrong_is_reported_at_once(
+    words: tuple[str, ...], expected: list[str], film: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(film.parent)
+    told = refused(film, *words)
+    for part in expected:
+        assert part in told
+    assert told.count("; also, ") >= len(expected) - 1
+
+
+def test_a_recording_that_is_none_is_reported_with_the_rest(tmp_path: Path) -> None:
+    told = refused(tmp_path / "no.mp4")
+    assert "no.mp4 needs --stature M" in told
+    assert "there is no recording" in told
+
+
+def test_films_are_known_by_their_content(tmp_path: Path) -> None:
+    """Images are a film; a file of another kind is refused only when it is opened."""
+    cv2.imwrite(str(tmp_path / "1.png"), np.zeros((8, 8), np.uint8))
+    assert "--fov DEG" in refused(tmp_path, "--stature", 1.7)
+    (tmp_path / "text.txt").touch()
+    assert asked(tmp_path / "text.txt", "--stature", 1.7)
+
+
+def test_settings_are_given_by_name(film: Path) -> None:
+    given = ("--fov=60", "--stature=1.7")
+    settings = film.with_name("settings.yaml")
+    settings.write_text("lost_frames: 9\nlost_iou: 0.1\nwhole_body:\n  effort: 3\n")
+    words = ("--set", "lost_frames=7", "--set", "lost_frames=8", "--set", "relocalize=false")
+    config = asked(film, *given, *words, "--settings", settings, "--effort", 2).config
+    assert (config.lost_frames, config.lost_iou) == (8, 0.1)
+    assert (config.relocalize, config.whole_body.effort) == (False, 2.0)
+    paper = ("--preset=paper", "--set", "torso.particles=50", "--set", "strategy=srs")
+    config = asked(film, *given, *paper, "--set", "arm.sigma_gamma_px=1e3").config
+    assert (config.torso.particles, config.strategy) == (50, "srs")
+    assert config.arm.sigma_gamma_px == 1000.0
+
+
+@pytest.mark.parametrize(
+    ("words", "expected"),
+    [
+        (("lost_frames=many",), "lost_frames is 'many'; expected a whole number"),
+        (("lost_frames=0",), "lost_frames is 0; expected 1 to 1e+06"),
+        (("torso.particles=100",), "torso.particles has no effect with the filter whole_body"),
+        (("torso.particles=100",), "use --effort"),
+        (("strategy=best",), "strategy is 'best'; expected one of"),
+        (("whole_body=1", "--set", "whole_body.effort=2"), "whole_body is 1; expected names"),
+        (("x", "--preset=paper"), "expected NAME=VALUE, such as lost_frames=10, got 'x'"),
+        (("torso.particles=9999999999", "--preset=paper"), "expected 2 to 1e+06"),
+        (("average=2", "--preset=paper", "--effort=1"), "--effort has no effect with the filter"),
+        (("average=2", "--preset=paper", "--effort=1"), "use --set torso.particles=VALUE"),
+    ],
+)
+def test_settings_that_are_wrong(
+    words: tuple[str, ...], expected: str, film: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    try:
+        told = refused(film, "--fov=60", "--stature=1.7", "--set", *words)
+    except SystemExit:
+        told = capsys.readouterr().err
+    assert expected in told
+
+
+def test_a_file_that_contradicts_itself_is_refused(tmp_path: Path) -> None:
+    (tmp_path / "a.options").write_text("--stature 1.7 --model a.yaml --background 0:1")
+    found = with_own_options(line("in", "--stature", 1.7), tmp_path, "a")
+    with pytest.raises(OptionsError, match="--stature and --model both say who is tracked"):
+        tracking_request(found)
+
+
+def test_without_a_file_the_command_line_is_left(tmp_path: Path) -> None:
+    given = line("in", "--stature", "1.7")
+    assert vars(with_own_options(given, tmp_path, "a/b")) == vars(given)
+
+
+def test_files_change_the_command_line_and_inner_ones_the_outer(tmp_path: Path) -> None:
+    (tmp_path / "anna").mkdir()
+    (tmp_path / "anna.options").write_text("--stature 1.64 --start 3 # Anna is always late\n")
+    (tmp_path / "anna" / "wave.options").write_text("--start 5\n--background 0:2 --set average=2")
+    (tmp_path / "wave.options").write_text("--start 9")
+    words = ("--stature", "1.7", "--effort", "2", "--silhouettes", "person_in_view")
+    given = line("in", *words, "--set", "lost_frames=9", "--set", "average=3")
+    wave, bow = (with_own_options(given, tmp_path, f"anna/{name}") for name in ("wave", "bow"))
+    assert (wave.stature, wave.start, wave.effort) == (1.64, 5.0, 2.0)
+    assert (wave.background, wave.silhouettes) == (TimeSpan(0.0, 2.0), None)
+    assert wave.set == {"lost_frames": 9, "average": 2}
+    assert (bow.stature, bow.start, bow.background) == (1.64, 3.0, None)
+    assert bow.silhouettes == "person_in_view"
+    assert (given.stature, given.start) == (1.7, None)
+    assert given.set == bow.set == {"lost_frames": 9, "average": 3}
+
+
+def test_a_measured_person_takes_the_place_of_a_stature(tmp_path: Path) -> None:
+    (tmp_path / "a.options").write_text("--model a.yaml --start 2 --detector points.csv")
+    (tmp_path / "points.csv").touch()
+    (tmp_path / "b.options").write_text("--detector mediapipe")
+    given = line("in", "--stature", "1.7", "--distance", "2", "--camera-pitch-deg", "5")
+    found = with_own_options(given, tmp_path, "a")
+    assert (found.stature, found.distance, found.camera_pitch_deg) == (None, None, None)
+    # A path begins at the folder of its file.
+    assert found.model == tmp_path / "a.yaml"
+    assert found.detector == str(tmp_path / "points.csv")
+    assert with_own_options(given, tmp_path, "b").detector == "mediapipe"
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        ("--efort 2", "unrecognized arguments: --efort"),
+        ("--csv out.csv", "unrecognized arguments: --csv"),
+        ("film.mp4", "unrecognized arguments: film.mp4"),
+        ("--start soon", "got 'soon'"),
+        ("--model 'a.yaml", "No closing quotation"),
+        ("--particles 3", "was removed: give --set"),
+    ],
+)
+def test_mistakes_name_the_file(tmp_path: Path, text: str, expected: str) -> None:
+    (tmp_path / "a.options").write_text(text)
+    with pytest.raises(CardboxError, match=expected) as caught:
+        with_own_options(line("in"), tmp_path, "a")
+    assert "a.options" in str(caught.value)
