@@ -167,7 +167,7 @@ def row_of(name: str, samples: Samples, said: FloatArray, uncertain_from: float)
     uncertain = ~tracked & (keypoints <= LOST_FROM)
     is_tracking = tracked[:, HANDS].all(axis=1) & (said[:, 6] <= WHOLE_UNCERTAIN_FROM)
 
-    def share(of: NDArray[Any], among: NDArray[Any]) -> str:
+    def share(of: Any, among: Any) -> str:
         return f"{100.0 * float(of[among].mean()):.1f}" if among.any() else ""
 
     everything = np.ones_like(tracked)
