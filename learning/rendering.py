@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from cardbox_tracker.compiling import njit
+from cardbox_tracker.compiling import kernel
 from cardbox_tracker.vision.camera import Camera
 
 FloatArray = NDArray[np.float64]
@@ -58,7 +58,7 @@ def render(
     return Rendering(depth_m, colour)
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel
 def _draw(
     pixels: Any, optical_m: Any, faces: Any, colours: Any, light: Any, depth_m: Any, colour: Any
 ) -> None:
@@ -94,7 +94,7 @@ def _draw(
                         colour[row, column, channel] = np.uint8(shade * colours[a, channel])
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel
 def _shade(a: Any, b: Any, c: Any, light: Any) -> float:
     """Return the brightness, 0.55 to 1, of a triangle that is lit from both sides."""
     ux, uy, uz = b[0] - a[0], b[1] - a[1], b[2] - a[2]

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from math import sqrt
 
-from cardbox_tracker.compiling import inlined_allocation, inlined_kernel, kernel
+from cardbox_tracker.compiling import inlined_kernel, kernel
 from cardbox_tracker.estimation.cost.kernel_arguments import (
     BOTTOM,
     BOTTOM_WIDTH,
@@ -154,10 +154,10 @@ def place_arm(arm: PosedArm, p: int, drawn: Floats, corners: Floats) -> None:
     _place_limb(arm, 1, (fore_m, thin, hand_cap), p + _LIMB_PATCHES, corners)
 
 
-@inlined_allocation
+@inlined_kernel
 def new_scratch() -> tuple[Workspace, PosedArm]:
     """Return the scratch arrays of :func:`place_patches`."""
-    return new_workspace(BODY_PATCHES, 1), new_arm()
+    return new_workspace(int(BODY_PATCHES), 1), new_arm()
 
 
 @inlined_kernel

@@ -78,13 +78,10 @@ def _upright(part: Floats, is_frontal: bool, p: int, shape: Floats) -> None:
 @inlined_kernel
 def _shape_trunk(parts: Floats, shape: Floats) -> None:
     """Write patches 0 to 7, in the torso's frame; see ``body/cardbox.py``."""
-    _upright(parts[TORSO], True, 0, shape)
-    _upright(parts[TORSO], False, 1, shape)
+    for part, p in ((TORSO, 0), (WAIST, 3), (HEAD, 5)):
+        _upright(parts[part], True, p, shape)
+        _upright(parts[part], False, p + 1, shape)
     lid(parts[TORSO], 2, shape)
-    _upright(parts[WAIST], True, 3, shape)
-    _upright(parts[WAIST], False, 4, shape)
-    _upright(parts[HEAD], True, 5, shape)
-    _upright(parts[HEAD], False, 6, shape)
     if parts[NECK, TOP_WIDTH] > 0.0:
         _upright(parts[NECK], True, 7, shape)
 
@@ -162,13 +159,13 @@ def trunk_costs(
     """Write the costs (N,) of trunks (N, 4), given the cost ``base`` of drawing nothing."""
     model = cardbox_of(cardbox)
     rows, width = row_sums.shape[0], row_sums.shape[1] - 1
-    work = new_workspace(TRUNK_PATCHES, rows)
+    work = new_workspace(int(TRUNK_PATCHES), rows)
     _shape_trunk(model.parts, work.shape)
     for i in range(postures.shape[0]):
         torso_pose(postures[i], model.place, model.camera, work.torso, work.hip)
         _place_trunk(work)
         draw(work, model.camera, rows, width)
-        costs[i] = base + sum_union(work, TRUNK_PATCHES, row_sums)[0]
+        costs[i] = base + sum_union(work, row_sums)[0]
 
 
 @kernel
@@ -176,7 +173,7 @@ def cover_trunk(torso: Floats, cardbox: CardboxTuple, row_sums: RowSums, covered
     """Write the row sums outside of a trunk (4,) to ``covered``; return the gain of the trunk."""
     model = cardbox_of(cardbox)
     rows, width = row_sums.shape[0], row_sums.shape[1] - 1
-    work = new_workspace(TRUNK_PATCHES, rows)
+    work = new_workspace(int(TRUNK_PATCHES), rows)
     _shape_trunk(model.parts, work.shape)
     torso_pose(torso, model.place, model.camera, work.torso, work.hip)
     _place_trunk(work)
@@ -189,7 +186,7 @@ def cover_arms(posture: Floats, cardbox: CardboxTuple, row_sums: RowSums, covere
     """Write the row sums outside of the arms of a posture (12,); return the gain of the arms."""
     model = cardbox_of(cardbox)
     rows, width = row_sums.shape[0], row_sums.shape[1] - 1
-    work = new_workspace(2 * ARM_PATCHES, rows)
+    work = new_workspace(int(2 * ARM_PATCHES), rows)
     torso_pose(posture, model.place, model.camera, work.torso, work.hip)
     for arm in range(2):
         first = ARM_PATCHES * arm
@@ -212,13 +209,13 @@ def arm_costs(
     """Write the costs (N,) of arms (N, 4) beside a trunk (4,), given its row sums and its cost."""
     model = cardbox_of(cardbox)
     rows, width = covered.shape[0], covered.shape[1] - 1
-    work = new_workspace(ARM_PATCHES, rows)
+    work = new_workspace(int(ARM_PATCHES), rows)
     _shape_arm(model.parts, 0, work.shape)
     torso_pose(torso, model.place, model.camera, work.torso, work.hip)
     for i in range(postures.shape[0]):
         _place_arm(work, 0, postures[i], side, model)
         draw(work, model.camera, rows, width)
-        costs[i] = base + sum_union(work, ARM_PATCHES, covered)[0]
+        costs[i] = base + sum_union(work, covered)[0]
 
 
 @kernel
@@ -233,12 +230,12 @@ def full_costs(
     """Write costs and drawn areas (N,), px, of whole postures (N, 12)."""
     model = cardbox_of(cardbox)
     rows, width = row_sums.shape[0], row_sums.shape[1] - 1
-    work = new_workspace(_BODY_PATCHES, rows)
+    work = new_workspace(int(_BODY_PATCHES), rows)
     _shape_body(model.parts, work.shape)
     for i in range(postures.shape[0]):
         _place_body(work, postures[i], model)
         draw(work, model.camera, rows, width)
-        gain, area = sum_union(work, _BODY_PATCHES, row_sums)
+        gain, area = sum_union(work, row_sums)
         costs[i] = base + gain
         areas[i] = area
 
@@ -249,14 +246,14 @@ def body_costs(
 ) -> None:
     """Write the costs (N,) of N ``bodies`` at one place in the N ``postures`` (N, 12)."""
     rows, width = row_sums.shape[0], row_sums.shape[1] - 1
-    work = new_workspace(_BODY_PATCHES, rows)
+    work = new_workspace(int(_BODY_PATCHES), rows)
     parts, shoulders, place, camera = bodies
     for i in range(postures.shape[0]):
         model = cardbox_of((parts[i], shoulders[i], place, camera))
         _shape_body(model.parts, work.shape)
         _place_body(work, postures[i], model)
         draw(work, model.camera, rows, width)
-        costs[i] = base + sum_union(work, _BODY_PATCHES, row_sums)[0]
+        costs[i] = base + sum_union(work, row_sums)[0]
 
 
 @kernel
@@ -273,7 +270,7 @@ def polygon_costs(
                 for axis in range(3):
                     work.corners[axis, c * count + p] = corners_m[i, p, c, axis]
         draw(work, Intrinsics(*camera), rows, width)
-        costs[i] = base + sum_union(work, count, row_sums)[0]
+        costs[i] = base + sum_union(work, row_sums)[0]
 
 
 @kernel

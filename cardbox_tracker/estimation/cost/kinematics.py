@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from cardbox_tracker.body.posture import ARM_ANGLES, FIRST_ANGLES, TORSO_X, TORSO_Z
-from cardbox_tracker.compiling import copied_kernel, inlined_allocation, inlined_kernel, kernel
+from cardbox_tracker.compiling import copied_kernel, inlined_kernel, kernel
 from cardbox_tracker.estimation.cost.kernel_arguments import (
     ASIDE,
     CLAVICLE,
@@ -103,7 +103,7 @@ class PosedArm(NamedTuple):
     """(6,): the directions with y outwards, for the arms' prior; otherwise scratch."""
 
 
-@inlined_allocation
+@inlined_kernel
 def new_arm() -> PosedArm:
     """Return the scratch arrays of one arm."""
     return PosedArm(

@@ -11,7 +11,7 @@ The pixels are those of equation (2), with the outlines of
 
 from __future__ import annotations
 
-from cardbox_tracker.compiling import borrowing_kernel, inlined_kernel, kernel
+from cardbox_tracker.compiling import inlined_kernel, kernel
 from cardbox_tracker.estimation.cost.bit_masks import cover_masks, new_masks, sum_masks
 from cardbox_tracker.estimation.cost.bit_planes import Planes
 from cardbox_tracker.estimation.cost.body_outline import (
@@ -60,15 +60,15 @@ def _copy(points: Floats, written: Floats) -> None:
 def _place_arms(
     states: Floats,
     i: int,
-    p: int,
     rated: float,
     of: Body,
     given: Prior,
     scratch: Scratch,
     points: Points,
 ) -> float:
-    """Write both arms of a state, their patches from ``p`` on; return ``rated`` + their priors."""
+    """Write both arms of a state, the last patches; return ``rated`` + their priors."""
     work, arm = scratch.work, scratch.arm
+    p = work.corners.shape[1] // 4 - 2 * ARM_PATCHES
     for k in range(2):
         angles, side = angles_in(states[i], k), side_of(k)
         pose_arm(angles, side, of.parts, of.girdle, arm.points, arm.directions)
@@ -86,11 +86,11 @@ def rate_trunks(
 ) -> None:
     """Write ratings (N,) of the trunks of states (N, 14)."""
     seen, given = Observed(*observed), Prior(*prior)
-    scratch = new_scratch(TRUNK_PATCHES, seen, given)
+    scratch = new_scratch(int(TRUNK_PATCHES), seen, given)
     _rate_trunks(states, body_of(body), seen, given, scratch, ratings)
 
 
-@borrowing_kernel
+@kernel
 def _rate_trunks(
     states: Floats, of: Body, seen: Observed, given: Prior, scratch: Scratch, ratings: Floats
 ) -> None:
@@ -120,11 +120,11 @@ def rate_arms(
     Shoulder, elbow and hand in the torso's frame are written to ``joints_m`` (N, 3, 3).
     """
     seen, given = Observed(*observed), Prior(*prior)
-    scratch = new_scratch(ARM_PATCHES, seen, given)
+    scratch = new_scratch(int(ARM_PATCHES), seen, given)
     _rate_arms(arms, side, torso, body_of(body), seen, given, scratch, ratings, joints_m)
 
 
-@borrowing_kernel
+@kernel
 def _rate_arms(
     arms: Floats,
     side: float,
@@ -171,11 +171,11 @@ def rate_bodies(
         points: fields of :class:`Points`, written.
     """
     seen, given = Observed(*observed), Prior(*prior)
-    scratch = new_scratch(BODY_PATCHES, seen, given)
+    scratch = new_scratch(int(BODY_PATCHES), seen, given)
     _rate_bodies(states, body_of(body), seen, given, scratch, ratings, pixels, Points(*points))
 
 
-@borrowing_kernel
+@kernel
 def _rate_bodies(
     states: Floats,
     of: Body,
@@ -192,7 +192,7 @@ def _rate_bodies(
         state_pose(states[i], of.place, of.camera, work.torso, work.hip)
         place_trunk(work, of.drawn)
         rated = torso_prior(states[i], given)
-        rated = _place_arms(states, i, TRUNK_PATCHES, rated, of, given, scratch, points)
+        rated = _place_arms(states, i, rated, of, given, scratch, points)
         has_cuts = draw(work, of.camera, seen.rows, seen.width)
         gain, area = sum_masks(work, has_cuts, seen.width, seen.planes, scratch.masks)
         costs_px[i] = seen.base_px + gain
@@ -215,11 +215,11 @@ def rate_pairs(
     are those of :func:`rate_bodies`.
     """
     seen, given = Observed(*observed), Prior(*prior)
-    scratch = new_scratch(2 * ARM_PATCHES, seen, given)
+    scratch = new_scratch(int(2 * ARM_PATCHES), seen, given)
     _rate_pairs(states, body_of(body), seen, given, scratch, ratings, Points(*points))
 
 
-@borrowing_kernel
+@kernel
 def _rate_pairs(
     states: Floats,
     of: Body,
@@ -233,7 +233,7 @@ def _rate_pairs(
     state_pose(states[0], of.place, of.camera, work.torso, work.hip)
     of_torso = torso_prior(states[0], given)
     for i in range(states.shape[0]):
-        rated = _place_arms(states, i, 0, of_torso, of, given, scratch, points)
+        rated = _place_arms(states, i, of_torso, of, given, scratch, points)
         has_cuts = draw(work, of.camera, seen.rows, seen.width)
         gain = sum_masks(work, has_cuts, seen.width, seen.planes, scratch.masks)[0]
         ratings[i] = (seen.base_px + gain) * seen.scale + rated

@@ -25,7 +25,7 @@ import numpy as np
 
 from cardbox_tracker.body.posture import N_JOINTS, ROLL
 from cardbox_tracker.body.sizes import FloatArray
-from cardbox_tracker.compiling import njit
+from cardbox_tracker.compiling import kernel
 from cardbox_tracker.estimation.cost.keypoint_fit_kernels import pose_at_keypoints
 from cardbox_tracker.estimation.cost.terms import USUAL_INTERVAL_S
 from cardbox_tracker.estimation.cost.whole_body import WholeBodyCost, iou_of
@@ -105,7 +105,7 @@ def limited(answers_m: FloatArray, spread_m: FloatArray, doubt: float = DOUBT) -
     return shortened
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel
 def _shorten(answers_m: Any, spread_m: Any, doubt: float, shortened: Any) -> None:
     """Write :func:`limited` to ``shortened``."""
     for arm in range(2):
@@ -119,7 +119,7 @@ def _shorten(answers_m: Any, spread_m: Any, doubt: float, shortened: Any) -> Non
                 shortened[arm, i] = gain * answers_m[arm, i]
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel
 def _move(keypoints_m: Any, answers_m: Any, result: Any) -> None:
     """Write :func:`moved` to ``result``."""
     ahead = np.empty(3)

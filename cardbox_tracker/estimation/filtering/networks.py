@@ -13,7 +13,7 @@ from typing import Any, BinaryIO, NamedTuple, TypeVar
 import numpy as np
 
 from cardbox_tracker.body.sizes import FloatArray
-from cardbox_tracker.compiling import njit
+from cardbox_tracker.compiling import kernel
 from cardbox_tracker.errors import CardboxError
 from cardbox_tracker.files import UnreadableFileError, regular_file
 
@@ -117,7 +117,7 @@ class RecurrentNetwork(NamedTuple):
         return answers.mean(axis=0) * self.unit, answers.std(axis=0) * self.unit, hidden
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel
 def _add_answers(
     features: FloatArray,
     scaling: tuple[FloatArray, FloatArray, float],

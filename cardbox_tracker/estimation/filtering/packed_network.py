@@ -32,7 +32,7 @@ _ZERO, _QUARTER, _HALF, _ONE, _TWO = (np.float32(one) for one in (0.0, 0.25, 0.5
 _LARGE = np.float32(9.0)
 # With an unsigned index, numba compiles no code for negative indices.
 _index = np.uint64
-_quick = njit(cache=True, nogil=True, error_model="numpy", fastmath={"contract"})
+_quick = njit(fastmath={"contract"})
 
 
 class PackedNetwork:

@@ -10,7 +10,7 @@ import numpy as np
 
 from cardbox_tracker.body.posture import MIRROR_SIGNS, MIRRORED, N_STATE, YAW
 from cardbox_tracker.body.sizes import FloatArray
-from cardbox_tracker.compiling import njit
+from cardbox_tracker.compiling import kernel
 
 _OTHER_POINTS = np.array([3, 4, 5, 0, 1, 2])
 # Keypoints at begin and end of each bone of both arms.
@@ -95,7 +95,7 @@ def features_of(
     return features
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel
 def _fill(
     states: Any,
     stddevs: Any,

@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from cardbox_tracker.body.sizes import FloatArray
-from cardbox_tracker.compiling import njit
+from cardbox_tracker.compiling import kernel
 from cardbox_tracker.estimation.filtering.loss import Evidence, freshness, log_area
 
 # Least relative weight of a state that counts.
@@ -75,7 +75,7 @@ def features_of_search(search: Search, result_m: FloatArray) -> FloatArray:
     return features
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel
 def _fill(keypoints_m: Any, ratings: Any, spread: float, result_m: Any, features: Any) -> None:
     """Write means and deviations of :func:`features_of_search` to ``features`` (2, F)."""
     count = len(_MOVING)
@@ -106,7 +106,7 @@ def _fill(keypoints_m: Any, ratings: Any, spread: float, result_m: Any, features
                 features[arm, of_deviation + axis] = sqrt(max(variance, 0.0))
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel
 def _beside_middle(points: Any, seen: Any) -> None:
     """Write elbows and hands relative to mid-shoulder, then mid-shoulder, to ``seen`` (5, 3)."""
     for axis in range(3):
