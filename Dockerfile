@@ -33,7 +33,7 @@ ENV PATH=/opt/venv/bin:$PATH
 RUN source /opt/ros/jazzy/setup.bash \
     && python -m colcon build --packages-select cardbox_tracker \
     && source install/setup.bash \
-    && python -m cardbox_tracker.estimation.precompile
+    && python -m cardbox_tracker.tracking.precompile
 
 ENTRYPOINT ["/bin/bash", "-c", "source /ws/install/setup.bash && exec \"$@\"", "--"]
 CMD ["bash"]

@@ -67,7 +67,7 @@ $(VENV)/package: $(VENV)/dependencies $(NAMES) $(SOURCES) setup.py setup.cfg pyp
 
 $(VENV)/compiled: $(VENV)/package
 	@echo "compiling the tracker's inner loop, once, for one to two minutes"
-	cd $(VENV) && $(BIN)/python -m cardbox_tracker.estimation.precompile
+	cd $(VENV) && $(BIN)/python -m cardbox_tracker.tracking.precompile
 	@touch $@
 
 .PHONY: setup
@@ -122,14 +122,14 @@ example: setup
 .PHONY: benchmark
 benchmark: setup
 	$(BIN)/cardbox benchmark --json docs/benchmarks.json --report docs/benchmarks.md
-	$(BIN)/python -m tools.readme_figures
+	$(BIN)/python -m lab.tools.readme_figures
 
 # Fewer runs: make experiments RUNS=2
 RUNS ?= 100
 .PHONY: experiments
 experiments: setup
 	$(BIN)/cardbox evaluate --runs $(RUNS) --output docs/evaluation --force
-	$(BIN)/python -m tools.readme_figures
+	$(BIN)/python -m lab.tools.readme_figures
 
 # This compares the recorded sessions of one camera beside the checkout with their ground truth.
 DATA ?= ../shared/data
@@ -148,23 +148,23 @@ REPORT := docs/evaluation/real-people.md
 people: export XDG_DATA_HOME := $(CURDIR)/$(VENV)/data
 people: setup $(VENV)/extras
 	@if [ -z "$(PEOPLE)" ]; then echo "skipped: no films of people in $(DATA)"; else \
-		$(BIN)/python -m tools.people_sheet $(PEOPLE) --output docs/images/real-people.jpg; \
+		$(BIN)/python -m lab.tools.people_sheet $(PEOPLE) --output docs/images/real-people.jpg; \
 		$(BIN)/cardbox evaluate --sessions $(PEOPLE) --detector none mediapipe --output docs/evaluation --force; \
-		$(BIN)/python -m tools.real_report --session $(DATA)/real_signs --output $(REPORT) \
+		$(BIN)/python -m lab.tools.real_report --session $(DATA)/real_signs --output $(REPORT) \
 			--sheet docs/images/real.jpg; fi
 
 # Fewer examples: make reliability EXAMPLES=1000
 EXAMPLES ?= 100000
 .PHONY: reliability
 reliability: $(VENV)/package
-	$(BIN)/python -m tools.reliability --examples $(EXAMPLES)
+	$(BIN)/python -m lab.tools.reliability --examples $(EXAMPLES)
 
 .PHONY: reliability-quick
 reliability-quick: $(VENV)/package
-	$(BIN)/python -m tools.reliability --quick
+	$(BIN)/python -m lab.tools.reliability --quick
 
-# Only some: make bounds TESTS=test/vision
-TESTS ?= test/reliability test/vision test/body test/estimation
+# Only some: make bounds TESTS=test/segmentation
+TESTS ?= test/reliability test/person test/camera test/segmentation test/terms test/search test/measuring test/tracking
 .PHONY: bounds
 bounds: $(VENV)/extras
 	XDG_DATA_HOME=$(CURDIR)/$(VENV)/data NUMBA_BOUNDSCHECK=1 \

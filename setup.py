@@ -103,11 +103,11 @@ setup(
     ],
     packages=find_packages(include=[NAME, f"{NAME}.*"]),
     package_data={
-        NAME: ["py.typed"],
         f"{NAME}.applications.ergonomics": ["*.html"],
-        f"{NAME}.estimation.cost": ["*.json"],
-        f"{NAME}.estimation.filtering": ["*.json"],
+        NAME: ["py.typed"],
         f"{NAME}.ros": ["*.csv"],
+        f"{NAME}.search": ["*.json"],
+        f"{NAME}.terms": ["*.json"],
     },
     zip_safe=False,
     data_files=[

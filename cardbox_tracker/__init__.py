@@ -1,7 +1,8 @@
 """Upper-body posture of one person from the silhouettes of one fixed camera.
 
-The folders follow the data: :mod:`.body` has the body model, :mod:`.vision` cameras and
-silhouettes, :mod:`.estimation` the tracker, :mod:`.ros` the nodes.
+The folders follow the data: :mod:`.person` has the body model, :mod:`.camera` and
+:mod:`.segmentation` images and silhouettes, :mod:`.terms` and :mod:`.search` the search of the
+posture, :mod:`.tracking` the tracker, :mod:`.ros` the nodes.
 
 The names in ``__all__`` are the Python interface (``docs/python.md``). Each is imported at its
 first use, so that ``import cardbox_tracker`` is fast.
@@ -13,11 +14,11 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from cardbox_tracker.body.model import BodyModel
-    from cardbox_tracker.body.model_file import load_body_model, save_body_model
-    from cardbox_tracker.body.proportions import body_from_proportions
-    from cardbox_tracker.body.skeleton import JOINT_NAMES, KEYPOINT_NAMES
-    from cardbox_tracker.errors import (
+    from cardbox_tracker.person.model import BodyModel
+    from cardbox_tracker.person.model_file import load_body_model, save_body_model
+    from cardbox_tracker.person.proportions import body_from_proportions
+    from cardbox_tracker.person.skeleton import JOINT_NAMES, KEYPOINT_NAMES
+    from cardbox_tracker.common.errors import (
         BackgroundFileError,
         BagError,
         BodyModelError,
@@ -28,24 +29,24 @@ if TYPE_CHECKING:
         NotFiniteError,
         RosMissingError,
     )
-    from cardbox_tracker.estimation.config import PRESETS, TrackerConfig
-    from cardbox_tracker.estimation.cost.depth import Depth
-    from cardbox_tracker.estimation.cost.view import OtherCamera
-    from cardbox_tracker.estimation.estimate import Estimate
-    from cardbox_tracker.estimation.initialization.config import (
+    from cardbox_tracker.search.config import PRESETS, TrackerConfig
+    from cardbox_tracker.terms.depth import Depth
+    from cardbox_tracker.camera.view import OtherCamera
+    from cardbox_tracker.tracking.estimate import Estimate
+    from cardbox_tracker.measuring.config import (
         InitializationConfig,
         InitializationResult,
     )
-    from cardbox_tracker.estimation.initialization.measure import initialize_body
-    from cardbox_tracker.estimation.observation import Observation
-    from cardbox_tracker.estimation.tracker import Tracker
-    from cardbox_tracker.vision.background import SilhouetteExtractor
-    from cardbox_tracker.vision.background_config import BackgroundConfig
-    from cardbox_tracker.vision.calibration_file import load_calibration
-    from cardbox_tracker.vision.camera import Calibration, Camera
-    from cardbox_tracker.vision.empty_scene import BackgroundLearner, BackgroundModel
-    from cardbox_tracker.vision.extrinsics import Extrinsics
-    from cardbox_tracker.vision.extrinsics_files import load_extrinsics
+    from cardbox_tracker.measuring.measure import initialize_body
+    from cardbox_tracker.tracking.observation import Observation
+    from cardbox_tracker.tracking.tracker import Tracker
+    from cardbox_tracker.segmentation.background import SilhouetteExtractor
+    from cardbox_tracker.segmentation.background_config import BackgroundConfig
+    from cardbox_tracker.camera.calibration_file import load_calibration
+    from cardbox_tracker.camera.camera import Calibration, Camera
+    from cardbox_tracker.segmentation.empty_scene import BackgroundLearner, BackgroundModel
+    from cardbox_tracker.camera.extrinsics import Extrinsics
+    from cardbox_tracker.camera.extrinsics_files import load_extrinsics
 
 __version__ = "0.1.0"
 
@@ -87,11 +88,11 @@ __all__ = [
 ]
 
 _MODULES = {
-    "body.model": ("BodyModel",),
-    "body.model_file": ("load_body_model", "save_body_model"),
-    "body.proportions": ("body_from_proportions",),
-    "body.skeleton": ("JOINT_NAMES", "KEYPOINT_NAMES"),
-    "errors": (
+    "person.model": ("BodyModel",),
+    "person.model_file": ("load_body_model", "save_body_model"),
+    "person.proportions": ("body_from_proportions",),
+    "person.skeleton": ("JOINT_NAMES", "KEYPOINT_NAMES"),
+    "common.errors": (
         "BackgroundFileError",
         "BagError",
         "BodyModelError",
@@ -102,21 +103,21 @@ _MODULES = {
         "NotFiniteError",
         "RosMissingError",
     ),
-    "estimation.config": ("PRESETS", "TrackerConfig"),
-    "estimation.cost.depth": ("Depth",),
-    "estimation.cost.view": ("OtherCamera",),
-    "estimation.initialization.config": ("InitializationConfig", "InitializationResult"),
-    "estimation.initialization.measure": ("initialize_body",),
-    "estimation.estimate": ("Estimate",),
-    "estimation.observation": ("Observation",),
-    "estimation.tracker": ("Tracker",),
-    "vision.background": ("SilhouetteExtractor",),
-    "vision.background_config": ("BackgroundConfig",),
-    "vision.calibration_file": ("load_calibration",),
-    "vision.camera": ("Calibration", "Camera"),
-    "vision.empty_scene": ("BackgroundLearner", "BackgroundModel"),
-    "vision.extrinsics": ("Extrinsics",),
-    "vision.extrinsics_files": ("load_extrinsics",),
+    "search.config": ("PRESETS", "TrackerConfig"),
+    "terms.depth": ("Depth",),
+    "camera.view": ("OtherCamera",),
+    "measuring.config": ("InitializationConfig", "InitializationResult"),
+    "measuring.measure": ("initialize_body",),
+    "tracking.estimate": ("Estimate",),
+    "tracking.observation": ("Observation",),
+    "tracking.tracker": ("Tracker",),
+    "segmentation.background": ("SilhouetteExtractor",),
+    "segmentation.background_config": ("BackgroundConfig",),
+    "camera.calibration_file": ("load_calibration",),
+    "camera.camera": ("Calibration", "Camera"),
+    "segmentation.empty_scene": ("BackgroundLearner", "BackgroundModel"),
+    "camera.extrinsics": ("Extrinsics",),
+    "camera.extrinsics_files": ("load_extrinsics",),
 }
 _MODULE_OF = {name: module for module, names in _MODULES.items() for name in names}
 

@@ -16,7 +16,7 @@ from functools import partial
 from importlib import import_module
 from pickle import UnpicklingError
 
-from cardbox_tracker import garbage, interrupts
+from cardbox_tracker.common import garbage, interrupts
 
 COMMAND = "cardbox_tracker.commands.main"
 """Module of the executable ``cardbox``."""
@@ -57,7 +57,7 @@ def start(name: str, main: Callable[[], int]) -> int:
         )
         return 1
     except (EOFError, UnpicklingError):
-        compiling = sys.modules.get("cardbox_tracker.compiling")
+        compiling = sys.modules.get("cardbox_tracker.common.compiling")
         if compiling is None:
             raise
         compiling.discard()

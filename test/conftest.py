@@ -18,8 +18,17 @@ from typing import Any
 import pytest
 from hypothesis import HealthCheck, settings
 
-from cardbox_tracker.estimation.config import PRESETS
-from cardbox_tracker.estimation.precompile import compile_all
+from cardbox_tracker.search.config import PRESETS
+from cardbox_tracker.tracking.precompile import compile_all
+from collections.abc import Callable
+import numpy as np
+from cardbox_tracker.person.model import BodyModel
+from cardbox_tracker.person.posture import N_STATE
+from cardbox_tracker.detectors.image_points import ImagePoints
+from cardbox_tracker.terms import joint_points_kernels as kernels
+from cardbox_tracker.terms.drawn_body import body_tuple
+from cardbox_tracker.terms.whole_body_config import WholeBodyCostConfig
+from cardbox_tracker.camera.camera import Camera
 
 with contextlib.suppress(ImportError), warnings.catch_warnings():
     # What rclpy imports with the first message uses modules that Python has deprecated.
@@ -47,7 +56,7 @@ WORKER = int(os.environ.get("PYTEST_XDIST_WORKER", "gw0")[2:])
 MOST_DOMAINS = 100
 
 # These take longest; begun first, none of them is left over at the end for one process alone.
-LONGEST = ("system", "estimation", "experiments", "evaluation", "demo", "benchmarks", "recordings")
+LONGEST = ("system", "tracking", "measuring", "search", "terms", "lab", "applications", "ros", "recordings")
 
 
 @pytest.hookimpl(tryfirst=True)
@@ -157,3 +166,37 @@ def _compiled_kernels() -> None:
     presets = deque(PRESETS)
     presets.rotate(WORKER)
     compile_all(tuple(presets))
+
+
+Detect = Callable[..., ImagePoints]
+
+
+def _rows() -> dict[str, int]:
+    """Index of the projected joint by the name of a point."""
+    rows = {"left_hip": 8, "right_hip": 8, "left_ear": 9, "right_ear": 9}
+    for first, side in ((0, "left"), (4, "right")):
+        for joint, name in enumerate(("shoulder", "elbow", "wrist", "index")):
+            rows[f"{side}_{name}"] = first + joint
+        rows[f"{side}_little_finger"] = first + 3
+    return rows
+
+
+def _detected(
+    body: BodyModel,
+    camera: Camera,
+    state: np.ndarray,
+    score: float = 0.9,
+    stamp_ns: int | None = None,
+) -> ImagePoints:
+    """Return the points of a state (12,) or (14,) before a camera with the body's pitch."""
+    whole, pixels = np.zeros(N_STATE), np.empty((kernels.N_POINTS, 3))
+    whole[: len(state)] = state
+    kernels.project(whole, body_tuple(body, camera, WholeBodyCostConfig()), pixels)
+    found = {name: (pixels[row, 0], pixels[row, 1], score) for name, row in _rows().items()}
+    return ImagePoints.of(found, stamp_ns)
+
+
+@pytest.fixture(scope="session")
+def detected() -> Detect:
+    """See :func:`_detected`."""
+    return _detected

@@ -13,7 +13,7 @@ from typing import Any
 import pytest
 
 import cardbox_tracker
-from cardbox_tracker import errors
+from cardbox_tracker.common import errors
 
 ROOT = Path(__file__).resolve().parents[1]
 

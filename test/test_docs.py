@@ -217,8 +217,8 @@ def test_a_made_up_quote_would_be_noticed() -> None:
 def test_joint_limits_of_the_conventions_are_those_of_the_code() -> None:
     import numpy as np
 
-    from cardbox_tracker.body.posture import TURNING_LIMITS, place_limits
-    from cardbox_tracker.body.skeleton import JOINT_NAMES, NECK_LIMITS, NECK_NAMES, PLACE_NAMES
+    from cardbox_tracker.person.posture import TURNING_LIMITS, place_limits
+    from cardbox_tracker.person.skeleton import JOINT_NAMES, NECK_LIMITS, NECK_NAMES, PLACE_NAMES
 
     rows = re.findall(
         r"(?m)^\| `(\w+)`.*\| (-?[\d.]+) to ([\d.]+) \|$", text_of(Path("docs/conventions.md"))

@@ -149,7 +149,7 @@ def executables(nodes: list[Action]) -> list[str]:
 
 
 def recording(folder: Path, images: int = 1) -> Path:
-    from cardbox_tracker.vision.camera import Camera
+    from cardbox_tracker.camera.camera import Camera
 
     with BagWriter(folder / "bag") as bag:
         bag.write_camera_info("/eye/camera_info", 1, "eye", Camera(4, 3, 5.0, 5.0, 1.5, 1.0))
@@ -188,7 +188,7 @@ def test_replay_says_why_a_bag_cannot_be_played(launch: Callable[..., Any]) -> N
 def bag_of_two(tmp_path: Path) -> Path:
     """Compressed images of two cameras; made before ``launch`` takes away what it is made with."""
     pytest.importorskip("rclpy", reason="rclpy is not installed")
-    from cardbox_tracker.vision.camera import Camera
+    from cardbox_tracker.camera.camera import Camera
 
     with BagWriter(tmp_path / "two") as bag:
         for name in ("left", "right"):
@@ -494,7 +494,7 @@ def test_another_launch_file_has_arguments_of_its_own(
 
 def test_arguments_are_what_the_parameters_of_the_same_name_are() -> None:
     pytest.importorskip("rclpy", reason="rclpy is not installed")
-    from tools.parameter_docs import NODES as PARAMETERS
+    from lab.tools.parameter_docs import NODES as PARAMETERS
 
     compared = 0
     for name, of in (("live", "camera"), ("replay", "play_bag"), ("nodes", "")):

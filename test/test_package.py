@@ -22,14 +22,11 @@ import cardbox_tracker
 ROOT = Path(__file__).resolve().parents[1]
 SOURCES = ROOT / "cardbox_tracker"
 CORE = (
-    *("body", "vision", "detection", "estimation", "ergonomics", "retargeting"),
-    *("drawing", "exporting"),
+    *("common", "person", "camera", "segmentation", "detectors", "terms", "search"),
+    *("measuring", "tracking"),
 )
 CORE_FILES = sorted(path for folder in CORE for path in (SOURCES / folder).rglob("*.py"))
-OUTER = (
-    *("recordings", "ros", "simulation", "evaluation", "viewing", "demo"),
-    "commands",
-)
+OUTER = ("recordings", "applications", "ros", "commands")
 MESSAGES = (
     "builtin_interfaces",
     "diagnostic_msgs",
@@ -45,7 +42,7 @@ MESSAGES = (
 ROS = ("rclpy", "rosbags", "launch", "launch_ros", "ament_index_python", *MESSAGES)
 
 # Folders of a checkout that are not installed.
-CHECKOUT = ("experiments", "benchmarks", "learning", "tools")
+CHECKOUT = ("lab",)
 
 
 @cache
@@ -255,7 +252,7 @@ def test_the_rule_for_the_core_would_find_an_offender(tmp_path: Path) -> None:
 
 def test_recordings_are_handled_without_rclpy() -> None:
     """What 'cardbox initialize' and 'cardbox track' import, other than in functions."""
-    for folder in ("recordings", "simulation", "viewing"):
+    for folder in ("recordings", "applications"):
         for path in (SOURCES / folder).rglob("*.py"):
             assert not [n for n in imported_by(path) if n.split(".")[0] in ("rclpy", *MESSAGES)]
 

@@ -10,7 +10,7 @@ import pytest
 
 pytest.importorskip("rclpy", reason="rclpy is not installed")
 
-from cardbox_tracker.estimation import tracker
+from cardbox_tracker.tracking import tracker
 
 DOCUMENT = Path(__file__).parents[1] / "docs" / "safety-slow-down.md"
 

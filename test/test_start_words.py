@@ -13,7 +13,7 @@ from unittest.mock import Mock
 
 import pytest
 
-from cardbox_tracker import compiling
+from cardbox_tracker.common import compiling
 from cardbox_tracker.start import other_package, start
 
 ROOT = Path(__file__).resolve().parents[1]

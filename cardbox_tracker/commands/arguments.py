@@ -12,9 +12,9 @@ from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
-from cardbox_tracker.errors import CardboxError
-from cardbox_tracker.files import check_writable, is_written_in_place
-from cardbox_tracker.settings import settings_of
+from cardbox_tracker.common.errors import CardboxError
+from cardbox_tracker.common.files import check_writable, is_written_in_place
+from cardbox_tracker.common.settings import settings_of
 
 if TYPE_CHECKING:
     from cardbox_tracker.recordings.silhouettes import TimeSpan
@@ -101,7 +101,7 @@ def _number(text: str) -> float:
 
 def add_references(parser: argparse.ArgumentParser) -> None:
     """Add the spans of the reference postures, and ``--side-turn``."""
-    from cardbox_tracker.body.posture import SIDE_TURNS
+    from cardbox_tracker.person.posture import SIDE_TURNS
 
     for name, posture in REFERENCES.items():
         parser.add_argument(
@@ -121,7 +121,7 @@ def add_references(parser: argparse.ArgumentParser) -> None:
 
 def add_preset(parser: argparse.ArgumentParser) -> None:
     """Add ``--preset``, a name of ``estimation.config.PRESETS``."""
-    from cardbox_tracker.estimation.config import PRESETS
+    from cardbox_tracker.search.config import PRESETS
 
     parser.add_argument(
         "--preset",

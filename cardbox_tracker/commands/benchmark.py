@@ -1,4 +1,4 @@
-"""``cardbox benchmark``: the speed on this machine, measured by ``benchmarks/`` of a checkout."""
+"""``cardbox benchmark``: the speed of this machine, measured by ``lab/`` of a checkout."""
 
 from __future__ import annotations
 
@@ -19,6 +19,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> None:
     """Measure, write the results and print a short table."""
-    benchmark = from_checkout("benchmarks.run", "benchmark")
+    benchmark = from_checkout("lab.benchmarks.run", "benchmark")
     print(benchmark.short_table(benchmark.run_benchmark(options.json, options.report)))
     print(f"wrote {options.json}" + (f" and {options.report}" if options.report else ""))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 
-from cardbox_tracker.errors import RosMissingError
+from cardbox_tracker.common.errors import RosMissingError
 
 NAME = "call"
 HELP = "call a service of the running nodes, as 'ros2 service call' does"

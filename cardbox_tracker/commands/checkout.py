@@ -1,4 +1,4 @@
-"""Modules of ``experiments/`` and ``benchmarks/``, which only a checkout has."""
+"""Modules of ``lab/``, which only a checkout has."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any
 
-from cardbox_tracker.errors import CardboxError
+from cardbox_tracker.common.errors import CardboxError
 
 _PACKAGE = Path(__file__).parents[1]
 
@@ -18,7 +18,7 @@ def from_checkout(module: str, target: str) -> Any:
     The checkout is the current directory, one above it, or the parent of this package.
 
     Args:
-        module: full name of the module, such as ``benchmarks.run``.
+        module: full name of the module, such as ``lab.benchmarks.run``.
         target: the ``make`` target that runs it.
 
     Raises:

@@ -23,6 +23,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> None:
     """Record, measure and track a synthetic person through the nodes; write the results."""
-    from cardbox_tracker.demo.run import run_demo
+    from cardbox_tracker.ros.demo.run import run_demo
 
     run_demo(options.output, options.preset, options.seed, options.cameras)

@@ -28,8 +28,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> None:
     """Install the files if asked to, load both networks, and print their places."""
-    from cardbox_tracker.detection.model_files import install_models, installed_models
-    from cardbox_tracker.detection.pose_network import PoseNetwork
+    from cardbox_tracker.detectors.model_files import install_models, installed_models
+    from cardbox_tracker.detectors.pose_network import PoseNetwork
 
     models = install_models(options.wheel) if options.install else installed_models()
     PoseNetwork(*models)

@@ -1,6 +1,6 @@
 """``cardbox evaluate``: recorded sessions with ground truth, or the paper's experiments.
 
-``experiments/`` of a checkout has the experiments.
+``lab/experiments/`` of a checkout has the experiments.
 """
 
 from __future__ import annotations
@@ -97,17 +97,17 @@ def run(options: argparse.Namespace) -> None:
         return
     inputs = [options.session] if options.session else []
     check_outputs((), options.force, inputs=inputs, results=(options.output / "report.md",))
-    experiments = from_checkout("experiments.evaluate", "experiments")
-    plans = from_checkout("experiments.plan", "experiments")
+    experiments = from_checkout("lab.experiments.evaluate", "experiments")
+    plans = from_checkout("lab.experiments.plan", "experiments")
     plan = (plans.quick_plan if options.quick else plans.full_plan)(options.runs)
     experiments.evaluate(options.output, plan, options.seed, options.session, jobs)
     print(f"wrote {options.output}/report.md, and all numbers to {options.output}/results.json")
 
 
 def _sessions(options: argparse.Namespace, jobs: int) -> None:
-    from cardbox_tracker.evaluation.recorded.evaluate import evaluate_sessions, result_name
-    from cardbox_tracker.evaluation.recorded.plan import NO_POINTS, Plan
-    from cardbox_tracker.progress import progress_bar
+    from cardbox_tracker.applications.evaluation.evaluate import evaluate_sessions, result_name
+    from cardbox_tracker.applications.evaluation.plan import NO_POINTS, Plan
+    from cardbox_tracker.common.progress import progress_bar
 
     names = dict.fromkeys(result_name(folder) for folder in options.sessions)
     results = [options.output / f"{name}.md" for name in names]

@@ -6,7 +6,7 @@ import argparse
 from pathlib import Path
 
 from cardbox_tracker.commands.arguments import add_force, body_beside, check_outputs
-from cardbox_tracker.errors import CardboxError
+from cardbox_tracker.common.errors import CardboxError
 
 NAME = "export"
 HELP = "write results as TRC, BVH or C3D, or as joint angles of the ISB"
@@ -52,8 +52,8 @@ def run(options: argparse.Namespace) -> None:
     from cardbox_tracker.applications.exporting.formats import FORMATS
     from cardbox_tracker.applications.exporting.motion_reader import read_motion
     from cardbox_tracker.applications.exporting.placed import images_of_body
-    from cardbox_tracker.body.model_file import load_body_model
-    from cardbox_tracker.estimation.estimate import UNCERTAIN
+    from cardbox_tracker.person.model_file import load_body_model
+    from cardbox_tracker.tracking.estimate import UNCERTAIN
 
     chosen = FORMATS[options.to]
     output = options.output or Path(options.results.resolve().stem + chosen.suffix)

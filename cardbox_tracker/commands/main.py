@@ -9,7 +9,8 @@ import sys
 from collections.abc import Container, Sequence
 from typing import Protocol
 
-from cardbox_tracker import __version__, interrupts
+from cardbox_tracker import __version__
+from cardbox_tracker.common import interrupts
 from cardbox_tracker.commands import (
     benchmark,
     body,
@@ -27,7 +28,7 @@ from cardbox_tracker.commands import (
     urdf,
     view,
 )
-from cardbox_tracker.errors import CardboxError
+from cardbox_tracker.common.errors import CardboxError
 
 
 class Command(Protocol):
@@ -73,7 +74,7 @@ COMMANDS: tuple[Command, ...] = (
     evaluate,
 )
 # Replacements of the subcommands of former versions.
-RETIRED = {"screenshots": "python -m tools.screenshots --output docs/images"}
+RETIRED = {"screenshots": "python -m lab.tools.screenshots --output docs/images"}
 # Methods that users may look for, and why there is none.
 ABSENT = {
     "reba": "REBA rates legs and knees in every posture, and this tracker does not see legs; use "

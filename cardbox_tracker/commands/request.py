@@ -26,16 +26,16 @@ from cardbox_tracker.commands.arguments import (
     span,
     time,
 )
-from cardbox_tracker.errors import CardboxError
-from cardbox_tracker.files import UnreadableFileError, read_regular
-from cardbox_tracker.settings import NoEffectError, nested, settings_of
+from cardbox_tracker.common.errors import CardboxError
+from cardbox_tracker.common.files import UnreadableFileError, read_regular
+from cardbox_tracker.common.settings import NoEffectError, nested, settings_of
 
 if TYPE_CHECKING:
-    from cardbox_tracker.body.model import BodyModel
-    from cardbox_tracker.estimation.config import TrackerConfig
-    from cardbox_tracker.recordings.detector import Detector
+    from cardbox_tracker.person.model import BodyModel
+    from cardbox_tracker.search.config import TrackerConfig
+    from cardbox_tracker.detectors.detector import Detector
     from cardbox_tracker.recordings.given_camera import GivenCamera
-    from cardbox_tracker.recordings.point_table import PointTable
+    from cardbox_tracker.detectors.point_table import PointTable
     from cardbox_tracker.recordings.recording import Recording, Segmentation
     from cardbox_tracker.recordings.silhouettes import TimeSpan
 
@@ -101,7 +101,7 @@ class RecordingRequest:
     @property
     def detector(self) -> Detector | None:
         """The detector among the sources of silhouettes and points; None without one."""
-        from cardbox_tracker.recordings.detector import Detector
+        from cardbox_tracker.detectors.detector import Detector
 
         sources = self.silhouettes, self.points
         return next((source for source in sources if isinstance(source, Detector)), None)
@@ -313,7 +313,7 @@ def add_recording(parser: argparse.ArgumentParser, required: bool = True) -> Non
 
 def add_tracking(parser: argparse.ArgumentParser, needs_recording: bool = True) -> None:
     """Add the options for recording, person and settings, read by :func:`tracking_request`."""
-    from cardbox_tracker.estimation.filtering.whole_body_config import WholeBodyConfig
+    from cardbox_tracker.search.whole_body_config import WholeBodyConfig
 
     add_recording(parser, needs_recording)
     add = parser.add_argument
@@ -417,7 +417,7 @@ def recording_request(options: argparse.Namespace, problems: Problems) -> Record
     """Return what the options of :func:`add_recording` ask for; note what is wrong with them."""
     from cardbox_tracker.recordings.open_images import check_exists
     from cardbox_tracker.recordings.recording import input_faults
-    from cardbox_tracker.vision.pairing import camera_names
+    from cardbox_tracker.camera.pairing import camera_names
 
     path, depth = options.recording, options.depth
     problems.caught(lambda: check_exists(path), None)
@@ -451,7 +451,7 @@ def tracking_request(options: argparse.Namespace, faults: Iterable[str] = ()) ->
     Raises:
         OptionsError: options are missing, wrong or contradict each other.
     """
-    from cardbox_tracker.estimation.config import PRESETS
+    from cardbox_tracker.search.config import PRESETS
 
     problems = Problems(options.recording, faults)
     recording = recording_request(options, problems)
@@ -489,7 +489,7 @@ def _camera(options: argparse.Namespace, problems: Problems) -> GivenCamera:
 def _silhouettes(options: argparse.Namespace, problems: Problems) -> Segmentation:
     """Return the source of the silhouettes that is given, or that fits the recording."""
     from cardbox_tracker.recordings.depth_silhouettes import Within
-    from cardbox_tracker.recordings.detector import MEDIAPIPE, Detector
+    from cardbox_tracker.detectors.detector import MEDIAPIPE, Detector
     from cardbox_tracker.recordings.open_images import is_bag
     from cardbox_tracker.recordings.person_in_view import PersonInView
     from cardbox_tracker.recordings.recording import STEREO
@@ -533,8 +533,8 @@ def points_named(name: str) -> Detector | PointTable:
     Raises:
         CardboxError: the detector is not installed, or there is no such table.
     """
-    from cardbox_tracker.recordings.detector import MEDIAPIPE, Detector
-    from cardbox_tracker.recordings.point_table import PointTable
+    from cardbox_tracker.detectors.detector import MEDIAPIPE, Detector
+    from cardbox_tracker.detectors.point_table import PointTable
 
     if name == MEDIAPIPE:
         return Detector.installed()
@@ -548,9 +548,9 @@ def points_named(name: str) -> Detector | PointTable:
 
 
 def _person(options: argparse.Namespace, problems: Problems) -> PersonRequest:
-    from cardbox_tracker.body.model import BodyModel
-    from cardbox_tracker.body.model_file import load_body_model
-    from cardbox_tracker.body.proportions import body_from_proportions
+    from cardbox_tracker.person.model import BodyModel
+    from cardbox_tracker.person.model_file import load_body_model
+    from cardbox_tracker.person.proportions import body_from_proportions
 
     pitch_deg, body = options.camera_pitch_deg, BodyModel()
     if options.model is None and options.stature is None:
@@ -583,7 +583,7 @@ def _config(options: argparse.Namespace, preset: TrackerConfig) -> TrackerConfig
     Raises:
         CardboxError: the file cannot be read, or a value is wrong or has no effect.
     """
-    from cardbox_tracker.estimation.settings_file import read_settings
+    from cardbox_tracker.search.settings_file import read_settings
 
     config = preset if options.depth is None else preset.with_depth()
     if options.settings is not None:

@@ -12,13 +12,13 @@ from cardbox_tracker import __version__
 from cardbox_tracker.commands.arguments import add_force, add_settings, check_outputs, settings_from
 from cardbox_tracker.commands.request import add_tracking, tracking_request
 from cardbox_tracker.commands.tracking import track
-from cardbox_tracker.errors import CardboxError
+from cardbox_tracker.common.errors import CardboxError
 
 if TYPE_CHECKING:
     from cardbox_tracker.applications.ergonomics.config import RulaConfig
     from cardbox_tracker.applications.ergonomics.recording import MomentImages, RulaRow
     from cardbox_tracker.applications.ergonomics.report import PageContent
-    from cardbox_tracker.body.model import BodyModel
+    from cardbox_tracker.person.model import BodyModel
 
 NAME = "rula"
 HELP = "score the strain on arms, neck and trunk in a recording (RULA)"

@@ -9,8 +9,8 @@ from pathlib import Path
 from cardbox_tracker.commands.arguments import add_force, at_least, body_beside, check_outputs
 from cardbox_tracker.commands.request import TrackFiles, add_tracking, tracking_request
 from cardbox_tracker.commands.tracking import track
-from cardbox_tracker.errors import CardboxError
-from cardbox_tracker.files import is_written_in_place
+from cardbox_tracker.common.errors import CardboxError
+from cardbox_tracker.common.files import is_written_in_place
 
 NAME = "track"
 HELP = "follow the posture through a recording, or through all recordings of a folder"

@@ -22,7 +22,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> None:
     """Print the URDF."""
-    from cardbox_tracker.body.model_file import load_body_model
-    from cardbox_tracker.body.urdf import urdf_from_body
+    from cardbox_tracker.person.model_file import load_body_model
+    from cardbox_tracker.person.urdf import urdf_from_body
 
     print(urdf_from_body(load_body_model(options.model), torso_place=options.torso_place))

@@ -18,11 +18,11 @@ from cardbox_tracker.commands.request import (
     tracking_request,
 )
 from cardbox_tracker.commands.tracking import track
-from cardbox_tracker.errors import CardboxError, RosMissingError
+from cardbox_tracker.common.errors import CardboxError, RosMissingError
 
 if TYPE_CHECKING:
     from cardbox_tracker.applications.viewing.scene import Scene
-    from cardbox_tracker.evaluation.truth import TrueFrame
+    from cardbox_tracker.applications.evaluation.truth import TrueFrame
 
 NAME = "view"
 HELP = "show results in a viewer: image, body in 3D, plots, error, a slider for the time"
@@ -152,7 +152,7 @@ def _truth_of(
         CardboxError: the ground truth cannot be read, or is given for other images.
     """
     from cardbox_tracker.applications.viewing.sources import image_stamps
-    from cardbox_tracker.evaluation.truth import load_ground_truth
+    from cardbox_tracker.applications.evaluation.truth import load_ground_truth
 
     path = options.truth or _truth_beside(options.recording)
     if path is None:
@@ -171,7 +171,7 @@ def _truth_of(
 def _show_results(paths: Sequence[Path], scenes: Sequence[Scene]) -> list[int]:
     """Show the results in bags; return the number of images with a posture of each."""
     from cardbox_tracker.applications.viewing.sources import show_together
-    from cardbox_tracker.progress import progress_bar
+    from cardbox_tracker.common.progress import progress_bar
     from cardbox_tracker.recordings.bag_reader import BagReader
 
     if not paths:

@@ -18,7 +18,7 @@ from typing import Any, BinaryIO
 import lz4.frame
 from rosbags.rosbag2 import reader, storage_mcap
 
-from cardbox_tracker.errors import BagError
+from cardbox_tracker.common.errors import BagError
 
 MOST_BYTES = 256 * 1024 * 1024
 """Limit of one chunk or message, several times the largest image."""

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from cardbox_tracker.markers import MarkerShape, Rgba
-from cardbox_tracker.outputs import Markers
+from cardbox_tracker.recordings.outputs import Markers
 from cardbox_tracker.recordings.bag_writer import BagWriter
 
 _NO_BYTES = np.zeros(0, np.uint8)

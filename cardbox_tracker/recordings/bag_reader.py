@@ -14,13 +14,13 @@ from numpy.typing import NDArray
 from rosbags.highlevel import AnyReader, AnyReaderError
 from rosbags.typesys import Stores, get_typestore
 
-from cardbox_tracker.errors import BagError, EncodingError, cut
+from cardbox_tracker.common.errors import BagError, EncodingError, cut
 from cardbox_tracker.recordings.bag_limits import check_recording, limit_decompression
 from cardbox_tracker.recordings.given_camera import GivenCamera
 from cardbox_tracker.recordings.image_recording import WORKING_SIZE, RecordedImage
-from cardbox_tracker.vision.camera import Calibration
-from cardbox_tracker.vision.camera_info import calibration_from_info
-from cardbox_tracker.vision.encodings import (
+from cardbox_tracker.camera.camera import Calibration
+from cardbox_tracker.camera.camera_info import calibration_from_info
+from cardbox_tracker.camera.encodings import (
     decode_as_sent,
     decode_compressed,
     image_parts,

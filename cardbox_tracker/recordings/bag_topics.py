@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 
-from cardbox_tracker.errors import CardboxError
+from cardbox_tracker.common.errors import CardboxError
 from cardbox_tracker.recordings.bag_reader import IMAGE_TYPES, BagReader
 
 _COMPRESSED = "/compressed"

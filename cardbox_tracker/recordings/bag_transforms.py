@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from cardbox_tracker.body.urdf import LinkTransforms
+from cardbox_tracker.person.urdf import LinkTransforms
 from cardbox_tracker.recordings.bag_writer import BagWriter
 
 TOPIC = "/tf"

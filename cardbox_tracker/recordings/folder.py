@@ -7,7 +7,7 @@ from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
 
-from cardbox_tracker.errors import CardboxError, quoted
+from cardbox_tracker.common.errors import CardboxError, quoted
 from cardbox_tracker.recordings.bag_reader import FILE_ENDINGS
 from cardbox_tracker.recordings.image_folder import image_files
 from cardbox_tracker.recordings.video_reader import SUFFIXES as VIDEO_ENDINGS

@@ -12,7 +12,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from cardbox_tracker.vision.camera import Calibration
+from cardbox_tracker.camera.camera import Calibration
 
 WORKING_SIZE = (320, 240)
 """Working size (width, height), px, of bags, whatever the aspect ratio of their images."""

@@ -5,16 +5,16 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from functools import partial
 
-from cardbox_tracker.body.model import BodyModel
-from cardbox_tracker.errors import CardboxError
-from cardbox_tracker.estimation.initialization.config import (
+from cardbox_tracker.person.model import BodyModel
+from cardbox_tracker.common.errors import CardboxError
+from cardbox_tracker.measuring.config import (
     InitializationConfig,
     InitializationResult,
     fit_text,
 )
-from cardbox_tracker.estimation.initialization.measure import initialize_body
-from cardbox_tracker.estimation.initialization.references import average_silhouette
-from cardbox_tracker.estimation.initialization.scale import (
+from cardbox_tracker.measuring.measure import initialize_body
+from cardbox_tracker.measuring.references import average_silhouette
+from cardbox_tracker.measuring.scale import (
     SCALE_REFERENCES,
     DepthReference,
     depth_scale,
@@ -23,8 +23,8 @@ from cardbox_tracker.estimation.initialization.scale import (
 )
 from cardbox_tracker.recordings.recording import Recording
 from cardbox_tracker.recordings.silhouettes import SilhouetteSource, TimeSpan
-from cardbox_tracker.vision.camera import Camera
-from cardbox_tracker.vision.depth_image import median_depth
+from cardbox_tracker.camera.camera import Camera
+from cardbox_tracker.camera.depth_image import median_depth
 
 # Further images of one posture add no information.
 _MOST_IMAGES = 20

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
-from cardbox_tracker.errors import BagError
+from cardbox_tracker.common.errors import BagError
 from cardbox_tracker.recordings.bag_reader import FILE_ENDINGS, BagReader
 from cardbox_tracker.recordings.given_camera import GivenCamera
 from cardbox_tracker.recordings.image_folder import SUFFIXES, ImageFolder, image_files

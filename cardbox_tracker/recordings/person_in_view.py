@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from cardbox_tracker.errors import CardboxError
-from cardbox_tracker.recordings.detector import Detector
+from cardbox_tracker.common.errors import CardboxError
+from cardbox_tracker.detectors.detector import Detector
 from cardbox_tracker.recordings.image_recording import ImageRecording
-from cardbox_tracker.recordings.point_table import PointTable
+from cardbox_tracker.detectors.point_table import PointTable
 from cardbox_tracker.recordings.silhouettes import SilhouetteSource
-from cardbox_tracker.vision.learning import Learning, PersonInViewLearning
+from cardbox_tracker.segmentation.learning import Learning, PersonInViewLearning
 
 # A standing person sways too slowly to be seen in images at a higher rate than the live nodes'.
 _LEARNING_HZ = 15.0

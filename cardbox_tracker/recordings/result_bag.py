@@ -12,13 +12,13 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from cardbox_tracker.body.model import BodyModel
-from cardbox_tracker.body.model_file import dumps_body_model
-from cardbox_tracker.body.urdf import urdf_from_body
-from cardbox_tracker.estimation.estimate import Estimate
-from cardbox_tracker.estimation.tracker import Tracker
-from cardbox_tracker.keypoint_status import CHANCE_KEY, LEVELS, KeypointStates, chance_text
-from cardbox_tracker.outputs import (
+from cardbox_tracker.person.model import BodyModel
+from cardbox_tracker.person.model_file import dumps_body_model
+from cardbox_tracker.person.urdf import urdf_from_body
+from cardbox_tracker.tracking.estimate import Estimate
+from cardbox_tracker.tracking.tracker import Tracker
+from cardbox_tracker.recordings.keypoint_status import CHANCE_KEY, LEVELS, KeypointStates, chance_text
+from cardbox_tracker.recordings.outputs import (
     JointValues,
     Markers,
     OutputStream,

@@ -7,12 +7,12 @@ from typing import Any
 
 import numpy as np
 
-from cardbox_tracker.body.model import BodyModel
-from cardbox_tracker.body.model_file import loads_body_model
-from cardbox_tracker.body.sizes import FloatArray
-from cardbox_tracker.errors import BagError
-from cardbox_tracker.estimation.estimate import NO_PERSON, TRACKING, UNCERTAIN
-from cardbox_tracker.outputs import JointValues, neck_from, place_from, posture_from
+from cardbox_tracker.person.model import BodyModel
+from cardbox_tracker.person.model_file import loads_body_model
+from cardbox_tracker.person.sizes import FloatArray
+from cardbox_tracker.common.errors import BagError
+from cardbox_tracker.tracking.estimate import NO_PERSON, TRACKING, UNCERTAIN
+from cardbox_tracker.recordings.outputs import JointValues, neck_from, place_from, posture_from
 from cardbox_tracker.recordings.bag_reader import BagReader, stamp_ns_of
 
 MODEL = "/body_model"

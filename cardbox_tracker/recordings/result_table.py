@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from cardbox_tracker.body.skeleton import (
+from cardbox_tracker.person.skeleton import (
     CLAVICLE_NAMES,
     JOINT_NAMES,
     KEYPOINT_NAMES,
@@ -20,11 +20,11 @@ from cardbox_tracker.body.skeleton import (
     PLACE_NAMES,
     UNITS,
 )
-from cardbox_tracker.errors import CardboxError
-from cardbox_tracker.estimation.estimate import Estimate
-from cardbox_tracker.files import atomic_path
-from cardbox_tracker.keypoint_status import keypoint_states
-from cardbox_tracker.outputs import METRICS, joint_deviations, joint_values, positions_of
+from cardbox_tracker.common.errors import CardboxError
+from cardbox_tracker.tracking.estimate import Estimate
+from cardbox_tracker.common.files import atomic_path
+from cardbox_tracker.recordings.keypoint_status import keypoint_states
+from cardbox_tracker.recordings.outputs import METRICS, joint_deviations, joint_values, positions_of
 from cardbox_tracker.recordings.silhouettes import RecordedFrame
 
 Cell = int | float | str | Decimal | None

@@ -9,11 +9,11 @@ from pathlib import Path
 
 import numpy as np
 
-from cardbox_tracker.body.model import BodyModel
-from cardbox_tracker.errors import CardboxError
-from cardbox_tracker.estimation.config import TrackerConfig
-from cardbox_tracker.estimation.estimate import UNCERTAIN, Estimate
-from cardbox_tracker.estimation.tracker import Tracker
+from cardbox_tracker.person.model import BodyModel
+from cardbox_tracker.common.errors import CardboxError
+from cardbox_tracker.search.config import TrackerConfig
+from cardbox_tracker.tracking.estimate import UNCERTAIN, Estimate
+from cardbox_tracker.tracking.tracker import Tracker
 from cardbox_tracker.recordings.recording import Recording
 from cardbox_tracker.recordings.result_table import result_table
 from cardbox_tracker.recordings.silhouettes import RecordedFrame

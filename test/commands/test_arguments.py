@@ -13,7 +13,7 @@ from pathlib import Path
 import pytest
 
 from cardbox_tracker.commands.arguments import at_least, between, check_outputs, span, time
-from cardbox_tracker.errors import CardboxError
+from cardbox_tracker.common.errors import CardboxError
 from cardbox_tracker.recordings.bag_writer import BagWriter
 
 
@@ -93,7 +93,7 @@ def test_synthesize_replaces_a_recording_with_force(
     def synthesize(*_: object, **options: object) -> None:
         called.update(options)
 
-    monkeypatch.setattr("cardbox_tracker.simulation.session.synthesize_session", synthesize)
+    monkeypatch.setattr("cardbox_tracker.applications.simulation.session.synthesize_session", synthesize)
     assert cardbox("synthesize", "--output", files / "session", "--force").code == 0
     assert called["overwrite"] is True
 
@@ -102,7 +102,7 @@ def test_evaluate_does_not_replace_a_report_but_resumes_without_one(
     tmp_path: Path, cardbox: Callable, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     done: list[Path] = []
-    monkeypatch.setattr("experiments.evaluate.evaluate", lambda *given: done.append(given[0]))
+    monkeypatch.setattr("lab.experiments.evaluate.evaluate", lambda *given: done.append(given[0]))
     (tmp_path / "parts").mkdir()
     assert cardbox("evaluate", "--output", tmp_path).code == 0
     (tmp_path / "report.md").write_text("days of work")
@@ -115,7 +115,7 @@ SLOW = """
 import signal, sys, time
 from pathlib import Path
 from cardbox_tracker.commands import main, synthesize
-from cardbox_tracker.files import atomic_path
+from cardbox_tracker.common.files import atomic_path
 from cardbox_tracker.recordings.bag_writer import BagWriter
 
 def run(options):

@@ -17,7 +17,7 @@ from cardbox_tracker.commands import checkout
 from cardbox_tracker.commands import main as main_module
 from cardbox_tracker.commands.checkout import from_checkout
 from cardbox_tracker.commands.main import COMMANDS, RETIRED, build_parser
-from cardbox_tracker.errors import CardboxError
+from cardbox_tracker.common.errors import CardboxError
 
 ROOT = Path(__file__).resolve().parents[2]
 NAMES = [command.NAME for command in COMMANDS]
@@ -122,7 +122,7 @@ def test_an_interrupted_command_says_so(
     def interrupted(*_: object) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("cardbox_tracker.body.model_file.load_body_model", interrupted)
+    monkeypatch.setattr("cardbox_tracker.person.model_file.load_body_model", interrupted)
     done = cardbox("urdf", files / "person.yaml")
     assert done.code == 130
     done.assert_refused("urdf", "interrupted")
@@ -134,7 +134,7 @@ def test_a_full_disk_is_told_in_words(
     def full(*_: object, **__: object) -> None:
         raise OSError(28, "No space left on device", "somewhere")
 
-    monkeypatch.setattr("cardbox_tracker.simulation.session.synthesize_session", full)
+    monkeypatch.setattr("cardbox_tracker.applications.simulation.session.synthesize_session", full)
     done = cardbox("synthesize", "--output", tmp_path / "bag")
     assert done.code == 1
     assert done.err.endswith("cardbox synthesize: somewhere: No space left on device\n")
@@ -292,7 +292,7 @@ def test_beside_the_package_it_is_found_from_anywhere(tmp_path: Path) -> None:
     program = (
         f"import sys; sys.path.insert(0, {str(ROOT)!r})\n"
         "from cardbox_tracker.commands.checkout import from_checkout\n"
-        "print(from_checkout('benchmarks.report', 'benchmark').COMMAND)"
+        "print(from_checkout('lab.benchmarks.report', 'benchmark').COMMAND)"
     )
     done = subprocess.run(
         [sys.executable, "-c", program], capture_output=True, text=True, cwd=tmp_path, check=True

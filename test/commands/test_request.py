@@ -11,8 +11,8 @@ import cv2
 import numpy as np
 import pytest
 
-from cardbox_tracker.body.model import BodyModel
-from cardbox_tracker.body.model_file import save_body_model
+from cardbox_tracker.person.model import BodyModel
+from cardbox_tracker.person.model_file import save_body_model
 from cardbox_tracker.commands.main import build_parser
 from cardbox_tracker.commands.request import (
     OptionsError,
@@ -20,10 +20,10 @@ from cardbox_tracker.commands.request import (
     tracking_request,
     with_own_options,
 )
-from cardbox_tracker.errors import CardboxError
+from cardbox_tracker.common.errors import CardboxError
 from cardbox_tracker.recordings.given_camera import GivenCamera
 from cardbox_tracker.recordings.person_in_view import PersonInView
-from cardbox_tracker.recordings.point_table import PointTable
+from cardbox_tracker.detectors.point_table import PointTable
 from cardbox_tracker.recordings.silhouettes import TimeSpan
 
 

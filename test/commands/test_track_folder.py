@@ -20,7 +20,7 @@ from cardbox_tracker.commands import track_folder
 from cardbox_tracker.commands.main import build_parser
 from cardbox_tracker.commands.request import TrackingRequest, tracking_request
 from cardbox_tracker.commands.track_folder import digest_of_inputs
-from cardbox_tracker.errors import CardboxError
+from cardbox_tracker.common.errors import CardboxError
 from cardbox_tracker.recordings.folder import SUMMARY
 from cardbox_tracker.recordings.track import TrackSummary
 

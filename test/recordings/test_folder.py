@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from cardbox_tracker.errors import CardboxError
+from cardbox_tracker.common.errors import CardboxError
 from cardbox_tracker.recordings.folder import SUMMARY, is_one_recording, recordings_in
 
 

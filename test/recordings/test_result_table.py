@@ -13,9 +13,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from cardbox_tracker.body.skeleton import KeypointState
-from cardbox_tracker.errors import CardboxError
-from cardbox_tracker.estimation.estimate import Estimate
+from cardbox_tracker.person.skeleton import KeypointState
+from cardbox_tracker.common.errors import CardboxError
+from cardbox_tracker.tracking.estimate import Estimate
 from cardbox_tracker.recordings.result_table import (
     check_table,
     columns,

@@ -13,20 +13,20 @@ import numpy as np
 import pytest
 
 from cardbox_tracker.applications.drawing.video import overlay_video
-from cardbox_tracker.body.kinematics import pose
-from cardbox_tracker.body.model_file import loads_body_model
-from cardbox_tracker.body.skeleton import (
+from cardbox_tracker.person.kinematics import pose
+from cardbox_tracker.person.model_file import loads_body_model
+from cardbox_tracker.person.skeleton import (
     JOINT_NAMES,
     JOINT_STATE_NAMES,
     KEYPOINT_NAMES,
     PLACE_NAMES,
 )
-from cardbox_tracker.body.urdf import LinkTransforms
-from cardbox_tracker.errors import BagError, CardboxError
-from cardbox_tracker.estimation.config import default_preset
-from cardbox_tracker.estimation.estimate import Estimate
-from cardbox_tracker.estimation.initialization.config import InitializationConfig
-from cardbox_tracker.estimation.tracker import Tracker
+from cardbox_tracker.person.urdf import LinkTransforms
+from cardbox_tracker.common.errors import BagError, CardboxError
+from cardbox_tracker.search.config import default_preset
+from cardbox_tracker.tracking.estimate import Estimate
+from cardbox_tracker.measuring.config import InitializationConfig
+from cardbox_tracker.tracking.tracker import Tracker
 from cardbox_tracker.recordings.bag_reader import BagReader
 from cardbox_tracker.recordings.initialize import describe, initialize_from_recording
 from cardbox_tracker.recordings.recording import Recording

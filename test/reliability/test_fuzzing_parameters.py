@@ -15,8 +15,8 @@ from rclpy.context import Context  # noqa: E402
 from rclpy.parameter import Parameter  # noqa: E402
 
 from cardbox_tracker.ros.runtime.parameters import LiveParameters  # noqa: E402
-from cardbox_tracker.settings import check  # noqa: E402
-from tools.parameter_docs import NODES  # noqa: E402
+from cardbox_tracker.common.settings import check  # noqa: E402
+from lab.tools.parameter_docs import NODES  # noqa: E402
 
 PLAY_BAG = [Parameter("bag", value="bag")]
 TEXTS = st.text(st.characters(codec="utf-8", exclude_characters="\0"), max_size=20)

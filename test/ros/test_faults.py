@@ -10,8 +10,8 @@ import pytest
 
 pytest.importorskip("rclpy", reason="rclpy is not installed")
 
-from tools.fault_nodes import InsideNodes
-from tools.fault_scene import FAULTS, START_NS, Found, Person, S, even, judge, run_of
+from lab.tools.fault_nodes import InsideNodes
+from lab.tools.fault_scene import FAULTS, START_NS, Found, Person, S, even, judge, run_of
 
 PERSON = Person()
 

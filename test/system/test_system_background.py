@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from cardbox_tracker.body.posture import reference_posture
+from cardbox_tracker.person.posture import reference_posture
 
 rclpy = pytest.importorskip("rclpy", reason="rclpy is not installed")
 

@@ -8,7 +8,7 @@ import pytest
 
 pytest.importorskip("rclpy", reason="rclpy is not installed")
 
-from benchmarks import nodes as benchmark_nodes
+from lab.benchmarks import nodes as benchmark_nodes
 
 
 def test_the_nodes_are_measured(monkeypatch: pytest.MonkeyPatch, ros_domain: int) -> None:

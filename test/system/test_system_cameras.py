@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 import yaml
 
-from cardbox_tracker.body.model_file import loads_body_model, save_body_model
+from cardbox_tracker.person.model_file import loads_body_model, save_body_model
 
 rclpy = pytest.importorskip("rclpy", reason="rclpy is not installed")
 

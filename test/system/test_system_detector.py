@@ -8,11 +8,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from cardbox_tracker.body.kinematics import pose
-from cardbox_tracker.body.model_file import save_body_model
-from cardbox_tracker.body.posture import reference_posture
-from cardbox_tracker.detection.landmarks import LANDMARKS
-from cardbox_tracker.detection.pose_network import Detection
+from cardbox_tracker.person.kinematics import pose
+from cardbox_tracker.person.model_file import save_body_model
+from cardbox_tracker.person.posture import reference_posture
+from cardbox_tracker.detectors.landmarks import LANDMARKS
+from cardbox_tracker.detectors.pose_network import Detection
 
 rclpy = pytest.importorskip("rclpy", reason="rclpy is not installed")
 
@@ -21,7 +21,7 @@ from geometry_msgs.msg import Point32, Polygon, PolygonStamped  # noqa: E402
 from sensor_msgs.msg import CameraInfo, Image, JointState  # noqa: E402
 from std_msgs.msg import Header  # noqa: E402
 
-from cardbox_tracker.recordings.detector import PersonDetector  # noqa: E402
+from cardbox_tracker.detectors.detector import PersonDetector  # noqa: E402
 from cardbox_tracker.ros.messages.conversions import (  # noqa: E402
     camera_info_message,
     image_message,

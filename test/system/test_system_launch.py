@@ -20,7 +20,7 @@ import numpy as np
 import pytest
 import yaml
 
-from cardbox_tracker.body.model_file import save_body_model
+from cardbox_tracker.person.model_file import save_body_model
 from cardbox_tracker.recordings.bag_writer import BagWriter
 
 rclpy = pytest.importorskip("rclpy", reason="rclpy is not installed")
@@ -30,7 +30,7 @@ pytest.importorskip("ros2launch", reason="ros2launch is not installed (not on Py
 from sensor_msgs.msg import Image, JointState  # noqa: E402
 
 from cardbox_tracker.ros.runtime import qos  # noqa: E402
-from cardbox_tracker.vision.background_config import BackgroundConfig  # noqa: E402
+from cardbox_tracker.segmentation.background_config import BackgroundConfig  # noqa: E402
 
 EMPTY = BackgroundConfig().learn_images + 30
 FRONT = 120

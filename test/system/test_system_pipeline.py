@@ -15,11 +15,11 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from cardbox_tracker.body.kinematics import pose
-from cardbox_tracker.body.model_file import loads_body_model
-from cardbox_tracker.body.posture import N_STATE, reference_posture
-from cardbox_tracker.body.skeleton import JOINT_NAMES, JOINT_STATE_NAMES
-from cardbox_tracker.estimation.estimate import Estimate
+from cardbox_tracker.person.kinematics import pose
+from cardbox_tracker.person.model_file import loads_body_model
+from cardbox_tracker.person.posture import N_STATE, reference_posture
+from cardbox_tracker.person.skeleton import JOINT_NAMES, JOINT_STATE_NAMES
+from cardbox_tracker.tracking.estimate import Estimate
 
 rclpy = pytest.importorskip("rclpy", reason="rclpy is not installed")
 

@@ -9,22 +9,22 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from cardbox_tracker.body.cardbox import PATCH_NAMES, cardbox_patches, patches_at
-from cardbox_tracker.body.kinematics import (
+from cardbox_tracker.person.cardbox import PATCH_NAMES, cardbox_patches, patches_at
+from cardbox_tracker.person.kinematics import (
     PosedBodies,
     gaze_m,
     pose,
 )
-from cardbox_tracker.body.model import BodyModel
-from cardbox_tracker.body.parts import body_parts
-from cardbox_tracker.body.posture import PLACE, POSTURE
-from cardbox_tracker.body.sizes import FloatArray
-from cardbox_tracker.body.skeleton import KeypointState
-from cardbox_tracker.detection.image_points import POINT_INDEX, ImagePoints
-from cardbox_tracker.estimation.estimate import Estimate
-from cardbox_tracker.estimation.tracker import Tracker
-from cardbox_tracker.vision.camera import Camera
-from cardbox_tracker.vision.rasterisation import clip_near, in_front
+from cardbox_tracker.person.model import BodyModel
+from cardbox_tracker.person.parts import body_parts
+from cardbox_tracker.person.posture import PLACE, POSTURE
+from cardbox_tracker.person.sizes import FloatArray
+from cardbox_tracker.person.skeleton import KeypointState
+from cardbox_tracker.detectors.image_points import POINT_INDEX, ImagePoints
+from cardbox_tracker.tracking.estimate import Estimate
+from cardbox_tracker.tracking.tracker import Tracker
+from cardbox_tracker.camera.camera import Camera
+from cardbox_tracker.camera.rasterisation import clip_near, in_front
 
 ImageArray = NDArray[np.uint8]
 

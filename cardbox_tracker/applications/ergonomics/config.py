@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, fields
 from typing import NamedTuple
 
-from cardbox_tracker.settings import Settings, setting, settings_of
+from cardbox_tracker.common.settings import Settings, setting, settings_of
 
 MEASURED, DECLARED, MIXED = "measured", "declared", "mixed"
 """Origins of a part score; tables and the grand score are mixed."""

@@ -34,11 +34,11 @@ from cardbox_tracker.applications.ergonomics.config import (
     RulaConfig,
     declared,
 )
-from cardbox_tracker.body.model import BodyModel
-from cardbox_tracker.body.parts import body_parts
-from cardbox_tracker.body.posture import LEFT_ARM, PITCH, RIGHT_ARM, ROLL
-from cardbox_tracker.body.sizes import FloatArray
-from cardbox_tracker.body.skeleton import NECK_LIMITS, arm_directions
+from cardbox_tracker.person.model import BodyModel
+from cardbox_tracker.person.parts import body_parts
+from cardbox_tracker.person.posture import LEFT_ARM, PITCH, RIGHT_ARM, ROLL
+from cardbox_tracker.person.sizes import FloatArray
+from cardbox_tracker.person.skeleton import NECK_LIMITS, arm_directions
 
 ScoreArray = NDArray[np.int64]
 

@@ -2,7 +2,7 @@
 
 Its axes are X to the left of a person who faces the camera, Y up, Z to the camera, in metres. At
 rest, with all rotations 0, the person is upright with hanging arms, so that the rotations of torso,
-neck and elbows are the joint angles of :mod:`cardbox_tracker.body.kinematics`, axis by axis. The
+neck and elbows are the joint angles of :mod:`cardbox_tracker.person.kinematics`, axis by axis. The
 bones from the middle of the chest to the shoulders turn about Z alone and lift the shoulders.
 """
 
@@ -15,9 +15,9 @@ import numpy as np
 
 from cardbox_tracker.applications.exporting.motion import Motion
 from cardbox_tracker.applications.exporting.placed import frames_of
-from cardbox_tracker.body.model import BodyModel
-from cardbox_tracker.body.parts import body_parts
-from cardbox_tracker.body.posture import (
+from cardbox_tracker.person.model import BodyModel
+from cardbox_tracker.person.parts import body_parts
+from cardbox_tracker.person.posture import (
     ELBOW_ABDUCTION,
     ELBOW_FLEXION,
     FIRST_ANGLES,
@@ -27,10 +27,10 @@ from cardbox_tracker.body.posture import (
     SHOULDER_FLEXION,
     YAW,
 )
-from cardbox_tracker.body.sizes import FloatArray
-from cardbox_tracker.body.skeleton import head_from_pivot_m, neck_pivot_m
-from cardbox_tracker.errors import CardboxError
-from cardbox_tracker.files import atomic_path
+from cardbox_tracker.person.sizes import FloatArray
+from cardbox_tracker.person.skeleton import head_from_pivot_m, neck_pivot_m
+from cardbox_tracker.common.errors import CardboxError
+from cardbox_tracker.common.files import atomic_path
 
 _FINGERS_TO_FOREARM = 0.25
 # Length of the clavicles in shoulder breadths: so a shoulder that turns about their inner ends is

@@ -10,7 +10,7 @@ from cardbox_tracker.applications.exporting.bvh import write_bvh
 from cardbox_tracker.applications.exporting.isb import write_isb
 from cardbox_tracker.applications.exporting.markers import ezc3d_or_error, write_c3d, write_trc
 from cardbox_tracker.applications.exporting.motion import Motion
-from cardbox_tracker.body.model import BodyModel
+from cardbox_tracker.person.model import BodyModel
 
 
 class Format(NamedTuple):

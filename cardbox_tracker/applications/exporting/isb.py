@@ -18,10 +18,10 @@ import numpy as np
 
 from cardbox_tracker.applications.exporting.markers import LABORATORY
 from cardbox_tracker.applications.exporting.motion import Motion
-from cardbox_tracker.body.model import BodyModel
-from cardbox_tracker.body.posture import LEFT_ARM, PITCH, RIGHT_ARM, ROLL, TORSO_Y, YAW
-from cardbox_tracker.body.sizes import FloatArray
-from cardbox_tracker.body.skeleton import (
+from cardbox_tracker.person.model import BodyModel
+from cardbox_tracker.person.posture import LEFT_ARM, PITCH, RIGHT_ARM, ROLL, TORSO_Y, YAW
+from cardbox_tracker.person.sizes import FloatArray
+from cardbox_tracker.person.skeleton import (
     JOINT_NAMES,
     NECK_NAMES,
     PLACE_NAMES,
@@ -30,7 +30,7 @@ from cardbox_tracker.body.skeleton import (
     rotation_y,
     rotation_z,
 )
-from cardbox_tracker.files import write_table
+from cardbox_tracker.common.files import write_table
 
 THORAX = ("extension", "lateral_flexion_right", "axial_rotation_left")
 """Angles of the thorax in the laboratory, order Z-X'-Y''; the names tell the positive direction."""

@@ -10,12 +10,12 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from cardbox_tracker.applications.exporting.motion import Motion
-from cardbox_tracker.body.model import BodyModel
-from cardbox_tracker.body.posture import N_JOINTS, N_STATE
-from cardbox_tracker.body.sizes import FloatArray
-from cardbox_tracker.body.skeleton import JOINT_NAMES, KEYPOINT_NAMES, NECK_NAMES, PLACE_NAMES
-from cardbox_tracker.errors import BagError, CardboxError, quoted
-from cardbox_tracker.estimation.estimate import LOST, NO_PERSON, TRACKING, UNCERTAIN
+from cardbox_tracker.person.model import BodyModel
+from cardbox_tracker.person.posture import N_JOINTS, N_STATE
+from cardbox_tracker.person.sizes import FloatArray
+from cardbox_tracker.person.skeleton import JOINT_NAMES, KEYPOINT_NAMES, NECK_NAMES, PLACE_NAMES
+from cardbox_tracker.common.errors import BagError, CardboxError, quoted
+from cardbox_tracker.tracking.estimate import LOST, NO_PERSON, TRACKING, UNCERTAIN
 from cardbox_tracker.recordings.bag_reader import BagReader
 from cardbox_tracker.recordings.open_images import is_bag
 from cardbox_tracker.recordings.result_reader import Result, read_results

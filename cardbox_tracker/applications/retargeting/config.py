@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from cardbox_tracker.settings import Settings, setting
+from cardbox_tracker.common.settings import Settings, setting
 
 
 @dataclass(frozen=True)

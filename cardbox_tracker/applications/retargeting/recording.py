@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from cardbox_tracker.applications.retargeting.retargeter import Command, Moment, Retargeter
-from cardbox_tracker.files import write_table
+from cardbox_tracker.common.files import write_table
 from cardbox_tracker.recordings.bag_reader import BagReader
 from cardbox_tracker.recordings.bag_writer import BagWriter
 from cardbox_tracker.recordings.result_reader import read_results

@@ -11,10 +11,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cardbox_tracker.applications.viewing.viewer import rerun
-from cardbox_tracker.body.model import BodyModel
-from cardbox_tracker.body.model_file import loads_body_model
-from cardbox_tracker.body.sizes import FloatArray
-from cardbox_tracker.body.skeleton import (
+from cardbox_tracker.person.model import BodyModel
+from cardbox_tracker.person.model_file import loads_body_model
+from cardbox_tracker.person.sizes import FloatArray
+from cardbox_tracker.person.skeleton import (
     CLAVICLE_NAMES,
     JOINT_NAMES,
     NECK_NAMES,
@@ -22,12 +22,12 @@ from cardbox_tracker.body.skeleton import (
     UNITS,
     KeypointState,
 )
-from cardbox_tracker.body.urdf import ROOT_LINK, urdf_from_body
-from cardbox_tracker.errors import CardboxError, cut
-from cardbox_tracker.evaluation.metrics import beside_shoulders
-from cardbox_tracker.evaluation.truth import TrueFrame
-from cardbox_tracker.outputs import JointValues
-from cardbox_tracker.vision.camera import Camera
+from cardbox_tracker.person.urdf import ROOT_LINK, urdf_from_body
+from cardbox_tracker.common.errors import CardboxError, cut
+from cardbox_tracker.applications.evaluation.metrics import beside_shoulders
+from cardbox_tracker.applications.evaluation.truth import TrueFrame
+from cardbox_tracker.recordings.outputs import JointValues
+from cardbox_tracker.camera.camera import Camera
 
 Rgb = tuple[int, int, int]
 

@@ -20,8 +20,8 @@ from pathlib import Path
 from typing import Any
 from urllib.parse import quote
 
-from cardbox_tracker.errors import CardboxError
-from cardbox_tracker.files import atomic_path
+from cardbox_tracker.common.errors import CardboxError
+from cardbox_tracker.common.files import atomic_path
 
 APPLICATION = "cardbox_tracker"
 THIS_COMPUTER, PORT = "127.0.0.1", 9090

@@ -16,16 +16,16 @@ from numpy.typing import NDArray
 from sensor_msgs.msg import CameraInfo, CompressedImage, Image
 from std_msgs.msg import Header
 
-from cardbox_tracker.errors import CameraError, EncodingError, quoted
-from cardbox_tracker.vision.camera import Calibration, Camera
-from cardbox_tracker.vision.camera_checks import matrix_problem
-from cardbox_tracker.vision.encodings import (
+from cardbox_tracker.common.errors import CameraError, EncodingError, quoted
+from cardbox_tracker.camera.camera import Calibration, Camera
+from cardbox_tracker.camera.camera_checks import matrix_problem
+from cardbox_tracker.camera.encodings import (
     MOST_PIXELS,
     decode_as_sent,
     decode_compressed,
     image_parts,
 )
-from cardbox_tracker.vision.given_arrays import silhouette_from
+from cardbox_tracker.camera.given_arrays import silhouette_from
 
 ImageArray = NDArray[np.uint8]
 
@@ -87,7 +87,7 @@ def image_behind(silhouette: ImageArray, message: Image | None) -> ImageArray | 
 def silhouette_of(message: Image) -> ImageArray:
     """Return the silhouette (H, W), 0 or 255, of a mask with one number for each pixel.
 
-    :func:`~cardbox_tracker.vision.given_arrays.silhouette_from` says which pixels are the person.
+    :func:`~cardbox_tracker.camera.given_arrays.silhouette_from` says which pixels are the person.
 
     Raises:
         EncodingError: the encoding is not that of a mask, the bytes do not match the size, or the

@@ -7,7 +7,7 @@ import re
 from collections.abc import Callable, Iterable, Mapping
 from typing import Any
 
-from cardbox_tracker.errors import BagError, cut, quoted
+from cardbox_tracker.common.errors import BagError, cut, quoted
 
 _TYPE = re.compile(r"([a-z][a-z0-9_]{0,99})/msg/([A-Z][A-Za-z0-9]{0,99})")
 

@@ -11,9 +11,9 @@ import numpy as np
 from sensor_msgs.msg import Image
 from std_msgs.msg import Header
 
-from cardbox_tracker.errors import CameraError, CardboxError
-from cardbox_tracker.estimation.cost.view import OtherCamera
-from cardbox_tracker.estimation.observation import Observation
+from cardbox_tracker.common.errors import CameraError, CardboxError
+from cardbox_tracker.camera.view import OtherCamera
+from cardbox_tracker.tracking.observation import Observation
 from cardbox_tracker.ros.messages import conversions
 from cardbox_tracker.ros.messages.conversions import ImageArray
 from cardbox_tracker.ros.nodes.camera_poses import CameraPoses, silhouettes_of
@@ -24,9 +24,9 @@ from cardbox_tracker.ros.nodes.keypoint_inputs import KeypointInputs
 from cardbox_tracker.ros.nodes.tracker_parameters import TrackerParameters
 from cardbox_tracker.ros.runtime import qos
 from cardbox_tracker.ros.runtime.node import CardboxNode
-from cardbox_tracker.vision.camera import Camera
-from cardbox_tracker.vision.depth_image import DepthImage
-from cardbox_tracker.vision.pairing import TOLERANCE_NS, Arrivals
+from cardbox_tracker.camera.camera import Camera
+from cardbox_tracker.camera.depth_image import DepthImage
+from cardbox_tracker.camera.pairing import TOLERANCE_NS, Arrivals
 
 _SILENT_S = 3.0
 # Of one clock, images from different computers or of depth may arrive this much later.
@@ -71,7 +71,7 @@ class CameraInputs:
     """Subscribes to all cameras, and delivers messages of the same time in order.
 
     :class:`ImagePairing` pairs each silhouette with its image. With several cameras or depth
-    images, :class:`~cardbox_tracker.vision.pairing.Arrivals` then synchronizes the streams by their
+    images, :class:`~cardbox_tracker.camera.pairing.Arrivals` then synchronizes the streams by their
     stamps.
     """
 

@@ -11,17 +11,17 @@ from typing import Any
 
 from sensor_msgs.msg import CameraInfo
 
-from cardbox_tracker.errors import CameraError
-from cardbox_tracker.estimation.cost.view import OtherCamera
-from cardbox_tracker.files import user_path
+from cardbox_tracker.common.errors import CameraError
+from cardbox_tracker.camera.view import OtherCamera
+from cardbox_tracker.common.files import user_path
 from cardbox_tracker.ros.messages import conversions
 from cardbox_tracker.ros.messages.types import optional_class
 from cardbox_tracker.ros.runtime import qos
 from cardbox_tracker.ros.runtime.node import CardboxNode
-from cardbox_tracker.vision.camera import Camera
-from cardbox_tracker.vision.extrinsics import Extrinsics
-from cardbox_tracker.vision.extrinsics_files import load_extrinsics
-from cardbox_tracker.vision.extrinsics_sources import (
+from cardbox_tracker.camera.camera import Camera
+from cardbox_tracker.camera.extrinsics import Extrinsics
+from cardbox_tracker.camera.extrinsics_files import load_extrinsics
+from cardbox_tracker.camera.extrinsics_sources import (
     FrameTransform,
     extrinsics_between,
     transforms_of,

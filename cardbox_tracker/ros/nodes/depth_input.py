@@ -10,8 +10,8 @@ from sensor_msgs.msg import CameraInfo, CompressedImage, Image
 from cardbox_tracker.ros.messages import conversions
 from cardbox_tracker.ros.runtime import qos
 from cardbox_tracker.ros.runtime.node import CardboxNode
-from cardbox_tracker.vision.camera import Camera
-from cardbox_tracker.vision.depth_image import (
+from cardbox_tracker.camera.camera import Camera
+from cardbox_tracker.camera.depth_image import (
     DepthImage,
     as_seen_by,
     at_size,

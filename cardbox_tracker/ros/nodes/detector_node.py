@@ -12,9 +12,9 @@ import numpy as np
 from geometry_msgs.msg import PolygonStamped
 from std_msgs.msg import Header
 
-from cardbox_tracker.detection.landmarks import LANDMARKS
-from cardbox_tracker.detection.pose_network import Detection
-from cardbox_tracker.recordings.detector import Detector, PersonDetector
+from cardbox_tracker.detectors.landmarks import LANDMARKS
+from cardbox_tracker.detectors.pose_network import Detection
+from cardbox_tracker.detectors.detector import Detector, PersonDetector
 from cardbox_tracker.ros.messages.conversions import ImageArray, stamp_ns
 from cardbox_tracker.ros.messages.keypoints import (
     keypoints_message,
@@ -33,10 +33,10 @@ from cardbox_tracker.ros.runtime.node import CardboxNode, run_node
 from cardbox_tracker.ros.runtime.parameter_fields import AT_START, NodeParameters, parameter
 from cardbox_tracker.ros.runtime.parameters import LiveParameters
 from cardbox_tracker.ros.runtime.publishers import SinglePublisher
-from cardbox_tracker.vision.camera import Calibration
-from cardbox_tracker.vision.silhouettes import SilhouettePipeline
-from cardbox_tracker.vision.stamps import WINDOW, StampOrder
-from cardbox_tracker.vision.unrectify import unrectified
+from cardbox_tracker.camera.camera import Calibration
+from cardbox_tracker.segmentation.silhouettes import SilhouettePipeline
+from cardbox_tracker.camera.stamps import WINDOW, StampOrder
+from cardbox_tracker.camera.unrectify import unrectified
 
 _DOES = "Find the person in a camera's images: images in, 2D points and silhouettes out."
 

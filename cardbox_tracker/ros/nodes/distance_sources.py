@@ -13,14 +13,14 @@ from typing import Any
 
 from sensor_msgs.msg import Image
 
-from cardbox_tracker.errors import InitializationError
-from cardbox_tracker.estimation.initialization.config import (
+from cardbox_tracker.common.errors import InitializationError
+from cardbox_tracker.measuring.config import (
     InitializationConfig,
     InitializationResult,
 )
-from cardbox_tracker.estimation.initialization.measure import initialize_body
-from cardbox_tracker.estimation.initialization.references import Silhouette, average_silhouette
-from cardbox_tracker.estimation.initialization.scale import (
+from cardbox_tracker.measuring.measure import initialize_body
+from cardbox_tracker.measuring.references import Silhouette, average_silhouette
+from cardbox_tracker.measuring.scale import (
     SCALE_REFERENCES,
     DepthReference,
     Measure,
@@ -41,8 +41,8 @@ from cardbox_tracker.ros.nodes.reference_capture import (
 from cardbox_tracker.ros.runtime import qos
 from cardbox_tracker.ros.runtime.node import CardboxNode
 from cardbox_tracker.ros.runtime.recent import RecentImages
-from cardbox_tracker.vision.camera import Camera
-from cardbox_tracker.vision.depth_image import DepthImage, median_depth
+from cardbox_tracker.camera.camera import Camera
+from cardbox_tracker.camera.depth_image import DepthImage, median_depth
 
 Progress = Callable[[float], None]
 """Callback that receives the finished fraction of a measurement."""

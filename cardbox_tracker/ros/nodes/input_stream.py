@@ -7,7 +7,7 @@ from collections import deque
 
 import numpy as np
 
-from cardbox_tracker.vision.stamps import StampOrder, StreamStatistics
+from cardbox_tracker.camera.stamps import StampOrder, StreamStatistics
 
 # A paused camera falls behind, so stamps are compared only while both cameras send.
 _RECENT_S = 0.5

@@ -26,7 +26,7 @@ from rclpy.parameter import Parameter
 from rclpy.publisher import Publisher
 from std_msgs.msg import String
 
-from cardbox_tracker.errors import BagError, CardboxError
+from cardbox_tracker.common.errors import BagError, CardboxError
 from cardbox_tracker.recordings.bag_reader import BagReader
 from cardbox_tracker.recordings.bag_topics import find_topics
 from cardbox_tracker.ros.messages.types import message_classes

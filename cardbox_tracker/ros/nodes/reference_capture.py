@@ -6,11 +6,11 @@ import time
 
 from sensor_msgs.msg import Image
 
-from cardbox_tracker.body.posture import REFERENCE_NAMES
-from cardbox_tracker.errors import InitializationError
-from cardbox_tracker.estimation.initialization.asked_outline import check_asked
-from cardbox_tracker.estimation.initialization.config import InitializationConfig
-from cardbox_tracker.estimation.initialization.references import (
+from cardbox_tracker.person.posture import REFERENCE_NAMES
+from cardbox_tracker.common.errors import InitializationError
+from cardbox_tracker.measuring.asked_outline import check_asked
+from cardbox_tracker.measuring.config import InitializationConfig
+from cardbox_tracker.measuring.references import (
     Silhouette,
     average_silhouette,
     check_reference,
@@ -22,7 +22,7 @@ from cardbox_tracker.ros.messages.conversions import (
     stamp_ns,
 )
 from cardbox_tracker.ros.runtime.recent import RecentImages
-from cardbox_tracker.vision.camera import Camera
+from cardbox_tracker.camera.camera import Camera
 
 KEPT = 30
 """Number of silhouettes to keep, the maximum of the parameter capture_frames."""

@@ -11,11 +11,11 @@ import numpy as np
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Header, String
 
-from cardbox_tracker.body.rep155 import Rep155Joints, head_joints, joint_names
-from cardbox_tracker.body.urdf import rep155_urdf
-from cardbox_tracker.estimation.estimate import Estimate
-from cardbox_tracker.estimation.tracker import Tracker
-from cardbox_tracker.outputs import JointValues, clavicles_of, neck_of, place_of
+from cardbox_tracker.person.rep155 import Rep155Joints, head_joints, joint_names
+from cardbox_tracker.person.urdf import rep155_urdf
+from cardbox_tracker.tracking.estimate import Estimate
+from cardbox_tracker.tracking.tracker import Tracker
+from cardbox_tracker.recordings.outputs import JointValues, clavicles_of, neck_of, place_of
 from cardbox_tracker.ros.messages import results
 from cardbox_tracker.ros.messages.types import optional_class
 from cardbox_tracker.ros.nodes.tracker_parameters import TrackerParameters

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from cardbox_tracker.ros.runtime.parameter_fields import AT_START, parameter
-from cardbox_tracker.vision.encodings import MOST_PIXELS
+from cardbox_tracker.camera.encodings import MOST_PIXELS
 
 
 def cameras_parameter() -> Any:

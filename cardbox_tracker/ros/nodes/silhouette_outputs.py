@@ -10,7 +10,7 @@ from cardbox_tracker.ros.messages import conversions
 from cardbox_tracker.ros.messages.conversions import ImageArray
 from cardbox_tracker.ros.runtime import qos
 from cardbox_tracker.ros.runtime.node import CardboxNode
-from cardbox_tracker.vision.camera import Camera
+from cardbox_tracker.camera.camera import Camera
 
 
 class SilhouetteOutputs:

@@ -8,9 +8,9 @@ from sensor_msgs.msg import Image
 from std_msgs.msg import Bool
 
 from cardbox_tracker.applications.drawing.overlay import draw_camera_overlay, draw_message
-from cardbox_tracker.estimation.estimate import Estimate
-from cardbox_tracker.estimation.tracker import Tracker
-from cardbox_tracker.outputs import Output, OutputStream, outputs
+from cardbox_tracker.tracking.estimate import Estimate
+from cardbox_tracker.tracking.tracker import Tracker
+from cardbox_tracker.recordings.outputs import Output, OutputStream, outputs
 from cardbox_tracker.ros.messages import conversions, results
 from cardbox_tracker.ros.nodes.camera_inputs import ObservationSet
 from cardbox_tracker.ros.nodes.rep155_outputs import Rep155Outputs

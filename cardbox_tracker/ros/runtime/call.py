@@ -16,7 +16,7 @@ from rclpy.utilities import try_shutdown
 from std_msgs.msg import String
 from std_srvs.srv import Trigger
 
-from cardbox_tracker.errors import CardboxError, cut, quoted
+from cardbox_tracker.common.errors import CardboxError, cut, quoted
 from cardbox_tracker.ros.runtime import qos
 
 _FIND_S = 10.0

@@ -20,7 +20,7 @@ from rclpy.qos import QoSProfile
 
 from cardbox_tracker.ros.runtime import qos
 from cardbox_tracker.ros.runtime.log_limit import LogLimit
-from cardbox_tracker.vision.stamps import WINDOW, StreamStatistics
+from cardbox_tracker.camera.stamps import WINDOW, StreamStatistics
 
 PERIOD_S = 1.0
 # The input has ceased after this time and this number of periods without a message.

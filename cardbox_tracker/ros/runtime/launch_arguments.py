@@ -14,7 +14,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from cardbox_tracker.errors import CardboxError, quoted
+from cardbox_tracker.common.errors import CardboxError, quoted
 
 _PACKAGE = "cardbox_tracker"
 # ``ros2 launch`` passes these options on like arguments.

@@ -18,8 +18,8 @@ from rclpy.subscription import Subscription
 from rclpy.utilities import ok, remove_ros_args, try_shutdown
 from std_srvs.srv import Trigger
 
-from cardbox_tracker import garbage, interrupts
-from cardbox_tracker.errors import CardboxError, cut, quoted
+from cardbox_tracker.common import garbage, interrupts
+from cardbox_tracker.common.errors import CardboxError, cut, quoted
 from cardbox_tracker.ros.runtime import qos
 from cardbox_tracker.ros.runtime.diagnostics import NodeDiagnostics
 from cardbox_tracker.ros.runtime.intra_process import IntraProcess, IntraProcessPublisher

@@ -13,7 +13,7 @@ from typing import Any, ClassVar, get_type_hints
 
 from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor
 
-from cardbox_tracker.settings import Setting, settings_of
+from cardbox_tracker.common.settings import Setting, settings_of
 
 NEXT_IMAGE, RESTARTS = "next image", "restarts tracking"
 """Effects of a live change: it holds from the next image on, or tracking starts again."""

@@ -12,7 +12,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 import cardbox_tracker
-from cardbox_tracker.errors import CardboxError
+from cardbox_tracker.common.errors import CardboxError
 
 _STOP_S = 10.0
 # Characters of a failed process's output that an error shows.
@@ -49,7 +49,7 @@ def compile_kernels() -> None:
         CardboxError: the process failed; the text has the end of its output.
     """
     done = subprocess.run(
-        [*_OF_PACKAGE, "cardbox_tracker.estimation.precompile"],
+        [*_OF_PACKAGE, "cardbox_tracker.tracking.precompile"],
         stdout=subprocess.PIPE,
         stderr=subprocess.STDOUT,
         text=True,

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from cardbox_tracker.applications.drawing.video import video_file
-from cardbox_tracker.errors import CardboxError
+from cardbox_tracker.common.errors import CardboxError
 
 LEVELS = (30, 90, 150, 210)
 

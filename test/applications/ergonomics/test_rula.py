@@ -21,9 +21,9 @@ from cardbox_tracker.applications.ergonomics.rula import (
     rula_scores,
     score_distribution,
 )
-from cardbox_tracker.body.posture import TURNING_LIMITS
-from cardbox_tracker.body.proportions import body_from_proportions
-from cardbox_tracker.body.skeleton import JOINT_NAMES
+from cardbox_tracker.person.posture import TURNING_LIMITS
+from cardbox_tracker.person.proportions import body_from_proportions
+from cardbox_tracker.person.skeleton import JOINT_NAMES
 
 BODY = body_from_proportions(1.75, 2.0)
 

@@ -20,8 +20,8 @@ from cardbox_tracker.applications.exporting.isb import (
     thorax_angles,
     write_isb,
 )
-from cardbox_tracker.body.model import BodyModel
-from cardbox_tracker.body.skeleton import rotation_x, rotation_y, rotation_z
+from cardbox_tracker.person.model import BodyModel
+from cardbox_tracker.person.skeleton import rotation_x, rotation_y, rotation_z
 
 # Directions in the torso's frame: forwards, to the person's left, up.
 FORWARD, LEFT, UP = np.eye(3)

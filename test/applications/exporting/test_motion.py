@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from cardbox_tracker.applications.exporting.motion import MISSING, Motion
-from cardbox_tracker.errors import CardboxError
+from cardbox_tracker.common.errors import CardboxError
 
 
 def motion_at(*times_ms: int) -> Motion:

@@ -14,9 +14,9 @@ from cardbox_tracker.applications.retargeting.config import RetargetConfig
 from cardbox_tracker.applications.retargeting.joint_map import load_joint_map
 from cardbox_tracker.applications.retargeting.retargeter import Limits, Retargeter, SafeMotion
 from cardbox_tracker.applications.retargeting.robot import load_robot
-from cardbox_tracker.body.posture import reference_posture
-from cardbox_tracker.body.proportions import body_from_proportions
-from cardbox_tracker.body.skeleton import JOINT_NAMES
+from cardbox_tracker.person.posture import reference_posture
+from cardbox_tracker.person.proportions import body_from_proportions
+from cardbox_tracker.person.skeleton import JOINT_NAMES
 
 CONFIG = Path(__file__).parents[3] / "config"
 ROBOT = load_robot(CONFIG / "example_arm.urdf")

@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from cardbox_tracker.applications.retargeting.config import RetargetConfig
 from cardbox_tracker.applications.retargeting.hand import HandFollower
 from cardbox_tracker.applications.retargeting.robot import load_robot, parse_robot
-from cardbox_tracker.errors import CardboxError
+from cardbox_tracker.common.errors import CardboxError
 
 PROMISE = "Any damaged or hostile input is read or refused with a reason"
 

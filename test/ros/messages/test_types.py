@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from sensor_msgs.msg import Image
 
-from cardbox_tracker.errors import BagError
+from cardbox_tracker.common.errors import BagError
 from cardbox_tracker.ros.messages.types import message_class, message_classes
 
 

@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 
-from cardbox_tracker.body.skeleton import JOINT_NAMES
+from cardbox_tracker.person.skeleton import JOINT_NAMES
 
 
 class Bus:

@@ -15,9 +15,9 @@ pytest.importorskip("rclpy", reason="rclpy is not installed")
 from rclpy.qos import DurabilityPolicy
 from std_msgs.msg import Header
 
-from cardbox_tracker.body.model import BodyModel
-from cardbox_tracker.body.posture import reference_posture
-from cardbox_tracker.estimation.estimate import LOST, TRACKING, Estimate
+from cardbox_tracker.person.model import BodyModel
+from cardbox_tracker.person.posture import reference_posture
+from cardbox_tracker.tracking.estimate import LOST, TRACKING, Estimate
 from cardbox_tracker.ros.nodes.rep155_outputs import Rep155Outputs
 
 PLACE = "/humans/bodies/p1"

@@ -11,7 +11,7 @@ from builtin_interfaces.msg import Time
 from sensor_msgs.msg import Image
 from std_msgs.msg import Header
 
-from cardbox_tracker.errors import EncodingError
+from cardbox_tracker.common.errors import EncodingError
 from cardbox_tracker.ros.messages.conversions import image_message
 from cardbox_tracker.ros.nodes.image_pairing import ImagePairing
 from cardbox_tracker.ros.nodes.reference_capture import ReferenceCapture

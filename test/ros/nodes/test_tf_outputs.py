@@ -14,12 +14,12 @@ pytest.importorskip("rclpy", reason="rclpy is not installed")
 from builtin_interfaces.msg import Time
 from std_msgs.msg import Header
 
-from cardbox_tracker.body.model import BodyModel
-from cardbox_tracker.body.posture import reference_posture
-from cardbox_tracker.body.urdf import LinkTransforms, urdf_from_body
-from cardbox_tracker.errors import CardboxError
-from cardbox_tracker.estimation.estimate import LOST, TRACKING, Estimate
-from cardbox_tracker.outputs import joint_values, positions_of
+from cardbox_tracker.person.model import BodyModel
+from cardbox_tracker.person.posture import reference_posture
+from cardbox_tracker.person.urdf import LinkTransforms, urdf_from_body
+from cardbox_tracker.common.errors import CardboxError
+from cardbox_tracker.tracking.estimate import LOST, TRACKING, Estimate
+from cardbox_tracker.recordings.outputs import joint_values, positions_of
 from cardbox_tracker.ros.nodes.tf_outputs import TfOutputs
 
 BODY = BodyModel.of(distance_m=2.3, hip_height_m=-0.4)

@@ -13,7 +13,7 @@ import yaml
 pytest.importorskip("rclpy", reason="rclpy is not installed")
 
 from cardbox_tracker.ros.runtime.parameters import LiveParameters
-from tools.parameter_docs import NODES
+from lab.tools.parameter_docs import NODES
 
 GIVEN = {"play_bag": {"bag": "bag"}}
 

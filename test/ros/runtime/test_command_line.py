@@ -10,7 +10,7 @@ pytest.importorskip("rclpy", reason="rclpy is not installed")
 
 from cardbox_tracker.ros.runtime.command_line import plain_command_line
 from cardbox_tracker.ros.runtime.interface import entries
-from tools.parameter_docs import NODES as PARAMETERS
+from lab.tools.parameter_docs import NODES as PARAMETERS
 
 NODES = ("background", "initializer", "tracker")
 

@@ -16,7 +16,7 @@ from cardbox_tracker.ros.runtime.diagnostics import (
     WORKING,
     NodeDiagnostics,
 )
-from cardbox_tracker.vision.stamps import StampOrder, StreamStatistics
+from cardbox_tracker.camera.stamps import StampOrder, StreamStatistics
 
 PERIOD_NS = 66_666_667
 

@@ -13,7 +13,7 @@ rclpy = pytest.importorskip("rclpy", reason="rclpy is not installed")
 from rclpy.executors import SingleThreadedExecutor  # noqa: E402
 from std_msgs.msg import String  # noqa: E402
 
-from cardbox_tracker.errors import CardboxError  # noqa: E402
+from cardbox_tracker.common.errors import CardboxError  # noqa: E402
 from cardbox_tracker.ros.runtime import qos  # noqa: E402
 from cardbox_tracker.ros.runtime.intra_process import IntraProcess  # noqa: E402
 from cardbox_tracker.ros.runtime.node import CardboxNode  # noqa: E402

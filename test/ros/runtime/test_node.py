@@ -11,7 +11,7 @@ rclpy = pytest.importorskip("rclpy", reason="rclpy is not installed")
 from rclpy.context import Context  # noqa: E402
 from std_msgs.msg import String  # noqa: E402
 
-from cardbox_tracker.errors import CardboxError  # noqa: E402
+from cardbox_tracker.common.errors import CardboxError  # noqa: E402
 from cardbox_tracker.ros.runtime import qos  # noqa: E402
 from cardbox_tracker.ros.runtime.node import CardboxNode, own_arguments, run  # noqa: E402
 

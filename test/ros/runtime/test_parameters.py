@@ -15,9 +15,9 @@ from rclpy.executors import SingleThreadedExecutor
 from rclpy.parameter import Parameter, parameter_value_to_python
 from rclpy.parameter_client import AsyncParameterClient
 
-from cardbox_tracker.errors import CardboxError
-from cardbox_tracker.estimation.config import PRESETS, TrackerConfig
-from cardbox_tracker.estimation.initialization.config import InitializationConfig
+from cardbox_tracker.common.errors import CardboxError
+from cardbox_tracker.search.config import PRESETS, TrackerConfig
+from cardbox_tracker.measuring.config import InitializationConfig
 from cardbox_tracker.ros.nodes.background_node import BackgroundParameters
 from cardbox_tracker.ros.nodes.initializer_parameters import InitializerParameters
 from cardbox_tracker.ros.nodes.play_bag_node import PlayBagParameters
@@ -30,10 +30,10 @@ from cardbox_tracker.ros.runtime.parameter_fields import (
     parameter,
 )
 from cardbox_tracker.ros.runtime.parameters import LiveParameters
-from cardbox_tracker.settings import check, settings_of
-from cardbox_tracker.vision.background_config import BackgroundConfig
-from tools import parameter_docs
-from tools.parameter_docs import NODES
+from cardbox_tracker.common.settings import check, settings_of
+from cardbox_tracker.segmentation.background_config import BackgroundConfig
+from lab.tools import parameter_docs
+from lab.tools.parameter_docs import NODES
 
 ROOT = Path(__file__).resolve().parents[3]
 
@@ -359,9 +359,9 @@ def test_an_empty_list_keeps_its_type_and_properties(
 @pytest.mark.parametrize("name", parameter_docs.files())
 def test_committed_files_are_the_generated_ones(name: str) -> None:
     path = ROOT / name
-    assert path.exists(), f"{name} is missing: run python -m tools.parameter_docs"
+    assert path.exists(), f"{name} is missing: run python -m lab.tools.parameter_docs"
     assert path.read_text(encoding="utf-8") == parameter_docs.files()[name], (
-        f"{name} is stale: run python -m tools.parameter_docs"
+        f"{name} is stale: run python -m lab.tools.parameter_docs"
     )
 
 
@@ -458,7 +458,7 @@ INSTEAD = {"effort": "particles"}
 def test_a_parameter_of_the_tracker_acts_or_is_refused_with_the_one_that_does(
     preset: str, name: str
 ) -> None:
-    """The effect of the core's settings is tested in test/estimation/test_settings_act.py."""
+    """The effect of the core's settings is tested in test/tracking/test_settings_act.py."""
     values = {**OTHERS["paper"], **OTHERS["default"]}
     if name in OTHERS[preset]:
         changed = TrackerParameters(preset=preset, **{name: OTHERS[preset][name]})

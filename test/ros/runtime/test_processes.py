@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from cardbox_tracker.demo import run
-from cardbox_tracker.errors import CardboxError
+from cardbox_tracker.ros.demo import run
+from cardbox_tracker.common.errors import CardboxError
 from cardbox_tracker.ros.runtime import processes
 
 
@@ -20,7 +20,7 @@ def test_a_failed_compilation_shows_its_output(
     monkeypatch.setattr(processes, "_OF_PACKAGE", (str(program),))
     with pytest.raises(CardboxError, match=r"ended with 3.*make setup") as caught:
         processes.compile_kernels()
-    assert "no memory for cardbox_tracker.estimation.precompile" in str(caught.value)
+    assert "no memory for cardbox_tracker.tracking.precompile" in str(caught.value)
 
 
 def test_the_demo_compiles_before_it_starts_nodes(

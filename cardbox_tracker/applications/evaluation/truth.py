@@ -1,0 +1,225 @@
+"""Ground truth of a recorded session, and the error of estimates."""
+
+from __future__ import annotations
+
+import json
+import os
+from collections import defaultdict
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cardbox_tracker.person.skeleton import JOINT_NAMES, KEYPOINT_NAMES
+from cardbox_tracker.common.errors import CardboxError, cut
+from cardbox_tracker.applications.evaluation.metrics import SHOULDERS
+from cardbox_tracker.common.files import UnreadableFileError, read_regular
+
+FloatArray = NDArray[np.float64]
+
+# A person who is about to move still stands where the recording began in this many frames.
+_FIRST_FRAMES = 10
+_MOST_BYTES = 256 * 1024 * 1024
+
+
+@dataclass(frozen=True)
+class TrueFrame:
+    """One image with a person.
+
+    Attributes:
+        segment: name of the person's action.
+        keypoints_m: shape (6, 3), metres in the optical frame, ordered as ``KEYPOINT_NAMES``.
+        posture: d1..d12 (12,); None if the person does not have the model's joints.
+        torso_rad: roll, pitch and yaw of the torso (3,); None if unknown.
+        is_in_sight: True if the neck is in the image, so that the person can be tracked.
+        hips_m: middle of the hips (3,), metres in the optical frame; None if unknown.
+    """
+
+    segment: str
+    keypoints_m: FloatArray
+    posture: FloatArray | None
+    torso_rad: FloatArray | None
+    is_in_sight: bool = True
+    hips_m: FloatArray | None = None
+
+
+@dataclass(frozen=True)
+class GroundTruth:
+    """Ground truth of a session.
+
+    Attributes:
+        frames: images with a person, by stamp in nanoseconds.
+        spans: start and end of the first segment of each name, seconds from the first image.
+        start_ns: stamp of the first image.
+        distance_m: horizontal distance to the person.
+        pitch_deg: downward pitch of the camera.
+        side_turn: direction in which the person turned for the side reference.
+        cameras: namespaces of several cameras, the first camera's first; empty with one.
+        is_rectified: True if the first two cameras are a rectified pair.
+        stature_m: height of the person; None if unknown.
+        depth_topic: topic of depth images with the first camera's field of view; None without.
+        source: origin and licence of the recording; empty if the file does not say.
+    """
+
+    frames: Mapping[int, TrueFrame]
+    spans: Mapping[str, tuple[float, float]]
+    start_ns: int
+    distance_m: float
+    pitch_deg: float
+    side_turn: str
+    cameras: tuple[str, ...] = ()
+    is_rectified: bool = False
+    stature_m: float | None = None
+    depth_topic: str | None = None
+    source: str = ""
+
+
+def load_ground_truth(path: str | os.PathLike[str], camera: str | None = None) -> GroundTruth:
+    """Read the ``ground_truth.json`` of a session.
+
+    Args:
+        path: the file.
+        camera: namespace of the camera to which keypoints, stamps, distance and pitch belong; None
+            for the first camera. The distance to any other camera than the first is that of the
+            true hips, or else shoulders, in its first images.
+
+    Raises:
+        CardboxError: the file cannot be read or is not a ground truth.
+    """
+    try:
+        data = json.loads(read_regular(path, _MOST_BYTES))
+        if camera is not None:
+            data = _seen_by(data, camera)
+        frames = {}
+        for entry in data["frames"]:
+            if "joints_m" not in entry:
+                continue
+            joints = entry["joints_m"]
+            points = np.array([joints[name] for name in KEYPOINT_NAMES])
+            posture = torso = None
+            if "posture" in entry:
+                posture = np.array([entry["posture"][name] for name in JOINT_NAMES])
+            if "torso_rpy_deg" in entry:
+                torso = np.radians(entry["torso_rpy_deg"])
+            frames[int(entry["stamp_ns"])] = TrueFrame(
+                entry["segment"],
+                points,
+                posture,
+                torso,
+                _is_in_sight(entry, data["camera"]),
+                np.array(joints["hips"]) if "hips" in joints else None,
+            )
+        spans: dict[str, tuple[float, float]] = {}
+        for segment in data["segments"]:
+            spans.setdefault(segment["name"], (segment["start_s"], segment["end_s"]))
+        stature_m = data["person"].get("height")
+        return GroundTruth(
+            frames,
+            spans,
+            int(data["frames"][0]["stamp_ns"]),
+            _distance_m(data, frames),
+            float(data["camera"]["pitch_down_deg"]),
+            str(data["side_posture_turns_to"]),
+            tuple(str(camera["name"]) for camera in data.get("cameras", ())),
+            "baseline_m" in str(data.get("cameras", ())),
+            None if stature_m is None else float(stature_m),
+            data.get("depth_topic"),
+            str(data.get("source", "")),
+        )
+    except UnreadableFileError as error:
+        raise CardboxError(
+            f"cannot read the ground truth {path}: {error}; expected the "
+            "ground_truth.json of a session, such as 'cardbox synthesize' writes"
+        ) from None
+    except (ValueError, KeyError, IndexError, TypeError, RecursionError) as error:
+        raise CardboxError(
+            f"{path} is not a ground truth: {cut(repr(error))}; expected the ground_truth.json of "
+            "a session"
+        ) from None
+
+
+def _seen_by(data: dict[str, Any], camera: str) -> dict[str, Any]:
+    """Return the ground truth with the values of one camera in place of the first one's."""
+    own = {str(one["name"]): one for one in data["cameras"]}
+    if camera == str(data["cameras"][0]["name"]):
+        return data
+    shared = ("segment", "torso_rpy_deg", "posture")
+    frames = [
+        {key: entry[key] for key in shared if key in entry} | entry["cameras"][camera]
+        for entry in data["frames"]
+    ]
+    person = {key: value for key, value in data["person"].items() if key != "distance_m"}
+    return data | {"camera": own[camera], "person": person, "frames": frames}
+
+
+def _distance_m(data: Mapping[str, Any], frames: Mapping[int, TrueFrame]) -> float:
+    """Return the horizontal distance to the person, as it is given or from the first frames."""
+    if "distance_m" in data["person"]:
+        return float(data["person"]["distance_m"])
+    first = list(frames.values())[:_FIRST_FRAMES]
+    middles = [
+        f.keypoints_m[SHOULDERS, :].mean(axis=0) if f.hips_m is None else f.hips_m for f in first
+    ]
+    pitch_rad = np.radians(float(data["camera"]["pitch_down_deg"]))
+    level = np.array([0.0, -np.sin(pitch_rad), np.cos(pitch_rad)])
+    return float(np.median(np.array(middles) @ level))
+
+
+def _is_in_sight(entry: Mapping[str, Any], camera: Mapping[str, Any]) -> bool:
+    if "joints_px" not in entry:
+        return True
+    u, v = entry["joints_px"]["neck"]
+    return bool(0 <= u < camera["width"] and 0 <= v < camera["height"])
+
+
+@dataclass(frozen=True)
+class TrackingError:
+    """Distances between estimated and true keypoints.
+
+    Attributes:
+        mean_m: mean 3D error over shoulders, elbows and hands (MPJPE).
+        by_keypoint_m: mean 3D error of each keypoint.
+        by_segment_m: mean 3D error in each segment of the session.
+        lateral_m: mean error along x of the optical frame.
+        vertical_m: mean error along y.
+        depth_m: mean error along z.
+        frames: number of compared images.
+    """
+
+    mean_m: float
+    by_keypoint_m: dict[str, float]
+    by_segment_m: dict[str, float]
+    lateral_m: float
+    vertical_m: float
+    depth_m: float
+    frames: int
+
+
+def tracking_error(estimates: Mapping[int, FloatArray], truth: GroundTruth) -> TrackingError:
+    """Compare keypoints (6, 3), metres in the optical frame, by stamp, with the truth.
+
+    Raises:
+        CardboxError: no estimate has the stamp of a true frame.
+    """
+    stamps = [stamp for stamp in estimates if stamp in truth.frames]
+    if not stamps:
+        raise CardboxError(
+            "no estimate has the stamp of a true frame; give the ground truth of this recording"
+        )
+    differences = np.array([estimates[s] - truth.frames[s].keypoints_m for s in stamps])
+    distances = np.linalg.norm(differences, axis=2)
+    segments: dict[str, list[float]] = defaultdict(list)
+    for stamp, row in zip(stamps, distances, strict=True):
+        segments[truth.frames[stamp].segment].append(float(row.mean()))
+    along = np.abs(differences).mean(axis=(0, 1))
+    return TrackingError(
+        float(distances.mean()),
+        dict(zip(KEYPOINT_NAMES, distances.mean(axis=0).tolist(), strict=True)),
+        {name: float(np.mean(values)) for name, values in segments.items()},
+        float(along[0]),
+        float(along[1]),
+        float(along[2]),
+        len(stamps),
+    )

@@ -1,0 +1,109 @@
+"""Images of a synthetic person in front of a wall, with sensor noise."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import pairwise
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from cardbox_tracker.person.model import BodyModel
+from cardbox_tracker.applications.simulation.person import person_parts
+from cardbox_tracker.camera.camera import Camera
+from cardbox_tracker.camera.rasterisation import in_front
+
+ImageArray = NDArray[np.uint8]
+
+# fillConvexPoly paints every pixel that an edge touches, which widens outlines by up to a subpixel.
+_SUPERSAMPLING = 4
+_SHIFT = 4
+
+
+@dataclass(frozen=True)
+class Scene:
+    """Wall and sensor.
+
+    Attributes:
+        wall: mean brightness of the wall, grey levels.
+        texture: standard deviation of the wall's blotches, grey levels.
+        noise: standard deviation of the sensor's noise, grey levels.
+        flicker: standard deviation of the whole scene's brightness, as a fraction.
+        shadow: darkening of the wall in the middle of the person's soft shadow, as a fraction.
+    """
+
+    wall: float = 180.0
+    texture: float = 8.0
+    noise: float = 3.0
+    flicker: float = 0.0
+    shadow: float = 0.0
+
+
+class Renderer:
+    """Renders one scene; all random numbers come from the given generator."""
+
+    def __init__(self, camera: Camera, scene: Scene, rng: np.random.Generator) -> None:
+        """Generate the wall."""
+        self.camera = camera
+        self._scene = scene
+        self._rng = rng
+        coarse = rng.normal(0.0, 1.0, (camera.height // 20 + 2, camera.width // 20 + 2))
+        blotches = cv2.resize(coarse, (camera.width, camera.height), interpolation=cv2.INTER_CUBIC)
+        self.wall = np.clip(scene.wall + scene.texture * blotches, 0, 255).astype(np.float32)
+
+    def silhouette(self, body: BodyModel, posture: NDArray[np.float64]) -> ImageArray:
+        """Return the exact silhouette (H, W), 0 or 255, legs included."""
+        return np.where(self._draw(body, posture)[1] >= 0.5, 255, 0).astype(np.uint8)
+
+    def image(
+        self, body: BodyModel | None = None, posture: NDArray[np.float64] | None = None
+    ) -> tuple[ImageArray, ImageArray]:
+        """Return a noisy image (H, W) and its silhouette; without a body the empty scene."""
+        scene = self._scene
+        clean = self.wall
+        mask = np.zeros(clean.shape, np.uint8)
+        if body is not None and posture is not None:
+            person, cover = self._draw(body, posture)
+            clean = clean * (1.0 - scene.shadow * self._shade(cover)) * (1.0 - cover) + person
+            mask = np.where(cover >= 0.5, 255, 0).astype(np.uint8)
+        gain = 1.0 + scene.flicker * self._rng.standard_normal()
+        noise = self._rng.standard_normal(clean.shape, dtype=np.float32) * scene.noise
+        return np.clip(np.rint(clean * gain + noise), 0, 255).astype(np.uint8), mask
+
+    def _shade(self, cover: NDArray[np.float32]) -> NDArray[np.float32]:
+        """Return the strength (H, W) of the shadow in [0, 1]; the light comes from above left."""
+        height, width = cover.shape
+        move = np.array([(1.0, 0.0, 0.05 * width), (0.0, 1.0, 0.04 * height)])
+        cast = cv2.warpAffine(cover, move, (width, height))
+        return np.asarray(cv2.GaussianBlur(cast, (0, 0), 0.02 * width), np.float32)
+
+    def _draw(
+        self, body: BodyModel, posture: NDArray[np.float64]
+    ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+        """Return brightness times coverage, and coverage in [0, 1], of the person, each (H, W)."""
+        camera = self.camera.scaled(
+            _SUPERSAMPLING * self.camera.width, _SUPERSAMPLING * self.camera.height
+        )
+        shade = np.zeros((camera.height, camera.width), np.uint8)
+        cover = np.zeros_like(shade)
+        # Painter's algorithm: near parts cover far ones.
+        parts = sorted(person_parts(body, posture), key=lambda part: part.rings[..., 0].mean())
+        for part in parts:
+            points = camera.reference_to_optical(part.rings)
+            # Parts behind the camera are skipped; clipping is not needed for synthetic people.
+            if not in_front(points).all():
+                continue
+            pixels = np.asarray(np.rint(camera.project(points) * (1 << _SHIFT)), dtype=np.int32)
+            for i, pair in enumerate(pairwise(pixels)):
+                hull = cv2.convexHull(np.concatenate(pair))
+                # The brightness varies along a part, so that it is not uniform.
+                level = part.brightness + 6 * (i % 3)
+                cv2.fillConvexPoly(shade, hull, level, cv2.LINE_8, _SHIFT)
+                cv2.fillConvexPoly(cover, hull, 255, cv2.LINE_8, _SHIFT)
+        size = (self.camera.width, self.camera.height)
+        small = [
+            cv2.resize(layer, size, interpolation=cv2.INTER_AREA).astype(np.float32)
+            for layer in (shade, cover)
+        ]
+        return small[0], small[1] / np.float32(255.0)

@@ -1,0 +1,100 @@
+"""Follows lasting changes of a camera's calibration and ignores brief or invalid ones.
+
+A single wrong CameraInfo, or a second camera on the same topic, must not discard the background
+that was learned with the right one.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from cardbox_tracker.common.errors import CameraError
+from cardbox_tracker.camera.camera import Calibration
+from cardbox_tracker.camera.camera_info import calibration_from_info
+
+LASTING = 30
+"""A change is accepted after this many equal calibrations in a row, one or two seconds."""
+
+# A remark is removed after this many valid calibrations.
+_REMEMBERED = 150
+
+
+class CalibrationWatch:
+    """Selects the calibration of the camera from the CameraInfo messages that arrive.
+
+    Attributes:
+        current: calibration in use; None before the first valid one.
+        seen: True once any CameraInfo arrived, valid or not.
+        ignored: number of messages that were ignored.
+        remark: description of a recently ignored message; empty if there is none.
+    """
+
+    def __init__(self, topic: str, image_topic: str) -> None:
+        """Watch the calibrations on ``topic``, which belong to the images on ``image_topic``."""
+        self.current: Calibration | None = None
+        self.seen = False
+        self.ignored = 0
+        self.remark = ""
+        self._topic = topic
+        self._image_topic = image_topic
+        self._other: Calibration | None = None
+        self._count = 0
+        self._good = 0
+
+    def see(self, message: Any) -> bool:
+        """Process a sensor_msgs/CameraInfo; return whether the calibration in use has changed.
+
+        Raises:
+            CameraError: the message is invalid and no valid one has arrived yet.
+        """
+        self.seen = True
+        try:
+            calibration = calibration_from_info(message, self._image_topic, self._topic)
+            self._check(calibration)
+        except CameraError as error:
+            self._other = None
+            if self.current is None:
+                raise
+            self._ignore(
+                f"an invalid CameraInfo on {self._topic} is ignored, the one before is used: "
+                f"{error}"
+            )
+            return False
+        if self.current is not None and self.current.is_same(calibration):
+            self._back_to_good()
+            return False
+        if self.current is not None and not self._lasts(calibration):
+            self._ignore(
+                f"a CameraInfo on {self._topic} that differs from those before ({calibration} "
+                f"instead of {self.current}) is ignored; the background is kept. If the camera "
+                f"was really changed, it is followed after {LASTING} of them in a row; if not, "
+                f"see who publishes it: ros2 topic info --verbose {self._topic}"
+            )
+            return False
+        self.current, self._other, self._count = calibration, None, 0
+        self.remark = ""
+        return True
+
+    def _check(self, calibration: Calibration) -> None:
+        try:
+            calibration.camera(calibration.width, calibration.height)
+        except CameraError as error:
+            raise CameraError(
+                f"{self._topic}, of the images on {self._image_topic}: {error}"
+            ) from None
+
+    def _lasts(self, calibration: Calibration) -> bool:
+        if self._other is None or not self._other.is_same(calibration):
+            self._other, self._count = calibration, 0
+        self._count += 1
+        return self._count >= LASTING
+
+    def _ignore(self, remark: str) -> None:
+        self.ignored += 1
+        self.remark, self._good = remark, 0
+
+    def _back_to_good(self) -> None:
+        self._other, self._count = None, 0
+        self._good += 1
+        if self._good >= _REMEMBERED:
+            self.remark = ""

@@ -1,0 +1,292 @@
+"""The pinhole camera, its calibration, and lens distortion."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from typing import Any
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from cardbox_tracker.common.errors import CameraError, quoted
+from cardbox_tracker.camera.camera_checks import (
+    distortion_problem,
+    matrix_problem,
+    real_number,
+    whole_pixels,
+)
+
+FloatArray = NDArray[np.float64]
+
+DISTORTION_MODELS = ("plumb_bob", "rational_polynomial", "equidistant")
+# Largest side of a JPEG image; a CameraInfo and a file may contain any number.
+_MOST_SIDE_PX = 65535
+
+
+@dataclass(frozen=True)
+class Camera:
+    """An ideal pinhole camera at a working resolution.
+
+    Attributes:
+        width: image width, px.
+        height: image height, px.
+        fx: horizontal focal length, px.
+        fy: vertical focal length, px.
+        cx: principal point, px; (0, 0) is the centre of the first pixel.
+        cy: principal point, px.
+        pitch_rad: downward pitch of the camera, rad; the reference frame stays level.
+
+    Raises:
+        CameraError: a value is impossible; the text names it.
+    """
+
+    width: int
+    height: int
+    fx: float
+    fy: float
+    cx: float
+    cy: float
+    pitch_rad: float = 0.0
+
+    def __post_init__(self) -> None:
+        """Check the values; whole numbers of another type become ``int``."""
+        for name in ("width", "height"):
+            object.__setattr__(self, name, whole_pixels(name, getattr(self, name)))
+        for name in ("fx", "fy", "cx", "cy", "pitch_rad"):
+            object.__setattr__(self, name, real_number(name, getattr(self, name)))
+        if not all(0 < side <= _MOST_SIDE_PX for side in (self.width, self.height)):
+            raise CameraError(
+                f"the camera's image has {self.width}x{self.height} px; expected 1 to "
+                f"{_MOST_SIDE_PX} each: give the size of the silhouettes"
+            )
+        if not all(0.0 < length < math.inf for length in (self.fx, self.fy)):
+            raise CameraError(
+                f"the camera's focal lengths are {self.fx:g} and {self.fy:g} px; expected finite "
+                "numbers above 0: calibrate the camera, or take half of the image's width divided "
+                "by the tangent of half the field of view"
+            )
+        if not all(map(math.isfinite, (self.cx, self.cy, self.pitch_rad))):
+            raise CameraError(
+                f"the camera's principal point ({self.cx:g}, {self.cy:g}) px or pitch "
+                f"{self.pitch_rad:g} rad is not finite; expected the middle of the image and the "
+                "angle by which the camera looks down"
+            )
+
+    def scaled(self, width: int, height: int) -> Camera:
+        """Return the same camera with its image resized to ``width`` x ``height`` px."""
+        sx, sy = width / self.width, height / self.height
+        return Camera(
+            width,
+            height,
+            self.fx * sx,
+            self.fy * sy,
+            # The centre of the first pixel is half a pixel inside the image.
+            (self.cx + 0.5) * sx - 0.5,
+            (self.cy + 0.5) * sy - 0.5,
+            self.pitch_rad,
+        )
+
+    def with_pitch(self, pitch_rad: float) -> Camera:
+        """Return the same camera looking down by ``pitch_rad``."""
+        return replace(self, pitch_rad=pitch_rad)
+
+    def reference_to_optical_rotation(self) -> FloatArray:
+        """Return the rotation (3, 3) from the reference frame into the optical frame."""
+        # Level camera: x_optical = Y, y_optical = -Z, z_optical = -X of the reference frame.
+        level = np.array([(0.0, 1.0, 0.0), (0.0, 0.0, -1.0), (-1.0, 0.0, 0.0)])
+        c, s = np.cos(self.pitch_rad), np.sin(self.pitch_rad)
+        look_down = np.array([(1.0, 0.0, 0.0), (0.0, c, -s), (0.0, s, c)])
+        rotation: FloatArray = look_down @ level
+        return rotation
+
+    def reference_to_optical(self, points_m: FloatArray) -> FloatArray:
+        """Rotate points (..., 3), metres, from the level reference frame into the optical frame."""
+        turned: FloatArray = np.asarray(points_m) @ self.reference_to_optical_rotation().T
+        return turned
+
+    def optical_to_reference(self, points_m: FloatArray) -> FloatArray:
+        """Rotate points (..., 3), metres, from the optical frame into the level reference frame."""
+        turned: FloatArray = np.asarray(points_m) @ self.reference_to_optical_rotation()
+        return turned
+
+    def project(self, points_m: FloatArray) -> FloatArray:
+        """Project points (..., 3), metres, of the optical frame, z > 0, to pixels (..., 2)."""
+        points = np.asarray(points_m, dtype=np.float64)
+        z = points[..., 2]
+        return np.stack(
+            [self.fx * points[..., 0] / z + self.cx, self.fy * points[..., 1] / z + self.cy], -1
+        )
+
+
+@dataclass(frozen=True)
+class Calibration:
+    """Calibration of a real camera, from a CameraInfo message or a camera_calibration file.
+
+    Attributes:
+        width: calibrated image width, px.
+        height: calibrated image height, px.
+        k: intrinsic matrix (3, 3).
+        distortion: coefficients (n,) of ``distortion_model``; empty or all zero without distortion.
+        distortion_model: ``plumb_bob``, ``rational_polynomial`` or ``equidistant``.
+        frame_id: name of the optical frame.
+        roll_rad: how far the camera is turned clockwise about its axis, seen from behind it;
+            working images are turned back, so that they are level.
+    """
+
+    width: int
+    height: int
+    k: FloatArray
+    distortion: FloatArray
+    distortion_model: str = "plumb_bob"
+    frame_id: str = "camera_optical_frame"
+    roll_rad: float = 0.0
+
+    @classmethod
+    def of_fov(cls, width: int, height: int, fov_deg: float) -> Calibration:
+        """Return an ideal lens with a field of view, degrees, across the width of the image.
+
+        Raises:
+            CameraError: the field of view is not between 0 and 180 degrees.
+        """
+        if not 0.0 < fov_deg < 180.0:
+            raise CameraError(
+                f"the field of view is {fov_deg:g} degrees; expected more than 0 and less than 180"
+            )
+        focal_px = width / 2 / np.tan(np.radians(fov_deg) / 2)
+        k = np.diag([focal_px, focal_px, 1.0])
+        k[:2, 2] = (width - 1) / 2, (height - 1) / 2
+        return cls(width, height, k, np.zeros(5))
+
+    @property
+    def is_distorted(self) -> bool:
+        """Whether any distortion coefficient is not zero."""
+        return bool(np.any(self.distortion != 0))
+
+    def is_same(self, other: Calibration) -> bool:
+        """Return whether ``other`` has the same intrinsics; the names of the frames may differ."""
+        return (
+            (self.width, self.height) == (other.width, other.height)
+            and np.array_equal(self.k, other.k)
+            and self._lens() == other._lens()
+            and self.roll_rad == other.roll_rad
+        )
+
+    def _lens(self) -> tuple[Any, ...]:
+        """Return model and coefficients of the distortion; empty without distortion."""
+        return (self.distortion_model, *self.distortion) if self.is_distorted else ()
+
+    def __str__(self) -> str:
+        """Return a short description with size, focal length and lens."""
+        lens = self.distortion_model if self.is_distorted else "no distortion"
+        return f"{self.width}x{self.height}, f {self.k[0, 0]:g} px, {lens}"
+
+    def camera(self, width: int, height: int, pitch_rad: float = 0.0) -> Camera:
+        """Return the pinhole camera at the working resolution ``width`` x ``height``, px.
+
+        Raises:
+            CameraError: the camera is uncalibrated or its distortion model is unknown.
+        """
+        self._check()
+        k = self.k
+        full = Camera(self.width, self.height, k[0, 0], k[1, 1], k[0, 2], k[1, 2], pitch_rad)
+        return full.scaled(width, height)
+
+    def rectifier(self, width: int, height: int) -> Rectifier | None:
+        """Return a rectifier for images of ``width`` x ``height`` px; None if none is needed.
+
+        Raises:
+            CameraError: the camera is uncalibrated or its distortion model is unknown.
+        """
+        self._check()
+        if not self.is_distorted and self.roll_rad == 0.0:
+            return None
+        camera = self.camera(width, height)
+        k = np.array([(camera.fx, 0.0, camera.cx), (0.0, camera.fy, camera.cy), (0.0, 0.0, 1.0)])
+        size, turn = (width, height), self._turn()
+        if not self.is_distorted:
+            maps = cv2.initUndistortRectifyMap(k, np.zeros(5), turn, k, size, cv2.CV_16SC2)
+        elif self.distortion_model == "equidistant":
+            maps = cv2.fisheye.initUndistortRectifyMap(
+                k, self.distortion[:4].reshape(4, 1), turn, k, size, cv2.CV_16SC2
+            )
+        else:
+            maps = cv2.initUndistortRectifyMap(k, self.distortion, turn, k, size, cv2.CV_16SC2)
+        return Rectifier(*maps)
+
+    def _turn(self) -> FloatArray:
+        """Return the rotation (3, 3) that makes the rays of a rolled camera level."""
+        if self.roll_rad == 0.0:
+            return np.eye(3)
+        c, s = np.cos(self.roll_rad), np.sin(self.roll_rad)
+        return np.array([(c, -s, 0.0), (s, c, 0.0), (0.0, 0.0, 1.0)])
+
+    def rectified(self, px: FloatArray, width: int, height: int) -> FloatArray:
+        """Return where pixels (N, 2) of the calibrated image lie in the working image, px.
+
+        Raises:
+            CameraError: the camera is uncalibrated or its distortion model is unknown.
+        """
+        camera, rays = self.camera(width, height), np.empty((len(px), 2))
+        if not self.is_distorted:
+            rays[:] = (px - self.k[:2, 2]) / self.k.diagonal()[:2]
+        elif self.distortion_model == "equidistant":
+            lens = self.distortion[:4].reshape(4, 1)
+            rays[:] = cv2.fisheye.undistortPoints(px[:, None], self.k, lens).reshape(-1, 2)
+        else:
+            rays[:] = cv2.undistortPoints(px[:, None], self.k, self.distortion).reshape(-1, 2)
+        if self.roll_rad:
+            rays = rays @ self._turn()[:2, :2].T
+        placed: FloatArray = rays * (camera.fx, camera.fy) + (camera.cx, camera.cy)
+        return placed
+
+    def _check(self) -> None:
+        size = (self.width, self.height)
+        if not all(0 < side <= _MOST_SIDE_PX for side in size):
+            raise CameraError(
+                f"the calibration is for an image of {quoted(self.width)}x{quoted(self.height)}; "
+                f"expected the camera's size in pixels, at most {_MOST_SIDE_PX} each: calibrate "
+                "the camera, or fill in width and height"
+            )
+        problem = matrix_problem(self.k, self.width, self.height)
+        if problem:
+            raise CameraError(
+                f"the camera is not calibrated (its matrix K {problem}); calibrate it with "
+                "camera_calibration, or give its driver a calibration file"
+            )
+        problem = distortion_problem(self.distortion)
+        if problem:
+            raise CameraError(
+                f"the distortion coefficients D {problem}; calibrate the camera anew, or feed "
+                "rectified images with all-zero distortion"
+            )
+        if self.is_distorted and self.distortion_model not in DISTORTION_MODELS:
+            raise CameraError(
+                f"distortion model {quoted(self.distortion_model)} is unknown; supported are "
+                f"{', '.join(DISTORTION_MODELS)}: calibrate with one of those, or feed "
+                "rectified images with all-zero distortion"
+            )
+        allowed = {"equidistant": (4,), "plumb_bob": (4, 5), "rational_polynomial": (8, 12, 14)}
+        counts = allowed.get(self.distortion_model, ())
+        if self.is_distorted and len(self.distortion) not in counts:
+            raise CameraError(
+                f"distortion model '{self.distortion_model}' has {len(self.distortion)} "
+                f"coefficients; expected {' or '.join(map(str, counts))}"
+            )
+
+
+class Rectifier:
+    """Undistorts images of one size with maps computed once."""
+
+    def __init__(self, map_1: NDArray[Any], map_2: NDArray[Any]) -> None:
+        """Keep the fixed-point maps of ``cv2.remap``."""
+        self._maps = (map_1, map_2)
+
+    def __call__(self, image: NDArray[np.uint8]) -> NDArray[np.uint8]:
+        """Return ``image`` (H, W) or (H, W, 3) undistorted.
+
+        Pixels outside the lens's view repeat the border, so that they stay background.
+        """
+        rectified = cv2.remap(image, *self._maps, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
+        return np.asarray(rectified, dtype=np.uint8)

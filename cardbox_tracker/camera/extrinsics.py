@@ -1,0 +1,120 @@
+"""Extrinsics of a further camera: the rigid transform between two optical frames."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from cardbox_tracker.common.errors import CameraError, quoted
+
+FloatArray = NDArray[np.float64]
+
+FARTHEST_M = 30.0
+"""Cameras that see one person are nearer to each other, metres."""
+
+# Tolerance for a rotation matrix in a file, which may be rounded to three digits.
+_ROTATION_TOLERANCE = 1e-2
+# Largest plausible length, even in millimetres; sums of such numbers stay finite.
+_LARGEST = 1e6
+
+
+def _is_possible(values: FloatArray) -> bool:
+    return bool(np.all(np.abs(values) <= _LARGEST))  # false for NaN, too
+
+
+@dataclass(frozen=True, eq=False)
+class Extrinsics:
+    """Rigid transform from the first camera's optical frame into another camera's.
+
+    A point p of that frame is ``rotation @ p + translation_m`` in the other's optical frame.
+
+    Attributes:
+        rotation: (3, 3).
+        translation_m: (3,), metres.
+        source: description of the origin, for messages.
+    """
+
+    rotation: FloatArray
+    translation_m: FloatArray
+    source: str = ""
+
+    @classmethod
+    def of(cls, matrix: object, source: str = "") -> Extrinsics:
+        """Create extrinsics from a matrix, (4, 4) or (3, 4).
+
+        Raises:
+            CameraError: the matrix is no rigid transform; the text names ``source``.
+        """
+        try:
+            values = np.array(matrix, dtype=np.float64)
+        except (TypeError, ValueError, OverflowError):
+            values = np.zeros(0)
+        if values.shape not in ((4, 4), (3, 4)) or not _is_possible(values):
+            raise CameraError(
+                f"{source}: expected a rigid transform of 4 x 4 finite numbers in metres, got "
+                f"{quoted(matrix)}"
+            )
+        if values.shape == (4, 4) and not np.array_equal(values[3], (0.0, 0.0, 0.0, 1.0)):
+            raise CameraError(
+                f"{source}: the last row of the matrix is {quoted(values[3].tolist())}; expected "
+                "0, 0, 0, 1: is it transposed?"
+            )
+        rotation = values[:3, :3]
+        u, _, v = np.linalg.svd(rotation)
+        nearest = u @ v
+        if np.abs(nearest - rotation).max() > _ROTATION_TOLERANCE or np.linalg.det(nearest) < 0:
+            raise CameraError(
+                f"{source}: the matrix is no rotation with a translation; calibrate the cameras "
+                "anew, or copy the transform with all its digits"
+            )
+        return cls(nearest, values[:3, 3].copy(), source)
+
+    @classmethod
+    def of_vectors(cls, rotation: object, translation_m: object, source: str = "") -> Extrinsics:
+        """Create extrinsics from a rotation vector (3,), rad, and a translation (3,), metres.
+
+        Raises:
+            CameraError: the vectors do not have three finite numbers each.
+        """
+        try:
+            vectors = np.array([rotation, translation_m], dtype=np.float64).reshape(2, 3)
+        except (TypeError, ValueError, OverflowError):
+            vectors = np.full((2, 3), np.nan)
+        if not _is_possible(vectors):
+            raise CameraError(
+                f"{source}: expected a rotation vector and a translation of three numbers each, "
+                f"got {quoted(rotation)} and {quoted(translation_m)}"
+            )
+        turn = np.asarray(cv2.Rodrigues(vectors[0])[0], np.float64)
+        return cls(turn, vectors[1].copy(), source)
+
+    def after(self, first: Extrinsics) -> Extrinsics:
+        """Return the composition that applies ``first``, then this transform."""
+        moved = self.rotation @ first.translation_m + self.translation_m
+        return Extrinsics(self.rotation @ first.rotation, moved, self.source or first.source)
+
+    def inverse(self) -> Extrinsics:
+        """Return the inverse transform."""
+        turned = self.rotation.T
+        return Extrinsics(turned, -turned @ self.translation_m, self.source)
+
+    @property
+    def centre_m(self) -> FloatArray:
+        """Centre (3,), metres, of the other camera in the first camera's optical frame."""
+        centre: FloatArray = -self.rotation.T @ self.translation_m
+        return centre
+
+    def difference(self, other: Extrinsics) -> tuple[float, float]:
+        """Return the angle between the rotations, rad, and the distance of the centres, metres."""
+        turned = cv2.Rodrigues(self.rotation @ other.rotation.T)[0]
+        angle = float(np.linalg.norm(turned))
+        return angle, float(np.linalg.norm(self.centre_m - other.centre_m))
+
+    def __str__(self) -> str:
+        """Return distance and angle between the cameras, and the source."""
+        angle = np.degrees(np.linalg.norm(cv2.Rodrigues(self.rotation)[0]))
+        text = f"{np.linalg.norm(self.translation_m):.3f} m and {angle:.1f} degrees apart"
+        return f"{text} ({self.source})" if self.source else text

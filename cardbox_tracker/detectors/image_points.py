@@ -1,0 +1,146 @@
+"""2D points of a person's joints in an image, as a detector finds them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from operator import index
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cardbox_tracker.person.sizes import FloatArray
+from cardbox_tracker.common.errors import quoted
+
+POINT_NAMES: tuple[str, ...] = (
+    "nose",
+    "left_eye",
+    "right_eye",
+    "left_ear",
+    "right_ear",
+    "left_shoulder",
+    "right_shoulder",
+    "left_elbow",
+    "right_elbow",
+    "left_wrist",
+    "right_wrist",
+    "left_hip",
+    "right_hip",
+    "left_little_finger",
+    "right_little_finger",
+    "left_index",
+    "right_index",
+)
+"""``left`` is the person's left. The first 13 are those of COCO, in its order; fingers are the
+knuckles at the base."""
+
+_FARTHEST = 1e6
+# Score of a certain point, and share of certain points that shows a person.
+_CERTAIN, _SHARE = 0.5, 0.5
+
+POINT_INDEX = {name: index for index, name in enumerate(POINT_NAMES)}
+
+_OTHER_SIDE = [
+    POINT_INDEX[name.replace("left", "right") if "left" in name else name.replace("right", "left")]
+    for name in POINT_NAMES
+]
+
+
+@dataclass(frozen=True, eq=False)
+class ImagePoints:
+    """The points of one person in one image.
+
+    Attributes:
+        px: column and row of each of ``POINT_NAMES``, (17, 2); (0, 0) is the centre of the first
+            pixel. A point that is not known is nan, as is one a million pixels away.
+        scores: chance that the point is right, 0 to 1, (17,); 0 for a point that is not known.
+        stamp_ns: stamp of the image, ns; points may be older than the image they are used with.
+            None if they are of the same image.
+        spatial_m: the points in space as the detector estimates them, (17, 3), up to a common
+            scale: x right, y down, z away from the camera, in a level frame; None without it. Only
+            directions between the points are used.
+
+    Raises:
+        ValueError: an array has another shape or is not numeric, or the stamp is no whole number.
+    """
+
+    px: FloatArray
+    scores: FloatArray
+    stamp_ns: int | None = None
+    spatial_m: FloatArray | None = None
+
+    def __post_init__(self) -> None:
+        """Check the types; points that are not finite get the score 0, and others 0 to 1."""
+        count = len(POINT_NAMES)
+        px, scores = _array("px", self.px, (count, 2)), _array("scores", self.scores, (count,))
+        known = _is_finite(px) & (scores > 0.0)
+        px[~known] = np.nan
+        object.__setattr__(self, "px", px)
+        object.__setattr__(self, "scores", np.where(known, np.clip(scores, 0.0, 1.0), 0.0))
+        if self.spatial_m is not None:
+            spatial_m = _array("spatial_m", self.spatial_m, (count, 3))
+            spatial_m[~_is_finite(spatial_m)] = np.nan
+            object.__setattr__(self, "spatial_m", spatial_m)
+        if self.stamp_ns is not None:
+            try:
+                object.__setattr__(self, "stamp_ns", index(self.stamp_ns))
+            except TypeError:
+                raise ValueError(
+                    f"stamp_ns of points is {quoted(self.stamp_ns)}; expected a whole number of "
+                    "nanoseconds, or None"
+                ) from None
+
+    @classmethod
+    def of(
+        cls, found: Mapping[str, tuple[float, float, float]], stamp_ns: int | None = None
+    ) -> ImagePoints:
+        """Return the points with column, row and score by name; other names are not used."""
+        px, scores = np.full((len(POINT_NAMES), 2), np.nan), np.zeros(len(POINT_NAMES))
+        for name, (column, row, score) in found.items():
+            if name in POINT_INDEX:
+                place = POINT_INDEX[name]
+                px[place], scores[place] = (column, row), score
+        return cls(px, scores, stamp_ns)
+
+    def exchanged(self) -> ImagePoints:
+        """Return the points with left and right exchanged."""
+        return replace(
+            self,
+            px=self.px[_OTHER_SIDE],
+            scores=self.scores[_OTHER_SIDE],
+            spatial_m=None if self.spatial_m is None else self.spatial_m[_OTHER_SIDE],
+        )
+
+    @property
+    def are_certain(self) -> bool:
+        """Whether at least half of the points are certain."""
+        return float(np.mean(self.scores >= _CERTAIN)) >= _SHARE
+
+    @property
+    def is_empty(self) -> bool:
+        """Whether no point is known."""
+        return not self.scores.any()
+
+
+def _array(name: str, values: FloatArray, shape: tuple[int, ...]) -> FloatArray:
+    """Return a copy of ``values`` if it has the expected shape."""
+    try:
+        if np.iscomplexobj(values):
+            raise TypeError
+        array = np.array(values, np.float64)
+    except (TypeError, ValueError, OverflowError):
+        raise ValueError(
+            f"{name} of points is {quoted(values)}; expected numbers of the shape {shape}, ordered "
+            "as POINT_NAMES"
+        ) from None
+    if array.shape != shape:
+        raise ValueError(
+            f"{name} of points has the shape {array.shape}; expected {shape}, ordered as "
+            "POINT_NAMES"
+        )
+    return array
+
+
+def _is_finite(points: FloatArray) -> NDArray[np.bool_]:
+    """Return whether all coordinates of each point are finite and below a million, (N,)."""
+    return np.asarray((np.abs(points) < _FARTHEST).all(axis=1))

@@ -1,0 +1,44 @@
+"""Choice of the tracked person among several in an image."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from cardbox_tracker.detectors.image_points import ImagePoints
+
+# Joints near the outline may lie this far outside the silhouette.
+_MARGIN_PX = 5
+
+
+def person_in(silhouette: NDArray[np.uint8], persons: Sequence[ImagePoints]) -> ImagePoints | None:
+    """Return the person whose points lie in the silhouette with the largest sum of scores.
+
+    If no point of anybody does, the person with the most certain points is returned.
+
+    Args:
+        silhouette: (H, W), 0 or 255.
+        persons: points of each person, px of the silhouette.
+
+    Returns:
+        The person; None if nobody has a point.
+    """
+    known = [person for person in persons if not person.is_empty]
+    if len(known) < 2:
+        return known[0] if known else None
+    kernel = np.ones((2 * _MARGIN_PX + 1, 2 * _MARGIN_PX + 1), np.uint8)
+    near = np.asarray(cv2.dilate(silhouette, kernel), np.uint8)
+    return max(known, key=lambda person: (_support(near, person), person.scores.sum()))
+
+
+def _support(near: NDArray[np.uint8], person: ImagePoints) -> float:
+    """Return the sum of the scores of the points on pixels that are not 0."""
+    height, width = near.shape
+    is_known = person.scores > 0.0
+    columns, rows = np.rint(person.px[is_known].T)
+    inside = (columns >= 0) & (columns < width) & (rows >= 0) & (rows < height)
+    on = near[rows[inside].astype(int), columns[inside].astype(int)] > 0
+    return float(person.scores[is_known][inside][on].sum())

@@ -1,0 +1,276 @@
+"""MediaPipe's pose networks on LiteRT: 33 points and a person mask from one colour image.
+
+1. A detector (224x224) finds the person: hip centre, size and direction of the body.
+2. A landmark network (256x256) on that turned square gives points, heat maps and the mask.
+3. While the person stays in view, the square of the next image follows from the points of the last
+   one, so step 1 runs only for a new person.
+
+Both networks are files of the wheel ``mediapipe`` 0.10.21 (Apache-2.0), see :mod:`.model_files`.
+"""
+
+from __future__ import annotations
+
+from math import atan2, cos, hypot, pi, sin
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from cardbox_tracker.common.errors import CardboxError
+
+FloatArray = NDArray[np.float64]
+ColorImage = NDArray[np.uint8]
+
+POINTS = 33
+"""Points of a person; ``LANDMARKS`` of :mod:`.landmarks` names them."""
+
+_DETECTOR_PX, _LANDMARK_PX = 224, 256
+# Cells of the detector's feature maps: pixels a cell, anchors a cell.
+_LAYERS = ((8, 2), (16, 2), (32, 6))
+_LEAST_DETECTION, _LEAST_PRESENCE = 0.5, 0.5
+_SAME_PERSON_IOU = 0.3
+# A chance of one half.
+_LEAST_MASK = 128
+# The square around the person is this much larger than the circle through the detected points.
+_SQUARE_SCALE = 1.25
+# Two further outputs of the landmark network say where the next square is: centre and scale.
+_CENTRE, _SCALE = 33, 34
+_OUTPUTS = 39
+# A point moves to the centroid of its heat map in a window of this many cells.
+_HEAT_WINDOW, _LEAST_HEAT = 7, 0.5
+
+
+class Square(NamedTuple):
+    """A turned square of the image.
+
+    Attributes:
+        u: column of its centre, px.
+        v: row of its centre, px.
+        side: px.
+        angle_rad: by which it is turned clockwise in the image.
+    """
+
+    u: float
+    v: float
+    side: float
+    angle_rad: float
+
+    def to_image(self, points: FloatArray) -> FloatArray:
+        """Return points (N, 2) of the square, 0 to 1, in pixels of the image."""
+        x, y = self.side * (points[:, 0] - 0.5), self.side * (points[:, 1] - 0.5)
+        c, s = cos(self.angle_rad), sin(self.angle_rad)
+        return np.column_stack([self.u + c * x - s * y, self.v + s * x + c * y])
+
+
+class Detection(NamedTuple):
+    """One person in one image.
+
+    Attributes:
+        points_px: (33, 2), column and row; (0, 0) is the centre of the first pixel.
+        scores: (33,), chance that the point is in the image and visible, 0 to 1.
+        mask: (H, W) uint8, 255 times the chance that a pixel shows the person.
+        spatial_m: the points in space relative to the hips, (33, 3), metres for an average person:
+            x right, y down, z away from the camera; None if it is unknown. The network takes the
+            camera for level.
+    """
+
+    points_px: FloatArray
+    scores: FloatArray
+    mask: NDArray[np.uint8]
+    spatial_m: FloatArray | None = None
+
+    def silhouette(self) -> NDArray[np.uint8]:
+        """Return the silhouette (H, W), 255 where a pixel more likely shows the person, else 0."""
+        return np.where(self.mask >= _LEAST_MASK, 255, 0).astype(np.uint8)
+
+
+class PoseNetwork:
+    """Finds one person in image after image."""
+
+    def __init__(self, detector: Path, landmarks: Path, threads: int = 1) -> None:
+        """Load both networks.
+
+        Raises:
+            CardboxError: LiteRT is not installed, or a file is missing or damaged.
+        """
+        self._detect = _Network(detector, threads)
+        self._locate = _Network(landmarks, threads)
+        self._square: Square | None = None
+
+    def forget(self) -> None:
+        """Search the whole next image instead of around the last person."""
+        self._square = None
+
+    def __call__(self, image: ColorImage) -> Detection | None:
+        """Return the person in ``image`` (H, W, 3), bgr; None where there is nobody."""
+        image = np.ascontiguousarray(image[..., ::-1])
+        if self._square is not None and (found := self._located(image, self._square)) is not None:
+            return found
+        square = self._detected(image)
+        self._square = None
+        return None if square is None else self._located(image, square)
+
+    def _detected(self, image: ColorImage) -> Square | None:
+        """Return the square around the most certain person of an rgb image."""
+        height, width = image.shape[:2]
+        side = max(height, width)
+        whole = Square(width / 2, height / 2, side, 0.0)
+        cut = _cut_out(image, whole, _DETECTOR_PX, cv2.BORDER_CONSTANT)
+        boxes, logits = self._detect(2.0 * cut - 1.0)
+        scores = _chance(logits.ravel())
+        likely = np.flatnonzero(scores >= _LEAST_DETECTION)
+        if not len(likely):
+            return None
+        decoded = boxes[0, likely].astype(np.float64) / _DETECTOR_PX
+        anchors = _anchors()[likely]
+        decoded.reshape(-1, 6, 2)[:, [0, 2, 3, 4, 5]] += anchors[:, None]
+        merged = _merged(decoded, scores[likely])
+        hips, rim = whole.to_image(merged[4:8].reshape(2, 2))
+        return _square_of(hips, rim)
+
+    def _located(self, image: ColorImage, square: Square) -> Detection | None:
+        """Return the points and the mask in a square of an rgb image; None if nobody is there."""
+        cut = _cut_out(image, square, _LANDMARK_PX, cv2.BORDER_REPLICATE)
+        raw, presence, mask, heat, space = self._locate(cut)
+        if float(presence[0, 0]) < _LEAST_PRESENCE:
+            return None
+        values = raw.reshape(_OUTPUTS, 5).astype(np.float64)
+        points = values[:, :2] / _LANDMARK_PX
+        points = _refined(points, _chance(heat[0]))
+        placed = square.to_image(points)
+        self._square = _square_of(placed[_CENTRE], placed[_SCALE])
+        visible, present = _chance(values[:POINTS, 3:5].T)
+        return Detection(
+            placed[:POINTS] - 0.5,
+            np.minimum(visible, present),
+            _mask_in_image(mask[0, :, :, 0], square, image.shape[:2]),
+            _turned(space.reshape(_OUTPUTS, 3)[:POINTS].astype(np.float64), square.angle_rad),
+        )
+
+
+class _Network:
+    """One network file on one or more threads."""
+
+    def __init__(self, path: Path, threads: int) -> None:
+        try:
+            from ai_edge_litert.interpreter import Interpreter
+        except ImportError as error:
+            raise CardboxError(
+                f"the detector needs ai-edge-litert ({error}); install it with "
+                "pip install 'cardbox_tracker[detector]'"
+            ) from None
+        try:
+            self._run: Any = Interpreter(str(path), num_threads=threads)
+        except (ValueError, OSError, RuntimeError) as error:
+            raise CardboxError(
+                f"{path} is no network that LiteRT can run ({error}); run "
+                "'cardbox detector --install'"
+            ) from None
+        self._run.allocate_tensors()
+        self._input = self._run.get_input_details()[0]["index"]
+        self._outputs = [detail["index"] for detail in self._run.get_output_details()]
+
+    def __call__(self, image: NDArray[np.float32]) -> list[NDArray[np.float32]]:
+        """Return the outputs for one square image (N, N, 3)."""
+        self._run.set_tensor(self._input, image[None])
+        self._run.invoke()
+        return [self._run.get_tensor(index) for index in self._outputs]
+
+
+def _anchors() -> FloatArray:
+    """Centres of the detector's anchors, 0 to 1, (2254, 2)."""
+    rows = []
+    for stride, count in _LAYERS:
+        cells = _DETECTOR_PX // stride
+        centres = (np.arange(cells) + 0.5) / cells
+        x, y = np.meshgrid(centres, centres)
+        rows.append(np.repeat(np.column_stack([x.ravel(), y.ravel()]), count, axis=0))
+    return np.concatenate(rows)
+
+
+def _merged(decoded: FloatArray, scores: FloatArray) -> FloatArray:
+    """Weighted mean of the detections that overlap the most certain one, (12,)."""
+    centre, size = decoded[:, 0:2], decoded[:, 2:4]
+    low, high = centre - size / 2, centre + size / 2
+    best = int(np.argmax(scores))
+    both = np.minimum(high, high[best]) - np.maximum(low, low[best])
+    shared = np.prod(np.maximum(both, 0.0), axis=1)
+    iou = shared / (np.prod(size, axis=1) + np.prod(size[best]) - shared)
+    same = iou > _SAME_PERSON_IOU
+    mean: FloatArray = np.average(decoded[same], axis=0, weights=scores[same])
+    return mean
+
+
+def _square_of(centre: FloatArray, rim: FloatArray) -> Square:
+    """Square whose centre is ``centre`` and whose upward axis points to ``rim``, px."""
+    du, dv = rim - centre
+    angle = pi / 2 - atan2(-dv, du)
+    turn = angle - 2 * pi * np.floor((angle + pi) / (2 * pi))
+    return Square(float(centre[0]), float(centre[1]), 2 * _SQUARE_SCALE * hypot(du, dv), turn)
+
+
+def _cut_out(image: ColorImage, square: Square, size: int, border: int) -> NDArray[np.float32]:
+    """Return a square of the image at ``size`` pixels, values 0 to 1."""
+    turned = cv2.warpAffine(
+        image,
+        _to_image(square, size),
+        (size, size),
+        flags=cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP,
+        borderMode=border,
+    )
+    return turned.astype(np.float32) / 255.0
+
+
+def _to_image(square: Square, size: int) -> FloatArray:
+    """Matrix (2, 3) from pixels of a square of ``size`` to pixels of the image."""
+    corners = np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]])
+    there = square.to_image(corners).astype(np.float32)
+    matrix = cv2.getAffineTransform(size * corners.astype(np.float32), there)
+    return matrix.astype(np.float64)
+
+
+def _refined(points: FloatArray, heat: FloatArray) -> FloatArray:
+    """Move each point (N, 2) to the centroid of its heat map (H, W, N) around it."""
+    height, width = heat.shape[:2]
+    refined, half = points.copy(), (_HEAT_WINDOW - 1) // 2
+    for number, (x, y) in enumerate(points):
+        column, row = int(x * width), int(y * height)
+        if not (0 <= column < width and 0 <= row < height):
+            continue
+        left, top = max(0, column - half), max(0, row - half)
+        window = heat[top : row + half + 1, left : column + half + 1, number]
+        total = window.sum()
+        if window.max() < _LEAST_HEAT or total <= 0.0:
+            continue
+        rows, columns = np.indices(window.shape)
+        refined[number] = (
+            (left + (columns * window).sum() / total) / width,
+            (top + (rows * window).sum() / total) / height,
+        )
+    return refined
+
+
+def _turned(points: FloatArray, angle_rad: float) -> FloatArray:
+    """Return points (N, 3) of a turned square in the axes of the image."""
+    c, s = cos(angle_rad), sin(angle_rad)
+    x, y, z = points.T
+    turned: FloatArray = np.column_stack([c * x - s * y, s * x + c * y, z])
+    return turned
+
+
+def _mask_in_image(
+    logits: NDArray[np.float32], square: Square, shape: tuple[int, ...]
+) -> NDArray[np.uint8]:
+    """Return the network's mask, whose values are logits, in the image, (H, W)."""
+    matrix = _to_image(square, len(logits))
+    mask = cv2.warpAffine(_chance(logits), matrix, (shape[1], shape[0]))
+    pixels: NDArray[np.uint8] = np.rint(255.0 * mask).astype(np.uint8)
+    return pixels
+
+
+def _chance(logits: NDArray[Any]) -> FloatArray:
+    """Logistic function, without overflow."""
+    chances: FloatArray = 1.0 / (1.0 + np.exp(-np.clip(logits.astype(np.float64), -60.0, 60.0)))
+    return chances

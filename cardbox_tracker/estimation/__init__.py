@@ -1,1 +1,0 @@
-"""Estimation of a posture: cost, resampling, particle filter, hierarchy, initialization."""

@@ -1,1 +1,0 @@
-"""The hierarchical particle filter: resampling schemes, one filter, the hierarchy."""

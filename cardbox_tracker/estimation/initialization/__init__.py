@@ -1,1 +1,0 @@
-"""Measurement of a person from three reference silhouettes, and guidance through the postures."""

@@ -1,1 +1,0 @@
-"""Recorded sessions with ground truth: initialize, track, compare, report."""

@@ -1,0 +1,227 @@
+"""Fit of a body from proportions to the first silhouette of a person in any posture.
+
+A body that was not measured (:mod:`cardbox_tracker.person.proportions`) has unknown values: the
+height of the hips, the breadths of the person with clothes, and possibly the distance. They are
+estimated by an alternating search:
+
+1. The whole-body filter searches for postures of the current body.
+2. Random bodies around the current one are rated in the best of these postures, with a prior
+   that keeps them near the proportions of people; the best body is kept.
+
+Lengths along the bones are not searched, because one outline in an unknown posture does not
+determine them. With an image, colours are learned, too (:mod:`.part_colors`).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from cardbox_tracker.person.model import BodyModel
+from cardbox_tracker.person.posture import N_STATE, PLACE, POSTURE, TORSO_Y
+from cardbox_tracker.person.proportions import BREADTHS
+from cardbox_tracker.person.sizes import SIZE_INDEX, SIZE_LIMITS, FloatArray
+from cardbox_tracker.common.errors import InitializationError
+from cardbox_tracker.search.config import TrackerConfig
+from cardbox_tracker.terms.compiled import CompiledSilhouette
+from cardbox_tracker.terms.term import Image, Silhouette
+from cardbox_tracker.terms.whole_body import WholeBodyCost, iou_of
+from cardbox_tracker.search.pose_filter import Presence
+from cardbox_tracker.search.whole_body import WholeBodyFilter
+from cardbox_tracker.measuring.outline import filled
+from cardbox_tracker.measuring.part_colors import (
+    seen_appearance,
+    torso_colors,
+)
+from cardbox_tracker.measuring.references import (
+    MAX_PERSON_FRACTION,
+    MIN_PERSON_FRACTION,
+    lateral_m,
+)
+from cardbox_tracker.measuring.standing import at_height_of
+from cardbox_tracker.measuring.wording import rounded_down
+from cardbox_tracker.camera.camera import Camera
+
+MIN_IOU = 0.6
+"""Least IoU of the fitted body; below it the silhouette is not a person."""
+
+# Distances that are tried if none is given.
+_DISTANCES_M = 0.9 * 1.2 ** np.arange(9)
+_BREADTHS = [SIZE_INDEX[name] for name in BREADTHS]
+_ROUNDS, _BODIES, _POSTURES = 6, 60, 12
+# Standard deviations of the prior: of the logarithmic distance, the hip height, and the
+# logarithmic breadths. The noise of a round is a fraction of them that shrinks.
+_DISTANCE_SD, _HEIGHT_SD_M, _BREADTH_SD = 0.25, 0.10, 0.20
+_NOISE, _SHRINK = 0.5, 0.75
+# Unit of the prior of a step along the line of sight, m.
+_X_STEP_M = 0.06
+# Cost of one standard deviation as a share of the silhouette's pixels.
+_PRIOR = 0.003
+
+
+def upper_body(silhouette: Silhouette) -> Silhouette | None:
+    """Return the person of a silhouette (H, W), which is its largest region.
+
+    Returns:
+        None if the region is too small or too large, or the head is cut off.
+    """
+    seen = filled(silhouette)
+    share = np.count_nonzero(seen) / seen.size
+    if not MIN_PERSON_FRACTION <= share <= MAX_PERSON_FRACTION or seen[0].any():
+        return None
+    return seen
+
+
+@dataclass(frozen=True)
+class FirstSight:
+    """Result of a fit.
+
+    Attributes:
+        body: fitted body without unknown values.
+        iou: IoU of the fitted body and the silhouette.
+        clothes: histogram of the torso in the image, (bins,); None if it is unknown.
+    """
+
+    body: BodyModel
+    iou: float
+    clothes: FloatArray | None = None
+
+
+def fit_first_sight(
+    body: BodyModel,
+    camera: Camera,
+    silhouette: Silhouette,
+    image: Image | None,
+    config: TrackerConfig,
+    rng: np.random.Generator,
+) -> FirstSight:
+    """Estimate the unknown values of a body from one silhouette.
+
+    Args:
+        body: body model with ``unknown`` values.
+        camera: working camera.
+        silhouette: (H, W), 0 or 255, as :func:`upper_body` returns it.
+        image: (H, W, 3) bgr or (H, W) of the same frame, for the colours; None to skip them.
+        config: settings of the tracker, of which ``whole_body`` is used.
+        rng: random numbers.
+
+    Raises:
+        InitializationError: no body fits the silhouette.
+    """
+    camera = camera.with_pitch(body.camera_pose.pitch_rad)
+    found, posture, iou = _Search(body, camera, silhouette, config, rng).run()
+    if iou < MIN_IOU:
+        raise InitializationError(
+            f"no body of these proportions fits the silhouette (IoU {rounded_down(iou)}, expected "
+            f"{MIN_IOU:.2f} or more)"
+        )
+    clothes = None
+    if image is not None:
+        seen = image, silhouette, found, camera, posture
+        clothes = torso_colors(*seen)
+        if found.appearance is None:
+            found = found.with_values(appearance=seen_appearance(*seen))
+    return FirstSight(found.with_values(unknown=()), iou, clothes)
+
+
+class _Search:
+    """Alternating search of body and posture for one silhouette."""
+
+    def __init__(
+        self,
+        body: BodyModel,
+        camera: Camera,
+        seen: Silhouette,
+        config: TrackerConfig,
+        rng: np.random.Generator,
+    ) -> None:
+        self._prior, self._camera, self._seen = body, camera, seen
+        # A broad person must not be taken for a near one.
+        cost = replace(config.whole_body.cost, x_step_m=_X_STEP_M)
+        self._config = replace(config, whole_body=replace(config.whole_body, cost=cost))
+        self._rng = rng
+        unknown = body.unknown
+        # Standard deviations of distance, hip height and breadths; 0 for known values.
+        self._spread = np.array(
+            [
+                _DISTANCE_SD if "distance_m" in unknown else 0.0,
+                _HEIGHT_SD_M if "hip_height_m" in unknown else 0.0,
+                *[_BREADTH_SD if name in unknown else 0.0 for name in BREADTHS],
+            ]
+        )
+
+    def run(self) -> tuple[BodyModel, FloatArray, float]:
+        """Return the fitted body, its posture (12,), and its IoU."""
+        self._base = self._prior
+        if "distance_m" in self._prior.unknown:
+            placed = [self._standing(distance_m) for distance_m in _DISTANCES_M]
+            self._base = min(placed, key=lambda body: self._postures(body)[1][0])
+        else:
+            self._base = self._standing(self._prior.placement.distance_m)
+        best, noise = np.zeros(len(self._spread)), _NOISE
+        for _ in range(_ROUNDS):
+            postures, _ = self._postures(self._body(best))
+            steps = best + noise * self._rng.standard_normal((_BODIES, len(best)))
+            steps[0] = best
+            ratings = [self._rate(step, postures) for step in steps]
+            best = steps[int(np.argmin(ratings))]
+            noise *= _SHRINK
+        body = self._body(best)
+        postures, _ = self._postures(body)
+        cost = self._cost(body, postures)
+        rated = cost.bodies(postures)
+        iou = iou_of(cost.silhouette_px, rated.areas_px[0], rated.costs_px[0])
+        x_m, z_m = postures[0, PLACE].tolist()
+        place, unknown = body.placement, body.unknown
+        body = body.with_values(
+            distance_m=place.distance_m - (x_m if "distance_m" in unknown else 0.0),
+            hip_height_m=place.hip_height_m + (z_m if "hip_height_m" in unknown else 0.0),
+            lateral_m=float(postures[0, TORSO_Y]),
+        )
+        return body, postures[0, POSTURE], iou
+
+    def _standing(self, distance_m: float) -> BodyModel:
+        """Return the body at a distance, aligned with the silhouette's head."""
+        body = self._prior.with_values(
+            distance_m=distance_m, lateral_m=lateral_m(self._seen, self._camera, distance_m)
+        )
+        if "hip_height_m" not in self._prior.unknown:
+            return body
+        return at_height_of(self._seen, body, self._camera)
+
+    def _body(self, steps: FloatArray) -> BodyModel:
+        """Return the initial body changed by ``steps`` standard deviations."""
+        values = steps * self._spread
+        sizes = self._base.sizes.copy()
+        sizes[_BREADTHS] *= np.exp(values[2:])
+        place = self._base.placement
+        return self._base.with_values(
+            sizes=np.clip(sizes, SIZE_LIMITS[:, 0], SIZE_LIMITS[:, 1]),
+            distance_m=float(place.distance_m * np.exp(values[0])),
+            hip_height_m=float(place.hip_height_m + values[1]),
+        )
+
+    def _rate(self, steps: FloatArray, postures: FloatArray) -> float:
+        own = np.sum(np.where(self._spread > 0, steps, 0.0) ** 2)
+        return float(self._cost(self._body(steps), postures).bodies(postures).ratings.min()) + (
+            _PRIOR * float(own)
+        )
+
+    def _cost(self, body: BodyModel, postures: FloatArray) -> WholeBodyCost:
+        cost = WholeBodyCost(body, self._camera, self._config.whole_body.cost)
+        cost.see(self._seen, postures[0])
+        return cost
+
+    def _postures(self, body: BodyModel) -> tuple[FloatArray, FloatArray]:
+        """Return the best states (n, 14) of a body, best first, and their costs (n,)."""
+        silhouette = CompiledSilhouette(body, self._camera)
+        search = WholeBodyFilter(self._config, silhouette, self._rng)
+        search.approach.is_fixed = True
+        frames = [silhouette.frame(self._seen)]
+        if search.look(frames) is not Presence.PERSON:
+            return np.zeros((1, N_STATE)), np.array([np.inf])
+        search.follow(frames, [()])
+        rated = search.rated
+        order = np.argsort(rated.ratings, kind="stable")[:_POSTURES]
+        return rated.states[order], rated.ratings[order]

@@ -1,0 +1,127 @@
+"""Guides a person through the reference postures: instruct, count down, capture, repeat.
+
+The module is free of ROS; it shows, waits and captures by functions that the caller supplies.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import NamedTuple
+
+from cardbox_tracker.common.errors import InitializationError
+
+ASK, GOOD, BAD = "ask", "good", "bad"
+"""Moods of a prompt: an instruction, a success or a failure."""
+
+HOLD_STILL = "Hold still"
+FINISHED, FAILED, CANCELLED = "Thank you. Done.", "That did not work. Sorry.", "Stopped."
+
+_TURN = {
+    "left": "turn a quarter to your left",
+    "right": "turn a quarter to your right",
+}
+_HOLD_S = 1.0
+_READ_S = 2.0
+# The last seconds are counted aloud for a person who stands sideways and cannot see them.
+_SPOKEN_COUNT = 3
+
+
+def instruction(name: str, side_turn: str) -> str:
+    """Return the instruction for the reference ``front``, ``side`` or ``arms``."""
+    return {
+        "front": "face the camera, arms hanging a little away from the body",
+        "side": f"{_TURN[side_turn]}, arms hanging a little away from the body",
+        "arms": "face the camera, arms stretched sideways, just below the shoulders, hands open",
+    }[name]
+
+
+def short_words(name: str, side_turn: str) -> str:
+    """Return a short instruction that can be read at two metres or spoken."""
+    return {
+        "front": "Face the camera, arms a little out",
+        "side": f"Now turn {side_turn}, arms as before",
+        "arms": "Face the camera, arms out sideways",
+    }[name]
+
+
+class Prompt(NamedTuple):
+    """An instruction or a message of the guidance.
+
+    Attributes:
+        name: name of the reference, or ``measuring``.
+        words: short text for the person.
+        left_s: remaining seconds of the count-down; None if there is no count-down.
+        detail: text for the operator; ``words`` if empty.
+        mood: ``ask``, ``good`` or ``bad``.
+    """
+
+    name: str
+    words: str
+    left_s: int | None = None
+    detail: str = ""
+    mood: str = ASK
+
+    @property
+    def text(self) -> str:
+        """Line of text for the operator."""
+        count = "" if self.left_s is None else f": {self.left_s}"
+        return f"{self.name}: {self.detail or self.words}{count}"
+
+
+def spoken(before: Prompt | None, now: Prompt) -> str:
+    """Return the text to be spoken when ``now`` follows ``before``; it may be empty."""
+    if before is None or before.words != now.words or before.name != now.name:
+        return now.words
+    if now.left_s is not None and now.left_s != before.left_s and now.left_s <= _SPOKEN_COUNT:
+        return str(now.left_s)
+    return ""
+
+
+def measuring(fraction: float) -> Prompt:
+    """Return the prompt during the measurement, of which ``fraction`` is done."""
+    return Prompt("measuring", "Good. Measuring, you may relax", detail=f"{100 * fraction:.0f} %")
+
+
+class Guidance:
+    """Guides a person through the missing references."""
+
+    def __init__(
+        self,
+        show: Callable[[Prompt], None],
+        capture: Callable[[str], str],
+        wait: Callable[[float], None],
+    ) -> None:
+        """Store the functions of the caller.
+
+        Args:
+            show: shows a prompt to the person.
+            capture: captures the named reference and returns a text; raises InitializationError.
+            wait: waits for a number of seconds; an exception of it ends the guidance.
+        """
+        self._show, self._capture, self._wait = show, capture, wait
+
+    def run(self, missing: Sequence[str], side_turn: str, count_down_s: int, attempts: int) -> None:
+        """Capture each reference in ``missing``.
+
+        Raises:
+            InitializationError: a reference could not be captured in ``attempts`` attempts.
+        """
+        for name in missing:
+            words, detail = short_words(name, side_turn), instruction(name, side_turn)
+            for attempt in range(1, attempts + 1):
+                for left in range(count_down_s, 0, -1):
+                    self._show(Prompt(name, words, left, detail))
+                    self._wait(1.0)
+                self._show(Prompt(name, HOLD_STILL, detail="hold still"))
+                self._wait(_HOLD_S)
+                try:
+                    done = self._capture(name)
+                    self._show(Prompt(name, "Good.", detail=done, mood=GOOD))
+                    self._wait(_HOLD_S)
+                    break
+                except InitializationError as error:
+                    failed = f"not captured: {error}"
+                    self._show(Prompt(name, error.words, detail=failed, mood=BAD))
+                    if attempt == attempts:
+                        raise
+                    self._wait(_READ_S)

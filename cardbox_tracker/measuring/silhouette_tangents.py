@@ -1,0 +1,206 @@
+"""Epipolar tangency constraints on the relative pose of two cameras.
+
+A plane through both camera centres that touches a person from above touches both silhouettes
+(Cipolla, Astrom and Giblin, "Motion from the frontier of curved surfaces", 1995). So both
+silhouettes have the same highest angle about the baseline. The constraint needs no body model,
+hence hair and clothes cause no error.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Iterable
+from math import atan2, sqrt
+from typing import NamedTuple
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from cardbox_tracker.person.sizes import FloatArray
+from cardbox_tracker.terms.term import Silhouette
+from cardbox_tracker.camera.camera import Camera
+from cardbox_tracker.camera.extrinsics import Extrinsics
+
+# A point this close to the image border may belong to a part that is cut off.
+_BORDER_PX = 4.0
+# Standard deviation of a height, and the height with a quarter of the weight, px. The small
+# deviation lets the tangents outweigh the outlines, which are biased.
+_HEIGHT_PX, _HALF_PX = 0.1, 4.0
+# Largest effective number of frames, since neighbouring frames are correlated.
+_COUNTED = 150
+# Roll: Gauss-Newton steps, step of the differences, height with a quarter of the weight, least
+# noise; fewest heights and largest condition number.
+_ROLL_STEPS, _TRIED_RAD, _ROLL_HALF_PX, _LEAST_NOISE_PX = 4, 0.003, 2.0, 0.3
+_FEWEST, _LARGEST_CONDITION = 8, 1e6
+
+_Hull = tuple[FloatArray, NDArray[np.bool_]]
+
+
+class Pencil(NamedTuple):
+    """The planes through both cameras of a pose.
+
+    Attributes:
+        along: direction of the baseline in the other camera's frame, (3,).
+        here: directions up and ahead across the baseline, (2, 3), in the first camera's frame.
+        there: the same in the other camera's frame.
+    """
+
+    along: FloatArray
+    here: FloatArray
+    there: FloatArray
+
+
+class TopTangents:
+    """The convex hulls of two cameras' silhouettes, which determine their tangent planes."""
+
+    def __init__(
+        self,
+        first: Camera,
+        other: Camera,
+        pairs: Iterable[tuple[Silhouette, Silhouette]] = (),
+        most: int | None = None,
+    ) -> None:
+        """Add the silhouettes of some frames.
+
+        Args:
+            first: the first camera, including its pitch.
+            other: the further camera.
+            pairs: silhouettes (H, W), 0 or 255, of both cameras.
+            most: number of latest frames that are kept; None keeps all.
+        """
+        self._first, self._other = first, other
+        self._up = first.reference_to_optical_rotation() @ np.array([0.0, 0.0, 1.0])
+        self._hulls: deque[tuple[_Hull, _Hull]] = deque(maxlen=most)
+        for one, two in pairs:
+            self.add(one, two)
+
+    def add(self, one: Silhouette, two: Silhouette) -> bool:
+        """Add the silhouettes of a frame and return True, unless one of them is empty."""
+        hulls = _hull(one, self._first), _hull(two, self._other)
+        is_there = all(len(rays) for rays, _ in hulls)
+        if is_there:
+            self._hulls.append(hulls)
+        return is_there
+
+    def copy(self) -> TopTangents:
+        """Return a copy for use in another thread."""
+        now = TopTangents(self._first, self._other)
+        now._hulls.extend(list(self._hulls))
+        return now
+
+    def pencil(self, extrinsics: Extrinsics) -> Pencil:
+        """Return the planes of a pose, for several calls of :meth:`heights`."""
+        along = extrinsics.translation_m / np.linalg.norm(extrinsics.translation_m)
+        up = extrinsics.rotation @ self._up
+        ahead = np.cross(along, up)
+        ahead /= np.linalg.norm(ahead)
+        # The person is in front of the other camera.
+        ahead *= 1.0 if ahead[2] > 0.0 else -1.0
+        axes = np.array([up - (up @ along) * along, ahead])
+        axes[0] /= np.linalg.norm(axes[0])
+        return Pencil(along, axes @ extrinsics.rotation, axes)
+
+    def heights(self, pose: Extrinsics | Pencil) -> FloatArray:
+        """Return the height of the first camera's tangent above the other camera's, (n,), px.
+
+        It is measured in pixels of the other camera; NaN if a silhouette is cut off at the border.
+        """
+        along, axes_here, axes = self.pencil(pose) if isinstance(pose, Extrinsics) else pose
+        found = np.full(len(self._hulls), np.nan)
+        for number, (one, two) in enumerate(self._hulls):
+            here, is_whole = _highest(one, axes_here)
+            there, is_whole_there = _highest(two, axes)
+            if is_whole and is_whole_there:
+                angles = [atan2(*(axes_here @ here)), atan2(*(axes @ there))]
+                across = sqrt(1.0 - float(there @ along) ** 2)
+                found[number] = (angles[0] - angles[1]) * across * self._other.fx
+        return found
+
+    def equations(
+        self, extrinsics: Extrinsics, beside: list[tuple[Extrinsics, Extrinsics, float]]
+    ) -> tuple[FloatArray, FloatArray]:
+        """Return the normal equations, ``matrix`` @ change = -``right``, of a change of the pose.
+
+        Args:
+            extrinsics: the pose.
+            beside: for each number of the change the pose with a larger and with a smaller value,
+                and the difference of the values.
+        """
+        now = self.heights(extrinsics)
+        slopes = np.array(
+            [(self.heights(more) - self.heights(less)) / step for more, less, step in beside]
+        )
+        known = np.isfinite(now) & np.isfinite(slopes).all(axis=0)
+        now, slopes = now[known], slopes[:, known]
+        weights = (_HEIGHT_PX * (1.0 + (now / _HALF_PX) ** 2)) ** -2.0
+        weights *= min(1.0, _COUNTED / max(1, len(now)))
+        return (slopes * weights) @ slopes.T, (slopes * weights) @ now
+
+
+def roll_of(tangents: TopTangents, extrinsics: Extrinsics) -> tuple[float, float]:
+    """Return the roll of the other camera against ``extrinsics``, and its standard deviation.
+
+    Pitch changes all heights equally, while the effect of roll depends on the column; both are
+    estimated by weighted least squares. So the highest points (head, raised hands) must lie at
+    different columns.
+
+    Args:
+        tangents: tangents of several frames.
+        extrinsics: assumed pose.
+
+    Returns:
+        Roll and its standard deviation, rad; the deviation is inf if the roll is undetermined.
+    """
+    turn = np.zeros(2)
+    for _ in range(_ROLL_STEPS):
+        now = _turned(extrinsics, turn)
+        heights = tangents.heights(now)
+        slopes = np.array(
+            [
+                tangents.heights(_turned(now, change)) - tangents.heights(_turned(now, -change))
+                for change in _TRIED_RAD * np.eye(2)
+            ]
+        ) / (2.0 * _TRIED_RAD)
+        known = np.isfinite(heights) & np.isfinite(slopes).all(axis=0)
+        heights, slopes = heights[known], slopes[:, known]
+        weighted = slopes * (1.0 + (heights / _ROLL_HALF_PX) ** 2) ** -2.0
+        matrix = weighted @ slopes.T
+        if len(heights) < _FEWEST or np.linalg.cond(matrix) > _LARGEST_CONDITION:
+            return 0.0, float("inf")
+        turn -= np.linalg.solve(matrix, weighted @ heights)
+    noise_px = max(_LEAST_NOISE_PX, 1.48 * float(np.median(np.abs(heights))))
+    return float(turn[1]), noise_px * float(np.sqrt(np.linalg.inv(matrix)[1, 1]))
+
+
+def _turned(extrinsics: Extrinsics, turn: FloatArray) -> Extrinsics:
+    """Return the pose after a pitch and a roll, (2,), rad."""
+    vector = np.array([turn[0], 0.0, turn[1]])
+    matrix = np.asarray(cv2.Rodrigues(vector)[0], np.float64)
+    return Extrinsics(matrix @ extrinsics.rotation, matrix @ extrinsics.translation_m)
+
+
+def _hull(mask: Silhouette, camera: Camera) -> _Hull:
+    """Return the convex hull as unit rays (n, 3), and whether each is inside the image, (n,)."""
+    left, top, width, height = cv2.boundingRect(mask)
+    if not width:
+        return np.empty((0, 3)), np.empty(0, np.bool_)
+    seen = mask[top : top + height, left : left + width] != 0
+    # The ends of the rows have the same hull as all pixels, and are a hundredth of them.
+    starts, ends = seen.argmax(axis=1), width - 1 - seen[:, ::-1].argmax(axis=1)
+    rows = np.flatnonzero(seen[np.arange(height), starts])
+    columns = np.concatenate([starts[rows], ends[rows]]) + left
+    points = np.column_stack([columns, np.concatenate([rows, rows]) + top]).astype(np.int32)
+    hull = cv2.convexHull(points).reshape(-1, 2).astype(np.float64)
+    x, y = hull.T
+    inside = (x >= _BORDER_PX) & (x < camera.width - _BORDER_PX) & (y >= _BORDER_PX)
+    rays = np.column_stack([(x - camera.cx) / camera.fx, (y - camera.cy) / camera.fy, 0.0 * x + 1])
+    return rays / np.linalg.norm(rays, axis=1)[:, None], inside
+
+
+def _highest(hull: _Hull, axes: FloatArray) -> tuple[FloatArray, bool]:
+    """Return the ray with the largest angle in the plane of ``axes`` (2, 3): up, ahead."""
+    rays, inside = hull
+    up, ahead = axes @ rays.T
+    number = int(np.argmax(np.arctan2(up, ahead)))
+    return rays[number], bool(inside[number])

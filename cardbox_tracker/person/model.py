@@ -1,0 +1,268 @@
+"""Body model: sizes and placement of a person, and pose of the camera (paper, section II-A).
+
+A model file and the topic ``body_model`` contain this model, which is constant while the person is
+tracked. Its parts are separate, since a second camera adds a pose and another place changes the
+placement, and neither changes the person.
+
+Placement and pose are given in the reference frame: origin at the camera's centre, X towards the
+camera, Y to the right of the image, Z up; level, independent of the camera's pitch.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import asdict, dataclass, field, fields, replace
+from typing import Any
+
+import numpy as np
+
+from cardbox_tracker.person.appearance import Appearance
+from cardbox_tracker.person.posture import N_STATE, POSTURE, SIDE_TURNS, TORSO_Y, reference_posture
+from cardbox_tracker.person.sizes import (
+    DEFAULT_SIZES,
+    N_SIZES,
+    SIZE_INDEX,
+    SIZE_NAMES,
+    SIZES,
+    FloatArray,
+)
+from cardbox_tracker.person.skeleton import SHOULDER_RISE
+from cardbox_tracker.common.errors import BodyModelError, quoted
+
+# name: (lowest, highest, unit, meaning)
+PLACEMENT = {
+    "distance_m": (0.3, 20.0, "m", "level distance from the camera to the middle of the hips"),
+    "hip_height_m": (-5.0, 5.0, "m", "height of the middle of the hips above the camera's centre"),
+    "lateral_m": (-5.0, 5.0, "m", "torso_y in the front reference posture"),
+}
+CAMERA_POSE = {"camera_pitch_rad": (-1.4, 1.4, "rad", "how far the camera looks down")}
+CONSTANTS = {**PLACEMENT, **CAMERA_POSE}
+"""Range, unit and meaning of the numbers of placement and camera pose, by name."""
+
+MEASURED, PROPORTIONS = SOURCES = ("measured", "proportions")
+"""Origin of the sizes: reference postures, or the proportions of people of a stature."""
+
+
+def check_range(name: str, value: float, lowest: float, highest: float, unit: str) -> None:
+    """Refuse a value that is not finite or lies outside ``lowest`` to ``highest``.
+
+    Raises:
+        BodyModelError: the value is refused; the text gives name, value, unit, range and a likely
+            wrong unit.
+    """
+    if not math.isfinite(value):
+        raise BodyModelError(f"{name} is {value}; expected a finite number of {unit}")
+    if not lowest <= value <= highest:
+        hint = ""
+        if unit == "m" and lowest <= value / 100 <= highest and value > 1:
+            hint = " (is it given in centimetres?)"
+        elif unit == "m" and lowest <= value / 1000 <= highest and value > 10:
+            hint = " (is it given in millimetres?)"
+        raise BodyModelError(
+            f"{name} is {value:g} {unit}; expected {lowest:g} to {highest:g} {unit}{hint}"
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class Person:
+    """Sizes of one person, independent of place and camera.
+
+    Attributes:
+        sizes: shape (18,), metres, ordered as ``SIZE_NAMES``; kept read-only.
+
+    Raises:
+        BodyModelError: a size is not finite or outside of its range; the text names it.
+    """
+
+    sizes: FloatArray = field(default_factory=lambda: DEFAULT_SIZES.copy())
+
+    def __post_init__(self) -> None:
+        """Check every size and freeze a copy of the vector."""
+        sizes = np.array(self.sizes, dtype=np.float64)
+        if sizes.shape != (N_SIZES,):
+            raise BodyModelError(f"sizes has shape {sizes.shape}; expected ({N_SIZES},)")
+        for size, value in zip(SIZES, sizes, strict=True):
+            check_range(size.name, float(value), size.minimum_m, size.maximum_m, "m")
+        sizes.setflags(write=False)
+        object.__setattr__(self, "sizes", sizes)
+
+    def size(self, name: str) -> float:
+        """Return the size of that name in metres."""
+        return float(self.sizes[SIZE_INDEX[name]])
+
+    def __eq__(self, other: object) -> bool:
+        """Return whether all sizes are equal."""
+        if not isinstance(other, Person):
+            return NotImplemented
+        return np.array_equal(self.sizes, other.sizes)
+
+    def __hash__(self) -> int:
+        """Return a hash of all sizes."""
+        return hash(self.sizes.tobytes())
+
+    def __str__(self) -> str:
+        """Return a line per size, in centimetres."""
+        return "\n".join(
+            f"{name:20s} {100 * value:6.1f} cm"
+            for name, value in zip(SIZE_NAMES, self.sizes, strict=True)
+        )
+
+
+@dataclass(frozen=True)
+class Placement:
+    """Position of mid-hip in the front reference posture, metres in the reference frame.
+
+    Attributes:
+        distance_m: level distance from the camera: X is ``-distance_m``.
+        hip_height_m: Z, usually negative.
+        lateral_m: Y, which is ``torso_y`` where tracking starts.
+
+    Raises:
+        BodyModelError: a value is not finite or outside of its range; the text names it.
+    """
+
+    distance_m: float = 2.0
+    hip_height_m: float = -0.5
+    lateral_m: float = 0.0
+
+    def __post_init__(self) -> None:
+        """Check every value."""
+        for entry in fields(self):
+            lowest, highest, unit, _ = PLACEMENT[entry.name]
+            check_range(entry.name, getattr(self, entry.name), lowest, highest, unit)
+
+
+@dataclass(frozen=True)
+class CameraPose:
+    """Pose of the camera in the reference frame, whose origin is the camera's centre.
+
+    Attributes:
+        pitch_rad: downward pitch, rad.
+
+    Raises:
+        BodyModelError: the pitch is not finite or outside of its range.
+    """
+
+    pitch_rad: float = 0.0
+
+    def __post_init__(self) -> None:
+        """Check the pitch."""
+        lowest, highest, unit, _ = CAMERA_POSE["camera_pitch_rad"]
+        check_range("camera_pitch_rad", self.pitch_rad, lowest, highest, unit)
+
+
+@dataclass(frozen=True)
+class BodyModel:
+    """One person in one place before one camera.
+
+    Attributes:
+        person: the 18 sizes.
+        placement: position of mid-hip.
+        camera_pose: pose of the camera.
+        side_turn: turn of the person for the side reference, ``left`` or ``right``.
+        appearance: the colours of the person's parts; None if they were not learned.
+        source: one of ``SOURCES``; sizes from proportions are less exact.
+        unknown: names of sizes and of ``PLACEMENT`` whose values are guesses; a tracker fits them
+            to the first silhouette of a person.
+        shoulder_rise: rise of a shoulder joint per radian of elevation of its arm, in shoulder
+            breadths (:mod:`.skeleton`); it is no part of a model file.
+
+    Raises:
+        BodyModelError: ``side_turn``, ``source`` or a name in ``unknown`` is not valid.
+    """
+
+    person: Person = field(default_factory=Person)
+    placement: Placement = Placement()
+    camera_pose: CameraPose = CameraPose()
+    side_turn: str = "left"
+    appearance: Appearance | None = None
+    source: str = MEASURED
+    unknown: tuple[str, ...] = ()
+    shoulder_rise: float = SHOULDER_RISE
+
+    def __post_init__(self) -> None:
+        """Check the names; the parts check themselves."""
+        if self.side_turn not in SIDE_TURNS:
+            raise BodyModelError(
+                f"side_turn is {quoted(self.side_turn)}; expected one of {SIDE_TURNS}"
+            )
+        if self.source not in SOURCES:
+            raise BodyModelError(f"source is {quoted(self.source)}; expected one of {SOURCES}")
+        for name in self.unknown:
+            if name not in (*PLACEMENT, *SIZE_NAMES):
+                raise BodyModelError(
+                    f"unknown names {quoted(name)}; expected sizes, or any of "
+                    + ", ".join(PLACEMENT)
+                )
+
+    @classmethod
+    def of(cls, sizes: FloatArray | None = None, **values: Any) -> BodyModel:
+        """Create a model from plain numbers.
+
+        Args:
+            sizes: shape (18,), metres; None for the default sizes.
+            values: any of ``CONSTANTS``, ``side_turn``, ``appearance``, ``source``,
+                ``unknown`` and ``shoulder_rise``; missing values have their defaults.
+
+        Raises:
+            BodyModelError: a number is outside of its range; the text names it.
+        """
+        model = cls() if sizes is None else cls(Person(sizes))
+        return model.with_values(**values)
+
+    def with_values(self, **values: Any) -> BodyModel:
+        """Return the same model with other numbers.
+
+        Args:
+            values: any of ``sizes``, ``CONSTANTS``, ``side_turn``, ``appearance``, ``source``,
+                ``unknown`` and ``shoulder_rise``.
+
+        Raises:
+            BodyModelError: a number is outside of its range; the text names it.
+        """
+        changed: dict[str, Any] = {}
+        if "sizes" in values:
+            changed["person"] = Person(values.pop("sizes"))
+        if "camera_pitch_rad" in values:
+            changed["camera_pose"] = CameraPose(values.pop("camera_pitch_rad"))
+        place = {name: values.pop(name) for name in PLACEMENT if name in values}
+        changed["placement"] = replace(self.placement, **place)
+        return replace(self, **changed, **values)
+
+    @property
+    def rigid(self) -> BodyModel:
+        """The same body with rigid shoulders, as in the paper."""
+        return replace(self, shoulder_rise=0.0)
+
+    @property
+    def constants(self) -> dict[str, float]:
+        """Numbers of placement and camera pose by name, ordered as ``CONSTANTS``."""
+        return {**asdict(self.placement), "camera_pitch_rad": self.camera_pose.pitch_rad}
+
+    @property
+    def sizes(self) -> FloatArray:
+        """The person's sizes, shape (18,), metres, ordered as ``SIZE_NAMES``; read-only."""
+        return self.person.sizes
+
+    def size(self, name: str) -> float:
+        """Return the person's size of that name in metres."""
+        return self.person.size(name)
+
+    def reference_state(self, name: str = "front", side_turn: str = "left") -> FloatArray:
+        """Return the state (14,) of a reference posture at the measured place, rad and metres."""
+        state = np.zeros(N_STATE)
+        state[POSTURE] = reference_posture(name, side_turn)
+        state[TORSO_Y] = self.placement.lateral_m
+        return state
+
+    def __str__(self) -> str:
+        """Return a line per size, in centimetres, and a remark if they were not measured."""
+        return f"{self.person}\n{self.doubt}" if self.doubt else str(self.person)
+
+    @property
+    def doubt(self) -> str:
+        """Remark on sizes that were not measured; empty for measured ones."""
+        if self.source == MEASURED:
+            return ""
+        text = "sizes from the proportions of people, not measured: less exact"
+        return f"{text}; unknown: {', '.join(self.unknown)}" if self.unknown else text

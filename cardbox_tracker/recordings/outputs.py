@@ -1,0 +1,305 @@
+"""The tracker's outputs for an image: topics, joints and figures.
+
+:mod:`.ros.messages.results` encodes them as messages of the nodes, :mod:`.recordings.result_bag`
+as messages of a bag, and :mod:`.recordings.result_table` as rows of a table. Add a joint to
+:mod:`.person.skeleton` and ``joint_values``, a topic to ``outputs``, and a number to ``METRICS``.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from cardbox_tracker.person.sizes import FloatArray
+from cardbox_tracker.person.skeleton import (
+    CLAVICLE_NAMES,
+    JOINT_NAMES,
+    JOINT_STATE_NAMES,
+    NECK_NAMES,
+    PLACE_NAMES,
+)
+from cardbox_tracker.tracking.estimate import Estimate
+from cardbox_tracker.tracking.tracker import Tracker
+from cardbox_tracker.recordings.keypoint_status import KeypointStates, keypoint_states
+from cardbox_tracker.markers import MarkerShape, marker_shapes
+
+
+class JointValues(NamedTuple):
+    """Values (n,) of the joints ``names``, rad and metres.
+
+    ``velocities`` (n,) are their changes, rad/s and m/s; None if unknown.
+    """
+
+    names: tuple[str, ...]
+    values: FloatArray
+    velocities: FloatArray | None = None
+
+
+class Points(NamedTuple):
+    """Points (n, 3), metres in the optical frame."""
+
+    points_m: FloatArray
+
+
+class Markers(NamedTuple):
+    """Shapes to show; without shapes, all earlier ones are removed."""
+
+    shapes: tuple[MarkerShape, ...]
+
+
+class Text(NamedTuple):
+    """A text."""
+
+    text: str
+
+
+Value = JointValues | Points | Markers | Text | KeypointStates
+
+
+@dataclass(frozen=True)
+class Output:
+    """One topic.
+
+    Attributes:
+        topic: relative name.
+        kind: class of the values, which determines the message type.
+        of: value for an estimate with a posture; None if the estimate has no such value.
+        absent: value that is sent once when the posture is lost; None if nothing is sent.
+        needs_posture: False if ``of`` has a value for every estimate.
+        moves: whether the values are joints with velocities.
+    """
+
+    topic: str
+    kind: type[Value]
+    of: Callable[[Estimate, Tracker], Value | None]
+    absent: Value | None = None
+    needs_posture: bool = True
+    moves: bool = False
+
+
+@dataclass(frozen=True)
+class Metric:
+    """One number of an estimate.
+
+    Attributes:
+        name: name of the column.
+        unit: empty for a plain number.
+        format: format specification of the number.
+        of: the number of an estimate; None if it has no such number.
+    """
+
+    name: str
+    unit: str
+    format: str
+    of: Callable[[Estimate], float | None]
+
+    @property
+    def label(self) -> str:
+        """Name with its unit for the diagnostics."""
+        return f"{self.name} ({self.unit})" if self.unit else self.name
+
+    def text(self, estimate: Estimate) -> str:
+        """Return the number as text; empty if there is no number."""
+        value = self.of(estimate)
+        return "" if value is None else format(value, self.format)
+
+
+# The mean velocity over a longer gap is not that of the moment.
+_LONGEST_NS = 1_000_000_000
+
+
+def joint_values(estimate: Estimate, torso_place: bool = True) -> JointValues | None:
+    """Return the joints of an estimate; None without a posture.
+
+    Without ``torso_place``, these are the 12 joints of the posture.
+    """
+    if estimate.posture is None or not torso_place:
+        return _joints(JOINT_NAMES, estimate.posture)
+    others = place_of(estimate), neck_of(estimate), clavicles_of(estimate)
+    return _joints(JOINT_STATE_NAMES, estimate.posture, *others)
+
+
+def joint_deviations(estimate: Estimate, torso_place: bool = True) -> JointValues | None:
+    """Return the standard deviation of each joint; None if unknown.
+
+    The joints of the neck are among them only if the face was seen.
+    """
+    if estimate.posture_stddev is None or not torso_place:
+        return _joints(JOINT_NAMES, estimate.posture_stddev)
+    names, known = [*JOINT_NAMES, *PLACE_NAMES], [_or_zeros(estimate.offset_stddev_m)]
+    if estimate.neck_stddev is not None:
+        names, known = [*names, *NECK_NAMES], [*known, estimate.neck_stddev]
+    known.append(_or_zeros(estimate.clavicles_stddev_m))
+    return _joints((*names, *CLAVICLE_NAMES), estimate.posture_stddev, *known)
+
+
+def place_of(estimate: Estimate) -> FloatArray:
+    """Return ``torso_x`` and ``torso_z`` (2,), metres; 0 if the filter keeps them constant."""
+    return _or_zeros(estimate.offset_m)
+
+
+def neck_of(estimate: Estimate) -> FloatArray:
+    """Return ``neck_yaw`` and ``neck_pitch`` (2,), rad; 0 if the face was not seen."""
+    return _or_zeros(estimate.neck)
+
+
+def clavicles_of(estimate: Estimate) -> FloatArray:
+    """Return the rise of both shoulders, (2,), metres; 0 if it is not known."""
+    return _or_zeros(estimate.clavicles_m)
+
+
+def _or_zeros(pair: FloatArray | None) -> FloatArray:
+    return np.zeros(2) if pair is None else pair
+
+
+def _joints(
+    names: tuple[str, ...], posture: FloatArray | None, *others: FloatArray
+) -> JointValues | None:
+    return None if posture is None else JointValues(names, np.concatenate([posture, *others]))
+
+
+def posture_from(joints: JointValues) -> FloatArray:
+    """Return the posture (12,) from named joints in any order.
+
+    Raises:
+        ValueError: a joint of the posture is missing.
+    """
+    by_name = positions_of(joints)
+    missing = [name for name in JOINT_NAMES if name not in by_name]
+    if missing:
+        raise ValueError(f"joints {', '.join(missing)} are missing")
+    return np.array([by_name[name] for name in JOINT_NAMES])
+
+
+def place_from(joints: JointValues) -> FloatArray | None:
+    """Return ``torso_x`` and ``torso_z`` (2,) from named joints; None if one is missing."""
+    by_name = positions_of(joints)
+    if not by_name.keys() >= set(PLACE_NAMES):
+        return None
+    return np.array([by_name[name] for name in PLACE_NAMES])
+
+
+def neck_from(joints: JointValues) -> FloatArray | None:
+    """Return ``neck_yaw`` and ``neck_pitch`` (2,) from named joints; None if one is missing."""
+    by_name = positions_of(joints)
+    if not by_name.keys() >= set(NECK_NAMES):
+        return None
+    return np.array([by_name[name] for name in NECK_NAMES])
+
+
+def positions_of(joints: JointValues) -> dict[str, float]:
+    """Return the joint values by name."""
+    return dict(zip(joints.names, np.asarray(joints.values).tolist(), strict=True))
+
+
+def _keypoints(estimate: Estimate, _: Tracker) -> Points | None:
+    return None if estimate.keypoints_m is None else Points(estimate.keypoints_m)
+
+
+def _markers(estimate: Estimate, tracker: Tracker) -> Markers | None:
+    if estimate.posture is None:
+        return None
+    body = estimate.placed(tracker.body)
+    return Markers(marker_shapes(body, tracker.camera, estimate.posture, estimate.neck))
+
+
+def outputs(torso_place: bool = True) -> tuple[Output, ...]:
+    """Return the topics of the tracker in the order of publication.
+
+    With ``torso_place``, the joints include ``torso_x``, ``torso_z`` and those of the neck.
+    """
+    return (
+        # The states come first, so that subscribers have them when the posture arrives.
+        Output(
+            "tracking_state", Text, lambda estimate, _: Text(estimate.state), needs_posture=False
+        ),
+        Output("keypoint_states", KeypointStates, lambda found, _: keypoint_states(found)),
+        Output(
+            "joint_states",
+            JointValues,
+            lambda found, _: joint_values(found, torso_place),
+            moves=True,
+        ),
+        Output(
+            "joint_states_stddev",
+            JointValues,
+            lambda found, _: joint_deviations(found, torso_place),
+        ),
+        Output("keypoints", Points, _keypoints),
+        # Markers stay visible until they are removed.
+        Output("markers", Markers, _markers, absent=Markers(())),
+    )
+
+
+OUTPUTS: tuple[Output, ...] = outputs()
+"""All topics, with all joints."""
+
+METRICS: tuple[Metric, ...] = (
+    Metric("cost", "px", "d", lambda estimate: estimate.cost_px),
+    Metric("iou", "", ".4f", lambda estimate: estimate.iou),
+)
+"""Numbers that describe the fit of the model."""
+
+
+class OutputStream:
+    """The output values of a sequence of images; ``absent`` values are sent once."""
+
+    def __init__(self, topics: tuple[Output, ...] = OUTPUTS) -> None:
+        """Begin before the first image with the ``topics`` of :func:`outputs`."""
+        self._topics = topics
+        self._state = ""
+        self._motion = _Motion()
+
+    def values(
+        self,
+        stamp_ns: int,
+        estimate: Estimate,
+        tracker: Tracker,
+        wanted: Callable[[Output], bool] = lambda _: True,
+    ) -> Iterator[tuple[Output, Value]]:
+        """Yield the values to send for the image of a stamp; only ``wanted`` ones are computed."""
+        is_new, self._state = estimate.state != self._state, estimate.state
+        velocities = self._motion.velocities(stamp_ns, estimate, tracker)
+        for output in self._topics:
+            has_value = estimate.posture is not None or not output.needs_posture
+            if not has_value and not (is_new and output.absent):
+                continue
+            if not wanted(output):
+                continue
+            value = output.of(estimate, tracker) if has_value else output.absent
+            if output.moves and isinstance(value, JointValues) and velocities is not None:
+                value = value._replace(velocities=velocities[: len(value.names)])
+            if value is not None:
+                yield output, value
+
+
+class _Motion:
+    """Velocities of the joints, from the results of two images that follow each other."""
+
+    def __init__(self) -> None:
+        self._last: tuple[int, FloatArray, bool, Tracker] | None = None
+
+    def velocities(self, stamp_ns: int, estimate: Estimate, tracker: Tracker) -> FloatArray | None:
+        """Return those of ``JOINT_STATE_NAMES``, rad/s and m/s; None without an image before.
+
+        An image counts that has a posture of the same tracker, at most ``_LONGEST_NS`` before.
+        """
+        before, self._last = self._last, None
+        joints = joint_values(estimate)
+        if joints is None:
+            return None
+        has_neck = estimate.neck is not None
+        self._last = stamp_ns, joints.values, has_neck, tracker
+        if before is None or before[3] is not tracker:
+            return None
+        step_ns = stamp_ns - before[0]
+        if not 0 < step_ns <= _LONGEST_NS:
+            return None
+        found: FloatArray = (joints.values - before[1]) / (step_ns / 1e9)
+        if not (has_neck and before[2]):
+            # A face that appears does not turn.
+            found[[JOINT_STATE_NAMES.index(name) for name in NECK_NAMES]] = 0.0
+        return found

@@ -1,0 +1,203 @@
+"""The demo's ROS client, which calls services, subscribes to topics and records the results."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import numpy as np
+import rclpy
+from diagnostic_msgs.msg import DiagnosticStatus
+from numpy.typing import NDArray
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.qos import QoSProfile, ReliabilityPolicy
+from rclpy.serialization import deserialize_message
+from rclpy.utilities import try_shutdown
+from sensor_msgs.msg import CameraInfo, Image
+from std_msgs.msg import String
+from std_srvs.srv import Trigger
+
+from cardbox_tracker.common.errors import CardboxError
+from cardbox_tracker.recordings.outputs import OUTPUTS, place_from, positions_of, posture_from
+from cardbox_tracker.recordings.bag_transforms import BagTransforms
+from cardbox_tracker.recordings.bag_writer import BagWriter
+from cardbox_tracker.ros.messages import results
+from cardbox_tracker.ros.messages.measurement import mean_iou_of
+from cardbox_tracker.ros.nodes.camera_poses import silhouettes_of
+from cardbox_tracker.ros.runtime import qos
+from cardbox_tracker.ros.runtime.processes import Nodes
+
+# Without a cache, each node compiles at its start.
+_START_S = 600.0
+_UNRELIABLE = QoSProfile(depth=100, reliability=ReliabilityPolicy.BEST_EFFORT)
+# The bag of 'cardbox track --bag' has the same topics; /tf is derived from two of them.
+_OF_PERSON = {
+    "body_model": (String, qos.LATCHED),
+    "robot_description": (String, qos.LATCHED),
+    **{output.topic: (results.message_type(output.kind), qos.REPLAY) for output in OUTPUTS},
+}
+_OF_CAMERA = {
+    "silhouette": (Image, qos.REPLAY),
+    "silhouette/camera_info": (CameraInfo, qos.REPLAY),
+    "overlay": (Image, _UNRELIABLE),
+}
+
+
+def topics_of(cameras: Sequence[str] = ()) -> dict[str, tuple[Any, QoSProfile]]:
+    """Return type and QoS of each result topic, for one camera or for camera namespaces."""
+    spaces = [f"{camera}/" for camera in cameras] or [""]
+    of_cameras = {f"{space}{name}": kind for space in spaces for name, kind in _OF_CAMERA.items()}
+    return {**_OF_PERSON, **of_cameras}
+
+
+class Client:
+    """Records the results in a bag and keeps the data of the report.
+
+    Attributes:
+        body_model: YAML text of the measured person; empty before it is published.
+        initialization_iou: mean fit of the references; None before it is published.
+        postures: joint positions (12,) by stamp, ns.
+        places_m: ``torso_x`` and ``torso_z`` (2,) by stamp, ns.
+        states: tracking state of each posture by stamp, ns.
+        keypoints_m: keypoints (6, 3) by stamp, ns, metres in the optical frame.
+        silhouettes: silhouettes (H, W) of the first camera by stamp, ns.
+        arrivals_s: arrival time of each joint state, monotonic seconds.
+    """
+
+    def __init__(self, nodes: Nodes, bag: BagWriter, cameras: Sequence[str] = ()) -> None:
+        """Subscribe to the topics of nodes for one camera, or for several camera namespaces."""
+        self._silhouettes = silhouettes_of(cameras or [""])
+        self.body_model = ""
+        self.initialization_iou: float | None = None
+        self.postures: dict[int, NDArray[np.float64]] = {}
+        self.places_m: dict[int, NDArray[np.float64]] = {}
+        self.states: dict[int, str] = {}
+        self.keypoints_m: dict[int, NDArray[np.float64]] = {}
+        self.silhouettes: dict[int, NDArray[np.uint8]] = {}
+        self.arrivals_s: list[float] = []
+        self._player_status = ""
+        self._state = ""
+        self._nodes = nodes
+        self._bag = bag
+        self._transforms = BagTransforms(bag)
+        self._stamp_ns = 0
+        rclpy.init(args=[])
+        self._node = rclpy.create_node("cardbox_demo", enable_rosout=False)
+        self._executor = SingleThreadedExecutor()
+        self._executor.add_node(self._node)
+        for topic, (kind, profile) in topics_of(cameras).items():
+            self._node.create_subscription(
+                kind, topic, self.recorder(topic, kind), profile, raw=True
+            )
+        self._node.create_subscription(String, "play_bag/status", self._note_status, qos.LATCHED)
+        self._node.create_subscription(
+            DiagnosticStatus, "initializer/result", self._note_result, qos.LATCHED
+        )
+
+    def recorder(self, topic: str, kind: Any) -> Callable[[bytes], None]:
+        """Return a callback that records the serialized messages of ``topic``."""
+        name = f"{kind.__module__.split('.')[0]}/msg/{kind.__name__}"
+
+        def record(raw: bytes) -> None:
+            message = deserialize_message(raw, kind)
+            if hasattr(message, "header"):
+                stamp = message.header.stamp
+                self._stamp_ns = stamp.sec * 10**9 + stamp.nanosec
+            self._keep(topic, message)
+            self._bag.write_raw(f"/{topic}", name, raw, self._stamp_ns)
+
+        return record
+
+    def _keep(self, topic: str, message: Any) -> None:
+        stamp = self._stamp_ns
+        if topic == "body_model":
+            self.body_model = message.data
+        elif topic == "robot_description":
+            self._transforms.describe(message.data)
+        elif topic == "tracking_state":
+            # The state has no stamp; the tracker sends it just before the joint state.
+            self._state = message.data
+        elif topic == "joint_states":
+            joints = results.joint_values_of(message)
+            self._transforms.write(stamp, positions_of(joints))
+            self.postures[stamp] = posture_from(joints)
+            place_m = place_from(joints)
+            if place_m is not None:
+                self.places_m[stamp] = place_m
+            self.states[stamp] = self._state
+            self.arrivals_s.append(time.monotonic())
+        elif topic == "keypoints":
+            self.keypoints_m[stamp] = results.points_of(message).points_m
+        elif topic == self._silhouettes[0]:
+            pixels = np.frombuffer(message.data, np.uint8)
+            self.silhouettes[stamp] = pixels.reshape(message.height, message.width)
+
+    def _note_status(self, message: String) -> None:
+        self._player_status = message.data
+
+    def _note_result(self, message: DiagnosticStatus) -> None:
+        # If the initialization failed, the service's response has the reason.
+        if message.level == DiagnosticStatus.OK:
+            self.initialization_iou = mean_iou_of(message)
+
+    def wait(self, condition: Callable[[], bool], what: str, timeout_s: float = 120.0) -> None:
+        """Spin until ``condition`` holds.
+
+        Raises:
+            CardboxError: ``condition`` does not hold in time, or a node died.
+        """
+        end = time.monotonic() + timeout_s
+        while not condition():
+            self._executor.spin_once(timeout_sec=0.05)
+            self._nodes.check()
+            if time.monotonic() > end:
+                raise CardboxError(
+                    f"waited {timeout_s:g} s for {what}; see the nodes' log files in the output "
+                    "folder"
+                )
+
+    def wait_for_nodes(self) -> None:
+        """Wait until the nodes are connected to each other."""
+        # The initializer, too, subscribes to the first two cameras.
+        wanted = [3, 3, 2, 2][: len(self._silhouettes)]
+        self.wait(
+            lambda: (
+                [self._node.count_subscribers(topic) for topic in self._silhouettes] == wanted
+                and self._node.count_publishers("joint_states") == 1
+            ),
+            "the nodes to find each other",
+            _START_S,
+        )
+
+    def wait_for_pause(self, time_s: float) -> None:
+        """Wait until the player pauses at ``time_s`` and its images have been processed."""
+        self.wait(lambda: self._player_status == f"paused at {time_s:.3f} s", f"{time_s:g} s")
+        self.rest(0.5)
+
+    def rest(self, duration_s: float) -> None:
+        """Spin for ``duration_s``."""
+        end = time.monotonic() + duration_s
+        while time.monotonic() < end:
+            self._executor.spin_once(timeout_sec=0.05)
+
+    def call(self, service: str) -> str:
+        """Call a Trigger service and return its message.
+
+        Raises:
+            CardboxError: the service refused, or is not available.
+        """
+        client = self._node.create_client(Trigger, service)
+        self.wait(client.service_is_ready, f"the service {service}")
+        future = client.call_async(Trigger.Request())
+        self.wait(future.done, f"the answer of {service}")
+        response = future.result()
+        if not response.success:
+            raise CardboxError(f"{service} refused: {response.message}")
+        return str(response.message)
+
+    def close(self) -> None:
+        """Destroy the node."""
+        self._executor.shutdown()
+        self._node.destroy_node()
+        try_shutdown()

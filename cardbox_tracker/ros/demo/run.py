@@ -1,0 +1,167 @@
+"""The steps of the demo: synthesize, start the nodes, call the services, record, report."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from cardbox_tracker.person.model_file import loads_body_model
+from cardbox_tracker.person.posture import REFERENCE_NAMES
+from cardbox_tracker.ros.demo.report import write_report
+from cardbox_tracker.ros.demo.result import DemoResult
+from cardbox_tracker.common.errors import CardboxError, RosMissingError
+from cardbox_tracker.search.config import PRESETS
+from cardbox_tracker.applications.evaluation.truth import GroundTruth, load_ground_truth
+from cardbox_tracker.common.progress import progress_bar
+from cardbox_tracker.recordings.result_bag import result_writer
+from cardbox_tracker.ros.runtime.processes import (
+    Nodes,
+    compile_kernels,
+    isolate,
+    running_nodes,
+)
+from cardbox_tracker.applications.simulation.session import SessionFormat, synthesize_session
+
+_RATE = 2.0
+_NEUTRAL_S = 0.1
+
+
+def run_demo(output: Path, preset: str, seed: int, cameras: int = 1) -> None:
+    """Run the demo and write its results to the folder ``output``.
+
+    Raises:
+        CardboxError: a step failed; the text names it.
+    """
+    if cameras > 1 and not PRESETS[preset]().has_several_views:
+        raise CardboxError(f"--preset {preset} is for one camera; leave it out with --cameras")
+    try:
+        output.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise CardboxError(f"cannot make the folder {output}: {error.strerror}") from None
+    session = output / "session"
+    with progress_bar("synthesize") as show:
+        form = SessionFormat(cameras=cameras)
+        synthesize_session(session, "all", seed, form, overwrite=True, progress=show)
+    print("compile (one to two minutes, the first time only)", flush=True)
+    compile_kernels()
+    result = track_through_nodes(session, output, preset, seed)
+    write_report(result, session, output, preset, seed)
+
+
+def track_through_nodes(session: Path, output: Path, preset: str, seed: int) -> DemoResult:
+    """Play ``session`` to the nodes, which measure and track the person; record ``output``/bag.
+
+    Raises:
+        CardboxError: ROS is not installed, a node failed, or a service refused.
+    """
+    isolate()
+    try:
+        from cardbox_tracker.ros.demo.client import Client
+    except ImportError as error:
+        raise RosMissingError(error) from None
+    truth = load_ground_truth(session / "ground_truth.json")
+    pauses = {name: round(float(np.mean(truth.spans[name])), 3) for name in REFERENCE_NAMES}
+    start_s = round(truth.spans["neutral"][0] + _NEUTRAL_S, 3)
+    with running_nodes(output) as nodes, result_writer(output / "bag", overwrite=True) as bag:
+        client = Client(nodes, bag, truth.cameras)
+        try:
+            topics = _start_nodes(nodes, truth, session, preset, seed)
+            client.wait_for_nodes()
+            stops = [f"{at_s:.3f}" for at_s in (*pauses.values(), start_s)]
+            nodes.start(
+                "play_bag",
+                str(session),
+                *("--rate", f"{_RATE:g}", "--topics", *topics, "--pause-at", *stops),
+            )
+            for name, at_s in pauses.items():
+                client.wait_for_pause(at_s)
+                print(f"initializer/capture_{name}", flush=True)
+                client.call(f"initializer/capture_{name}")
+                client.call("play_bag/resume")
+            client.wait_for_pause(start_s)
+            print("initializer/initialize", flush=True)
+            client.call("initializer/initialize")
+            client.wait(
+                lambda: bool(client.body_model) and client.initialization_iou is not None,
+                "the body model and its fit",
+            )
+            client.rest(1.0)
+            client.call("tracker/reset")
+            first = len(client.arrivals_s)
+            client.call("play_bag/resume")
+            end_s = max(end for _, end in truth.spans.values())
+            with progress_bar("track") as show:
+                while nodes.is_running("play_bag"):
+                    client.rest(0.5)
+                    nodes.check()
+                    if client.postures:
+                        time_s = (max(client.postures) - truth.start_ns) / 1e9
+                        show((time_s - start_s) / (end_s - start_s))
+            client.rest(1.0)
+        finally:
+            client.close()
+    arrivals = client.arrivals_s[first:]
+    lasted_s = arrivals[-1] - arrivals[0] if len(arrivals) > 1 else float("nan")
+    return DemoResult(
+        loads_body_model(client.body_model, "body_model"),
+        truth,
+        truth.start_ns + round(start_s * 1e9),
+        client.postures,
+        client.keypoints_m,
+        client.silhouettes,
+        (len(arrivals) - 1) / lasted_s,
+        client.initialization_iou or 0.0,
+        client.places_m,
+        client.states,
+    )
+
+
+def _start_nodes(
+    nodes: Nodes, truth: GroundTruth, session: Path, preset: str, seed: int
+) -> list[str]:
+    """Start the nodes for one camera or several; return the topics to play."""
+
+    def parameters(**values: object) -> list[str]:
+        return [word for name, value in values.items() for word in ("-p", f"{name}:={value}")]
+
+    several = [f"/{name}" for name in truth.cameras]
+    # A replay must not lose images, while live nodes drop old ones.
+    deep = [
+        word
+        for space in several or [""]
+        for topic, end in (
+            (f"{space or '/camera'}/image_raw", "subscription"),
+            (f"{space}/silhouette", "publisher"),
+            (f"{space}/silhouette", "subscription"),
+        )
+        for word in (
+            *("-p", f"qos_overrides.{topic}.{end}.reliability:=reliable"),
+            *("-p", f"qos_overrides.{topic}.{end}.depth:=100"),
+        )
+    ]
+    for space in several:
+        called = f"background_{space[1:]}"
+        nodes.start("background", "--ros-args", "-r", f"__ns:={space}", *deep, called=called)
+    if several:
+        together = parameters(
+            cameras=f"[{', '.join(truth.cameras)}]", extrinsics_file=session / "extrinsics.yaml"
+        )
+    else:
+        together = []
+        remap = ("-r", "image_raw:=/camera/image_raw", "-r", "camera_info:=/camera/camera_info")
+        nodes.start("background", "--ros-args", *remap, *deep)
+    nodes.start(
+        "initializer",
+        "--ros-args",
+        *parameters(
+            person_distance_m=truth.distance_m,
+            camera_pitch_deg=truth.pitch_deg,
+            side_turn=truth.side_turn,
+            seed=seed,
+        ),
+        *together,
+    )
+    nodes.start("tracker", "--ros-args", *parameters(preset=preset, seed=seed), *together, *deep)
+    spaces = several or ["/camera"]
+    return [f"{space}/{name}" for space in spaces for name in ("image_raw", "camera_info")]

@@ -1,0 +1,337 @@
+"""Doubt: how probably a result is wrong, joint by joint, and the deviations of a state.
+
+A keypoint is wrong if it is off by more than 30 cm relative to the middle of the shoulders; a whole
+result is lost if its keypoints are off by more than 30 cm on average. Both probabilities are
+logistic regressions
+
+    p = 1 / (1 + exp(-(intercept + sum of coefficient * evidence)))
+
+of what search, silhouette and terms say about the result. There is one model for each kind of
+keypoint and for the whole, and one set of models for outlines alone, with points, and for the
+paper's filter. ``python -m lab.fits.doubt`` fits them on recorded sessions with ground truth and
+checks each on sessions that were left out (``doubt.json`` beside this file).
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from enum import StrEnum
+from functools import cache
+from math import exp, log
+from pathlib import Path
+from types import MappingProxyType
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cardbox_tracker.person.kinematics import keypoints
+from cardbox_tracker.person.posture import (
+    LEFT_ARM,
+    N_STATE,
+    PITCH,
+    RIGHT_ARM,
+    ROLL,
+    TORSO_X,
+    TURNS,
+    YAW,
+)
+from cardbox_tracker.person.sizes import FloatArray
+from cardbox_tracker.person.skeleton import KeypointState
+from cardbox_tracker.common.compiling import kernel
+from cardbox_tracker.terms.kernel_arguments import BodyTuple, body_of
+
+BoolArray = NDArray[np.bool_]
+Values = Mapping[str, FloatArray]
+"""Evidence by name, one value for each keypoint, (6,)."""
+
+FAR_M = 0.30
+"""A keypoint that is farther off is wrong, m."""
+LOST_FROM = 0.5
+"""Probability of being wrong above which a keypoint is lost: it is rather wrong than right."""
+WHOLE_UNCERTAIN_FROM, WHOLE_LOST_FROM = 0.5, 0.9
+"""Probabilities of being lost above which a result is uncertain, and counts as a poor one."""
+HANDS = [2, 5]
+"""Indices of the hands among the keypoints."""
+KINDS = ("shoulder", "elbow", "hand") * 2
+"""Kind of each keypoint; the models have these names, and ``whole``."""
+
+_FILE = Path(__file__).with_name("doubt.json")
+# Weight of the previous probability of loss in the smoothed one.
+_MEMORY = 0.5
+_FRESH_FRAMES = 15.0
+_AREAS, _PRIORS = (0.1, 3.0), (-0.2, 0.3)
+# Step of the numerical derivatives, rad and m.
+_STEP = 1e-3
+
+# Deviations of the states do not include errors of model and silhouette. These factors and floors,
+# chosen on motion capture, make two deviations cover about 95 % of the errors.
+_PLACE_GAIN, _PLACE_FLOOR_M = 2.0, 0.02
+_TORSO_GAIN, _ROLL_FLOOR_RAD, _PITCH_YAW_FLOOR_RAD = 2.0, 0.06, 0.15
+_ARM_GAIN, _ARM_FLOOR_RAD = 3.0, 0.20
+_GAINS, _FLOORS = np.full(N_STATE, _PLACE_GAIN), np.full(N_STATE, _PLACE_FLOOR_M)
+_GAINS[TURNS], _FLOORS[TURNS] = _TORSO_GAIN, _PITCH_YAW_FLOOR_RAD
+_FLOORS[ROLL] = _ROLL_FLOOR_RAD
+for _arm in (LEFT_ARM, RIGHT_ARM):
+    _GAINS[_arm], _FLOORS[_arm] = _ARM_GAIN, _ARM_FLOOR_RAD
+
+
+class Source(StrEnum):
+    """What a result rests on; each has its own models."""
+
+    OUTLINE = "outline"
+    POINTS = "points"
+    PAPER = "paper"
+
+
+class Model(NamedTuple):
+    """A logistic regression.
+
+    Attributes:
+        intercept: logit without evidence.
+        coefficients: by the names of the evidence.
+    """
+
+    intercept: float
+    coefficients: Mapping[str, float]
+
+
+class Models(NamedTuple):
+    """The models of results that rest on the same.
+
+    Attributes:
+        uncertain_from: probability of being wrong above which a keypoint is uncertain: the highest
+            one with which at most 2 % of the tracked keypoints of left-out sources are wrong.
+        by_kind: models by the names of :data:`KINDS`, and ``whole``.
+    """
+
+    uncertain_from: float
+    by_kind: Mapping[str, Model]
+
+
+class Judgement(NamedTuple):
+    """The doubt about one result.
+
+    Attributes:
+        chances: probability of each keypoint to be wrong, (6,).
+        states: state of each keypoint.
+        is_uncertain: whether the posture may be wrong.
+        is_poor: whether it does not fit; several such results in a row mean a lost person.
+        evidence: what the probabilities follow from, by name.
+    """
+
+    chances: FloatArray
+    states: tuple[KeypointState, ...]
+    is_uncertain: bool
+    is_poor: bool
+    evidence: Values
+
+
+class Doubt:
+    """The doubt about the results of one person over time."""
+
+    def __init__(self) -> None:
+        """Begin without results."""
+        self._models = models()
+        self.forget()
+
+    def forget(self) -> None:
+        """Forget the previous results."""
+        self._whole: float | None = None
+
+    def judge(
+        self, evidence: Values, source: Source, hidden: BoolArray, vetoes: Sequence[bool] = ()
+    ) -> Judgement:
+        """Return the doubt about a result.
+
+        Args:
+            evidence: see :func:`evidence_of_search`, and ``TermObservation.evidence``.
+            source: what the result rests on.
+            hidden: whether no camera sees a keypoint, (6,).
+            vetoes: facts of which each makes the whole result uncertain, such as a person's back.
+        """
+        uncertain_from, of = self._models[source]
+        chances = np.array([_chance(of[kind], evidence, i) for i, kind in enumerate(KINDS)])
+        whole = _chance(of["whole"], evidence, 0)
+        self._whole = whole if self._whole is None else _MEMORY * (self._whole + whole)
+        is_doubted = any(vetoes) or self._whole > WHOLE_UNCERTAIN_FROM
+        states = tuple(
+            _state_of(chance, is_hidden, is_doubted or chance > uncertain_from)
+            for chance, is_hidden in zip(chances.tolist(), hidden.tolist(), strict=True)
+        )
+        # The paper's filter finds hands so badly that its state only says whether it is lost.
+        needs_hands = source is not Source.PAPER
+        is_uncertain = is_doubted or (needs_hands and bool((chances[HANDS] > uncertain_from).any()))
+        return Judgement(chances, states, is_uncertain, self._whole > WHOLE_LOST_FROM, evidence)
+
+
+def doubted(states: Sequence[KeypointState]) -> tuple[KeypointState, ...]:
+    """Return the ``states`` of a result that is doubtful as a whole: nothing is tracked."""
+    doubt = {KeypointState.TRACKED: KeypointState.UNCERTAIN}
+    return tuple(doubt.get(state, state) for state in states)
+
+
+def reasons(judgement: Judgement, source: Source) -> list[str]:
+    """Return the evidence that speaks most against the most doubtful keypoint, worst first."""
+    worst = int(np.argmax(judgement.chances))
+    of = models()[source].by_kind[KINDS[worst]].coefficients
+    weights = {
+        name: coefficient * float(judgement.evidence[name][worst])
+        for name, coefficient in of.items()
+        if name in judgement.evidence
+    }
+    return sorted((name for name in weights if weights[name] > 0.0), key=lambda n: -weights[n])
+
+
+@cache
+def models() -> Mapping[Source, Models]:
+    """Return the package's models by what a result rests on."""
+    stored = json.loads(_FILE.read_text(encoding="utf-8"))
+    return MappingProxyType(
+        {
+            Source(source): Models(
+                one["uncertain_from"],
+                {kind: Model(*model) for kind, model in one["models"].items()},
+            )
+            for source, one in stored.items()
+        }
+    )
+
+
+def _chance(model: Model, evidence: Values, index: int) -> float:
+    logit = model.intercept
+    for name, coefficient in model.coefficients.items():
+        if name in evidence:
+            logit += coefficient * float(evidence[name][index])
+    return 1.0 / (1.0 + exp(-min(max(logit, -50.0), 50.0)))
+
+
+def _state_of(chance: float, is_hidden: bool, is_uncertain: bool) -> KeypointState:
+    if is_hidden:
+        return KeypointState.HIDDEN
+    if chance > LOST_FROM:
+        return KeypointState.LOST
+    return KeypointState.UNCERTAIN if is_uncertain else KeypointState.TRACKED
+
+
+def evidence_of_search(
+    pixels: tuple[float, float, float, float],
+    prior: float,
+    spreads_m: Sequence[float],
+    result: tuple[FloatArray, FloatArray],
+    body: BodyTuple,
+    age: int,
+) -> dict[str, FloatArray]:
+    """Return the evidence of search and silhouettes; numbers of pixels become shares.
+
+    Args:
+        pixels: pixels of the silhouettes, of the model in the front posture at the person's
+            distance, of the model in the result, and pixels in which the result differs.
+        prior: rating of the best state beyond its differing pixels: priors and further terms.
+        spreads_m: deviation of left elbow and hand, then right ones, in the search of the arms, m.
+        result: state (14,) and its deviations (14,), see :func:`deviations_of`.
+        body: fields of :class:`~cardbox_tracker.terms.kernel_arguments.Body`.
+        age: frames since the search began.
+    """
+    silhouette_px, frontal_px, model_px, differing_px = pixels
+    state, deviations = result
+    # A person at the border may have no pixels above the hips.
+    total = max(silhouette_px, 1.0)
+    common = 0.5 * (silhouette_px + model_px - differing_px)
+    area = log(min(max(total / max(frontal_px, 1.0), _AREAS[0]), _AREAS[1]))
+    spread_m = np.empty(6)
+    _spreads(state, deviations, body, spread_m)
+    left_elbow, left_hand, right_elbow, right_hand = spreads_m
+    whole = {
+        "residual": differing_px / total,
+        "left over": (total - common) / total,
+        "outside": (model_px - common) / total,
+        "area": area,
+        "area difference": abs(area),
+        "prior": min(max(prior, _PRIORS[0]), _PRIORS[1]),
+        "distance spread": float(deviations[TORSO_X]),
+        "yaw": abs(float(state[YAW])),
+        "pitch": abs(float(state[PITCH])),
+        "freshness": exp(-age / _FRESH_FRAMES),
+    }
+    found = {name: np.full(6, value) for name, value in whole.items()}
+    found["spread"] = np.log(np.maximum(spread_m, 1e-3) / 0.1)
+    found["arm spread"] = np.array(
+        [left_elbow, left_elbow, left_hand, right_elbow, right_elbow, right_hand]
+    )
+    return found
+
+
+def evidence_of_particles(
+    iou: float, area: float, posture: FloatArray, stddev: FloatArray, body: BodyTuple
+) -> dict[str, FloatArray]:
+    """Return the evidence of the paper's filter.
+
+    Args:
+        iou: intersection over union of model and silhouette.
+        area: pixels of the silhouette divided by those of the model in the front posture.
+        posture: d1..d12, (12,).
+        stddev: standard deviations of the particles, (12,).
+        body: fields of :class:`~cardbox_tracker.terms.kernel_arguments.Body`.
+    """
+    state, deviations, spread_m = np.zeros(N_STATE), np.zeros(N_STATE), np.empty(6)
+    state[: len(posture)], deviations[: len(stddev)] = posture, stddev
+    _spreads(state, deviations, body, spread_m)
+    log_area = log(min(max(area, _AREAS[0]), _AREAS[1]))
+    whole = {
+        "misfit": 1.0 - iou,
+        "area": log_area,
+        "area difference": abs(log_area),
+        "yaw": abs(float(state[YAW])),
+        "pitch": abs(float(state[PITCH])),
+    }
+    found = {name: np.full(6, value) for name, value in whole.items()}
+    found["spread"] = np.log(np.maximum(spread_m, 1e-3) / 0.1)
+    return found
+
+
+@kernel
+def _spreads(
+    state: FloatArray, deviations: FloatArray, body: BodyTuple, spread_m: FloatArray
+) -> None:
+    """Write the deviation (6,) of each keypoint beside the shoulders' middle, m.
+
+    It is the root of the trace of the covariance that follows from the derivatives by the elements
+    of the state, which are taken as independent.
+    """
+    middle_m, moved_m, moved = np.empty((6, 3)), np.empty((6, 3)), state.copy()
+    of = body_of(body)
+    keypoints(state, of, middle_m)
+    spread_m[:] = 0.0
+    for number in range(len(state)):
+        if deviations[number] == 0.0:
+            continue
+        moved[number] = state[number] + _STEP
+        keypoints(moved, of, moved_m)
+        moved[number] = state[number]
+        for point in range(6):
+            for axis in range(3):
+                common = 0.5 * (moved_m[0, axis] + moved_m[3, axis])
+                common -= 0.5 * (middle_m[0, axis] + middle_m[3, axis])
+                change = moved_m[point, axis] - middle_m[point, axis] - common
+                spread_m[point] += (change * deviations[number] / _STEP) ** 2
+    for point in range(6):
+        spread_m[point] = np.sqrt(spread_m[point])
+
+
+def deviations_of(stddev: FloatArray) -> FloatArray:
+    """Return calibrated standard deviations (14,) of a result from those of the states (14,)."""
+    calibrated: FloatArray = np.hypot(_GAINS * stddev, _FLOORS)
+    return calibrated
+
+
+def calibrated_deviations(deviations: FloatArray, rng: np.random.Generator) -> FloatArray:
+    """Return differences (n, 14) from a result with the deviations of :func:`deviations_of`.
+
+    Args:
+        deviations: differences of states, drawn by their weights, from the mean, (n, 14).
+        rng: source of the noise that the floors add.
+    """
+    calibrated: FloatArray = _GAINS * deviations + _FLOORS * rng.standard_normal(deviations.shape)
+    return calibrated

@@ -1,0 +1,140 @@
+"""Compiled moves of whole states.
+
+Callers pass the random numbers, unit normal or uniform in 0..1.
+"""
+
+from __future__ import annotations
+
+from math import sin
+from typing import NamedTuple
+
+import numpy as np
+
+from cardbox_tracker.person.posture import (
+    ARM_ANGLES,
+    FIRST_ANGLES,
+    N_STATE,
+    PITCH,
+    ROLL,
+    TORSO_X,
+    TORSO_Y,
+)
+from cardbox_tracker.common.compiling import inlined_kernel, kernel
+from cardbox_tracker.terms.kernel_arguments import Floats
+from cardbox_tracker.search.state_choice import least_of
+
+# Fraction of the noise that is added to a move by a difference.
+_NOISE_OF_DIFFERENCE = 0.2
+_LEFT, _RIGHT = FIRST_ANGLES
+
+
+class Numbers(NamedTuple):
+    """Random numbers of N proposals.
+
+    Attributes:
+        normals: unit normal, (N, D).
+        uniforms: uniform in 0..1, (N, K).
+    """
+
+    normals: Floats
+    uniforms: Floats
+
+
+class Noise(NamedTuple):
+    """Noise of a state.
+
+    Attributes:
+        sigma: deviations, (14,).
+        limits: lowest and highest values, (14, 2).
+        lever_m: height of the shoulders above the hips.
+    """
+
+    sigma: Floats
+    limits: Floats
+    lever_m: float
+
+
+NumbersTuple = tuple[Floats, Floats]
+NoiseTuple = tuple[Floats, Floats, float]
+
+
+@inlined_kernel
+def clip_state(state: Floats, limits: Floats) -> None:
+    """Clip a state (14,) to its ``limits`` (14, 2)."""
+    for d in range(N_STATE):
+        state[d] = min(max(state[d], limits[d, 0]), limits[d, 1])
+
+
+@inlined_kernel
+def pivot(state: Floats, source: Floats, lever_m: float) -> None:
+    """Move a rotated torso so that the shoulders, ``lever_m`` above the hips, keep their place."""
+    state[TORSO_Y] += lever_m * (sin(state[ROLL]) - sin(source[ROLL]))
+    state[TORSO_X] -= lever_m * (sin(state[PITCH]) - sin(source[PITCH]))
+
+
+@kernel
+def combine(
+    torso: Floats, left: Floats, left_ratings: Floats, right: Floats, right_ratings: Floats, n: int
+) -> Floats:
+    """Return ``torso`` (14,) with the best of both arms, (2 n, 14).
+
+    The first n states pair the i-th best left arm with the i-th best right arm. The others pair the
+    best left arm with the second to the (n/2 + 1)-th best right arm, and vice versa.
+    """
+    lefts, rights = least_of(left_ratings, n + 1), least_of(right_ratings, n + 1)
+    states = np.empty((2 * n, N_STATE))
+    for i in range(2 * n):
+        states[i] = torso
+        j = i - n
+        if i < n:
+            one, other = i, i
+        elif j < n // 2:
+            one, other = 0, j + 1
+        else:
+            one, other = j - n // 2 + 1, 0
+        states[i, _LEFT : _LEFT + ARM_ANGLES] = left[lefts[one]]
+        states[i, _RIGHT : _RIGHT + ARM_ANGLES] = right[rights[other]]
+    return states
+
+
+@kernel
+def move_all(
+    sources: Floats,
+    noise: NoiseTuple,
+    differing: int,
+    difference_scale: float,
+    numbers: NumbersTuple,
+) -> Floats:
+    """Return states (N, 14) around ``sources`` (M, 14), all joints moved together.
+
+    Every second state rotates about the shoulders. In the first half, states in turn move only the
+    torso, only the left arm, and only the right arm. The last ``differing`` states move by the
+    difference of two sources, which follows the flat directions of the cost (differential
+    evolution). ``numbers`` are fields of :class:`Numbers`, (N, 14) and (N, 2).
+    """
+    sigma, limits, lever_m = noise
+    normals, uniforms = numbers
+    n, m = normals.shape[0], sources.shape[0]
+    states = np.empty((n, N_STATE))
+    for i in range(n):
+        source, state = sources[i % m], states[i]
+        for d in range(N_STATE):
+            state[d] = source[d] + sigma[d] * normals[i, d]
+        if i % 2 == 1:
+            pivot(state, source, lever_m)
+        if i >= n - differing:
+            base = sources[(i - (n - differing)) % m]
+            one, other = sources[int(uniforms[i, 0] * m)], sources[int(uniforms[i, 1] * m)]
+            for d in range(N_STATE):
+                rest = _NOISE_OF_DIFFERENCE * (state[d] - source[d])
+                state[d] = base[d] + difference_scale * (one[d] - other[d]) + rest
+        elif i < n // 2:
+            part = i % 3
+            for d in range(N_STATE):
+                is_left = _LEFT <= d < _RIGHT
+                is_right = _RIGHT <= d < _RIGHT + ARM_ANGLES
+                of = 1 if is_left else (2 if is_right else 0)
+                if of != part:
+                    state[d] = source[d]
+        clip_state(state, limits)
+    return states

@@ -1,0 +1,120 @@
+"""Estimation of the person's place in a frame before the search of the posture."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from math import hypot
+from typing import NamedTuple
+
+from cardbox_tracker.person.posture import TORSO_X, TORSO_Y
+from cardbox_tracker.person.sizes import FloatArray
+from cardbox_tracker.terms.multi_view import MultiViewCost
+from cardbox_tracker.terms.term import Frame
+from cardbox_tracker.camera.view import LevelPoint, View
+from cardbox_tracker.search.walking import Walk
+
+# Deviation of the intersection, m: median columns of two cameras show different body points.
+_CROSSING_M = 0.1
+# Least sine of the angle between lines of sight that determine x.
+_LEAST_ANGLE = 0.05
+
+
+class Location(NamedTuple):
+    """Estimated place of the person.
+
+    Attributes:
+        bearing: lateral coordinate over depth of the silhouette's middle in the first camera.
+        step_m: lateral motion of the middle since the last frame, metres.
+        x_m: ``torso_x`` of the intersection of the lines of sight; None if it is not computed.
+        x_stddev_m: standard deviation of ``x_m``; None if the lines do not determine it.
+    """
+
+    bearing: float
+    step_m: float
+    x_m: float | None = None
+    x_stddev_m: float | None = None
+
+
+class Locator:
+    """Tracks the place and the walking direction of the person."""
+
+    def __init__(
+        self, cost: MultiViewCost, distance_m: float, views: Sequence[View], crosses: bool
+    ) -> None:
+        """Prepare.
+
+        Args:
+            cost: source of the bearings.
+            distance_m: distance of the hips from the first camera in the body model.
+            views: views of the further cameras.
+            crosses: whether the intersection of the lines of sight is computed.
+        """
+        self._cost, self._distance_m = cost, distance_m
+        self._views, self._crosses = views, crosses
+        self.forget()
+
+    def forget(self) -> None:
+        """Forget the person."""
+        self._walk = Walk()
+
+    @property
+    def yaw_rad(self) -> float:
+        """Expected yaw of the torso from the lateral motion."""
+        return self._walk.yaw_rad
+
+    def locate(
+        self, frames: Sequence[Frame], seeing: Sequence[int], before: FloatArray
+    ) -> Location:
+        """Return the place of the person.
+
+        Args:
+            frames: frames of all cameras, whose silhouettes the cost has.
+            seeing: indices of the cameras that show the person.
+            before: state (14,) of the previous frame.
+        """
+        costs, step_m = self._cost.costs, 0.0
+        bearings = {number: costs[number].bearing() for number in seeing}
+        if 0 in seeing:
+            ahead_m = self._distance_m - float(before[TORSO_X])
+            step_m = self._walk.see(frames[0].silhouette, bearings[0], ahead_m)
+        if not self._crosses:
+            return Location(bearings[0], step_m)
+        there = float(before[TORSO_X]) - self._distance_m, float(before[TORSO_Y])
+        x, y = crossing_of([self._line(*one) for one in bearings.items()], there)
+        lowest_m, highest_m = self._cost.limits[TORSO_X].tolist()
+        x_m = min(max(x + self._distance_m, lowest_m), highest_m)
+        stddev_m = None if list(seeing) == [0] else _CROSSING_M
+        return Location(y / max(-x, 1e-3), step_m, x_m, stddev_m)
+
+    def _line(self, number: int, bearing: float) -> tuple[LevelPoint, LevelPoint]:
+        if number:
+            return self._views[number - 1].line_of_sight(bearing)
+        length = hypot(1.0, bearing)
+        return (0.0, 0.0), (-1.0 / length, bearing / length)
+
+
+def crossing_of(
+    lines: Iterable[tuple[LevelPoint, LevelPoint]], before: LevelPoint
+) -> tuple[float, float]:
+    """Return the intersection (x, y) of lines; of a single line, the point nearest to ``before``.
+
+    The point minimizes the sum of the squared distances from all lines, plus a small multiple of
+    the squared distance from ``before``. With unit directions a, it solves
+
+        (w I + sum of (I - a a^T)) x = w before + sum of (I - a a^T) place
+
+    Args:
+        lines: point and unit direction of each line, metres in the first level frame.
+        before: previous place of the person, metres.
+    """
+    # Without numpy, whose calls for such small matrices take ten times as long.
+    weight = _LEAST_ANGLE**2
+    xx, xy, yy = weight, 0.0, weight
+    right_x, right_y = weight * before[0], weight * before[1]
+    for (x, y), (ahead_x, ahead_y) in lines:
+        of_xx, of_xy, of_yy = 1.0 - ahead_x**2, -ahead_x * ahead_y, 1.0 - ahead_y**2
+        xx, xy, yy = xx + of_xx, xy + of_xy, yy + of_yy
+        right_x += of_xx * x + of_xy * y
+        right_y += of_xy * x + of_yy * y
+    determinant = xx * yy - xy**2
+    return (yy * right_x - xy * right_y) / determinant, (xx * right_y - xy * right_x) / determinant

@@ -1,0 +1,126 @@
+"""Interface between the tracker and its particle filter."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from enum import Enum
+from math import isfinite
+from typing import Protocol
+
+import numpy as np
+
+from cardbox_tracker.person.sizes import FloatArray
+from cardbox_tracker.search.config import TrackerConfig
+from cardbox_tracker.terms.silhouette import SilhouetteTerm
+from cardbox_tracker.terms.term import Frame, Term
+from cardbox_tracker.camera.view import View
+from cardbox_tracker.search.doubt import Judgement
+from cardbox_tracker.search.particles import Particles
+
+
+class Presence(Enum):
+    """Whether a silhouette can be a person, by its size."""
+
+    NOBODY = "too few foreground pixels"
+    PERSON = "a person"
+    TOO_MUCH = "more foreground than a person can be"
+
+
+@dataclass(frozen=True)
+class Fit:
+    """The result of a filter in a frame.
+
+    Attributes:
+        posture: d1..d12, (12,), rad and metres.
+        posture_stddev: standard deviations, (12,).
+        keypoints_m: shoulder, elbow, hand of the left, then the right arm, (6, 3), metres in the
+            optical frame.
+        cost_px: pixels in which the drawn posture and the silhouette differ.
+        iou: intersection over union of drawn posture and silhouette.
+        is_poor: whether it does not fit; several such frames in a row mean that the person is lost.
+        seen: state that fits the image best, before any correction, (14,), or (12,) without
+            an offset.
+        seen_iou: ``iou`` of ``seen``.
+        offset_m: ``torso_x`` and ``torso_z``, (2,), or None.
+        offset_stddev_m: standard deviations of ``offset_m``, (2,), or None.
+        particles: particles of whole states; None if the filter has none.
+        judged: the doubt about the result; None if the filter has none.
+    """
+
+    posture: FloatArray
+    posture_stddev: FloatArray
+    keypoints_m: FloatArray
+    cost_px: int
+    iou: float
+    is_poor: bool
+    seen: FloatArray
+    seen_iou: float
+    offset_m: FloatArray | None = None
+    offset_stddev_m: FloatArray | None = None
+    particles: Particles | None = None
+    judged: Judgement | None = None
+
+    @property
+    def is_finite(self) -> bool:
+        """Whether all values are finite."""
+        values = self.posture, self.posture_stddev, self.keypoints_m.ravel()
+        chances = None if self.judged is None else self.judged.chances
+        others = self.offset_m, self.offset_stddev_m, chances
+        # A sum is only finite if all summands are; for few numbers, Python adds them fastest.
+        total = self.iou
+        for value in (*values, *others):
+            total += 0.0 if value is None else sum(value.tolist())
+        return isfinite(total)
+
+
+class PoseFilter(Protocol):
+    """A filter that tracks one person over frames."""
+
+    def look(self, frames: Sequence[Frame]) -> Presence:
+        """Set the frames of all cameras; return whether they can show a person."""
+
+    def follow(self, frames: Sequence[Frame], terms: Sequence[Sequence[Term]]) -> Fit:
+        """Estimate the posture in the frames of the last call of :meth:`look`.
+
+        A new search starts around the front reference posture.
+
+        Args:
+            frames: frames of the first camera, then of the further cameras.
+            terms: further terms of the cost for each camera.
+        """
+
+    def ious(self) -> list[float | None]:
+        """Return the IoU of the last result and each camera's silhouette.
+
+        It is None for a camera that showed no person, and before the first result.
+        """
+
+    def forget(self) -> None:
+        """Start a new search with the next frame, because the person has left."""
+
+    def recover(self) -> None:
+        """Widen the search from the next frame on, because the person is lost."""
+
+    def configure(self, config: TrackerConfig) -> None:
+        """Use other settings; settings that restart tracking are the same."""
+
+
+class Corrector(Protocol):
+    """Changes the results of the preset ``default``, see :class:`~cardbox_tracker.Tracker`."""
+
+    def __call__(self, frames: Sequence[Frame], state: FloatArray) -> FloatArray:
+        """Return the corrected state (14,).
+
+        Args:
+            frames: frames of the first camera, then of the further cameras.
+            state: the state that fits the frames: d1..d12, ``torso_x``, ``torso_z``, (14,), rad and
+                metres.
+        """
+
+
+MakeFilter = Callable[
+    [TrackerConfig, SilhouetteTerm, np.random.Generator, Sequence[View]], PoseFilter
+]
+"""Takes settings, the silhouette's term with body and first camera, the source of random numbers,
+and the views of the further cameras; returns a new filter."""

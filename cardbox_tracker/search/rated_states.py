@@ -1,0 +1,65 @@
+"""States of one frame with their ratings and the joints of their arms."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from cardbox_tracker.person.posture import N_STATE
+from cardbox_tracker.person.sizes import FloatArray
+from cardbox_tracker.terms.multi_view import MultiViewCost
+from cardbox_tracker.terms.whole_body import Ratings
+from cardbox_tracker.search import state_choice
+
+_SHAPES = (N_STATE,), (), (6, 3), (6, 3)
+# States for which there is memory at first.
+_USUAL = 256
+
+
+class RatedStates:
+    """Rated states of one frame; others can be added.
+
+    Attributes:
+        states: states of the first camera, (N, 14).
+        ratings: ratings, (N,); lower is better.
+        joints_m: shoulder, elbow, hand of both arms in the torso's frame, (N, 6, 3), metres.
+        keypoints_m: the same in the optical frame, (N, 6, 3), metres.
+    """
+
+    def __init__(self, cost: MultiViewCost, expected: int = _USUAL) -> None:
+        """Start without states; ``expected`` of them, at least one, need no further memory."""
+        self._cost = cost
+        self._storage = [np.empty((expected, *shape)) for shape in _SHAPES]
+        self._use(0)
+
+    def _use(self, count: int) -> None:
+        states, ratings, joints_m, keypoints_m = self._storage
+        self.states, self.ratings = states[:count], ratings[:count]
+        self.joints_m, self.keypoints_m = joints_m[:count], keypoints_m[:count]
+
+    def add(self, states: FloatArray) -> None:
+        """Rate and add states (N, 14)."""
+        self._cost.bodies(states, self._place(states))
+
+    def add_pairs(self, states: FloatArray) -> None:
+        """Rate and add states (N, 14), N > 0, with the trunk that the cost has fixed."""
+        self._cost.pairs(states, self._place(states))
+
+    def _place(self, states: FloatArray) -> Ratings:
+        """Add states (N, 14) and return the memory of their ratings."""
+        begin, count = len(self.states), len(self.states) + len(states)
+        while count > len(self._storage[0]):
+            self._storage = [np.concatenate([stored, stored]) for stored in self._storage]
+        self._use(count)
+        self.states[begin:] = states
+        return Ratings(self.ratings[begin:], self.joints_m[begin:], self.keypoints_m[begin:])
+
+    def best(self, count: int) -> FloatArray:
+        """Return the best ``count`` states, (count, 14), best first; all if there are fewer."""
+        return state_choice.best_states(self.states, self.ratings, min(count, len(self.states)))
+
+    def different(self, most: int, alike: int, apart_m: float) -> FloatArray:
+        """Return up to ``most`` states (M, 14), see :func:`~.state_choice.choose_apart`."""
+        kept = state_choice.choose_apart(
+            self.states, self.ratings, self.joints_m, most, alike, apart_m
+        )
+        return self.states[kept]

@@ -1,0 +1,39 @@
+"""Settings of the tracker in a YAML file, by the names that they have in ``TrackerConfig``.
+
+    lost_frames: 10
+    whole_body:
+      effort: 0.5
+      cost:
+        yaw_deg: 20.0
+
+docs/parameters.md has all names.
+"""
+
+from __future__ import annotations
+
+import os
+
+from cardbox_tracker.common.errors import CardboxError
+from cardbox_tracker.search.config import TrackerConfig
+from cardbox_tracker.common.small_yaml import SmallYamlError, parse_small_yaml, read_small_text
+
+
+def read_settings(path: str | os.PathLike[str], config: TrackerConfig) -> TrackerConfig:
+    """Return ``config`` with the values of the file at ``path``; docs/parameters.md has all names.
+
+    Raises:
+        CardboxError: the file cannot be read; a name is unknown; a value has the wrong type, is out
+            of range, or has no effect beside the others.
+    """
+    try:
+        given = parse_small_yaml(read_small_text(path))
+        if not isinstance(given, dict):
+            raise ValueError("expected names and values, such as 'lost_frames: 10'")
+        return config.changed(given)
+    except SmallYamlError as error:
+        raise CardboxError(
+            f"settings of {path}: {error}; give a YAML file with names of docs/parameters.md, such "
+            "as 'lost_frames: 10'"
+        ) from None
+    except ValueError as error:
+        raise CardboxError(f"settings of {path}: {error}") from None

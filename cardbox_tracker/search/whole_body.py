@@ -1,0 +1,419 @@
+"""The whole-body filter: a few dozen whole postures survive from frame to frame.
+
+A frame is searched by :data:`STAGES`, each of which adds rated states to those of the previous
+ones: torsos, then arms beside the best torso, then states that are fitted to the cues, then all
+joints together. :class:`~.refiner.Refiner` fits the weighted mean of the best states to all cues.
+Proposals are in :mod:`.torso_proposals`, :mod:`.arm_search` and :mod:`.joint_moves`, ratings in
+:mod:`cardbox_tracker.terms.multi_view`, and all numbers in :mod:`.whole_body_config`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from cardbox_tracker.person.parts import BOTTOM, HEIGHT, TORSO
+from cardbox_tracker.person.posture import (
+    ARM_ANGLES,
+    LEFT_ARM,
+    PLACE,
+    POSTURE,
+    RIGHT_ARM,
+    TORSO_X,
+    TORSO_Y,
+    TORSO_Z,
+    YAW,
+)
+from cardbox_tracker.person.sizes import FloatArray
+from cardbox_tracker.search.config import TrackerConfig
+from cardbox_tracker.terms.multi_view import MultiViewCost
+from cardbox_tracker.terms.silhouette import SilhouetteTerm
+from cardbox_tracker.terms.term import Frame, Posed, Term
+from cardbox_tracker.camera.view import View
+from cardbox_tracker.terms.whole_body import iou_of
+from cardbox_tracker.search import doubt, joint_moves, state_choice, torso_proposals
+from cardbox_tracker.search.approach import Approach
+from cardbox_tracker.search.arm_search import ArmSearch
+from cardbox_tracker.search.arms import ARM_LIMITS
+from cardbox_tracker.search.draws import Draws
+from cardbox_tracker.search.locating import Location, Locator
+from cardbox_tracker.search.mirroring import mirrored_states
+from cardbox_tracker.search.particles import Particles
+from cardbox_tracker.search.pose_filter import Corrector, Fit, Presence
+from cardbox_tracker.search.presence import PersonPresence
+from cardbox_tracker.search.rated_states import RatedStates
+from cardbox_tracker.search.refiner import Cue, Prior, Refiner
+from cardbox_tracker.search.visibility import are_hidden, is_trackable
+from cardbox_tracker.search.whole_body_config import SearchProfile
+
+# Deviation of ``torso_x`` of upright torsos, which is larger in the first frames of a search.
+_SETTLED_FRAMES, _SETTLED_X_M, _YOUNG_X_M = 15, 0.25, 0.5
+# Lateral step, m, after which the legs have left their last columns.
+_STEP_M = 0.05
+# Factor on the numbers of states in a frame whose cues tell where joints are.
+_LOCATED_EFFORT = 0.25
+# States that are fitted to such cues: number, number of similar ones, least distance of the others,
+# m; Gauss-Newton steps, and deviation of a value in a step, rad and m.
+_FITTED, _FITTED_STEPS, _FITTED_DAMPING = (6, 1, 0.1), 3, 0.25**-2
+# The same for fits to outlines.
+_OUTLINED, _OUTLINED_STEPS = (3, 1, 0.1), 2
+# Inverse variances (14,) of the prior around the search's mean, angles in rad and places in m: the
+# outline only moves it slightly, so that it does not become another posture of a similar outline.
+_NEAR = (0.7 * np.array([0.1, 0.1, 0.1, 0.2, *[0.2] * (2 * ARM_ANGLES), 0.1, 0.1])) ** -2
+# The same for cues that tell where joints are, which mainly correct the depth of the arms.
+_LOCATED = np.array([0.03, 0.05, 0.05, 0.08, *[0.2] * (2 * ARM_ANGLES), 0.05, 0.02]) ** -2
+_NONE = np.zeros(6)
+# Weight of the last correction by the outline in the next one, against jitter.
+_KEPT = 0.6
+
+
+@dataclass
+class Search:
+    """The search of one frame.
+
+    Attributes:
+        cost: rates states by the cameras that show the person.
+        profile: numbers of the search.
+        survivors: states (M, 14) of the last frame, the best first.
+        before: state (14,) of the last frame.
+        rated: rated states, to which each stage adds.
+        location: the person's place by the silhouettes.
+        reference: state (14,) of the front reference posture.
+        draws: random numbers.
+        age: frames since the search began.
+        is_new: whether the person is new in this frame.
+        is_lost: whether the person was lost.
+        cues: observations that tell where joints are, by camera.
+    """
+
+    cost: MultiViewCost
+    profile: SearchProfile
+    survivors: FloatArray
+    before: FloatArray
+    rated: RatedStates
+    location: Location
+    reference: FloatArray
+    draws: Draws
+    age: int
+    is_new: bool
+    is_lost: bool
+    cues: list[Cue]
+
+
+class WholeBodyFilter:
+    """Tracks states (14,) of the first camera; a :class:`~.pose_filter.PoseFilter`.
+
+    A state is d1..d12, ``torso_x`` and ``torso_z``. Each of several cameras may show no person for
+    a while.
+
+    Attributes:
+        rated: rated states of the last frame.
+        refine: fits states to the cues of a frame.
+        approach: expects and proposes distances of the person.
+    """
+
+    def __init__(
+        self,
+        config: TrackerConfig,
+        silhouette: SilhouetteTerm,
+        rng: np.random.Generator,
+        views: Sequence[View] = (),
+        corrector: Corrector | None = None,
+    ) -> None:
+        """Prepare, and compile the kernels if necessary; see ``MakeFilter``."""
+        self._views, self._corrector = tuple(views), corrector
+        self._config = settings = config.whole_body
+        self._profile = settings.profile_for(1 + len(views)).scaled(settings.effort)
+        self._located = self._profile.scaled(_LOCATED_EFFORT)
+        self._rng, self._lost_iou = rng, config.lost_iou
+        self._use_body(silhouette)
+        self._reference = self._body.reference_state()
+        self.approach = Approach(self._profile.home_rate)
+        self.forget()
+
+    def _use_body(self, silhouette: SilhouetteTerm) -> None:
+        """Prepare rating and fits for the body of ``silhouette``."""
+        self._body, views = silhouette.body, self._views
+        self._cost = cost = MultiViewCost(self._body, silhouette.camera, views, self._config.cost)
+        self._presence = PersonPresence(cost, self._config)
+        self._arm = ArmSearch(cost)
+        crosses = self._profile.crosses
+        self._locator = Locator(cost, self._body.placement.distance_m, views, crosses)
+        self.refine = Refiner(cost, views)
+        self._doubt = doubt.Doubt()
+
+    def forget(self) -> None:
+        """See :class:`~.pose_filter.PoseFilter`."""
+        self._survivors = self._reference[None].copy()
+        self._seeing: list[int] = []
+        self._is_new, self._is_lost = True, False
+        self._age = 0
+        self._presence.forget()
+        self.approach.begin(0.0)
+        self._locator.forget()
+        self._output: FloatArray | None = None
+        self._correction: FloatArray | None = None
+        self._arm.forget()
+        self._doubt.forget()
+
+    def recover(self) -> None:
+        """See :class:`~.pose_filter.PoseFilter`; an upright state is added to the search.
+
+        The survivors are kept, because the silhouettes may stay poor for a while.
+        """
+        self._is_lost = True
+        # A wrong result must not be smoothed into the next one.
+        self._output = self._correction = None
+
+    def configure(self, config: TrackerConfig) -> None:
+        """See :class:`~.pose_filter.PoseFilter`; all other settings of this filter restart it."""
+        self._lost_iou = config.lost_iou
+
+    def look(self, frames: Sequence[Frame]) -> Presence:
+        """See :class:`~.pose_filter.PoseFilter`; one camera that shows a person is enough."""
+        self._cost.see([frame.silhouette for frame in frames], self._survivors[0])
+        presence, self._seeing = self._presence.see(frames, self._survivors[0])
+        self._is_lost = self._is_lost or self._presence.is_elsewhere
+        return presence
+
+    def follow(self, frames: Sequence[Frame], terms: Sequence[Sequence[Term]]) -> Fit:
+        """See :class:`~.pose_filter.PoseFilter`."""
+        location = self._observe(frames, terms)
+        passes = self._profile.start_passes if self._is_new else 1
+        if self._is_new or self._is_lost:
+            given = self._survivors, self._reference, location.bearing, self._is_new
+            self._survivors = self.approach.with_upright(self._cost, frames, *given)
+        moved = self._survivors[0].copy()
+        moved[TORSO_Y] += location.step_m
+        if self._is_new or abs(location.step_m) > _STEP_M:
+            # The pixels of the legs depend on the place of the person.
+            self._cost.see([frame.silhouette for frame in frames], moved)
+            self._cost.choose(self._seeing)
+        self._age += not self._is_new
+        for _ in range(passes):
+            self._search(location)
+        self._is_new = self._is_lost = False
+        return self._fit(frames)
+
+    def _observe(self, frames: Sequence[Frame], terms: Sequence[Sequence[Term]]) -> Location:
+        """Set the observations of the terms, and return the place of the person."""
+        seeing, cost = self._seeing, self._cost
+        location = self._locator.locate(frames, seeing, self._survivors[0])
+        cost.choose(seeing)
+        cost.observe(frames, terms)
+        self._cues = [
+            (number, cue) for number in seeing for cue in cost.costs[number].terms if cue.locates
+        ]
+        return location
+
+    def _search(self, location: Location) -> None:
+        """Run all stages once."""
+        profile, cost = self._located if self._cues else self._profile, self._cost
+        before = self._survivors[0].copy()
+        approach, z_m = self.approach, float(before[TORSO_Z])
+        approach.see(float(before[TORSO_X]))
+        cost.expect(approach.expected_m, z_m, approach.home_m, self._locator.yaw_rad)
+        self.rated = RatedStates(cost)
+        search = Search(
+            cost,
+            profile,
+            self._survivors,
+            before,
+            self.rated,
+            location,
+            self._reference,
+            Draws(self._rng, profile),
+            self._age,
+            self._is_new,
+            self._is_lost,
+            self._cues,
+        )
+        for stage in STAGES:
+            stage(self, search)
+        self._survivors = self.rated.different(profile.survivors, profile.alike, profile.apart_m)
+
+    def torsos(self, search: Search) -> None:
+        """Rate survivors and new torsos with arms; of a new person, also arms of upright ones."""
+        profile, cost, before = search.profile, search.cost, search.before
+        location = search.location
+        is_settled = not search.is_new and search.age > _SETTLED_FRAMES
+        fresh = search.reference.copy()
+        fresh[TORSO_X] = before[TORSO_X] if location.x_m is None else location.x_m
+        fresh_x_m = location.x_stddev_m or (_SETTLED_X_M if is_settled else _YOUNG_X_M)
+        upright = profile.fresh_torsos if is_settled else profile.torso_explorers
+        torsos = torso_proposals.propose_torsos(
+            search.survivors,
+            (_of_torso(profile.noise()), cost.limits, _lever_m(cost)),
+            location.step_m,
+            profile.torso_explorers,
+            (upright, fresh, fresh_x_m, location.bearing, float(cost.place[0])),
+            search.draws.for_torsos(profile.torsos),
+        )
+        ratings = cost.torsos(torsos, before)
+        pool = torso_proposals.pool_of(
+            search.survivors, torsos, ratings, profile.best_torsos, before, cost.body, ARM_LIMITS
+        )
+        # Upright torsos were rated with the arms of the last frame, but keep their hanging arms.
+        standing = torsos[len(torsos) - upright :]
+        more = [standing, self.approach.nearer_and_farther(before, cost)]
+        if search.cues:
+            turned, hanging = before.copy(), search.reference.copy()
+            turned[YAW] *= -1.0
+            hanging[[TORSO_X, TORSO_Y]] = before[[TORSO_X, TORSO_Y]]
+            begin = [search.survivors[0], search.survivors[-1], turned, hanging]
+            more.append(self._located_by_cues(np.array(begin)))
+        search.rated.add(np.concatenate([pool, *more]))
+        if (search.is_new or search.is_lost) and len(standing):
+            # Its own arms make a wrong torso better than an upright one with hanging arms.
+            rated = search.rated.ratings[len(pool) : len(pool) + upright]
+            best = search.rated.best(profile.survivors)
+            first = standing[np.argmin(rated)]
+            self._add_arms(search, np.concatenate([first[None], best]), Draws(self._rng, profile))
+
+    def arms(self, search: Search) -> None:
+        """Rate arms beside the best torso, and pairs of the best ones."""
+        self._add_arms(search, search.rated.best(search.profile.survivors), search.draws)
+
+    def _add_arms(self, search: Search, pool: FloatArray, draws: Draws) -> None:
+        """Search arms for the torso of the first state of a pool (M, 14), and rate their pairs."""
+        search.cost.fix_torso(pool[0])
+        left, right = (self._arm(pool, arm, search.profile, draws) for arm in (0, 1))
+        most = search.profile.paired_arms
+        search.rated.add_pairs(joint_moves.combine(pool[0], *left, *right, most))
+
+    def fitted(self, search: Search) -> None:
+        """Rate states that are fitted to the cues, from the best different ones."""
+        rated = search.rated
+        if search.profile.fits_outlines:
+            chosen = rated.different(*_OUTLINED)
+            near = Prior(chosen, _NEAR)
+            rated.add(self.refine(chosen, self._cost.outlines(chosen[0]), near, _OUTLINED_STEPS)[0])
+        if search.cues:
+            chosen = rated.different(*_FITTED)
+            # A point gives a line of sight, on which a bone has two directions.
+            mirrored = mirrored_states(chosen[0], search.cost.body, ARM_LIMITS)
+            rated.add(self._located_by_cues(np.concatenate([chosen, mirrored[1:]])))
+
+    def _located_by_cues(self, states: FloatArray) -> FloatArray:
+        """Return states (N, 14) near ``states`` that fit the cues and the priors of the torso."""
+        prior = Prior(*self._cost.prior())
+        return self.refine(states, self._cues, prior, _FITTED_STEPS, _FITTED_DAMPING)[0]
+
+    def together(self, search: Search) -> None:
+        """Move all joints of the best states together, and by the differences of others."""
+        profile, rated = search.profile, search.rated
+        sigma = profile.together_noise * profile.noise()
+        sources = rated.different(profile.survivors, profile.alike, profile.apart_m)
+        for number in range(profile.rounds):
+            if number > 0:
+                sources = rated.best(profile.survivors)
+            moved = joint_moves.move_all(
+                sources,
+                (sigma, search.cost.limits, _lever_m(search.cost)),
+                int(profile.differing * profile.together),
+                profile.difference_scale,
+                search.draws.for_states(profile.together),
+            )
+            rated.add(moved)
+            sigma = profile.round_decay * sigma
+
+    def _fit(self, frames: Sequence[Frame]) -> Fit:
+        """Return the refined mean of the best states with its confidence."""
+        profile, cost = self._profile, self._cost
+        rated = self.rated.states, self.rated.ratings
+        average = (self._located if self._cues else profile).average
+        mean, stddev = state_choice.mean_and_spread(*rated, average, profile.spread)
+        before = mean if self._output is None else self._output
+        kept = self._config.smoothing * profile.smoothing
+        self._output = kept * before + (1.0 - kept) * mean
+        fitted = self._refined(frames, self._output)
+        result = self._corrected(frames, fitted)
+        both = np.array([fitted, result])
+        ratings, (differs_px, cost_px), (drawn_px, area_px), points = cost.bodies(both)
+        deviations, total = doubt.deviations_of(stddev), cost.silhouette_px
+        fit_iou = iou_of(total, drawn_px, differs_px)
+        pixels = float(total), float(cost.frontal_px_at(result)), float(area_px), float(cost_px)
+        prior = float(ratings[1]) - float(cost_px) / max(total, 1)
+        found = pixels, prior, self._arm.spreads_m, (result, deviations), cost.body, self._age
+        evidence = doubt.evidence_of_search(*found)
+        for number, cue in self._cues:
+            there = cost.to_views[number](result[None])
+            evidence |= cue.evidence(Posed(cost.costs[number].body, there))
+        evidence["cameras"] = np.full(6, float(len(self._seeing) > 1))
+        source = doubt.Source.POINTS if self._cues else doubt.Source.OUTLINE
+        vetoes = not is_trackable(cost, fitted), bool(evidence.get("back", _NONE).any())
+        judged = self._doubt.judge(evidence, source, are_hidden(cost, result), vetoes)
+        self._result = result
+        if profile.keeps_result:
+            self._survivors[-1] = fitted  # in place of the worst one
+        return Fit(
+            posture=result[POSTURE],
+            posture_stddev=deviations[POSTURE],
+            keypoints_m=points.keypoints_m[1],
+            cost_px=int(cost_px),
+            iou=iou_of(total, area_px, cost_px),
+            # Points that the result fits show that a silhouette which it does not fit is wrong.
+            is_poor=judged.is_poor or (fit_iou < self._lost_iou and not self._cues),
+            seen=fitted,
+            seen_iou=fit_iou,
+            offset_m=result[PLACE],
+            offset_stddev_m=deviations[PLACE],
+            particles=Particles(*rated, mean, profile.spread),
+            judged=judged,
+        )
+
+    def _refined(self, frames: Sequence[Frame], state: FloatArray) -> FloatArray:
+        """Return the state (14,) near ``state`` that fits all cues best."""
+        cost, steps = self._cost, self._profile.refining_steps
+        # A depth image determines the distance better than an outline.
+        outlines = cost.outlines(state) if frames[0].depth_m is None else []
+        if self._cues:
+            near = Prior(state, _LOCATED)
+            found, _ = self.refine(state[None], [*outlines, *self._cues], near, 2 * steps)
+            located: FloatArray = found[0]
+            return located
+        (refined,), _ = self.refine(state[None], outlines, Prior(state, _NEAR), steps)
+        # Outlines alone jitter.
+        before = refined - state if self._correction is None else self._correction
+        self._correction = _KEPT * before + (1.0 - _KEPT) * (refined - state)
+        smooth: FloatArray = np.clip(state + self._correction, *cost.limits.T)
+        return smooth
+
+    def _corrected(self, frames: Sequence[Frame], fitted: FloatArray) -> FloatArray:
+        """Return the state (14,) that the corrector makes of ``fitted``, within the limits."""
+        if self._corrector is None:
+            return fitted
+        corrected = np.array(self._corrector(frames, fitted.copy()), np.float64)
+        if corrected.shape != fitted.shape:
+            raise ValueError(f"the corrector returned the shape {corrected.shape}; expected (14,)")
+        return np.clip(corrected, *self._cost.limits.T)
+
+    def ious(self) -> list[float | None]:
+        """See :class:`~.pose_filter.PoseFilter`."""
+        if self._output is None:
+            return [None] * len(self._cost.costs)
+        return self._cost.ious(self._result, self._seeing)
+
+
+Stage = Callable[[WholeBodyFilter, Search], None]
+
+STAGES: tuple[Stage, ...] = (
+    WholeBodyFilter.torsos,
+    WholeBodyFilter.arms,
+    WholeBodyFilter.fitted,
+    WholeBodyFilter.together,
+)
+"""The search of a frame: each stage adds rated states to those of the previous ones."""
+
+
+def _of_torso(noise: FloatArray) -> FloatArray:
+    """Return the noise (14,) of a torso, whose arms keep their angles."""
+    noise[LEFT_ARM] = noise[RIGHT_ARM] = 0.0
+    return noise
+
+
+def _lever_m(cost: MultiViewCost) -> float:
+    """Return the height of the torso's top above the hips, which is about that of the shoulders."""
+    return float(cost.parts[TORSO, BOTTOM] + cost.parts[TORSO, HEIGHT])

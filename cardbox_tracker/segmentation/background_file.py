@@ -1,0 +1,246 @@
+"""Saves and loads a learned background, so that a restart does not need an empty scene.
+
+The file is a NumPy archive without pickled objects: the format's name, mean and standard deviation
+of the brightness and of the colours, and the calibration of the camera. The size of every entry is
+checked against the expected working size before it is unpacked.
+"""
+
+from __future__ import annotations
+
+import math
+import os
+import re
+import stat
+import struct
+import tempfile
+import zipfile
+import zlib
+from pathlib import Path
+from typing import IO, Any, BinaryIO, Literal, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cardbox_tracker.common.errors import BackgroundFileError, CameraError, CardboxError, quoted
+from cardbox_tracker.common.files import UnreadableFileError, atomic_path, regular_file
+from cardbox_tracker.camera.camera import Calibration
+from cardbox_tracker.segmentation.chroma import ChromaModel
+from cardbox_tracker.segmentation.empty_scene import BackgroundModel
+
+FORMAT = "cardbox_background_1"
+
+_FORMAT, _MEAN, _STDDEV = "format", "mean", "stddev"
+_CHROMA_MEAN, _CHROMA_STDDEV = "chroma_mean", "chroma_stddev"
+_SIZE, _K, _DISTORTION, _DISTORTION_MODEL = "size", "k", "distortion", "distortion_model"
+_NEEDED = (_FORMAT, _MEAN, _STDDEV, _SIZE, _K, _DISTORTION, _DISTORTION_MODEL)
+_COLOR = (_CHROMA_MEAN, _CHROMA_STDDEV)
+# Longest list of numbers of an entry, and bytes of a number; a text may have as many bytes.
+_MOST_NUMBERS, _LARGEST_NUMBER = 32, 8
+# A background of 4096x4096, the largest working size, has 235 MB.
+_MOST_BYTES = 256 * 1024 * 1024
+_MAGIC, _HEADER = b"\x93NUMPY\x01\x00", struct.Struct("<8sH")
+_LONGEST_HEADER = 1024
+_WRITTEN = re.compile(
+    r"\{'descr': '(?P<kind><(?:[if][48]|U\d{1,6}))', 'fortran_order': (?P<order>True|False), "
+    r"'shape': \((?P<shape>(?:\d{1,12}, ?)*(?:\d{1,12})?)\), \} *\n"
+)
+_BRIGHTEST = 255.0
+
+
+class StoredBackground(NamedTuple):
+    """A background and the calibration of the camera that it was learned with.
+
+    Attributes:
+        model: the learned scene.
+        calibration: calibration of the images that the scene was learned from.
+    """
+
+    model: BackgroundModel
+    calibration: Calibration
+
+    def check_camera(self, calibration: Calibration, name: str) -> None:
+        """Check that ``calibration`` belongs to the camera of this background.
+
+        Raises:
+            BackgroundFileError: the calibration differs; the text calls the file ``name``.
+        """
+        if not self.calibration.is_same(calibration):
+            raise BackgroundFileError(
+                f"the background in {name} was learned with another camera or calibration "
+                f"({self.calibration}) than the images have now ({calibration}); start the node "
+                "with the file of this camera, or call background/learn with nobody in view, "
+                "which replaces it"
+            )
+
+
+def background_path(name: str) -> Path | None:
+    """Return the path that ``name`` stands for, ``~`` expanded; None for an empty name.
+
+    Raises:
+        BackgroundFileError: no file can be read or written there.
+    """
+    if not name:
+        return None
+    try:
+        path = Path(name).expanduser()
+        if path.exists() and not stat.S_ISREG(path.stat().st_mode):
+            kind = "a folder" if path.is_dir() else "no ordinary file"
+            raise BackgroundFileError(
+                f"background_file {path} is {kind}; give the name of a file, such as "
+                "~/background.npz"
+            )
+        with tempfile.TemporaryFile(dir=path.parent):
+            pass
+    except (OSError, RuntimeError, ValueError) as error:
+        reason = error.strerror if isinstance(error, OSError) else str(error)
+        raise BackgroundFileError(
+            f"background_file {name} cannot be written: {reason}; choose a folder that exists and "
+            "is writable"
+        ) from None
+    return path
+
+
+def save_background(stored: StoredBackground, path: str | os.PathLike[str]) -> None:
+    """Write a background atomically: a reader sees either the old file or the new one.
+
+    Raises:
+        BackgroundFileError: the file cannot be written.
+    """
+    model, calibration = stored
+    arrays: dict[str, NDArray[Any]] = {
+        _FORMAT: np.array(FORMAT),
+        _MEAN: model.mean,
+        _STDDEV: model.stddev,
+        _SIZE: np.array([calibration.width, calibration.height]),
+        _K: np.asarray(calibration.k, np.float64),
+        _DISTORTION: np.asarray(calibration.distortion, np.float64),
+        _DISTORTION_MODEL: np.array(calibration.distortion_model),
+    }
+    if model.chroma is not None:
+        arrays |= {_CHROMA_MEAN: model.chroma.mean, _CHROMA_STDDEV: model.chroma.stddev}
+    try:
+        with atomic_path(path) as temporary, temporary.open("wb") as file:
+            np.savez(file, allow_pickle=False, **arrays)
+            file.flush()
+            os.fsync(file.fileno())
+    except CardboxError as error:
+        raise BackgroundFileError(str(error)) from None
+    except OSError as error:
+        raise BackgroundFileError(
+            f"cannot write the background {os.fspath(path)}: {error.strerror}; choose a folder "
+            "that exists and is writable, on a disk with space"
+        ) from None
+
+
+def load_background(path: str | os.PathLike[str], size: tuple[int, int]) -> StoredBackground:
+    """Read a background of the working size (width, height), px.
+
+    Raises:
+        BackgroundFileError: the file cannot be read, is no background, or is of another size.
+    """
+    name = os.fspath(path)
+    try:
+        with regular_file(path, _MOST_BYTES) as file:
+            arrays = _read(file, size)
+        return _checked(arrays, size)
+    except UnreadableFileError as error:
+        raise BackgroundFileError(
+            f"cannot read the background {name}: {error}; give the file that the background node "
+            "wrote"
+        ) from None
+    # These are the errors of zipfile and numpy for damaged archives.
+    except (
+        ValueError,
+        LookupError,
+        EOFError,
+        OSError,
+        NotImplementedError,
+        RuntimeError,
+        CameraError,
+        struct.error,
+        zipfile.BadZipFile,
+        zlib.error,
+    ) as error:
+        raise BackgroundFileError(
+            f"{name} is no background that can be used: {error}; expected a file that the "
+            "background node wrote. Delete it, or give another name, and let the node learn with "
+            "nobody in view"
+        ) from None
+
+
+def _read(file: BinaryIO, size: tuple[int, int]) -> dict[str, NDArray[Any]]:
+    pixels = size[0] * size[1]
+    most = {_MEAN: pixels, _STDDEV: pixels, _CHROMA_MEAN: 3 * pixels, _CHROMA_STDDEV: 3 * pixels}
+    arrays: dict[str, NDArray[Any]] = {}
+    with zipfile.ZipFile(file) as archive:
+        names = {info.filename.removesuffix(".npy"): info for info in archive.infolist()}
+        for key in _NEEDED:
+            if key not in names:
+                raise ValueError(f"it has no entry '{key}'")
+        for key in (*_NEEDED, *(k for k in _COLOR if k in names)):
+            if names[key].compress_type not in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED):
+                raise ValueError(f"'{key}' is compressed in a way that NumPy does not use")
+            with archive.open(names[key]) as entry:
+                arrays[key] = _array(entry, key, most.get(key, _MOST_NUMBERS))
+    return arrays
+
+
+def _array(entry: IO[bytes], key: str, most: int) -> NDArray[Any]:
+    """Return the array of an entry with at most ``most`` numbers, which is checked first."""
+    begin = entry.read(_HEADER.size)
+    if len(begin) < _HEADER.size or not begin.startswith(_MAGIC):
+        raise ValueError(f"'{key}' is not in version 1.0 of NumPy's format")
+    text = entry.read(min(_HEADER.unpack(begin)[-1], _LONGEST_HEADER)).decode("latin-1")
+    # NumPy would evaluate the header as Python, with all errors of its parser.
+    header = _WRITTEN.fullmatch(text)
+    if header is None:
+        raise ValueError(f"'{key}' has the header {quoted(text)}, which NumPy does not write")
+    kind = np.dtype(header["kind"])
+    shape = tuple(int(side) for side in header["shape"].split(",") if side.strip())
+    count = math.prod(shape)
+    if count * kind.itemsize > _LARGEST_NUMBER * most:
+        raise ValueError(
+            f"'{key}' has the shape {shape} and type {kind}, too much for a background of this size"
+        )
+    data = entry.read(count * kind.itemsize)
+    order: Literal["C", "F"] = "F" if header["order"] == "True" else "C"
+    return np.frombuffer(data, kind, count).reshape(shape, order=order)
+
+
+def _checked(arrays: dict[str, NDArray[Any]], size: tuple[int, int]) -> StoredBackground:
+    if str(arrays[_FORMAT]) != FORMAT:
+        raise ValueError(f"its format is '{arrays[_FORMAT]}'; this version reads '{FORMAT}'")
+    mean = arrays[_MEAN]
+    if mean.shape != size[::-1]:
+        found = "x".join(map(str, mean.shape[::-1]))
+        raise ValueError(f"it is of {found} px, but width and height of the node are {size}")
+    chroma = None
+    if all(key in arrays for key in _COLOR):
+        shape = 3, max(size[1] // 2, 1), max(size[0] // 2, 1)
+        chroma = ChromaModel(*(_plane(arrays, key, shape) for key in _COLOR))
+    model = BackgroundModel(
+        _plane(arrays, _MEAN, mean.shape), _plane(arrays, _STDDEV, mean.shape), chroma
+    )
+    if arrays[_SIZE].dtype.kind != "i":
+        raise ValueError("its size is not two whole numbers")
+    width, height = arrays[_SIZE].tolist()
+    calibration = Calibration(
+        width,
+        height,
+        np.asarray(arrays[_K], np.float64).reshape(3, 3),
+        np.asarray(arrays[_DISTORTION], np.float64).ravel(),
+        str(arrays[_DISTORTION_MODEL]),
+    )
+    calibration.camera(width, height)
+    return StoredBackground(model, calibration)
+
+
+def _plane(
+    arrays: dict[str, NDArray[Any]], key: str, shape: tuple[int, ...]
+) -> NDArray[np.float32]:
+    plane = arrays[key]
+    if plane.shape != shape or plane.dtype != np.float32:
+        raise ValueError(f"'{key}' has the shape {plane.shape} of {plane.dtype}, expected {shape}")
+    if not (np.isfinite(plane).all() and plane.min() >= 0.0 and plane.max() <= _BRIGHTEST):
+        raise ValueError(f"'{key}' has values outside 0 to {_BRIGHTEST:g}")
+    return np.asarray(plane, np.float32)

@@ -1,0 +1,164 @@
+"""Turns camera images into silhouettes, with the same steps live and in a recording.
+
+An image is resized and rectified. The first images teach the empty scene; from every later one the
+silhouette of the person is extracted.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cardbox_tracker.segmentation.background import SilhouetteExtractor
+from cardbox_tracker.segmentation.background_config import BackgroundConfig
+from cardbox_tracker.camera.camera import Calibration
+from cardbox_tracker.segmentation.empty_scene import BackgroundModel, brightness_of
+from cardbox_tracker.segmentation.learning import Learning
+from cardbox_tracker.camera.resize import to_working_size
+
+ImageArray = NDArray[np.uint8]
+
+# If another light makes the silhouette smaller by this factor, that light is correct.
+_IN_WRONG_LIGHT = 1.7
+
+
+class SilhouettePipeline:
+    """Learns the empty scene of one camera, then extracts silhouettes from its images.
+
+    Attributes:
+        calibration: calibration of the input images.
+        camera: pinhole camera of the silhouettes, at the working size, without distortion.
+        learning: the method and progress of learning the empty scene.
+    """
+
+    def __init__(
+        self,
+        calibration: Calibration,
+        size: tuple[int, int],
+        config: BackgroundConfig | None = None,
+        learning: type[Learning] = Learning,
+    ) -> None:
+        """Start without a background.
+
+        Args:
+            calibration: calibration of the input images, which may have any size of its aspect
+                ratio.
+            size: working size (width, height), px.
+            config: settings of the background model.
+            learning: the method of learning the empty scene.
+
+        Raises:
+            CameraError: the camera is uncalibrated or its distortion model is unknown.
+        """
+        self.calibration = calibration
+        self.camera = calibration.camera(*size)
+        self._size = size
+        self._rectifier = calibration.rectifier(*size)
+        self._config = config or BackgroundConfig()
+        self._way = learning
+        self.learning = learning(self._config.learn_images)
+        self._extractor: SilhouetteExtractor | None = None
+
+    @property
+    def config(self) -> BackgroundConfig:
+        """The settings; other settings act on the next image and keep the background."""
+        return self._config
+
+    @config.setter
+    def config(self, config: BackgroundConfig) -> None:
+        self._config = config
+        self.learning.images = config.learn_images
+        if self._extractor is not None:
+            self._extractor = SilhouetteExtractor(self._extractor.model, config)
+
+    @property
+    def model(self) -> BackgroundModel | None:
+        """The learned background; None before :meth:`finish_learning`."""
+        return None if self._extractor is None else self._extractor.model
+
+    @property
+    def is_ready(self) -> bool:
+        """Whether a background is learned, so that silhouettes can be extracted."""
+        return self._extractor is not None
+
+    @property
+    def learned_images(self) -> int:
+        """Number of images of the empty scene added so far."""
+        return self.learning.count
+
+    @property
+    def has_enough(self) -> bool:
+        """Whether enough is learned for :meth:`finish_learning`."""
+        return self.learning.has_enough()
+
+    def prepare(self, image: ImageArray) -> ImageArray:
+        """Return ``image`` (H, W) or (H, W, 3) at the working size, without lens distortion."""
+        small = to_working_size(image, *self._size)
+        return small if self._rectifier is None else self._rectifier(small)
+
+    def learn(self, image: ImageArray) -> None:
+        """Add a prepared image, grey (H, W) or bgr (H, W, 3), of the empty scene."""
+        self.learning.add(image)
+
+    def finish_learning(self) -> BackgroundModel:
+        """Make a background from the added images; later images are compared with it.
+
+        Raises:
+            ValueError: fewer than two images were added.
+        """
+        model = self.learning.model()
+        self._extractor = SilhouetteExtractor(model, self._config)
+        return model
+
+    def relearn(self, learning: type[Learning] | None = None) -> None:
+        """Forget the background and learn it again, with another method if one is given."""
+        self._way = learning or self._way
+        self.learning = self._way(self._config.learn_images)
+        self._extractor = None
+
+    def resume(self, model: BackgroundModel, image: ImageArray) -> None:
+        """Continue with a background learned before; the prepared image may show a person.
+
+        The light may have changed since. If the silhouette is much smaller in a light that is
+        estimated from this image, that light is used.
+        """
+        extractor = SilhouetteExtractor(model, self._config)
+        found = np.count_nonzero(extractor(image))
+        extractor.restart()
+        other = SilhouetteExtractor(model, self._config)
+        other.expect_other_light()
+        for _ in range(2):  # the second pass excludes the person
+            left = np.count_nonzero(other(image))
+        self._extractor = other if found > _IN_WRONG_LIGHT * left else extractor
+
+    def silhouette(self, image: ImageArray, stamp_ns: int = 0) -> ImageArray:
+        """Return the silhouette (H, W), 0 or 255, of a prepared image, grey or bgr.
+
+        The stamp, ns, 0 if unknown, is only used to measure the rate of the images.
+
+        Raises:
+            RuntimeError: no background is learned yet.
+        """
+        if self._extractor is None:
+            raise RuntimeError("no background is learned yet; call finish_learning() first")
+        return self._extractor(image, stamp_ns)
+
+    def restart(self) -> None:
+        """Forget the light, since the next image does not follow the last one."""
+        if self._extractor is not None:
+            self._extractor.restart()
+
+    @property
+    def light(self) -> float:
+        """Brightness of the scene in the last image relative to the learned background."""
+        return 1.0 if self._extractor is None else self._extractor.gain
+
+    def drift(self, image: ImageArray) -> float:
+        """Return the median difference of a prepared image from the background, grey levels.
+
+        The median is robust, since the person covers less than half of the image. It is 0 before a
+        background is learned.
+        """
+        if self._extractor is None:
+            return 0.0
+        return float(np.median(brightness_of(image) - self._extractor.model.mean))

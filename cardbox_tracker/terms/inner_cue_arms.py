@@ -1,0 +1,75 @@
+"""Arms of posed bodies in the image, and the gains of the inner cue."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cardbox_tracker.person.model import BodyModel
+from cardbox_tracker.person.sizes import FloatArray
+from cardbox_tracker.terms import inner_cue_kernels as kernels
+from cardbox_tracker.terms.term import Posed
+
+
+def arms_in_image(posed: Posed, arm: int) -> tuple[FloatArray, NDArray[np.bool_]]:
+    """Return the left arm, 0, or the right arm, 1, of N states in the image.
+
+    Returns:
+        Column, row and pixels per metre of elbow and hand, (N, 2, 3); whether the hand is hidden
+        behind the trunk, (N,).
+    """
+    points, hidden = np.empty((len(posed), 2, 3)), np.empty(len(posed), np.bool_)
+    kernels.project_arms(posed.states, arm, posed.body, points, hidden)
+    return points, hidden
+
+
+def forearm_of(person: BodyModel) -> tuple[float, float]:
+    """Return length, including the fist, and width of a person's forearm, m."""
+    return person.size("forearm_length"), person.size("forearm_width")
+
+
+def zones_of(posed: Posed) -> FloatArray:
+    """Return the places of head and torso of the first state in the image, (6,), px.
+
+    The values are the head's centre (u, v), the half axes of an ellipse around it, the row of the
+    hips, and the row of the torso's top.
+    """
+    zones = np.empty(6)
+    kernels.torso_zones(posed.states[0], posed.body, zones)
+    return zones
+
+
+@dataclass(frozen=True, eq=False)
+class ArmGains:
+    """The gains of arms in one image.
+
+    Attributes:
+        maps: log-likelihood ratios of hand and forearm, (2, h, w), nats.
+        corner: column and row of the image where the maps begin.
+        weights: weight of a nat of hand and forearm, px of the outline, (2,).
+        px_per_m: scale at the expected place of the person.
+        forearm_m: length, including the fist, and width of the forearm.
+    """
+
+    maps: NDArray[np.float32]
+    corner: tuple[int, int]
+    weights: FloatArray
+    px_per_m: float
+    forearm_m: tuple[float, float]
+
+    def __call__(
+        self, points: FloatArray, hidden: NDArray[np.bool_], others: FloatArray
+    ) -> FloatArray:
+        """Return the gains (N,), px, of arms.
+
+        Args:
+            points: see :func:`arms_in_image`.
+            hidden: see :func:`arms_in_image`.
+            others: points of the other arm, (N, 2, 3), or (1, 2, 3) for all.
+        """
+        gains = np.empty(len(points))
+        seen, forearm = (self.maps, *self.corner), (*self.forearm_m, self.px_per_m)
+        kernels.arm_gains(points, hidden, others, seen, forearm, self.weights, gains)
+        return gains

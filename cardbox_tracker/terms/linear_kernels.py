@@ -1,0 +1,33 @@
+"""Compiled solution of small linear systems; numba's own linear algebra would need SciPy."""
+
+from __future__ import annotations
+
+from math import sqrt
+
+from cardbox_tracker.common.compiling import kernel
+from cardbox_tracker.terms.kernel_arguments import Floats
+
+
+@kernel
+def solve(matrix: Floats, right: Floats) -> None:
+    """Solve a linear system in place by a Cholesky decomposition.
+
+    Args:
+        matrix: symmetric, positive definite, (n, n); its lower triangle is read, and overwritten.
+        right: right side (n,); becomes the solution.
+    """
+    n = right.shape[0]
+    for i in range(n):
+        for j in range(i + 1):
+            total = matrix[i, j]
+            for k in range(j):
+                total -= matrix[i, k] * matrix[j, k]
+            matrix[i, j] = sqrt(max(total, 1e-12)) if i == j else total / matrix[j, j]
+    for i in range(n):
+        for k in range(i):
+            right[i] -= matrix[i, k] * right[k]
+        right[i] /= matrix[i, i]
+    for i in range(n - 1, -1, -1):
+        for k in range(i + 1, n):
+            right[i] -= matrix[k, i] * right[k]
+        right[i] /= matrix[i, i]

@@ -1,0 +1,76 @@
+"""Arguments and scratch arrays of the compiled ratings of whole bodies."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from cardbox_tracker.person.kinematics import PosedArm, new_arm
+from cardbox_tracker.common.compiling import inlined_kernel
+from cardbox_tracker.terms.bit_masks import Masks, new_masks
+from cardbox_tracker.terms.bit_planes import Planes
+from cardbox_tracker.terms.body_priors import Prior
+from cardbox_tracker.terms.kernel_arguments import Floats
+from cardbox_tracker.terms.rasterisation import Workspace, new_workspace
+
+
+class Observed(NamedTuple):
+    """A silhouette, or the part of it outside of parts that are already drawn.
+
+    Attributes:
+        planes: pixels that count, and foreground, (2, words, rows); see :mod:`.bit_planes`.
+        rows: number of rows that count, from the top.
+        width: width of the image, px.
+        base_px: cost without further parts, px.
+        scale: 1 / (pixels of the silhouette).
+    """
+
+    planes: Planes
+    rows: int
+    width: int
+    base_px: int
+    scale: float
+
+
+class Points(NamedTuple):
+    """Shoulder, elbow and hand of the left, then of the right arm of N states.
+
+    Attributes:
+        joints_m: in the torso's frame, (N, 6, 3), metres.
+        keypoints_m: in the optical frame, (N, 6, 3), metres.
+    """
+
+    joints_m: Floats
+    keypoints_m: Floats
+
+
+ObservedTuple = tuple[Planes, int, int, int, float]
+PointsTuple = tuple[Floats, Floats]
+
+
+class Scratch(NamedTuple):
+    """Scratch arrays of the ratings.
+
+    Attributes:
+        work: for the drawn patches.
+        arm: for one arm.
+        masks: for the union of the patches.
+        logs: one value for each Gaussian of the prior, (K,).
+    """
+
+    work: Workspace
+    arm: PosedArm
+    masks: Masks
+    logs: Floats
+
+
+@inlined_kernel
+def new_scratch(patches: int, seen: Observed, given: Prior) -> Scratch:
+    """Return the scratch arrays for a number of patches."""
+    return Scratch(
+        new_workspace(patches, seen.planes.shape[2]),
+        new_arm(),
+        new_masks(patches, seen.planes),
+        np.empty(given.gaussians.shape[1]),
+    )

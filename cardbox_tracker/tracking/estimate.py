@@ -1,0 +1,76 @@
+"""The result of tracking for one time.
+
+States: ``tracking``; ``uncertain`` (the posture may be wrong); ``lost`` (a person is visible, but
+the model has not fitted for several frames); ``no_person`` (too few foreground pixels for a
+person). Only ``tracking`` and ``uncertain`` have a posture.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from cardbox_tracker.person.model import BodyModel
+from cardbox_tracker.person.sizes import FloatArray
+from cardbox_tracker.person.skeleton import KeypointState
+
+TRACKING, UNCERTAIN, LOST, NO_PERSON = "tracking", "uncertain", "lost", "no_person"
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """State of tracking and posture of the person at one time.
+
+    Attributes:
+        state: ``tracking``, ``uncertain``, ``lost`` or ``no_person``; with the last two, all other
+            attributes are None.
+        posture: d1..d12, (12,), rad and metres.
+        posture_stddev: standard deviation of each joint, (12,), rad and metres: the weighted spread
+            of the particles.
+        keypoints_m: shoulder, elbow, hand of the left, then the right arm, (6, 3), metres in the
+            optical frame.
+        keypoint_states: state of each keypoint, (6,): ``tracked``; ``uncertain`` (it may be off by
+            more than 30 cm); ``lost`` (it rather is); ``hidden`` (behind the trunk or outside of
+            the images). ``tracking`` has no ``uncertain`` or ``lost`` hand. None if the filter has
+            none.
+        keypoint_chances: probability of each keypoint to be off by more than 30 cm relative to the
+            middle of the shoulders, (6,), or None.
+        evidence: what these probabilities follow from, by name, one value for each keypoint, (6,).
+        cost_px: cost of the posture (equation (2)), px.
+        iou: intersection over union of model and silhouette, above the hips.
+        offset_m: ``torso_x`` and ``torso_z``, (2,), metres: displacement of the hips from the body
+            model's placement, towards the camera and up; None if the filter keeps it constant.
+        offset_stddev_m: standard deviations of ``offset_m``, (2,), metres.
+        neck: ``neck_yaw`` and ``neck_pitch``, (2,), rad, relative to the torso; None without points
+            of the face.
+        neck_stddev: standard deviations of ``neck``, (2,), rad, those of the torso included.
+        clavicles_m: rise of the left and right shoulder with the arms, (2,), metres; None without a
+            posture.
+        clavicles_stddev_m: standard deviations of ``clavicles_m``, (2,), metres.
+    """
+
+    state: str
+    posture: FloatArray | None = None
+    posture_stddev: FloatArray | None = None
+    keypoints_m: FloatArray | None = None
+    cost_px: int | None = None
+    iou: float | None = None
+    offset_m: FloatArray | None = None
+    offset_stddev_m: FloatArray | None = None
+    neck: FloatArray | None = None
+    neck_stddev: FloatArray | None = None
+    keypoint_states: tuple[KeypointState, ...] | None = None
+    keypoint_chances: FloatArray | None = None
+    evidence: Mapping[str, FloatArray] | None = None
+    clavicles_m: FloatArray | None = None
+    clavicles_stddev_m: FloatArray | None = None
+
+    def placed(self, body: BodyModel) -> BodyModel:
+        """Return ``body`` at the place of this estimate."""
+        if self.offset_m is None:
+            return body
+        x_m, z_m = self.offset_m.tolist()
+        place = body.placement
+        return body.with_values(
+            distance_m=place.distance_m - x_m, hip_height_m=place.hip_height_m + z_m
+        )

@@ -1,0 +1,280 @@
+"""Finds how the head turns and nods on the torso from the points of a face in an image.
+
+A silhouette shows the head's place but hardly its direction. A rigid model of the face (nose, eyes
+and ears) is fitted to the points of a detector by maximum a posteriori estimation: Gauss-Newton
+from several starts over yaw, pitch and roll of the neck, the place of the head in the image and its
+size, with normal priors. The torso is that of the tracked state, so the angles are those between
+torso and head:
+
+    R_head = R_torso Rz(yaw) Ry(pitch) Rx(roll)
+
+The signs are those of the torso's angles: a positive yaw turns the face to the person's left, a
+positive pitch lowers it. Both are 0 if the face looks along the torso's forward axis. The roll is
+estimated and not returned.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from math import cos, exp, sin, sqrt
+from typing import NamedTuple
+
+import numpy as np
+
+from cardbox_tracker.person.kinematics import pose
+from cardbox_tracker.person.model import BodyModel
+from cardbox_tracker.person.parts import body_parts
+from cardbox_tracker.person.posture import PITCH, YAW
+from cardbox_tracker.person.sizes import FloatArray
+from cardbox_tracker.person.skeleton import NECK_LIMITS
+from cardbox_tracker.common.compiling import kernel
+from cardbox_tracker.detectors.image_points import POINT_INDEX, ImagePoints
+from cardbox_tracker.terms.kernel_arguments import Floats
+from cardbox_tracker.terms.linear_kernels import solve
+from cardbox_tracker.terms.term import Frame
+from cardbox_tracker.tracking.estimate import Estimate
+from cardbox_tracker.tracking.low_pass import LowPass
+from cardbox_tracker.camera.camera import Camera
+
+FACE_POINTS = ("nose", "left_eye", "right_eye", "left_ear", "right_ear")
+FACE_M: FloatArray = np.array(
+    [
+        (0.090, 0.0, -0.018),
+        (0.060, 0.0315, 0.017),
+        (0.060, -0.0315, 0.017),
+        (0.0, 0.065, 0.0),
+        (0.0, -0.065, 0.0),
+    ]
+)
+"""``FACE_POINTS`` of a head 0.23 m high, (5, 3), metres; X forwards, Y to its left, Z up.
+
+The origin lies between the ears. Pupils are 63 mm apart (Dodgson, "Variation and extrema of human
+interpupillary distance", 2004). The other lengths are those of the detector's points, whose ears
+lie 2 cm before the ear canals; measured on rendered and recorded people whose heads turn.
+"""
+FACE_M.setflags(write=False)
+HEAD_HEIGHT_M = 0.23
+"""Chin to crown of the head of ``FACE_M``, metres."""
+
+LEAST_SCORE = 0.5
+"""Points with lower scores are not used."""
+LEAST_POINTS = 3
+"""Two points do not tell turning, nodding and tilting apart."""
+LARGEST_STDDEV_RAD = np.radians(20.0)
+"""Angles that the points determine less exactly are not returned."""
+LARGEST_RMS = 2.5
+"""Largest residual in its standard deviations; points that fit worse are not those of a face."""
+_BEYOND_LIMITS_RAD = np.radians(15.0)
+_FARTHEST_M = 0.3
+
+# Standard deviations: face model and detector in metres at the face, detector in pixels.
+_POINT_M, _POINT_PX = 0.010, 1.0
+# Of the priors of yaw, pitch, roll, rad; place across and up, m; logarithm of the size.
+_PRIOR = np.array([*np.radians([60.0, 40.0, 15.0]), 0.15, 0.15, 0.10])
+_STARTS_RAD = np.radians([(0.0, 0.0), (45.0, 0.0), (-45.0, 0.0), (0.0, 35.0), (0.0, -35.0)])
+_STEPS = 8
+_LARGEST_STEP = np.array([0.5, 0.5, 0.5, 0.2, 0.2, 0.2])
+_DIFFERENCE = 1e-6
+
+_SMOOTHING_S = 0.15
+_KEPT_S = 0.5
+_DRIFT_RAD_S = 1.0
+
+
+class Neck(NamedTuple):
+    """Direction of the head relative to the torso.
+
+    Attributes:
+        angles: yaw and pitch, (2,), rad.
+        stddev: their standard deviations, (2,), rad.
+    """
+
+    angles: FloatArray
+    stddev: FloatArray
+
+
+def fit_neck(
+    points: ImagePoints, body: BodyModel, camera: Camera, posture: FloatArray
+) -> Neck | None:
+    """Return the direction of the head that fits the points of the face best.
+
+    Args:
+        points: of the image of ``camera``.
+        body: the person, at the place of the estimate.
+        camera: working camera, with the pitch of the body model.
+        posture: d1..d12, (12,), rad and metres; its torso is taken as exact.
+
+    Returns:
+        The angles; None if the points are too few or too uncertain, or do not form a face.
+    """
+    chosen = np.array([POINT_INDEX[name] for name in FACE_POINTS])
+    known = points.scores[chosen] >= LEAST_SCORE
+    if np.count_nonzero(known) < LEAST_POINTS:
+        return None
+    frames = pose(body, posture)
+    depth_m = float(camera.reference_to_optical(frames.head)[2])
+    if depth_m <= _FARTHEST_M:
+        return None
+    size = body_parts(body.sizes).head.height_m / HEAD_HEIGHT_M
+    axes = camera.reference_to_optical_rotation()
+    values, rms, covariance = _solve(
+        np.ascontiguousarray(axes @ frames.torso_rotation),
+        np.ascontiguousarray(axes.T),
+        camera.reference_to_optical(frames.head),
+        size * FACE_M[known],
+        points.px[chosen[known]],
+        (camera.fx, camera.fy, camera.cx, camera.cy),
+        float(np.hypot(_POINT_PX, camera.fx * _POINT_M / depth_m)),
+    )
+    angles = values[:2]
+    beyond = np.maximum(NECK_LIMITS[:, 0] - angles, angles - NECK_LIMITS[:, 1])
+    stddev = np.sqrt(np.diag(covariance)[:2]) * max(1.0, rms)
+    is_face = rms <= LARGEST_RMS and np.hypot(*values[3:5]) <= _FARTHEST_M
+    if not is_face or (beyond > _BEYOND_LIMITS_RAD).any() or (stddev > LARGEST_STDDEV_RAD).any():
+        return None
+    return Neck(np.clip(angles, NECK_LIMITS[:, 0], NECK_LIMITS[:, 1]), stddev)
+
+
+@kernel
+def _residuals(
+    values: Floats,
+    torso: Floats,
+    axes: Floats,
+    centre_m: Floats,
+    face_m: Floats,
+    px: Floats,
+    lens: tuple[float, float, float, float],
+    sigma_px: float,
+    residuals: Floats,
+) -> None:
+    """Write the residuals (2n + 6,) of values (6,), in standard deviations.
+
+    Args:
+        values: yaw, pitch and roll of the neck, rad; place across and up, m; logarithm of the size.
+        torso: rotation (3, 3) from the torso's to the optical frame.
+        axes: rows are the reference frame's axes X, Y and Z in the optical frame, (3, 3).
+        centre_m: where the model has the middle of the head, (3,), optical frame.
+        face_m: points of a face of this size, (n, 3).
+        px: the same points in the image, (n, 2).
+        lens: focal lengths and principal point, px.
+        sigma_px: standard deviation of a coordinate.
+        residuals: written.
+    """
+    cy, sy = cos(values[0]), sin(values[0])
+    cp, sp = cos(values[1]), sin(values[1])
+    cr, sr = cos(values[2]), sin(values[2])
+    size = exp(values[5])
+    fx, fy, cx, cy_px = lens
+    for i in range(face_m.shape[0]):
+        x, y, z = size * face_m[i, 0], size * face_m[i, 1], size * face_m[i, 2]
+        # Rx(roll), then Ry(pitch), then Rz(yaw).
+        y, z = cr * y - sr * z, sr * y + cr * z
+        x, z = cp * x + sp * z, cp * z - sp * x
+        x, y = cy * x - sy * y, sy * x + cy * y
+        at = [0.0, 0.0, 0.0]
+        for c in range(3):
+            at[c] = centre_m[c] + values[3] * axes[1, c] + values[4] * axes[2, c]
+            at[c] += torso[c, 0] * x + torso[c, 1] * y + torso[c, 2] * z
+        depth = max(at[2], 0.05)
+        residuals[2 * i] = (fx * at[0] / depth + cx - px[i, 0]) / sigma_px
+        residuals[2 * i + 1] = (fy * at[1] / depth + cy_px - px[i, 1]) / sigma_px
+    for j in range(6):
+        residuals[2 * face_m.shape[0] + j] = values[j] / _PRIOR[j]
+
+
+@kernel
+def _solve(
+    torso: Floats,
+    axes: Floats,
+    centre_m: Floats,
+    face_m: Floats,
+    px: Floats,
+    lens: tuple[float, float, float, float],
+    sigma_px: float,
+) -> tuple[Floats, float, Floats]:
+    """Return the best values (6,), the residuals' RMS and the covariance (6, 6); see above."""
+    count = 2 * face_m.shape[0] + 6
+    here, above, jacobian = np.empty(count), np.empty(count), np.empty((count, 6))
+    normal, step, best = np.empty((6, 6)), np.empty(6), np.empty(6)
+    least, kept = np.inf, np.empty((6, 6))
+    for start in range(_STARTS_RAD.shape[0]):
+        values = np.zeros(6)
+        values[:2] = _STARTS_RAD[start]
+        for number in range(_STEPS + 1):
+            _residuals(values, torso, axes, centre_m, face_m, px, lens, sigma_px, here)
+            for j in range(6):
+                before = values[j]
+                values[j] = before + _DIFFERENCE
+                _residuals(values, torso, axes, centre_m, face_m, px, lens, sigma_px, above)
+                values[j] = before
+                for i in range(count):
+                    jacobian[i, j] = (above[i] - here[i]) / _DIFFERENCE
+            for j in range(6):
+                step[j] = 0.0
+                for i in range(count):
+                    step[j] += jacobian[i, j] * here[i]
+                for k in range(6):
+                    normal[j, k] = 0.0
+                    for i in range(count):
+                        normal[j, k] += jacobian[i, j] * jacobian[i, k]
+            if number == _STEPS:
+                break
+            solve(normal, step)
+            for j in range(6):
+                values[j] -= min(max(step[j], -_LARGEST_STEP[j]), _LARGEST_STEP[j])
+        cost = 0.0
+        for i in range(count):
+            cost += here[i] ** 2
+        if cost < least:
+            least = cost
+            best[:], kept[:] = values, normal
+    covariance, matrix = np.empty((6, 6)), np.empty((6, 6))
+    for j in range(6):
+        matrix[:] = kept
+        covariance[j] = 0.0
+        covariance[j, j] = 1.0
+        solve(matrix, covariance[j])
+    # Priors add as many residuals as there are unknowns, so the points are the degrees of freedom.
+    return best, sqrt(least / (2 * face_m.shape[0])), covariance
+
+
+class HeadTracker:
+    """Adds the direction of the head to the estimates of one person, smoothed over time.
+
+    A face that is hidden for less than half a second keeps its direction, with a growing deviation.
+    """
+
+    def __init__(self, body: BodyModel, camera: Camera) -> None:
+        """Start without a direction.
+
+        Args:
+            body: the person.
+            camera: working camera of the points, with the pitch of the body model.
+        """
+        self._body, self._camera = body, camera
+        self._smooth = LowPass(_SMOOTHING_S)
+        self._last: Neck | None = None
+        self._age_s = 0.0
+
+    def see(self, frame: Frame, found: Estimate) -> Estimate:
+        """Return ``found``, the estimate of a frame, with the angles of the neck if known."""
+        self._age_s += frame.interval_s
+        if self._age_s > _KEPT_S:
+            self._smooth.forget()
+            self._last = None
+        neck = self._fit(frame.points, found)
+        if neck is not None:
+            angles = self._smooth(neck.angles, self._age_s)
+            self._last, self._age_s = Neck(angles, neck.stddev), 0.0
+        if self._last is None or found.posture is None:
+            return found
+        stddev = np.hypot(self._last.stddev, _DRIFT_RAD_S * self._age_s)
+        return replace(found, neck=self._last.angles, neck_stddev=stddev)
+
+    def _fit(self, points: ImagePoints | None, found: Estimate) -> Neck | None:
+        if points is None or found.posture is None:
+            return None
+        neck = fit_neck(points, found.placed(self._body), self._camera, found.posture)
+        if neck is None or found.posture_stddev is None:
+            return neck
+        return neck._replace(stddev=np.hypot(neck.stddev, found.posture_stddev[[YAW, PITCH]]))

@@ -1,0 +1,162 @@
+"""The input of the tracker: one camera's data at one time, as named channels."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from cardbox_tracker.person.sizes import FloatArray
+from cardbox_tracker.detectors.image_points import ImagePoints
+from cardbox_tracker.terms.term import DepthImage, Image, Silhouette
+from cardbox_tracker.camera.view import View
+from cardbox_tracker.camera.given_arrays import depth_from, image_from, silhouette_from
+
+
+class Channel(NamedTuple):
+    """How the data of one kind gets from an :class:`Observation` into a frame.
+
+    Attributes:
+        checked: takes the data, its name in errors, and height and width of the camera; returns
+            data that terms can use, or raises ValueError.
+        upright: takes the view of a camera and the data; returns the data of the upright image.
+    """
+
+    checked: Callable[[Any, str, tuple[int, int]], Any]
+    upright: Callable[[View, Any], Any]
+
+
+def points_from(given: Any, name: str, size: tuple[int, int]) -> ImagePoints:
+    """Return a detector's points.
+
+    Raises:
+        ValueError: they are no ImagePoints.
+    """
+    if not isinstance(given, ImagePoints):
+        raise ValueError(
+            f"{name} are of the type {type(given).__name__}; expected ImagePoints, such as "
+            "ImagePoints.of(...), or None"
+        )
+    return given
+
+
+def pixels_from(given: Any, name: str, size: tuple[int, int]) -> FloatArray:
+    """Return columns and rows of points, (N, 2), px; nan for unknown ones.
+
+    Raises:
+        ValueError: they are not numbers of this shape.
+    """
+    pixels = np.asarray(given)
+    if pixels.dtype.kind not in "iuf" or pixels.ndim != 2 or pixels.shape[1] != 2:
+        raise ValueError(
+            f"{name} has the shape {pixels.shape} and the type {pixels.dtype}; expected column and "
+            "row of each point, (N, 2)"
+        )
+    return pixels.astype(np.float64)
+
+
+CHANNELS: dict[str, Channel] = {
+    "silhouette": Channel(silhouette_from, lambda view, mask: view.upright(mask, is_mask=True)),
+    "image": Channel(image_from, View.upright),
+    "depth_m": Channel(depth_from, View.upright),
+    "points": Channel(
+        points_from, lambda view, found: replace(found, px=view.upright_px(found.px))
+    ),
+}
+"""The channels by name. A line ``CHANNELS["name"] = Channel(pixels_from, View.upright_px)`` adds
+another one, which ``Observation(..., name=...)`` then takes and terms read as ``frame["name"]``."""
+
+
+class Observation:
+    """The data of one camera at one time.
+
+    An observation without a silhouette stands for a camera without data at this time. The tracker
+    converts arrays of other types, or refuses them with a ValueError; see
+    :mod:`cardbox_tracker.camera.given_arrays`.
+
+    Attributes:
+        channels: data by the names of :data:`CHANNELS`; missing ones have no data.
+        stamp_ns: time of the data, ns; None if it is unknown.
+    """
+
+    __slots__ = ("channels", "stamp_ns")
+
+    def __init__(
+        self,
+        silhouette: Silhouette | None = None,
+        image: Image | None = None,
+        depth_m: DepthImage | None = None,
+        stamp_ns: int | None = None,
+        points: ImagePoints | None = None,
+        **more: Any,
+    ) -> None:
+        """Take the data.
+
+        Args:
+            silhouette: (H, W), 0 or 255, of the camera's size, or a mask of another numeric type;
+                None if there is none.
+            image: (H, W) grey or (H, W, 3) bgr of the same time, for terms that use it.
+            depth_m: (H, W), metres along the optical axis, for the term ``Depth``; unknown depths
+                are not above 0 or not finite.
+            stamp_ns: time of the data, ns; None if it is unknown.
+            points: the person's joints in the image, from a detector; None without one.
+            more: further channels.
+
+        Raises:
+            ValueError: there is no channel of a name.
+        """
+        given = {
+            "silhouette": silhouette,
+            "image": image,
+            "depth_m": depth_m,
+            "points": points,
+            **more,
+        }
+        for name in given.keys() - CHANNELS.keys():
+            raise ValueError(
+                f"an observation has no channel {name!r}; expected any of {', '.join(CHANNELS)}, "
+                "or add it to CHANNELS"
+            )
+        self.channels = {name: data for name, data in given.items() if data is not None}
+        self.stamp_ns = stamp_ns
+
+    def having(self, **given: Any) -> Observation:
+        """Return the observation with other channels, or another ``stamp_ns``."""
+        return Observation(**{"stamp_ns": self.stamp_ns, **self.channels, **given})
+
+    @property
+    def silhouette(self) -> Silhouette | None:
+        """The silhouette as it was given."""
+        return self.channels.get("silhouette")
+
+    @property
+    def image(self) -> Image | None:
+        """The image as it was given."""
+        return self.channels.get("image")
+
+    @property
+    def depth_m(self) -> DepthImage | None:
+        """The depth image as it was given."""
+        return self.channels.get("depth_m")
+
+    @property
+    def points(self) -> ImagePoints | None:
+        """The detector's points."""
+        return self.channels.get("points")
+
+
+Observations = Sequence[Observation | None]
+"""One observation for each camera, the first camera first; None for a camera without data."""
+
+
+def stamp_of(observations: Observations) -> int | None:
+    """Return the common stamp of the observations, ns; None if no stamp is known.
+
+    This is the stamp of the first camera, or else the earliest stamp of the further cameras.
+    """
+    first, *others = (None if one is None else one.stamp_ns for one in observations)
+    if first is not None:
+        return first
+    return min((stamp_ns for stamp_ns in others if stamp_ns is not None), default=None)

@@ -1,0 +1,238 @@
+"""Masks of the image regions in which a person is expected, from the last posture.
+
+The masks are drawn on a grid of square cells, about 80 in a row of the image.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cache
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from cardbox_tracker.person.model import BodyModel
+from cardbox_tracker.person.sizes import FloatArray
+from cardbox_tracker.common.compiling import kernel
+from cardbox_tracker.tracking.person_points import (
+    HEAD_CENTRE,
+    HIP,
+    LEFT,
+    NECK,
+    RIGHT,
+    PersonPoints,
+)
+from cardbox_tracker.camera.camera import Camera
+
+Mask = NDArray[np.uint8]
+Point = tuple[float, float, float]
+"""Column and row in cells, and cells per metre at the point's depth."""
+
+_CELLS_IN_A_ROW = 80
+# Clothes are added to the widths of the body model.
+_CLOTHES_M = 0.02
+# All foreground within this distance of the last posture belongs to the person.
+_BAND_M = 0.1
+# Distance from the fist to the fingertips, plus the error of keypoints.
+_BEYOND_HAND_M = 0.25
+# Limit of the dilation in cells.
+_WIDEST = 40
+# Gap and width of the background ring around head and shoulders.
+_GAP_M, _RING_M = 0.05, 0.2
+
+
+@dataclass(frozen=True)
+class PersonMasks:
+    """Regions of the expected person on the grid, each (h, w), 0 or 1.
+
+    Attributes:
+        core: the body in the last posture.
+        near: cells that the person can occupy in the next frame.
+        reach: cells that the arms can reach.
+        hip: column and row of mid-hip, cells.
+        cells_per_m: scale at the hips.
+    """
+
+    core: Mask
+    near: Mask
+    reach: Mask
+    hip: tuple[float, float]
+    cells_per_m: float
+
+    def band(self) -> Mask:
+        """Return all cells (h, w) within 10 cm of the body, 0 or 1."""
+        return grown(self.core, self.cells_per_m * _BAND_M)
+
+
+class PersonDrawer:
+    """Draws the masks of one body for one camera.
+
+    Attributes:
+        cell_px: side of a cell, px.
+        shape: rows and columns of the grid.
+        front: state (14,) of the front reference at the measured place.
+        cells_per_m: scale at the person's distance in the body model.
+    """
+
+    def __init__(self, body: BodyModel, camera: Camera) -> None:
+        """Set up the grid; ``camera`` includes the pitch."""
+        self._body = body
+        self.cell_px = cell = max(1, round(camera.width / _CELLS_IN_A_ROW))
+        self.shape = -(-camera.height // cell), -(-camera.width // cell)
+        self._camera = replace(
+            camera,
+            width=self.shape[1],
+            height=self.shape[0],
+            fx=camera.fx / cell,
+            fy=camera.fy / cell,
+            cx=(camera.cx + 0.5) / cell - 0.5,
+            cy=(camera.cy + 0.5) / cell - 0.5,
+        )
+        self.cells_per_m = self._camera.fx / body.placement.distance_m
+        self._places = PersonPoints(body, self._camera)
+        self.front = body.reference_state()
+
+    def masks(self, posture: FloatArray, near_m: float) -> PersonMasks:
+        """Return the masks of a person for their last posture.
+
+        Args:
+            posture: (12,) or with ``torso_x`` and ``torso_z`` (14,), rad and metres.
+            near_m: largest movement of a body part until the next frame.
+        """
+        points = self._points(posture)
+        core: Mask = np.zeros(self.shape, np.uint8)
+        self._draw_head(core, points, _CLOTHES_M)
+        self._draw_torso(core, points, _CLOTHES_M)
+        size = self._body.size
+        thick_m = size("upper_arm_width") + 2 * _CLOTHES_M
+        for first in (LEFT, RIGHT):
+            for start in (first, first + 1):
+                nearest = max(points[start][2], points[start + 1][2])
+                _line(core, points[start], points[start + 1], nearest * thick_m)
+        scale = points[HIP][2]
+        near = grown(core, scale * near_m)
+        reach = near.copy()
+        length_m = size("upper_arm_length") + size("forearm_length") + _BEYOND_HAND_M
+        for first in (LEFT, RIGHT):
+            depth_m = self._camera.fx / points[first][2]
+            radius_m = min(length_m, 0.9 * depth_m)
+            # The silhouette of a sphere is wider than a disc of its radius.
+            radius_m *= depth_m / float(np.sqrt(depth_m**2 - radius_m**2))
+            _disc(reach, points[first], radius_m * points[first][2])
+        return PersonMasks(core, near, reach, points[HIP][:2], scale)
+
+    def head_and_shoulders(self) -> tuple[list[NDArray[np.float32]], tuple[int, int]]:
+        """Return a head kernel, a trunk kernel, and column and row of the hips in them.
+
+        A kernel's product with a silhouette on the grid is the foreground share of head or trunk,
+        minus the foreground share of the ring around head and shoulders.
+        """
+        points = self._points(self.front)
+        head, trunk, gap, ring = (np.zeros(self.shape, np.uint8) for _ in range(4))
+        self._draw_head(head, points, 0.0)
+        self._draw_torso(trunk, points, 0.0)
+        for mask, grow_m in ((gap, _GAP_M), (ring, _RING_M)):
+            self._draw_head(mask, points, grow_m)
+            self._draw_torso(mask, points, grow_m)
+        hip, shoulder = points[HIP], points[LEFT]
+        rows = np.arange(self.shape[0])
+        trunk[rows > hip[1]] = 0
+        around = (ring > 0) & (gap == 0) & (rows < shoulder[1])[:, None]
+        kernels = []
+        for inside in (head > 0, trunk > 0):
+            kernel = np.zeros(self.shape, np.float32)
+            kernel[around] = -1.0 / max(int(np.count_nonzero(around)), 1)
+            kernel[inside] = 1.0 / max(int(np.count_nonzero(inside)), 1)
+            kernels.append(kernel)
+        column, row = (
+            int(np.clip(round(place), 0, length - 1))
+            for place, length in zip(hip[:2], self.shape[::-1], strict=True)
+        )
+        return kernels, (column, row)
+
+    def _points(self, posture: FloatArray) -> list[Point]:
+        """Return hip, neck, head, then shoulder, elbow and fingertips of each arm."""
+        points: list[list[float]] = self._places.of(posture).tolist()
+        return [(column, row, scale) for column, row, scale in points]
+
+    def _draw_head(self, mask: Mask, points: list[Point], grow_m: float) -> None:
+        """Draw head and neck, widened by ``grow_m``."""
+        size, neck, head = self._body.size, points[NECK], points[HEAD_CENTRE]
+        _line(mask, neck, head, 2 * head[2] * (0.3 * size("head_width") + grow_m))
+        _disc(mask, head, head[2] * (0.5 * size("head_height") + grow_m))
+
+    def _draw_torso(self, mask: Mask, points: list[Point], grow_m: float) -> None:
+        """Draw the torso and the region below the hips, widened by ``grow_m``."""
+        size, hip, neck = self._body.size, points[HIP], points[NECK]
+        half_m = 0.5 * max(size("torso_top_width"), size("torso_bottom_width"))
+        wide = 2 * hip[2] * (half_m + grow_m)
+        floor = (hip[0], self.shape[0] + wide, hip[2])
+        middle = (0.5 * (hip[0] + neck[0]), 0.5 * (hip[1] + neck[1]), hip[2])
+        _line(mask, middle, hip, wide)
+        _line(mask, hip, floor, wide)
+        arm = 2 * hip[2] * (0.5 * size("upper_arm_width") + grow_m)
+        _line(mask, points[LEFT], points[RIGHT], arm)
+        for shoulder in (points[LEFT], points[RIGHT]):
+            _line(mask, shoulder, hip, 2 * hip[2] * (0.5 * half_m + grow_m))
+
+
+def grown(mask: Mask, cells: float) -> Mask:
+    """Return a mask (h, w), 0 or 1, dilated by a disc whose radius is ``cells``, at most 40."""
+    radius = max(0, min(round(cells), _WIDEST))
+    found: Mask = np.zeros_like(mask)
+    nearest = np.empty_like(mask)
+    _dilate(mask, _reaches_of(radius), nearest, found)
+    return found
+
+
+@cache
+def _reaches_of(radius: int) -> NDArray[np.uint8]:
+    """Return how far a disc of 2 ``radius`` + 1 rows reaches to either side, in cells."""
+    wide = 2 * radius + 1
+    disc = np.asarray(cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (wide, wide)))
+    reaches: NDArray[np.uint8] = (np.count_nonzero(disc, axis=1) // 2).astype(np.uint8)
+    return reaches
+
+
+@kernel
+def _dilate(mask: Mask, reaches: NDArray[np.uint8], nearest: Mask, found: Mask) -> None:
+    """Add the dilation of ``mask`` (h, w) to ``found``; ``nearest`` (h, w) is scratch memory.
+
+    ``nearest`` becomes the distance of each cell to the nearest one of its row that is 1.
+    """
+    height, width = mask.shape
+    radius = len(reaches) // 2
+    far = np.uint8(255)
+    first, last = height, -1
+    for v in range(height):
+        away, is_empty = far, True
+        for u in range(width):
+            away = np.uint8(0) if mask[v, u] else away + np.uint8(away < far)
+            nearest[v, u] = away
+            is_empty &= mask[v, u] == 0
+        if is_empty:
+            continue
+        first, last = min(first, v), v
+        for u in range(width - 2, -1, -1):
+            nearest[v, u] = min(nearest[v, u], nearest[v, u + 1] + np.uint8(1))
+    for v in range(first, last + 1):
+        if nearest[v, 0] == far:
+            continue
+        for i in range(max(radius - v, 0), min(radius + height - v, len(reaches))):
+            reach, row = reaches[i], v + i - radius
+            for u in range(width):
+                found[row, u] |= np.uint8(nearest[v, u] <= reach)
+
+
+def _whole(place: Point) -> tuple[int, int]:
+    column, row, _ = place
+    return round(min(max(column, -1000.0), 1000.0)), round(min(max(row, -1000.0), 1000.0))
+
+
+def _line(mask: Mask, start: Point, end: Point, wide: float) -> None:
+    cv2.line(mask, _whole(start), _whole(end), 1, min(max(1, round(wide)), 255))
+
+
+def _disc(mask: Mask, middle: Point, radius: float) -> None:
+    cv2.circle(mask, _whole(middle), min(max(0, round(radius)), 1000), 1, cv2.FILLED)

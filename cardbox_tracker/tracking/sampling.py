@@ -1,0 +1,60 @@
+"""Samples of the posterior of an estimate, from particles or from mean and deviations."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from cardbox_tracker.person.posture import TURNING_LIMITS
+from cardbox_tracker.person.sizes import FloatArray
+from cardbox_tracker.search.particles import Particles
+
+
+def normal_postures(
+    posture: FloatArray, stddev: FloatArray, count: int, rng: np.random.Generator
+) -> FloatArray:
+    """Return postures (count, 12) with independent normal joints, clipped to their limits.
+
+    Mean and deviations have neither correlations nor the mirror ambiguity in depth;
+    :func:`likely_postures` has both.
+
+    Args:
+        posture: mean, (12,), rad and metres.
+        stddev: standard deviations, (12,).
+        count: number of samples.
+        rng: random numbers.
+    """
+    noise = rng.standard_normal((count, len(posture)))
+    drawn: FloatArray = np.clip(
+        posture + stddev * noise, TURNING_LIMITS[:, 0], TURNING_LIMITS[:, 1]
+    )
+    return drawn
+
+
+def likely_postures(
+    posture: FloatArray | None,
+    stddev: FloatArray | None,
+    offset_m: FloatArray | None,
+    particles: Particles | None,
+    count: int,
+    rng: np.random.Generator,
+) -> FloatArray:
+    """Return equally weighted samples (count, 12) of the posterior of an estimate.
+
+    They are drawn from the particles, or by :func:`normal_postures` without particles.
+
+    Args:
+        posture: posture of the estimate, (12,).
+        stddev: standard deviations of the estimate, (12,).
+        offset_m: ``torso_x`` and ``torso_z`` of the estimate, (2,), needed with particles.
+        particles: particles of the same image.
+        count: number of samples.
+        rng: random numbers.
+
+    Raises:
+        ValueError: the estimate has no posture.
+    """
+    if posture is None or stddev is None:
+        raise ValueError("the estimate has no posture to sample from")
+    if particles is None or offset_m is None:
+        return normal_postures(posture, stddev, count, rng)
+    return particles.postures(np.concatenate([posture, offset_m]), count, rng)

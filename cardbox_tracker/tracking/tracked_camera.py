@@ -1,0 +1,122 @@
+"""One camera of a tracker: view of the body, selection of the person, terms of the cost."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import cv2
+import numpy as np
+
+from cardbox_tracker.person.model import BodyModel
+from cardbox_tracker.person.sizes import FloatArray
+from cardbox_tracker.search.config import TrackerConfig
+from cardbox_tracker.terms.drawn_body import body_tuple
+from cardbox_tracker.terms.silhouette import rows_above_hips
+from cardbox_tracker.terms.term import USUAL_INTERVAL_S, Frame, Posed, Term
+from cardbox_tracker.camera.view import OtherCamera, View
+from cardbox_tracker.tracking.depth_agreement import DepthAgreement
+from cardbox_tracker.tracking.observation import CHANNELS, Observation
+from cardbox_tracker.tracking.person_region import PersonRegion
+from cardbox_tracker.camera.camera import Camera
+
+
+class TrackedCamera:
+    """The first camera, or a further one whose images are turned upright.
+
+    Attributes:
+        view: the body in the frame of a further camera; None for the first camera.
+        terms: terms of its cost in addition to the silhouette.
+        depth: check that its depth images show the view of its silhouettes.
+    """
+
+    def __init__(
+        self,
+        body: BodyModel,
+        first: Camera,
+        config: TrackerConfig,
+        other: OtherCamera | None = None,
+    ) -> None:
+        """Prepare for ``body`` in front of ``first``, with the pitch of the body model.
+
+        Call :meth:`reset` before the first frame.
+
+        Args:
+            body: the person.
+            first: the first camera.
+            config: settings of the tracker.
+            other: this camera if it is a further one; None for the first camera.
+
+        Raises:
+            CameraError: the person is not in front of the camera.
+        """
+        self.view = None if other is None else View.of(body, first, other)
+        raw = first if other is None else other.camera
+        self._size = raw.height, raw.width
+        self._name = "the first camera" if other is None else "a further camera"
+        self._body = body if self.view is None else self.view.body
+        self._camera = first if self.view is None else self.view.camera
+        # The cost of a further camera limits the rows where the person is found.
+        self._rows = rows_above_hips(body, first) if self.view is None else self._camera.height
+        self.configure(config)
+        self._region: PersonRegion | None = None
+        self.depth = DepthAgreement()
+
+    def configure(self, config: TrackerConfig) -> None:
+        """Build the terms from other settings."""
+        built = (settings.build(self._body, self._camera) for settings in config.terms)
+        self.terms: list[Term] = [term for term in built if term is not None]
+        self._posable = body_tuple(self._body, self._camera)
+
+    def reset(self, config: TrackerConfig) -> None:
+        """Forget the region of the person in the images."""
+        self._region = PersonRegion(self._body, self._camera) if config.select_person else None
+
+    def frame(
+        self,
+        observation: Observation | None,
+        before: FloatArray | None,
+        is_sure: bool,
+        interval_s: float = USUAL_INTERVAL_S,
+    ) -> Frame:
+        """Return the frame of an observation: upright, with the person's part of the silhouette.
+
+        Args:
+            observation: data of the camera; without a silhouette, the frame is empty.
+            before: state (14,) of the previous frame for the first camera; None at the start of
+                tracking.
+            is_sure: whether that state fitted.
+            interval_s: time since the previous frame, s.
+
+        Raises:
+            ValueError: data do not fit the camera, see :data:`~.observation.CHANNELS`.
+        """
+        if before is not None and self.view is not None:
+            before = self.view.states(before)
+        channels, camera = self._channels(observation), self._camera
+        if "silhouette" not in channels:
+            nothing = np.zeros((camera.height, camera.width), np.uint8)
+            channels = {"silhouette": nothing}
+        elif self._region is not None:
+            channels["silhouette"] = self._region.select(
+                channels["silhouette"], before, is_sure, channels.get("image")
+            )
+        silhouette = channels["silhouette"]
+        if self.depth.accepted(silhouette, channels.get("depth_m")) is None:
+            channels.pop("depth_m", None)
+        return Frame(
+            camera,
+            channels,
+            self._rows,
+            cv2.countNonZero(np.ascontiguousarray(silhouette[: self._rows])),
+            None if before is None else Posed(self._posable, before[None]),
+            interval_s,
+            None if observation is None else observation.stamp_ns,
+        )
+
+    def _channels(self, observation: Observation | None) -> dict[str, Any]:
+        """Return the data of all channels, checked and turned upright."""
+        channels = {}
+        for name, given in ({} if observation is None else observation.channels).items():
+            data = CHANNELS[name].checked(given, f"{name} of {self._name}", self._size)
+            channels[name] = data if self.view is None else CHANNELS[name].upright(self.view, data)
+        return channels

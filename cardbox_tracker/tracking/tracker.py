@@ -1,0 +1,332 @@
+"""Tracking of one person's posture over silhouettes, with a confidence for each frame."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from functools import partial
+from itertools import zip_longest
+from types import MappingProxyType
+
+import numpy as np
+
+from cardbox_tracker.person.kinematics import clavicles
+from cardbox_tracker.person.model import BodyModel
+from cardbox_tracker.person.posture import N_STATE
+from cardbox_tracker.person.sizes import FloatArray
+from cardbox_tracker.tracking.camera_agreement import CameraAgreement
+from cardbox_tracker.search.config import TrackerConfig
+from cardbox_tracker.terms.compiled import CompiledSilhouette
+from cardbox_tracker.terms.drawn_body import body_tuple
+from cardbox_tracker.terms.silhouette import SilhouetteTerm
+from cardbox_tracker.terms.term import USUAL_INTERVAL_S, Frame, Image, Posed, Silhouette
+from cardbox_tracker.camera.view import OtherCamera, View
+from cardbox_tracker.tracking.estimate import (
+    LOST,
+    NO_PERSON,
+    TRACKING,
+    UNCERTAIN,
+    Estimate,
+)
+from cardbox_tracker.tracking.facing import Facing
+from cardbox_tracker.search.cycles import Cycles
+from cardbox_tracker.search.doubt import doubted
+from cardbox_tracker.search.particles import Particles
+from cardbox_tracker.search.pose_filter import (
+    Corrector,
+    MakeFilter,
+    PoseFilter,
+    Presence,
+)
+from cardbox_tracker.search.whole_body import WholeBodyFilter
+from cardbox_tracker.tracking.fitting import Fitting
+from cardbox_tracker.tracking.head import HeadTracker
+from cardbox_tracker.tracking.observation import Observation, Observations, stamp_of
+from cardbox_tracker.tracking.sampling import likely_postures
+from cardbox_tracker.tracking.tracked_camera import TrackedCamera
+from cardbox_tracker.common.settings import restarts
+from cardbox_tracker.camera.camera import Camera
+
+FILTERS: MappingProxyType[str, MakeFilter] = MappingProxyType(
+    {"hierarchical": Cycles, "whole_body": WholeBodyFilter}
+)
+"""Filter classes by the values of ``TrackerConfig.filter``."""
+
+
+class Tracker:
+    """Tracks one measured person (paper, algorithm "Online Motion Tracking").
+
+    Attributes:
+        agreement: check of the extrinsics of several cameras; None with one camera.
+    """
+
+    def __init__(
+        self,
+        body: BodyModel,
+        camera: Camera,
+        config: TrackerConfig | None = None,
+        rng: np.random.Generator | None = None,
+        silhouette: SilhouetteTerm | None = None,
+        make_filter: MakeFilter | None = None,
+        others: Sequence[OtherCamera] = (),
+        corrector: Corrector | None = None,
+    ) -> None:
+        """Set up for ``body``; the camera gets the pitch of the body model.
+
+        Args:
+            body: the person. Unknown values are fitted while tracking, which replaces the attribute
+                ``body``. Until then, estimates are at best ``uncertain``.
+            camera: working camera, of the silhouettes' size.
+            config: settings; the paper's by default.
+            rng: source of all noise; seeded with 0 by default.
+            silhouette: implementation of the silhouette's term; compiled by default.
+            make_filter: filter that replaces the one of the settings.
+            others: further cameras; they need the filter ``whole_body``.
+            corrector: changes the fitted state of each frame before it becomes the result; joints
+                are kept within their limits. It needs the filter ``whole_body``.
+
+        Raises:
+            CameraError: the person was not measured in front of one of ``others``.
+            ValueError: there are ``others`` or a ``corrector``, but the filter is not
+                ``whole_body``.
+        """
+        self.camera = camera.with_pitch(body.camera_pose.pitch_rad)
+        self.config = config or TrackerConfig()
+        self._rng = rng or np.random.default_rng(0)
+        self._make_filter, self._corrector = make_filter, corrector
+        self._others = tuple(others)
+        if (others or corrector) and (make_filter or not self.config.has_several_views):
+            what = "several cameras need" if others else "a corrector needs"
+            raise ValueError(f"{what} the filter whole_body: the preset default")
+        self._fitting = None
+        self.agreement: CameraAgreement | None = None
+        if body.unknown:
+            fits = self._rng.spawn(1)[0]
+            self._fitting = Fitting(body, self.camera, self.config, fits)
+        self._use(body, silhouette or CompiledSilhouette(body, self.camera))
+
+    def _use(self, body: BodyModel, silhouette: SilhouetteTerm) -> None:
+        """Track ``body`` from the next frame on."""
+        self.body = self.config.with_shoulders(body)
+        self._silhouette = silhouette
+        self._cameras = [
+            TrackedCamera(self.body, self.camera, self.config, other)
+            for other in (None, *self._others)
+        ]
+        views = self.views
+        earlier = self.agreement
+        self.agreement = CameraAgreement(body, self.camera, views, earlier) if views else None
+        self.reset()
+
+    def reset(self) -> None:
+        """Forget the posture; the next frame is tracked from the front reference posture."""
+        make_filter = self._make_filter or FILTERS[self.config.filter]
+        if self._corrector is not None:
+            make_filter = partial(WholeBodyFilter, corrector=self._corrector)
+        for camera in self._cameras:
+            camera.reset(self.config)
+        rng = self._rng.spawn(1)[0]
+        self._filter = make_filter(self.config, self._silhouette, rng, self.views)
+        self._head = HeadTracker(self.body, self.camera)
+        # The outlines of several cameras determine the direction; the paper has no such doubt.
+        is_alone = self.config.has_several_views and not self._others
+        self._facing = Facing(self.body) if is_alone else None
+        self._poor_frames = 0
+        self._last_ns: int | None = None
+        self._particles: Particles | None = None
+        # State (14,) of the previous frame for the terms.
+        self._before: FloatArray | None = None
+        # IoU of the last result before any correction.
+        self._seen_iou = 0.0
+
+    def configure(self, config: TrackerConfig) -> bool:
+        """Use other settings from the next frame on.
+
+        Returns:
+            True if tracking starts again, as after :meth:`reset`, because the particles change.
+        """
+        is_new_start = restarts(self.config, config)
+        if config.terms != self.config.terms:
+            for camera in self._cameras:
+                camera.configure(config)
+        self.config = config
+        if is_new_start:
+            self.reset()
+        else:
+            self._filter.configure(config)
+        return is_new_start
+
+    @property
+    def filter(self) -> PoseFilter:
+        """The particle filter, for tools that need more than the estimate."""
+        return self._filter
+
+    @property
+    def views(self) -> tuple[View, ...]:
+        """Views of the body from the further cameras."""
+        return tuple(camera.view for camera in self._cameras if camera.view is not None)
+
+    @property
+    def remarks(self) -> list[str]:
+        """Warnings about images that contradict each other, for diagnostics and logs."""
+        return [text for text in (camera.depth.remark for camera in self._cameras) if text]
+
+    def camera_ious(self) -> list[float | None]:
+        """Return the IoU of the last estimate with each camera's silhouette, the first one first.
+
+        Returns:
+            One value for each camera; None for a camera that showed no person.
+        """
+        return self._filter.ious()
+
+    def track(
+        self,
+        observations: Observations | Observation | Silhouette,
+        image: Image | None = None,
+        stamp_ns: int | None = None,
+    ) -> Estimate:
+        """Estimate the posture from the observations of all cameras at one time.
+
+        Args:
+            observations: one for each camera, the first camera first. A camera without data has
+                None or an observation without a silhouette, and may be missing at the end. A single
+                observation or silhouette (H, W) belongs to the first camera. Masks of any numeric
+                type are silhouettes, see
+                :func:`~cardbox_tracker.camera.given_arrays.silhouette_from`.
+            image: (H, W) grey or (H, W, 3) bgr of the same time as a bare silhouette.
+            stamp_ns: time of a bare silhouette, ns. Without a stamp, the interval to the previous
+                frame is 1/15 s.
+
+        Raises:
+            ValueError: the size of an array is not its camera's, or its type or values are
+                impossible; points are no ImagePoints; there are more observations than cameras; or
+                ``image`` or ``stamp_ns`` is given in addition to observations.
+        """
+        if isinstance(observations, np.ndarray):
+            observations = Observation(observations, image, stamp_ns=stamp_ns)
+        elif image is not None or stamp_ns is not None:
+            raise ValueError("give image and stamp_ns in the observations, not beside them")
+        if isinstance(observations, Observation):
+            observations = (observations,)
+        if not isinstance(observations, Sequence):
+            raise ValueError(
+                f"the observations are of the type {type(observations).__name__}; expected a "
+                "silhouette as a numpy array, an Observation, or a list with one for each camera"
+            )
+        if not 1 <= len(observations) <= len(self._cameras):
+            raise ValueError(
+                f"there are {len(observations)} observations; expected one for each of "
+                f"{len(self._cameras)} cameras"
+            )
+        for one in observations:
+            if one is not None and not isinstance(one, Observation):
+                raise ValueError(
+                    f"an observation is of the type {type(one).__name__}; expected an Observation, "
+                    "such as Observation(silhouette), or None"
+                )
+        frames = self._frames_of(observations)
+        estimate = self._track(frames)
+        return self._head.see(frames[0], estimate)
+
+    def _frames_of(self, observations: Observations) -> list[Frame]:
+        """Return the frames of all cameras; the frame of a camera without data is empty."""
+        stamp_ns, before_ns = stamp_of(observations), self._last_ns
+        self._last_ns, interval_s = stamp_ns, USUAL_INTERVAL_S
+        if stamp_ns is not None and before_ns is not None and stamp_ns > before_ns:
+            interval_s = (stamp_ns - before_ns) / 1e9
+        is_sure = self._poor_frames == 0
+        return [
+            camera.frame(observation, self._before, is_sure, interval_s)
+            for camera, observation in zip_longest(self._cameras, observations)
+        ]
+
+    def _track(self, frames: list[Frame]) -> Estimate:
+        if self._fitting is None:
+            return self._follow(frames)
+        silhouette, image = frames[0].silhouette, frames[0].image
+        fitted = self._fitting.before(silhouette, image)
+        if fitted is not None:
+            self._use(fitted, CompiledSilhouette(fitted, self.camera))
+            again = self._silhouette.frame(silhouette)
+            counted = again.rows, again.foreground_px
+            frames[0] = frames[0].changed(rows=counted[0], foreground_px=counted[1], before=None)
+        estimate = self._follow(frames)
+        iou = None if estimate.iou is None else self._seen_iou
+        self._fitting.after(estimate.state != NO_PERSON, iou)
+        if estimate.posture is not None:
+            there = estimate.placed(self.body)
+            self._fitting.compare(silhouette, image, there, estimate.posture)
+        if self.body.unknown and estimate.state == TRACKING:
+            return replace(estimate, state=UNCERTAIN)
+        return estimate
+
+    def sample(self, estimate: Estimate, count: int, rng: np.random.Generator) -> FloatArray:
+        """Sample postures (count, 12) for the last ``estimate``; see ``likely_postures``."""
+        found = estimate.posture, estimate.posture_stddev, estimate.offset_m
+        return likely_postures(*found, self._particles, count, rng)
+
+    def _follow(self, frames: Sequence[Frame]) -> Estimate:
+        presence = self._filter.look(frames)
+        if presence is Presence.NOBODY:
+            self._before = None
+            if self._facing is not None:
+                self._facing.forget()
+            if self.config.relocalize:
+                # The person may come back at another place.
+                self._filter.forget()
+            return Estimate(NO_PERSON)
+        if presence is Presence.TOO_MUCH:
+            # After a short change of the light, the person is still at the same place.
+            return Estimate(LOST)
+        if self.agreement is not None:
+            self.agreement.look(*_silhouettes(frames))
+        fit = self._filter.follow(frames, [camera.terms for camera in self._cameras])
+        self._particles = fit.particles
+        if not fit.is_finite:
+            # Without a reset, values that are not finite would stay in the particles.
+            self.reset()
+            return Estimate(LOST)
+        self._before, self._seen_iou = np.zeros(N_STATE), fit.seen_iou
+        self._before[: len(fit.seen)] = fit.seen
+        self._poor_frames = self._poor_frames + 1 if fit.is_poor else 0
+        if self._poor_frames >= self.config.lost_frames:
+            if self.config.relocalize:
+                self._filter.recover()
+            return Estimate(LOST)
+        if self.agreement is not None and fit.offset_m is not None:
+            self.agreement.see(self._before, *_silhouettes(frames))
+        judged, is_doubtful = fit.judged, self._is_doubtful(frames[0])
+        states = None if judged is None else judged.states
+        if is_doubtful and states is not None:
+            states = doubted(states)
+        is_uncertain = is_doubtful or (judged is not None and judged.is_uncertain)
+        clavicles_m, clavicles_stddev_m = clavicles(self.body, fit.posture, fit.posture_stddev)
+        return Estimate(
+            UNCERTAIN if is_uncertain else TRACKING,
+            fit.posture,
+            fit.posture_stddev,
+            fit.keypoints_m,
+            fit.cost_px,
+            fit.iou,
+            fit.offset_m,
+            fit.offset_stddev_m,
+            keypoint_states=states,
+            keypoint_chances=None if judged is None else judged.chances,
+            evidence=None if judged is None else judged.evidence,
+            clavicles_m=clavicles_m,
+            clavicles_stddev_m=clavicles_stddev_m,
+        )
+
+    def _is_doubtful(self, frame: Frame) -> bool:
+        """Return whether poses of cameras, or a person's back, make the whole result doubtful."""
+        if self._facing is not None and self._before is not None:
+            posable = body_tuple(self.body, self.camera)
+            self._facing.see(frame, Posed(posable, self._before[None]))
+            return self._facing.shows_back
+        return self.agreement is not None and self.agreement.is_contradicted
+
+
+def _silhouettes(frames: Sequence[Frame]) -> tuple[Silhouette, list[Silhouette]]:
+    """Return the silhouette of the first camera and those of the further ones."""
+    first, *others = (frame.silhouette for frame in frames)
+    return first, others

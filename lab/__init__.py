@@ -1,0 +1,1 @@
+"""Work on the package that no user needs: experiments, benchmarks, tools, fits of shipped files."""

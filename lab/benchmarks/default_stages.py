@@ -1,0 +1,73 @@
+"""Time of the parts of a frame with the preset ``default``."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from typing import Any
+
+import numpy as np
+
+from lab.benchmarks.scene import BenchmarkScene
+from lab.benchmarks.tools import WARM_UP, summary
+from cardbox_tracker.search.config import default_preset
+from cardbox_tracker.search import whole_body
+from cardbox_tracker.search.arm_search import ArmSearch
+from cardbox_tracker.estimation.filtering.outline_fit import OutlineFit
+from cardbox_tracker.search.whole_body import WholeBodyFilter
+from cardbox_tracker.tracking.tracker import Tracker
+
+WHOLE = "the whole frame"
+# No part contains another one, so that the rest is the difference to the whole.
+_PARTS: dict[str, tuple[Any, str]] = {
+    "region of the person": (Tracker, "_frames_of"),
+    "silhouette as bits, presence": (WholeBodyFilter, "look"),
+    "place of the person": (WholeBodyFilter, "_observe"),
+    "search of torsos": (WholeBodyFilter, "_torsos"),
+    "search of both arms": (ArmSearch, "__call__"),
+    "search of all joints together": (WholeBodyFilter, "_together"),
+    "fit to the outline": (OutlineFit, "__call__"),
+    "states of the keypoints": (whole_body, "judged"),
+}
+
+
+def measure_default_stages(scene: BenchmarkScene) -> dict[str, dict[str, float]]:
+    """Return the times of the parts, of the rest and of the whole frame, ms."""
+    times_ms: dict[str, list[float]] = {name: [] for name in _PARTS}
+    whole_ms: list[float] = []
+    with _timed(times_ms):
+        tracker = Tracker(scene.body, scene.camera, default_preset())
+        for silhouette in scene.silhouettes:
+            for values in times_ms.values():
+                values.append(0.0)
+            start = time.perf_counter()
+            tracker.track(silhouette)
+            whole_ms.append(1e3 * (time.perf_counter() - start))
+    rest_ms = np.array(whole_ms) - np.sum(list(times_ms.values()), axis=0)
+    rows = {**times_ms, "everything else": rest_ms.tolist(), WHOLE: whole_ms}
+    return {name: summary(values[WARM_UP:]) for name, values in rows.items()}
+
+
+@contextmanager
+def _timed(times_ms: dict[str, list[float]]) -> Iterator[None]:
+    """Context in which calls of the parts add their time to the last value of their list."""
+    before = {name: getattr(*place) for name, place in _PARTS.items()}
+    for name, (owner, called) in _PARTS.items():
+        setattr(owner, called, _timing(before[name], times_ms[name]))
+    try:
+        yield
+    finally:
+        for name, (owner, called) in _PARTS.items():
+            setattr(owner, called, before[name])
+
+
+def _timing(call: Callable[..., Any], times_ms: list[float]) -> Callable[..., Any]:
+    def timed(*arguments: Any) -> Any:
+        start = time.perf_counter()
+        try:
+            return call(*arguments)
+        finally:
+            times_ms[-1] += 1e3 * (time.perf_counter() - start)
+
+    return timed

@@ -1,0 +1,220 @@
+"""The benchmark's report in Markdown, and the README's figures of speed, from its JSON file."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from lab.benchmarks.nodes import PERCENTILES
+from cardbox_tracker.common.files import atomic_path
+
+BEGIN, END = "<!-- benchmark:begin -->", "<!-- benchmark:end -->"
+COMMAND = "make benchmark"
+PICTURE_OF_WAY = "images/way.png"
+"""Plot of the steps of an image's way, relative to the report."""
+
+_STREAM = "mono8 320x240 at 30 Hz"
+
+_FRAMES = {
+    "paper": "silhouette to posture, the paper's settings",
+    "opencv": "the same with OpenCV drawing the patches",
+    "default": "silhouette to posture, preset `default`",
+    "image_to_posture": "image to posture, the paper's settings",
+}
+
+
+def write_report(results: Mapping[str, Any], path: Path) -> None:
+    """Write the report of ``results``, as ``benchmark.json`` holds them, to ``path``."""
+    with atomic_path(path) as temporary:
+        temporary.write_text(report(results), encoding="utf-8")
+
+
+def report(results: Mapping[str, Any]) -> str:
+    """Return the whole report."""
+    versions = ", ".join(f"{name} {version}" for name, version in results["versions"].items())
+    parts = [
+        "# Benchmarks",
+        f"`{COMMAND}` made this page on {results['cpu']} with {results['cores']} cores; "
+        f"{versions}; commit {results['commit']}. "
+        "[benchmarks.json](benchmarks.json) has all numbers.",
+        "The first three tables were measured on one core, on "
+        f"{results['measured_frames']} images (320x240) of a synthetic person who waves. The "
+        "compared trackers take turns of ten images. p95 is the 95th percentile.",
+        "## One image",
+        _table(
+            ("600 particles unless the preset says otherwise", "median", "p95"),
+            [(_FRAMES[name], *_ms(times)) for name, times in results["frames"].items()],
+        ),
+        f"The compiled cost is {results['ratio_opencv']:.0f} times faster than `fillConvexPoly`, "
+        f"XOR and `countNonZero`. The preset `default` takes {results['ratio_default']:.1f} times "
+        "as long as the paper's settings, and the volumetric model of 42 planes "
+        f"{results['ratio_volumetric']:.1f} times as long as the cardbox model of 15. The process "
+        f"holds {results['rss_mb']:.0f} MB.",
+        "## Parts of a frame with the preset `default`",
+        _stages(results["default_stages"]),
+        "## Resolution and particles",
+        f"Twice the width and height take {results['ratio_double_resolution']:.2f} times as long.",
+        _table(
+            ("image", "median", "p95"),
+            [(name, *_ms(times)) for name, times in results["resolutions"].items()],
+        ),
+        f"One core manages {results['particles_at_30hz']:,} particles per image at 30 Hz.",
+        *_ratios(results.get("ratios")),
+        *_nodes(results["nodes"]),
+        *_way(results["way"]),
+        "In the pauses of a live node the processor slows down and its caches cool. Image to "
+        "posture, preset `default`, takes "
+        f"{results['after_pauses']['without_ms']:.1f} ms without pauses and "
+        f"{results['after_pauses']['with_ms']:.1f} ms after each thirtieth of a second.",
+    ]
+    return "\n\n".join(parts) + "\n"
+
+
+def readme_section(results: Mapping[str, Any]) -> str:
+    """Return the README's table of speed."""
+    rows = [
+        (
+            "silhouette to posture, 600 particles, one core",
+            _ms(results["frames"]["paper"])[0],
+        ),
+        (
+            "the same with OpenCV drawing the patches takes",
+            f"{results['ratio_opencv']:.0f} times as long",
+        ),
+        ("particles per image that one core manages at 30 Hz", f"{results['particles_at_30hz']:,}"),
+    ]
+    nodes = results["nodes"]
+    for words, measured in (
+        (("all nodes in one process", nodes["single_process"]), ("each in its own", nodes))
+        if nodes
+        else ()
+    ):
+        stream = measured["streams"][_STREAM]
+        text = f"{stream['p50_ms']:.1f} ms median, {stream['p95_ms']:.1f} ms p95"
+        rows.append((f"image stamp to JointState over DDS, {_STREAM}, {words}", text))
+    return _table(("speed", f"on {results['cpu']}"), rows)
+
+
+def _ratios(ratios: Mapping[str, Any] | None) -> list[str]:
+    if ratios is None:
+        return []
+    silhouette = ratios["silhouette"]
+    without = silhouette["ratios_without"]
+    rows = [
+        ("silhouette with all steps / by brightness alone", f"{silhouette['ratio']:.2f}"),
+        *((f"without {name} / by brightness alone", f"{of:.2f}") for name, of in without.items()),
+        ("a frame with two cameras / with one, preset `default`", f"{ratios['two_views']:.2f}"),
+        *(
+            (f"start of `{name}` ({start['seconds']:.2f} s) / imports", f"{start['ratio']:.1f}")
+            for name, start in (ratios["start"] or {}).items()
+        ),
+        (
+            "`cardbox track FOLDER` of eight recordings with one process / with two",
+            f"{ratios['folder']:.2f}",
+        ),
+    ]
+    return [
+        "## Ratios",
+        f"`python -m lab.benchmarks.ratios` (commit {ratios['commit']}) measures times in turns, on "
+        "one core except the last. A start lasts until all nodes of a process wait for their "
+        "input, with compiled code in the cache; `imports` are those of rclpy, numba, OpenCV and "
+        "numpy. `python -m lab.benchmarks.silhouette RECORDING` measures a recording's silhouettes.",
+        _table(("ratio", "median"), rows),
+    ]
+
+
+def _nodes(nodes: Mapping[str, Any] | None) -> list[str]:
+    if nodes is None:
+        return ["## Nodes", "Not measured: ROS 2 was not installed."]
+    return [
+        "## Nodes",
+        "Time from the image's stamp until the callback of a Python subscriber has the JointState, "
+        "over DDS on one machine, preset `default`; in brackets until the message is in its "
+        "process. Processor time is in percent of one core.",
+        "### Each node a process of its own",
+        *_streams(nodes),
+        "### All nodes in one process (`cardbox_nodes`)",
+        *_streams(nodes["single_process"]),
+        *_beside_detector(nodes.get("with_detector")),
+    ]
+
+
+def _way(ways: Mapping[str, Any] | None) -> list[str]:
+    if not ways:
+        return []
+    rows = [
+        (
+            step,
+            *(
+                f"{measured[step]['p50_ms']:.2f} ms, {measured[step]['p95_ms']:.2f} ms"
+                for measured in ways.values()
+            ),
+        )
+        for step in next(iter(ways.values()))
+    ]
+    return [
+        "### Where the milliseconds are",
+        "Grey images of 320x240 at 30 Hz; median and 95th percentile of each step.",
+        _table(("step", *ways), rows),
+        f"![Medians of the steps]({PICTURE_OF_WAY})",
+    ]
+
+
+def _beside_detector(measured: Mapping[str, Any] | None) -> list[str]:
+    if measured is None:
+        return []
+    return [
+        "### Beside the node `detector`",
+        "The tracker takes the detector's [points](detectors.md) when they come. The networks do "
+        "not recognize the drawn person; an image takes two thirds of the time of a person then.",
+        *_streams(measured),
+    ]
+
+
+def _streams(measured: Mapping[str, Any]) -> list[str]:
+    ready = ", ".join(f"{name} {seconds:.1f} s" for name, seconds in measured["ready_s"].items())
+    memory = ", ".join(f"{name} {value:.0f} MB" for name, value in measured["rss_mb"].items())
+    processes = list(measured["ready_s"])
+    several = len(processes) > 1
+    rows = [
+        (
+            name,
+            *(
+                f"{stream[f'p{p}_ms']:.1f} ms ({stream[f'received_p{p}_ms']:.1f})"
+                for p in PERCENTILES
+            ),
+            f"{stream['received']}/{stream['sent']}",
+            *(f"{stream['cpu_percent'][process]:.0f} %" for process in processes),
+            *([f"{stream['cpu_percent_sum']:.0f} %"] if several else []),
+        )
+        for name, stream in measured["streams"].items()
+    ]
+    titles = (*(f"p{p}" for p in PERCENTILES), "arrived", *processes)
+    return [
+        _table(
+            (
+                "stream",
+                *titles,
+                *(["all three" if len(processes) == 3 else "all"] if several else []),
+            ),
+            rows,
+        ),
+        f"Ready after: {ready} (from the start of the process, with compiled code in the cache). "
+        f"Memory: {memory}.",
+    ]
+
+
+def _stages(stages: Mapping[str, Mapping[str, float]]) -> str:
+    rows = [(name, *_ms(times)) for name, times in stages.items()]
+    return _table(("step", "median", "p95"), rows)
+
+
+def _ms(times: Mapping[str, float]) -> tuple[str, str]:
+    return f"{times['median_ms']:.3g} ms", f"{times['p95_ms']:.3g} ms"
+
+
+def _table(header: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
+    lines = ["| " + " | ".join(cells) + " |" for cells in (header, *rows)]
+    lines.insert(1, "|" + "---|" * len(header))
+    return "\n".join(lines)

@@ -1,0 +1,268 @@
+"""Fit the models of doubt on recorded sessions with ground truth; check them on left-out sources.
+
+    python -m lab.fits.doubt SESSION... --output cardbox_tracker/search/doubt.json
+
+A source is a person before a camera. Each is tracked by the preset ``default`` without and, if the
+detector is installed, with its points, and by ``paper`` if its person can be measured. A model is a
+ridge-penalized logistic regression in which all sources weigh the same. The printed table has, for
+each source, what the models that were fitted without it say about it.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+from collections import defaultdict
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cardbox_tracker.common.errors import CardboxError
+from cardbox_tracker.search.config import PRESETS
+from cardbox_tracker.tracking.estimate import Estimate
+from cardbox_tracker.search.doubt import (
+    FAR_M,
+    HANDS,
+    KINDS,
+    LOST_FROM,
+    WHOLE_UNCERTAIN_FROM,
+    Source,
+)
+from cardbox_tracker.tracking.tracker import Tracker
+from cardbox_tracker.applications.evaluation.session import load_session
+from cardbox_tracker.applications.evaluation.tracking import InputSelection, track_session
+from cardbox_tracker.common.files import atomic_path
+from cardbox_tracker.detectors.detector import Detector
+
+FloatArray = NDArray[np.float64]
+PENALTY = 0.02
+"""Ridge penalty of a standardized coefficient, beside a mean log-likelihood."""
+MOST_WRONG, HIGHEST = 0.02, 0.25
+"""Largest share of wrong keypoints among tracked ones, and highest threshold."""
+MODELS = (*dict.fromkeys(KINDS), "whole")
+
+
+@dataclass(frozen=True)
+class Samples:
+    """Results of one source.
+
+    Attributes:
+        evidence: by name, (n, 6).
+        aligned_m: errors relative to the middle of the shoulders, (n, 6).
+        off_m: absolute errors, (n, 6).
+    """
+
+    evidence: Mapping[str, FloatArray]
+    aligned_m: FloatArray
+    off_m: FloatArray
+
+    def rows(self, model: str) -> tuple[Mapping[str, FloatArray], FloatArray]:
+        """Return evidence by name, (k,), and whether a result is wrong, (k,), for a model."""
+        if model == "whole":
+            wrong = self.off_m.mean(axis=1) > FAR_M
+            return {name: one[:, 0] for name, one in self.evidence.items()}, wrong.astype(float)
+        at = [number for number, kind in enumerate(KINDS) if kind == model]
+        wrong = self.aligned_m[:, at].ravel() > FAR_M
+        return {name: one[:, at].ravel() for name, one in self.evidence.items()}, wrong.astype(
+            float
+        )
+
+
+class Collector:
+    """Collects results whose truth is known."""
+
+    def __init__(self, truth: Mapping[int, FloatArray], source: Source) -> None:
+        """Prepare for true keypoints (6, 3), metres, by stamp, and what results rest on."""
+        self._truth, self._has_points = truth, source is Source.POINTS
+        self._evidence: defaultdict[str, list[FloatArray]] = defaultdict(list)
+        self._errors: list[FloatArray] = []
+
+    def __call__(self, seed: int, stamp_ns: int, estimate: Estimate, tracker: Tracker) -> None:
+        """Add an estimate."""
+        truth = self._truth.get(stamp_ns)
+        if truth is None or estimate.evidence is None or estimate.keypoints_m is None:
+            return
+        if ("point distance" in estimate.evidence) != self._has_points:
+            return
+        for name, values in estimate.evidence.items():
+            self._evidence[name].append(values)
+        self._errors.append(estimate.keypoints_m - truth)
+
+    def samples(self) -> Samples | None:
+        """Return what was collected; None if there is nothing."""
+        if not self._errors:
+            return None
+        errors = np.array(self._errors)
+        aligned = errors - errors[:, [0, 3]].mean(axis=1, keepdims=True)
+        evidence = {name: np.array(values) for name, values in self._evidence.items()}
+        return Samples(evidence, np.linalg.norm(aligned, axis=2), np.linalg.norm(errors, axis=2))
+
+
+def fit(
+    sources: Sequence[Samples], model: str, names: Sequence[str]
+) -> tuple[float, dict[str, float]]:
+    """Return intercept and coefficients by name of a logistic regression, by Newton's method."""
+    parts = [source.rows(model) for source in sources]
+    x = np.concatenate([np.column_stack([rows[name] for name in names]) for rows, _ in parts])
+    y = np.concatenate([wrong for _, wrong in parts])
+    weight = np.concatenate([np.full(len(wrong), 1.0 / len(wrong)) for _, wrong in parts])
+    weight /= weight.sum()
+    mean = weight @ x
+    scale = np.sqrt(weight @ (x - mean) ** 2) + 1e-9
+    z = np.column_stack([np.ones(len(x)), (x - mean) / scale])
+    penalty = np.full(z.shape[1], PENALTY)
+    penalty[0] = 1e-4
+    beta = np.zeros(z.shape[1])
+    for _ in range(50):
+        p = 1.0 / (1.0 + np.exp(-np.clip(z @ beta, -30.0, 30.0)))
+        gradient = z.T @ (weight * (y - p)) - penalty * beta
+        hessian = (z * (weight * p * (1.0 - p))[:, None]).T @ z + np.diag(penalty)
+        step = np.linalg.solve(hessian, gradient)
+        beta += np.clip(step, -2.0, 2.0)
+        if np.abs(step).max() < 1e-8:
+            break
+    coefficients = beta[1:] / scale
+    return float(beta[0] - coefficients @ mean), dict(
+        zip(names, coefficients.tolist(), strict=True)
+    )
+
+
+def chances(samples: Samples, models: Mapping[str, tuple[float, dict[str, float]]]) -> FloatArray:
+    """Return the probabilities (n, 7) of the keypoints and of the whole."""
+    columns = [*enumerate(KINDS), (0, "whole")]
+    found = np.empty((len(samples.off_m), len(columns)))
+    for column, (at, model) in enumerate(columns):
+        intercept, coefficients = models[model]
+        logit = intercept + sum(
+            coefficient * samples.evidence[name][:, at]
+            for name, coefficient in coefficients.items()
+        )
+        found[:, column] = 1.0 / (1.0 + np.exp(-np.clip(logit, -50.0, 50.0)))
+    return found
+
+
+def threshold_of(checked: Sequence[tuple[Samples, FloatArray]]) -> float:
+    """Return the highest probability below which at most ``MOST_WRONG`` of the keypoints are wrong.
+
+    Args:
+        checked: left-out results, and their probabilities (n, 7).
+    """
+    wrong = np.concatenate([(one.aligned_m > FAR_M).ravel() for one, _ in checked])
+    said = np.concatenate([chances[:, :6].ravel() for _, chances in checked])
+    order = np.argsort(said)
+    shares = np.cumsum(wrong[order]) / np.arange(1, len(order) + 1)
+    last = np.flatnonzero(shares <= MOST_WRONG)
+    highest = float(said[order][last[-1]]) if len(last) else 0.0
+    return round(min(highest, HIGHEST), 3)
+
+
+def row_of(name: str, samples: Samples, said: FloatArray, uncertain_from: float) -> str:
+    """Return a row of the table: how the states of a source compare with its errors."""
+    keypoints, wrong = said[:, :6], samples.aligned_m > FAR_M
+    tracked = keypoints <= uncertain_from
+    uncertain = ~tracked & (keypoints <= LOST_FROM)
+    is_tracking = tracked[:, HANDS].all(axis=1) & (said[:, 6] <= WHOLE_UNCERTAIN_FROM)
+
+    def share(of: Any, among: Any) -> str:
+        return f"{100.0 * float(of[among].mean()):.1f}" if among.any() else ""
+
+    everything = np.ones_like(tracked)
+    return (
+        f"| {name} | {len(said)} | {share(is_tracking, np.ones(len(said), bool))} "
+        f"| {share(wrong.any(axis=1), is_tracking)} | {share(tracked, everything)} "
+        f"| {share(wrong, tracked)} | {share(samples.aligned_m > 0.15, uncertain)} "
+        f"| {100.0 * float(keypoints.mean()):.1f} | {share(wrong, everything)} |"
+    )
+
+
+HEADER = """| source | images | `tracking` % | of these a joint > 30 cm % | joints tracked % \
+| of these > 30 cm % | uncertain ones > 15 cm % | mean chance % | wrong % |
+|---|---|---|---|---|---|---|---|---|"""
+
+
+def collect(folder: Path, seeds: Sequence[int], detector: Detector | None) -> dict[Source, Samples]:
+    """Return the samples of a session by what they rest on."""
+    session = load_session(folder)
+    truth = dict(zip(session.stamps_ns.tolist(), session.keypoints_m, strict=True))
+    ways = [(Source.OUTLINE, "default", InputSelection())]
+    if detector is not None:
+        ways.append((Source.POINTS, "default", InputSelection(points=detector)))
+    if session.has_references:
+        ways.append((Source.PAPER, "paper", InputSelection()))
+    found = {}
+    for source, preset, inputs in ways:
+        collector = Collector(truth, source)
+        track_session(session, PRESETS[preset](), tuple(seeds), inputs, collector)
+        samples = collector.samples()
+        if samples is not None:
+            found[source] = samples
+    return found
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    """Fit, check and write the models."""
+    parser = argparse.ArgumentParser(description=__doc__.split("\n", 1)[0])
+    parser.add_argument("sessions", nargs="+", type=Path, help="recorded sessions with truth")
+    parser.add_argument("--seeds", nargs="+", type=int, default=[0])
+    parser.add_argument("--output", type=Path, help="JSON file of the models")
+    given = parser.parse_args(arguments)
+    try:
+        detector: Detector | None = Detector.installed()
+    except CardboxError as error:
+        print(f"without points: {error}")
+        detector = None
+    # Clips of one person are one source, also before several cameras.
+    by_source: defaultdict[Source, defaultdict[str, list[Samples]]] = defaultdict(
+        lambda: defaultdict(list)
+    )
+    for folder in given.sessions:
+        is_clip = folder.parent.name.startswith("real_")
+        name = folder.parent.name if is_clip else folder.name
+        for source, samples in collect(folder, given.seeds, detector).items():
+            by_source[source][name].append(samples)
+        print(f"tracked {folder}", flush=True)
+    stored = fit_all(by_source)
+    if given.output is not None:
+        with atomic_path(given.output) as path:
+            path.write_text(json.dumps(stored, indent=1) + "\n", encoding="utf-8")
+
+
+def fit_all(
+    by_source: Mapping[Source, Mapping[str, Sequence[Samples]]],
+) -> dict[str, dict[str, Any]]:
+    """Return the models of all sources, and print what left-out ones say."""
+    stored: dict[str, dict[str, Any]] = {}
+    for source, people in by_source.items():
+        everyone = [one for parts in people.values() for one in parts]
+        names = sorted(set.intersection(*(set(one.evidence) for one in everyone)))
+        checked = []
+        for left_out, own in people.items():
+            others = [one for name, parts in people.items() if name != left_out for one in parts]
+            if others:
+                models = {model: fit(others, model, names) for model in MODELS}
+                checked += [(left_out, one, chances(one, models)) for one in own]
+        uncertain_from = threshold_of([(one, said) for _, one, said in checked])
+        print(f"\n{source.value}: uncertain above {uncertain_from}\n\n{HEADER}")
+        for name, one, said in checked:
+            print(row_of(name, one, said, uncertain_from))
+        stored[source.value] = {
+            "uncertain_from": uncertain_from,
+            "models": {
+                model: [
+                    round(intercept, 4),
+                    {name: round(value, 4) for name, value in coefficients.items()},
+                ]
+                for model, (intercept, coefficients) in (
+                    (model, fit(everyone, model, names)) for model in MODELS
+                )
+            },
+        }
+    return stored
+
+
+if __name__ == "__main__":
+    main()

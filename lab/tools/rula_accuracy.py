@@ -1,0 +1,196 @@
+"""Compare RULA scores with those of the true joints, as a table for ``docs/ergonomics.md``.
+
+python -m lab.tools.rula_accuracy SESSION...
+
+Each session is a folder with ``bag/`` and ``ground_truth.json``. The table of the means replaces
+that between the marks in the document; the errors of each session are printed.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Mapping
+from dataclasses import dataclass, fields
+from pathlib import Path
+
+import numpy as np
+
+from cardbox_tracker.applications.ergonomics.config import RulaConfig
+from cardbox_tracker.applications.ergonomics.rula import (
+    ABOVE,
+    HIGHEST,
+    SAMPLES,
+    ScoreArray,
+    ScoreDistribution,
+    rula_scores,
+    score_distribution,
+)
+from cardbox_tracker.person.model import BodyModel
+from cardbox_tracker.person.sizes import FloatArray
+from cardbox_tracker.search.config import PRESETS, TrackerConfig
+from cardbox_tracker.tracking.estimate import Estimate
+from cardbox_tracker.tracking.sampling import normal_postures
+from cardbox_tracker.tracking.tracker import Tracker
+from cardbox_tracker.applications.evaluation.marks import replaced
+from cardbox_tracker.applications.evaluation.angles import comparable, true_postures
+from cardbox_tracker.applications.evaluation.session import RecordedSession, load_session
+from cardbox_tracker.applications.evaluation.tracking import track_session
+
+DOCUMENT = Path(__file__).resolve().parents[2] / "docs" / "ergonomics.md"
+BEGIN, END = "<!-- rula-accuracy:begin -->", "<!-- rula-accuracy:end -->"
+TASKS = {
+    "no load": RulaConfig(),
+    "2 to 10 kg held": RulaConfig(arm_load=2, arm_muscle_use=1, body_load=2, body_muscle_use=1),
+}
+_HEAD = (
+    "session",
+    "task",
+    "score of",
+    "mean difference",
+    "equal",
+    "within 1",
+    "chance of the true score",
+    f"time above {ABOVE}, true",
+)
+WAYS = ("mean posture", "normal", "particles", "always the same")
+"""Sources of a score: the mean posture; mean and deviations, as in the node; the particles; and for
+comparison the most frequent true score of the session."""
+
+
+@dataclass(frozen=True)
+class ScoreError:
+    """Errors of scores over the images with a true score.
+
+    Attributes:
+        frames: number of images.
+        difference: mean absolute difference of the expected score.
+        equal: share of images whose likeliest score is the true one.
+        within_one: share of images where it is at most 1 off.
+        chance_of_truth: mean chance that the distribution gives the true score.
+        above: mean chance of a score above ``ABOVE``.
+        true_above: share of images whose true score is above ``ABOVE``.
+    """
+
+    frames: int
+    difference: float
+    equal: float
+    within_one: float
+    chance_of_truth: float
+    above: float
+    true_above: float
+
+
+def score_errors(
+    session: RecordedSession, config: TrackerConfig, seed: int, tasks: Mapping[str, RulaConfig]
+) -> dict[str, dict[str, ScoreError]]:
+    """Track a session; return the error of each of ``WAYS`` for each of the ``tasks``.
+
+    Raises:
+        CardboxError: the recording cannot be read.
+        ValueError: the truth lacks the torso's angles, or nobody was tracked.
+    """
+    found: dict[int, dict[tuple[str, str], ScoreDistribution]] = {}
+    rng = np.random.default_rng(seed)
+    body: list[BodyModel] = []
+
+    def observe(_: int, stamp_ns: int, estimate: Estimate, tracker: Tracker) -> None:
+        if estimate.posture is None or estimate.posture_stddev is None:
+            return
+        body[:] = [tracker.body]
+        normal = normal_postures(estimate.posture, estimate.posture_stddev, SAMPLES, rng)
+        drawn = (estimate.posture[None], normal, tracker.sample(estimate, SAMPLES, rng))
+        found[stamp_ns] = {
+            (task, way): score_distribution(tracker.body, postures, rula)
+            for task, rula in tasks.items()
+            for way, postures in zip(WAYS, drawn, strict=False)
+        }
+
+    track_session(session, config, (seed,), observe=observe)
+    known = comparable(session, found)
+    stamps = session.stamps_ns[known].tolist()
+    errors: dict[str, dict[str, ScoreError]] = {}
+    for task, rula in tasks.items():
+        truth = true_scores(session, body[0], rula)[known]
+        same = np.eye(HIGHEST)[np.bincount(truth).argmax() - 1]
+        constant = [ScoreDistribution(same, same, same)] * len(truth)
+        of_way = [[found[s][task, way] for s in stamps] for way in WAYS[:-1]]
+        errors[task] = {
+            way: score_error(scores, truth)
+            for way, scores in zip(WAYS, [*of_way, constant], strict=True)
+        }
+    return errors
+
+
+def true_scores(session: RecordedSession, body: BodyModel, rula: RulaConfig) -> ScoreArray:
+    """Return the grand scores (n,) of the true joints with the lengths of ``body``."""
+    postures = true_postures(session)
+    return rula_scores(body, postures, rula).grand
+
+
+def score_error(scores: list[ScoreDistribution], truth: ScoreArray) -> ScoreError:
+    """Compare distributions with the true scores (n,)."""
+    means = np.array([one.mean for one in scores])
+    likeliest = np.array([one.likeliest for one in scores])
+    chances: FloatArray = np.array([one.grand for one in scores])
+    off = np.abs(likeliest - truth)
+    return ScoreError(
+        frames=len(truth),
+        difference=float(np.abs(means - truth).mean()),
+        equal=float((off == 0).mean()),
+        within_one=float((off <= 1).mean()),
+        chance_of_truth=float(chances[np.arange(len(truth)), truth - 1].mean()),
+        above=float(chances[:, ABOVE:].sum(axis=1).mean()),
+        true_above=float((truth > ABOVE).mean()),
+    )
+
+
+def row(name: str, task: str, way: str, error: ScoreError) -> str:
+    """Return one row of the table."""
+    cells = (
+        name,
+        task,
+        way,
+        f"{error.difference:.2f}",
+        *(f"{share:.0%}" for share in (error.equal, error.within_one, error.chance_of_truth)),
+        f"{error.above:.0%}, {error.true_above:.0%}",
+    )
+    return f"| {' | '.join(cells)} |"
+
+
+def mean_of(errors: list[ScoreError]) -> ScoreError:
+    """Return the mean over sessions; the frames are added."""
+    names = [field.name for field in fields(ScoreError) if field.name != "frames"]
+    means = {name: float(np.mean([getattr(one, name) for one in errors])) for name in names}
+    return ScoreError(frames=sum(one.frames for one in errors), **means)
+
+
+def main(args: list[str] | None = None) -> int:
+    """Measure and write the table."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("sessions", nargs="+", type=Path, metavar="SESSION")
+    parser.add_argument("--seed", type=int, default=0)
+    given = parser.parse_args(args)
+    rows = [f"| {' | '.join(_HEAD)} |", "|---" * len(_HEAD) + "|"]
+    found = {(task, way): list[ScoreError]() for task in TASKS for way in WAYS}
+    for folder in given.sessions:
+        session = load_session(folder)
+        try:
+            errors = score_errors(session, PRESETS["default"](), given.seed, TASKS)
+        except ValueError as error:
+            print(f"left out: {error}", file=sys.stderr)
+            continue
+        for task, way in found:
+            found[task, way].append(errors[task][way])
+        for task in TASKS:
+            print(row(session.name, task, "particles", errors[task]["particles"]), flush=True)
+    rows += [row("**mean**", *which, mean_of(errors)) for which, errors in found.items()]
+    text = DOCUMENT.read_text(encoding="utf-8")
+    table = "\n".join(rows)
+    DOCUMENT.write_text(replaced(text, f"\n{table}\n", BEGIN, END), encoding="utf-8")
+    print(table)
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,137 @@
+"""How the stamps of a stream are read, whatever a camera or its clock does."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from cardbox_tracker.camera.stamps import StampOrder, StampSequence, StreamStatistics
+
+S, MS = 1_000_000_000, 1_000_000
+START = 1_000 * S
+
+
+def orders(stamps: Iterable[int]) -> list[StampOrder]:
+    sequence = StampSequence()
+    return [sequence.add(stamp) for stamp in stamps]
+
+
+def even(count: int, first_ns: int = START) -> list[int]:
+    return [first_ns + i * 66 * MS for i in range(count)]
+
+
+def test_an_even_stream_is_one_image_after_the_other() -> None:
+    assert set(orders(even(50))) == {StampOrder.NEXT}
+
+
+def test_a_repeated_stamp_is_used_once() -> None:
+    twice = [stamp for stamp in even(5) for _ in range(2)]
+    assert orders(twice) == [StampOrder.NEXT, StampOrder.REPEATED] * 5
+    assert not StampOrder.REPEATED.is_usable
+
+
+def test_without_stamps_the_order_of_arrival_counts() -> None:
+    assert orders([0] * 20) == [StampOrder.UNSTAMPED] * 20
+    assert StampOrder.UNSTAMPED.is_usable
+    assert orders([START, 0, START + 1]) == [StampOrder.NEXT, StampOrder.UNSTAMPED, StampOrder.NEXT]
+
+
+@pytest.mark.parametrize(
+    ("back_ns", "order"), [(1, StampOrder.LATE), (S, StampOrder.LATE), (S + 1, StampOrder.RESTART)]
+)
+def test_back_by_more_than_a_second_is_a_new_start(back_ns: int, order: StampOrder) -> None:
+    assert orders([START, START - back_ns]) == [StampOrder.NEXT, order]
+    assert order.is_usable is (order is StampOrder.RESTART)
+
+
+def test_what_was_overtaken_changes_nothing() -> None:
+    a, b, c, d = even(4)
+    assert orders([a, c, b, d]) == [
+        StampOrder.NEXT,
+        StampOrder.NEXT,
+        StampOrder.LATE,
+        StampOrder.NEXT,
+    ]
+
+
+def test_a_jump_ahead_is_a_gap() -> None:
+    assert orders([*even(3), *even(3, START + 60 * S)])[3:] == [
+        StampOrder.GAP,
+        StampOrder.NEXT,
+        StampOrder.NEXT,
+    ]
+
+
+def test_a_bag_that_loops_starts_anew_each_time() -> None:
+    found = orders(even(60) * 3)
+    assert [i for i, order in enumerate(found) if order is StampOrder.RESTART] == [60, 120]
+    assert set(found) == {StampOrder.NEXT, StampOrder.RESTART}
+
+
+@pytest.mark.promise("Whatever the stamps, each image has one place in the order")
+@pytest.mark.parametrize("offset_s", [-3600, 3600, 5])
+def test_of_two_clocks_one_is_followed(offset_s: int) -> None:
+    both = zip(even(100), even(100, START + offset_s * S), strict=True)
+    found = orders(stamp for pair in both for stamp in pair)
+    assert found.count(StampOrder.RESTART) + found.count(StampOrder.GAP) == 1
+    assert found.count(StampOrder.FOREIGN) >= 98
+    assert found[::2] == [StampOrder.NEXT] * 100, "the one that was first goes on"
+
+
+def test_one_wrong_stamp_does_not_hold_up_for_long() -> None:
+    stamps = [*even(10), START - 3600 * S, *even(20, START + 660 * MS)]
+    found = orders(stamps)
+    assert found == [*[StampOrder.NEXT] * 10, StampOrder.RESTART, *[StampOrder.NEXT] * 20]
+
+
+def test_a_publisher_that_stays_alone_is_followed() -> None:
+    both = [stamp for pair in zip(even(20), even(20, 5 * S), strict=True) for stamp in pair]
+    found = orders([*both, *even(20, 5 * S + 20 * 66 * MS)])
+    assert found[-10:] == [StampOrder.NEXT] * 10
+
+
+@given(st.lists(st.integers(-(2**31) * S, 2**31 * S), max_size=60))
+@pytest.mark.promise("Whatever the stamps, each image has one place in the order")
+def test_whatever_the_stamps_every_image_gets_one_answer(stamps: list[int]) -> None:
+    statistics = StreamStatistics()
+    for stamp in stamps:
+        assert isinstance(statistics.add(stamp), StampOrder)
+    assert sum(statistics.counts.values()) == len(stamps)
+    assert 0.0 <= statistics.loss <= 1.0 and statistics.dropped >= 0
+
+
+@pytest.mark.parametrize(
+    ("stamps", "kinds"),
+    [
+        (even(60), set()),
+        ([*even(60), *even(60, START + 100 * S)], set()),
+        ([0] * 5, {"stamps that are zero"}),
+        ([START] * 30, {"stamps that repeat"}),
+        (
+            [s for p in zip(even(30), even(30, 5 * S), strict=True) for s in p],
+            {"stamps of two clocks"},
+        ),
+        (even(20) * 4, {"stamps that go back"}),
+    ],
+)
+def test_what_is_wrong_with_the_stamps_is_said(stamps: list[int], kinds: set[str]) -> None:
+    statistics = StreamStatistics()
+    for stamp in stamps:
+        statistics.add(stamp)
+    assert set(statistics.remarks()) == kinds
+
+
+@pytest.mark.promise("Whatever the stamps, each image has one place in the order")
+@pytest.mark.parametrize("first", [1, 3, 7, 40])
+def test_losses_are_counted_from_the_first_image_on(first: int) -> None:
+    """Every third image of a second is lost, and two more in a row, at ``first``."""
+    sent = [number * 66_666_667 for number in range(1, 100)]
+    lost = {*range(0, 15, 3), first, first + 1} - {0}
+    statistics = StreamStatistics()
+    for number, stamp_ns in enumerate(sent):
+        if number not in lost:
+            statistics.add(stamp_ns)
+    assert statistics.received + statistics.dropped == len(sent)

@@ -1,0 +1,218 @@
+"""Compiled code is kept where that is possible, and never outlives its sources."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import numba
+import pytest
+
+import cardbox_tracker
+from cardbox_tracker.common import compiling
+
+ROOT = Path(__file__).resolve().parents[2]
+FACTOR = "FACTOR = 2\n"
+CONSTANTS = "from cardbox_tracker.factor import FACTOR\nTWICE = FACTOR\n"
+CALLEE = """
+from cardbox_tracker.common.compiling import kernel
+from cardbox_tracker.constants import (
+    TWICE,
+)
+
+@kernel
+def scaled(x):
+    return TWICE * x
+"""
+CALLER = """
+from cardbox_tracker import callee
+from cardbox_tracker.common.compiling import kernel
+
+scaled = callee.scaled
+
+@kernel
+def double(x):
+    return scaled(x)
+
+@kernel
+def read(array, place):
+    return array[place]
+"""
+
+
+@pytest.fixture
+def package(tmp_path: Path) -> Path:
+    """A small package of the same name, whose function ``double`` calls one of another file."""
+    folder, source = tmp_path / "cardbox_tracker", Path(compiling.__file__)
+    copy = folder / source.relative_to(Path(cardbox_tracker.__file__).parent)
+    copy.parent.mkdir(parents=True)
+    shutil.copy(source, copy)
+    texts = {"factor": FACTOR, "constants": CONSTANTS, "callee": CALLEE, "caller": CALLER}
+    for name, text in {"__init__": "", "other": "", **texts}.items():
+        (folder / f"{name}.py").write_text(text)
+    return folder
+
+
+def run(package: Path, program: str, **environment: str) -> tuple[str, str]:
+    """Run a program in a new interpreter; return its output and its warnings."""
+    values = {**os.environ, "PYTHONPATH": str(package.parent), "PYTHONDONTWRITEBYTECODE": "1"}
+    values.pop("NUMBA_CACHE_DIR", None)
+    done = subprocess.run(
+        [sys.executable, "-c", program],
+        env=values | environment,
+        cwd=package.parent,
+        capture_output=True,
+        text=True,
+    )
+    assert done.returncode == 0, done.stderr
+    return done.stdout, done.stderr
+
+
+USE = """
+from cardbox_tracker.caller import double
+print(double(21), sum(double.stats.cache_hits.values()))
+"""
+
+
+def test_code_is_kept_until_a_source_changes(package: Path) -> None:
+    assert run(package, USE) == ("42 0\n", "")
+    (package / "other.py").write_text("CHANGED = True")
+    assert run(package, USE) == ("42 1\n", ""), "no kernel contains the other file"
+    for name, old, new in (
+        ("callee", "TWICE * x", "TWICE * x + 1"),
+        ("factor", "2", "3"),
+    ):
+        path = package / f"{name}.py"
+        path.write_text(path.read_text().replace(old, new))
+        out, _ = run(package, USE)
+        assert out == ("43 0\n" if name == "callee" else "64 0\n")
+    assert run(package, USE) == ("64 1\n", "")
+
+
+def test_only_the_last_folders_are_kept(package: Path) -> None:
+    found = []
+    for count in range(6):
+        (package / "factor.py").write_text(f"FACTOR = {count}")
+        found.append(compiling.choose_folder(str(package)))
+        assert found[-1] is not None
+        os.utime(found[-1], (count, count))
+    (package / "factor.py").write_text("FACTOR = 2")
+    assert compiling.choose_folder(str(package)) == found[2]
+    assert set((package / "__pycache__").iterdir()) == set(found[2:])
+
+
+BOUNDS = """
+import numpy
+from cardbox_tracker.caller import read
+try:
+    print(read(numpy.zeros(3)[:2], 2))
+except IndexError:
+    print("refused")
+"""
+
+
+def test_code_with_bounds_checks_is_kept_apart(package: Path) -> None:
+    for _ in range(2):
+        assert run(package, BOUNDS, NUMBA_BOUNDSCHECK="0") == ("0.0\n", "")
+        assert run(package, BOUNDS, NUMBA_BOUNDSCHECK="1") == ("refused\n", "")
+
+
+DAMAGED = """
+from cardbox_tracker.common import compiling
+from cardbox_tracker.caller import double
+try:
+    double(21)
+except compiling.DAMAGED:
+    compiling.discard()
+print(double(21), len(list(compiling.FOLDER.rglob("*.double-*"))))
+"""
+
+
+@pytest.mark.promise("A damaged cache of compiled code is made again")
+@pytest.mark.parametrize("ending", [".nbi", ".nbc"])
+def test_a_file_that_was_cut_off_is_made_again(ending: str, package: Path) -> None:
+    run(package, USE)
+    (file,) = package.rglob(f"*.double-*{ending}")
+    whole = file.read_bytes()
+    for length in (0, len(whole) // 2):
+        file.write_bytes(whole[:length])
+        out, said = run(package, DAMAGED)
+        assert out == "42 2\n"
+        assert "damaged" in said and str(file.parents[1]) in said and "Traceback" not in said
+        assert run(package, USE) == ("42 1\n", ""), "it was kept again"
+
+
+@pytest.fixture
+def places(package: Path, tmp_path: Path) -> dict[str, str]:
+    """Environment with a read-only package and home, and a folder for temporary files."""
+    (package / "__pycache__").touch()
+    (tmp_path / "temporary").mkdir()
+    return {
+        "XDG_CACHE_HOME": str(package / "__pycache__" / "below a file"),
+        "TMPDIR": str(tmp_path / "temporary"),
+    }
+
+
+def test_the_users_folder_comes_first(package: Path, tmp_path: Path) -> None:
+    run(package, USE, NUMBA_CACHE_DIR=str(tmp_path / "mine"))
+    assert list((tmp_path / "mine").glob("cardbox_tracker-*/**/*.double-*.nbc"))
+    assert not (package / "__pycache__").exists()
+
+
+def test_a_package_that_is_read_only_is_kept_elsewhere(
+    package: Path, places: dict[str, str], tmp_path: Path
+) -> None:
+    assert run(package, USE, **places) == ("42 0\n", "")
+    assert run(package, USE, **places) == ("42 1\n", "")
+    (kept,) = (tmp_path / "temporary").glob("cardbox_tracker-*")
+    assert kept.stat().st_mode & 0o077 == 0
+    home = {"XDG_CACHE_HOME": str(tmp_path / "cache")}
+    assert run(package, USE, **places | home) == ("42 0\n", "")
+    assert list((tmp_path / "cache").rglob("*.nbc"))
+
+
+@pytest.mark.promise("No cache of compiled code is used that others may write to")
+@pytest.mark.parametrize("planted", ["open to all", "a link", "somebody else's", "a file"])
+def test_a_folder_that_somebody_planted_is_not_used(
+    planted: str, package: Path, places: dict[str, str], tmp_path: Path
+) -> None:
+    run(package, USE, **places)
+    (folder,) = (tmp_path / "temporary").iterdir()
+    shutil.rmtree(folder)
+    program = USE
+    if planted == "a link":
+        (tmp_path / "theirs").mkdir(mode=0o700)
+        folder.symlink_to(tmp_path / "theirs")
+    elif planted == "a file":
+        folder.touch()
+    else:
+        folder.mkdir()
+        folder.chmod(0o777 if planted == "open to all" else 0o700)
+    if planted == "somebody else's":
+        somebody = os.geteuid() + 1
+        folder.rename(folder.with_name(folder.name.replace(f"-{somebody - 1}-", f"-{somebody}-")))
+        program = f"import os\nos.geteuid = lambda: {somebody}\n{USE}"
+    out, said = run(package, program, **places)
+    assert out == "42 0\n"
+    assert "set NUMBA_CACHE_DIR" in said
+    assert not list(tmp_path.rglob("*.nb?"))
+
+
+def test_other_packages_keep_their_folder() -> None:
+    before = numba.config.CACHE_DIR
+    compiling.kernel(lambda x: x)
+    assert before == numba.config.CACHE_DIR
+
+
+@pytest.mark.parametrize("command", ["urdf", "synthesize", "call"])
+def test_what_needs_no_compiled_code_does_not_load_the_compiler(command: str) -> None:
+    code = (
+        "import sys\nfrom cardbox_tracker.commands.main import main\n"
+        f"try: main([{command!r}, '--help'])\nexcept SystemExit: pass\n"
+        "import cardbox_tracker.person.urdf, cardbox_tracker.person.model_file\n"
+        "assert 'numba' not in sys.modules"
+    )
+    run(ROOT / "cardbox_tracker", code)

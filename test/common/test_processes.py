@@ -1,0 +1,99 @@
+"""Calls in processes of one thread each."""
+
+from __future__ import annotations
+
+import math
+import os
+import signal
+import threading
+import time
+from collections.abc import Iterator
+from functools import partial
+from itertools import islice
+from pathlib import Path
+
+import pytest
+
+from cardbox_tracker.common import interrupts
+from cardbox_tracker.common.errors import CardboxError
+from cardbox_tracker.common.processes import cores, results_of
+from cardbox_tracker.common.progress import SharedProgress
+
+
+@pytest.mark.parametrize("jobs", [1, 2])
+def test_all_results_come(jobs: int) -> None:
+    with results_of(math.factorial, range(5), jobs) as found:
+        assert sorted(found) == [1, 1, 2, 6, 24]
+
+
+def test_processes_have_one_thread_and_leave_ctrl_c_to_their_parent() -> None:
+    names = ["OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "NUMBA_NUM_THREADS"]
+    with results_of(os.getenv, names, 2) as found:
+        assert list(found) == ["1", "1", "1"]
+    with results_of(partial(signal.pthread_sigmask, signal.SIG_BLOCK), [(), ()], 2) as masks:
+        assert all(signal.SIGINT in mask for mask in masks)
+    assert signal.SIGINT not in signal.pthread_sigmask(signal.SIG_BLOCK, ())
+
+
+def test_a_killed_process_is_told() -> None:
+    with (
+        pytest.raises(CardboxError, match=r"ended unexpectedly.*--jobs"),
+        results_of(os._exit, [1, 1], 2) as found,
+    ):
+        list(found)
+    with results_of(math.factorial, [3, 3], 2) as found:
+        assert list(found) == [6, 6]
+
+
+class Late(list[int]):
+    """Arguments of which the last ones come when the first calls have ended."""
+
+    def __iter__(self) -> Iterator[int]:
+        yield from self[:2]
+        time.sleep(1.0)
+        yield from self[2:]
+
+
+def test_a_process_that_is_killed_while_others_get_their_calls_is_told() -> None:
+    with (
+        pytest.raises(CardboxError, match=r"ended unexpectedly.*--jobs"),
+        results_of(os._exit, Late([1, 1, 1, 1]), 2) as found,
+    ):
+        list(found)
+    with results_of(math.factorial, [3, 3], 2) as found:
+        assert list(found) == [6, 6]
+
+
+def test_leaving_before_the_end_is_silent(monkeypatch: pytest.MonkeyPatch) -> None:
+    failed: list[threading.ExceptHookArgs] = []
+    monkeypatch.setattr(threading, "excepthook", failed.append)
+    for count in range(12):
+        with results_of(time.sleep, [0.002 * (i % 3) for i in range(60)], 2) as found:
+            for _ in islice(found, count):
+                pass
+    assert not [repr(one.exc_value) for one in failed]
+
+
+def test_a_withheld_ctrl_c_comes_at_the_end() -> None:
+    reached = []
+    with pytest.raises(KeyboardInterrupt), interrupts.raised(), interrupts.withheld():
+        os.kill(os.getpid(), signal.SIGINT)
+        reached.append(1)
+    assert reached
+
+
+def test_there_is_a_core() -> None:
+    assert 1 <= cores() <= len(os.sched_getaffinity(0))
+
+
+def test_the_common_progress_is_the_mean_of_all(tmp_path: Path) -> None:
+    progress = SharedProgress(tmp_path / "progress", 4)
+    progress.start()
+    assert progress.fraction() == 0.0
+    first, last = progress.of_task(0), progress.of_task(3)
+    first(0.5)
+    # An image after the stated end of a recording is no more than its end.
+    last(1.5)
+    assert progress.fraction() == pytest.approx(0.375)
+    first(1.0)
+    assert progress.fraction() == pytest.approx(0.5)

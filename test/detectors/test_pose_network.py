@@ -1,0 +1,109 @@
+"""The geometry around the pose networks, and the networks themselves where they are installed."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from cardbox_tracker.detectors import pose_network
+from cardbox_tracker.detectors.model_files import installed_models
+from cardbox_tracker.detectors.pose_network import Detection, PoseNetwork, Square
+from cardbox_tracker.common.errors import CardboxError
+
+
+def test_a_square_that_is_not_turned_keeps_the_axes_of_the_image() -> None:
+    square = Square(100.0, 50.0, 40.0, 0.0)
+    points = square.to_image(np.array([[0.5, 0.5], [0.0, 0.0], [1.0, 0.5]]))
+    np.testing.assert_allclose(points, [[100.0, 50.0], [80.0, 30.0], [120.0, 50.0]])
+
+
+def test_a_square_turned_by_a_quarter_has_its_right_side_below() -> None:
+    square = Square(100.0, 50.0, 40.0, np.pi / 2)
+    np.testing.assert_allclose(square.to_image(np.array([[1.0, 0.5]])), [[100.0, 70.0]], atol=1e-9)
+
+
+@given(
+    angle=st.floats(-3.1, 3.1),
+    reach=st.floats(5.0, 200.0),
+    u=st.floats(-50.0, 400.0),
+    v=st.floats(-50.0, 400.0),
+)
+def test_the_square_around_a_person_points_to_the_rim(
+    angle: float, reach: float, u: float, v: float
+) -> None:
+    centre = np.array([u, v])
+    rim = centre + reach * np.array([np.sin(angle), -np.cos(angle)])
+    square = pose_network._square_of(centre, rim)
+    # The rim lies above the centre, at 0.4 of the side: the circle fills 1 / 1.25 of the square.
+    np.testing.assert_allclose(square.to_image(np.array([[0.5, 0.1]]))[0], rim, atol=1e-6)
+
+
+def test_the_detector_has_two_anchors_in_the_first_cell() -> None:
+    anchors = pose_network._anchors()
+    assert anchors.shape == (2254, 2)
+    np.testing.assert_allclose(anchors[:3], [[4 / 224, 4 / 224]] * 2 + [[12 / 224, 4 / 224]])
+
+
+def test_overlapping_detections_are_averaged_by_their_scores() -> None:
+    one, other, far = (np.full(12, value) for value in (0.5, 0.52, 0.9))
+    for row in (one, other, far):
+        row[2:4] = 0.2
+    merged = pose_network._merged(np.array([one, other, far]), np.array([0.9, 0.6, 0.8]))
+    assert merged[0] == pytest.approx((0.9 * 0.5 + 0.6 * 0.52) / 1.5)
+
+
+def test_a_point_moves_to_the_centroid_of_its_heat() -> None:
+    heat = np.zeros((64, 64, 1))
+    heat[20, 30], heat[20, 31] = 0.6, 0.6
+    refined = pose_network._refined(np.array([[29.2 / 64, 20.5 / 64]]), heat)
+    np.testing.assert_allclose(refined, [[30.5 / 64, 20.0 / 64]])
+
+
+def test_a_point_without_heat_stays() -> None:
+    point = np.array([[0.4, 0.6]])
+    np.testing.assert_array_equal(pose_network._refined(point, np.zeros((64, 64, 1))), point)
+
+
+def test_a_point_outside_of_the_heat_map_stays() -> None:
+    point = np.array([[1.2, -0.1]])
+    np.testing.assert_array_equal(pose_network._refined(point, np.ones((64, 64, 1))), point)
+
+
+def test_a_mask_lies_where_its_square_is() -> None:
+    logits = np.full((256, 256), 60.0)
+    mask = pose_network._mask_in_image(logits, Square(60.0, 40.0, 20.0, 0.0), (100, 120))
+    assert mask.shape == (100, 120)
+    assert mask[40, 60] == 255 and mask[40, 75] == 0 and mask[25, 60] == 0
+
+
+def test_a_file_that_is_no_network_is_refused(tmp_path: object) -> None:
+    pytest.importorskip("ai_edge_litert", reason="ai-edge-litert is not installed")
+    from pathlib import Path
+
+    path = Path(str(tmp_path)) / "network.tflite"
+    path.write_bytes(b"nothing")
+    with pytest.raises(CardboxError, match=r"network\.tflite.*detector --install"):
+        PoseNetwork(path, path)
+
+
+@pytest.fixture(scope="module")
+def network() -> PoseNetwork:
+    pytest.importorskip("ai_edge_litert", reason="ai-edge-litert is not installed")
+    try:
+        return PoseNetwork(*installed_models())
+    except CardboxError as error:
+        pytest.skip(str(error))
+
+
+def test_nobody_is_found_in_an_empty_image(network: PoseNetwork) -> None:
+    network.forget()
+    assert network(np.full((240, 320, 3), 120, np.uint8)) is None
+
+
+@pytest.mark.parametrize("shape", [(1, 1, 3), (7, 5, 3), (480, 64, 3)])
+def test_images_of_odd_sizes_are_searched(network: PoseNetwork, shape: tuple[int, ...]) -> None:
+    network.forget()
+    found = network(np.zeros(shape, np.uint8))
+    assert found is None or isinstance(found, Detection)

@@ -1,0 +1,124 @@
+"""Scores and robots of a tracked session beside those of its true joints."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from cardbox_tracker.applications.ergonomics.config import RulaConfig
+from cardbox_tracker.applications.ergonomics.rula import ScoreDistribution
+from cardbox_tracker.applications.retargeting.config import RetargetConfig
+from cardbox_tracker.applications.retargeting.robot import load_robot
+from cardbox_tracker.person.kinematics import pose
+from cardbox_tracker.person.posture import reference_posture
+from cardbox_tracker.person.proportions import body_from_proportions
+from cardbox_tracker.search.config import default_preset
+from cardbox_tracker.tracking.estimate import LOST, TRACKING, Estimate
+from cardbox_tracker.applications.evaluation.angles import true_postures
+from cardbox_tracker.applications.simulation.session import session_camera
+from lab.tools import retarget_accuracy, rula_accuracy
+
+BODY = body_from_proportions(1.75, 2.0, 0.4, 0.0)
+COUNT = 20
+ROBOT = load_robot(Path(__file__).parents[3] / "config" / "example_arm.urdf")
+
+
+def postures() -> np.ndarray:
+    """Both arms rise sideways."""
+    found = np.tile(reference_posture("front"), (COUNT, 1))
+    found[:, [4, 8]] = np.linspace(0.2, 1.4, COUNT)[:, None]
+    return found
+
+
+def session() -> Any:
+    points = session_camera().reference_to_optical(pose(BODY.rigid, postures()).keypoints_m)
+    return SimpleNamespace(
+        name="made up",
+        stamps_ns=np.arange(COUNT, dtype=np.int64) * 10**8,
+        keypoints_m=points,
+        torso_rad=np.zeros((COUNT, 3)),
+        truth=SimpleNamespace(pitch_deg=0.0),
+    )
+
+
+def tracked(*changes: Callable[[int, Estimate], Estimate]) -> Callable[..., None]:
+    """Stand in for track_session: says the truth, changed."""
+
+    def run(session: Any, *_: Any, observe: Callable[..., None]) -> None:
+        tracker = SimpleNamespace(body=BODY, sample=lambda estimate, n, _: estimate.posture[None])
+        for i, posture in enumerate(postures()):
+            estimate = Estimate(TRACKING, posture, np.full(12, 1e-6))
+            for change in changes:
+                estimate = change(i, estimate)
+            observe(0, i * 10**8, estimate, tracker)
+
+    return run
+
+
+def test_the_true_postures_are_those_of_the_keypoints() -> None:
+    np.testing.assert_allclose(true_postures(session()), postures(), atol=1e-9)
+
+
+def test_whoever_measures_the_truth_has_its_scores(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(rula_accuracy, "track_session", tracked())
+    errors = rula_accuracy.score_errors(session(), default_preset(), 0, {"task": RulaConfig()})[
+        "task"
+    ]
+    for way in ("mean posture", "normal", "particles"):
+        assert errors[way].difference == pytest.approx(0.0, abs=0.05)
+        assert errors[way].equal == errors[way].within_one == 1.0
+    assert errors["always the same"].equal < 1.0
+
+
+def test_score_errors_are_counted() -> None:
+    chances = np.array([0, 0.5, 0.3, 0, 0, 0, 0.2])
+    one = ScoreDistribution(chances, chances, chances)
+    error = rula_accuracy.score_error([one, one, one], np.array([2, 3, 7]))
+    assert (error.equal, error.within_one) == pytest.approx((1 / 3, 2 / 3))
+    assert error.chance_of_truth == pytest.approx((0.5 + 0.3 + 0.2) / 3)
+    assert error.difference == pytest.approx((1.3 + 0.3 + 3.7) / 3)
+    assert (error.above, error.true_above) == pytest.approx((0.2, 1 / 3))
+
+
+def robot_error(monkeypatch: pytest.MonkeyPatch, *changes: Any) -> retarget_accuracy.HandError:
+    pytest.importorskip("pink", reason="pin-pink is not installed")
+    monkeypatch.setattr(retarget_accuracy, "track_session", tracked(*changes))
+    (error,) = retarget_accuracy.hand_errors(
+        session(), default_preset(), 0, ROBOT, [RetargetConfig()]
+    )
+    return error
+
+
+def test_a_robot_that_follows_the_truth_is_where_it_is(monkeypatch: pytest.MonkeyPatch) -> None:
+    error = robot_error(monkeypatch)
+    assert error.images == COUNT
+    assert (error.frozen, error.mean) == pytest.approx((0.0, 0.0), abs=1e-6)
+
+
+def test_a_robot_that_stands_still_falls_behind(monkeypatch: pytest.MonkeyPatch) -> None:
+    error = robot_error(monkeypatch, lambda i, e: Estimate(LOST) if i >= COUNT / 2 else e)
+    assert error.frozen == 0.5
+    assert error.mean == pytest.approx(0.0, abs=1e-6)
+    assert error.with_frozen > 1.0
+
+
+def test_a_wrong_arm_is_a_distance(monkeypatch: pytest.MonkeyPatch) -> None:
+    lifted = np.zeros(12)
+    lifted[[5, 9]] = 0.3
+    error = robot_error(monkeypatch, lambda _, e: replace(e, posture=e.posture + lifted))
+    assert 2.0 < error.mean < 0.3 * 68
+
+
+@pytest.mark.parametrize("tool", [rula_accuracy, retarget_accuracy])
+def test_the_documents_have_the_tables_of_today(tool: Any) -> None:
+    text = tool.DOCUMENT.read_text(encoding="utf-8")
+    rows = text.split(tool.BEGIN)[1].split(tool.END)[0].strip().splitlines()
+    assert rows[0] == f"| {' | '.join(tool._HEAD)} |"
+    assert re.search(r"\*\*mean\*\*", rows[-1])
