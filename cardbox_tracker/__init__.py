@@ -14,10 +14,11 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from cardbox_tracker.person.model import BodyModel
-    from cardbox_tracker.person.model_file import load_body_model, save_body_model
-    from cardbox_tracker.person.proportions import body_from_proportions
-    from cardbox_tracker.person.skeleton import JOINT_NAMES, KEYPOINT_NAMES
+    from cardbox_tracker.camera.calibration_file import load_calibration
+    from cardbox_tracker.camera.camera import Calibration, Camera
+    from cardbox_tracker.camera.extrinsics import Extrinsics
+    from cardbox_tracker.camera.extrinsics_files import load_extrinsics
+    from cardbox_tracker.camera.view import OtherCamera
     from cardbox_tracker.common.errors import (
         BackgroundFileError,
         BagError,
@@ -29,24 +30,23 @@ if TYPE_CHECKING:
         NotFiniteError,
         RosMissingError,
     )
-    from cardbox_tracker.search.config import PRESETS, TrackerConfig
-    from cardbox_tracker.terms.depth import Depth
-    from cardbox_tracker.camera.view import OtherCamera
-    from cardbox_tracker.tracking.estimate import Estimate
     from cardbox_tracker.measuring.config import (
         InitializationConfig,
         InitializationResult,
     )
     from cardbox_tracker.measuring.measure import initialize_body
-    from cardbox_tracker.tracking.observation import Observation
-    from cardbox_tracker.tracking.tracker import Tracker
+    from cardbox_tracker.person.model import BodyModel
+    from cardbox_tracker.person.model_file import load_body_model, save_body_model
+    from cardbox_tracker.person.proportions import body_from_proportions
+    from cardbox_tracker.person.skeleton import JOINT_NAMES, KEYPOINT_NAMES
+    from cardbox_tracker.search.config import PRESETS, TrackerConfig
     from cardbox_tracker.segmentation.background import SilhouetteExtractor
     from cardbox_tracker.segmentation.background_config import BackgroundConfig
-    from cardbox_tracker.camera.calibration_file import load_calibration
-    from cardbox_tracker.camera.camera import Calibration, Camera
     from cardbox_tracker.segmentation.empty_scene import BackgroundLearner, BackgroundModel
-    from cardbox_tracker.camera.extrinsics import Extrinsics
-    from cardbox_tracker.camera.extrinsics_files import load_extrinsics
+    from cardbox_tracker.terms.depth import Depth
+    from cardbox_tracker.tracking.estimate import Estimate
+    from cardbox_tracker.tracking.observation import Observation
+    from cardbox_tracker.tracking.tracker import Tracker
 
 __version__ = "0.1.0"
 

@@ -12,23 +12,22 @@ import socket
 import warnings
 import zlib
 from collections import deque
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from typing import Any
 
+import numpy as np
 import pytest
 from hypothesis import HealthCheck, settings
 
-from cardbox_tracker.search.config import PRESETS
-from cardbox_tracker.tracking.precompile import compile_all
-from collections.abc import Callable
-import numpy as np
+from cardbox_tracker.camera.camera import Camera
+from cardbox_tracker.detectors.image_points import ImagePoints
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.posture import N_STATE
-from cardbox_tracker.detectors.image_points import ImagePoints
+from cardbox_tracker.search.config import PRESETS
 from cardbox_tracker.terms import joint_points_kernels as kernels
 from cardbox_tracker.terms.drawn_body import body_tuple
 from cardbox_tracker.terms.whole_body_config import WholeBodyCostConfig
-from cardbox_tracker.camera.camera import Camera
+from cardbox_tracker.tracking.precompile import compile_all
 
 with contextlib.suppress(ImportError), warnings.catch_warnings():
     # What rclpy imports with the first message uses modules that Python has deprecated.
@@ -56,7 +55,17 @@ WORKER = int(os.environ.get("PYTEST_XDIST_WORKER", "gw0")[2:])
 MOST_DOMAINS = 100
 
 # These take longest; begun first, none of them is left over at the end for one process alone.
-LONGEST = ("system", "tracking", "measuring", "search", "terms", "lab", "applications", "ros", "recordings")
+LONGEST = (
+    "system",
+    "tracking",
+    "measuring",
+    "search",
+    "terms",
+    "lab",
+    "applications",
+    "ros",
+    "recordings",
+)
 
 
 @pytest.hookimpl(tryfirst=True)

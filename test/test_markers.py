@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from cardbox_tracker.camera.camera import Camera
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.posture import reference_posture
-from cardbox_tracker.markers import marker_shapes
-from cardbox_tracker.camera.camera import Camera
+from cardbox_tracker.recordings.markers import marker_shapes
 
 BODY = BodyModel()
 CAMERA = Camera(320, 240, 250.0, 250.0, 159.5, 119.5)

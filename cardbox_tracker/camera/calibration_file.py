@@ -6,9 +6,9 @@ import os
 
 import numpy as np
 
+from cardbox_tracker.camera.camera import Calibration
 from cardbox_tracker.common.errors import CameraError, cut
 from cardbox_tracker.common.small_yaml import SmallYamlError, parse_small_yaml, read_small_text
-from cardbox_tracker.camera.camera import Calibration
 
 
 def load_calibration(path: str | os.PathLike[str]) -> Calibration:

@@ -8,9 +8,9 @@ from __future__ import annotations
 
 from typing import Any
 
-from cardbox_tracker.common.errors import CameraError
 from cardbox_tracker.camera.camera import Calibration
 from cardbox_tracker.camera.camera_info import calibration_from_info
+from cardbox_tracker.common.errors import CameraError
 
 LASTING = 30
 """A change is accepted after this many equal calibrations in a row, one or two seconds."""

@@ -10,13 +10,13 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from cardbox_tracker.common.errors import CameraError, quoted
 from cardbox_tracker.camera.camera_checks import (
     distortion_problem,
     matrix_problem,
     real_number,
     whole_pixels,
 )
+from cardbox_tracker.common.errors import CameraError, quoted
 
 FloatArray = NDArray[np.float64]
 

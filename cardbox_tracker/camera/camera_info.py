@@ -6,9 +6,9 @@ from typing import Any
 
 import numpy as np
 
-from cardbox_tracker.common.errors import CameraError
 from cardbox_tracker.camera.camera import Calibration
 from cardbox_tracker.camera.camera_checks import matrix_problem
+from cardbox_tracker.common.errors import CameraError
 
 
 def calibration_from_info(message: Any, image_topic: str, info_topic: str) -> Calibration:

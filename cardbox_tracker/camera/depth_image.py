@@ -14,11 +14,11 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from cardbox_tracker.common.errors import EncodingError
 from cardbox_tracker.camera.camera import Camera
 from cardbox_tracker.camera.encodings import MOST_PIXELS, image_parts
 from cardbox_tracker.camera.given_arrays import depth_from
 from cardbox_tracker.camera.image_headers import check_pixels, compressed_size
+from cardbox_tracker.common.errors import EncodingError
 
 DepthImage = NDArray[np.float32]
 

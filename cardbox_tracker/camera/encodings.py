@@ -14,8 +14,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from cardbox_tracker.common.errors import EncodingError, quoted
 from cardbox_tracker.camera.image_headers import check_pixels, compressed_size
+from cardbox_tracker.common.errors import EncodingError, quoted
 
 ImageArray = NDArray[np.uint8]
 
@@ -190,3 +190,10 @@ def _pixels(
     if kind.channels == 1:
         return (rows if step == row_bytes else np.ascontiguousarray(rows)), kind
     return np.ascontiguousarray(rows).reshape(height, width, kind.channels), kind
+
+
+def brightness_of(image: NDArray[Any]) -> NDArray[np.uint8]:
+    """Return the brightness (H, W) of an image that is grey (H, W) or bgr (H, W, 3)."""
+    if image.ndim == 2:
+        return np.asarray(image, np.uint8)
+    return np.asarray(cv2.cvtColor(np.asarray(image, np.uint8), cv2.COLOR_BGR2GRAY), np.uint8)

@@ -10,11 +10,11 @@ from typing import Any
 import numpy as np
 import yaml
 
+from cardbox_tracker.camera.camera import Camera
+from cardbox_tracker.camera.extrinsics import FARTHEST_M, Extrinsics
 from cardbox_tracker.common.errors import CameraError, cut
 from cardbox_tracker.common.files import atomic_path
 from cardbox_tracker.common.small_yaml import SmallYamlError, parse_small_yaml, read_small_text
-from cardbox_tracker.camera.camera import Camera
-from cardbox_tracker.camera.extrinsics import FARTHEST_M, Extrinsics
 
 _EXPECTED = "a camchain of Kalibr (YAML with T_cn_cnm1) or a camera group of aniposelib (TOML)"
 

@@ -15,8 +15,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from cardbox_tracker.common.errors import CameraError
 from cardbox_tracker.camera.extrinsics import FARTHEST_M, Extrinsics
+from cardbox_tracker.common.errors import CameraError
 
 # Two sources that differ by more do not belong to the same calibration.
 _AGREE_DEG, _AGREE_M = 1.0, 0.02

@@ -8,10 +8,10 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from cardbox_tracker.common.errors import CameraError
 from cardbox_tracker.camera.camera import Camera
-from cardbox_tracker.segmentation.empty_scene import brightness_of
+from cardbox_tracker.camera.encodings import brightness_of
 from cardbox_tracker.camera.extrinsics import Extrinsics
+from cardbox_tracker.common.errors import CameraError
 
 DepthImage = NDArray[np.float32]
 

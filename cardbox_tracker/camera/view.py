@@ -17,13 +17,13 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from cardbox_tracker.camera.camera import Camera
+from cardbox_tracker.camera.extrinsics import Extrinsics
+from cardbox_tracker.common.compiling import kernel
+from cardbox_tracker.common.errors import BodyModelError, CameraError
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.posture import N_STATE, TORSO_X, TORSO_Y, TORSO_Z, YAW
 from cardbox_tracker.person.sizes import FloatArray
-from cardbox_tracker.common.compiling import kernel
-from cardbox_tracker.common.errors import BodyModelError, CameraError
-from cardbox_tracker.camera.camera import Camera
-from cardbox_tracker.camera.extrinsics import Extrinsics
 
 AnyImage = NDArray[Any]
 LevelPoint = tuple[float, float]

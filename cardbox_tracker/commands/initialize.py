@@ -52,10 +52,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> None:
     """Measure the person, write the body model and print its sizes."""
+    from cardbox_tracker.common.progress import progress_bar
+    from cardbox_tracker.measuring.config import InitializationConfig
     from cardbox_tracker.person.model import BodyModel
     from cardbox_tracker.person.model_file import save_body_model
-    from cardbox_tracker.measuring.config import InitializationConfig
-    from cardbox_tracker.common.progress import progress_bar
     from cardbox_tracker.recordings.initialize import (
         describe,
         initialize_from_cameras,

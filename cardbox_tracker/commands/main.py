@@ -10,7 +10,6 @@ from collections.abc import Container, Sequence
 from typing import Protocol
 
 from cardbox_tracker import __version__
-from cardbox_tracker.common import interrupts
 from cardbox_tracker.commands import (
     benchmark,
     body,
@@ -28,6 +27,7 @@ from cardbox_tracker.commands import (
     urdf,
     view,
 )
+from cardbox_tracker.common import interrupts
 from cardbox_tracker.common.errors import CardboxError
 
 

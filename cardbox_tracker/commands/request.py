@@ -31,13 +31,13 @@ from cardbox_tracker.common.files import UnreadableFileError, read_regular
 from cardbox_tracker.common.settings import NoEffectError, nested, settings_of
 
 if TYPE_CHECKING:
-    from cardbox_tracker.person.model import BodyModel
-    from cardbox_tracker.search.config import TrackerConfig
     from cardbox_tracker.detectors.detector import Detector
-    from cardbox_tracker.recordings.given_camera import GivenCamera
     from cardbox_tracker.detectors.point_table import PointTable
+    from cardbox_tracker.person.model import BodyModel
+    from cardbox_tracker.recordings.given_camera import GivenCamera
     from cardbox_tracker.recordings.recording import Recording, Segmentation
     from cardbox_tracker.recordings.silhouettes import TimeSpan
+    from cardbox_tracker.search.config import TrackerConfig
 
 S = TypeVar("S")
 T = TypeVar("T")
@@ -415,9 +415,9 @@ def _setting(text: str) -> tuple[str, bool | int | float | str]:
 
 def recording_request(options: argparse.Namespace, problems: Problems) -> RecordingRequest:
     """Return what the options of :func:`add_recording` ask for; note what is wrong with them."""
+    from cardbox_tracker.camera.pairing import camera_names
     from cardbox_tracker.recordings.open_images import check_exists
     from cardbox_tracker.recordings.recording import input_faults
-    from cardbox_tracker.camera.pairing import camera_names
 
     path, depth = options.recording, options.depth
     problems.caught(lambda: check_exists(path), None)
@@ -488,8 +488,8 @@ def _camera(options: argparse.Namespace, problems: Problems) -> GivenCamera:
 
 def _silhouettes(options: argparse.Namespace, problems: Problems) -> Segmentation:
     """Return the source of the silhouettes that is given, or that fits the recording."""
-    from cardbox_tracker.recordings.depth_silhouettes import Within
     from cardbox_tracker.detectors.detector import MEDIAPIPE, Detector
+    from cardbox_tracker.recordings.depth_silhouettes import Within
     from cardbox_tracker.recordings.open_images import is_bag
     from cardbox_tracker.recordings.person_in_view import PersonInView
     from cardbox_tracker.recordings.recording import STEREO

@@ -40,8 +40,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> None:
     """Write the recording."""
-    from cardbox_tracker.common.progress import progress_bar
     from cardbox_tracker.applications.simulation.session import SessionFormat, synthesize_session
+    from cardbox_tracker.common.progress import progress_bar
 
     check_outputs((), options.force, results=(options.output,))
     form = SessionFormat(

@@ -25,7 +25,6 @@ import numba
 import numpy as np
 
 import cardbox_tracker
-from cardbox_tracker.common import interrupts
 from cardbox_tracker.commands.arguments import body_beside
 from cardbox_tracker.commands.request import (
     TrackFiles,
@@ -34,14 +33,15 @@ from cardbox_tracker.commands.request import (
     with_own_options,
 )
 from cardbox_tracker.commands.tracking import track
+from cardbox_tracker.common import interrupts
 from cardbox_tracker.common.errors import CardboxError
-from cardbox_tracker.tracking.precompile import compile_all
 from cardbox_tracker.common.files import claimed_name, write_table
 from cardbox_tracker.common.processes import cores, results_of
 from cardbox_tracker.common.progress import SharedProgress, progress_bar, told
 from cardbox_tracker.recordings.folder import SUMMARY, recordings_in
 from cardbox_tracker.recordings.result_table import check_table
 from cardbox_tracker.recordings.track import TrackSummary
+from cardbox_tracker.tracking.precompile import compile_all
 
 TABLES = ("csv", "parquet")
 FORMATS = (*TABLES, "mp4", "bag")

@@ -38,8 +38,8 @@ def track(
     Raises:
         CardboxError: the recording cannot be read, or a result cannot be written.
     """
-    from cardbox_tracker.person.model_file import save_body_model
     from cardbox_tracker.common.progress import progress_bar
+    from cardbox_tracker.person.model_file import save_body_model
     from cardbox_tracker.recordings.silhouettes import TimeSpan
     from cardbox_tracker.recordings.track import track_recording
 

@@ -9,8 +9,8 @@ from operator import index
 import numpy as np
 from numpy.typing import NDArray
 
-from cardbox_tracker.person.sizes import FloatArray
 from cardbox_tracker.common.errors import quoted
+from cardbox_tracker.person.sizes import FloatArray
 
 POINT_NAMES: tuple[str, ...] = (
     "nose",

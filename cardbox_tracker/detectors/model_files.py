@@ -16,7 +16,12 @@ from pathlib import Path
 from typing import NamedTuple
 
 from cardbox_tracker.common.errors import CardboxError
-from cardbox_tracker.common.files import UnreadableFileError, atomic_path, read_regular, regular_file
+from cardbox_tracker.common.files import (
+    UnreadableFileError,
+    atomic_path,
+    read_regular,
+    regular_file,
+)
 
 REQUIREMENT = "mediapipe==0.10.21"
 """The one release whose wheel ships its models; Apache-2.0."""

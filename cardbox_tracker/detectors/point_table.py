@@ -8,11 +8,11 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import NamedTuple
 
-from cardbox_tracker.detectors.image_points import POINT_INDEX, ImagePoints
+from cardbox_tracker.camera.camera import Calibration
 from cardbox_tracker.common.errors import CardboxError, quoted
 from cardbox_tracker.common.files import UnreadableFileError, regular_file
 from cardbox_tracker.detectors.detector import FindPoints
-from cardbox_tracker.camera.camera import Calibration
+from cardbox_tracker.detectors.image_points import POINT_INDEX, ImagePoints
 
 COLUMNS = ("stamp_ns", "joint", "u", "v", "score")
 """Columns that a table needs."""

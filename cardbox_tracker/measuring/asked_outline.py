@@ -10,18 +10,18 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from cardbox_tracker.person.cardbox import cardbox_patches
-from cardbox_tracker.person.model import BodyModel
-from cardbox_tracker.person.posture import REFERENCE_NAMES, TORSO_Y, reference_posture
-from cardbox_tracker.person.proportions import sizes_of_stature
+from cardbox_tracker.camera.camera import Camera
+from cardbox_tracker.camera.rasterisation import render
 from cardbox_tracker.common.errors import InitializationError
 from cardbox_tracker.measuring.config import InitializationConfig
 from cardbox_tracker.measuring.outline import filled
 from cardbox_tracker.measuring.references import POSTURE_TEXT, lateral_m
 from cardbox_tracker.measuring.standing import at_height_of
 from cardbox_tracker.measuring.wording import rounded_down
-from cardbox_tracker.camera.camera import Camera
-from cardbox_tracker.camera.rasterisation import render
+from cardbox_tracker.person.cardbox import cardbox_patches
+from cardbox_tracker.person.model import BodyModel
+from cardbox_tracker.person.posture import REFERENCE_NAMES, TORSO_Y, reference_posture
+from cardbox_tracker.person.proportions import sizes_of_stature
 
 Silhouette = NDArray[np.uint8]
 

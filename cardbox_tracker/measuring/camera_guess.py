@@ -15,6 +15,11 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from cardbox_tracker.camera.camera import Camera
+from cardbox_tracker.camera.extrinsics import Extrinsics
+from cardbox_tracker.camera.view import OtherCamera, View
+from cardbox_tracker.common.errors import CameraError, InitializationError
+from cardbox_tracker.measuring.camera_pose import PoseProblem, Sighting
 from cardbox_tracker.person.kinematics import pose
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.parts import body_parts
@@ -26,14 +31,9 @@ from cardbox_tracker.person.posture import (
     reference_posture,
 )
 from cardbox_tracker.person.sizes import FloatArray
-from cardbox_tracker.common.errors import CameraError, InitializationError
-from cardbox_tracker.measuring.camera_pose import PoseProblem, Sighting
 from cardbox_tracker.terms.term import Silhouette
-from cardbox_tracker.camera.view import OtherCamera, View
 from cardbox_tracker.terms.whole_body import WholeBodyCost
 from cardbox_tracker.terms.whole_body_config import WholeBodyCostConfig
-from cardbox_tracker.camera.camera import Camera
-from cardbox_tracker.camera.extrinsics import Extrinsics
 
 _WIDTH = 80
 _YAWS_RAD = np.radians(np.arange(-180.0, 180.0, 7.5))

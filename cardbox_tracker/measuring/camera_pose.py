@@ -19,6 +19,10 @@ from typing import NamedTuple
 import cv2
 import numpy as np
 
+from cardbox_tracker.camera.camera import Camera
+from cardbox_tracker.camera.extrinsics import Extrinsics
+from cardbox_tracker.camera.view import OtherCamera, View
+from cardbox_tracker.measuring.silhouette_tangents import TopTangents
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.posture import N_STATE
 from cardbox_tracker.person.sizes import FloatArray
@@ -29,12 +33,8 @@ from cardbox_tracker.terms.outline_distances import (
     comparing,
 )
 from cardbox_tracker.terms.term import Silhouette
-from cardbox_tracker.camera.view import OtherCamera, View
 from cardbox_tracker.terms.whole_body import WholeBodyCost
 from cardbox_tracker.terms.whole_body_config import WholeBodyCostConfig
-from cardbox_tracker.measuring.silhouette_tangents import TopTangents
-from cardbox_tracker.camera.camera import Camera
-from cardbox_tracker.camera.extrinsics import Extrinsics
 
 N_POSE = 6
 ROTATION = (0, 1, 2)

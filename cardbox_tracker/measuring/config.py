@@ -6,11 +6,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from cardbox_tracker.common.errors import InitializationError
+from cardbox_tracker.common.settings import Settings, setting
+from cardbox_tracker.measuring.wording import rounded_down
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.posture import REFERENCE_NAMES, SIDE_TURNS
-from cardbox_tracker.common.errors import InitializationError
-from cardbox_tracker.measuring.wording import rounded_down
-from cardbox_tracker.common.settings import Settings, setting
 
 MAX_PITCH_RAD = float(np.radians(80.0))
 """Limit of the camera's pitch, beyond which an upright person's outline is not visible."""

@@ -18,17 +18,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from cardbox_tracker.person.model import BodyModel
-from cardbox_tracker.person.posture import N_STATE, PLACE, POSTURE, TORSO_Y
-from cardbox_tracker.person.proportions import BREADTHS
-from cardbox_tracker.person.sizes import SIZE_INDEX, SIZE_LIMITS, FloatArray
+from cardbox_tracker.camera.camera import Camera
 from cardbox_tracker.common.errors import InitializationError
-from cardbox_tracker.search.config import TrackerConfig
-from cardbox_tracker.terms.compiled import CompiledSilhouette
-from cardbox_tracker.terms.term import Image, Silhouette
-from cardbox_tracker.terms.whole_body import WholeBodyCost, iou_of
-from cardbox_tracker.search.pose_filter import Presence
-from cardbox_tracker.search.whole_body import WholeBodyFilter
 from cardbox_tracker.measuring.outline import filled
 from cardbox_tracker.measuring.part_colors import (
     seen_appearance,
@@ -41,7 +32,16 @@ from cardbox_tracker.measuring.references import (
 )
 from cardbox_tracker.measuring.standing import at_height_of
 from cardbox_tracker.measuring.wording import rounded_down
-from cardbox_tracker.camera.camera import Camera
+from cardbox_tracker.person.model import BodyModel
+from cardbox_tracker.person.posture import N_STATE, PLACE, POSTURE, TORSO_Y
+from cardbox_tracker.person.proportions import BREADTHS
+from cardbox_tracker.person.sizes import SIZE_INDEX, SIZE_LIMITS, FloatArray
+from cardbox_tracker.search.config import TrackerConfig
+from cardbox_tracker.search.pose_filter import Presence
+from cardbox_tracker.search.whole_body import WholeBodyFilter
+from cardbox_tracker.terms.compiled import CompiledSilhouette
+from cardbox_tracker.terms.term import Image, Silhouette
+from cardbox_tracker.terms.whole_body import WholeBodyCost, iou_of
 
 MIN_IOU = 0.6
 """Least IoU of the fitted body; below it the silhouette is not a person."""

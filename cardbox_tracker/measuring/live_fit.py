@@ -13,10 +13,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from cardbox_tracker.person.cardbox import cardbox_patches
-from cardbox_tracker.person.model import BodyModel
-from cardbox_tracker.person.posture import REFERENCE_NAMES, reference_posture
-from cardbox_tracker.person.proportions import sizes_of_stature
+from cardbox_tracker.camera.camera import Camera
+from cardbox_tracker.camera.rasterisation import render
 from cardbox_tracker.measuring.asked_outline import (
     CLEARLY,
     LEAST_IOU,
@@ -26,8 +24,10 @@ from cardbox_tracker.measuring.asked_outline import (
 from cardbox_tracker.measuring.config import InitializationConfig
 from cardbox_tracker.measuring.outline import filled
 from cardbox_tracker.measuring.references import lateral_m
-from cardbox_tracker.camera.camera import Camera
-from cardbox_tracker.camera.rasterisation import render
+from cardbox_tracker.person.cardbox import cardbox_patches
+from cardbox_tracker.person.model import BodyModel
+from cardbox_tracker.person.posture import REFERENCE_NAMES, reference_posture
+from cardbox_tracker.person.proportions import sizes_of_stature
 
 FITS, NEARLY, FAR = "fits", "nearly", "far"
 """A capture would be accepted without a warning, or almost; or another posture is shown."""

@@ -24,6 +24,26 @@ from dataclasses import replace
 
 import numpy as np
 
+from cardbox_tracker.camera.camera import Camera
+from cardbox_tracker.camera.given_arrays import image_from, silhouette_from
+from cardbox_tracker.common.errors import InitializationError
+from cardbox_tracker.measuring.config import (
+    InitializationConfig,
+    InitializationResult,
+    check_fit,
+)
+from cardbox_tracker.measuring.outline import filled
+from cardbox_tracker.measuring.part_colors import can_learn, learn_appearance
+from cardbox_tracker.measuring.reference_checks import check_postures
+from cardbox_tracker.measuring.references import (
+    POSTURE_TEXT,
+    Silhouette,
+    check_references,
+    lateral_m,
+)
+from cardbox_tracker.measuring.shoulders import GIRDLE_RISE
+from cardbox_tracker.measuring.skeleton import measure_skeleton
+from cardbox_tracker.measuring.stature import SHOULDER_TO_HIP, stature_m
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.posture import (
     LEFT_ARM,
@@ -44,28 +64,8 @@ from cardbox_tracker.person.sizes import (
     SUBSETS,
     FloatArray,
 )
-from cardbox_tracker.common.errors import InitializationError
 from cardbox_tracker.terms.compiled import CompiledSilhouette
 from cardbox_tracker.terms.term import Image
-from cardbox_tracker.measuring.config import (
-    InitializationConfig,
-    InitializationResult,
-    check_fit,
-)
-from cardbox_tracker.measuring.outline import filled
-from cardbox_tracker.measuring.part_colors import can_learn, learn_appearance
-from cardbox_tracker.measuring.reference_checks import check_postures
-from cardbox_tracker.measuring.references import (
-    POSTURE_TEXT,
-    Silhouette,
-    check_references,
-    lateral_m,
-)
-from cardbox_tracker.measuring.shoulders import GIRDLE_RISE
-from cardbox_tracker.measuring.skeleton import measure_skeleton
-from cardbox_tracker.measuring.stature import SHOULDER_TO_HIP, stature_m
-from cardbox_tracker.camera.camera import Camera
-from cardbox_tracker.camera.given_arrays import image_from, silhouette_from
 
 STEPS = (("O1", "front"), ("O2", "side"), ("O3", "arms"))
 """Subset of the sizes and its reference, in the order of the paper."""

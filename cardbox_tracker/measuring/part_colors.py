@@ -22,6 +22,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from cardbox_tracker.camera.camera import Camera
 from cardbox_tracker.person.appearance import (
     COLOR_STEPS,
     FOREARM,
@@ -50,7 +51,6 @@ from cardbox_tracker.person.posture import (
 from cardbox_tracker.person.sizes import FloatArray
 from cardbox_tracker.terms.compiled import CompiledSilhouette
 from cardbox_tracker.terms.term import Image, Silhouette
-from cardbox_tracker.camera.camera import Camera
 
 LEARNED_FROM = ("front", "arms")
 """References whose images are needed."""

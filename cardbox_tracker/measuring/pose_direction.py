@@ -13,10 +13,10 @@ from enum import Enum
 
 import numpy as np
 
-from cardbox_tracker.terms.term import Silhouette
-from cardbox_tracker.measuring.silhouette_tangents import TopTangents
 from cardbox_tracker.camera.camera import Camera
 from cardbox_tracker.camera.extrinsics import Extrinsics
+from cardbox_tracker.measuring.silhouette_tangents import TopTangents
+from cardbox_tracker.terms.term import Silhouette
 
 # Samples in a window, and the least number for a verdict.
 _WINDOW, _LEAST = 15, 6

@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from cardbox_tracker.person.posture import REFERENCE_NAMES
+from cardbox_tracker.camera.camera import Camera
 from cardbox_tracker.common.errors import InitializationError
 from cardbox_tracker.measuring.outline import (
     LevelArm,
@@ -27,7 +27,7 @@ from cardbox_tracker.measuring.outline import (
 from cardbox_tracker.measuring.references import POSTURE_TEXT
 from cardbox_tracker.measuring.skeleton import BREADTH_OF_SPAN
 from cardbox_tracker.measuring.wording import rounded_down, rounded_up
-from cardbox_tracker.camera.camera import Camera
+from cardbox_tracker.person.posture import REFERENCE_NAMES
 
 Silhouette = NDArray[np.uint8]
 

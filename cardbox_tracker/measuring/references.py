@@ -10,10 +10,10 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from cardbox_tracker.person.posture import REFERENCE_NAMES
+from cardbox_tracker.camera.camera import Camera
 from cardbox_tracker.common.errors import InitializationError
 from cardbox_tracker.measuring.wording import rounded_down, rounded_up
-from cardbox_tracker.camera.camera import Camera
+from cardbox_tracker.person.posture import REFERENCE_NAMES
 
 Silhouette = NDArray[np.uint8]
 

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import os
 
-from cardbox_tracker.person.model import BodyModel
-from cardbox_tracker.person.model_file import load_body_model, save_body_model
 from cardbox_tracker.common.errors import CardboxError, InitializationError
 from cardbox_tracker.common.files import check_writable, user_path
+from cardbox_tracker.person.model import BodyModel
+from cardbox_tracker.person.model_file import load_body_model, save_body_model
 
 
 class SavedModel:

@@ -14,20 +14,20 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from cardbox_tracker.person.model import BodyModel
-from cardbox_tracker.person.sizes import FloatArray
-from cardbox_tracker.common.errors import BodyModelError, CameraError, InitializationError
-from cardbox_tracker.terms.depth import Depth, DepthTerm
-from cardbox_tracker.terms.drawn_body import body_tuple
-from cardbox_tracker.terms.term import DepthImage, Frame, Posed
+from cardbox_tracker.camera.camera import Camera
 from cardbox_tracker.camera.view import OtherCamera, View
-from cardbox_tracker.terms.whole_body import WholeBodyCost
-from cardbox_tracker.terms.whole_body_config import WholeBodyCostConfig
+from cardbox_tracker.common.errors import BodyModelError, CameraError, InitializationError
 from cardbox_tracker.measuring.config import (
     InitializationConfig,
     InitializationResult,
 )
-from cardbox_tracker.camera.camera import Camera
+from cardbox_tracker.person.model import BodyModel
+from cardbox_tracker.person.sizes import FloatArray
+from cardbox_tracker.terms.depth import Depth, DepthTerm
+from cardbox_tracker.terms.drawn_body import body_tuple
+from cardbox_tracker.terms.term import DepthImage, Frame, Posed
+from cardbox_tracker.terms.whole_body import WholeBodyCost
+from cardbox_tracker.terms.whole_body_config import WholeBodyCostConfig
 
 _LEAST, _MOST, _STEP = 0.5, 2.0, 0.005
 # Largest share of differing pixels of a fit.

@@ -13,8 +13,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from cardbox_tracker.measuring.outline import plane_points_m, row_heights_m
 from cardbox_tracker.camera.camera import Camera
+from cardbox_tracker.measuring.outline import plane_points_m, row_heights_m
 
 FloatArray = NDArray[np.float64]
 Silhouette = NDArray[np.uint8]

@@ -17,10 +17,10 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from cardbox_tracker.person.sizes import FloatArray
-from cardbox_tracker.terms.term import Silhouette
 from cardbox_tracker.camera.camera import Camera
 from cardbox_tracker.camera.extrinsics import Extrinsics
+from cardbox_tracker.person.sizes import FloatArray
+from cardbox_tracker.terms.term import Silhouette
 
 # A point this close to the image border may belong to a part that is cut off.
 _BORDER_PX = 4.0

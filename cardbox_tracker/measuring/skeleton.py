@@ -28,6 +28,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from cardbox_tracker.camera.camera import Camera
 from cardbox_tracker.measuring.outline import (
     axes_distance_m,
     level_arm,
@@ -40,7 +41,6 @@ from cardbox_tracker.measuring.shoulders import (
     shoulder_height_m,
     shoulders_forward_m,
 )
-from cardbox_tracker.camera.camera import Camera
 
 FloatArray = NDArray[np.float64]
 Silhouette = NDArray[np.uint8]

@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from cardbox_tracker.camera.camera import Camera
+from cardbox_tracker.measuring.stature import height_of_row_m
 from cardbox_tracker.person.kinematics import pose
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.parts import body_parts
 from cardbox_tracker.person.posture import N_JOINTS
-from cardbox_tracker.measuring.stature import height_of_row_m
-from cardbox_tracker.camera.camera import Camera
 
 # Range of the hips' height; beyond it, the topmost row is not the top of a head.
 _LOWEST_M, _HIGHEST_M = -2.5, 1.5

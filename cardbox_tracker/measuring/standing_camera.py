@@ -14,8 +14,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from cardbox_tracker.person.sizes import FloatArray
 from cardbox_tracker.camera.camera import Camera
+from cardbox_tracker.person.sizes import FloatArray
 
 
 class Level(NamedTuple):

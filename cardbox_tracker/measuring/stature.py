@@ -11,8 +11,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from cardbox_tracker.measuring.skeleton import Skeleton, combined
 from cardbox_tracker.camera.camera import Camera
+from cardbox_tracker.measuring.skeleton import Skeleton, combined
 
 SHOULDER_TO_HIP = 0.275
 """Height of the shoulder joints above the hip joints in statures, chosen on rendered bodies with

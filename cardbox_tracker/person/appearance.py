@@ -16,8 +16,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from cardbox_tracker.person.sizes import FloatArray
 from cardbox_tracker.common.errors import BodyModelError
+from cardbox_tracker.person.sizes import FloatArray
 
 PARTS = ("hand", "forearm", "torso", "head", "legs")
 HAND, FOREARM, TORSO, HEAD, LEGS = range(len(PARTS))

@@ -25,6 +25,7 @@ from typing import NamedTuple, Protocol
 
 import numpy as np
 
+from cardbox_tracker.common.compiling import copied_kernel, inlined_kernel, kernel
 from cardbox_tracker.person.model import BodyModel, Person, Placement
 from cardbox_tracker.person.parts import (
     BOTTOM,
@@ -65,7 +66,6 @@ from cardbox_tracker.person.skeleton import (
     neck_pivot_m,
     neck_rotation,
 )
-from cardbox_tracker.common.compiling import copied_kernel, inlined_kernel, kernel
 
 # Values of ``girdle`` (3,): shoulder joint of a hanging arm in the torso's frame, metres; its rise
 # per elevation of the arm, m/rad.

@@ -16,6 +16,7 @@ from typing import Any
 
 import numpy as np
 
+from cardbox_tracker.common.errors import BodyModelError, quoted
 from cardbox_tracker.person.appearance import Appearance
 from cardbox_tracker.person.posture import N_STATE, POSTURE, SIDE_TURNS, TORSO_Y, reference_posture
 from cardbox_tracker.person.sizes import (
@@ -27,7 +28,6 @@ from cardbox_tracker.person.sizes import (
     FloatArray,
 )
 from cardbox_tracker.person.skeleton import SHOULDER_RISE
-from cardbox_tracker.common.errors import BodyModelError, quoted
 
 # name: (lowest, highest, unit, meaning)
 PLACEMENT = {

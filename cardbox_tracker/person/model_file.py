@@ -9,12 +9,12 @@ import os
 import textwrap
 from typing import Any
 
-from cardbox_tracker.person.appearance import Appearance
-from cardbox_tracker.person.model import CONSTANTS, MEASURED, PROPORTIONS, BodyModel
-from cardbox_tracker.person.sizes import SIZE_NAMES, SIZES
 from cardbox_tracker.common.errors import BodyModelError, CardboxError, cut, quoted
 from cardbox_tracker.common.files import atomic_path
 from cardbox_tracker.common.small_yaml import SmallYamlError, parse_small_yaml, read_small_text
+from cardbox_tracker.person.appearance import Appearance
+from cardbox_tracker.person.model import CONSTANTS, MEASURED, PROPORTIONS, BodyModel
+from cardbox_tracker.person.sizes import SIZE_NAMES, SIZES
 
 FORMAT = "cardbox_body_model/1"
 _UNITS = {"length": "m", "angle": "rad"}

@@ -6,9 +6,9 @@ from typing import Any
 
 import numpy as np
 
-from cardbox_tracker.markers import MarkerShape, Rgba
-from cardbox_tracker.recordings.outputs import Markers
 from cardbox_tracker.recordings.bag_writer import BagWriter
+from cardbox_tracker.recordings.markers import MarkerShape, Rgba
+from cardbox_tracker.recordings.outputs import Markers
 
 _NO_BYTES = np.zeros(0, np.uint8)
 _NO_POINTS = np.zeros((0, 3))

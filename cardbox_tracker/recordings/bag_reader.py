@@ -14,10 +14,6 @@ from numpy.typing import NDArray
 from rosbags.highlevel import AnyReader, AnyReaderError
 from rosbags.typesys import Stores, get_typestore
 
-from cardbox_tracker.common.errors import BagError, EncodingError, cut
-from cardbox_tracker.recordings.bag_limits import check_recording, limit_decompression
-from cardbox_tracker.recordings.given_camera import GivenCamera
-from cardbox_tracker.recordings.image_recording import WORKING_SIZE, RecordedImage
 from cardbox_tracker.camera.camera import Calibration
 from cardbox_tracker.camera.camera_info import calibration_from_info
 from cardbox_tracker.camera.encodings import (
@@ -25,6 +21,10 @@ from cardbox_tracker.camera.encodings import (
     decode_compressed,
     image_parts,
 )
+from cardbox_tracker.common.errors import BagError, EncodingError, cut
+from cardbox_tracker.recordings.bag_limits import check_recording, limit_decompression
+from cardbox_tracker.recordings.given_camera import GivenCamera
+from cardbox_tracker.recordings.image_recording import WORKING_SIZE, RecordedImage
 
 IMAGE_TYPES = ("sensor_msgs/msg/Image", "sensor_msgs/msg/CompressedImage")
 CAMERA_INFO_TYPE = "sensor_msgs/msg/CameraInfo"

@@ -22,9 +22,9 @@ from rosbags.interfaces import (
 from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin, Writer
 from rosbags.typesys import Stores, get_typestore
 
+from cardbox_tracker.camera.camera import Camera
 from cardbox_tracker.common.errors import BagError, CardboxError
 from cardbox_tracker.common.files import claimed_name
-from cardbox_tracker.camera.camera import Camera
 
 STORAGES = {"mcap": StoragePlugin.MCAP, "sqlite3": StoragePlugin.SQLITE3}
 

@@ -8,20 +8,20 @@ from contextlib import ExitStack
 from functools import partial
 from typing import NamedTuple
 
-from cardbox_tracker.person.model import BodyModel
+from cardbox_tracker.camera.camera import Camera
+from cardbox_tracker.camera.pairing import MOST_CAMERAS, side_by_side
 from cardbox_tracker.common.errors import CardboxError
+from cardbox_tracker.measuring.config import InitializationConfig
+from cardbox_tracker.measuring.references import average_silhouette
+from cardbox_tracker.person.model import BodyModel
+from cardbox_tracker.recordings.bag_reader import BagReader
+from cardbox_tracker.recordings.initialize import initialize_from_recording
+from cardbox_tracker.recordings.silhouettes import RecordedFrame, SilhouetteSource, TimeSpan
 from cardbox_tracker.tracking.camera_calibration import (
     CalibratedCamera,
     MovingFrame,
     calibrated_camera,
 )
-from cardbox_tracker.measuring.config import InitializationConfig
-from cardbox_tracker.measuring.references import average_silhouette
-from cardbox_tracker.recordings.bag_reader import BagReader
-from cardbox_tracker.recordings.initialize import initialize_from_recording
-from cardbox_tracker.recordings.silhouettes import RecordedFrame, SilhouetteSource, TimeSpan
-from cardbox_tracker.camera.camera import Camera
-from cardbox_tracker.camera.pairing import MOST_CAMERAS, side_by_side
 
 # Images are paired if their stamps differ by at most this.
 _TOLERANCE_NS = 50_000_000

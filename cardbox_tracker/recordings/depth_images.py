@@ -5,10 +5,10 @@ from __future__ import annotations
 import os
 from collections.abc import Iterator
 
-from cardbox_tracker.common.errors import BagError
-from cardbox_tracker.recordings.bag_reader import IMAGE_TYPES, BagReader, stamp_ns_of
 from cardbox_tracker.camera.camera import Camera
 from cardbox_tracker.camera.depth_image import DepthImage, at_size, depth_from_image
+from cardbox_tracker.common.errors import BagError
+from cardbox_tracker.recordings.bag_reader import IMAGE_TYPES, BagReader, stamp_ns_of
 
 
 def depth_images(

@@ -5,15 +5,15 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Any, NamedTuple
 
+from cardbox_tracker.camera.encodings import brightness_of
+from cardbox_tracker.camera.pairing import TOLERANCE_NS, side_by_side
 from cardbox_tracker.common.errors import CardboxError
-from cardbox_tracker.recordings.depth_images import depth_images
 from cardbox_tracker.detectors.detector import Detector
-from cardbox_tracker.recordings.image_recording import ImageRecording
 from cardbox_tracker.detectors.point_table import PointTable
+from cardbox_tracker.recordings.depth_images import depth_images
+from cardbox_tracker.recordings.image_recording import ImageRecording
 from cardbox_tracker.recordings.silhouettes import RecordedFrame, SilhouetteSource
 from cardbox_tracker.segmentation.depth_silhouette import WITHIN_LIMITS_M, silhouette_within
-from cardbox_tracker.segmentation.empty_scene import brightness_of
-from cardbox_tracker.camera.pairing import TOLERANCE_NS, side_by_side
 
 
 class Within(NamedTuple):

@@ -6,13 +6,13 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from cardbox_tracker.detectors.landmarks import image_points
-from cardbox_tracker.detectors.pose_network import Detection
+from cardbox_tracker.camera.encodings import brightness_of
 from cardbox_tracker.detectors.detector import Detector
-from cardbox_tracker.recordings.image_recording import ImageRecording
+from cardbox_tracker.detectors.landmarks import image_points
 from cardbox_tracker.detectors.point_table import PointTable
+from cardbox_tracker.detectors.pose_network import Detection
+from cardbox_tracker.recordings.image_recording import ImageRecording
 from cardbox_tracker.recordings.silhouettes import PreparedImage, RecordedFrame, SilhouetteSource
-from cardbox_tracker.segmentation.empty_scene import brightness_of
 
 
 class DetectorSilhouetteSource(SilhouetteSource):

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from cardbox_tracker.camera.camera import Calibration
 from cardbox_tracker.common.errors import BagError
 from cardbox_tracker.recordings.given_camera import GivenCamera
 from cardbox_tracker.recordings.image_recording import working_size
-from cardbox_tracker.camera.camera import Calibration
 
 
 class Film:

@@ -6,9 +6,9 @@ from dataclasses import dataclass, replace
 from math import atan, degrees, radians, tan
 from pathlib import Path
 
-from cardbox_tracker.common.errors import CameraError
 from cardbox_tracker.camera.calibration_file import load_calibration
 from cardbox_tracker.camera.camera import Calibration
+from cardbox_tracker.common.errors import CameraError
 
 # Largest difference of the aspect ratios of a calibration and of the images.
 _ASPECT = 0.02

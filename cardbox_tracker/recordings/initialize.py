@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from functools import partial
 
-from cardbox_tracker.person.model import BodyModel
+from cardbox_tracker.camera.camera import Camera
+from cardbox_tracker.camera.depth_image import median_depth
 from cardbox_tracker.common.errors import CardboxError
 from cardbox_tracker.measuring.config import (
     InitializationConfig,
@@ -21,10 +22,9 @@ from cardbox_tracker.measuring.scale import (
     measured_at_scale,
     measured_scale,
 )
+from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.recordings.recording import Recording
 from cardbox_tracker.recordings.silhouettes import SilhouetteSource, TimeSpan
-from cardbox_tracker.camera.camera import Camera
-from cardbox_tracker.camera.depth_image import median_depth
 
 # Further images of one posture add no information.
 _MOST_IMAGES = 20

@@ -21,10 +21,10 @@ from cardbox_tracker.person.skeleton import (
     NECK_NAMES,
     PLACE_NAMES,
 )
+from cardbox_tracker.recordings.keypoint_status import KeypointStates, keypoint_states
+from cardbox_tracker.recordings.markers import MarkerShape, marker_shapes
 from cardbox_tracker.tracking.estimate import Estimate
 from cardbox_tracker.tracking.tracker import Tracker
-from cardbox_tracker.recordings.keypoint_status import KeypointStates, keypoint_states
-from cardbox_tracker.markers import MarkerShape, marker_shapes
 
 
 class JointValues(NamedTuple):

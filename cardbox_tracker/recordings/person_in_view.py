@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 from cardbox_tracker.common.errors import CardboxError
 from cardbox_tracker.detectors.detector import Detector
-from cardbox_tracker.recordings.image_recording import ImageRecording
 from cardbox_tracker.detectors.point_table import PointTable
+from cardbox_tracker.recordings.image_recording import ImageRecording
 from cardbox_tracker.recordings.silhouettes import SilhouetteSource
 from cardbox_tracker.segmentation.learning import Learning, PersonInViewLearning
 

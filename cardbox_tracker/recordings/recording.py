@@ -10,20 +10,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from cardbox_tracker.common.errors import BagError, CameraError, CardboxError
-from cardbox_tracker.camera.view import OtherCamera
-from cardbox_tracker.tracking.observation import Observation
-from cardbox_tracker.recordings.bag_reader import BagReader
-from cardbox_tracker.recordings.depth_images import depth_images
-from cardbox_tracker.recordings.depth_silhouettes import DepthSilhouetteSource, Within
-from cardbox_tracker.detectors.detector import Detector
-from cardbox_tracker.recordings.detector_silhouettes import DetectorSilhouetteSource
-from cardbox_tracker.recordings.given_camera import GivenCamera
-from cardbox_tracker.recordings.image_recording import ImageRecording
-from cardbox_tracker.recordings.open_images import is_bag, open_images
-from cardbox_tracker.recordings.person_in_view import PersonInView, PersonInViewSource
-from cardbox_tracker.detectors.point_table import PointTable
-from cardbox_tracker.recordings.silhouettes import RecordedFrame, SilhouetteSource, TimeSpan
 from cardbox_tracker.camera.camera import Camera
 from cardbox_tracker.camera.depth_image import DepthImage
 from cardbox_tracker.camera.extrinsics import Extrinsics
@@ -35,6 +21,20 @@ from cardbox_tracker.camera.extrinsics_sources import (
 )
 from cardbox_tracker.camera.pairing import camera_names, side_by_side
 from cardbox_tracker.camera.stereo import StereoDepth, stereo_of_pair
+from cardbox_tracker.camera.view import OtherCamera
+from cardbox_tracker.common.errors import BagError, CameraError, CardboxError
+from cardbox_tracker.detectors.detector import Detector
+from cardbox_tracker.detectors.point_table import PointTable
+from cardbox_tracker.recordings.bag_reader import BagReader
+from cardbox_tracker.recordings.depth_images import depth_images
+from cardbox_tracker.recordings.depth_silhouettes import DepthSilhouetteSource, Within
+from cardbox_tracker.recordings.detector_silhouettes import DetectorSilhouetteSource
+from cardbox_tracker.recordings.given_camera import GivenCamera
+from cardbox_tracker.recordings.image_recording import ImageRecording
+from cardbox_tracker.recordings.open_images import is_bag, open_images
+from cardbox_tracker.recordings.person_in_view import PersonInView, PersonInViewSource
+from cardbox_tracker.recordings.silhouettes import RecordedFrame, SilhouetteSource, TimeSpan
+from cardbox_tracker.tracking.observation import Observation
 
 STEREO = "stereo"
 """Given in place of a depth topic: stereo depth of the first two cameras, a rectified pair."""

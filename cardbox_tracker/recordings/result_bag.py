@@ -15,9 +15,15 @@ from numpy.typing import NDArray
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.model_file import dumps_body_model
 from cardbox_tracker.person.urdf import urdf_from_body
-from cardbox_tracker.tracking.estimate import Estimate
-from cardbox_tracker.tracking.tracker import Tracker
-from cardbox_tracker.recordings.keypoint_status import CHANCE_KEY, LEVELS, KeypointStates, chance_text
+from cardbox_tracker.recordings.bag_markers import write_markers
+from cardbox_tracker.recordings.bag_transforms import BagTransforms
+from cardbox_tracker.recordings.bag_writer import BagWriter
+from cardbox_tracker.recordings.keypoint_status import (
+    CHANCE_KEY,
+    LEVELS,
+    KeypointStates,
+    chance_text,
+)
 from cardbox_tracker.recordings.outputs import (
     JointValues,
     Markers,
@@ -28,11 +34,10 @@ from cardbox_tracker.recordings.outputs import (
     joint_values,
     positions_of,
 )
-from cardbox_tracker.recordings.bag_markers import write_markers
-from cardbox_tracker.recordings.bag_transforms import BagTransforms
-from cardbox_tracker.recordings.bag_writer import BagWriter
 from cardbox_tracker.recordings.silhouettes import RecordedFrame
 from cardbox_tracker.recordings.track import Observer
+from cardbox_tracker.tracking.estimate import Estimate
+from cardbox_tracker.tracking.tracker import Tracker
 
 Draw = Callable[[NDArray[np.uint8], Estimate, Tracker], NDArray[np.uint8]]
 """Draws an estimate over the picture (H, W, ...) of the first camera; returns bgr."""

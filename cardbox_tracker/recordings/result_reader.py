@@ -7,13 +7,13 @@ from typing import Any
 
 import numpy as np
 
+from cardbox_tracker.common.errors import BagError
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.model_file import loads_body_model
 from cardbox_tracker.person.sizes import FloatArray
-from cardbox_tracker.common.errors import BagError
-from cardbox_tracker.tracking.estimate import NO_PERSON, TRACKING, UNCERTAIN
-from cardbox_tracker.recordings.outputs import JointValues, neck_from, place_from, posture_from
 from cardbox_tracker.recordings.bag_reader import BagReader, stamp_ns_of
+from cardbox_tracker.recordings.outputs import JointValues, neck_from, place_from, posture_from
+from cardbox_tracker.tracking.estimate import NO_PERSON, TRACKING, UNCERTAIN
 
 MODEL = "/body_model"
 _STATE, _JOINTS, _STDDEV = "/tracking_state", "/joint_states", "/joint_states_stddev"

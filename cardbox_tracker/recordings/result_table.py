@@ -12,6 +12,8 @@ from typing import Any
 
 import numpy as np
 
+from cardbox_tracker.common.errors import CardboxError
+from cardbox_tracker.common.files import atomic_path
 from cardbox_tracker.person.skeleton import (
     CLAVICLE_NAMES,
     JOINT_NAMES,
@@ -20,12 +22,10 @@ from cardbox_tracker.person.skeleton import (
     PLACE_NAMES,
     UNITS,
 )
-from cardbox_tracker.common.errors import CardboxError
-from cardbox_tracker.tracking.estimate import Estimate
-from cardbox_tracker.common.files import atomic_path
 from cardbox_tracker.recordings.keypoint_status import keypoint_states
 from cardbox_tracker.recordings.outputs import METRICS, joint_deviations, joint_values, positions_of
 from cardbox_tracker.recordings.silhouettes import RecordedFrame
+from cardbox_tracker.tracking.estimate import Estimate
 
 Cell = int | float | str | Decimal | None
 """A value of the table; None is unknown. A Decimal keeps the nine decimals of a stamp."""

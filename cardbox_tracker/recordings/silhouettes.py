@@ -10,15 +10,15 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from cardbox_tracker.detectors.image_points import ImagePoints
-from cardbox_tracker.common.errors import BagError, CardboxError, EncodingError
-from cardbox_tracker.detectors.detector import Detector, FindPoints
-from cardbox_tracker.recordings.image_recording import ImageRecording, RecordedImage
-from cardbox_tracker.detectors.point_table import PointTable
-from cardbox_tracker.segmentation.background_config import BackgroundConfig
 from cardbox_tracker.camera.camera import Rectifier
 from cardbox_tracker.camera.depth_image import DepthImage
-from cardbox_tracker.segmentation.empty_scene import brightness_of
+from cardbox_tracker.camera.encodings import brightness_of
+from cardbox_tracker.common.errors import BagError, CardboxError, EncodingError
+from cardbox_tracker.detectors.detector import Detector, FindPoints
+from cardbox_tracker.detectors.image_points import ImagePoints
+from cardbox_tracker.detectors.point_table import PointTable
+from cardbox_tracker.recordings.image_recording import ImageRecording, RecordedImage
+from cardbox_tracker.segmentation.background_config import BackgroundConfig
 from cardbox_tracker.segmentation.learning import Learning
 from cardbox_tracker.segmentation.silhouettes import SilhouettePipeline
 

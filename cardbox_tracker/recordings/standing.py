@@ -6,11 +6,11 @@ from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import NamedTuple
 
-from cardbox_tracker.person.sizes import FloatArray
+from cardbox_tracker.detectors.detector import Detector
 from cardbox_tracker.detectors.landmarks import LANDMARKS
 from cardbox_tracker.detectors.pose_network import Detection
 from cardbox_tracker.measuring.standing_camera import StandingCamera, middles, standing_camera
-from cardbox_tracker.detectors.detector import Detector
+from cardbox_tracker.person.sizes import FloatArray
 from cardbox_tracker.recordings.detector_silhouettes import DetectorSilhouetteSource
 from cardbox_tracker.recordings.given_camera import GivenCamera
 from cardbox_tracker.recordings.open_images import open_images

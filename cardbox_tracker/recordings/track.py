@@ -9,14 +9,14 @@ from pathlib import Path
 
 import numpy as np
 
-from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.common.errors import CardboxError
-from cardbox_tracker.search.config import TrackerConfig
-from cardbox_tracker.tracking.estimate import UNCERTAIN, Estimate
-from cardbox_tracker.tracking.tracker import Tracker
+from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.recordings.recording import Recording
 from cardbox_tracker.recordings.result_table import result_table
 from cardbox_tracker.recordings.silhouettes import RecordedFrame
+from cardbox_tracker.search.config import TrackerConfig
+from cardbox_tracker.tracking.estimate import UNCERTAIN, Estimate
+from cardbox_tracker.tracking.tracker import Tracker
 
 Observer = Callable[[RecordedFrame, Estimate, Tracker], None]
 """Callback that receives each image with its estimate and the tracker."""

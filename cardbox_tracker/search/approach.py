@@ -11,12 +11,12 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from cardbox_tracker.common.compiling import kernel
 from cardbox_tracker.person.posture import N_STATE, TORSO_X, TORSO_Y
 from cardbox_tracker.person.sizes import FloatArray
-from cardbox_tracker.common.compiling import kernel
+from cardbox_tracker.search.joint_moves import clip_state
 from cardbox_tracker.terms.multi_view import MultiViewCost
 from cardbox_tracker.terms.term import Frame, Silhouette
-from cardbox_tracker.search.joint_moves import clip_state
 
 # Multiples of the last distance at which the last posture is proposed.
 _SCALES = np.exp([-0.16, -0.08, -0.04, 0.04, 0.08, 0.16])

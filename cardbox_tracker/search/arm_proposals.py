@@ -10,6 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from cardbox_tracker.common.compiling import inlined_kernel, kernel
 from cardbox_tracker.person.kinematics import (
     angles_in,
     angles_of_arm,
@@ -20,13 +21,12 @@ from cardbox_tracker.person.kinematics import (
 )
 from cardbox_tracker.person.parts import FOREARM, HEIGHT, UPPER_ARM
 from cardbox_tracker.person.posture import ARM_ANGLES
-from cardbox_tracker.common.compiling import inlined_kernel, kernel
-from cardbox_tracker.terms.bit_planes import Planes
-from cardbox_tracker.terms.kernel_arguments import BodyTuple, Floats, body_of
 from cardbox_tracker.search.joint_moves import NumbersTuple
 from cardbox_tracker.search.mirroring import mirror
 from cardbox_tracker.search.state_choice import least_of
 from cardbox_tracker.search.uncovered import farthest_uncovered
+from cardbox_tracker.terms.bit_planes import Planes
+from cardbox_tracker.terms.kernel_arguments import BodyTuple, Floats, body_of
 
 # Margins of the distance from shoulder to hand of an arm that reaches for a pixel, against the
 # difference and the sum of the bones' lengths, m.

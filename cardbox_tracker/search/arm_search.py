@@ -7,11 +7,11 @@ from collections.abc import Sequence
 import numpy as np
 
 from cardbox_tracker.person.sizes import FloatArray
-from cardbox_tracker.terms.multi_view import MultiViewCost
 from cardbox_tracker.search import arm_proposals, state_choice
 from cardbox_tracker.search.arms import ARM_LIMITS, propose_arms
 from cardbox_tracker.search.draws import Draws
 from cardbox_tracker.search.whole_body_config import SearchProfile
+from cardbox_tracker.terms.multi_view import MultiViewCost
 
 # Noise around the best arms, as a fraction of the usual noise.
 _AGAIN_NOISE = 0.45

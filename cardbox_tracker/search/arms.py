@@ -9,10 +9,10 @@ import numpy as np
 from cardbox_tracker.person.kinematics import angles_of_arms
 from cardbox_tracker.person.posture import JOINT_LIMITS, LEFT_ARM
 from cardbox_tracker.person.sizes import FloatArray
-from cardbox_tracker.terms.pose_prior import sample_bank
-from cardbox_tracker.terms.whole_body import WholeBodyCost
 from cardbox_tracker.search import arm_proposals
 from cardbox_tracker.search.whole_body_config import SearchProfile
+from cardbox_tracker.terms.pose_prior import sample_bank
+from cardbox_tracker.terms.whole_body import WholeBodyCost
 
 ARM_LIMITS = np.ascontiguousarray(JOINT_LIMITS[LEFT_ARM])
 """Lowest and highest angles of an arm, (4, 2), rad."""

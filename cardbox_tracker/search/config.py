@@ -7,14 +7,7 @@ from dataclasses import dataclass, replace
 from types import MappingProxyType
 from typing import Any
 
-from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.common.errors import CardboxError
-from cardbox_tracker.terms.depth import Depth
-from cardbox_tracker.terms.inner_cue import InnerCue
-from cardbox_tracker.terms.joint_points import JointPoints
-from cardbox_tracker.terms.term import TermSettings
-from cardbox_tracker.search.resampling import STRATEGIES
-from cardbox_tracker.search.whole_body_config import WholeBodyConfig
 from cardbox_tracker.common.settings import (
     NoEffectError,
     Settings,
@@ -23,6 +16,13 @@ from cardbox_tracker.common.settings import (
     setting,
     suggestion,
 )
+from cardbox_tracker.person.model import BodyModel
+from cardbox_tracker.search.resampling import STRATEGIES
+from cardbox_tracker.search.whole_body_config import WholeBodyConfig
+from cardbox_tracker.terms.depth import Depth
+from cardbox_tracker.terms.inner_cue import InnerCue
+from cardbox_tracker.terms.joint_points import JointPoints
+from cardbox_tracker.terms.term import TermSettings
 
 FILTERS = ("hierarchical", "whole_body")
 """Allowed values of ``filter``."""

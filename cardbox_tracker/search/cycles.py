@@ -6,18 +6,18 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
+from cardbox_tracker.camera.rasterisation import render
+from cardbox_tracker.camera.view import View
 from cardbox_tracker.person.cardbox import cardbox_patches
 from cardbox_tracker.person.kinematics import pose
 from cardbox_tracker.person.posture import TORSO_Y, clip_to_limits, reference_posture
+from cardbox_tracker.search import doubt
 from cardbox_tracker.search.config import TrackerConfig
+from cardbox_tracker.search.hierarchy import HierarchicalFilter, SumOfTerms
+from cardbox_tracker.search.pose_filter import Fit, Presence
 from cardbox_tracker.terms.drawn_body import body_tuple
 from cardbox_tracker.terms.silhouette import SilhouetteTerm
 from cardbox_tracker.terms.term import Frame, Silhouette, Term
-from cardbox_tracker.camera.view import View
-from cardbox_tracker.search import doubt
-from cardbox_tracker.search.hierarchy import HierarchicalFilter, SumOfTerms
-from cardbox_tracker.search.pose_filter import Fit, Presence
-from cardbox_tracker.camera.rasterisation import render
 
 # A person from the side has about half the area of the front view, and less at the border.
 _PERSON_FRACTION = 0.25

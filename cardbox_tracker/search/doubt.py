@@ -26,6 +26,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from cardbox_tracker.common.compiling import kernel
 from cardbox_tracker.person.kinematics import keypoints
 from cardbox_tracker.person.posture import (
     LEFT_ARM,
@@ -39,7 +40,6 @@ from cardbox_tracker.person.posture import (
 )
 from cardbox_tracker.person.sizes import FloatArray
 from cardbox_tracker.person.skeleton import KeypointState
-from cardbox_tracker.common.compiling import kernel
 from cardbox_tracker.terms.kernel_arguments import BodyTuple, body_of
 
 BoolArray = NDArray[np.bool_]

@@ -17,6 +17,7 @@ import numpy as np
 from cardbox_tracker.person.posture import JOINT_LIMITS, N_JOINTS, N_STATE, POSTURE, TORSO, TORSO_Y
 from cardbox_tracker.person.sizes import FloatArray
 from cardbox_tracker.search.config import TrackerConfig
+from cardbox_tracker.search.particle_filter import CostFunction, ParticleFilter
 from cardbox_tracker.terms.kernel_arguments import BodyTuple, Drawn
 from cardbox_tracker.terms.term import (
     ARM,
@@ -27,7 +28,6 @@ from cardbox_tracker.terms.term import (
     TermObservation,
     TorsoCosts,
 )
-from cardbox_tracker.search.particle_filter import CostFunction, ParticleFilter
 
 _REFERENCE_AREA_PX = 320 * 240
 

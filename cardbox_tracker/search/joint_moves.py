@@ -10,6 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from cardbox_tracker.common.compiling import inlined_kernel, kernel
 from cardbox_tracker.person.posture import (
     ARM_ANGLES,
     FIRST_ANGLES,
@@ -19,9 +20,8 @@ from cardbox_tracker.person.posture import (
     TORSO_X,
     TORSO_Y,
 )
-from cardbox_tracker.common.compiling import inlined_kernel, kernel
-from cardbox_tracker.terms.kernel_arguments import Floats
 from cardbox_tracker.search.state_choice import least_of
+from cardbox_tracker.terms.kernel_arguments import Floats
 
 # Fraction of the noise that is added to a move by a difference.
 _NOISE_OF_DIFFERENCE = 0.2

@@ -6,12 +6,12 @@ from collections.abc import Iterable, Sequence
 from math import hypot
 from typing import NamedTuple
 
+from cardbox_tracker.camera.view import LevelPoint, View
 from cardbox_tracker.person.posture import TORSO_X, TORSO_Y
 from cardbox_tracker.person.sizes import FloatArray
+from cardbox_tracker.search.walking import Walk
 from cardbox_tracker.terms.multi_view import MultiViewCost
 from cardbox_tracker.terms.term import Frame
-from cardbox_tracker.camera.view import LevelPoint, View
-from cardbox_tracker.search.walking import Walk
 
 # Deviation of the intersection, m: median columns of two cameras show different body points.
 _CROSSING_M = 0.1

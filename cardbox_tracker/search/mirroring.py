@@ -6,6 +6,7 @@ from math import sqrt
 
 import numpy as np
 
+from cardbox_tracker.common.compiling import inlined_kernel, kernel
 from cardbox_tracker.person.kinematics import (
     angles_in,
     angles_of_arm,
@@ -14,7 +15,6 @@ from cardbox_tracker.person.kinematics import (
     side_of,
     state_pose,
 )
-from cardbox_tracker.common.compiling import inlined_kernel, kernel
 from cardbox_tracker.terms.kernel_arguments import BodyTuple, Floats, body_of
 
 

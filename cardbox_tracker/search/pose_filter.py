@@ -10,13 +10,13 @@ from typing import Protocol
 
 import numpy as np
 
+from cardbox_tracker.camera.view import View
 from cardbox_tracker.person.sizes import FloatArray
 from cardbox_tracker.search.config import TrackerConfig
-from cardbox_tracker.terms.silhouette import SilhouetteTerm
-from cardbox_tracker.terms.term import Frame, Term
-from cardbox_tracker.camera.view import View
 from cardbox_tracker.search.doubt import Judgement
 from cardbox_tracker.search.particles import Particles
+from cardbox_tracker.terms.silhouette import SilhouetteTerm
+from cardbox_tracker.terms.term import Frame, Term
 
 
 class Presence(Enum):

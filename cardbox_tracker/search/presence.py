@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from cardbox_tracker.person.sizes import FloatArray
-from cardbox_tracker.terms.multi_view import MultiViewCost
-from cardbox_tracker.terms.term import Frame
 from cardbox_tracker.search.pose_filter import Presence
 from cardbox_tracker.search.whole_body_config import WholeBodyConfig
+from cardbox_tracker.terms.multi_view import MultiViewCost
+from cardbox_tracker.terms.term import Frame
 
 # Frames with too much foreground after which it is assumed to be a near person.
 _TOO_MUCH_FRAMES = 15

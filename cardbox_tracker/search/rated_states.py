@@ -6,9 +6,9 @@ import numpy as np
 
 from cardbox_tracker.person.posture import N_STATE
 from cardbox_tracker.person.sizes import FloatArray
+from cardbox_tracker.search import state_choice
 from cardbox_tracker.terms.multi_view import MultiViewCost
 from cardbox_tracker.terms.whole_body import Ratings
-from cardbox_tracker.search import state_choice
 
 _SHAPES = (N_STATE,), (), (6, 3), (6, 3)
 # States for which there is memory at first.

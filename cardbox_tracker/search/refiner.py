@@ -17,14 +17,14 @@ from typing import NamedTuple
 
 import numpy as np
 
+from cardbox_tracker.camera.view import View
+from cardbox_tracker.common.compiling import kernel
 from cardbox_tracker.person.posture import N_STATE
 from cardbox_tracker.person.sizes import FloatArray
-from cardbox_tracker.common.compiling import kernel
 from cardbox_tracker.terms.kernel_arguments import Floats
 from cardbox_tracker.terms.linear_kernels import solve
 from cardbox_tracker.terms.multi_view import MultiViewCost
 from cardbox_tracker.terms.term import Posed, TermObservation
-from cardbox_tracker.camera.view import View
 
 Cue = tuple[int, TermObservation]
 """Index of the camera, and what it observed."""

@@ -14,8 +14,8 @@ from __future__ import annotations
 import os
 
 from cardbox_tracker.common.errors import CardboxError
-from cardbox_tracker.search.config import TrackerConfig
 from cardbox_tracker.common.small_yaml import SmallYamlError, parse_small_yaml, read_small_text
+from cardbox_tracker.search.config import TrackerConfig
 
 
 def read_settings(path: str | os.PathLike[str], config: TrackerConfig) -> TrackerConfig:

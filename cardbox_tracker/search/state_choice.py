@@ -7,8 +7,8 @@ from math import exp, sqrt
 import numpy as np
 from numpy.typing import NDArray
 
-from cardbox_tracker.person.posture import N_STATE, PITCH, TORSO_X, TORSO_Y, YAW
 from cardbox_tracker.common.compiling import kernel
+from cardbox_tracker.person.posture import N_STATE, PITCH, TORSO_X, TORSO_Y, YAW
 from cardbox_tracker.terms.kernel_arguments import Floats
 
 # Metres per radian of yaw or pitch in the distance between states.

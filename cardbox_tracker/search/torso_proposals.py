@@ -10,6 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from cardbox_tracker.common.compiling import kernel
 from cardbox_tracker.person.kinematics import (
     angles_in,
     angles_of_arm,
@@ -25,8 +26,6 @@ from cardbox_tracker.person.posture import (
     TORSO_Y,
     YAW,
 )
-from cardbox_tracker.common.compiling import kernel
-from cardbox_tracker.terms.kernel_arguments import BodyTuple, Floats, body_of
 from cardbox_tracker.search.joint_moves import (
     NoiseTuple,
     NumbersTuple,
@@ -34,6 +33,7 @@ from cardbox_tracker.search.joint_moves import (
     pivot,
 )
 from cardbox_tracker.search.state_choice import least_of
+from cardbox_tracker.terms.kernel_arguments import BodyTuple, Floats, body_of
 
 # Explorers: half of them bow within this range, two fifths get any yaw, the others mirror the yaw;
 # the distance of all has this deviation, m.

@@ -11,9 +11,9 @@ from math import sqrt
 import numpy as np
 from numpy.typing import NDArray
 
+from cardbox_tracker.common.compiling import inlined_kernel, kernel
 from cardbox_tracker.person.kinematics import keypoints
 from cardbox_tracker.person.sizes import FloatArray
-from cardbox_tracker.common.compiling import inlined_kernel, kernel
 from cardbox_tracker.terms.body_outline import (
     BODY_PATCHES,
     TRUNK_PATCHES,

@@ -14,6 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from cardbox_tracker.camera.view import View
 from cardbox_tracker.person.parts import BOTTOM, HEIGHT, TORSO
 from cardbox_tracker.person.posture import (
     ARM_ANGLES,
@@ -27,16 +28,11 @@ from cardbox_tracker.person.posture import (
     YAW,
 )
 from cardbox_tracker.person.sizes import FloatArray
-from cardbox_tracker.search.config import TrackerConfig
-from cardbox_tracker.terms.multi_view import MultiViewCost
-from cardbox_tracker.terms.silhouette import SilhouetteTerm
-from cardbox_tracker.terms.term import Frame, Posed, Term
-from cardbox_tracker.camera.view import View
-from cardbox_tracker.terms.whole_body import iou_of
 from cardbox_tracker.search import doubt, joint_moves, state_choice, torso_proposals
 from cardbox_tracker.search.approach import Approach
 from cardbox_tracker.search.arm_search import ArmSearch
 from cardbox_tracker.search.arms import ARM_LIMITS
+from cardbox_tracker.search.config import TrackerConfig
 from cardbox_tracker.search.draws import Draws
 from cardbox_tracker.search.locating import Location, Locator
 from cardbox_tracker.search.mirroring import mirrored_states
@@ -47,6 +43,10 @@ from cardbox_tracker.search.rated_states import RatedStates
 from cardbox_tracker.search.refiner import Cue, Prior, Refiner
 from cardbox_tracker.search.visibility import are_hidden, is_trackable
 from cardbox_tracker.search.whole_body_config import SearchProfile
+from cardbox_tracker.terms.multi_view import MultiViewCost
+from cardbox_tracker.terms.silhouette import SilhouetteTerm
+from cardbox_tracker.terms.term import Frame, Posed, Term
+from cardbox_tracker.terms.whole_body import iou_of
 
 # Deviation of ``torso_x`` of upright torsos, which is larger in the first frames of a search.
 _SETTLED_FRAMES, _SETTLED_X_M, _YOUNG_X_M = 15, 0.25, 0.5

@@ -9,9 +9,9 @@ from typing import Any
 
 import numpy as np
 
+from cardbox_tracker.common.settings import Settings, restarting
 from cardbox_tracker.person.sizes import FloatArray
 from cardbox_tracker.terms.whole_body_config import WholeBodyCostConfig
-from cardbox_tracker.common.settings import Settings, restarting
 
 # Numbers of states that `effort` scales, and their least values. Totals are rounded up and parts
 # down, so that parts do not exceed their totals.

@@ -15,8 +15,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from cardbox_tracker.common.compiling import kernel
 from cardbox_tracker.common.array_checks import ANY, check_array
+from cardbox_tracker.common.compiling import kernel
 from cardbox_tracker.segmentation.empty_scene import BackgroundLearner, BackgroundModel
 from cardbox_tracker.segmentation.scene_motion import changed_pixels
 

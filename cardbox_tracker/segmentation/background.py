@@ -20,13 +20,14 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from cardbox_tracker.camera.encodings import brightness_of
+from cardbox_tracker.camera.given_arrays import image_from
 from cardbox_tracker.segmentation.absorption import Absorber
 from cardbox_tracker.segmentation.background_config import BackgroundConfig
 from cardbox_tracker.segmentation.chroma import ChromaScore
 from cardbox_tracker.segmentation.color_reader import ColorReader
-from cardbox_tracker.segmentation.empty_scene import BackgroundLearner, BackgroundModel, brightness_of
+from cardbox_tracker.segmentation.empty_scene import BackgroundLearner, BackgroundModel
 from cardbox_tracker.segmentation.foreground import segment_foreground
-from cardbox_tracker.camera.given_arrays import image_from
 from cardbox_tracker.segmentation.light import LightFollower
 from cardbox_tracker.segmentation.partial_scene import merged
 from cardbox_tracker.segmentation.regions import clean_in_window

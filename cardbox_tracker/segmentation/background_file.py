@@ -21,9 +21,9 @@ from typing import IO, Any, BinaryIO, Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from cardbox_tracker.camera.camera import Calibration
 from cardbox_tracker.common.errors import BackgroundFileError, CameraError, CardboxError, quoted
 from cardbox_tracker.common.files import UnreadableFileError, atomic_path, regular_file
-from cardbox_tracker.camera.camera import Calibration
 from cardbox_tracker.segmentation.chroma import ChromaModel
 from cardbox_tracker.segmentation.empty_scene import BackgroundModel
 

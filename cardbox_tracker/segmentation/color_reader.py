@@ -8,8 +8,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from cardbox_tracker.common.compiling import kernel
 from cardbox_tracker.common.array_checks import check_array
+from cardbox_tracker.common.compiling import kernel
 
 ImageArray = NDArray[np.uint8]
 

@@ -10,8 +10,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from cardbox_tracker.segmentation.background_config import BackgroundConfig
 from cardbox_tracker.camera.depth_image import DepthImage
+from cardbox_tracker.segmentation.background_config import BackgroundConfig
 from cardbox_tracker.segmentation.regions import clean_silhouette
 
 WITHIN_LIMITS_M = 0.3, 20.0

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from cardbox_tracker.camera.encodings import brightness_of
+from cardbox_tracker.camera.given_arrays import image_from
 from cardbox_tracker.common.array_checks import ANY, check_array
 from cardbox_tracker.segmentation.chroma import ChromaModel, chroma_planes
 from cardbox_tracker.segmentation.color_reader import half_size
-from cardbox_tracker.camera.given_arrays import image_from
 
 FloatImage = NDArray[np.float32]
 ImageArray = NDArray[np.uint8]
@@ -110,10 +110,3 @@ class _Moments:
             raise ValueError(f"{self.count} images learned; a deviation needs two or more")
         stddev = np.sqrt(self._squares / (self.count - 1))
         return self._mean.copy(), stddev.astype(np.float32)
-
-
-def brightness_of(image: NDArray[np.uint8] | FloatImage) -> ImageArray:
-    """Return the brightness (H, W) of an image that is grey (H, W) or bgr (H, W, 3)."""
-    if image.ndim == 2:
-        return np.asarray(image, np.uint8)
-    return np.asarray(cv2.cvtColor(np.asarray(image, np.uint8), cv2.COLOR_BGR2GRAY), np.uint8)

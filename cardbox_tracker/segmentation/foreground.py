@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from cardbox_tracker.common.compiling import kernel
 from cardbox_tracker.common.array_checks import ANY, check_array
+from cardbox_tracker.common.compiling import kernel
 from cardbox_tracker.segmentation.window import Window, find_edges
 
 FloatImage = NDArray[np.float32]
@@ -39,7 +39,7 @@ def segment_foreground(
         score: scratch, (H, W).
 
     Returns:
-        (H, W), 0 or 255, and its window as :func:`~cardbox_tracker.segmentation.window.window_of` has it.
+        (H, W), 0 or 255, and its window as :func:`~.window.window_of` has it.
 
     Raises:
         ValueError: the arrays differ in shape, or one is read-only.

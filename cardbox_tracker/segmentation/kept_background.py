@@ -7,13 +7,14 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from cardbox_tracker.camera.encodings import brightness_of
 from cardbox_tracker.common.errors import BackgroundFileError
 from cardbox_tracker.segmentation.background_file import (
     StoredBackground,
     load_background,
     save_background,
 )
-from cardbox_tracker.segmentation.empty_scene import BackgroundModel, brightness_of
+from cardbox_tracker.segmentation.empty_scene import BackgroundModel
 from cardbox_tracker.segmentation.scene_fit import compare_scene
 from cardbox_tracker.segmentation.silhouettes import SilhouettePipeline
 

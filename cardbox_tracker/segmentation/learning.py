@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from cardbox_tracker.segmentation.empty_scene import BackgroundLearner, BackgroundModel, brightness_of
+from cardbox_tracker.camera.encodings import brightness_of
+from cardbox_tracker.segmentation.empty_scene import BackgroundLearner, BackgroundModel
 from cardbox_tracker.segmentation.partial_scene import PartialScene
 from cardbox_tracker.segmentation.scene_motion import STILL, SceneMotion
 

@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from cardbox_tracker.common.compiling import inlined_kernel, kernel
 from cardbox_tracker.common.array_checks import ANY, check_array
+from cardbox_tracker.common.compiling import inlined_kernel, kernel
 
 _i32 = np.int32
 LARGEST_BITS = np.int32(0x7FFFFFFF)

@@ -14,8 +14,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from cardbox_tracker.common.compiling import copied_kernel, kernel
 from cardbox_tracker.common.array_checks import ANY, check_array
+from cardbox_tracker.common.compiling import copied_kernel, kernel
 from cardbox_tracker.segmentation.window import Window, find_edges
 
 ImageArray = NDArray[np.uint8]

@@ -12,8 +12,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from cardbox_tracker.common.compiling import copied_kernel, kernel
 from cardbox_tracker.common.array_checks import ANY, check_array
+from cardbox_tracker.common.compiling import copied_kernel, kernel
 from cardbox_tracker.segmentation.window import Window
 
 FloatImage = NDArray[np.float32]

@@ -9,12 +9,13 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from cardbox_tracker.camera.camera import Calibration
+from cardbox_tracker.camera.encodings import brightness_of
+from cardbox_tracker.camera.resize import to_working_size
 from cardbox_tracker.segmentation.background import SilhouetteExtractor
 from cardbox_tracker.segmentation.background_config import BackgroundConfig
-from cardbox_tracker.camera.camera import Calibration
-from cardbox_tracker.segmentation.empty_scene import BackgroundModel, brightness_of
+from cardbox_tracker.segmentation.empty_scene import BackgroundModel
 from cardbox_tracker.segmentation.learning import Learning
-from cardbox_tracker.camera.resize import to_working_size
 
 ImageArray = NDArray[np.uint8]
 

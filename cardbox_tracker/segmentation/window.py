@@ -7,8 +7,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from cardbox_tracker.common.compiling import kernel
 from cardbox_tracker.common.array_checks import ANY, check_array
+from cardbox_tracker.common.compiling import kernel
 
 ImageArray = NDArray[np.uint8]
 

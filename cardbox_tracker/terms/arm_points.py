@@ -15,9 +15,9 @@ from math import sqrt
 
 import numpy as np
 
+from cardbox_tracker.common.compiling import kernel
 from cardbox_tracker.person.kinematics import pose_arm, state_pose
 from cardbox_tracker.person.parts import HEIGHT, TOP_WIDTH, UPPER_ARM
-from cardbox_tracker.common.compiling import kernel
 from cardbox_tracker.terms.bit_planes import Planes, value_at
 from cardbox_tracker.terms.kernel_arguments import BodyTuple, Floats, body_of
 

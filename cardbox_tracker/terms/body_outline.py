@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from math import sqrt
 
+from cardbox_tracker.common.compiling import inlined_kernel, kernel
 from cardbox_tracker.person.kinematics import (
     PosedArm,
     angles_in,
@@ -29,7 +30,6 @@ from cardbox_tracker.person.parts import (
     TORSO,
     UPPER_ARM,
 )
-from cardbox_tracker.common.compiling import inlined_kernel, kernel
 from cardbox_tracker.terms.kernel_arguments import Body, BodyTuple, Floats, body_of
 from cardbox_tracker.terms.rasterisation import Workspace, new_workspace
 

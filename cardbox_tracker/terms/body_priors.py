@@ -7,6 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from cardbox_tracker.common.compiling import inlined_kernel, kernel
 from cardbox_tracker.person.kinematics import PosedArm, angles_in, new_arm, pose_arm, side_of
 from cardbox_tracker.person.parts import (
     BOTTOM,
@@ -21,7 +22,6 @@ from cardbox_tracker.person.parts import (
     WAIST,
 )
 from cardbox_tracker.person.posture import PITCH, ROLL, TORSO_X, TORSO_Z, YAW
-from cardbox_tracker.common.compiling import inlined_kernel, kernel
 from cardbox_tracker.terms.kernel_arguments import BodyTuple, Floats, body_of
 from cardbox_tracker.terms.pose_prior import nats_of
 from cardbox_tracker.terms.whole_body_config import WholeBodyCostConfig

@@ -14,6 +14,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from cardbox_tracker.common.compiling import inlined_kernel, kernel
 from cardbox_tracker.person.kinematics import angles_in, side_of, torso_pose, turn_limb
 from cardbox_tracker.person.parts import (
     BOTTOM,
@@ -29,7 +30,6 @@ from cardbox_tracker.person.parts import (
     UPPER_ARM,
     WAIST,
 )
-from cardbox_tracker.common.compiling import inlined_kernel, kernel
 from cardbox_tracker.terms.body_outline import lid
 from cardbox_tracker.terms.kernel_arguments import (
     Cardbox,

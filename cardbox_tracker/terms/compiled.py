@@ -12,6 +12,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from cardbox_tracker.camera.camera import Camera
+from cardbox_tracker.common.array_checks import ANY, check_array
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.parts import shape_of
 from cardbox_tracker.person.posture import LEFT_ARM, N_JOINTS, TORSO
@@ -21,8 +23,6 @@ from cardbox_tracker.terms.kernel_arguments import CardboxTuple, intrinsics_of, 
 from cardbox_tracker.terms.row_sums import fill_row_sums
 from cardbox_tracker.terms.silhouette import SilhouetteObservation, SilhouetteTerm
 from cardbox_tracker.terms.term import ArmCosts, Frame, Silhouette, TorsoCosts
-from cardbox_tracker.common.array_checks import ANY, check_array
-from cardbox_tracker.camera.camera import Camera
 
 CountArray = NDArray[np.int64]
 

@@ -14,6 +14,9 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
+from cardbox_tracker.camera.camera import Camera
+from cardbox_tracker.common.array_checks import ANY, check_array
+from cardbox_tracker.common.settings import Settings, setting
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.parts import (
     BOTTOM_WIDTH,
@@ -30,9 +33,6 @@ from cardbox_tracker.person.posture import N_STATE
 from cardbox_tracker.person.sizes import FloatArray
 from cardbox_tracker.terms import depth_kernels as kernels
 from cardbox_tracker.terms.term import Frame, Posed, Term, TermObservation
-from cardbox_tracker.common.settings import Settings, setting
-from cardbox_tracker.common.array_checks import ANY, check_array
-from cardbox_tracker.camera.camera import Camera
 
 
 @dataclass(frozen=True)

@@ -18,6 +18,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from cardbox_tracker.common.compiling import inlined_kernel, kernel
 from cardbox_tracker.person.kinematics import (
     angles_in,
     new_arm,
@@ -39,7 +40,6 @@ from cardbox_tracker.person.parts import (
     UPPER_ARM,
     WAIST,
 )
-from cardbox_tracker.common.compiling import inlined_kernel, kernel
 from cardbox_tracker.terms.kernel_arguments import (
     BodyTuple,
     Drawn,

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
+from cardbox_tracker.camera.camera import Camera
 from cardbox_tracker.person.kinematics import girdle_of
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.parts import BOTTOM, FOREARM, HEAD, HEIGHT, NECK, WAIST, shape_of
 from cardbox_tracker.person.sizes import FloatArray
 from cardbox_tracker.terms.kernel_arguments import BodyTuple, intrinsics_of, place_of
 from cardbox_tracker.terms.whole_body_config import WholeBodyCostConfig
-from cardbox_tracker.camera.camera import Camera
 
 # Overlap of neck and head, as a fraction of the head's height: an outline has no gap below the jaw.
 _NECK_INTO_HEAD = 0.25

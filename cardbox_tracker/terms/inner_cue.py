@@ -25,6 +25,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from cardbox_tracker.camera.camera import Camera
+from cardbox_tracker.common.settings import Settings, setting
 from cardbox_tracker.person.appearance import (
     COLOR_STEPS,
     FOREARM,
@@ -53,8 +55,6 @@ from cardbox_tracker.terms.term import (
     Term,
     TermObservation,
 )
-from cardbox_tracker.common.settings import Settings, setting
-from cardbox_tracker.camera.camera import Camera
 
 # Limit of a ratio, since histograms of a few hundred pixels are uncertain.
 _LIMIT_NATS = 2.5

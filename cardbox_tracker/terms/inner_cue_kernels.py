@@ -7,6 +7,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from cardbox_tracker.common.compiling import inlined_kernel, kernel
 from cardbox_tracker.person.kinematics import (
     angles_in,
     new_arm,
@@ -16,7 +17,6 @@ from cardbox_tracker.person.kinematics import (
     turn_arm,
 )
 from cardbox_tracker.person.parts import BOTTOM, FORWARD, HEAD, HEIGHT, TOP_WIDTH, TORSO, WAIST
-from cardbox_tracker.common.compiling import inlined_kernel, kernel
 from cardbox_tracker.terms.kernel_arguments import BodyTuple, body_of
 
 # Begin and end of the forearm's patch between elbow and fist, and its width in forearm widths; a

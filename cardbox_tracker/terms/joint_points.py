@@ -19,10 +19,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from cardbox_tracker.camera.camera import Camera
+from cardbox_tracker.common.settings import Settings, setting
+from cardbox_tracker.detectors.image_points import POINT_INDEX, ImagePoints
 from cardbox_tracker.person.model import MEASURED, BodyModel
 from cardbox_tracker.person.posture import N_STATE
 from cardbox_tracker.person.sizes import FloatArray
-from cardbox_tracker.detectors.image_points import POINT_INDEX, ImagePoints
 from cardbox_tracker.terms import joint_points_kernels as kernels
 from cardbox_tracker.terms.joint_points_kernels import (
     EARS,
@@ -45,8 +47,6 @@ from cardbox_tracker.terms.term import (
     Term,
     TermObservation,
 )
-from cardbox_tracker.common.settings import Settings, setting
-from cardbox_tracker.camera.camera import Camera
 
 # Deviation of a point, m and px; speed of the joint, m/s, which makes older points uncertain.
 _JOINT_M = {SHOULDER: 0.025, ELBOW: 0.02, WRIST: 0.02, KNUCKLES: 0.04}

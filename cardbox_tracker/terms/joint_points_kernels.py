@@ -15,6 +15,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from cardbox_tracker.common.compiling import inlined_kernel, kernel
 from cardbox_tracker.person.kinematics import (
     TWIST,
     PosedArm,
@@ -27,7 +28,6 @@ from cardbox_tracker.person.kinematics import (
 )
 from cardbox_tracker.person.parts import BOTTOM, FORWARD, HEAD, HEIGHT
 from cardbox_tracker.person.posture import N_STATE
-from cardbox_tracker.common.compiling import inlined_kernel, kernel
 from cardbox_tracker.terms.kernel_arguments import (
     Body,
     BodyTuple,

@@ -11,10 +11,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from cardbox_tracker.camera.camera import Camera
+from cardbox_tracker.common.compiling import copied_kernel
 from cardbox_tracker.person.kinematics import Place
 from cardbox_tracker.person.model import BodyModel
-from cardbox_tracker.common.compiling import copied_kernel
-from cardbox_tracker.camera.camera import Camera
 
 Floats = NDArray[np.float64]
 Whole = NDArray[np.int32]

@@ -16,6 +16,8 @@ from dataclasses import replace
 
 import numpy as np
 
+from cardbox_tracker.camera.camera import Camera
+from cardbox_tracker.camera.view import View
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.posture import (
     N_STATE,
@@ -29,10 +31,8 @@ from cardbox_tracker.person.posture import (
 from cardbox_tracker.person.sizes import FloatArray
 from cardbox_tracker.terms.outline import Outline
 from cardbox_tracker.terms.term import Frame, Silhouette, Term
-from cardbox_tracker.camera.view import View
 from cardbox_tracker.terms.whole_body import Bodies, Ratings, WholeBodyCost, iou_of
 from cardbox_tracker.terms.whole_body_config import WholeBodyCostConfig
-from cardbox_tracker.camera.camera import Camera
 
 # Distance for which the units of the priors of ``torso_x`` were chosen, m.
 _NORMAL_M = 2.5

@@ -16,10 +16,11 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from cardbox_tracker.camera.camera import Camera
+from cardbox_tracker.common.compiling import kernel
 from cardbox_tracker.person.kinematics import TWIST
 from cardbox_tracker.person.posture import N_STATE
 from cardbox_tracker.person.sizes import FloatArray
-from cardbox_tracker.common.compiling import kernel
 from cardbox_tracker.terms.body_outline import BODY_PATCHES, new_scratch, place_patches
 from cardbox_tracker.terms.distance_field import (
     FAR,
@@ -37,7 +38,6 @@ from cardbox_tracker.terms.outline_points import (
     project_corners,
 )
 from cardbox_tracker.terms.term import Posed, Residuals, Silhouette, TermObservation
-from cardbox_tracker.camera.camera import Camera
 
 INFORMATION = 0.01
 """Weight of a pixel of outline, 1 / px^2; it is low because errors of neighbours are correlated."""

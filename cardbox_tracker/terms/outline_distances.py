@@ -11,10 +11,10 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from cardbox_tracker.camera.camera import Camera
 from cardbox_tracker.person.posture import ARM_ANGLES
 from cardbox_tracker.person.sizes import FloatArray
 from cardbox_tracker.terms.term import Silhouette
-from cardbox_tracker.camera.camera import Camera
 
 WIDTH = 320
 """Width of the image for the comparison, px."""

@@ -6,14 +6,14 @@ its outline moves along the line of sight only. Each value of a state moves a se
 beyond it as one rigid body, so its twist, six numbers in the optical frame, describes the motion of
 all points.
 
-With the twist (v, w) of :mod:`cardbox_tracker.person.kinematics`, a point's force f = d(distance)/dX
-and torque X x f give the derivative of its distance by a value as f . v + (X x f) . w.
+With the twist (v, w) of :mod:`cardbox_tracker.person.kinematics`, a point's force
+f = d(distance)/dX and torque X x f give the derivative of its distance by a value as f . v + (X x f) . w.
 """
 
 from __future__ import annotations
 
-from cardbox_tracker.person.kinematics import state_twists
 from cardbox_tracker.common.compiling import inlined_kernel, kernel
+from cardbox_tracker.person.kinematics import state_twists
 from cardbox_tracker.terms.body_outline import TRUNK_PATCHES
 from cardbox_tracker.terms.kernel_arguments import BodyTuple, Floats, body_of
 

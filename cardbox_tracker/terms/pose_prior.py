@@ -19,8 +19,8 @@ from typing import Any
 
 import numpy as np
 
-from cardbox_tracker.person.sizes import FloatArray
 from cardbox_tracker.common.compiling import inlined_kernel
+from cardbox_tracker.person.sizes import FloatArray
 
 FLOOR_NATS = 8.0
 """Approximate cost of a posture that is not in the motion capture; it is finite, so that the image

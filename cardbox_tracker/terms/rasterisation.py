@@ -14,14 +14,14 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from cardbox_tracker.common.compiling import inlined_kernel, kernel
-from cardbox_tracker.terms.kernel_arguments import Counts, Floats, Intrinsics, Whole
 from cardbox_tracker.camera.rasterisation import (
     CROSSING_BITS,
     FARTHEST_PX,
     NEAR_PLANE_M,
     SUBPIXELS,
 )
+from cardbox_tracker.common.compiling import inlined_kernel, kernel
+from cardbox_tracker.terms.kernel_arguments import Counts, Floats, Intrinsics, Whole
 
 _ONE = float(2**CROSSING_BITS)
 _BITS = np.int32(CROSSING_BITS)

@@ -6,8 +6,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from cardbox_tracker.person.kinematics import PosedArm, new_arm
 from cardbox_tracker.common.compiling import inlined_kernel
+from cardbox_tracker.person.kinematics import PosedArm, new_arm
 from cardbox_tracker.terms.bit_masks import Masks, new_masks
 from cardbox_tracker.terms.bit_planes import Planes
 from cardbox_tracker.terms.body_priors import Prior

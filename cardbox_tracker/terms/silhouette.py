@@ -17,11 +17,11 @@ from abc import ABC, abstractmethod
 import cv2
 import numpy as np
 
+from cardbox_tracker.camera.camera import Camera
+from cardbox_tracker.camera.given_arrays import image_from, silhouette_from
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.sizes import FloatArray
 from cardbox_tracker.terms.term import ArmCosts, Frame, Image, Silhouette, TorsoCosts
-from cardbox_tracker.camera.camera import Camera
-from cardbox_tracker.camera.given_arrays import image_from, silhouette_from
 
 
 class SilhouetteObservation(ABC):

@@ -24,13 +24,13 @@ from typing import Any, NamedTuple, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from cardbox_tracker.camera.camera import Camera
+from cardbox_tracker.detectors.image_points import ImagePoints
 from cardbox_tracker.person.kinematics import keypoints_of_states
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.posture import LEFT_ARM, RIGHT_ARM
 from cardbox_tracker.person.sizes import FloatArray
-from cardbox_tracker.detectors.image_points import ImagePoints
 from cardbox_tracker.terms.kernel_arguments import BodyTuple, Drawn
-from cardbox_tracker.camera.camera import Camera
 
 Silhouette = NDArray[np.uint8]
 Image = NDArray[np.uint8]

@@ -12,6 +12,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from cardbox_tracker.camera.camera import Camera
+from cardbox_tracker.common.array_checks import check_array
 from cardbox_tracker.person.kinematics import pose
 from cardbox_tracker.person.model import MEASURED, BodyModel
 from cardbox_tracker.person.posture import (
@@ -47,8 +49,6 @@ from cardbox_tracker.terms.term import (
     TermObservation,
 )
 from cardbox_tracker.terms.whole_body_config import WholeBodyCostConfig
-from cardbox_tracker.common.array_checks import check_array
-from cardbox_tracker.camera.camera import Camera
 
 SIDES = tuple(ARMS)
 _NO_WORDS = np.zeros((1, 0), np.uint64)

@@ -11,6 +11,7 @@ The pixels are those of equation (2), with the outlines of
 
 from __future__ import annotations
 
+from cardbox_tracker.common.compiling import inlined_kernel, kernel
 from cardbox_tracker.person.kinematics import (
     angles_in,
     new_arm,
@@ -19,7 +20,6 @@ from cardbox_tracker.person.kinematics import (
     state_pose,
     turn_arm,
 )
-from cardbox_tracker.common.compiling import inlined_kernel, kernel
 from cardbox_tracker.terms.bit_masks import cover_masks, new_masks, sum_masks
 from cardbox_tracker.terms.bit_planes import Planes
 from cardbox_tracker.terms.body_outline import (

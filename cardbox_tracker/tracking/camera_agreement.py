@@ -19,16 +19,16 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from cardbox_tracker.person.model import MEASURED, BodyModel
-from cardbox_tracker.person.sizes import FloatArray
-from cardbox_tracker.common.errors import CameraError
-from cardbox_tracker.measuring.camera_pose import ROTATION, PoseProblem, Sighting, turned_by
-from cardbox_tracker.terms.term import Silhouette
-from cardbox_tracker.camera.view import View
-from cardbox_tracker.measuring.pose_direction import PoseDirection, PoseFault
-from cardbox_tracker.measuring.silhouette_tangents import TopTangents, roll_of
 from cardbox_tracker.camera.camera import Camera
 from cardbox_tracker.camera.extrinsics import Extrinsics
+from cardbox_tracker.camera.view import View
+from cardbox_tracker.common.errors import CameraError
+from cardbox_tracker.measuring.camera_pose import ROTATION, PoseProblem, Sighting, turned_by
+from cardbox_tracker.measuring.pose_direction import PoseDirection, PoseFault
+from cardbox_tracker.measuring.silhouette_tangents import TopTangents, roll_of
+from cardbox_tracker.person.model import MEASURED, BodyModel
+from cardbox_tracker.person.sizes import FloatArray
+from cardbox_tracker.terms.term import Silhouette
 
 DOUBTFUL_DEG, DOUBTFUL_ROLL_DEG = 0.85, 1.5
 """Pitch or yaw, and roll, beyond which extrinsics are reported as wrong."""

@@ -12,18 +12,18 @@ from typing import NamedTuple
 
 import numpy as np
 
-from cardbox_tracker.person.model import BodyModel
+from cardbox_tracker.camera.camera import Camera
+from cardbox_tracker.camera.extrinsics import Extrinsics
+from cardbox_tracker.camera.view import OtherCamera
 from cardbox_tracker.common.errors import CameraError, InitializationError
 from cardbox_tracker.measuring.camera_guess import guessed_extrinsics, reference_states
 from cardbox_tracker.measuring.camera_pose import PoseProblem, Sighting
+from cardbox_tracker.measuring.silhouette_tangents import TopTangents
+from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.search.config import default_preset
 from cardbox_tracker.terms.term import Image, Silhouette
-from cardbox_tracker.camera.view import OtherCamera
 from cardbox_tracker.tracking.observation import Observation
-from cardbox_tracker.measuring.silhouette_tangents import TopTangents
 from cardbox_tracker.tracking.tracker import Tracker
-from cardbox_tracker.camera.camera import Camera
-from cardbox_tracker.camera.extrinsics import Extrinsics
 
 _PASSES, _SIGHTINGS, _STEPS, _HALF_STEPS = 2, 30, 6, 4
 _LEAST_SIGHTINGS = 8

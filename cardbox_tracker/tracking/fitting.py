@@ -11,14 +11,14 @@ from __future__ import annotations
 
 import numpy as np
 
-from cardbox_tracker.person.model import BodyModel
-from cardbox_tracker.person.sizes import FloatArray
+from cardbox_tracker.camera.camera import Camera
 from cardbox_tracker.common.errors import InitializationError
-from cardbox_tracker.search.config import TrackerConfig
-from cardbox_tracker.terms.term import Image, Silhouette
 from cardbox_tracker.measuring.first_sight import fit_first_sight, upper_body
 from cardbox_tracker.measuring.part_colors import torso_colors
-from cardbox_tracker.camera.camera import Camera
+from cardbox_tracker.person.model import BodyModel
+from cardbox_tracker.person.sizes import FloatArray
+from cardbox_tracker.search.config import TrackerConfig
+from cardbox_tracker.terms.term import Image, Silhouette
 
 # Empty frames after which another person is expected.
 _ABSENT_FRAMES = 5

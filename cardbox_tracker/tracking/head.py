@@ -21,20 +21,20 @@ from typing import NamedTuple
 
 import numpy as np
 
+from cardbox_tracker.camera.camera import Camera
+from cardbox_tracker.common.compiling import kernel
+from cardbox_tracker.detectors.image_points import POINT_INDEX, ImagePoints
 from cardbox_tracker.person.kinematics import pose
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.parts import body_parts
 from cardbox_tracker.person.posture import PITCH, YAW
 from cardbox_tracker.person.sizes import FloatArray
 from cardbox_tracker.person.skeleton import NECK_LIMITS
-from cardbox_tracker.common.compiling import kernel
-from cardbox_tracker.detectors.image_points import POINT_INDEX, ImagePoints
 from cardbox_tracker.terms.kernel_arguments import Floats
 from cardbox_tracker.terms.linear_kernels import solve
 from cardbox_tracker.terms.term import Frame
 from cardbox_tracker.tracking.estimate import Estimate
 from cardbox_tracker.tracking.low_pass import LowPass
-from cardbox_tracker.camera.camera import Camera
 
 FACE_POINTS = ("nose", "left_eye", "right_eye", "left_ear", "right_ear")
 FACE_M: FloatArray = np.array(

@@ -8,11 +8,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from cardbox_tracker.person.sizes import FloatArray
-from cardbox_tracker.detectors.image_points import ImagePoints
-from cardbox_tracker.terms.term import DepthImage, Image, Silhouette
-from cardbox_tracker.camera.view import View
 from cardbox_tracker.camera.given_arrays import depth_from, image_from, silhouette_from
+from cardbox_tracker.camera.view import View
+from cardbox_tracker.detectors.image_points import ImagePoints
+from cardbox_tracker.person.sizes import FloatArray
+from cardbox_tracker.terms.term import DepthImage, Image, Silhouette
 
 
 class Channel(NamedTuple):

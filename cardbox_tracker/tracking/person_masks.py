@@ -12,9 +12,10 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from cardbox_tracker.camera.camera import Camera
+from cardbox_tracker.common.compiling import kernel
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.sizes import FloatArray
-from cardbox_tracker.common.compiling import kernel
 from cardbox_tracker.tracking.person_points import (
     HEAD_CENTRE,
     HIP,
@@ -23,7 +24,6 @@ from cardbox_tracker.tracking.person_points import (
     RIGHT,
     PersonPoints,
 )
-from cardbox_tracker.camera.camera import Camera
 
 Mask = NDArray[np.uint8]
 Point = tuple[float, float, float]

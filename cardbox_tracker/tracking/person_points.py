@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
+from cardbox_tracker.camera.camera import Camera
 from cardbox_tracker.person.kinematics import pose
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.posture import N_STATE, TORSO_X
 from cardbox_tracker.person.sizes import FloatArray
 from cardbox_tracker.person.skeleton import POINT_NAMES
-from cardbox_tracker.camera.camera import Camera
 
 HIP, NECK, HEAD_CENTRE, LEFT, RIGHT = (
     POINT_NAMES.index(name) for name in ("hip", "neck", "head", "left_shoulder", "right_shoulder")

@@ -19,14 +19,14 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from cardbox_tracker.camera.camera import Camera
+from cardbox_tracker.common.array_checks import check_array
+from cardbox_tracker.common.compiling import kernel
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.sizes import FloatArray
-from cardbox_tracker.common.compiling import kernel
+from cardbox_tracker.segmentation.regions import Regions, find_regions
 from cardbox_tracker.tracking.person_masks import Mask, PersonDrawer, PersonMasks, grown
 from cardbox_tracker.tracking.still_things import CHANGED, SAME, THING, StillThings
-from cardbox_tracker.common.array_checks import check_array
-from cardbox_tracker.camera.camera import Camera
-from cardbox_tracker.segmentation.regions import Regions, find_regions
 
 # Largest movement of a body part between frames: a hand at 3 m/s and 15 Hz.
 _NEAR_M = 0.2

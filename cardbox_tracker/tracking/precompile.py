@@ -9,21 +9,21 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from cardbox_tracker.camera.camera import Camera
+from cardbox_tracker.camera.extrinsics import Extrinsics
+from cardbox_tracker.camera.rasterisation import render
+from cardbox_tracker.camera.view import OtherCamera
 from cardbox_tracker.common import compiling
+from cardbox_tracker.detectors.image_points import POINT_NAMES, ImagePoints
 from cardbox_tracker.person.appearance import PARTS, Appearance, bins_of
 from cardbox_tracker.person.cardbox import cardbox_patches
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.posture import reference_posture
-from cardbox_tracker.detectors.image_points import POINT_NAMES, ImagePoints
-from cardbox_tracker.tracking import person_region
 from cardbox_tracker.search.config import PRESETS, TrackerConfig
-from cardbox_tracker.camera.view import OtherCamera
+from cardbox_tracker.segmentation import background
+from cardbox_tracker.tracking import person_region
 from cardbox_tracker.tracking.observation import Observation
 from cardbox_tracker.tracking.tracker import Tracker
-from cardbox_tracker.segmentation import background
-from cardbox_tracker.camera.camera import Camera
-from cardbox_tracker.camera.extrinsics import Extrinsics
-from cardbox_tracker.camera.rasterisation import render
 
 
 def compile_all(

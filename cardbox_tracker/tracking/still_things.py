@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from cardbox_tracker.common.compiling import copied_kernel, kernel
 from cardbox_tracker.common.array_checks import check_array
+from cardbox_tracker.common.compiling import copied_kernel, kernel
 
 ImageArray = NDArray[np.uint8]
 

@@ -7,17 +7,17 @@ from typing import Any
 import cv2
 import numpy as np
 
+from cardbox_tracker.camera.camera import Camera
+from cardbox_tracker.camera.view import OtherCamera, View
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.sizes import FloatArray
 from cardbox_tracker.search.config import TrackerConfig
 from cardbox_tracker.terms.drawn_body import body_tuple
 from cardbox_tracker.terms.silhouette import rows_above_hips
 from cardbox_tracker.terms.term import USUAL_INTERVAL_S, Frame, Posed, Term
-from cardbox_tracker.camera.view import OtherCamera, View
 from cardbox_tracker.tracking.depth_agreement import DepthAgreement
 from cardbox_tracker.tracking.observation import CHANNELS, Observation
 from cardbox_tracker.tracking.person_region import PersonRegion
-from cardbox_tracker.camera.camera import Camera
 
 
 class TrackedCamera:

@@ -10,25 +10,14 @@ from types import MappingProxyType
 
 import numpy as np
 
+from cardbox_tracker.camera.camera import Camera
+from cardbox_tracker.camera.view import OtherCamera, View
+from cardbox_tracker.common.settings import restarts
 from cardbox_tracker.person.kinematics import clavicles
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.posture import N_STATE
 from cardbox_tracker.person.sizes import FloatArray
-from cardbox_tracker.tracking.camera_agreement import CameraAgreement
 from cardbox_tracker.search.config import TrackerConfig
-from cardbox_tracker.terms.compiled import CompiledSilhouette
-from cardbox_tracker.terms.drawn_body import body_tuple
-from cardbox_tracker.terms.silhouette import SilhouetteTerm
-from cardbox_tracker.terms.term import USUAL_INTERVAL_S, Frame, Image, Posed, Silhouette
-from cardbox_tracker.camera.view import OtherCamera, View
-from cardbox_tracker.tracking.estimate import (
-    LOST,
-    NO_PERSON,
-    TRACKING,
-    UNCERTAIN,
-    Estimate,
-)
-from cardbox_tracker.tracking.facing import Facing
 from cardbox_tracker.search.cycles import Cycles
 from cardbox_tracker.search.doubt import doubted
 from cardbox_tracker.search.particles import Particles
@@ -39,13 +28,24 @@ from cardbox_tracker.search.pose_filter import (
     Presence,
 )
 from cardbox_tracker.search.whole_body import WholeBodyFilter
+from cardbox_tracker.terms.compiled import CompiledSilhouette
+from cardbox_tracker.terms.drawn_body import body_tuple
+from cardbox_tracker.terms.silhouette import SilhouetteTerm
+from cardbox_tracker.terms.term import USUAL_INTERVAL_S, Frame, Image, Posed, Silhouette
+from cardbox_tracker.tracking.camera_agreement import CameraAgreement
+from cardbox_tracker.tracking.estimate import (
+    LOST,
+    NO_PERSON,
+    TRACKING,
+    UNCERTAIN,
+    Estimate,
+)
+from cardbox_tracker.tracking.facing import Facing
 from cardbox_tracker.tracking.fitting import Fitting
 from cardbox_tracker.tracking.head import HeadTracker
 from cardbox_tracker.tracking.observation import Observation, Observations, stamp_of
 from cardbox_tracker.tracking.sampling import likely_postures
 from cardbox_tracker.tracking.tracked_camera import TrackedCamera
-from cardbox_tracker.common.settings import restarts
-from cardbox_tracker.camera.camera import Camera
 
 FILTERS: MappingProxyType[str, MakeFilter] = MappingProxyType(
     {"hierarchical": Cycles, "whole_body": WholeBodyFilter}

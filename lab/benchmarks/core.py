@@ -13,6 +13,11 @@ from typing import Any
 
 import numpy as np
 
+from cardbox_tracker.person.cardbox import cardbox_patches
+from cardbox_tracker.person.posture import N_JOINTS, clip_to_limits, reference_posture
+from cardbox_tracker.search.config import TrackerConfig, default_preset, paper_preset
+from cardbox_tracker.terms.compiled import CompiledSilhouette
+from cardbox_tracker.tracking.tracker import Tracker
 from lab.benchmarks.default_stages import measure_default_stages
 from lab.benchmarks.scene import BenchmarkScene, make_scene
 from lab.benchmarks.stages import measure_stages
@@ -24,11 +29,6 @@ from lab.benchmarks.tools import (
     rss_mb,
     summary,
 )
-from cardbox_tracker.person.cardbox import cardbox_patches
-from cardbox_tracker.person.posture import N_JOINTS, clip_to_limits, reference_posture
-from cardbox_tracker.search.config import TrackerConfig, default_preset, paper_preset
-from cardbox_tracker.terms.compiled import CompiledSilhouette
-from cardbox_tracker.tracking.tracker import Tracker
 from lab.experiments.models import make_silhouette_term
 from lab.experiments.volumetric import volumetric_faces
 

@@ -22,11 +22,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from lab.benchmarks.scene import BenchmarkScene, make_scene
-from cardbox_tracker.person.model_file import save_body_model
-from cardbox_tracker.detectors.model_files import installed_models
 from cardbox_tracker.common.errors import CardboxError
+from cardbox_tracker.detectors.model_files import installed_models
+from cardbox_tracker.person.model_file import save_body_model
 from cardbox_tracker.ros.runtime.processes import Nodes, isolate, running_nodes
+from lab.benchmarks.scene import BenchmarkScene, make_scene
 
 RATES_HZ = (15, 30, 60)
 STREAMS = (("mono8", 320, 240), ("bgr8", 640, 480))

@@ -6,8 +6,8 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from lab.benchmarks.nodes import PERCENTILES
 from cardbox_tracker.common.files import atomic_path
+from lab.benchmarks.nodes import PERCENTILES
 
 BEGIN, END = "<!-- benchmark:begin -->", "<!-- benchmark:end -->"
 COMMAND = "make benchmark"
@@ -116,10 +116,11 @@ def _ratios(ratios: Mapping[str, Any] | None) -> list[str]:
     ]
     return [
         "## Ratios",
-        f"`python -m lab.benchmarks.ratios` (commit {ratios['commit']}) measures times in turns, on "
-        "one core except the last. A start lasts until all nodes of a process wait for their "
+        f"`python -m lab.benchmarks.ratios` (commit {ratios['commit']}) measures times in turns, "
+        "on one core except the last. A start lasts until all nodes of a process wait for their "
         "input, with compiled code in the cache; `imports` are those of rclpy, numba, OpenCV and "
-        "numpy. `python -m lab.benchmarks.silhouette RECORDING` measures a recording's silhouettes.",
+        "numpy. `python -m lab.benchmarks.silhouette RECORDING` measures a recording's "
+        "silhouettes.",
         _table(("ratio", "median"), rows),
     ]
 

@@ -7,11 +7,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.applications.simulation.motions import WAVE_S, wave
 from cardbox_tracker.applications.simulation.renderer import Renderer, Scene
 from cardbox_tracker.applications.simulation.session import session_camera
 from cardbox_tracker.camera.camera import Camera
+from cardbox_tracker.person.model import BodyModel
 
 Images = NDArray[np.uint8]
 

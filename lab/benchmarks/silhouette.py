@@ -1,7 +1,7 @@
 """Time of the silhouette with colours, shadows, light and absorption, against brightness alone.
 
-``python -m lab.benchmarks.silhouette RECORDING`` measures a recording that begins with the empty scene,
-and prints a digest of its silhouettes.
+``python -m lab.benchmarks.silhouette RECORDING`` measures a recording that begins with the empty
+scene, and prints a digest of its silhouettes.
 """
 
 from __future__ import annotations
@@ -17,14 +17,14 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from lab.benchmarks.scene import BenchmarkScene
-from lab.benchmarks.tools import WARM_UP, pinned
 from cardbox_tracker.common.errors import CardboxError
 from cardbox_tracker.recordings.open_images import open_images
 from cardbox_tracker.recordings.silhouettes import SilhouetteSource, TimeSpan
 from cardbox_tracker.segmentation.background import SilhouetteExtractor
 from cardbox_tracker.segmentation.background_config import BackgroundConfig
 from cardbox_tracker.segmentation.empty_scene import BackgroundLearner, BackgroundModel
+from lab.benchmarks.scene import BenchmarkScene
+from lab.benchmarks.tools import WARM_UP, pinned
 
 Images = list[NDArray[np.uint8]]
 

@@ -9,14 +9,14 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from lab.benchmarks.scene import BenchmarkScene
-from lab.benchmarks.tools import WARM_UP, extractor_of, summary
 from cardbox_tracker.person.posture import reference_posture
 from cardbox_tracker.search.config import TrackerConfig, paper_preset
-from cardbox_tracker.terms.compiled import CompiledSilhouette
 from cardbox_tracker.search.hierarchy import HierarchicalFilter
 from cardbox_tracker.search.particle_filter import ParticleFilter
 from cardbox_tracker.search.resampling import truncation
+from cardbox_tracker.terms.compiled import CompiledSilhouette
+from lab.benchmarks.scene import BenchmarkScene
+from lab.benchmarks.tools import WARM_UP, extractor_of, summary
 
 T = TypeVar("T")
 

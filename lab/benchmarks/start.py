@@ -15,10 +15,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from lab.benchmarks.tools import pinned
+from cardbox_tracker.common.errors import CardboxError
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.model_file import save_body_model
-from cardbox_tracker.common.errors import CardboxError
+from lab.benchmarks.tools import pinned
 
 IMPORTS = "import rclpy, numba, cv2, numpy"
 """Statement of the process that the nodes are compared with."""

@@ -10,9 +10,9 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from lab.benchmarks.scene import BenchmarkScene
 from cardbox_tracker.segmentation.background import SilhouetteExtractor
 from cardbox_tracker.segmentation.empty_scene import BackgroundLearner
+from lab.benchmarks.scene import BenchmarkScene
 
 WARM_UP = 5
 """Number of first images that do not count, as they allocate memory and compile code."""

@@ -7,15 +7,15 @@ import time
 import numpy as np
 from numpy.typing import NDArray
 
-from lab.benchmarks.scene import BenchmarkScene
-from lab.benchmarks.tools import WARM_UP
-from cardbox_tracker.search.config import default_preset
-from cardbox_tracker.camera.view import OtherCamera
-from cardbox_tracker.tracking.observation import Observation
-from cardbox_tracker.tracking.tracker import Tracker
 from cardbox_tracker.applications.simulation.cameras import SyntheticCamera, synthetic_cameras
 from cardbox_tracker.applications.simulation.motions import WAVE_S, wave
 from cardbox_tracker.applications.simulation.renderer import Renderer, Scene
+from cardbox_tracker.camera.view import OtherCamera
+from cardbox_tracker.search.config import default_preset
+from cardbox_tracker.tracking.observation import Observation
+from cardbox_tracker.tracking.tracker import Tracker
+from lab.benchmarks.scene import BenchmarkScene
+from lab.benchmarks.tools import WARM_UP
 
 
 def measure_two_views(scene: BenchmarkScene, repetitions: int = 3) -> float:

@@ -12,11 +12,11 @@ from typing import Any
 import matplotlib
 import numpy as np
 
+from cardbox_tracker.common.files import atomic_path
+from cardbox_tracker.person.model_file import save_body_model
+from cardbox_tracker.ros.runtime.processes import Nodes, isolate
 from lab.benchmarks.nodes import SEPARATE, TOGETHER, CameraAndListener
 from lab.benchmarks.scene import make_scene
-from cardbox_tracker.person.model_file import save_body_model
-from cardbox_tracker.common.files import atomic_path
-from cardbox_tracker.ros.runtime.processes import Nodes, isolate
 
 matplotlib.use("Agg")
 

@@ -14,14 +14,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from cardbox_tracker.person.model import BodyModel
-from cardbox_tracker.person.posture import N_JOINTS, REFERENCE_NAMES, reference_posture
-from cardbox_tracker.person.sizes import DEFAULT_SIZES, SIZE_NAMES, SUBSETS
-from cardbox_tracker.measuring.config import InitializationConfig
-from cardbox_tracker.measuring.measure import initialize_body
 from cardbox_tracker.applications.simulation.person import random_body
 from cardbox_tracker.applications.simulation.renderer import Renderer, Scene
 from cardbox_tracker.applications.simulation.session import session_camera
+from cardbox_tracker.measuring.config import InitializationConfig
+from cardbox_tracker.measuring.measure import initialize_body
+from cardbox_tracker.person.model import BodyModel
+from cardbox_tracker.person.posture import N_JOINTS, REFERENCE_NAMES, reference_posture
+from cardbox_tracker.person.sizes import DEFAULT_SIZES, SIZE_NAMES, SUBSETS
 from lab.experiments.parallel import Call
 
 FloatArray = NDArray[np.float64]

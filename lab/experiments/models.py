@@ -16,6 +16,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from cardbox_tracker.camera.camera import Camera
+from cardbox_tracker.camera.rasterisation import NEAR_PLANE_M, clip_near, in_front
 from cardbox_tracker.person.cardbox import (
     LEFT_ARM_PATCHES,
     N_PATCHES,
@@ -28,8 +30,6 @@ from cardbox_tracker.person.posture import N_JOINTS, TORSO, clip_to_limits, refe
 from cardbox_tracker.terms.compiled import CompiledSilhouette
 from cardbox_tracker.terms.silhouette import SilhouetteObservation, SilhouetteTerm
 from cardbox_tracker.terms.term import ARMS, ArmCosts, Frame, Silhouette, TorsoCosts
-from cardbox_tracker.camera.camera import Camera
-from cardbox_tracker.camera.rasterisation import NEAR_PLANE_M, clip_near, in_front
 from lab.experiments.volumetric import (
     LEFT_ARM_FACES,
     N_FACES,

@@ -10,9 +10,9 @@ from typing import Any
 import matplotlib
 import numpy as np
 
+from cardbox_tracker.common.files import atomic_path
 from cardbox_tracker.person.skeleton import JOINT_NAMES, KEYPOINT_NAMES
 from cardbox_tracker.search.config import paper_preset
-from cardbox_tracker.common.files import atomic_path
 from lab.experiments.results import Curves, motions_in
 from lab.experiments.tracking import FloatArray
 

@@ -8,6 +8,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from cardbox_tracker.camera.camera import Camera
+from cardbox_tracker.camera.rasterisation import render
 from cardbox_tracker.person.cardbox import (
     LEFT_ARM_PATCHES,
     RIGHT_ARM_PATCHES,
@@ -19,8 +21,6 @@ from cardbox_tracker.person.posture import N_JOINTS, TORSO
 from cardbox_tracker.person.sizes import FloatArray
 from cardbox_tracker.terms.silhouette import SilhouetteObservation, SilhouetteTerm
 from cardbox_tracker.terms.term import ARMS, ArmCosts, Frame, Silhouette, TorsoCosts
-from cardbox_tracker.camera.camera import Camera
-from cardbox_tracker.camera.rasterisation import render
 
 _ARM_PATCHES = {"left": LEFT_ARM_PATCHES, "right": RIGHT_ARM_PATCHES}
 _BOTH_ARMS = slice(LEFT_ARM_PATCHES.start, RIGHT_ARM_PATCHES.stop)

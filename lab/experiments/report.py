@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from cardbox_tracker.person.skeleton import JOINT_NAMES, KEYPOINT_NAMES
 from cardbox_tracker.common.files import atomic_path
+from cardbox_tracker.person.skeleton import JOINT_NAMES, KEYPOINT_NAMES
 from lab.experiments.results import motions_in, recorded_results
 from lab.experiments.tracking import AXES
 

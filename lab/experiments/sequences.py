@@ -12,13 +12,13 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from cardbox_tracker.person.cardbox import cardbox_patches
-from cardbox_tracker.person.model import BodyModel
-from cardbox_tracker.common.errors import CardboxError
-from cardbox_tracker.terms.silhouette import rows_above_hips
-from cardbox_tracker.common.files import atomic_path
 from cardbox_tracker.camera.camera import Camera
 from cardbox_tracker.camera.rasterisation import clip_near, render
+from cardbox_tracker.common.errors import CardboxError
+from cardbox_tracker.common.files import atomic_path
+from cardbox_tracker.person.cardbox import cardbox_patches
+from cardbox_tracker.person.model import BodyModel
+from cardbox_tracker.terms.silhouette import rows_above_hips
 from lab.experiments.sessions import Session
 
 ImageArray = NDArray[np.uint8]

@@ -13,11 +13,11 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from cardbox_tracker.applications.evaluation.metrics import align, angle_errors_deg, distances_m
 from cardbox_tracker.person.posture import N_JOINTS, TURNS
 from cardbox_tracker.person.skeleton import JOINT_NAMES, KEYPOINT_NAMES
 from cardbox_tracker.search.config import TrackerConfig
 from cardbox_tracker.tracking.tracker import Tracker
-from cardbox_tracker.applications.evaluation.metrics import align, angle_errors_deg, distances_m
 from lab.experiments.models import make_silhouette_term
 from lab.experiments.parallel import Call
 from lab.experiments.sessions import Session

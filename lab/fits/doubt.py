@@ -21,9 +21,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from cardbox_tracker.applications.evaluation.session import load_session
+from cardbox_tracker.applications.evaluation.tracking import InputSelection, track_session
 from cardbox_tracker.common.errors import CardboxError
+from cardbox_tracker.common.files import atomic_path
+from cardbox_tracker.detectors.detector import Detector
 from cardbox_tracker.search.config import PRESETS
-from cardbox_tracker.tracking.estimate import Estimate
 from cardbox_tracker.search.doubt import (
     FAR_M,
     HANDS,
@@ -32,11 +35,8 @@ from cardbox_tracker.search.doubt import (
     WHOLE_UNCERTAIN_FROM,
     Source,
 )
+from cardbox_tracker.tracking.estimate import Estimate
 from cardbox_tracker.tracking.tracker import Tracker
-from cardbox_tracker.applications.evaluation.session import load_session
-from cardbox_tracker.applications.evaluation.tracking import InputSelection, track_session
-from cardbox_tracker.common.files import atomic_path
-from cardbox_tracker.detectors.detector import Detector
 
 FloatArray = NDArray[np.float64]
 PENALTY = 0.02

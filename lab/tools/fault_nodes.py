@@ -12,9 +12,8 @@ from rclpy.context import Context
 from rclpy.parameter import Parameter
 from std_msgs.msg import Header
 
-from cardbox_tracker.person.model_file import save_body_model
 from cardbox_tracker.common.errors import CardboxError
-from cardbox_tracker.tracking.estimate import Estimate
+from cardbox_tracker.person.model_file import save_body_model
 from cardbox_tracker.ros.messages.conversions import (
     camera_info_message,
     image_message,
@@ -24,6 +23,7 @@ from cardbox_tracker.ros.nodes.background_node import BackgroundNode
 from cardbox_tracker.ros.nodes.camera_inputs import ObservationSet
 from cardbox_tracker.ros.nodes.tracker_node import TrackerNode
 from cardbox_tracker.ros.runtime.intra_process import IntraProcess
+from cardbox_tracker.tracking.estimate import Estimate
 from lab.tools.fault_scene import EMPTY, START_NS, Found, Person, S, Sent
 
 LEARN_IMAGES = 5

@@ -11,9 +11,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-from cardbox_tracker.search.config import TrackerConfig
-from cardbox_tracker.terms.depth import Depth
-from cardbox_tracker.terms.inner_cue import InnerCue
+from cardbox_tracker.common.settings import settings_below
 from cardbox_tracker.ros.nodes.background_node import BackgroundParameters
 from cardbox_tracker.ros.nodes.camera_node import CameraParameters
 from cardbox_tracker.ros.nodes.detector_node import DetectorParameters
@@ -25,7 +23,9 @@ from cardbox_tracker.ros.nodes.stereo_depth_node import StereoDepthParameters
 from cardbox_tracker.ros.nodes.tracker_parameters import TrackerParameters
 from cardbox_tracker.ros.runtime.parameter_fields import NodeParameters
 from cardbox_tracker.ros.runtime.parameter_text import default_of, details, type_name, yaml_value
-from cardbox_tracker.common.settings import settings_below
+from cardbox_tracker.search.config import TrackerConfig
+from cardbox_tracker.terms.depth import Depth
+from cardbox_tracker.terms.inner_cue import InnerCue
 
 _GENERATED = (
     "made by 'python -m lab.tools.parameter_docs'; edit the settings and ros/nodes/*_parameters.py"

@@ -15,11 +15,11 @@ from typing import Any
 
 import numpy as np
 
-from lab.benchmarks import report as benchmark_report
 from cardbox_tracker.applications.evaluation.marks import replaced
 from cardbox_tracker.applications.evaluation.report import mean_of
 from cardbox_tracker.applications.evaluation.results import read_json
 from cardbox_tracker.common.files import atomic_path
+from lab.benchmarks import report as benchmark_report
 from lab.experiments.results import motions_in, recorded_results
 from lab.tools.people_rows import people_rows
 

@@ -10,13 +10,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from cardbox_tracker.detectors.image_points import ImagePoints
+from cardbox_tracker.camera.camera import Camera
 from cardbox_tracker.common.errors import CardboxError
-from cardbox_tracker.recordings.bag_reader import BagReader
 from cardbox_tracker.detectors.detector import Detector
+from cardbox_tracker.detectors.image_points import ImagePoints
+from cardbox_tracker.recordings.bag_reader import BagReader
 from cardbox_tracker.recordings.detector_silhouettes import DetectorSilhouetteSource
 from cardbox_tracker.recordings.silhouettes import SilhouetteSource, TimeSpan
-from cardbox_tracker.camera.camera import Camera
 from lab.tools.silhouette_report import read_masks
 
 Image = NDArray[np.uint8]

@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cardbox_tracker.applications.drawing.overlay import draw_overlay
+from cardbox_tracker.camera.camera import Camera
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.tracking.estimate import Estimate
-from cardbox_tracker.camera.camera import Camera
 
 Image = NDArray[np.uint8]
 FloatArray = NDArray[np.float64]

@@ -18,6 +18,10 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from cardbox_tracker.applications.evaluation.angles import comparable, true_postures
+from cardbox_tracker.applications.evaluation.marks import replaced
+from cardbox_tracker.applications.evaluation.session import RecordedSession, load_session
+from cardbox_tracker.applications.evaluation.tracking import track_session
 from cardbox_tracker.applications.retargeting.config import RetargetConfig
 from cardbox_tracker.applications.retargeting.hand import HandFollower
 from cardbox_tracker.applications.retargeting.retargeter import Retargeter
@@ -27,10 +31,6 @@ from cardbox_tracker.person.sizes import FloatArray
 from cardbox_tracker.search.config import PRESETS, TrackerConfig
 from cardbox_tracker.tracking.estimate import TRACKING, Estimate
 from cardbox_tracker.tracking.tracker import Tracker
-from cardbox_tracker.applications.evaluation.marks import replaced
-from cardbox_tracker.applications.evaluation.angles import comparable, true_postures
-from cardbox_tracker.applications.evaluation.session import RecordedSession, load_session
-from cardbox_tracker.applications.evaluation.tracking import track_session
 
 ROOT = Path(__file__).resolve().parents[2]
 DOCUMENT, ROBOT = ROOT / "docs" / "retargeting.md", ROOT / "config" / "example_arm.urdf"

@@ -26,16 +26,16 @@ from cardbox_tracker.applications.ergonomics.rula import (
     rula_scores,
     score_distribution,
 )
+from cardbox_tracker.applications.evaluation.angles import comparable, true_postures
+from cardbox_tracker.applications.evaluation.marks import replaced
+from cardbox_tracker.applications.evaluation.session import RecordedSession, load_session
+from cardbox_tracker.applications.evaluation.tracking import track_session
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.sizes import FloatArray
 from cardbox_tracker.search.config import PRESETS, TrackerConfig
 from cardbox_tracker.tracking.estimate import Estimate
 from cardbox_tracker.tracking.sampling import normal_postures
 from cardbox_tracker.tracking.tracker import Tracker
-from cardbox_tracker.applications.evaluation.marks import replaced
-from cardbox_tracker.applications.evaluation.angles import comparable, true_postures
-from cardbox_tracker.applications.evaluation.session import RecordedSession, load_session
-from cardbox_tracker.applications.evaluation.tracking import track_session
 
 DOCUMENT = Path(__file__).resolve().parents[2] / "docs" / "ergonomics.md"
 BEGIN, END = "<!-- rula-accuracy:begin -->", "<!-- rula-accuracy:end -->"

@@ -18,19 +18,19 @@ import numpy as np
 
 from cardbox_tracker.applications.drawing.guidance import Guide
 from cardbox_tracker.applications.drawing.overlay import ImageArray, draw_overlay
-from cardbox_tracker.person.posture import REFERENCE_NAMES
+from cardbox_tracker.applications.simulation.motions import Segment, timeline
+from cardbox_tracker.applications.simulation.session import synthesize_session
 from cardbox_tracker.common.errors import CardboxError
-from cardbox_tracker.search.config import PRESETS
-from cardbox_tracker.measuring.config import InitializationConfig
-from cardbox_tracker.measuring.guidance import Prompt, short_words
-from cardbox_tracker.tracking.tracker import Tracker
 from cardbox_tracker.common.files import atomic_path
 from cardbox_tracker.common.progress import progress_bar
+from cardbox_tracker.measuring.config import InitializationConfig
+from cardbox_tracker.measuring.guidance import Prompt, short_words
+from cardbox_tracker.person.posture import REFERENCE_NAMES
 from cardbox_tracker.recordings.bag_reader import BagReader
 from cardbox_tracker.recordings.initialize import initialize_from_recording
 from cardbox_tracker.recordings.silhouettes import SilhouetteSource, TimeSpan
-from cardbox_tracker.applications.simulation.motions import Segment, timeline
-from cardbox_tracker.applications.simulation.session import synthesize_session
+from cardbox_tracker.search.config import PRESETS
+from cardbox_tracker.tracking.tracker import Tracker
 
 _SCALE = 2
 _QUALITY = 82

@@ -1,7 +1,7 @@
 """Write ``config/sros2_policy*.xml``, the rights of each node, from the graph of running nodes.
 
-``python -m lab.tools.sros2_policy`` starts the nodes of each layout in this process, asks the graph for
-their topics and services, and allows these and nothing else. ``docs/security.md`` says how the
+``python -m lab.tools.sros2_policy`` starts the nodes of each layout in this process, asks the graph
+for their topics and services, and allows these and nothing else. ``docs/security.md`` says how the
 files are used.
 """
 
@@ -24,8 +24,9 @@ import rclpy
 from rclpy.context import Context
 from rclpy.parameter import Parameter
 
-from cardbox_tracker.recordings.bag_writer import BagWriter
+from cardbox_tracker.applications.simulation.session import session_camera
 from cardbox_tracker.detectors.detector import PersonDetector
+from cardbox_tracker.recordings.bag_writer import BagWriter
 from cardbox_tracker.ros.nodes.background_node import BackgroundNode
 from cardbox_tracker.ros.nodes.camera_node import CameraNode
 from cardbox_tracker.ros.nodes.detector_node import DetectorNode
@@ -35,7 +36,6 @@ from cardbox_tracker.ros.nodes.retarget_node import RetargetNode
 from cardbox_tracker.ros.nodes.rula_node import RulaNode
 from cardbox_tracker.ros.nodes.stereo_depth_node import StereoDepthNode
 from cardbox_tracker.ros.nodes.tracker_node import TrackerNode
-from cardbox_tracker.applications.simulation.session import session_camera
 
 _CONFIG = Path(__file__).resolve().parents[2] / "config"
 # An operator of the tracker sets no parameters and publishes no topics.

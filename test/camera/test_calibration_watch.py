@@ -7,8 +7,8 @@ from typing import Any
 
 import pytest
 
-from cardbox_tracker.common.errors import CameraError
 from cardbox_tracker.camera.calibration_watch import LASTING, CalibrationWatch
+from cardbox_tracker.common.errors import CameraError
 
 
 def info(focal_px: float = 330.0, frame: str = "camera", **changes: Any) -> Any:

@@ -14,9 +14,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from cardbox_tracker.common.errors import CameraError
 from cardbox_tracker.camera.calibration_file import load_calibration
 from cardbox_tracker.camera.camera import Calibration, Camera
+from cardbox_tracker.common.errors import CameraError
 
 CAMERA = Camera(320, 240, 300.0, 310.0, 159.5, 119.5)
 K = np.array([(600.0, 0, 319.5), (0, 600.0, 239.5), (0, 0, 1)])

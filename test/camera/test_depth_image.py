@@ -11,7 +11,6 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from cardbox_tracker.common.errors import EncodingError
 from cardbox_tracker.camera.depth_image import (
     at_size,
     decode_depth,
@@ -19,6 +18,7 @@ from cardbox_tracker.camera.depth_image import (
     median_depth,
     unpack_depth,
 )
+from cardbox_tracker.common.errors import EncodingError
 
 
 def packed(pixels: np.ndarray, a: float = 0.0, b: float = 0.0) -> bytes:

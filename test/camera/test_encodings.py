@@ -11,7 +11,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from cardbox_tracker.common.errors import EncodingError
 from cardbox_tracker.camera.encodings import (
     SUPPORTED_ENCODINGS,
     decode_as_sent,
@@ -19,6 +18,7 @@ from cardbox_tracker.camera.encodings import (
     decode_compressed,
     decode_grey,
 )
+from cardbox_tracker.common.errors import EncodingError
 
 Bytes = NDArray[np.uint8]
 

@@ -12,7 +12,6 @@ import numpy as np
 import pytest
 import yaml
 
-from cardbox_tracker.common.errors import CameraError
 from cardbox_tracker.camera.camera import Camera
 from cardbox_tracker.camera.extrinsics import Extrinsics
 from cardbox_tracker.camera.extrinsics_files import load_extrinsics, save_camchain
@@ -22,6 +21,7 @@ from cardbox_tracker.camera.extrinsics_sources import (
     of_transforms,
     transforms_of,
 )
+from cardbox_tracker.common.errors import CameraError
 
 
 @pytest.fixture

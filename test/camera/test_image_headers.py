@@ -12,7 +12,6 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from cardbox_tracker.common.errors import EncodingError
 from cardbox_tracker.camera.encodings import (
     decode_as_sent,
     decode_bgr,
@@ -20,6 +19,7 @@ from cardbox_tracker.camera.encodings import (
     decode_grey,
 )
 from cardbox_tracker.camera.image_headers import compressed_size
+from cardbox_tracker.common.errors import EncodingError
 
 
 def png_of(width: int, height: int) -> bytes:

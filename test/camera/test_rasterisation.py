@@ -7,9 +7,6 @@ import pytest
 from hypothesis import assume, example, given
 from hypothesis import strategies as st
 
-from cardbox_tracker.person.cardbox import cardbox_patches
-from cardbox_tracker.person.model import BodyModel
-from cardbox_tracker.person.posture import reference_posture
 from cardbox_tracker.camera.camera import Camera
 from cardbox_tracker.camera.rasterisation import (
     CROSSING_BITS,
@@ -20,6 +17,9 @@ from cardbox_tracker.camera.rasterisation import (
     render,
     snap,
 )
+from cardbox_tracker.person.cardbox import cardbox_patches
+from cardbox_tracker.person.model import BodyModel
+from cardbox_tracker.person.posture import reference_posture
 
 H, W = 24, 32
 CAMERA = Camera(W, H, 20.0, 20.0, 15.5, 11.5)

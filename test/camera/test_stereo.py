@@ -6,9 +6,9 @@ import cv2
 import numpy as np
 import pytest
 
-from cardbox_tracker.common.errors import CameraError, EncodingError
 from cardbox_tracker.camera.depth_image import at_size, decode_depth
 from cardbox_tracker.camera.stereo import StereoDepth
+from cardbox_tracker.common.errors import CameraError, EncodingError
 
 
 @pytest.fixture

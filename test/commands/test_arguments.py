@@ -93,7 +93,9 @@ def test_synthesize_replaces_a_recording_with_force(
     def synthesize(*_: object, **options: object) -> None:
         called.update(options)
 
-    monkeypatch.setattr("cardbox_tracker.applications.simulation.session.synthesize_session", synthesize)
+    monkeypatch.setattr(
+        "cardbox_tracker.applications.simulation.session.synthesize_session", synthesize
+    )
     assert cardbox("synthesize", "--output", files / "session", "--force").code == 0
     assert called["overwrite"] is True
 

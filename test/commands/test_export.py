@@ -11,15 +11,15 @@ import numpy as np
 import pytest
 
 from cardbox_tracker.applications.exporting.formats import FORMATS
+from cardbox_tracker.camera.camera import Camera
 from cardbox_tracker.person.kinematics import pose
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.model_file import save_body_model
-from cardbox_tracker.tracking.estimate import Estimate
-from cardbox_tracker.tracking.tracker import Tracker
 from cardbox_tracker.recordings.result_bag import result_bag
 from cardbox_tracker.recordings.result_table import result_table
 from cardbox_tracker.recordings.silhouettes import RecordedFrame
-from cardbox_tracker.camera.camera import Camera
+from cardbox_tracker.tracking.estimate import Estimate
+from cardbox_tracker.tracking.tracker import Tracker
 
 
 @pytest.fixture(scope="module")

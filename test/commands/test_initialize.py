@@ -10,12 +10,12 @@ from typing import Any
 import numpy as np
 import pytest
 
+from cardbox_tracker.applications.evaluation.truth import load_ground_truth
+from cardbox_tracker.applications.simulation.session import SessionFormat, synthesize_session
 from cardbox_tracker.person.model_file import load_body_model
 from cardbox_tracker.person.skeleton import KEYPOINT_NAMES
-from cardbox_tracker.applications.evaluation.truth import load_ground_truth
 from cardbox_tracker.recordings.bag_reader import BagReader
 from cardbox_tracker.recordings.bag_writer import BagWriter
-from cardbox_tracker.applications.simulation.session import SessionFormat, synthesize_session
 
 SPAN = "expected T0:T1, seconds from the start of the recording"
 SPANS = {

@@ -11,8 +11,6 @@ import cv2
 import numpy as np
 import pytest
 
-from cardbox_tracker.person.model import BodyModel
-from cardbox_tracker.person.model_file import save_body_model
 from cardbox_tracker.commands.main import build_parser
 from cardbox_tracker.commands.request import (
     OptionsError,
@@ -21,9 +19,11 @@ from cardbox_tracker.commands.request import (
     with_own_options,
 )
 from cardbox_tracker.common.errors import CardboxError
+from cardbox_tracker.detectors.point_table import PointTable
+from cardbox_tracker.person.model import BodyModel
+from cardbox_tracker.person.model_file import save_body_model
 from cardbox_tracker.recordings.given_camera import GivenCamera
 from cardbox_tracker.recordings.person_in_view import PersonInView
-from cardbox_tracker.detectors.point_table import PointTable
 from cardbox_tracker.recordings.silhouettes import TimeSpan
 
 

@@ -10,14 +10,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from cardbox_tracker.camera.camera import Camera
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.posture import reference_posture
-from cardbox_tracker.tracking.estimate import LOST, TRACKING, Estimate
-from cardbox_tracker.tracking.tracker import Tracker
 from cardbox_tracker.recordings.bag_reader import BagReader
 from cardbox_tracker.recordings.result_bag import result_bag
 from cardbox_tracker.recordings.silhouettes import RecordedFrame
-from cardbox_tracker.camera.camera import Camera
+from cardbox_tracker.tracking.estimate import LOST, TRACKING, Estimate
+from cardbox_tracker.tracking.tracker import Tracker
 
 CONFIG = Path(__file__).parents[2] / "config"
 ROBOT, MAP = CONFIG / "example_arm.urdf", CONFIG / "example_joint_map.yaml"

@@ -12,16 +12,16 @@ import cv2
 import numpy as np
 import pytest
 
-from cardbox_tracker.person.model_file import load_body_model
 from cardbox_tracker.commands.request import RETIRED
-from cardbox_tracker.detectors.model_files import ModelFiles
-from cardbox_tracker.search.config import TrackerConfig
-from cardbox_tracker.measuring.standing_camera import StandingCamera
+from cardbox_tracker.common.settings import settings_below
 from cardbox_tracker.detectors import detector as detector_module
+from cardbox_tracker.detectors.model_files import ModelFiles
+from cardbox_tracker.measuring.standing_camera import StandingCamera
+from cardbox_tracker.person.model_file import load_body_model
 from cardbox_tracker.recordings import standing
 from cardbox_tracker.recordings.bag_reader import BagReader
 from cardbox_tracker.recordings.silhouettes import SilhouetteSource, TimeSpan
-from cardbox_tracker.common.settings import settings_below
+from cardbox_tracker.search.config import TrackerConfig
 
 FPS = 4.0
 GIVEN = ("--background", "0:3.9", "--start", 16, "--stature", 1.72)

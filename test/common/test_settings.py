@@ -11,12 +11,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from cardbox_tracker.common import settings
-from cardbox_tracker.search.config import FilterConfig, TrackerConfig
-from cardbox_tracker.terms.whole_body_config import WholeBodyCostConfig
-from cardbox_tracker.search.whole_body_config import WholeBodyConfig
-from cardbox_tracker.measuring.config import InitializationConfig
 from cardbox_tracker.common.settings import Setting, setting
+from cardbox_tracker.measuring.config import InitializationConfig
+from cardbox_tracker.search.config import FilterConfig, TrackerConfig
+from cardbox_tracker.search.whole_body_config import WholeBodyConfig
 from cardbox_tracker.segmentation.background_config import BackgroundConfig
+from cardbox_tracker.terms.whole_body_config import WholeBodyCostConfig
 
 CORE = (
     BackgroundConfig,

@@ -9,9 +9,9 @@ from pathlib import Path
 import pytest
 
 from cardbox_tracker.commands.main import main
+from cardbox_tracker.common.errors import CardboxError
 from cardbox_tracker.detectors import model_files
 from cardbox_tracker.detectors.model_files import install_models, installed_models, model_folder
-from cardbox_tracker.common.errors import CardboxError
 
 CONTENTS = {"pose_detection.tflite": b"detector", "pose_landmark_full.tflite": b"landmarks"}
 

@@ -8,10 +8,10 @@ import cv2
 import numpy as np
 import pytest
 
-from cardbox_tracker.detectors.image_points import POINT_INDEX
-from cardbox_tracker.common.errors import CardboxError
-from cardbox_tracker.detectors.point_table import PointTable
 from cardbox_tracker.camera.camera import Calibration
+from cardbox_tracker.common.errors import CardboxError
+from cardbox_tracker.detectors.image_points import POINT_INDEX
+from cardbox_tracker.detectors.point_table import PointTable
 
 K = np.array([(500.0, 0.0, 320.0), (0.0, 510.0, 240.0), (0.0, 0.0, 1.0)])
 PLAIN = Calibration(640, 480, K, np.zeros(5))

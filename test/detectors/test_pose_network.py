@@ -7,10 +7,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from cardbox_tracker.common.errors import CardboxError
 from cardbox_tracker.detectors import pose_network
 from cardbox_tracker.detectors.model_files import installed_models
 from cardbox_tracker.detectors.pose_network import Detection, PoseNetwork, Square
-from cardbox_tracker.common.errors import CardboxError
 
 
 def test_a_square_that_is_not_turned_keeps_the_axes_of_the_image() -> None:

@@ -5,14 +5,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from cardbox_tracker.person.model import PROPORTIONS, BodyModel
-from cardbox_tracker.person.posture import reference_posture
-from cardbox_tracker.person.skeleton import KeypointState
+from cardbox_tracker.applications.simulation.motions import wave
+from cardbox_tracker.applications.simulation.renderer import Renderer, Scene
+from cardbox_tracker.camera.camera import Camera
+from cardbox_tracker.camera.extrinsics import Extrinsics
+from cardbox_tracker.camera.view import OtherCamera, View
 from cardbox_tracker.common.errors import InitializationError
-from cardbox_tracker.tracking import camera_calibration
 from cardbox_tracker.measuring import camera_guess
-from cardbox_tracker.tracking.camera_agreement import CameraAgreement
-from cardbox_tracker.tracking.camera_calibration import MovingFrame, calibrated_camera
 from cardbox_tracker.measuring.camera_guess import guessed_extrinsics, reference_states
 from cardbox_tracker.measuring.camera_pose import (
     ROTATION,
@@ -21,17 +20,18 @@ from cardbox_tracker.measuring.camera_pose import (
     moved_by,
     turned_by,
 )
-from cardbox_tracker.search.config import default_preset
-from cardbox_tracker.camera.view import OtherCamera, View
-from cardbox_tracker.tracking.estimate import TRACKING, Estimate
-from cardbox_tracker.tracking.observation import Observation
 from cardbox_tracker.measuring.pose_direction import PoseDirection, PoseFault
 from cardbox_tracker.measuring.silhouette_tangents import TopTangents, roll_of
+from cardbox_tracker.person.model import PROPORTIONS, BodyModel
+from cardbox_tracker.person.posture import reference_posture
+from cardbox_tracker.person.skeleton import KeypointState
+from cardbox_tracker.search.config import default_preset
+from cardbox_tracker.tracking import camera_calibration
+from cardbox_tracker.tracking.camera_agreement import CameraAgreement
+from cardbox_tracker.tracking.camera_calibration import MovingFrame, calibrated_camera
+from cardbox_tracker.tracking.estimate import TRACKING, Estimate
+from cardbox_tracker.tracking.observation import Observation
 from cardbox_tracker.tracking.tracker import Tracker
-from cardbox_tracker.applications.simulation.motions import wave
-from cardbox_tracker.applications.simulation.renderer import Renderer, Scene
-from cardbox_tracker.camera.camera import Camera
-from cardbox_tracker.camera.extrinsics import Extrinsics
 
 BODY = BodyModel.of(hip_height_m=-0.51)
 CAMERA = Camera(320, 240, 330.0, 330.0, 159.5, 119.5)

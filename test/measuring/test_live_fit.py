@@ -5,15 +5,15 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from cardbox_tracker.camera.camera import Camera
+from cardbox_tracker.camera.rasterisation import render
+from cardbox_tracker.measuring.asked_outline import outline_ious
+from cardbox_tracker.measuring.config import InitializationConfig
+from cardbox_tracker.measuring.live_fit import FAR, FITS, NEARLY, LiveFit
 from cardbox_tracker.person.cardbox import cardbox_patches
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.posture import REFERENCE_NAMES, reference_posture
 from cardbox_tracker.person.proportions import sizes_of_stature
-from cardbox_tracker.measuring.asked_outline import outline_ious
-from cardbox_tracker.measuring.config import InitializationConfig
-from cardbox_tracker.measuring.live_fit import FAR, FITS, NEARLY, LiveFit
-from cardbox_tracker.camera.camera import Camera
-from cardbox_tracker.camera.rasterisation import render
 
 CAMERA = Camera(320, 240, 330.0, 330.0, 159.5, 119.5)
 CONFIG = InitializationConfig(2.0, camera_pitch_rad=0.1)

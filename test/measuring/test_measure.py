@@ -7,12 +7,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from cardbox_tracker.person.cardbox import cardbox_patches
-from cardbox_tracker.person.model import BodyModel
-from cardbox_tracker.person.posture import REFERENCE_NAMES, reference_posture
-from cardbox_tracker.person.sizes import SIZE_INDEX, SIZE_LIMITS, SUBSETS
+from cardbox_tracker.applications.simulation.person import FINGER_REACH, random_body
+from cardbox_tracker.applications.simulation.renderer import Renderer, Scene
+from cardbox_tracker.applications.simulation.session import session_camera
+from cardbox_tracker.camera.rasterisation import render
 from cardbox_tracker.common.errors import InitializationError
-from cardbox_tracker.terms.silhouette import rows_above_hips
 from cardbox_tracker.measuring.config import (
     InitializationConfig,
     InitializationResult,
@@ -21,10 +20,11 @@ from cardbox_tracker.measuring.config import (
 )
 from cardbox_tracker.measuring.measure import initialize_body
 from cardbox_tracker.measuring.shoulders import GIRDLE_RISE
-from cardbox_tracker.applications.simulation.person import FINGER_REACH, random_body
-from cardbox_tracker.applications.simulation.renderer import Renderer, Scene
-from cardbox_tracker.applications.simulation.session import session_camera
-from cardbox_tracker.camera.rasterisation import render
+from cardbox_tracker.person.cardbox import cardbox_patches
+from cardbox_tracker.person.model import BodyModel
+from cardbox_tracker.person.posture import REFERENCE_NAMES, reference_posture
+from cardbox_tracker.person.sizes import SIZE_INDEX, SIZE_LIMITS, SUBSETS
+from cardbox_tracker.terms.silhouette import rows_above_hips
 
 CAMERA = session_camera()
 BODIES = 8

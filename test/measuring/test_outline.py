@@ -7,6 +7,7 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
+from cardbox_tracker.camera.camera import Camera
 from cardbox_tracker.measuring.outline import (
     axes_distance_m,
     filled,
@@ -15,7 +16,6 @@ from cardbox_tracker.measuring.outline import (
     span_m,
     width_m,
 )
-from cardbox_tracker.camera.camera import Camera
 
 # At 2 m a pixel is 1 cm.
 CAMERA = Camera(320, 240, 200.0, 200.0, 159.5, 119.5)

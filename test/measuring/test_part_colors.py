@@ -6,11 +6,8 @@ import cv2
 import numpy as np
 import pytest
 
-from cardbox_tracker.person.appearance import FOREARM, HAND, HEAD, LEGS, TORSO, steps_of_levels
-from cardbox_tracker.person.cardbox import cardbox_patches
-from cardbox_tracker.person.kinematics import pose
-from cardbox_tracker.person.model import BodyModel
-from cardbox_tracker.person.posture import reference_posture
+from cardbox_tracker.camera.camera import Camera
+from cardbox_tracker.camera.rasterisation import render
 from cardbox_tracker.measuring.part_colors import (
     can_learn,
     fit_posture,
@@ -18,8 +15,11 @@ from cardbox_tracker.measuring.part_colors import (
     part_labels,
     seen_appearance,
 )
-from cardbox_tracker.camera.camera import Camera
-from cardbox_tracker.camera.rasterisation import render
+from cardbox_tracker.person.appearance import FOREARM, HAND, HEAD, LEGS, TORSO, steps_of_levels
+from cardbox_tracker.person.cardbox import cardbox_patches
+from cardbox_tracker.person.kinematics import pose
+from cardbox_tracker.person.model import BodyModel
+from cardbox_tracker.person.posture import reference_posture
 
 SHIRT, SKIN, SLEEVE = (150, 60, 30), (110, 150, 210), (30, 160, 40)
 BODY = BodyModel.of(distance_m=2.0)

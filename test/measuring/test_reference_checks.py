@@ -8,10 +8,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from cardbox_tracker.person.cardbox import cardbox_patches
-from cardbox_tracker.person.model import BodyModel
-from cardbox_tracker.person.posture import LEFT_ARM, RIGHT_ARM, SIDE_TURNS, reference_posture
-from cardbox_tracker.person.sizes import DEFAULT_SIZES, SIZE_INDEX
+from cardbox_tracker.applications.simulation.person import FINGER_REACH
+from cardbox_tracker.camera.camera import Camera
+from cardbox_tracker.camera.rasterisation import render
 from cardbox_tracker.common.errors import InitializationError
 from cardbox_tracker.measuring.asked_outline import check_asked
 from cardbox_tracker.measuring.config import InitializationConfig
@@ -19,9 +18,10 @@ from cardbox_tracker.measuring.reference_checks import (
     check_postures,
     posture_problems,
 )
-from cardbox_tracker.applications.simulation.person import FINGER_REACH
-from cardbox_tracker.camera.camera import Camera
-from cardbox_tracker.camera.rasterisation import render
+from cardbox_tracker.person.cardbox import cardbox_patches
+from cardbox_tracker.person.model import BodyModel
+from cardbox_tracker.person.posture import LEFT_ARM, RIGHT_ARM, SIDE_TURNS, reference_posture
+from cardbox_tracker.person.sizes import DEFAULT_SIZES, SIZE_INDEX
 
 CAMERA = Camera(320, 240, 300.0, 300.0, 159.5, 119.5)
 BODY = BodyModel.of(hip_height_m=-0.5)

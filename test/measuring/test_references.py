@@ -5,9 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from cardbox_tracker.person.cardbox import cardbox_patches
-from cardbox_tracker.person.model import BodyModel
-from cardbox_tracker.person.posture import REFERENCE_NAMES, SIDE_TURNS, reference_posture
+from cardbox_tracker.camera.camera import Camera
+from cardbox_tracker.camera.rasterisation import render
 from cardbox_tracker.common.errors import InitializationError
 from cardbox_tracker.measuring.references import (
     aligned_iou,
@@ -16,8 +15,9 @@ from cardbox_tracker.measuring.references import (
     check_references,
     lateral_m,
 )
-from cardbox_tracker.camera.camera import Camera
-from cardbox_tracker.camera.rasterisation import render
+from cardbox_tracker.person.cardbox import cardbox_patches
+from cardbox_tracker.person.model import BodyModel
+from cardbox_tracker.person.posture import REFERENCE_NAMES, SIDE_TURNS, reference_posture
 
 CAMERA = Camera(160, 120, 165.0, 165.0, 79.5, 59.5)
 BODY = BodyModel.of(hip_height_m=-0.51)

@@ -7,6 +7,7 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
+from cardbox_tracker.camera.camera import Camera
 from cardbox_tracker.measuring.shoulders import (
     CROWN,
     GIRDLE_RISE,
@@ -16,7 +17,6 @@ from cardbox_tracker.measuring.shoulders import (
     shoulders_forward_m,
     top_m,
 )
-from cardbox_tracker.camera.camera import Camera
 
 # At 2 m a pixel is 1 cm.
 CAMERA = Camera(320, 240, 200.0, 200.0, 159.5, 119.5)

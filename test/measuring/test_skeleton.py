@@ -8,10 +8,9 @@ import cv2
 import numpy as np
 import pytest
 
-from cardbox_tracker.person.cardbox import cardbox_patches
-from cardbox_tracker.person.model import BodyModel
-from cardbox_tracker.person.posture import REFERENCE_NAMES, reference_posture
-from cardbox_tracker.person.sizes import DEFAULT_SIZES, SIZE_INDEX
+from cardbox_tracker.applications.simulation.person import FINGER_REACH
+from cardbox_tracker.camera.camera import Camera
+from cardbox_tracker.camera.rasterisation import render
 from cardbox_tracker.measuring.shoulders import GIRDLE_RISE
 from cardbox_tracker.measuring.skeleton import (
     KNUCKLES_SHARE,
@@ -19,9 +18,10 @@ from cardbox_tracker.measuring.skeleton import (
     combined,
     measure_skeleton,
 )
-from cardbox_tracker.applications.simulation.person import FINGER_REACH
-from cardbox_tracker.camera.camera import Camera
-from cardbox_tracker.camera.rasterisation import render
+from cardbox_tracker.person.cardbox import cardbox_patches
+from cardbox_tracker.person.model import BodyModel
+from cardbox_tracker.person.posture import REFERENCE_NAMES, reference_posture
+from cardbox_tracker.person.sizes import DEFAULT_SIZES, SIZE_INDEX
 
 # At 2 m a pixel is 1 cm.
 CAMERA = Camera(320, 240, 200.0, 200.0, 159.5, 119.5)

@@ -7,14 +7,14 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from cardbox_tracker.camera.camera import Camera
+from cardbox_tracker.camera.rasterisation import render
+from cardbox_tracker.measuring.standing import at_height_of
 from cardbox_tracker.person.cardbox import cardbox_patches
 from cardbox_tracker.person.kinematics import pose
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.posture import reference_posture
 from cardbox_tracker.person.sizes import SIZE_NAMES
-from cardbox_tracker.measuring.standing import at_height_of
-from cardbox_tracker.camera.camera import Camera
-from cardbox_tracker.camera.rasterisation import render
 
 CAMERA = Camera(320, 240, 250.0, 250.0, 159.5, 119.5)
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from cardbox_tracker.measuring.standing_camera import LEVELS, middles, standing_camera
 from cardbox_tracker.camera.camera import Camera
+from cardbox_tracker.measuring.standing_camera import LEVELS, middles, standing_camera
 
 CAMERA = Camera(320, 240, 280.0, 280.0, 159.5, 119.5)
 STATURE_M = 1.8

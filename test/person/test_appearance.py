@@ -8,6 +8,7 @@ import zlib
 import numpy as np
 import pytest
 
+from cardbox_tracker.common.errors import BodyModelError
 from cardbox_tracker.person.appearance import (
     COLOR_STEPS,
     PARTS,
@@ -18,7 +19,6 @@ from cardbox_tracker.person.appearance import (
 )
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.model_file import dumps_body_model, loads_body_model
-from cardbox_tracker.common.errors import BodyModelError
 
 
 def histograms(channels: int, seed: int = 0) -> np.ndarray:

@@ -13,6 +13,7 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
+from cardbox_tracker.camera.camera import Camera
 from cardbox_tracker.person.kinematics import clavicles, gaze_m, jacobian, pose
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.parts import body_parts
@@ -26,7 +27,6 @@ from cardbox_tracker.person.skeleton import (
     rotation_y,
     rotation_z,
 )
-from cardbox_tracker.camera.camera import Camera
 
 BODY = BodyModel().rigid
 ANY_POSTURE = arrays(np.float64, N_JOINTS, elements=st.floats(-3.1, 3.1))

@@ -10,6 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from cardbox_tracker.common.errors import BodyModelError
 from cardbox_tracker.person import model_file
 from cardbox_tracker.person.model import BodyModel, CameraPose, Person, Placement
 from cardbox_tracker.person.model_file import (
@@ -19,7 +20,6 @@ from cardbox_tracker.person.model_file import (
     save_body_model,
 )
 from cardbox_tracker.person.sizes import DEFAULT_SIZES, SIZE_LIMITS
-from cardbox_tracker.common.errors import BodyModelError
 
 MODEL = BodyModel.of(
     sizes=DEFAULT_SIZES * 1.07,

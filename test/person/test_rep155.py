@@ -10,6 +10,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from cardbox_tracker.camera.camera import Camera
 from cardbox_tracker.person.kinematics import gaze_m, pose
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.parts import body_parts
@@ -28,7 +29,6 @@ from cardbox_tracker.person.rep155 import (
 from cardbox_tracker.person.skeleton import Group, joints_of, neck_rotation
 from cardbox_tracker.person.urdf import rep155_urdf
 from cardbox_tracker.tracking.estimate import TRACKING, Estimate
-from cardbox_tracker.camera.camera import Camera
 
 yourdfpy = pytest.importorskip("yourdfpy", reason="yourdfpy is not installed")
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from cardbox_tracker.common.errors import BodyModelError
 from cardbox_tracker.person.model import CONSTANTS, BodyModel
 from cardbox_tracker.person.sizes import (
     DEFAULT_SIZES,
@@ -14,7 +15,6 @@ from cardbox_tracker.person.sizes import (
     SIZE_NAMES,
     SUBSETS,
 )
-from cardbox_tracker.common.errors import BodyModelError
 
 
 def test_there_are_18_sizes_with_names_of_their_own() -> None:

@@ -15,6 +15,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
+from cardbox_tracker.camera.camera import Camera
+from cardbox_tracker.commands.main import main
+from cardbox_tracker.common.compiling import kernel
 from cardbox_tracker.person.kinematics import clavicles, gaze_m, keypoints, pose
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.model_file import load_body_model
@@ -37,14 +40,11 @@ from cardbox_tracker.person.skeleton import (
     neck_rotation,
 )
 from cardbox_tracker.person.urdf import ROOT_LINK, rep155_urdf, urdf_from_body
-from cardbox_tracker.commands.main import main
-from cardbox_tracker.common.compiling import kernel
+from cardbox_tracker.recordings.outputs import joint_values, positions_of
 from cardbox_tracker.search.config import PRESETS
 from cardbox_tracker.terms.drawn_body import body_tuple
 from cardbox_tracker.terms.kernel_arguments import BodyTuple, body_of
 from cardbox_tracker.tracking.estimate import TRACKING, Estimate
-from cardbox_tracker.recordings.outputs import joint_values, positions_of
-from cardbox_tracker.camera.camera import Camera
 
 CLAVICLE_LINKS = ("left_clavicle", "right_clavicle")
 KEYPOINT_LINKS = (

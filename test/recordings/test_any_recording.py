@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 import yaml
 
+from cardbox_tracker.camera.camera import Camera
 from cardbox_tracker.common.errors import BagError, CameraError, CardboxError
 from cardbox_tracker.recordings.bag_writer import BagWriter
 from cardbox_tracker.recordings.given_camera import GivenCamera
@@ -19,7 +20,6 @@ from cardbox_tracker.recordings.open_images import open_images
 from cardbox_tracker.recordings.person_in_view import PersonInView
 from cardbox_tracker.recordings.recording import open_recording
 from cardbox_tracker.recordings.silhouettes import TimeSpan
-from cardbox_tracker.camera.camera import Camera
 
 FOV = GivenCamera(fov_deg=60.0)
 EMPTY = TimeSpan(0.0, 0.3)

@@ -16,13 +16,13 @@ import numpy as np
 import pytest
 from rosbags.rosbag2 import storage_mcap
 
+from cardbox_tracker.camera.camera import Camera
 from cardbox_tracker.common.errors import BagError, CardboxError
 from cardbox_tracker.recordings import bag_limits
 from cardbox_tracker.recordings.bag_limits import LimitedFile, unpack_lz4, unpack_zstd
 from cardbox_tracker.recordings.bag_reader import BagReader
 from cardbox_tracker.recordings.bag_writer import BagWriter
 from cardbox_tracker.recordings.silhouettes import SilhouetteSource, TimeSpan
-from cardbox_tracker.camera.camera import Camera
 
 CAMERA = Camera(64, 48, 66.0, 66.0, 31.5, 23.5)
 START_NS = 1_700_000_000_000_000_000

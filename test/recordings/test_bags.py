@@ -14,11 +14,11 @@ import numpy as np
 import pytest
 import yaml
 
-from cardbox_tracker.person.skeleton import JOINT_NAMES
+from cardbox_tracker.camera.camera import Camera
 from cardbox_tracker.common.errors import BagError, CameraError
+from cardbox_tracker.person.skeleton import JOINT_NAMES
 from cardbox_tracker.recordings.bag_reader import BagReader
 from cardbox_tracker.recordings.bag_writer import STORAGES, BagWriter
-from cardbox_tracker.camera.camera import Camera
 
 CAMERA = Camera(32, 24, 33.0, 34.0, 15.5, 11.0)
 START_NS = 1_700_000_000_000_000_000

@@ -11,12 +11,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from cardbox_tracker.camera.camera import Camera
 from cardbox_tracker.person.kinematics import pose
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.posture import reference_posture
 from cardbox_tracker.person.skeleton import JOINT_NAMES, KeypointState
-from cardbox_tracker.tracking.estimate import LOST, NO_PERSON, TRACKING, UNCERTAIN, Estimate
-from cardbox_tracker.tracking.tracker import Tracker
 from cardbox_tracker.recordings.outputs import (
     METRICS,
     OUTPUTS,
@@ -31,7 +30,8 @@ from cardbox_tracker.recordings.outputs import (
     place_from,
     posture_from,
 )
-from cardbox_tracker.camera.camera import Camera
+from cardbox_tracker.tracking.estimate import LOST, NO_PERSON, TRACKING, UNCERTAIN, Estimate
+from cardbox_tracker.tracking.tracker import Tracker
 
 STAMP_NS = 5_000_000_000
 CAMERA = Camera(320, 240, 300.0, 300.0, 159.5, 119.5)
@@ -162,7 +162,9 @@ def test_markers_go_once_when_the_posture_does(state: str) -> None:
 
 
 def test_what_nobody_wants_is_not_computed(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("cardbox_tracker.recordings.outputs.marker_shapes", lambda *_: pytest.fail("computed"))
+    monkeypatch.setattr(
+        "cardbox_tracker.recordings.outputs.marker_shapes", lambda *_: pytest.fail("computed")
+    )
     stream = OutputStream()
     wanted = topics(stream, FOUND, wanted=lambda output: output.topic == "keypoints")
     assert wanted == ["keypoints"]

@@ -12,10 +12,10 @@ import cv2
 import numpy as np
 import pytest
 
+from cardbox_tracker.camera.encodings import decode_as_sent, decode_compressed
 from cardbox_tracker.common.errors import BagError, CardboxError, EncodingError
 from cardbox_tracker.recordings.given_camera import GivenCamera
 from cardbox_tracker.recordings.open_images import open_images
-from cardbox_tracker.camera.encodings import decode_as_sent, decode_compressed
 
 FOV = GivenCamera(fov_deg=60.0)
 READ = "Any damaged or hostile input is read or refused with a reason"

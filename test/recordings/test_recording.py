@@ -9,16 +9,16 @@ import numpy as np
 import pytest
 import yaml
 
-from cardbox_tracker.detectors.model_files import ModelFiles
-from cardbox_tracker.detectors.pose_network import Detection
+from cardbox_tracker.camera.camera import Camera
 from cardbox_tracker.common.errors import BagError, CameraError, CardboxError
 from cardbox_tracker.detectors import detector as detector_module
+from cardbox_tracker.detectors.model_files import ModelFiles
+from cardbox_tracker.detectors.pose_network import Detection
 from cardbox_tracker.recordings.bag_reader import BagReader
 from cardbox_tracker.recordings.bag_writer import BagWriter
 from cardbox_tracker.recordings.depth_silhouettes import Within
 from cardbox_tracker.recordings.recording import Recording, open_recording
 from cardbox_tracker.recordings.silhouettes import SilhouetteSource, TimeSpan
-from cardbox_tracker.camera.camera import Camera
 
 PERIOD_NS = 100_000_000
 LATER_NS = 8_000_000

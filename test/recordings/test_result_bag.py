@@ -11,11 +11,11 @@ import pytest
 import yaml
 
 from cardbox_tracker.applications.drawing.overlay import draw_sharp_overlay
-from cardbox_tracker.search.config import default_preset
 from cardbox_tracker.recordings.recording import Recording
 from cardbox_tracker.recordings.result_bag import result_bag
 from cardbox_tracker.recordings.silhouettes import SilhouetteSource
 from cardbox_tracker.recordings.track import TrackSummary, track_recording
+from cardbox_tracker.search.config import default_preset
 
 # As ROS 2 Jazzy's own message packages have them.
 TYPES = {

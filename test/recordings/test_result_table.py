@@ -13,9 +13,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from cardbox_tracker.person.skeleton import KeypointState
 from cardbox_tracker.common.errors import CardboxError
-from cardbox_tracker.tracking.estimate import Estimate
+from cardbox_tracker.person.skeleton import KeypointState
 from cardbox_tracker.recordings.result_table import (
     check_table,
     columns,
@@ -24,6 +23,7 @@ from cardbox_tracker.recordings.result_table import (
     units,
 )
 from cardbox_tracker.recordings.silhouettes import RecordedFrame
+from cardbox_tracker.tracking.estimate import Estimate
 
 ROOT = Path(__file__).parents[2]
 ANGLES = (

@@ -8,12 +8,12 @@ from typing import Any
 import numpy as np
 import pytest
 
+from cardbox_tracker.camera.camera import Camera
 from cardbox_tracker.common.errors import BagError, CardboxError
 from cardbox_tracker.recordings.bag_reader import BagReader
 from cardbox_tracker.recordings.bag_writer import BagWriter
 from cardbox_tracker.recordings.silhouettes import SilhouetteSource, TimeSpan
 from cardbox_tracker.segmentation.background_config import BackgroundConfig
-from cardbox_tracker.camera.camera import Camera
 
 
 @pytest.mark.parametrize(

@@ -10,12 +10,12 @@ from typing import Any
 import numpy as np
 import pytest
 
+from cardbox_tracker.camera.camera import Camera
 from cardbox_tracker.detectors.landmarks import LANDMARKS
 from cardbox_tracker.detectors.pose_network import Detection
 from cardbox_tracker.measuring.standing_camera import LEVELS
 from cardbox_tracker.recordings import standing
 from cardbox_tracker.recordings.silhouettes import TimeSpan
-from cardbox_tracker.camera.camera import Camera
 
 CAMERA = Camera(640, 480, 500.0, 500.0, 319.5, 239.5)
 PITCH_RAD = np.radians(10.0)

@@ -13,6 +13,8 @@ import numpy as np
 import pytest
 
 from cardbox_tracker.applications.drawing.video import overlay_video
+from cardbox_tracker.common.errors import BagError, CardboxError
+from cardbox_tracker.measuring.config import InitializationConfig
 from cardbox_tracker.person.kinematics import pose
 from cardbox_tracker.person.model_file import loads_body_model
 from cardbox_tracker.person.skeleton import (
@@ -22,11 +24,6 @@ from cardbox_tracker.person.skeleton import (
     PLACE_NAMES,
 )
 from cardbox_tracker.person.urdf import LinkTransforms
-from cardbox_tracker.common.errors import BagError, CardboxError
-from cardbox_tracker.search.config import default_preset
-from cardbox_tracker.tracking.estimate import Estimate
-from cardbox_tracker.measuring.config import InitializationConfig
-from cardbox_tracker.tracking.tracker import Tracker
 from cardbox_tracker.recordings.bag_reader import BagReader
 from cardbox_tracker.recordings.initialize import describe, initialize_from_recording
 from cardbox_tracker.recordings.recording import Recording
@@ -34,6 +31,9 @@ from cardbox_tracker.recordings.result_bag import result_bag
 from cardbox_tracker.recordings.result_table import columns
 from cardbox_tracker.recordings.silhouettes import SilhouetteSource, TimeSpan
 from cardbox_tracker.recordings.track import TrackSummary, track_recording
+from cardbox_tracker.search.config import default_preset
+from cardbox_tracker.tracking.estimate import Estimate
+from cardbox_tracker.tracking.tracker import Tracker
 
 CONFIG = default_preset()
 

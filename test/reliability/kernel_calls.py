@@ -19,11 +19,28 @@ from typing import Any
 
 import numpy as np
 
+from cardbox_tracker.camera.camera import Camera
+from cardbox_tracker.camera.given_arrays import depth_from, image_from, silhouette_from
+from cardbox_tracker.common.errors import CardboxError
+from cardbox_tracker.detectors.image_points import POINT_NAMES, ImagePoints
 from cardbox_tracker.person.appearance import PARTS, Appearance, bins_of
 from cardbox_tracker.person.model import BodyModel
-from cardbox_tracker.detectors.image_points import POINT_NAMES, ImagePoints
-from cardbox_tracker.common.errors import CardboxError
 from cardbox_tracker.search.config import PRESETS
+from cardbox_tracker.segmentation.absorption import StillRegions
+from cardbox_tracker.segmentation.background import SilhouetteExtractor
+from cardbox_tracker.segmentation.chroma import ChromaModel, ChromaScore
+from cardbox_tracker.segmentation.color_reader import ColorReader
+from cardbox_tracker.segmentation.empty_scene import BackgroundLearner, BackgroundModel
+from cardbox_tracker.segmentation.foreground import segment_foreground
+from cardbox_tracker.segmentation.light import LightFollower
+from cardbox_tracker.segmentation.medians import median
+from cardbox_tracker.segmentation.regions import (
+    clean_silhouette,
+    find_regions,
+    remove_small_regions,
+)
+from cardbox_tracker.segmentation.shadows import decide_shadows
+from cardbox_tracker.segmentation.window import Window, window_of
 from cardbox_tracker.terms.compiled import CompiledSilhouette
 from cardbox_tracker.terms.depth import Depth
 from cardbox_tracker.terms.inner_cue import InnerCue
@@ -37,19 +54,6 @@ from cardbox_tracker.tracking.person_region import PersonRegion
 from cardbox_tracker.tracking.precompile import quickest
 from cardbox_tracker.tracking.still_things import StillThings
 from cardbox_tracker.tracking.tracker import Tracker
-from cardbox_tracker.segmentation.absorption import StillRegions
-from cardbox_tracker.segmentation.background import SilhouetteExtractor
-from cardbox_tracker.camera.camera import Camera
-from cardbox_tracker.segmentation.chroma import ChromaModel, ChromaScore
-from cardbox_tracker.segmentation.color_reader import ColorReader
-from cardbox_tracker.segmentation.empty_scene import BackgroundLearner, BackgroundModel
-from cardbox_tracker.segmentation.foreground import segment_foreground
-from cardbox_tracker.camera.given_arrays import depth_from, image_from, silhouette_from
-from cardbox_tracker.segmentation.light import LightFollower
-from cardbox_tracker.segmentation.medians import median
-from cardbox_tracker.segmentation.regions import clean_silhouette, find_regions, remove_small_regions
-from cardbox_tracker.segmentation.shadows import decide_shadows
-from cardbox_tracker.segmentation.window import Window, window_of
 
 CAMERA = Camera(48, 32, 50.0, 50.0, 23.5, 15.5)
 SIZE = (CAMERA.height, CAMERA.width)

@@ -22,13 +22,6 @@ import yaml
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from cardbox_tracker.person.model import BodyModel
-from cardbox_tracker.person.model_file import dumps_body_model, loads_body_model
-from cardbox_tracker.commands import arguments
-from cardbox_tracker.common.errors import CardboxError
-from cardbox_tracker.recordings.bag_reader import BagReader
-from cardbox_tracker.recordings.bag_writer import BagWriter
-from cardbox_tracker.common.small_yaml import parse_small_yaml
 from cardbox_tracker.camera.calibration_file import load_calibration
 from cardbox_tracker.camera.camera import Camera
 from cardbox_tracker.camera.camera_info import calibration_from_info
@@ -40,6 +33,13 @@ from cardbox_tracker.camera.encodings import (
     decode_grey,
 )
 from cardbox_tracker.camera.extrinsics_files import load_extrinsics
+from cardbox_tracker.commands import arguments
+from cardbox_tracker.common.errors import CardboxError
+from cardbox_tracker.common.small_yaml import parse_small_yaml
+from cardbox_tracker.person.model import BodyModel
+from cardbox_tracker.person.model_file import dumps_body_model, loads_body_model
+from cardbox_tracker.recordings.bag_reader import BagReader
+from cardbox_tracker.recordings.bag_writer import BagWriter
 
 CORPUS = Path(__file__).parent / "corpus"
 MODEL = dumps_body_model(BodyModel())

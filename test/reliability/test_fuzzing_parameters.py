@@ -14,8 +14,8 @@ rclpy = pytest.importorskip("rclpy", reason="rclpy is not installed")
 from rclpy.context import Context  # noqa: E402
 from rclpy.parameter import Parameter  # noqa: E402
 
-from cardbox_tracker.ros.runtime.parameters import LiveParameters  # noqa: E402
 from cardbox_tracker.common.settings import check  # noqa: E402
+from cardbox_tracker.ros.runtime.parameters import LiveParameters  # noqa: E402
 from lab.tools.parameter_docs import NODES  # noqa: E402
 
 PLAY_BAG = [Parameter("bag", value="bag")]

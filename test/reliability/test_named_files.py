@@ -10,22 +10,22 @@ from typing import Any
 import numpy as np
 import pytest
 
+from cardbox_tracker.applications.evaluation.truth import load_ground_truth
 from cardbox_tracker.applications.retargeting.joint_map import load_joint_map
 from cardbox_tracker.applications.retargeting.robot import load_robot
-from cardbox_tracker.person.model_file import load_body_model
-from cardbox_tracker.detectors.model_files import install_models
-from cardbox_tracker.common.errors import CardboxError
-from cardbox_tracker.search.config import TrackerConfig
-from cardbox_tracker.search.settings_file import read_settings
-from cardbox_tracker.applications.evaluation.truth import load_ground_truth
-from cardbox_tracker.recordings.given_camera import GivenCamera
-from cardbox_tracker.recordings.image_folder import ImageFolder
-from cardbox_tracker.detectors.point_table import PointTable
-from cardbox_tracker.recordings.video_reader import VideoReader
-from cardbox_tracker.segmentation.background_file import load_background
 from cardbox_tracker.camera.calibration_file import load_calibration
 from cardbox_tracker.camera.camera import Calibration
 from cardbox_tracker.camera.extrinsics_files import load_extrinsics
+from cardbox_tracker.common.errors import CardboxError
+from cardbox_tracker.detectors.model_files import install_models
+from cardbox_tracker.detectors.point_table import PointTable
+from cardbox_tracker.person.model_file import load_body_model
+from cardbox_tracker.recordings.given_camera import GivenCamera
+from cardbox_tracker.recordings.image_folder import ImageFolder
+from cardbox_tracker.recordings.video_reader import VideoReader
+from cardbox_tracker.search.config import TrackerConfig
+from cardbox_tracker.search.settings_file import read_settings
+from cardbox_tracker.segmentation.background_file import load_background
 
 SIZE = (320, 240)
 CAMERA = Calibration.of_fov(*SIZE, 60.0)

@@ -8,7 +8,6 @@ from typing import Any
 import pytest
 
 from cardbox_tracker.common.errors import CardboxError
-from cardbox_tracker.tracking import tracker
 from cardbox_tracker.search.config import (
     FILTERS,
     PRESETS,
@@ -18,6 +17,7 @@ from cardbox_tracker.search.config import (
     paper_preset,
 )
 from cardbox_tracker.search.whole_body_config import WholeBodyConfig
+from cardbox_tracker.tracking import tracker
 
 
 def test_the_paper_preset_is_table_one() -> None:

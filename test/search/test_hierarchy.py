@@ -8,6 +8,8 @@ from typing import Any
 import numpy as np
 import pytest
 
+from cardbox_tracker.camera.camera import Camera
+from cardbox_tracker.camera.rasterisation import render
 from cardbox_tracker.person.cardbox import cardbox_patches
 from cardbox_tracker.person.kinematics import pose
 from cardbox_tracker.person.model import BodyModel
@@ -19,6 +21,7 @@ from cardbox_tracker.person.posture import (
     reference_posture,
 )
 from cardbox_tracker.search.config import TrackerConfig, paper_preset
+from cardbox_tracker.search.hierarchy import HierarchicalFilter, SumOfTerms
 from cardbox_tracker.terms.compiled import CompiledSilhouette
 from cardbox_tracker.terms.drawn_body import body_tuple
 from cardbox_tracker.terms.term import (
@@ -28,9 +31,6 @@ from cardbox_tracker.terms.term import (
     TermObservation,
     TorsoCosts,
 )
-from cardbox_tracker.search.hierarchy import HierarchicalFilter, SumOfTerms
-from cardbox_tracker.camera.camera import Camera
-from cardbox_tracker.camera.rasterisation import render
 
 CAMERA = Camera(96, 72, 99.0, 99.0, 47.5, 35.5)
 BODY = BodyModel.of(hip_height_m=-0.51)

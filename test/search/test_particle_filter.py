@@ -9,8 +9,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from cardbox_tracker.search.config import FilterConfig
 from cardbox_tracker.search import particle_filter
+from cardbox_tracker.search.config import FilterConfig
 from cardbox_tracker.search.particle_filter import SPREAD_PX, ParticleFilter
 
 NOISE = np.array([0.25, 0.02, 0.1])

@@ -11,20 +11,20 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from cardbox_tracker.camera.camera import Camera
+from cardbox_tracker.camera.extrinsics import Extrinsics
+from cardbox_tracker.camera.view import OtherCamera, View
+from cardbox_tracker.detectors.image_points import POINT_INDEX, ImagePoints
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.posture import reference_posture, state_limits
-from cardbox_tracker.detectors.image_points import POINT_INDEX, ImagePoints
+from cardbox_tracker.search.arms import ARM_LIMITS
+from cardbox_tracker.search.mirroring import mirrored_states
+from cardbox_tracker.search.refiner import Cue, Prior, Refiner
 from cardbox_tracker.terms import joint_points_kernels as kernels
 from cardbox_tracker.terms.joint_points import JointPoints
 from cardbox_tracker.terms.multi_view import MultiViewCost
 from cardbox_tracker.terms.term import Frame, Posed, Residuals, TermObservation
-from cardbox_tracker.camera.view import OtherCamera, View
 from cardbox_tracker.terms.whole_body_config import WholeBodyCostConfig
-from cardbox_tracker.search.arms import ARM_LIMITS
-from cardbox_tracker.search.mirroring import mirrored_states
-from cardbox_tracker.search.refiner import Cue, Prior, Refiner
-from cardbox_tracker.camera.camera import Camera
-from cardbox_tracker.camera.extrinsics import Extrinsics
 
 Detect = Callable[..., ImagePoints]
 

@@ -9,21 +9,21 @@ import cv2
 import numpy as np
 import pytest
 
+from cardbox_tracker.applications.simulation.motions import wave
+from cardbox_tracker.camera.camera import Camera
+from cardbox_tracker.camera.rasterisation import render
+from cardbox_tracker.estimation.filtering.loss import Evidence, chance_of_loss, state_stddev
 from cardbox_tracker.person.cardbox import cardbox_patches
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.posture import reference_posture, state_limits
 from cardbox_tracker.person.skeleton import arm_directions
+from cardbox_tracker.search import arm_proposals, state_choice, torso_proposals
 from cardbox_tracker.search.config import TrackerConfig, default_preset
+from cardbox_tracker.search.pose_filter import Presence
+from cardbox_tracker.search.whole_body import WholeBodyFilter
 from cardbox_tracker.terms.compiled import CompiledSilhouette
 from cardbox_tracker.terms.whole_body import WholeBodyCost
 from cardbox_tracker.terms.whole_body_config import WholeBodyCostConfig
-from cardbox_tracker.search import arm_proposals, state_choice, torso_proposals
-from cardbox_tracker.estimation.filtering.loss import Evidence, chance_of_loss, state_stddev
-from cardbox_tracker.search.pose_filter import Presence
-from cardbox_tracker.search.whole_body import WholeBodyFilter
-from cardbox_tracker.applications.simulation.motions import wave
-from cardbox_tracker.camera.camera import Camera
-from cardbox_tracker.camera.rasterisation import render
 
 STATE_LIMITS = state_limits(2.0)
 CAMERA = Camera(160, 120, 165.0, 165.0, 79.5, 59.5)

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from cardbox_tracker.camera.camera import Calibration
 from cardbox_tracker.common.errors import BackgroundFileError
 from cardbox_tracker.segmentation.background_file import (
     StoredBackground,
@@ -17,7 +18,6 @@ from cardbox_tracker.segmentation.background_file import (
     load_background,
     save_background,
 )
-from cardbox_tracker.camera.camera import Calibration
 from cardbox_tracker.segmentation.chroma import ChromaModel
 from cardbox_tracker.segmentation.empty_scene import BackgroundModel
 

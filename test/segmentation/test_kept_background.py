@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 import pytest
 
+from cardbox_tracker.camera.camera import Calibration
 from cardbox_tracker.common.errors import BackgroundFileError
 from cardbox_tracker.segmentation.background_config import BackgroundConfig
-from cardbox_tracker.camera.camera import Calibration
 from cardbox_tracker.segmentation.kept_background import KeptBackground
 from cardbox_tracker.segmentation.learning import StillLearning
 from cardbox_tracker.segmentation.silhouettes import SilhouettePipeline

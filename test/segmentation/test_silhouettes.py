@@ -9,10 +9,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
+from cardbox_tracker.camera.camera import Calibration
 from cardbox_tracker.common.errors import CameraError
 from cardbox_tracker.segmentation.background import SilhouetteExtractor
 from cardbox_tracker.segmentation.background_config import BackgroundConfig
-from cardbox_tracker.camera.camera import Calibration
 from cardbox_tracker.segmentation.empty_scene import BackgroundLearner
 from cardbox_tracker.segmentation.silhouettes import SilhouettePipeline
 

@@ -16,13 +16,13 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from cardbox_tracker.person.cardbox import cardbox_patches
-from cardbox_tracker.person.model import BodyModel
-from cardbox_tracker.person.posture import reference_posture
-from cardbox_tracker.camera.view import OtherCamera, View
 from cardbox_tracker.camera.camera import Camera
 from cardbox_tracker.camera.extrinsics import Extrinsics
 from cardbox_tracker.camera.rasterisation import render
+from cardbox_tracker.camera.view import OtherCamera, View
+from cardbox_tracker.person.cardbox import cardbox_patches
+from cardbox_tracker.person.model import BodyModel
+from cardbox_tracker.person.posture import reference_posture
 
 # The limit must only end tests that hang, not slow ones.
 WAIT_S = 90.0

@@ -8,11 +8,11 @@ from typing import Any
 import numpy as np
 import pytest
 
+from cardbox_tracker.detectors.landmarks import LANDMARKS
+from cardbox_tracker.detectors.pose_network import Detection
 from cardbox_tracker.person.kinematics import pose
 from cardbox_tracker.person.model_file import save_body_model
 from cardbox_tracker.person.posture import reference_posture
-from cardbox_tracker.detectors.landmarks import LANDMARKS
-from cardbox_tracker.detectors.pose_network import Detection
 
 rclpy = pytest.importorskip("rclpy", reason="rclpy is not installed")
 

@@ -29,8 +29,6 @@ from std_msgs.msg import String  # noqa: E402
 from std_srvs.srv import Trigger  # noqa: E402
 
 from cardbox_tracker.person.model_file import dumps_body_model, save_body_model  # noqa: E402
-from cardbox_tracker.search.config import default_preset  # noqa: E402
-from cardbox_tracker.tracking.tracker import Tracker  # noqa: E402
 from cardbox_tracker.recordings.outputs import place_from, posture_from  # noqa: E402
 from cardbox_tracker.ros.messages.conversions import (  # noqa: E402
     camera_info_message,
@@ -38,6 +36,8 @@ from cardbox_tracker.ros.messages.conversions import (  # noqa: E402
 )
 from cardbox_tracker.ros.messages.results import joint_values_of  # noqa: E402
 from cardbox_tracker.ros.runtime import qos  # noqa: E402
+from cardbox_tracker.search.config import default_preset  # noqa: E402
+from cardbox_tracker.tracking.tracker import Tracker  # noqa: E402
 from lab.tools.endurance_record import resources_of  # noqa: E402
 from lab.tools.fault_nodes import header_of  # noqa: E402
 from lab.tools.fault_scene import (  # noqa: E402

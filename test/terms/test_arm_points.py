@@ -7,14 +7,14 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from cardbox_tracker.camera.camera import Camera
 from cardbox_tracker.person.kinematics import angles_of_arms
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.posture import reference_posture
 from cardbox_tracker.person.sizes import FloatArray
+from cardbox_tracker.search.arms import ARM_LIMITS
 from cardbox_tracker.terms.whole_body import WholeBodyCost
 from cardbox_tracker.terms.whole_body_config import WholeBodyCostConfig
-from cardbox_tracker.search.arms import ARM_LIMITS
-from cardbox_tracker.camera.camera import Camera
 
 BODY = BodyModel.of(hip_height_m=-0.4)
 CAMERA = Camera(160, 120, 150.0, 150.0, 79.5, 59.5)

@@ -7,13 +7,13 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from cardbox_tracker.camera.camera import Camera
+from cardbox_tracker.camera.rasterisation import clip_near, fill_convex, snap
 from cardbox_tracker.common.compiling import kernel
 from cardbox_tracker.terms.bit_masks import cover_masks, new_masks, sum_masks
 from cardbox_tracker.terms.bit_planes import Planes, fill_planes, new_planes
 from cardbox_tracker.terms.kernel_arguments import Floats, Intrinsics, intrinsics_of
 from cardbox_tracker.terms.rasterisation import draw, new_workspace
-from cardbox_tracker.camera.camera import Camera
-from cardbox_tracker.camera.rasterisation import clip_near, fill_convex, snap
 
 PATCHES = 6
 

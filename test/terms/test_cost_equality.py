@@ -9,6 +9,14 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from cardbox_tracker.camera.camera import Camera
+from cardbox_tracker.camera.rasterisation import (
+    NEAR_PLANE_M,
+    clip_near,
+    fill_convex,
+    render,
+    snap,
+)
 from cardbox_tracker.person import parts as indices
 from cardbox_tracker.person.cardbox import NECK_PATCHES, TORSO_PATCHES, cardbox_patches
 from cardbox_tracker.person.model import BodyModel
@@ -20,14 +28,6 @@ from cardbox_tracker.terms.compiled import CompiledSilhouette
 from cardbox_tracker.terms.kernel_arguments import intrinsics_of, place_of
 from cardbox_tracker.terms.row_sums import fill_row_sums
 from cardbox_tracker.terms.silhouette import SilhouetteTerm, rows_above_hips
-from cardbox_tracker.camera.camera import Camera
-from cardbox_tracker.camera.rasterisation import (
-    NEAR_PLANE_M,
-    clip_near,
-    fill_convex,
-    render,
-    snap,
-)
 from lab.experiments.reference import ReferenceSilhouette
 
 SMALL = ((33, 57), (57, 33), (64, 48), (97, 41), (160, 120))

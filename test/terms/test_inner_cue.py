@@ -9,6 +9,9 @@ import cv2
 import numpy as np
 import pytest
 
+from cardbox_tracker.camera.camera import Camera
+from cardbox_tracker.camera.rasterisation import render
+from cardbox_tracker.measuring.part_colors import learn_appearance
 from cardbox_tracker.person.appearance import PARTS, TORSO, UNSEEN, Appearance, bins_of
 from cardbox_tracker.person.cardbox import cardbox_patches
 from cardbox_tracker.person.kinematics import pose
@@ -36,10 +39,7 @@ from cardbox_tracker.terms.term import (
     Posed,
     TermObservation,
 )
-from cardbox_tracker.measuring.part_colors import learn_appearance
 from cardbox_tracker.tracking.tracker import Tracker
-from cardbox_tracker.camera.camera import Camera
-from cardbox_tracker.camera.rasterisation import render
 
 SHIRT, SKIN, TROUSERS, WALL = (150, 60, 30), (110, 150, 210), (40, 40, 40), (128, 128, 128)
 BODY = BodyModel.of(distance_m=2.0)

@@ -6,6 +6,9 @@ import cv2
 import numpy as np
 import pytest
 
+from cardbox_tracker.camera.camera import Camera
+from cardbox_tracker.camera.rasterisation import render
+from cardbox_tracker.measuring.part_colors import seen_appearance
 from cardbox_tracker.person.appearance import FOREARM, HAND, TORSO
 from cardbox_tracker.person.cardbox import cardbox_patches
 from cardbox_tracker.person.model import PROPORTIONS, BodyModel
@@ -15,9 +18,6 @@ from cardbox_tracker.terms.inner_cue import InnerCue, InnerCueTerm
 from cardbox_tracker.terms.inner_cue_arms import forearm_of
 from cardbox_tracker.terms.inner_cue_sleeves import Sleeves
 from cardbox_tracker.terms.term import Frame, Posed
-from cardbox_tracker.measuring.part_colors import seen_appearance
-from cardbox_tracker.camera.camera import Camera
-from cardbox_tracker.camera.rasterisation import render
 
 SHIRT, SKIN, WALL = (150, 60, 30), (110, 150, 210), (128, 128, 128)
 BODY = BodyModel.of(distance_m=2.0)

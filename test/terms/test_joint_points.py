@@ -12,10 +12,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
+from cardbox_tracker.camera.camera import Camera
+from cardbox_tracker.detectors.image_points import POINT_INDEX, POINT_NAMES, ImagePoints
 from cardbox_tracker.person.kinematics import pose
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.posture import reference_posture, state_limits
-from cardbox_tracker.detectors.image_points import POINT_INDEX, POINT_NAMES, ImagePoints
 from cardbox_tracker.terms import joint_points_kernels as kernels
 from cardbox_tracker.terms.joint_points import (
     JointPoints,
@@ -26,7 +27,6 @@ from cardbox_tracker.terms.kernel_arguments import Drawn
 from cardbox_tracker.terms.term import ARM, TRUNK, WHOLE, Frame, Posed
 from cardbox_tracker.terms.whole_body import WholeBodyCost
 from cardbox_tracker.terms.whole_body_config import WholeBodyCostConfig
-from cardbox_tracker.camera.camera import Camera
 
 Detect = Callable[..., ImagePoints]
 

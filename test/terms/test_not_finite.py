@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from cardbox_tracker.camera.camera import Camera
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.terms.compiled import CompiledSilhouette
 from cardbox_tracker.terms.outline import signed_distances
 from cardbox_tracker.terms.outline_points import distance_at
-from cardbox_tracker.camera.camera import Camera
 
 CAMERA = Camera(48, 32, 50.0, 50.0, 23.5, 15.5)
 # Metres in the optical frame; the lower half of the patch is in the image.

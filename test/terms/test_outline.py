@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from cardbox_tracker.camera.camera import Camera
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.posture import N_STATE, reference_posture
 from cardbox_tracker.terms.body_outline import BODY_PATCHES, corners_of_body
@@ -13,7 +14,6 @@ from cardbox_tracker.terms.outline import INFORMATION, Outline, signed_distances
 from cardbox_tracker.terms.outline_distances import HALF_PX
 from cardbox_tracker.terms.outline_points import POINTS, find_outline
 from cardbox_tracker.terms.term import Posed
-from cardbox_tracker.camera.camera import Camera
 
 CAMERA = Camera(320, 240, 300.0, 310.0, 159.5, 119.5, 0.15)
 BODY = BodyModel.of(distance_m=2.3, hip_height_m=-0.45, camera_pitch_rad=0.15)

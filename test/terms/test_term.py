@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from cardbox_tracker.camera.camera import Camera
 from cardbox_tracker.person.kinematics import pose
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.terms.drawn_body import body_tuple
@@ -16,7 +17,6 @@ from cardbox_tracker.terms.term import (
     Posed,
     TermObservation,
 )
-from cardbox_tracker.camera.camera import Camera
 
 PITCH = 0.2
 CAMERA = Camera(320, 240, 300.0, 310.0, 159.5, 119.5, PITCH)

@@ -10,6 +10,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from cardbox_tracker.camera.camera import Camera
+from cardbox_tracker.camera.rasterisation import clip_near, fill_convex, snap
 from cardbox_tracker.person.kinematics import angles_of_arms, pose
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.parts import (
@@ -30,8 +32,6 @@ from cardbox_tracker.terms.pose_prior import FLOOR_NATS, load_gmm, nats_of
 from cardbox_tracker.terms.term import Posed, TermObservation
 from cardbox_tracker.terms.whole_body import WholeBodyCost, iou_of
 from cardbox_tracker.terms.whole_body_config import WholeBodyCostConfig
-from cardbox_tracker.camera.camera import Camera
-from cardbox_tracker.camera.rasterisation import clip_near, fill_convex, snap
 
 CAMERA = Camera(160, 120, 165.0, 165.0, 79.5, 59.5)
 

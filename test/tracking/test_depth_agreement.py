@@ -5,6 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from cardbox_tracker.camera.camera import Camera
+from cardbox_tracker.camera.rasterisation import render
 from cardbox_tracker.person.cardbox import cardbox_patches
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.posture import reference_posture
@@ -13,8 +15,6 @@ from cardbox_tracker.tracking.depth_agreement import DepthAgreement, surplus_of_
 from cardbox_tracker.tracking.observation import Observation
 from cardbox_tracker.tracking.precompile import quickest
 from cardbox_tracker.tracking.tracker import Tracker
-from cardbox_tracker.camera.camera import Camera
-from cardbox_tracker.camera.rasterisation import render
 
 BODY, CAMERA = BodyModel(), Camera(96, 72, 99.0, 99.0, 47.5, 35.5)
 SHAPE = 120, 160

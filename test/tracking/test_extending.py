@@ -15,6 +15,10 @@ from typing import Any
 import numpy as np
 import pytest
 
+from cardbox_tracker.camera.camera import Camera
+from cardbox_tracker.camera.extrinsics import Extrinsics
+from cardbox_tracker.camera.rasterisation import render
+from cardbox_tracker.camera.view import OtherCamera
 from cardbox_tracker.person.cardbox import cardbox_patches
 from cardbox_tracker.person.kinematics import pose
 from cardbox_tracker.person.model import BodyModel
@@ -22,13 +26,9 @@ from cardbox_tracker.person.posture import TORSO_X, reference_posture, state_lim
 from cardbox_tracker.search.config import PRESETS
 from cardbox_tracker.terms.drawn_body import body_tuple
 from cardbox_tracker.terms.term import ARM, TRUNK, WHOLE, Frame, Posed
-from cardbox_tracker.camera.view import OtherCamera
 from cardbox_tracker.tracking.observation import Observation
 from cardbox_tracker.tracking.tracked_camera import TrackedCamera
 from cardbox_tracker.tracking.tracker import Tracker
-from cardbox_tracker.camera.camera import Camera
-from cardbox_tracker.camera.extrinsics import Extrinsics
-from cardbox_tracker.camera.rasterisation import render
 
 ROOT = Path(__file__).parents[2]
 CODE = re.findall(r"```python\n(.*?)```", (ROOT / "docs" / "extending.md").read_text(), re.DOTALL)

@@ -7,17 +7,17 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from cardbox_tracker.applications.simulation.renderer import Renderer, Scene
+from cardbox_tracker.camera.camera import Camera
+from cardbox_tracker.common.errors import InitializationError
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.posture import reference_posture
 from cardbox_tracker.person.proportions import body_from_proportions, sizes_of_stature
 from cardbox_tracker.person.sizes import SIZE_INDEX
-from cardbox_tracker.common.errors import InitializationError
-from cardbox_tracker.tracking import fitting
 from cardbox_tracker.search.config import default_preset
+from cardbox_tracker.tracking import fitting
 from cardbox_tracker.tracking.estimate import TRACKING, UNCERTAIN
 from cardbox_tracker.tracking.tracker import Tracker
-from cardbox_tracker.applications.simulation.renderer import Renderer, Scene
-from cardbox_tracker.camera.camera import Camera
 
 CAMERA = Camera(320, 240, 300.0, 300.0, 159.5, 119.5)
 NOBODY = np.zeros((240, 320), np.uint8)

@@ -8,20 +8,20 @@ from typing import Any
 import numpy as np
 import pytest
 
+from cardbox_tracker.camera.camera import Camera
+from cardbox_tracker.camera.rasterisation import render
+from cardbox_tracker.common.errors import InitializationError
+from cardbox_tracker.measuring.measure import initialize_body
 from cardbox_tracker.person.appearance import PARTS, Appearance, bins_of
 from cardbox_tracker.person.cardbox import cardbox_patches
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.posture import REFERENCE_NAMES, reference_posture
-from cardbox_tracker.common.errors import InitializationError
 from cardbox_tracker.search.config import PRESETS
 from cardbox_tracker.terms.compiled import CompiledSilhouette
 from cardbox_tracker.tracking.estimate import TRACKING
-from cardbox_tracker.measuring.measure import initialize_body
 from cardbox_tracker.tracking.observation import Observation
 from cardbox_tracker.tracking.precompile import quickest
 from cardbox_tracker.tracking.tracker import Tracker
-from cardbox_tracker.camera.camera import Camera
-from cardbox_tracker.camera.rasterisation import render
 
 CAMERA = Camera(96, 72, 99.0, 99.0, 47.5, 35.5)
 # With colours, images are used.

@@ -11,15 +11,15 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from cardbox_tracker.camera.camera import Camera
+from cardbox_tracker.detectors.image_points import POINT_INDEX, POINT_NAMES, ImagePoints
 from cardbox_tracker.person.kinematics import pose
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.sizes import FloatArray
 from cardbox_tracker.person.skeleton import NECK_LIMITS, neck_rotation
-from cardbox_tracker.detectors.image_points import POINT_INDEX, POINT_NAMES, ImagePoints
 from cardbox_tracker.terms.term import Frame
 from cardbox_tracker.tracking.estimate import LOST, TRACKING, Estimate
 from cardbox_tracker.tracking.head import FACE_M, FACE_POINTS, HeadTracker, fit_neck
-from cardbox_tracker.camera.camera import Camera
 
 CAMERA = Camera(320, 240, 300.0, 300.0, 159.5, 119.5, pitch_rad=0.1)
 BODY = BodyModel.of(hip_height_m=-0.3, camera_pitch_rad=0.1)

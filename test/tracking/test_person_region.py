@@ -8,6 +8,8 @@ import cv2
 import numpy as np
 import pytest
 
+from cardbox_tracker.camera.camera import Camera
+from cardbox_tracker.camera.rasterisation import render
 from cardbox_tracker.person.cardbox import cardbox_patches
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.posture import reference_posture
@@ -15,8 +17,6 @@ from cardbox_tracker.search.config import default_preset, paper_preset
 from cardbox_tracker.tracking.estimate import LOST, NO_PERSON, TRACKING
 from cardbox_tracker.tracking.person_region import PersonRegion
 from cardbox_tracker.tracking.tracker import Tracker
-from cardbox_tracker.camera.camera import Camera
-from cardbox_tracker.camera.rasterisation import render
 
 CAMERA = Camera(160, 120, 100.0, 100.0, 79.5, 59.5)
 BODY = BodyModel.of(hip_height_m=-0.4)

@@ -8,22 +8,22 @@ import numpy as np
 import pytest
 from numba.core.registry import CPUDispatcher
 
+from cardbox_tracker.camera.camera import Camera
+from cardbox_tracker.camera.extrinsics import Extrinsics
+from cardbox_tracker.camera.rasterisation import render
+from cardbox_tracker.camera.view import OtherCamera
+from cardbox_tracker.detectors.image_points import POINT_NAMES, ImagePoints
 from cardbox_tracker.person.appearance import Appearance, bins_of
 from cardbox_tracker.person.cardbox import cardbox_patches
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.posture import reference_posture
-from cardbox_tracker.detectors.image_points import POINT_NAMES, ImagePoints
 from cardbox_tracker.search.config import PRESETS
-from cardbox_tracker.camera.view import OtherCamera
+from cardbox_tracker.segmentation.background import SilhouetteExtractor
+from cardbox_tracker.segmentation.empty_scene import BackgroundLearner
 from cardbox_tracker.tracking.estimate import TRACKING
 from cardbox_tracker.tracking.observation import Observation
 from cardbox_tracker.tracking.precompile import compile_all
 from cardbox_tracker.tracking.tracker import Tracker
-from cardbox_tracker.segmentation.background import SilhouetteExtractor
-from cardbox_tracker.camera.camera import Camera
-from cardbox_tracker.segmentation.empty_scene import BackgroundLearner
-from cardbox_tracker.camera.extrinsics import Extrinsics
-from cardbox_tracker.camera.rasterisation import render
 
 CAMERA = Camera(320, 240, 300.0, 300.0, 159.5, 119.5)
 

@@ -5,6 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from cardbox_tracker.applications.simulation.motions import wave
+from cardbox_tracker.camera.camera import Camera
+from cardbox_tracker.camera.rasterisation import render
 from cardbox_tracker.person.cardbox import cardbox_patches
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.posture import TURNING_LIMITS, reference_posture
@@ -12,9 +15,6 @@ from cardbox_tracker.search.config import PRESETS
 from cardbox_tracker.tracking.estimate import LOST, Estimate
 from cardbox_tracker.tracking.sampling import normal_postures
 from cardbox_tracker.tracking.tracker import Tracker
-from cardbox_tracker.applications.simulation.motions import wave
-from cardbox_tracker.camera.camera import Camera
-from cardbox_tracker.camera.rasterisation import render
 
 CAMERA = Camera(160, 120, 165.0, 165.0, 79.5, 59.5)
 BODY = BodyModel.of(hip_height_m=-0.51)

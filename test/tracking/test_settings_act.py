@@ -12,11 +12,16 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from cardbox_tracker.applications.simulation.motions import wave
+from cardbox_tracker.camera.camera import Camera
+from cardbox_tracker.camera.rasterisation import render
+from cardbox_tracker.common.settings import NoEffectError, Setting, nested, settings_below
+from cardbox_tracker.detectors.image_points import ImagePoints
+from cardbox_tracker.measuring.part_colors import learn_appearance
 from cardbox_tracker.person.cardbox import cardbox_patches
 from cardbox_tracker.person.kinematics import pose
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.posture import reference_posture
-from cardbox_tracker.detectors.image_points import ImagePoints
 from cardbox_tracker.search.config import PRESETS, TrackerConfig
 from cardbox_tracker.search.whole_body import WholeBodyFilter
 from cardbox_tracker.search.whole_body_config import (
@@ -25,13 +30,8 @@ from cardbox_tracker.search.whole_body_config import (
     SearchProfile,
     WholeBodyConfig,
 )
-from cardbox_tracker.measuring.part_colors import learn_appearance
 from cardbox_tracker.tracking.observation import Observation
 from cardbox_tracker.tracking.tracker import Tracker
-from cardbox_tracker.common.settings import NoEffectError, Setting, nested, settings_below
-from cardbox_tracker.applications.simulation.motions import wave
-from cardbox_tracker.camera.camera import Camera
-from cardbox_tracker.camera.rasterisation import render
 
 CAMERA = Camera(160, 120, 165.0, 165.0, 79.5, 59.5)
 BODY = BodyModel.of(distance_m=2.0)

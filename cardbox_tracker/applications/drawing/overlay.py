@@ -9,6 +9,9 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from cardbox_tracker.camera.camera import Camera
+from cardbox_tracker.camera.rasterisation import clip_near, in_front
+from cardbox_tracker.detectors.image_points import POINT_INDEX, ImagePoints
 from cardbox_tracker.person.cardbox import PATCH_NAMES, cardbox_patches, patches_at
 from cardbox_tracker.person.kinematics import (
     PosedBodies,
@@ -20,11 +23,8 @@ from cardbox_tracker.person.parts import body_parts
 from cardbox_tracker.person.posture import PLACE, POSTURE
 from cardbox_tracker.person.sizes import FloatArray
 from cardbox_tracker.person.skeleton import KeypointState
-from cardbox_tracker.detectors.image_points import POINT_INDEX, ImagePoints
 from cardbox_tracker.tracking.estimate import Estimate
 from cardbox_tracker.tracking.tracker import Tracker
-from cardbox_tracker.camera.camera import Camera
-from cardbox_tracker.camera.rasterisation import clip_near, in_front
 
 ImageArray = NDArray[np.uint8]
 

@@ -11,12 +11,12 @@ import cv2
 
 from cardbox_tracker.applications.drawing.overlay import ImageArray, draw_camera_overlay
 from cardbox_tracker.common.errors import BagError, CardboxError
-from cardbox_tracker.tracking.estimate import Estimate
-from cardbox_tracker.tracking.tracker import Tracker
 from cardbox_tracker.common.files import atomic_path
 from cardbox_tracker.recordings.recording import Recording
 from cardbox_tracker.recordings.silhouettes import RecordedFrame
 from cardbox_tracker.recordings.track import Observer
+from cardbox_tracker.tracking.estimate import Estimate
+from cardbox_tracker.tracking.tracker import Tracker
 
 # Rate of a video of a single image.
 _USUAL_HZ = 15.0

@@ -30,11 +30,11 @@ from cardbox_tracker.applications.ergonomics.rula import (
     neck_samples,
     score_distribution,
 )
+from cardbox_tracker.common.files import write_table
 from cardbox_tracker.person.sizes import FloatArray
+from cardbox_tracker.recordings.silhouettes import RecordedFrame
 from cardbox_tracker.tracking.estimate import UNCERTAIN, Estimate
 from cardbox_tracker.tracking.tracker import Tracker
-from cardbox_tracker.common.files import write_table
-from cardbox_tracker.recordings.silhouettes import RecordedFrame
 
 CSV_HEADER = (
     *("stamp_ns", "state", "score", "likeliest", f"chance_above_{ABOVE}"),

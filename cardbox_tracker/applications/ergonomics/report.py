@@ -29,9 +29,9 @@ from cardbox_tracker.applications.ergonomics.rula import (
     PARTS,
     expected,
 )
+from cardbox_tracker.common.files import atomic_path
 from cardbox_tracker.person.sizes import FloatArray
 from cardbox_tracker.tracking.estimate import UNCERTAIN
-from cardbox_tracker.common.files import atomic_path
 
 _ACTION_COLOURS = ("#d9ecd5", "#fdf1c4", "#fbd5ac", "#f2aaa0")
 _UNCERTAIN_COLOUR, _NOTHING_COLOUR, _LINE_COLOUR = "#e69f00", "#9a9a9a", "#1b4f8a"

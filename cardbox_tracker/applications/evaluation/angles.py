@@ -16,8 +16,8 @@ from collections.abc import Container
 import numpy as np
 from numpy.typing import NDArray
 
-from cardbox_tracker.person.skeleton import rotation_x, rotation_y, rotation_z
 from cardbox_tracker.applications.evaluation.session import RecordedSession
+from cardbox_tracker.person.skeleton import rotation_x, rotation_y, rotation_z
 
 FloatArray = NDArray[np.float64]
 

@@ -13,11 +13,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from cardbox_tracker.person.model import BodyModel
-from cardbox_tracker.person.parts import body_parts
-from cardbox_tracker.person.skeleton import JOINT_NAMES, KEYPOINT_NAMES
-from cardbox_tracker.tracking.estimate import TRACKING
-from cardbox_tracker.search.doubt import FAR_M, HANDS
+from cardbox_tracker.applications.evaluation.angles import joint_angles
+from cardbox_tracker.applications.evaluation.keypoint_states import KINDS, compared
 from cardbox_tracker.applications.evaluation.metrics import (
     SHOULDERS,
     acceleration_error,
@@ -25,10 +22,13 @@ from cardbox_tracker.applications.evaluation.metrics import (
     angle_errors_deg,
     beside_shoulders,
 )
-from cardbox_tracker.applications.evaluation.angles import joint_angles
-from cardbox_tracker.applications.evaluation.keypoint_states import KINDS, compared
 from cardbox_tracker.applications.evaluation.session import RecordedSession
 from cardbox_tracker.applications.evaluation.tracking import SessionRun
+from cardbox_tracker.person.model import BodyModel
+from cardbox_tracker.person.parts import body_parts
+from cardbox_tracker.person.skeleton import JOINT_NAMES, KEYPOINT_NAMES
+from cardbox_tracker.search.doubt import FAR_M, HANDS
+from cardbox_tracker.tracking.estimate import TRACKING
 
 FloatArray = NDArray[np.float64]
 

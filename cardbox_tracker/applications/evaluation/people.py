@@ -8,12 +8,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from cardbox_tracker.tracking.estimate import TRACKING
-from cardbox_tracker.applications.evaluation.metrics import SHOULDERS
 from cardbox_tracker.applications.evaluation.angles import to_reference
 from cardbox_tracker.applications.evaluation.figures import figures
+from cardbox_tracker.applications.evaluation.metrics import SHOULDERS
 from cardbox_tracker.applications.evaluation.session import RecordedSession
 from cardbox_tracker.applications.evaluation.tracking import SessionRun
+from cardbox_tracker.tracking.estimate import TRACKING
 
 FloatArray = NDArray[np.float64]
 

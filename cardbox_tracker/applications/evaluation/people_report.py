@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from cardbox_tracker.common.errors import CardboxError
 from cardbox_tracker.applications.evaluation.marks import replaced
 from cardbox_tracker.applications.evaluation.people import BEYOND_CM
 from cardbox_tracker.applications.evaluation.report import mean_of
+from cardbox_tracker.common.errors import CardboxError
 
 FloatArray = NDArray[np.float64]
 Entry = Mapping[str, Any]

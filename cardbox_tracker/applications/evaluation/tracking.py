@@ -9,22 +9,22 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from cardbox_tracker.applications.evaluation.recovery import Recovery, measure_recovery
+from cardbox_tracker.applications.evaluation.session import RecordedSession
+from cardbox_tracker.common.errors import CardboxError
+from cardbox_tracker.detectors.detector import Detector
+from cardbox_tracker.detectors.point_table import PointTable
+from cardbox_tracker.measuring.config import InitializationConfig
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.posture import N_JOINTS, POSTURE
 from cardbox_tracker.person.proportions import body_from_proportions
-from cardbox_tracker.common.errors import CardboxError
-from cardbox_tracker.search.config import TrackerConfig
-from cardbox_tracker.tracking.estimate import Estimate
-from cardbox_tracker.measuring.config import InitializationConfig
-from cardbox_tracker.tracking.observation import Observation
-from cardbox_tracker.tracking.tracker import Tracker
-from cardbox_tracker.applications.evaluation.recovery import Recovery, measure_recovery
-from cardbox_tracker.applications.evaluation.session import RecordedSession
-from cardbox_tracker.detectors.detector import Detector
 from cardbox_tracker.recordings.initialize import initialize_from_recording
-from cardbox_tracker.detectors.point_table import PointTable
 from cardbox_tracker.recordings.recording import STEREO, FrameSet, open_recording
 from cardbox_tracker.recordings.silhouettes import SilhouetteSource, TimeSpan
+from cardbox_tracker.search.config import TrackerConfig
+from cardbox_tracker.tracking.estimate import Estimate
+from cardbox_tracker.tracking.observation import Observation
+from cardbox_tracker.tracking.tracker import Tracker
 
 FloatArray = NDArray[np.float64]
 

@@ -12,10 +12,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from cardbox_tracker.person.skeleton import JOINT_NAMES, KEYPOINT_NAMES
-from cardbox_tracker.common.errors import CardboxError, cut
 from cardbox_tracker.applications.evaluation.metrics import SHOULDERS
+from cardbox_tracker.common.errors import CardboxError, cut
 from cardbox_tracker.common.files import UnreadableFileError, read_regular
+from cardbox_tracker.person.skeleton import JOINT_NAMES, KEYPOINT_NAMES
 
 FloatArray = NDArray[np.float64]
 

@@ -15,6 +15,8 @@ import numpy as np
 
 from cardbox_tracker.applications.exporting.motion import Motion
 from cardbox_tracker.applications.exporting.placed import frames_of
+from cardbox_tracker.common.errors import CardboxError
+from cardbox_tracker.common.files import atomic_path
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.parts import body_parts
 from cardbox_tracker.person.posture import (
@@ -29,8 +31,6 @@ from cardbox_tracker.person.posture import (
 )
 from cardbox_tracker.person.sizes import FloatArray
 from cardbox_tracker.person.skeleton import head_from_pivot_m, neck_pivot_m
-from cardbox_tracker.common.errors import CardboxError
-from cardbox_tracker.common.files import atomic_path
 
 _FINGERS_TO_FOREARM = 0.25
 # Length of the clavicles in shoulder breadths: so a shoulder that turns about their inner ends is

@@ -18,6 +18,7 @@ import numpy as np
 
 from cardbox_tracker.applications.exporting.markers import LABORATORY
 from cardbox_tracker.applications.exporting.motion import Motion
+from cardbox_tracker.common.files import write_table
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.posture import LEFT_ARM, PITCH, RIGHT_ARM, ROLL, TORSO_Y, YAW
 from cardbox_tracker.person.sizes import FloatArray
@@ -30,7 +31,6 @@ from cardbox_tracker.person.skeleton import (
     rotation_y,
     rotation_z,
 )
-from cardbox_tracker.common.files import write_table
 
 THORAX = ("extension", "lateral_flexion_right", "axial_rotation_left")
 """Angles of the thorax in the laboratory, order Z-X'-Y''; the names tell the positive direction."""

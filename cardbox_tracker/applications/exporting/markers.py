@@ -13,10 +13,10 @@ import numpy as np
 
 from cardbox_tracker.applications.exporting.motion import Motion
 from cardbox_tracker.applications.exporting.placed import frames_of, keypoints_in_reference
-from cardbox_tracker.person.model import BodyModel
-from cardbox_tracker.person.sizes import FloatArray
 from cardbox_tracker.common.errors import CardboxError
 from cardbox_tracker.common.files import atomic_path
+from cardbox_tracker.person.model import BodyModel
+from cardbox_tracker.person.sizes import FloatArray
 
 LABORATORY: FloatArray = np.array([(1.0, 0.0, 0.0), (0.0, 0.0, 1.0), (0.0, -1.0, 0.0)])
 """Rotation from the reference frame, or the body frame, into axes forwards, up and right."""

@@ -7,9 +7,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from cardbox_tracker.common.errors import CardboxError
 from cardbox_tracker.person.sizes import FloatArray
 from cardbox_tracker.person.skeleton import KEYPOINT_NAMES
-from cardbox_tracker.common.errors import CardboxError
 
 MISSING = "missing"
 """State of a moment at which there is no image."""

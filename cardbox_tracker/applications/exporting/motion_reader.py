@@ -10,16 +10,16 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from cardbox_tracker.applications.exporting.motion import Motion
+from cardbox_tracker.common.errors import BagError, CardboxError, quoted
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.posture import N_JOINTS, N_STATE
 from cardbox_tracker.person.sizes import FloatArray
 from cardbox_tracker.person.skeleton import JOINT_NAMES, KEYPOINT_NAMES, NECK_NAMES, PLACE_NAMES
-from cardbox_tracker.common.errors import BagError, CardboxError, quoted
-from cardbox_tracker.tracking.estimate import LOST, NO_PERSON, TRACKING, UNCERTAIN
 from cardbox_tracker.recordings.bag_reader import BagReader
 from cardbox_tracker.recordings.open_images import is_bag
 from cardbox_tracker.recordings.result_reader import Result, read_results
 from cardbox_tracker.recordings.result_table import PARQUET, POINT_COLUMNS, pyarrow_or_error
+from cardbox_tracker.tracking.estimate import LOST, NO_PERSON, TRACKING, UNCERTAIN
 
 _STATES = (*JOINT_NAMES, *PLACE_NAMES)
 _NEEDED = ("stamp_ns", "time_s", "state", *_STATES, *POINT_COLUMNS)

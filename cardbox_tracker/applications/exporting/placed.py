@@ -5,6 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from cardbox_tracker.applications.exporting.motion import Motion
+from cardbox_tracker.camera.camera import Camera
+from cardbox_tracker.common.errors import CardboxError
 from cardbox_tracker.person.kinematics import (
     PosedBodies,
     pose,
@@ -12,8 +14,6 @@ from cardbox_tracker.person.kinematics import (
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.sizes import FloatArray
 from cardbox_tracker.person.skeleton import KEYPOINT_NAMES, Group, joints_of
-from cardbox_tracker.common.errors import CardboxError
-from cardbox_tracker.camera.camera import Camera
 
 SHOULDERS = [KEYPOINT_NAMES.index(f"{side}_shoulder") for side in ("left", "right")]
 

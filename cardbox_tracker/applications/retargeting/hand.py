@@ -13,12 +13,12 @@ import numpy as np
 
 from cardbox_tracker.applications.retargeting.config import RetargetConfig
 from cardbox_tracker.applications.retargeting.robot import Robot
+from cardbox_tracker.common.errors import CardboxError
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.parts import body_parts
 from cardbox_tracker.person.posture import LEFT_ARM, RIGHT_ARM
 from cardbox_tracker.person.sizes import FloatArray
 from cardbox_tracker.person.skeleton import arm_directions, rotation_x, rotation_y, rotation_z
-from cardbox_tracker.common.errors import CardboxError
 
 _ARM_JOINTS = ("shoulder_abduction", "shoulder_flexion", "elbow_abduction", "elbow_flexion")
 _STEPS, _CLOSE_M = 12, 1e-3

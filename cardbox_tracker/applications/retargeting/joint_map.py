@@ -21,6 +21,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from cardbox_tracker.common.errors import CardboxError, quoted
+from cardbox_tracker.common.small_yaml import SmallYamlError, parse_small_yaml, read_small_text
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.posture import (
     ELBOW_ABDUCTION,
@@ -31,8 +33,6 @@ from cardbox_tracker.person.posture import (
 )
 from cardbox_tracker.person.sizes import FloatArray
 from cardbox_tracker.person.skeleton import JOINT_NAMES, NECK_NAMES
-from cardbox_tracker.common.errors import CardboxError, quoted
-from cardbox_tracker.common.small_yaml import SmallYamlError, parse_small_yaml, read_small_text
 
 WITH_NECK: tuple[str, ...] = (*JOINT_NAMES, *NECK_NAMES)
 """Order of a posture with the head, (14,)."""

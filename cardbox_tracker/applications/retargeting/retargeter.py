@@ -11,11 +11,11 @@ from cardbox_tracker.applications.retargeting.config import RetargetConfig
 from cardbox_tracker.applications.retargeting.hand import HandFollower
 from cardbox_tracker.applications.retargeting.joint_map import load_joint_map, with_neck
 from cardbox_tracker.applications.retargeting.robot import Robot, load_robot
+from cardbox_tracker.common.errors import CardboxError
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.posture import N_JOINTS
 from cardbox_tracker.person.sizes import FloatArray
 from cardbox_tracker.person.skeleton import JOINT_NAMES
-from cardbox_tracker.common.errors import CardboxError
 from cardbox_tracker.tracking.estimate import TRACKING
 
 MOVING = "moving"

@@ -10,9 +10,9 @@ from xml.etree import ElementTree as Xml
 
 import numpy as np
 
-from cardbox_tracker.person.sizes import FloatArray
 from cardbox_tracker.common.errors import CardboxError, cut, quoted
 from cardbox_tracker.common.files import UnreadableFileError, read_regular
+from cardbox_tracker.person.sizes import FloatArray
 
 _MOVABLE = ("revolute", "continuous", "prismatic")
 # Some descriptions mean no limit by 1e16; differences of larger ones would not be finite.

@@ -8,13 +8,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from cardbox_tracker.person.model import BodyModel
-from cardbox_tracker.person.posture import PLACE, POSTURE
-from cardbox_tracker.common.errors import CardboxError
-from cardbox_tracker.camera.view import OtherCamera, View
 from cardbox_tracker.camera.camera import Camera
 from cardbox_tracker.camera.extrinsics import Extrinsics
 from cardbox_tracker.camera.pairing import MOST_CAMERAS
+from cardbox_tracker.camera.view import OtherCamera, View
+from cardbox_tracker.common.errors import CardboxError
+from cardbox_tracker.person.model import BodyModel
+from cardbox_tracker.person.posture import PLACE, POSTURE
 
 FRAME_ID = "camera_optical_frame"
 

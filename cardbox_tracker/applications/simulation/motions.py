@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from cardbox_tracker.common.errors import CardboxError
 from cardbox_tracker.person.posture import (
     LEFT_ARM,
     PITCH,
@@ -21,7 +22,6 @@ from cardbox_tracker.person.posture import (
     SHOULDER_FLEXION,
     reference_posture,
 )
-from cardbox_tracker.common.errors import CardboxError
 
 FloatArray = NDArray[np.float64]
 

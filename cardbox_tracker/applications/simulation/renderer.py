@@ -9,10 +9,10 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.applications.simulation.person import person_parts
 from cardbox_tracker.camera.camera import Camera
 from cardbox_tracker.camera.rasterisation import in_front
+from cardbox_tracker.person.model import BodyModel
 
 ImageArray = NDArray[np.uint8]
 

@@ -16,12 +16,6 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from cardbox_tracker.person.model import BodyModel
-from cardbox_tracker.person.parts import body_parts
-from cardbox_tracker.person.posture import TORSO_Y, TURNS
-from cardbox_tracker.person.skeleton import JOINT_NAMES, KEYPOINT_NAMES
-from cardbox_tracker.common.errors import EncodingError
-from cardbox_tracker.recordings.bag_writer import BagWriter
 from cardbox_tracker.applications.simulation.cameras import (
     FRAME_ID,
     SyntheticCamera,
@@ -32,6 +26,12 @@ from cardbox_tracker.applications.simulation.person import person_frames, person
 from cardbox_tracker.applications.simulation.renderer import Renderer, Scene
 from cardbox_tracker.camera.camera import Camera
 from cardbox_tracker.camera.extrinsics_files import save_camchain
+from cardbox_tracker.common.errors import EncodingError
+from cardbox_tracker.person.model import BodyModel
+from cardbox_tracker.person.parts import body_parts
+from cardbox_tracker.person.posture import TORSO_Y, TURNS
+from cardbox_tracker.person.skeleton import JOINT_NAMES, KEYPOINT_NAMES
+from cardbox_tracker.recordings.bag_writer import BagWriter
 
 START_NS = 1_700_000_000_000_000_000
 TRUTH_TOPIC = "/ground_truth/joint_states"

@@ -10,7 +10,11 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from cardbox_tracker.applications.evaluation.metrics import beside_shoulders
+from cardbox_tracker.applications.evaluation.truth import TrueFrame
 from cardbox_tracker.applications.viewing.viewer import rerun
+from cardbox_tracker.camera.camera import Camera
+from cardbox_tracker.common.errors import CardboxError, cut
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.model_file import loads_body_model
 from cardbox_tracker.person.sizes import FloatArray
@@ -23,11 +27,7 @@ from cardbox_tracker.person.skeleton import (
     KeypointState,
 )
 from cardbox_tracker.person.urdf import ROOT_LINK, urdf_from_body
-from cardbox_tracker.common.errors import CardboxError, cut
-from cardbox_tracker.applications.evaluation.metrics import beside_shoulders
-from cardbox_tracker.applications.evaluation.truth import TrueFrame
 from cardbox_tracker.recordings.outputs import JointValues
-from cardbox_tracker.camera.camera import Camera
 
 Rgb = tuple[int, int, int]
 

@@ -10,15 +10,15 @@ import numpy as np
 
 from cardbox_tracker.applications.drawing.overlay import draw_camera_overlay
 from cardbox_tracker.applications.viewing.scene import Scene
-from cardbox_tracker.person.model_file import dumps_body_model
+from cardbox_tracker.camera.encodings import decode_bgr, image_parts
 from cardbox_tracker.common.errors import BagError, CardboxError
-from cardbox_tracker.tracking.estimate import Estimate
-from cardbox_tracker.tracking.tracker import Tracker
-from cardbox_tracker.recordings.outputs import joint_deviations, joint_values
+from cardbox_tracker.person.model_file import dumps_body_model
 from cardbox_tracker.recordings.bag_reader import BagMessage, BagReader, stamp_ns_of
+from cardbox_tracker.recordings.outputs import joint_deviations, joint_values
 from cardbox_tracker.recordings.result_reader import MODEL, joints_of, namespace_of, points_of
 from cardbox_tracker.recordings.silhouettes import RecordedFrame
-from cardbox_tracker.camera.encodings import decode_bgr, image_parts
+from cardbox_tracker.tracking.estimate import Estimate
+from cardbox_tracker.tracking.tracker import Tracker
 
 _ROBOT, _JOINTS, _OVERLAY = "/robot_description", "/joint_states", "/overlay"
 

@@ -12,18 +12,18 @@ import numpy as np
 
 from cardbox_tracker.applications.drawing.overlay import draw_overlay
 from cardbox_tracker.applications.drawing.video import video_file
+from cardbox_tracker.applications.evaluation.truth import tracking_error
+from cardbox_tracker.camera.camera import Camera
+from cardbox_tracker.common.files import atomic_path
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.model_file import save_body_model
 from cardbox_tracker.person.skeleton import JOINT_NAMES
+from cardbox_tracker.recordings.bag_reader import BagReader
 from cardbox_tracker.ros.demo.result import DemoResult
 from cardbox_tracker.search.config import PRESETS
+from cardbox_tracker.segmentation.silhouettes import SilhouettePipeline
 from cardbox_tracker.terms.compiled import CompiledSilhouette
 from cardbox_tracker.tracking.estimate import TRACKING, UNCERTAIN, Estimate
-from cardbox_tracker.applications.evaluation.truth import tracking_error
-from cardbox_tracker.common.files import atomic_path
-from cardbox_tracker.recordings.bag_reader import BagReader
-from cardbox_tracker.camera.camera import Camera
-from cardbox_tracker.segmentation.silhouettes import SilhouettePipeline
 
 matplotlib.use("Agg")
 

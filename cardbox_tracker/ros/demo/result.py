@@ -7,8 +7,8 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.applications.evaluation.truth import GroundTruth
+from cardbox_tracker.person.model import BodyModel
 
 
 @dataclass(frozen=True)

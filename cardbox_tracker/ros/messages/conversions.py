@@ -16,7 +16,6 @@ from numpy.typing import NDArray
 from sensor_msgs.msg import CameraInfo, CompressedImage, Image
 from std_msgs.msg import Header
 
-from cardbox_tracker.common.errors import CameraError, EncodingError, quoted
 from cardbox_tracker.camera.camera import Calibration, Camera
 from cardbox_tracker.camera.camera_checks import matrix_problem
 from cardbox_tracker.camera.encodings import (
@@ -26,6 +25,7 @@ from cardbox_tracker.camera.encodings import (
     image_parts,
 )
 from cardbox_tracker.camera.given_arrays import silhouette_from
+from cardbox_tracker.common.errors import CameraError, EncodingError, quoted
 
 ImageArray = NDArray[np.uint8]
 

@@ -12,10 +12,10 @@ from typing import Any
 from geometry_msgs.msg import Point32, Polygon, PolygonStamped
 from std_msgs.msg import Header
 
-from cardbox_tracker.person.sizes import FloatArray
+from cardbox_tracker.common.errors import CardboxError, quoted
 from cardbox_tracker.detectors.image_points import POINT_NAMES, ImagePoints
 from cardbox_tracker.detectors.landmarks import LANDMARKS
-from cardbox_tracker.common.errors import CardboxError, quoted
+from cardbox_tracker.person.sizes import FloatArray
 from cardbox_tracker.ros.messages.types import optional_class
 
 COCO_NAMES = (*POINT_NAMES[:13], "left_knee", "right_knee", "left_ankle", "right_ankle")

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
 
-from cardbox_tracker.person.sizes import SIZE_NAMES
 from cardbox_tracker.measuring.config import InitializationResult, fit_text
+from cardbox_tracker.person.sizes import SIZE_NAMES
 
 _NAME = "initialization"
 _HARDWARE_ID = "cardbox_tracker"

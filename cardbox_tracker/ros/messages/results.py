@@ -14,10 +14,15 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import ColorRGBA, Header, String
 from visualization_msgs.msg import Marker, MarkerArray
 
-from cardbox_tracker.person.sizes import FloatArray
 from cardbox_tracker.common.errors import CardboxError, NotFiniteError
-from cardbox_tracker.recordings.keypoint_status import CHANCE_KEY, LEVELS, KeypointStates, chance_text
-from cardbox_tracker.markers import MarkerShape, Rgba
+from cardbox_tracker.person.sizes import FloatArray
+from cardbox_tracker.recordings.keypoint_status import (
+    CHANCE_KEY,
+    LEVELS,
+    KeypointStates,
+    chance_text,
+)
+from cardbox_tracker.recordings.markers import MarkerShape, Rgba
 from cardbox_tracker.recordings.outputs import (
     JointValues,
     Markers,

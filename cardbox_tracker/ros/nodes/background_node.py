@@ -9,8 +9,10 @@ from typing import Any
 from sensor_msgs.msg import Image
 from std_msgs.msg import Header
 
+from cardbox_tracker.camera.camera import Calibration, Camera
 from cardbox_tracker.common.errors import BackgroundFileError, CameraError
 from cardbox_tracker.common.progress import told
+from cardbox_tracker.common.settings import settings_of
 from cardbox_tracker.ros.messages import conversions
 from cardbox_tracker.ros.nodes.camera_images import CameraImages
 from cardbox_tracker.ros.nodes.depth_cut import DepthCut
@@ -25,12 +27,10 @@ from cardbox_tracker.ros.runtime.command_line import plain_command_line
 from cardbox_tracker.ros.runtime.node import CardboxNode, run_node
 from cardbox_tracker.ros.runtime.parameter_fields import AT_START, NodeParameters, parameter, shared
 from cardbox_tracker.ros.runtime.parameters import LiveParameters
-from cardbox_tracker.common.settings import settings_of
 from cardbox_tracker.segmentation.background import warm_up
 from cardbox_tracker.segmentation.background_advice import Findings, advice
 from cardbox_tracker.segmentation.background_config import BackgroundConfig
 from cardbox_tracker.segmentation.background_file import background_path
-from cardbox_tracker.camera.camera import Calibration, Camera
 from cardbox_tracker.segmentation.depth_silhouette import WITHIN_LIMITS_M
 from cardbox_tracker.segmentation.kept_background import KeptBackground
 from cardbox_tracker.segmentation.learning import WAYS

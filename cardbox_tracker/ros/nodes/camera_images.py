@@ -8,14 +8,14 @@ from rclpy.qos import QoSProfile
 from sensor_msgs.msg import CameraInfo, CompressedImage, Image
 from std_msgs.msg import Header
 
+from cardbox_tracker.camera.calibration_watch import CalibrationWatch
+from cardbox_tracker.camera.camera import Calibration
+from cardbox_tracker.camera.stamps import StampOrder
 from cardbox_tracker.ros.messages import conversions
 from cardbox_tracker.ros.messages.conversions import ImageArray
 from cardbox_tracker.ros.runtime import qos
 from cardbox_tracker.ros.runtime.node import CardboxNode
 from cardbox_tracker.ros.runtime.publishers import SinglePublisher
-from cardbox_tracker.camera.calibration_watch import CalibrationWatch
-from cardbox_tracker.camera.camera import Calibration
-from cardbox_tracker.camera.stamps import StampOrder
 
 Deliver = Callable[[Header, ImageArray, int], None]
 """Callback that receives header, image (H, W) or (H, W, 3), bgr, and its send time, ns."""

@@ -11,9 +11,11 @@ import numpy as np
 from sensor_msgs.msg import Image
 from std_msgs.msg import Header
 
-from cardbox_tracker.common.errors import CameraError, CardboxError
+from cardbox_tracker.camera.camera import Camera
+from cardbox_tracker.camera.depth_image import DepthImage
+from cardbox_tracker.camera.pairing import TOLERANCE_NS, Arrivals
 from cardbox_tracker.camera.view import OtherCamera
-from cardbox_tracker.tracking.observation import Observation
+from cardbox_tracker.common.errors import CameraError, CardboxError
 from cardbox_tracker.ros.messages import conversions
 from cardbox_tracker.ros.messages.conversions import ImageArray
 from cardbox_tracker.ros.nodes.camera_poses import CameraPoses, silhouettes_of
@@ -24,9 +26,7 @@ from cardbox_tracker.ros.nodes.keypoint_inputs import KeypointInputs
 from cardbox_tracker.ros.nodes.tracker_parameters import TrackerParameters
 from cardbox_tracker.ros.runtime import qos
 from cardbox_tracker.ros.runtime.node import CardboxNode
-from cardbox_tracker.camera.camera import Camera
-from cardbox_tracker.camera.depth_image import DepthImage
-from cardbox_tracker.camera.pairing import TOLERANCE_NS, Arrivals
+from cardbox_tracker.tracking.observation import Observation
 
 _SILENT_S = 3.0
 # Of one clock, images from different computers or of depth may arrive this much later.

@@ -14,13 +14,6 @@ import numpy as np
 from sensor_msgs.msg import CameraInfo, Image
 from std_msgs.msg import Header
 
-from cardbox_tracker.common.files import user_path
-from cardbox_tracker.ros.messages import conversions
-from cardbox_tracker.ros.runtime import qos
-from cardbox_tracker.ros.runtime.command_line import node_help
-from cardbox_tracker.ros.runtime.node import CardboxNode, own_arguments, run_node
-from cardbox_tracker.ros.runtime.parameter_fields import AT_START, NodeParameters, parameter
-from cardbox_tracker.ros.runtime.parameters import LiveParameters
 from cardbox_tracker.camera.calibration_file import load_calibration
 from cardbox_tracker.camera.camera import Calibration
 from cardbox_tracker.camera.camera_device import (
@@ -29,6 +22,13 @@ from cardbox_tracker.camera.camera_device import (
     open_device,
     open_video,
 )
+from cardbox_tracker.common.files import user_path
+from cardbox_tracker.ros.messages import conversions
+from cardbox_tracker.ros.runtime import qos
+from cardbox_tracker.ros.runtime.command_line import node_help
+from cardbox_tracker.ros.runtime.node import CardboxNode, own_arguments, run_node
+from cardbox_tracker.ros.runtime.parameter_fields import AT_START, NodeParameters, parameter
+from cardbox_tracker.ros.runtime.parameters import LiveParameters
 
 _RETRY_S = 1.0
 _SETTLE_S = 0.5

@@ -11,13 +11,6 @@ from typing import Any
 
 from sensor_msgs.msg import CameraInfo
 
-from cardbox_tracker.common.errors import CameraError
-from cardbox_tracker.camera.view import OtherCamera
-from cardbox_tracker.common.files import user_path
-from cardbox_tracker.ros.messages import conversions
-from cardbox_tracker.ros.messages.types import optional_class
-from cardbox_tracker.ros.runtime import qos
-from cardbox_tracker.ros.runtime.node import CardboxNode
 from cardbox_tracker.camera.camera import Camera
 from cardbox_tracker.camera.extrinsics import Extrinsics
 from cardbox_tracker.camera.extrinsics_files import load_extrinsics
@@ -26,6 +19,13 @@ from cardbox_tracker.camera.extrinsics_sources import (
     extrinsics_between,
     transforms_of,
 )
+from cardbox_tracker.camera.view import OtherCamera
+from cardbox_tracker.common.errors import CameraError
+from cardbox_tracker.common.files import user_path
+from cardbox_tracker.ros.messages import conversions
+from cardbox_tracker.ros.messages.types import optional_class
+from cardbox_tracker.ros.runtime import qos
+from cardbox_tracker.ros.runtime.node import CardboxNode
 
 _STATIC_TOPIC = "/tf_static"
 # A robot has a few hundred frames; the limit protects the memory.

@@ -7,14 +7,14 @@ from typing import Any, NamedTuple
 
 from std_msgs.msg import Header
 
+from cardbox_tracker.camera.camera import Camera
+from cardbox_tracker.camera.pairing import TOLERANCE_NS, Arrivals
 from cardbox_tracker.common.errors import EncodingError
 from cardbox_tracker.ros.messages import conversions
 from cardbox_tracker.ros.messages.conversions import ImageArray
 from cardbox_tracker.ros.nodes.depth_input import DepthInput
 from cardbox_tracker.ros.runtime.node import CardboxNode
-from cardbox_tracker.camera.camera import Camera
 from cardbox_tracker.segmentation.depth_silhouette import silhouette_within
-from cardbox_tracker.camera.pairing import TOLERANCE_NS, Arrivals
 
 
 class Taken(NamedTuple):

@@ -7,9 +7,6 @@ from typing import Any
 
 from sensor_msgs.msg import CameraInfo, CompressedImage, Image
 
-from cardbox_tracker.ros.messages import conversions
-from cardbox_tracker.ros.runtime import qos
-from cardbox_tracker.ros.runtime.node import CardboxNode
 from cardbox_tracker.camera.camera import Camera
 from cardbox_tracker.camera.depth_image import (
     DepthImage,
@@ -17,6 +14,9 @@ from cardbox_tracker.camera.depth_image import (
     at_size,
     depth_from_image,
 )
+from cardbox_tracker.ros.messages import conversions
+from cardbox_tracker.ros.runtime import qos
+from cardbox_tracker.ros.runtime.node import CardboxNode
 
 _PACKED = "/compressedDepth"
 

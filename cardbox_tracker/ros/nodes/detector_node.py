@@ -12,9 +12,12 @@ import numpy as np
 from geometry_msgs.msg import PolygonStamped
 from std_msgs.msg import Header
 
+from cardbox_tracker.camera.camera import Calibration
+from cardbox_tracker.camera.stamps import WINDOW, StampOrder
+from cardbox_tracker.camera.unrectify import unrectified
+from cardbox_tracker.detectors.detector import Detector, PersonDetector
 from cardbox_tracker.detectors.landmarks import LANDMARKS
 from cardbox_tracker.detectors.pose_network import Detection
-from cardbox_tracker.detectors.detector import Detector, PersonDetector
 from cardbox_tracker.ros.messages.conversions import ImageArray, stamp_ns
 from cardbox_tracker.ros.messages.keypoints import (
     keypoints_message,
@@ -33,10 +36,7 @@ from cardbox_tracker.ros.runtime.node import CardboxNode, run_node
 from cardbox_tracker.ros.runtime.parameter_fields import AT_START, NodeParameters, parameter
 from cardbox_tracker.ros.runtime.parameters import LiveParameters
 from cardbox_tracker.ros.runtime.publishers import SinglePublisher
-from cardbox_tracker.camera.camera import Calibration
 from cardbox_tracker.segmentation.silhouettes import SilhouettePipeline
-from cardbox_tracker.camera.stamps import WINDOW, StampOrder
-from cardbox_tracker.camera.unrectify import unrectified
 
 _DOES = "Find the person in a camera's images: images in, 2D points and silhouettes out."
 

@@ -13,6 +13,8 @@ from typing import Any
 
 from sensor_msgs.msg import Image
 
+from cardbox_tracker.camera.camera import Camera
+from cardbox_tracker.camera.depth_image import DepthImage, median_depth
 from cardbox_tracker.common.errors import InitializationError
 from cardbox_tracker.measuring.config import (
     InitializationConfig,
@@ -41,8 +43,6 @@ from cardbox_tracker.ros.nodes.reference_capture import (
 from cardbox_tracker.ros.runtime import qos
 from cardbox_tracker.ros.runtime.node import CardboxNode
 from cardbox_tracker.ros.runtime.recent import RecentImages
-from cardbox_tracker.camera.camera import Camera
-from cardbox_tracker.camera.depth_image import DepthImage, median_depth
 
 Progress = Callable[[float], None]
 """Callback that receives the finished fraction of a measurement."""

@@ -17,11 +17,9 @@ from std_msgs.msg import Bool, String
 from std_srvs.srv import Trigger
 
 from cardbox_tracker.applications.drawing.guidance import Guide
-from cardbox_tracker.person.model import BodyModel
-from cardbox_tracker.person.model_file import dumps_body_model
-from cardbox_tracker.person.posture import REFERENCE_NAMES
-from cardbox_tracker.person.urdf import urdf_from_body
+from cardbox_tracker.camera.camera import Camera
 from cardbox_tracker.common.errors import CardboxError, InitializationError
+from cardbox_tracker.common.progress import told
 from cardbox_tracker.measuring.cancellation import Cancellation
 from cardbox_tracker.measuring.guidance import (
     ASK,
@@ -31,7 +29,10 @@ from cardbox_tracker.measuring.guidance import (
     spoken,
 )
 from cardbox_tracker.measuring.saved_model import SavedModel
-from cardbox_tracker.common.progress import told
+from cardbox_tracker.person.model import BodyModel
+from cardbox_tracker.person.model_file import dumps_body_model
+from cardbox_tracker.person.posture import REFERENCE_NAMES
+from cardbox_tracker.person.urdf import urdf_from_body
 from cardbox_tracker.ros.messages import conversions
 from cardbox_tracker.ros.messages.measurement import (
     answer_text,
@@ -46,7 +47,6 @@ from cardbox_tracker.ros.runtime import qos
 from cardbox_tracker.ros.runtime.command_line import plain_command_line
 from cardbox_tracker.ros.runtime.node import CardboxNode, run_node
 from cardbox_tracker.ros.runtime.parameters import LiveParameters
-from cardbox_tracker.camera.camera import Camera
 
 _DOES = "Measure a person from the silhouettes of three reference postures."
 # Longest waits for a silhouette that a node advertises, and for a node that does.

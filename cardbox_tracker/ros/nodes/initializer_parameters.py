@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
+from cardbox_tracker.camera.pairing import camera_names
 from cardbox_tracker.measuring.config import (
     MAX_PITCH_RAD,
     InitializationConfig,
@@ -15,7 +16,6 @@ from cardbox_tracker.ros.nodes.shared_parameters import (
     extrinsics_parameter,
 )
 from cardbox_tracker.ros.runtime.parameter_fields import AT_START, NodeParameters, parameter, shared
-from cardbox_tracker.camera.pairing import camera_names
 
 _MAX_PITCH_DEG = round(math.degrees(MAX_PITCH_RAD), 6)
 _NEXT_GUIDANCE, _NEXT_CAPTURE = "next guidance", "next capture"

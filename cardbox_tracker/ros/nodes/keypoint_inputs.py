@@ -8,17 +8,17 @@ import numpy as np
 from sensor_msgs.msg import CameraInfo
 from std_msgs.msg import Header
 
+from cardbox_tracker.camera.calibration_watch import CalibrationWatch
+from cardbox_tracker.camera.camera import Calibration, Camera
+from cardbox_tracker.common.files import user_path
 from cardbox_tracker.detectors.image_points import ImagePoints
 from cardbox_tracker.detectors.person_choice import person_in
-from cardbox_tracker.common.files import user_path
 from cardbox_tracker.detectors.point_table import PointTable
 from cardbox_tracker.ros.messages.conversions import ImageArray, stamp_ns
 from cardbox_tracker.ros.nodes.keypoint_topic import KeypointTopic, Taken
 from cardbox_tracker.ros.nodes.tracker_parameters import TrackerParameters
 from cardbox_tracker.ros.runtime import qos
 from cardbox_tracker.ros.runtime.node import CardboxNode
-from cardbox_tracker.camera.calibration_watch import CalibrationWatch
-from cardbox_tracker.camera.camera import Calibration, Camera
 
 _PATIENCE_S = 3.0
 # With this calibration a table's points stay where they are.

@@ -10,15 +10,15 @@ from rclpy.clock import Clock
 from rclpy.clock_type import ClockType
 from rclpy.subscription import Subscription
 
-from cardbox_tracker.detectors.image_points import ImagePoints
+from cardbox_tracker.camera.stamps import StampOrder
 from cardbox_tracker.common.errors import CardboxError, cut, quoted
+from cardbox_tracker.detectors.image_points import ImagePoints
 from cardbox_tracker.ros.messages.conversions import stamp_ns
 from cardbox_tracker.ros.messages.keypoints import CONVERSIONS, POLYGON_STAMPED, Size
 from cardbox_tracker.ros.messages.types import optional_class
 from cardbox_tracker.ros.nodes.input_stream import InputStream
 from cardbox_tracker.ros.runtime import qos
 from cardbox_tracker.ros.runtime.node import CardboxNode
-from cardbox_tracker.camera.stamps import StampOrder
 
 MOST_AGE_NS = 300_000_000
 """Points that are older than the silhouette by more are not used."""

@@ -6,7 +6,7 @@ import time
 
 from sensor_msgs.msg import Image
 
-from cardbox_tracker.person.posture import REFERENCE_NAMES
+from cardbox_tracker.camera.camera import Camera
 from cardbox_tracker.common.errors import InitializationError
 from cardbox_tracker.measuring.asked_outline import check_asked
 from cardbox_tracker.measuring.config import InitializationConfig
@@ -15,6 +15,7 @@ from cardbox_tracker.measuring.references import (
     average_silhouette,
     check_reference,
 )
+from cardbox_tracker.person.posture import REFERENCE_NAMES
 from cardbox_tracker.ros.messages.conversions import (
     ImageArray,
     image_of,
@@ -22,7 +23,6 @@ from cardbox_tracker.ros.messages.conversions import (
     stamp_ns,
 )
 from cardbox_tracker.ros.runtime.recent import RecentImages
-from cardbox_tracker.camera.camera import Camera
 
 KEPT = 30
 """Number of silhouettes to keep, the maximum of the parameter capture_frames."""

@@ -13,14 +13,14 @@ from std_msgs.msg import Header, String
 
 from cardbox_tracker.person.rep155 import Rep155Joints, head_joints, joint_names
 from cardbox_tracker.person.urdf import rep155_urdf
-from cardbox_tracker.tracking.estimate import Estimate
-from cardbox_tracker.tracking.tracker import Tracker
 from cardbox_tracker.recordings.outputs import JointValues, clavicles_of, neck_of, place_of
 from cardbox_tracker.ros.messages import results
 from cardbox_tracker.ros.messages.types import optional_class
 from cardbox_tracker.ros.nodes.tracker_parameters import TrackerParameters
 from cardbox_tracker.ros.runtime import qos
 from cardbox_tracker.ros.runtime.node import CardboxNode
+from cardbox_tracker.tracking.estimate import Estimate
+from cardbox_tracker.tracking.tracker import Tracker
 
 
 class Rep155Outputs:

@@ -15,11 +15,11 @@ from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
 from cardbox_tracker.applications.retargeting.config import RetargetConfig
 from cardbox_tracker.applications.retargeting.retargeter import MOVING, Command, make_retargeter
+from cardbox_tracker.common.errors import CardboxError
+from cardbox_tracker.common.files import user_path
+from cardbox_tracker.common.settings import settings_of
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.model_file import loads_body_model
-from cardbox_tracker.common.errors import CardboxError
-from cardbox_tracker.tracking.estimate import TRACKING
-from cardbox_tracker.common.files import user_path
 from cardbox_tracker.ros.messages import conversions
 from cardbox_tracker.ros.messages.results import posture_and_neck_of
 from cardbox_tracker.ros.runtime import qos
@@ -27,7 +27,7 @@ from cardbox_tracker.ros.runtime.command_line import plain_command_line
 from cardbox_tracker.ros.runtime.node import CardboxNode, run_node
 from cardbox_tracker.ros.runtime.parameter_fields import AT_START, NodeParameters, parameter, shared
 from cardbox_tracker.ros.runtime.parameters import LiveParameters
-from cardbox_tracker.common.settings import settings_of
+from cardbox_tracker.tracking.estimate import TRACKING
 
 _DOES = "Move a robot arm as the tracked person moves theirs, within its limits."
 _CHECK_S = 0.1

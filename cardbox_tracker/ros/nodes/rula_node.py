@@ -23,9 +23,9 @@ from cardbox_tracker.applications.ergonomics.rula import (
     part_values,
     score_distribution,
 )
+from cardbox_tracker.common.settings import settings_of
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.model_file import loads_body_model
-from cardbox_tracker.tracking.sampling import normal_postures
 from cardbox_tracker.ros.messages import conversions
 from cardbox_tracker.ros.messages.results import neck_of, posture_of
 from cardbox_tracker.ros.runtime import qos
@@ -33,7 +33,7 @@ from cardbox_tracker.ros.runtime.command_line import plain_command_line
 from cardbox_tracker.ros.runtime.node import CardboxNode, run_node
 from cardbox_tracker.ros.runtime.parameter_fields import AT_START, NodeParameters, parameter, shared
 from cardbox_tracker.ros.runtime.parameters import LiveParameters
-from cardbox_tracker.common.settings import settings_of
+from cardbox_tracker.tracking.sampling import normal_postures
 
 _DOES = "Score the strain on arms, neck and trunk (RULA) while the tracker follows a person."
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
-from cardbox_tracker.ros.runtime.parameter_fields import AT_START, parameter
 from cardbox_tracker.camera.encodings import MOST_PIXELS
+from cardbox_tracker.ros.runtime.parameter_fields import AT_START, parameter
 
 
 def cameras_parameter() -> Any:

@@ -10,6 +10,11 @@ from typing import Any, NamedTuple
 import numpy as np
 from sensor_msgs.msg import CameraInfo, CompressedImage, Image
 
+from cardbox_tracker.camera.camera import Calibration, Camera, Rectifier
+from cardbox_tracker.camera.camera_info import calibration_from_info
+from cardbox_tracker.camera.extrinsics_sources import of_rectified_pair
+from cardbox_tracker.camera.resize import to_working_size
+from cardbox_tracker.camera.stereo import NEAREST_M, StereoDepth, stereo_of_pair
 from cardbox_tracker.common.errors import CameraError
 from cardbox_tracker.ros.messages import conversions
 from cardbox_tracker.ros.nodes.shared_parameters import (
@@ -22,11 +27,6 @@ from cardbox_tracker.ros.runtime.node import CardboxNode, run_node
 from cardbox_tracker.ros.runtime.parameter_fields import AT_START, NodeParameters, parameter
 from cardbox_tracker.ros.runtime.parameters import LiveParameters
 from cardbox_tracker.ros.runtime.recent import RecentImages
-from cardbox_tracker.camera.camera import Calibration, Camera, Rectifier
-from cardbox_tracker.camera.camera_info import calibration_from_info
-from cardbox_tracker.camera.extrinsics_sources import of_rectified_pair
-from cardbox_tracker.camera.resize import to_working_size
-from cardbox_tracker.camera.stereo import NEAREST_M, StereoDepth, stereo_of_pair
 
 _DOES = "Measure depth in a rectified pair of cameras, by semi-global matching."
 # Largest number of images of one side that wait for the other side.

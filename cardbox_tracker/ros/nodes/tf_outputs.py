@@ -10,15 +10,15 @@ from typing import Any
 from geometry_msgs.msg import Quaternion, Transform, TransformStamped, Vector3
 from std_msgs.msg import Header
 
-from cardbox_tracker.person.urdf import LinkTransform, LinkTransforms, urdf_from_body
 from cardbox_tracker.common.errors import CardboxError
-from cardbox_tracker.tracking.estimate import Estimate
-from cardbox_tracker.tracking.tracker import Tracker
+from cardbox_tracker.person.urdf import LinkTransform, LinkTransforms, urdf_from_body
 from cardbox_tracker.recordings.outputs import joint_values, positions_of
 from cardbox_tracker.ros.messages.types import optional_class
 from cardbox_tracker.ros.nodes.tracker_parameters import TrackerParameters
 from cardbox_tracker.ros.runtime import qos
 from cardbox_tracker.ros.runtime.node import CardboxNode
+from cardbox_tracker.tracking.estimate import Estimate
+from cardbox_tracker.tracking.tracker import Tracker
 
 
 class TfOutputs:

@@ -9,27 +9,27 @@ from typing import Any
 import numpy as np
 from std_msgs.msg import String
 
-from cardbox_tracker.person.model import BodyModel
-from cardbox_tracker.person.model_file import load_body_model, loads_body_model
-from cardbox_tracker.common.errors import CameraError
-from cardbox_tracker.tracking.agreement_watch import AgreementWatch
+from cardbox_tracker.camera.camera import Camera
+from cardbox_tracker.camera.stamps import StampOrder
 from cardbox_tracker.camera.view import OtherCamera
-from cardbox_tracker.tracking.precompile import compile_all
-from cardbox_tracker.tracking.tracker import Tracker
+from cardbox_tracker.common.errors import CameraError
 from cardbox_tracker.common.files import user_path
 from cardbox_tracker.common.progress import told
+from cardbox_tracker.common.settings import restarts
+from cardbox_tracker.person.model import BodyModel
+from cardbox_tracker.person.model_file import load_body_model, loads_body_model
 from cardbox_tracker.ros.messages import conversions
 from cardbox_tracker.ros.nodes.camera_inputs import CameraInputs, Received
 from cardbox_tracker.ros.nodes.tracker_outputs import TrackerOutputs
 from cardbox_tracker.ros.nodes.tracker_parameters import TrackerParameters
+from cardbox_tracker.ros.nodes.tracking_report import TrackingReport
 from cardbox_tracker.ros.runtime import qos
 from cardbox_tracker.ros.runtime.command_line import plain_command_line
 from cardbox_tracker.ros.runtime.node import CardboxNode, run_node
 from cardbox_tracker.ros.runtime.parameters import LiveParameters
-from cardbox_tracker.common.settings import restarts
-from cardbox_tracker.ros.nodes.tracking_report import TrackingReport
-from cardbox_tracker.camera.camera import Camera
-from cardbox_tracker.camera.stamps import StampOrder
+from cardbox_tracker.tracking.agreement_watch import AgreementWatch
+from cardbox_tracker.tracking.precompile import compile_all
+from cardbox_tracker.tracking.tracker import Tracker
 
 _DOES = "Follow the measured person: silhouettes in, joint states out."
 _PREPARING = "preparing (the very first start compiles for one to two minutes)"

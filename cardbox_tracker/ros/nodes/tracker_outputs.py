@@ -8,8 +8,6 @@ from sensor_msgs.msg import Image
 from std_msgs.msg import Bool
 
 from cardbox_tracker.applications.drawing.overlay import draw_camera_overlay, draw_message
-from cardbox_tracker.tracking.estimate import Estimate
-from cardbox_tracker.tracking.tracker import Tracker
 from cardbox_tracker.recordings.outputs import Output, OutputStream, outputs
 from cardbox_tracker.ros.messages import conversions, results
 from cardbox_tracker.ros.nodes.camera_inputs import ObservationSet
@@ -18,6 +16,8 @@ from cardbox_tracker.ros.nodes.tf_outputs import TfOutputs
 from cardbox_tracker.ros.nodes.tracker_parameters import TrackerParameters
 from cardbox_tracker.ros.runtime import qos
 from cardbox_tracker.ros.runtime.node import CardboxNode
+from cardbox_tracker.tracking.estimate import Estimate
+from cardbox_tracker.tracking.tracker import Tracker
 
 
 class TrackerOutputs:

@@ -7,10 +7,8 @@ from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Any
 
-from cardbox_tracker.search.config import PRESETS, FilterConfig, TrackerConfig
-from cardbox_tracker.search.resampling import STRATEGIES
-from cardbox_tracker.search.whole_body_config import WholeBodyConfig
-from cardbox_tracker.search.settings_file import read_settings
+from cardbox_tracker.camera.pairing import camera_names
+from cardbox_tracker.common.settings import NoEffectError, nested, settings_of
 from cardbox_tracker.ros.nodes.shared_parameters import (
     cameras_parameter,
     depth_parameter,
@@ -24,8 +22,10 @@ from cardbox_tracker.ros.runtime.parameter_fields import (
     parameter,
     shared,
 )
-from cardbox_tracker.common.settings import NoEffectError, nested, settings_of
-from cardbox_tracker.camera.pairing import camera_names
+from cardbox_tracker.search.config import PRESETS, FilterConfig, TrackerConfig
+from cardbox_tracker.search.resampling import STRATEGIES
+from cardbox_tracker.search.settings_file import read_settings
+from cardbox_tracker.search.whole_body_config import WholeBodyConfig
 
 _NEXT_START = "next start of tracking"
 

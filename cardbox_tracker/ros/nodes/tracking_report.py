@@ -7,8 +7,8 @@ from collections.abc import Mapping
 
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.skeleton import PLACE_NAMES
-from cardbox_tracker.tracking.estimate import LOST, NO_PERSON, UNCERTAIN, Estimate
 from cardbox_tracker.recordings.outputs import METRICS, place_of
+from cardbox_tracker.tracking.estimate import LOST, NO_PERSON, UNCERTAIN, Estimate
 
 _REASONS = {
     NO_PERSON: "nobody is in the image",

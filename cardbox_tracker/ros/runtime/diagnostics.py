@@ -18,9 +18,9 @@ from rclpy.clock_type import ClockType
 from rclpy.node import Node
 from rclpy.qos import QoSProfile
 
+from cardbox_tracker.camera.stamps import WINDOW, StreamStatistics
 from cardbox_tracker.ros.runtime import qos
 from cardbox_tracker.ros.runtime.log_limit import LogLimit
-from cardbox_tracker.camera.stamps import WINDOW, StreamStatistics
 
 PERIOD_S = 1.0
 # The input has ceased after this time and this number of periods without a message.

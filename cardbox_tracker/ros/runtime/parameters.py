@@ -17,8 +17,8 @@ from rclpy.node import Node
 from rclpy.parameter import Parameter
 
 from cardbox_tracker.common.errors import CardboxError, cut
-from cardbox_tracker.ros.runtime.parameter_fields import NodeParameters, descriptor
 from cardbox_tracker.common.settings import check, suggestion
+from cardbox_tracker.ros.runtime.parameter_fields import NodeParameters, descriptor
 
 T = TypeVar("T", bound=NodeParameters)
 

@@ -13,9 +13,7 @@ from cardbox_tracker.applications.drawing.guidance import (
     draw_guidance,
 )
 from cardbox_tracker.applications.drawing.overlay import TEXT_BGR
-from cardbox_tracker.person.kinematics import pose
-from cardbox_tracker.person.model import BodyModel
-from cardbox_tracker.person.posture import REFERENCE_NAMES, reference_posture
+from cardbox_tracker.camera.camera import Camera
 from cardbox_tracker.measuring.config import InitializationConfig
 from cardbox_tracker.measuring.guidance import (
     HOLD_STILL,
@@ -23,7 +21,9 @@ from cardbox_tracker.measuring.guidance import (
     measuring,
     short_words,
 )
-from cardbox_tracker.camera.camera import Camera
+from cardbox_tracker.person.kinematics import pose
+from cardbox_tracker.person.model import BodyModel
+from cardbox_tracker.person.posture import REFERENCE_NAMES, reference_posture
 
 BODY = BodyModel()
 CAMERA = Camera(320, 240, 330.0, 330.0, 159.5, 119.5)

@@ -19,19 +19,19 @@ from cardbox_tracker.applications.drawing.overlay import (
     draw_overlay,
     with_hidden_head,
 )
+from cardbox_tracker.camera.camera import Camera
+from cardbox_tracker.detectors.image_points import POINT_NAMES, ImagePoints
 from cardbox_tracker.person.cardbox import PATCH_NAMES, cardbox_patches
 from cardbox_tracker.person.kinematics import pose
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.posture import reference_posture
 from cardbox_tracker.person.proportions import body_from_proportions
 from cardbox_tracker.person.skeleton import KeypointState
-from cardbox_tracker.detectors.image_points import POINT_NAMES, ImagePoints
+from cardbox_tracker.recordings.markers import marker_shapes
 from cardbox_tracker.terms.whole_body import WholeBodyCost
 from cardbox_tracker.terms.whole_body_config import WholeBodyCostConfig
 from cardbox_tracker.tracking.estimate import NO_PERSON, TRACKING, Estimate
 from cardbox_tracker.tracking.tracker import Tracker
-from cardbox_tracker.markers import marker_shapes
-from cardbox_tracker.camera.camera import Camera
 
 BODY = BodyModel()
 CAMERA = Camera(320, 240, 250.0, 250.0, 159.5, 119.5)

@@ -35,10 +35,10 @@ from cardbox_tracker.applications.ergonomics.report import (
     write_page,
 )
 from cardbox_tracker.applications.ergonomics.rula import PARTS, ScoreDistribution
-from cardbox_tracker.person.proportions import body_from_proportions
-from cardbox_tracker.tracking.estimate import NO_PERSON, TRACKING, UNCERTAIN, Estimate
-from cardbox_tracker.recordings.silhouettes import RecordedFrame
 from cardbox_tracker.camera.camera import Camera
+from cardbox_tracker.person.proportions import body_from_proportions
+from cardbox_tracker.recordings.silhouettes import RecordedFrame
+from cardbox_tracker.tracking.estimate import NO_PERSON, TRACKING, UNCERTAIN, Estimate
 
 JPEG = b"\xff\xd8 an image \xff\xd9"
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from cardbox_tracker.common.errors import CardboxError
 from cardbox_tracker.applications.evaluation.marks import replaced
+from cardbox_tracker.common.errors import CardboxError
 
 BEGIN, END = "<!-- begin -->", "<!-- end -->"
 

@@ -10,10 +10,10 @@ import numpy as np
 import pytest
 
 from cardbox_tracker.applications.exporting.motion import Motion
+from cardbox_tracker.camera.camera import Camera
 from cardbox_tracker.person.kinematics import pose
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.skeleton import rotation_x, rotation_y, rotation_z
-from cardbox_tracker.camera.camera import Camera
 
 STEP_NS = 100_000_000
 TURNS: dict[str, Callable[..., np.ndarray]] = {"X": rotation_x, "Y": rotation_y, "Z": rotation_z}

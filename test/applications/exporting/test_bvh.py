@@ -14,9 +14,9 @@ from hypothesis.extra.numpy import arrays
 
 from cardbox_tracker.applications.exporting.bvh import write_bvh
 from cardbox_tracker.applications.exporting.markers import markers_of
+from cardbox_tracker.common.errors import CardboxError
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.posture import state_limits
-from cardbox_tracker.common.errors import CardboxError
 
 LIMBS = ("Arm", "ForeArm", "Hand")
 JOINTS = [f"{side}{limb}" for side in ("Left", "Right") for limb in LIMBS]

@@ -12,8 +12,8 @@ import pytest
 
 from cardbox_tracker.applications.exporting.markers import markers_of, write_c3d, write_trc
 from cardbox_tracker.applications.exporting.placed import images_of_body
-from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.common.errors import CardboxError
+from cardbox_tracker.person.model import BodyModel
 
 GAP = np.full(14, np.nan)
 NAMES = ["LShoulder", "LElbow", "LHand", "RShoulder", "RElbow", "RHand", "Hip", "Neck"]

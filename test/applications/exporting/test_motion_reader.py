@@ -13,15 +13,15 @@ import pytest
 from cardbox_tracker.applications.exporting import motion_reader
 from cardbox_tracker.applications.exporting.motion import Motion
 from cardbox_tracker.applications.exporting.motion_reader import read_motion
+from cardbox_tracker.camera.camera import Camera
+from cardbox_tracker.common.errors import CardboxError
 from cardbox_tracker.person.kinematics import pose
 from cardbox_tracker.person.model import BodyModel
-from cardbox_tracker.common.errors import CardboxError
-from cardbox_tracker.tracking.estimate import Estimate
-from cardbox_tracker.tracking.tracker import Tracker
 from cardbox_tracker.recordings.result_bag import result_bag
 from cardbox_tracker.recordings.result_table import columns, result_table
 from cardbox_tracker.recordings.silhouettes import RecordedFrame
-from cardbox_tracker.camera.camera import Camera
+from cardbox_tracker.tracking.estimate import Estimate
+from cardbox_tracker.tracking.tracker import Tracker
 
 BODY = BodyModel.of(hip_height_m=-0.51)
 CAMERA = Camera(64, 48, 66.0, 66.0, 31.5, 23.5)

@@ -14,6 +14,7 @@ from cardbox_tracker.applications.retargeting.config import RetargetConfig
 from cardbox_tracker.applications.retargeting.joint_map import angles_of, load_joint_map, with_neck
 from cardbox_tracker.applications.retargeting.retargeter import Retargeter
 from cardbox_tracker.applications.retargeting.robot import load_robot, parse_robot
+from cardbox_tracker.common.errors import CardboxError
 from cardbox_tracker.person.posture import RIGHT_ARM
 from cardbox_tracker.person.proportions import body_from_proportions
 from cardbox_tracker.person.skeleton import (
@@ -23,7 +24,6 @@ from cardbox_tracker.person.skeleton import (
     rotation_y,
     rotation_z,
 )
-from cardbox_tracker.common.errors import CardboxError
 
 CONFIG = Path(__file__).parents[3] / "config"
 ROBOT = load_robot(CONFIG / "example_arm.urdf")

@@ -7,10 +7,6 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from cardbox_tracker.person.kinematics import pose
-from cardbox_tracker.person.model import BodyModel
-from cardbox_tracker.person.posture import N_JOINTS, reference_posture
-from cardbox_tracker.measuring.shoulders import GIRDLE_RISE
 from cardbox_tracker.applications.simulation.person import (
     FINGER_REACH,
     girdle_lift_m,
@@ -18,6 +14,10 @@ from cardbox_tracker.applications.simulation.person import (
     person_keypoints_m,
     person_parts,
 )
+from cardbox_tracker.measuring.shoulders import GIRDLE_RISE
+from cardbox_tracker.person.kinematics import pose
+from cardbox_tracker.person.model import BodyModel
+from cardbox_tracker.person.posture import N_JOINTS, reference_posture
 
 BODY = BodyModel.of(hip_height_m=-0.51)
 BREADTH_M = BODY.size("shoulder_breadth")

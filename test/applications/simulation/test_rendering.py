@@ -9,10 +9,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from cardbox_tracker.person.cardbox import cardbox_patches
-from cardbox_tracker.person.kinematics import pose
-from cardbox_tracker.person.model import BodyModel
-from cardbox_tracker.person.posture import reference_posture
 from cardbox_tracker.applications.simulation.person import (
     SHIRT,
     SKIN,
@@ -23,6 +19,10 @@ from cardbox_tracker.applications.simulation.person import (
 from cardbox_tracker.applications.simulation.renderer import Renderer, Scene
 from cardbox_tracker.applications.simulation.session import session_camera
 from cardbox_tracker.camera.camera import Camera
+from cardbox_tracker.person.cardbox import cardbox_patches
+from cardbox_tracker.person.kinematics import pose
+from cardbox_tracker.person.model import BodyModel
+from cardbox_tracker.person.posture import reference_posture
 
 BODY = BodyModel.of(hip_height_m=-0.51)
 CAMERA = session_camera()

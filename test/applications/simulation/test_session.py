@@ -10,10 +10,6 @@ import cv2
 import numpy as np
 import pytest
 
-from cardbox_tracker.person.model import BodyModel
-from cardbox_tracker.person.skeleton import JOINT_NAMES
-from cardbox_tracker.common.errors import CardboxError
-from cardbox_tracker.recordings.bag_reader import BagReader
 from cardbox_tracker.applications.simulation.person import person_frames
 from cardbox_tracker.applications.simulation.session import (
     START_NS,
@@ -22,6 +18,10 @@ from cardbox_tracker.applications.simulation.session import (
     synthesize_session,
 )
 from cardbox_tracker.camera.extrinsics_files import load_extrinsics
+from cardbox_tracker.common.errors import CardboxError
+from cardbox_tracker.person.model import BodyModel
+from cardbox_tracker.person.skeleton import JOINT_NAMES
+from cardbox_tracker.recordings.bag_reader import BagReader
 
 SMALL = SessionFormat(2.0, 160, 120)
 

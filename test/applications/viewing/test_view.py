@@ -17,23 +17,23 @@ import numpy as np
 import pytest
 
 from cardbox_tracker.applications.drawing.overlay import draw_sharp_overlay
+from cardbox_tracker.applications.simulation.motions import wave
+from cardbox_tracker.applications.simulation.session import SessionFormat, synthesize_session
 from cardbox_tracker.applications.viewing.sources import show_together
 from cardbox_tracker.applications.viewing.viewer import THIS_COMPUTER, web_page
+from cardbox_tracker.camera.camera import Camera
+from cardbox_tracker.commands.main import main
 from cardbox_tracker.person.kinematics import pose
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.model_file import save_body_model
 from cardbox_tracker.person.posture import reference_posture
 from cardbox_tracker.person.urdf import urdf_from_body
-from cardbox_tracker.commands.main import main
-from cardbox_tracker.tracking.estimate import LOST, TRACKING, Estimate
-from cardbox_tracker.tracking.tracker import Tracker
 from cardbox_tracker.recordings.bag_reader import BagReader
 from cardbox_tracker.recordings.bag_writer import BagWriter
 from cardbox_tracker.recordings.result_bag import result_bag
 from cardbox_tracker.recordings.silhouettes import RecordedFrame
-from cardbox_tracker.applications.simulation.motions import wave
-from cardbox_tracker.applications.simulation.session import SessionFormat, synthesize_session
-from cardbox_tracker.camera.camera import Camera
+from cardbox_tracker.tracking.estimate import LOST, TRACKING, Estimate
+from cardbox_tracker.tracking.tracker import Tracker
 
 BODY = BodyModel.of(hip_height_m=-0.51)
 CAMERA = Camera(64, 48, 66.0, 66.0, 31.5, 23.5)

@@ -9,6 +9,8 @@ from typing import Any
 import numpy as np
 import pytest
 
+from cardbox_tracker.applications.evaluation.results import read_json
+from cardbox_tracker.commands.main import main
 from lab.benchmarks import core as benchmark_core
 from lab.benchmarks import report as benchmark_report
 from lab.benchmarks import run as benchmark
@@ -18,8 +20,6 @@ from lab.benchmarks.scene import make_scene
 from lab.benchmarks.silhouette import WITHOUT, colored, measure_silhouettes
 from lab.benchmarks.views import measure_two_views
 from lab.benchmarks.way import STEPS, steps_of
-from cardbox_tracker.commands.main import main
-from cardbox_tracker.applications.evaluation.results import read_json
 from lab.tools.readme_figures import BENCHMARKS
 
 ROOT = Path(__file__).parents[3]

@@ -12,11 +12,11 @@ from typing import Any
 import cv2
 import pytest
 
+from cardbox_tracker.applications.simulation.motions import MOTIONS
+from cardbox_tracker.commands.main import main
 from cardbox_tracker.person.sizes import SIZE_NAMES
 from cardbox_tracker.person.skeleton import JOINT_NAMES, KEYPOINT_NAMES
-from cardbox_tracker.commands.main import main
 from cardbox_tracker.search.resampling import STRATEGIES
-from cardbox_tracker.applications.simulation.motions import MOTIONS
 from lab.experiments.evaluate import evaluate
 from lab.experiments.parallel import Progress
 from lab.experiments.plan import Plan, full_plan, quick_plan

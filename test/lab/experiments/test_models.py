@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from cardbox_tracker.camera.camera import Camera
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.posture import N_JOINTS, TORSO, clip_to_limits, reference_posture
 from cardbox_tracker.terms.term import ARMS
-from cardbox_tracker.camera.camera import Camera
 from lab.experiments.models import (
     MODELS,
     PlaneSilhouette,

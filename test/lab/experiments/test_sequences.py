@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
+from cardbox_tracker.camera.camera import Camera
+from cardbox_tracker.camera.rasterisation import render
 from cardbox_tracker.person.cardbox import cardbox_patches
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.posture import N_JOINTS
-from cardbox_tracker.camera.camera import Camera
-from cardbox_tracker.camera.rasterisation import render
 from lab.experiments.sequences import draw_estimate
 
 CAMERA = Camera(160, 120, 80.0, 80.0, 79.5, 59.5)

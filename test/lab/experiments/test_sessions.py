@@ -9,9 +9,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from cardbox_tracker.person.model import BodyModel
-from cardbox_tracker.common.errors import CardboxError
 from cardbox_tracker.applications.simulation.person import person_keypoints_m
+from cardbox_tracker.common.errors import CardboxError
+from cardbox_tracker.person.model import BodyModel
 from lab.experiments.sessions import (
     SEQUENCE_LENGTH,
     Session,

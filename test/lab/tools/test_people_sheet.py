@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 import pytest
 
+from cardbox_tracker.camera.camera import Camera
 from cardbox_tracker.detectors.image_points import ImagePoints
 from cardbox_tracker.recordings.silhouettes import RecordedFrame
-from cardbox_tracker.camera.camera import Camera
 from lab.tools.people_sheet import HEAD_RADIUS_M, Circle, counts_of, heads_in, hidden
 
 CAMERA = Camera(320, 240, 300.0, 300.0, 159.5, 119.5)

@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from cardbox_tracker.common.errors import CardboxError
 from cardbox_tracker.camera.camera import Camera
+from cardbox_tracker.common.errors import CardboxError
 from lab.tools.real_frames import read_frames
 from lab.tools.real_report import Run, cells, projected
 from lab.tools.real_sheet import blurred

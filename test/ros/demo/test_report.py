@@ -10,12 +10,12 @@ import cv2
 import numpy as np
 import pytest
 
+from cardbox_tracker.applications.evaluation.truth import load_ground_truth
+from cardbox_tracker.applications.simulation.session import SessionFormat, synthesize_session
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.model_file import load_body_model
 from cardbox_tracker.ros.demo.report import write_report
 from cardbox_tracker.ros.demo.result import DemoResult
-from cardbox_tracker.applications.evaluation.truth import load_ground_truth
-from cardbox_tracker.applications.simulation.session import SessionFormat, synthesize_session
 
 BODY = BodyModel.of(hip_height_m=-0.51)
 LAST = 24

@@ -13,17 +13,17 @@ from sensor_msgs.msg import CameraInfo, CompressedImage, Image, RegionOfInterest
 from std_msgs.msg import Header
 from visualization_msgs.msg import Marker
 
+from cardbox_tracker.camera.camera import Calibration, Camera
+from cardbox_tracker.camera.camera_info import calibration_from_info
+from cardbox_tracker.common.errors import CameraError, EncodingError, NotFiniteError
 from cardbox_tracker.person.cardbox import cardbox_patches
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.posture import reference_posture
 from cardbox_tracker.person.skeleton import JOINT_NAMES, KeypointState
-from cardbox_tracker.common.errors import CameraError, EncodingError, NotFiniteError
 from cardbox_tracker.recordings.keypoint_status import KeypointStates
-from cardbox_tracker.markers import MarkerShape, marker_shapes
+from cardbox_tracker.recordings.markers import MarkerShape, marker_shapes
 from cardbox_tracker.recordings.outputs import OUTPUTS, JointValues, Markers, Points, Text
 from cardbox_tracker.ros.messages import conversions, results
-from cardbox_tracker.camera.camera import Calibration, Camera
-from cardbox_tracker.camera.camera_info import calibration_from_info
 
 HEADER = Header(frame_id="optical")
 CAMERA = Camera(320, 240, 300.0, 310.0, 159.5, 119.5)

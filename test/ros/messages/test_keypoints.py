@@ -14,9 +14,9 @@ pytest.importorskip("rclpy", reason="rclpy is not installed")
 from geometry_msgs.msg import Point32, Polygon, PolygonStamped
 from std_msgs.msg import Header
 
+from cardbox_tracker.common.errors import CardboxError
 from cardbox_tracker.detectors.image_points import POINT_INDEX, POINT_NAMES
 from cardbox_tracker.detectors.landmarks import LANDMARKS
-from cardbox_tracker.common.errors import CardboxError
 from cardbox_tracker.ros.messages.keypoints import (
     COCO_NAMES,
     MESSAGE_NAMES,

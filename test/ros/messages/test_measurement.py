@@ -5,8 +5,8 @@ from __future__ import annotations
 import pytest
 from diagnostic_msgs.msg import DiagnosticStatus
 
-from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.measuring.config import InitializationResult
+from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.ros.messages.measurement import (
     mean_iou_of,
     measured_message,

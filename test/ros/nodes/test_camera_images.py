@@ -14,6 +14,7 @@ from builtin_interfaces.msg import Time  # noqa: E402
 from rclpy.qos import QoSProfile  # noqa: E402
 from std_msgs.msg import Header  # noqa: E402
 
+from cardbox_tracker.camera.camera import Camera  # noqa: E402
 from cardbox_tracker.ros.messages.conversions import (  # noqa: E402
     camera_info_message,
     image_message,
@@ -22,7 +23,6 @@ from cardbox_tracker.ros.nodes.background_node import BackgroundNode  # noqa: E4
 from cardbox_tracker.ros.nodes.camera_images import CameraImages  # noqa: E402
 from cardbox_tracker.ros.nodes.tracker_node import TrackerNode  # noqa: E402
 from cardbox_tracker.ros.runtime.node import CardboxNode  # noqa: E402
-from cardbox_tracker.camera.camera import Camera  # noqa: E402
 
 CAMERA = Camera(160, 120, 150.0, 150.0, 79.5, 59.5)
 

@@ -15,14 +15,14 @@ pytest.importorskip("rclpy", reason="rclpy is not installed")
 from builtin_interfaces.msg import Time
 from std_msgs.msg import Header
 
-from cardbox_tracker.detectors.landmarks import LANDMARKS
-from cardbox_tracker.detectors.pose_network import Detection
+from cardbox_tracker.camera.camera import Calibration
 from cardbox_tracker.common.errors import CardboxError
 from cardbox_tracker.detectors.detector import PersonDetector
+from cardbox_tracker.detectors.landmarks import LANDMARKS
+from cardbox_tracker.detectors.pose_network import Detection
 from cardbox_tracker.ros.messages.conversions import calibration_message, image_message
 from cardbox_tracker.ros.messages.keypoints import MESSAGE_NAMES
 from cardbox_tracker.ros.nodes.detector_node import DetectorNode
-from cardbox_tracker.camera.camera import Calibration
 
 WIDTH, HEIGHT = 640, 480
 K = np.array([(500.0, 0.0, 319.5), (0.0, 500.0, 239.5), (0.0, 0.0, 1.0)])

@@ -14,20 +14,20 @@ rclpy = pytest.importorskip("rclpy", reason="rclpy is not installed")
 from builtin_interfaces.msg import Time  # noqa: E402
 from std_msgs.msg import Header  # noqa: E402
 
-from cardbox_tracker.person.model import BodyModel  # noqa: E402
-from cardbox_tracker.person.posture import reference_posture  # noqa: E402
+from cardbox_tracker.camera.camera import Camera  # noqa: E402
 from cardbox_tracker.common.errors import InitializationError  # noqa: E402
-from cardbox_tracker.terms.whole_body import WholeBodyCost  # noqa: E402
-from cardbox_tracker.terms.whole_body_config import WholeBodyCostConfig  # noqa: E402
 from cardbox_tracker.measuring.config import (  # noqa: E402
     InitializationConfig,
     InitializationResult,
 )
 from cardbox_tracker.measuring.scale import scaled  # noqa: E402
+from cardbox_tracker.person.model import BodyModel  # noqa: E402
+from cardbox_tracker.person.posture import reference_posture  # noqa: E402
 from cardbox_tracker.ros.messages.conversions import image_message  # noqa: E402
 from cardbox_tracker.ros.nodes.distance_sources import DepthDistance  # noqa: E402
 from cardbox_tracker.ros.nodes.reference_capture import ReferenceCapture  # noqa: E402
-from cardbox_tracker.camera.camera import Camera  # noqa: E402
+from cardbox_tracker.terms.whole_body import WholeBodyCost  # noqa: E402
+from cardbox_tracker.terms.whole_body_config import WholeBodyCostConfig  # noqa: E402
 
 CAMERA = Camera(160, 120, 150.0, 150.0, 79.5, 59.5)
 BODY = BodyModel.of(hip_height_m=-0.4)

@@ -19,6 +19,8 @@ rclpy = pytest.importorskip("rclpy", reason="rclpy is not installed")
 from rclpy.parameter import Parameter  # noqa: E402
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy  # noqa: E402
 
+from cardbox_tracker.applications.simulation.session import session_camera  # noqa: E402
+from cardbox_tracker.detectors.detector import PersonDetector  # noqa: E402
 from cardbox_tracker.person.model import BodyModel  # noqa: E402
 from cardbox_tracker.person.skeleton import JOINT_NAMES, JOINT_STATE_NAMES  # noqa: E402
 from cardbox_tracker.person.urdf import (  # noqa: E402
@@ -27,7 +29,6 @@ from cardbox_tracker.person.urdf import (  # noqa: E402
     urdf_from_body,
 )
 from cardbox_tracker.recordings.bag_writer import BagWriter  # noqa: E402
-from cardbox_tracker.detectors.detector import PersonDetector  # noqa: E402
 from cardbox_tracker.ros.nodes.background_node import BackgroundNode  # noqa: E402
 from cardbox_tracker.ros.nodes.camera_node import CameraNode  # noqa: E402
 from cardbox_tracker.ros.nodes.detector_node import DetectorNode  # noqa: E402
@@ -38,7 +39,6 @@ from cardbox_tracker.ros.nodes.rula_node import RulaNode  # noqa: E402
 from cardbox_tracker.ros.nodes.stereo_depth_node import StereoDepthNode  # noqa: E402
 from cardbox_tracker.ros.nodes.tracker_node import TrackerNode  # noqa: E402
 from cardbox_tracker.ros.runtime.interface import SERVICE, entries  # noqa: E402
-from cardbox_tracker.applications.simulation.session import session_camera  # noqa: E402
 
 ROOT = Path(__file__).parents[3]
 NODES = (

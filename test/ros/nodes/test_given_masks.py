@@ -13,6 +13,8 @@ from builtin_interfaces.msg import Time  # noqa: E402
 from sensor_msgs.msg import Image  # noqa: E402
 from std_msgs.msg import Header, String  # noqa: E402
 
+from cardbox_tracker.camera.camera import Camera  # noqa: E402
+from cardbox_tracker.camera.rasterisation import render  # noqa: E402
 from cardbox_tracker.person.cardbox import cardbox_patches  # noqa: E402
 from cardbox_tracker.person.model import BodyModel  # noqa: E402
 from cardbox_tracker.person.model_file import dumps_body_model  # noqa: E402
@@ -20,8 +22,6 @@ from cardbox_tracker.person.posture import reference_posture  # noqa: E402
 from cardbox_tracker.ros.messages.conversions import camera_info_message  # noqa: E402
 from cardbox_tracker.ros.nodes.initializer_node import InitializerNode  # noqa: E402
 from cardbox_tracker.ros.nodes.tracker_node import TrackerNode  # noqa: E402
-from cardbox_tracker.camera.camera import Camera  # noqa: E402
-from cardbox_tracker.camera.rasterisation import render  # noqa: E402
 
 CAMERA = Camera(96, 72, 99.0, 99.0, 47.5, 35.5)
 BODY = BodyModel()

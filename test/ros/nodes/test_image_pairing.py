@@ -18,18 +18,17 @@ from rclpy.parameter import Parameter  # noqa: E402
 from sensor_msgs.msg import CameraInfo, Image  # noqa: E402
 from std_msgs.msg import Header  # noqa: E402
 
+from cardbox_tracker.camera.camera import Camera  # noqa: E402
+from cardbox_tracker.camera.rasterisation import render  # noqa: E402
+from cardbox_tracker.common.errors import CameraError  # noqa: E402
+from cardbox_tracker.measuring.config import (  # noqa: E402
+    InitializationConfig,
+)
 from cardbox_tracker.person.appearance import Appearance  # noqa: E402
 from cardbox_tracker.person.cardbox import cardbox_patches  # noqa: E402
 from cardbox_tracker.person.model import BodyModel  # noqa: E402
 from cardbox_tracker.person.model_file import save_body_model  # noqa: E402
 from cardbox_tracker.person.posture import reference_posture  # noqa: E402
-from cardbox_tracker.common.errors import CameraError  # noqa: E402
-from cardbox_tracker.tracking.estimate import Estimate  # noqa: E402
-from cardbox_tracker.measuring.config import (  # noqa: E402
-    InitializationConfig,
-)
-from cardbox_tracker.tracking.observation import Observation  # noqa: E402
-from cardbox_tracker.tracking.tracker import Tracker  # noqa: E402
 from cardbox_tracker.ros.messages import conversions  # noqa: E402
 from cardbox_tracker.ros.nodes.background_node import BackgroundNode  # noqa: E402
 from cardbox_tracker.ros.nodes.image_pairing import ImagePairing  # noqa: E402
@@ -37,8 +36,9 @@ from cardbox_tracker.ros.nodes.reference_capture import ReferenceCapture  # noqa
 from cardbox_tracker.ros.nodes.tracker_node import TrackerNode  # noqa: E402
 from cardbox_tracker.ros.runtime import qos  # noqa: E402
 from cardbox_tracker.ros.runtime.intra_process import IntraProcess  # noqa: E402
-from cardbox_tracker.camera.camera import Camera  # noqa: E402
-from cardbox_tracker.camera.rasterisation import render  # noqa: E402
+from cardbox_tracker.tracking.estimate import Estimate  # noqa: E402
+from cardbox_tracker.tracking.observation import Observation  # noqa: E402
+from cardbox_tracker.tracking.tracker import Tracker  # noqa: E402
 
 BODY = BodyModel.of(distance_m=2.3, hip_height_m=-0.45)
 CAMERA = Camera(320, 240, 300.0, 300.0, 159.5, 119.5)

@@ -12,11 +12,11 @@ pytest.importorskip("rclpy", reason="rclpy is not installed")
 
 from std_msgs.msg import Header
 
+from cardbox_tracker.camera.camera import Camera
 from cardbox_tracker.measuring.guidance import BAD, GOOD, Prompt
 from cardbox_tracker.ros.messages.conversions import image_message
 from cardbox_tracker.ros.nodes.initializer_node import GuideOutputs
 from cardbox_tracker.ros.nodes.initializer_parameters import InitializerParameters
-from cardbox_tracker.camera.camera import Camera
 
 CAMERA = Camera(80, 60, 80.0, 80.0, 39.5, 29.5)
 ASKED = Prompt("front", "Face the camera", 2, "face the camera, arms hanging")

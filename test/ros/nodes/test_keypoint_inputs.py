@@ -18,8 +18,9 @@ from rclpy.context import Context  # noqa: E402
 from sensor_msgs.msg import Image  # noqa: E402
 from std_msgs.msg import Header  # noqa: E402
 
-from cardbox_tracker.detectors.image_points import POINT_INDEX, ImagePoints  # noqa: E402
+from cardbox_tracker.camera.camera import Camera  # noqa: E402
 from cardbox_tracker.common.errors import CardboxError  # noqa: E402
+from cardbox_tracker.detectors.image_points import POINT_INDEX, ImagePoints  # noqa: E402
 from cardbox_tracker.ros.messages.conversions import camera_info_message, image_message  # noqa: E402
 from cardbox_tracker.ros.nodes import input_stream, keypoint_topic  # noqa: E402
 from cardbox_tracker.ros.nodes.camera_inputs import CameraInputs, ObservationSet  # noqa: E402
@@ -27,7 +28,6 @@ from cardbox_tracker.ros.nodes.keypoint_inputs import KeypointInputs  # noqa: E4
 from cardbox_tracker.ros.nodes.tracker_parameters import TrackerParameters  # noqa: E402
 from cardbox_tracker.ros.runtime import qos  # noqa: E402
 from cardbox_tracker.ros.runtime.node import CardboxNode  # noqa: E402
-from cardbox_tracker.camera.camera import Camera  # noqa: E402
 
 MS = 1_000_000
 T = 10_000 * MS

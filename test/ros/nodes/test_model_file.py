@@ -15,15 +15,15 @@ rclpy = pytest.importorskip("rclpy", reason="rclpy is not installed")
 from rclpy.context import Context  # noqa: E402
 from rclpy.parameter import Parameter  # noqa: E402
 
+from cardbox_tracker.camera.camera import Camera  # noqa: E402
+from cardbox_tracker.common.errors import CardboxError  # noqa: E402
+from cardbox_tracker.measuring.config import InitializationResult  # noqa: E402
 from cardbox_tracker.person.model import BodyModel  # noqa: E402
 from cardbox_tracker.person.model_file import load_body_model  # noqa: E402
 from cardbox_tracker.person.posture import REFERENCE_NAMES  # noqa: E402
-from cardbox_tracker.common.errors import CardboxError  # noqa: E402
-from cardbox_tracker.measuring.config import InitializationResult  # noqa: E402
 from cardbox_tracker.ros.nodes import distance_sources, initializer_node  # noqa: E402
 from cardbox_tracker.ros.nodes.camera_node import CameraNode  # noqa: E402
 from cardbox_tracker.ros.nodes.tracker_node import TrackerNode  # noqa: E402
-from cardbox_tracker.camera.camera import Camera  # noqa: E402
 
 BODY = BodyModel.of(distance_m=2.3)
 

@@ -15,9 +15,9 @@ rclpy = pytest.importorskip("rclpy", reason="rclpy is not installed")
 from std_msgs.msg import String  # noqa: E402
 
 from cardbox_tracker.applications.retargeting.robot import load_robot  # noqa: E402
+from cardbox_tracker.common.errors import CardboxError  # noqa: E402
 from cardbox_tracker.person.model_file import dumps_body_model  # noqa: E402
 from cardbox_tracker.person.proportions import body_from_proportions  # noqa: E402
-from cardbox_tracker.common.errors import CardboxError  # noqa: E402
 from cardbox_tracker.ros.nodes.retarget_node import RetargetNode  # noqa: E402
 
 CONFIG = Path(__file__).parents[3] / "config"

@@ -16,10 +16,9 @@ from rclpy.parameter import Parameter  # noqa: E402
 from sensor_msgs.msg import Image  # noqa: E402
 from std_msgs.msg import Header  # noqa: E402
 
+from cardbox_tracker.camera.camera import Camera  # noqa: E402
 from cardbox_tracker.person.model import BodyModel  # noqa: E402
 from cardbox_tracker.person.model_file import save_body_model  # noqa: E402
-from cardbox_tracker.tracking.estimate import Estimate  # noqa: E402
-from cardbox_tracker.tracking.tracker import Tracker  # noqa: E402
 from cardbox_tracker.ros.messages.conversions import (  # noqa: E402
     camera_info_message,
     image_message,
@@ -27,7 +26,8 @@ from cardbox_tracker.ros.messages.conversions import (  # noqa: E402
 )
 from cardbox_tracker.ros.nodes.image_pairing import ImagePairing  # noqa: E402
 from cardbox_tracker.ros.nodes.tracker_node import TrackerNode  # noqa: E402
-from cardbox_tracker.camera.camera import Camera  # noqa: E402
+from cardbox_tracker.tracking.estimate import Estimate  # noqa: E402
+from cardbox_tracker.tracking.tracker import Tracker  # noqa: E402
 
 CAMERA = Camera(160, 120, 150.0, 150.0, 79.5, 59.5)
 EMPTY = np.zeros((120, 160), np.uint8)

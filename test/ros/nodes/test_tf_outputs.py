@@ -14,13 +14,13 @@ pytest.importorskip("rclpy", reason="rclpy is not installed")
 from builtin_interfaces.msg import Time
 from std_msgs.msg import Header
 
+from cardbox_tracker.common.errors import CardboxError
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.posture import reference_posture
 from cardbox_tracker.person.urdf import LinkTransforms, urdf_from_body
-from cardbox_tracker.common.errors import CardboxError
-from cardbox_tracker.tracking.estimate import LOST, TRACKING, Estimate
 from cardbox_tracker.recordings.outputs import joint_values, positions_of
 from cardbox_tracker.ros.nodes.tf_outputs import TfOutputs
+from cardbox_tracker.tracking.estimate import LOST, TRACKING, Estimate
 
 BODY = BodyModel.of(distance_m=2.3, hip_height_m=-0.4)
 FOUND = Estimate(TRACKING, reference_posture("arms"), offset_m=np.array([0.25, -0.05]))

@@ -15,19 +15,19 @@ from builtin_interfaces.msg import Time  # noqa: E402
 from rclpy.parameter import Parameter  # noqa: E402
 from std_msgs.msg import Header  # noqa: E402
 
+from cardbox_tracker.camera.camera import Camera  # noqa: E402
+from cardbox_tracker.camera.extrinsics import Extrinsics  # noqa: E402
+from cardbox_tracker.camera.rasterisation import render  # noqa: E402
+from cardbox_tracker.camera.view import OtherCamera, View  # noqa: E402
 from cardbox_tracker.person.cardbox import cardbox_patches  # noqa: E402
 from cardbox_tracker.person.model import BodyModel  # noqa: E402
 from cardbox_tracker.person.model_file import save_body_model  # noqa: E402
 from cardbox_tracker.person.posture import reference_posture  # noqa: E402
-from cardbox_tracker.camera.view import OtherCamera, View  # noqa: E402
 from cardbox_tracker.ros.messages.conversions import (  # noqa: E402
     camera_info_message,
     image_message,
 )
 from cardbox_tracker.ros.nodes.tracker_node import TrackerNode  # noqa: E402
-from cardbox_tracker.camera.camera import Camera  # noqa: E402
-from cardbox_tracker.camera.extrinsics import Extrinsics  # noqa: E402
-from cardbox_tracker.camera.rasterisation import render  # noqa: E402
 
 CAMERA = Camera(160, 120, 150.0, 150.0, 79.5, 59.5)
 BODY = BodyModel.of(distance_m=2.3, hip_height_m=-0.4)

@@ -20,20 +20,20 @@ from rclpy.parameter import Parameter  # noqa: E402
 from sensor_msgs.msg import CameraInfo, Image, JointState  # noqa: E402
 from std_msgs.msg import Header, String  # noqa: E402
 
+from cardbox_tracker.camera.camera import Camera  # noqa: E402
 from cardbox_tracker.person.kinematics import pose  # noqa: E402
 from cardbox_tracker.person.model import BodyModel  # noqa: E402
 from cardbox_tracker.person.model_file import save_body_model  # noqa: E402
 from cardbox_tracker.person.posture import reference_posture  # noqa: E402
 from cardbox_tracker.person.skeleton import JOINT_NAMES  # noqa: E402
-from cardbox_tracker.tracking.estimate import LOST, TRACKING, UNCERTAIN, Estimate  # noqa: E402
-from cardbox_tracker.tracking.tracker import Tracker  # noqa: E402
 from cardbox_tracker.ros.messages.conversions import (  # noqa: E402
     camera_info_message,
     image_message,
 )
 from cardbox_tracker.ros.nodes import tracker_node  # noqa: E402
 from cardbox_tracker.ros.runtime import qos  # noqa: E402
-from cardbox_tracker.camera.camera import Camera  # noqa: E402
+from cardbox_tracker.tracking.estimate import LOST, TRACKING, UNCERTAIN, Estimate  # noqa: E402
+from cardbox_tracker.tracking.tracker import Tracker  # noqa: E402
 
 CAMERA = Camera(160, 120, 150.0, 150.0, 79.5, 59.5)
 BODY = BodyModel.of(distance_m=2.3, hip_height_m=-0.4)

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from cardbox_tracker.person.model import BodyModel
-from cardbox_tracker.tracking.estimate import LOST, NO_PERSON, TRACKING, UNCERTAIN, Estimate
 from cardbox_tracker.ros.nodes.tracking_report import TrackingReport
+from cardbox_tracker.tracking.estimate import LOST, NO_PERSON, TRACKING, UNCERTAIN, Estimate
 
 BODY = BodyModel()
 

@@ -9,6 +9,7 @@ from typing import Any
 import pytest
 from diagnostic_msgs.msg import DiagnosticStatus
 
+from cardbox_tracker.camera.stamps import StampOrder, StreamStatistics
 from cardbox_tracker.ros.runtime.diagnostics import (
     ERROR,
     STATUS,
@@ -16,7 +17,6 @@ from cardbox_tracker.ros.runtime.diagnostics import (
     WORKING,
     NodeDiagnostics,
 )
-from cardbox_tracker.camera.stamps import StampOrder, StreamStatistics
 
 PERIOD_NS = 66_666_667
 

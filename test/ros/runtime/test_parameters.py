@@ -16,7 +16,7 @@ from rclpy.parameter import Parameter, parameter_value_to_python
 from rclpy.parameter_client import AsyncParameterClient
 
 from cardbox_tracker.common.errors import CardboxError
-from cardbox_tracker.search.config import PRESETS, TrackerConfig
+from cardbox_tracker.common.settings import check, settings_of
 from cardbox_tracker.measuring.config import InitializationConfig
 from cardbox_tracker.ros.nodes.background_node import BackgroundParameters
 from cardbox_tracker.ros.nodes.initializer_parameters import InitializerParameters
@@ -30,7 +30,7 @@ from cardbox_tracker.ros.runtime.parameter_fields import (
     parameter,
 )
 from cardbox_tracker.ros.runtime.parameters import LiveParameters
-from cardbox_tracker.common.settings import check, settings_of
+from cardbox_tracker.search.config import PRESETS, TrackerConfig
 from cardbox_tracker.segmentation.background_config import BackgroundConfig
 from lab.tools import parameter_docs
 from lab.tools.parameter_docs import NODES

@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from cardbox_tracker.ros.demo import run
 from cardbox_tracker.common.errors import CardboxError
+from cardbox_tracker.ros.demo import run
 from cardbox_tracker.ros.runtime import processes
 
 

@@ -6,12 +6,12 @@ from typing import NamedTuple
 
 import numpy as np
 
+from cardbox_tracker.camera.camera import Camera
 from cardbox_tracker.person.cardbox import PATCH_NAMES, patches_at
 from cardbox_tracker.person.kinematics import gaze_m, pose
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.parts import body_parts
 from cardbox_tracker.person.sizes import FloatArray
-from cardbox_tracker.camera.camera import Camera
 
 Rgba = tuple[float, float, float, float]
 
