@@ -19,7 +19,7 @@ from cardbox_tracker.estimation.cost.view import OtherCamera, View
 from cardbox_tracker.estimation.cost.whole_body import WholeBodyCost
 from cardbox_tracker.estimation.cost.whole_body_config import WholeBodyCostConfig
 from cardbox_tracker.estimation.estimate import TRACKING, UNCERTAIN, Estimate
-from cardbox_tracker.estimation.filtering.keypoint_states import HANDS, are_sure
+from cardbox_tracker.estimation.filtering.doubt import HANDS, Source, models
 from cardbox_tracker.estimation.observation import Observation
 from cardbox_tracker.estimation.tracker import Tracker
 from cardbox_tracker.simulation.motions import wave
@@ -29,6 +29,7 @@ from cardbox_tracker.vision.rasterisation import render
 
 Detect = Callable[..., ImagePoints]
 
+UNCERTAIN_ABOVE = models()[Source.POINTS].uncertain_from
 CAMERA = Camera(160, 120, 165.0, 165.0, 79.5, 59.5)
 MEASURED = BodyModel.of(hip_height_m=-0.51)
 GUESSED = MEASURED.with_values(source="proportions")
@@ -117,7 +118,7 @@ def is_tracked(found: tuple[np.ndarray, list[Estimate]], body: BodyModel) -> boo
     """
     estimates = found[1]
     sure = [
-        estimate.state == TRACKING or not are_sure(estimate.keypoint_chances[HANDS])
+        estimate.state == TRACKING or bool((estimate.keypoint_chances[HANDS] > UNCERTAIN_ABOVE).any())
         for estimate in estimates
     ]
     least = 0.8 * len(sure) if body is MEASURED else 0
