@@ -118,7 +118,8 @@ def is_tracked(found: tuple[np.ndarray, list[Estimate]], body: BodyModel) -> boo
     """
     estimates = found[1]
     sure = [
-        estimate.state == TRACKING or bool((estimate.keypoint_chances[HANDS] > UNCERTAIN_ABOVE).any())
+        estimate.state == TRACKING
+        or bool((estimate.keypoint_chances[HANDS] > UNCERTAIN_ABOVE).any())
         for estimate in estimates
     ]
     least = 0.8 * len(sure) if body is MEASURED else 0

@@ -342,11 +342,14 @@ def test_terms_of_each_camera_see_its_own_upright_channels() -> None:
     there = view.states(state)
     upright = drawn(cost, view.camera, there), depth_of(cost, view.camera, there)
     mask, depth_m = (raw_of(one, view, other.camera, 0) for one in upright)
-    px = CAMERA.project(FIRST.keypoints(state))[[2]]
-    points = ImagePoints.of({"left_wrist": (*other.camera.project(one), 0.9) for one in moved_to(other, state)[[2]]})
-    first = Observation(drawn(FIRST, CAMERA, state), points=ImagePoints.of({"left_wrist": (*px[0], 0.9)}))
+    there_px = other.camera.project(moved_to(other, state))[2]
+    points = ImagePoints.of({"left_wrist": (*there_px, 0.9)})
+    px = CAMERA.project(FIRST.keypoints(state))[2]
+    first = Observation(
+        drawn(FIRST, CAMERA, state), points=ImagePoints.of({"left_wrist": (*px, 0.9)})
+    )
     image = np.repeat(mask[..., None], 3, axis=2)
-    for number in range(2):
+    for _ in range(2):
         tracker.track([first, Observation(mask, image, depth_m, points=points)])
     one, two = asking.frames[-2:]
     assert (one.camera, two.camera) == (tracker.camera, view.camera)
