@@ -164,13 +164,13 @@ def trunk_costs(
     """Write the costs (N,) of trunks (N, 4), given the cost ``base`` of drawing nothing."""
     model = cardbox_of(cardbox)
     rows, width = row_sums.shape[0], row_sums.shape[1] - 1
-    work = new_workspace(TRUNK_PATCHES, rows)
+    work = new_workspace(int(TRUNK_PATCHES), rows)
     _shape_trunk(model.parts, work.shape)
     for i in range(postures.shape[0]):
         torso_pose(postures[i], model.place, model.camera, work.torso, work.hip)
         _place_trunk(work)
         draw(work, model.camera, rows, width)
-        costs[i] = base + sum_union(work, TRUNK_PATCHES, row_sums)[0]
+        costs[i] = base + sum_union(work, row_sums)[0]
 
 
 @kernel
@@ -178,7 +178,7 @@ def cover_trunk(torso: Floats, cardbox: CardboxTuple, row_sums: RowSums, covered
     """Write the row sums outside of a trunk (4,) to ``covered``; return the gain of the trunk."""
     model = cardbox_of(cardbox)
     rows, width = row_sums.shape[0], row_sums.shape[1] - 1
-    work = new_workspace(TRUNK_PATCHES, rows)
+    work = new_workspace(int(TRUNK_PATCHES), rows)
     _shape_trunk(model.parts, work.shape)
     torso_pose(torso, model.place, model.camera, work.torso, work.hip)
     _place_trunk(work)
@@ -191,7 +191,7 @@ def cover_arms(posture: Floats, cardbox: CardboxTuple, row_sums: RowSums, covere
     """Write the row sums outside of the arms of a posture (12,); return the gain of the arms."""
     model = cardbox_of(cardbox)
     rows, width = row_sums.shape[0], row_sums.shape[1] - 1
-    work = new_workspace(2 * ARM_PATCHES, rows)
+    work = new_workspace(int(2 * ARM_PATCHES), rows)
     torso_pose(posture, model.place, model.camera, work.torso, work.hip)
     for arm in range(2):
         first = ARM_PATCHES * arm
@@ -214,13 +214,13 @@ def arm_costs(
     """Write the costs (N,) of arms (N, 4) beside a trunk (4,), given its row sums and its cost."""
     model = cardbox_of(cardbox)
     rows, width = covered.shape[0], covered.shape[1] - 1
-    work = new_workspace(ARM_PATCHES, rows)
+    work = new_workspace(int(ARM_PATCHES), rows)
     _shape_arm(model.parts, 0, work.shape)
     torso_pose(torso, model.place, model.camera, work.torso, work.hip)
     for i in range(postures.shape[0]):
         _place_arm(work, 0, postures[i], side, model)
         draw(work, model.camera, rows, width)
-        costs[i] = base + sum_union(work, ARM_PATCHES, covered)[0]
+        costs[i] = base + sum_union(work, covered)[0]
 
 
 @kernel
@@ -235,12 +235,12 @@ def full_costs(
     """Write costs and drawn areas (N,), px, of whole postures (N, 12)."""
     model = cardbox_of(cardbox)
     rows, width = row_sums.shape[0], row_sums.shape[1] - 1
-    work = new_workspace(_BODY_PATCHES, rows)
+    work = new_workspace(int(_BODY_PATCHES), rows)
     _shape_body(model.parts, work.shape)
     for i in range(postures.shape[0]):
         _place_body(work, postures[i], model)
         draw(work, model.camera, rows, width)
-        gain, area = sum_union(work, _BODY_PATCHES, row_sums)
+        gain, area = sum_union(work, row_sums)
         costs[i] = base + gain
         areas[i] = area
 
@@ -251,14 +251,14 @@ def body_costs(
 ) -> None:
     """Write the costs (N,) of N ``bodies`` at one place in the N ``postures`` (N, 12)."""
     rows, width = row_sums.shape[0], row_sums.shape[1] - 1
-    work = new_workspace(_BODY_PATCHES, rows)
+    work = new_workspace(int(_BODY_PATCHES), rows)
     parts, shoulders, place, camera = bodies
     for i in range(postures.shape[0]):
         model = cardbox_of((parts[i], shoulders[i], place, camera))
         _shape_body(model.parts, work.shape)
         _place_body(work, postures[i], model)
         draw(work, model.camera, rows, width)
-        costs[i] = base + sum_union(work, _BODY_PATCHES, row_sums)[0]
+        costs[i] = base + sum_union(work, row_sums)[0]
 
 
 @kernel
@@ -275,4 +275,4 @@ def polygon_costs(
                 for axis in range(3):
                     work.corners[axis, c * count + p] = corners_m[i, p, c, axis]
         draw(work, Intrinsics(*camera), rows, width)
-        costs[i] = base + sum_union(work, count, row_sums)[0]
+        costs[i] = base + sum_union(work, row_sums)[0]

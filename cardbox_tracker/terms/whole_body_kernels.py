@@ -86,7 +86,7 @@ def rate_trunks(
 ) -> None:
     """Write ratings (N,) of the trunks of states (N, 14)."""
     seen, given = Observed(*observed), Prior(*prior)
-    scratch = new_scratch(TRUNK_PATCHES, seen, given)
+    scratch = new_scratch(int(TRUNK_PATCHES), seen, given)
     _rate_trunks(states, body_of(body), seen, given, scratch, ratings)
 
 
@@ -120,7 +120,7 @@ def rate_arms(
     Shoulder, elbow and hand in the torso's frame are written to ``joints_m`` (N, 3, 3).
     """
     seen, given = Observed(*observed), Prior(*prior)
-    scratch = new_scratch(ARM_PATCHES, seen, given)
+    scratch = new_scratch(int(ARM_PATCHES), seen, given)
     _rate_arms(arms, side, torso, body_of(body), seen, given, scratch, ratings, joints_m)
 
 
@@ -171,7 +171,7 @@ def rate_bodies(
         points: fields of :class:`Points`, written.
     """
     seen, given = Observed(*observed), Prior(*prior)
-    scratch = new_scratch(BODY_PATCHES, seen, given)
+    scratch = new_scratch(int(BODY_PATCHES), seen, given)
     _rate_bodies(states, body_of(body), seen, given, scratch, ratings, pixels, Points(*points))
 
 
@@ -215,7 +215,7 @@ def rate_pairs(
     are those of :func:`rate_bodies`.
     """
     seen, given = Observed(*observed), Prior(*prior)
-    scratch = new_scratch(2 * ARM_PATCHES, seen, given)
+    scratch = new_scratch(int(2 * ARM_PATCHES), seen, given)
     _rate_pairs(states, body_of(body), seen, given, scratch, ratings, Points(*points))
 
 

@@ -19,46 +19,48 @@ from typing import Any
 
 import numpy as np
 
-from cardbox_tracker.camera.camera import Camera
-from cardbox_tracker.camera.given_arrays import depth_from, image_from, silhouette_from
-from cardbox_tracker.common.errors import CardboxError
-from cardbox_tracker.detectors.image_points import POINT_NAMES, ImagePoints
-from cardbox_tracker.person.appearance import PARTS, Appearance, bins_of
-from cardbox_tracker.person.model import BodyModel
-from cardbox_tracker.search.config import PRESETS
-from cardbox_tracker.segmentation.absorption import StillRegions
-from cardbox_tracker.segmentation.background import SilhouetteExtractor
-from cardbox_tracker.segmentation.chroma import ChromaModel, ChromaScore
-from cardbox_tracker.segmentation.color_reader import ColorReader
-from cardbox_tracker.segmentation.empty_scene import BackgroundLearner, BackgroundModel
-from cardbox_tracker.segmentation.foreground import segment_foreground
-from cardbox_tracker.segmentation.light import LightFollower
-from cardbox_tracker.segmentation.medians import median
-from cardbox_tracker.segmentation.regions import (
-    clean_silhouette,
-    find_regions,
-    remove_small_regions,
-)
-from cardbox_tracker.segmentation.shadows import decide_shadows
-from cardbox_tracker.segmentation.window import Window, window_of
-from cardbox_tracker.terms.compiled import CompiledSilhouette
-from cardbox_tracker.terms.depth import Depth
-from cardbox_tracker.terms.inner_cue import InnerCue
-from cardbox_tracker.terms.outline import signed_distances
-from cardbox_tracker.terms.outline_distances import SeenOutline, comparing
-from cardbox_tracker.terms.term import Frame
-from cardbox_tracker.terms.whole_body import WholeBodyCost
-from cardbox_tracker.terms.whole_body_config import WholeBodyCostConfig
-from cardbox_tracker.tracking.observation import Observation
-from cardbox_tracker.tracking.person_region import PersonRegion
-from cardbox_tracker.tracking.precompile import quickest
-from cardbox_tracker.tracking.still_things import StillThings
-from cardbox_tracker.tracking.tracker import Tracker
+from cardbox_tracker.body.appearance import PARTS, Appearance, bins_of
+from cardbox_tracker.body.model import BodyModel
+from cardbox_tracker.detection.image_points import POINT_NAMES, ImagePoints
+from cardbox_tracker.errors import CardboxError
+from cardbox_tracker.estimation.config import PRESETS
+from cardbox_tracker.estimation.cost.compiled import CompiledSilhouette
+from cardbox_tracker.estimation.cost.depth import Depth
+from cardbox_tracker.estimation.cost.drawn_body import body_tuple
+from cardbox_tracker.estimation.cost.inner_cue import InnerCue
+from cardbox_tracker.estimation.cost.outline import Outline, signed_distances
+from cardbox_tracker.estimation.cost.terms import Frame, Posed
+from cardbox_tracker.estimation.cost.view import OtherCamera
+from cardbox_tracker.estimation.cost.whole_body import WholeBodyCost
+from cardbox_tracker.estimation.cost.whole_body_config import WholeBodyCostConfig
+from cardbox_tracker.estimation.observation import Observation
+from cardbox_tracker.estimation.person_region import PersonRegion
+from cardbox_tracker.estimation.precompile import quickest
+from cardbox_tracker.estimation.still_things import StillThings
+from cardbox_tracker.estimation.tracked_camera import TrackedCamera
+from cardbox_tracker.estimation.tracker import Tracker
+from cardbox_tracker.vision.absorption import StillRegions
+from cardbox_tracker.vision.background import SilhouetteExtractor
+from cardbox_tracker.vision.camera import Camera
+from cardbox_tracker.vision.chroma import ChromaModel, ChromaScore
+from cardbox_tracker.vision.color_reader import ColorReader
+from cardbox_tracker.vision.empty_scene import BackgroundLearner, BackgroundModel
+from cardbox_tracker.vision.extrinsics import Extrinsics
+from cardbox_tracker.vision.foreground import segment_foreground
+from cardbox_tracker.vision.given_arrays import depth_from, image_from, silhouette_from
+from cardbox_tracker.vision.light import LightFollower
+from cardbox_tracker.vision.medians import median
+from cardbox_tracker.vision.regions import clean_silhouette, find_regions, remove_small_regions
+from cardbox_tracker.vision.shadows import decide_shadows
+from cardbox_tracker.vision.window import Window, window_of
 
 CAMERA = Camera(48, 32, 50.0, 50.0, 23.5, 15.5)
 SIZE = (CAMERA.height, CAMERA.width)
 BODY = BodyModel()
 STATE = BODY.reference_state()
+POSABLE = body_tuple(BODY, CAMERA)
+# It lies on its side.
+BESIDE = OtherCamera(CAMERA, Extrinsics.of_vectors((0.0, 0.0, 1.5), (0.1, 0.0, 0.0)))
 CONTENTS = ("person", "mask", "one", "any", "special", "unit")
 LAYOUTS = ("C", "F", "strided", "reversed", "read-only", "unaligned")
 TYPES = ("?", "u1", "i1", "u2", ">u2", "i4", "f2", "f4", ">f4", "f8")
@@ -133,6 +135,7 @@ def terms() -> SimpleNamespace:
         depth=Depth().build(BODY, CAMERA),
         inner=InnerCue().build(colored, CAMERA),
         tracker=Tracker(colored, CAMERA, quickest(PRESETS["default"]().with_depth())),
+        beside=TrackedCamera(BODY, CAMERA, PRESETS["default"]().with_depth(), BESIDE),
         things=StillThings(),
     )
 
@@ -204,8 +207,12 @@ def select_person(take: Take, numbers: Iterator[int]) -> None:
     terms().region.select(take("u1", SIZE), state, bool(next(numbers) % 2), image)
 
 
+def frame_of(**channels: np.ndarray) -> Frame:
+    return Frame(CAMERA, channels, 20, 100)
+
+
 def rate(take: Take, _: Iterator[int]) -> None:
-    seen = terms().silhouette.observe(Frame(take("u1", SIZE), 20, 100))
+    seen = terms().silhouette.observe(frame_of(silhouette=take("u1", SIZE)))
     seen.postures(np.where(np.isfinite(found := take("f8", (3, 12))), found, 0.0))
     seen.polygons(np.abs(take("f8", (3, 2, 4, 3))))
 
@@ -220,20 +227,37 @@ def rate_bodies(take: Take, _: Iterator[int]) -> None:
 
 
 def rate_depth(take: Take, _: Iterator[int]) -> None:
-    states = take("f8", (2, 14))
-    terms().depth.costs(states, take("f4", SIZE))
+    states, depth_m = take("f8", (2, 14)), depth_from(take("f4", SIZE), size=SIZE)
+    silhouette = silhouette_from(take("u1", SIZE), size=SIZE)
+    seen = terms().depth.observe(frame_of(silhouette=silhouette, depth_m=depth_m))
+    seen.rate(Posed(POSABLE, states))
 
 
 def measure_outline(take: Take, numbers: Iterator[int]) -> None:
     silhouette = silhouette_from(take("u1", SIZE), size=SIZE)
     signed_distances(silhouette, float(next(numbers) - 20))
-    SeenOutline(silhouette, comparing(CAMERA), np.array([0.0, 0.2, 0.1 * next(numbers)]))
+    Outline(silhouette, CAMERA, (0.2, 0.1 * next(numbers))).residuals(Posed(POSABLE, STATE[None]))
 
 
 def rate_colors(take: Take, _: Iterator[int]) -> None:
     silhouette = silhouette_from(take("u1", SIZE), size=SIZE)
     image = image_from(take("u1", SIZE, (3,)), size=SIZE)
-    terms().inner.observe(Frame(silhouette, 20, 100, image, STATE)).postures(STATE[None])
+    frame = frame_of(silhouette=silhouette, image=image)
+    seen = terms().inner.observe(frame.changed(before=Posed(POSABLE, STATE[None])))
+    seen.rate(Posed(POSABLE, STATE[None]))
+
+
+def turn_upright(take: Take, numbers: Iterator[int]) -> None:
+    count = len(POINT_NAMES)
+    points = ImagePoints(take("f8", (count, 2)), take("f8", (count,)))
+    before = STATE if next(numbers) % 2 else None
+    seen = Observation(take("u1", SIZE), take("u1", SIZE, (3,)), take("f4", SIZE), points=points)
+    frame = terms().beside.frame(seen, before, bool(next(numbers) % 2))
+    for term in terms().beside.terms:
+        observation = term.observe(frame)
+        posed = Posed(POSABLE, STATE[None])
+        if observation is not None:
+            observation.rate(posed), observation.residuals(posed), observation.evidence(posed)
 
 
 def track(take: Take, numbers: Iterator[int]) -> None:
@@ -277,6 +301,7 @@ CALLS: dict[str, Callable[[Take, Iterator[int]], Any]] = {
     "DepthTerm": rate_depth,
     "outlines": measure_outline,
     "InnerCueTerm": rate_colors,
+    "TrackedCamera": turn_upright,
     "Tracker": track,
 }
 

@@ -7,20 +7,21 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from cardbox_tracker.applications.simulation.renderer import Renderer, Scene
-from cardbox_tracker.camera.camera import Camera
-from cardbox_tracker.person.model import BodyModel
-from cardbox_tracker.person.posture import reference_posture, state_limits
-from cardbox_tracker.person.skeleton import KeypointState
-from cardbox_tracker.search.approach import Approach, at_distances
-from cardbox_tracker.search.config import default_preset
-from cardbox_tracker.search.doubt import HANDS, UNCERTAIN_FROM
-from cardbox_tracker.search.visibility import is_trackable
-from cardbox_tracker.terms.multi_view import MultiViewCost
-from cardbox_tracker.terms.whole_body_config import WholeBodyCostConfig
-from cardbox_tracker.tracking.estimate import LOST, TRACKING, Estimate
-from cardbox_tracker.tracking.tracker import Tracker
+from cardbox_tracker.body.model import BodyModel
+from cardbox_tracker.body.posture import reference_posture, state_limits
+from cardbox_tracker.body.skeleton import KeypointState
+from cardbox_tracker.estimation.config import default_preset
+from cardbox_tracker.estimation.cost.multi_view import MultiViewCost
+from cardbox_tracker.estimation.cost.whole_body_config import WholeBodyCostConfig
+from cardbox_tracker.estimation.estimate import LOST, TRACKING, Estimate
+from cardbox_tracker.estimation.filtering.approach import Approach, at_distances
+from cardbox_tracker.estimation.filtering.doubt import HANDS, Source, models
+from cardbox_tracker.estimation.filtering.visibility import is_trackable
+from cardbox_tracker.estimation.tracker import Tracker
+from cardbox_tracker.simulation.renderer import Renderer, Scene
+from cardbox_tracker.vision.camera import Camera
 
+UNCERTAIN_ABOVE = models()[Source.OUTLINE].uncertain_from
 CAMERA = Camera(320, 240, 220.0, 220.0, 159.5, 119.5)
 HIP_HEIGHT_M = -0.51
 FRONT = reference_posture("front")
@@ -50,7 +51,7 @@ def test_a_person_who_walks_metres_is_followed(begin_m: float, end_m: float) -> 
     assert distance_of(found[-1], begin_m) == pytest.approx(end_m, rel=0.06)
     # Far away a keypoint may be in doubt, and the state follows the hands.
     assert found[-1].keypoint_chances is not None and found[-1].keypoint_states is not None
-    is_sure = bool((found[-1].keypoint_chances[HANDS] <= UNCERTAIN_FROM).all())
+    is_sure = bool((found[-1].keypoint_chances[HANDS] <= UNCERTAIN_ABOVE).all())
     assert (found[-1].state == TRACKING) == is_sure
     assert KeypointState.LOST not in found[-1].keypoint_states
 

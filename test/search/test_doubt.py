@@ -56,6 +56,31 @@ def test_states_follow_from_the_probability(by_hand: None, chance: float, state:
     assert judged.is_uncertain == (state != "tracked")
 
 
+def test_the_papers_state_only_says_whether_it_is_lost(by_hand: None) -> None:
+    judged = Doubt().judge(evidence(hand=0.6), Source.PAPER, SEEN)
+    assert judged.states[2] is KeypointState.LOST and not judged.is_uncertain
+    assert Doubt().judge(evidence(whole=0.6), Source.PAPER, SEEN).is_uncertain
+
+
+def test_the_packages_models_are_complete() -> None:
+    assert set(doubt.models()) == set(Source)
+    for uncertain_from, by_kind in doubt.models().values():
+        assert set(by_kind) == {"shoulder", "elbow", "hand", "whole"}
+        assert 0.0 < uncertain_from < doubt.LOST_FROM
+
+
+def test_reasons_are_what_speaks_against_the_worst_keypoint(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    model = Model(-3.0, {"yaw": 1.0, "depth": 2.0, "seen": -1.0, "missing": 9.0})
+    own = dict.fromkeys((*doubt.KINDS, "whole"), model)
+    monkeypatch.setattr(doubt, "models", lambda: dict.fromkeys(Source, Models(0.15, own)))
+    values = {"yaw": np.full(6, 1.5), "depth": np.eye(6)[5], "seen": np.ones(6)}
+    judged = Doubt().judge(values, Source.POINTS, SEEN)
+    assert judged.chances.argmax() == 5
+    assert doubt.reasons(judged, Source.POINTS) == ["depth", "yaw"]
+
+
 def test_an_uncertain_elbow_alone_leaves_the_result_as_it_is(by_hand: None) -> None:
     judged = Doubt().judge(evidence(elbow=0.3), Source.OUTLINE, SEEN)
     assert judged.states[1] is KeypointState.UNCERTAIN and not judged.is_uncertain

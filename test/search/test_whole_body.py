@@ -9,21 +9,26 @@ import cv2
 import numpy as np
 import pytest
 
-from cardbox_tracker.applications.simulation.motions import wave
-from cardbox_tracker.camera.camera import Camera
-from cardbox_tracker.camera.rasterisation import render
-from cardbox_tracker.estimation.filtering.loss import Evidence, chance_of_loss, state_stddev
-from cardbox_tracker.person.cardbox import cardbox_patches
-from cardbox_tracker.person.model import BodyModel
-from cardbox_tracker.person.posture import reference_posture, state_limits
-from cardbox_tracker.person.skeleton import arm_directions
-from cardbox_tracker.search import arm_proposals, state_choice, torso_proposals
-from cardbox_tracker.search.config import TrackerConfig, default_preset
-from cardbox_tracker.search.pose_filter import Presence
-from cardbox_tracker.search.whole_body import WholeBodyFilter
-from cardbox_tracker.terms.compiled import CompiledSilhouette
-from cardbox_tracker.terms.whole_body import WholeBodyCost
-from cardbox_tracker.terms.whole_body_config import WholeBodyCostConfig
+from cardbox_tracker.body.cardbox import cardbox_patches
+from cardbox_tracker.body.model import BodyModel
+from cardbox_tracker.body.posture import reference_posture, state_limits
+from cardbox_tracker.body.skeleton import arm_directions
+from cardbox_tracker.estimation.config import TrackerConfig, default_preset
+from cardbox_tracker.estimation.cost.compiled import CompiledSilhouette
+from cardbox_tracker.estimation.cost.whole_body import WholeBodyCost
+from cardbox_tracker.estimation.cost.whole_body_config import WholeBodyCostConfig
+from cardbox_tracker.estimation.filtering import (
+    arm_proposals,
+    state_choice,
+    torso_proposals,
+    whole_body,
+)
+from cardbox_tracker.estimation.filtering.pose_filter import Presence
+from cardbox_tracker.estimation.filtering.whole_body import STAGES, WholeBodyFilter
+from cardbox_tracker.estimation.filtering.whole_body_config import ONE_CAMERA
+from cardbox_tracker.simulation.motions import wave
+from cardbox_tracker.vision.camera import Camera
+from cardbox_tracker.vision.rasterisation import render
 
 STATE_LIMITS = state_limits(2.0)
 CAMERA = Camera(160, 120, 165.0, 165.0, 79.5, 59.5)
@@ -228,29 +233,50 @@ def test_too_much_and_too_little_are_seen() -> None:
 
 def test_smoothing_is_a_share_of_the_last_result() -> None:
     """With a still particle cloud, as after a jump, each frame leaves so much of the old place."""
-    whole_body = replace(default_preset().whole_body, smoothing=0.5, outline_steps=0)
-    of = made(0, replace(default_preset(), whole_body=whole_body))
+    unrefined = replace(ONE_CAMERA, refining_steps=0)
+    settings = replace(default_preset().whole_body, smoothing=0.5, profile=unrefined)
+    of = made(0, replace(default_preset(), whole_body=settings))
     first = follow(of, seen(wave(0.0)))
     second = follow(of, seen(wave(0.3)))
     mean, _ = state_choice.mean_and_spread(of.rated.states, of.rated.ratings, 150, 0.02)
     np.testing.assert_allclose(second.posture, 0.5 * first.posture + 0.5 * mean[:12])
 
 
-def test_the_chance_of_loss_by_hand() -> None:
-    nothing = np.zeros(14)
-    good = Evidence(0.0, 0.0, 0.0, 1.0, 0.0, 0.0, nothing, nothing, 10_000)
-    assert chance_of_loss(good) == pytest.approx(1 / (1 + np.exp(3.936)))
-    bad = good._replace(left_over=0.5, outside=0.5, residual=1.0)
-    logit = -3.936 + 0.5 * 8.733 - 0.5 * 2.048 + 2.574
-    assert chance_of_loss(bad) == pytest.approx(1 / (1 + np.exp(-logit)))
-    others: tuple[dict[str, Any], ...] = ({"area": 2.0}, {"area": 0.3}, {"age": 0})
-    for worse in ({"arm_m": 0.1}, {"prior": 0.1}, *others):
-        assert chance_of_loss(good._replace(**worse)) > chance_of_loss(good)
+def test_each_stage_adds_states_to_those_before(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The one of the cues adds nothing without cues, and with one camera fits no outlines."""
+    counts: list[tuple[str, int]] = []
+
+    def noting(stage: Any) -> Any:
+        def run(of: WholeBodyFilter, search: Any) -> None:
+            before = search.rated.states[:].copy() if len(search.rated.ratings) else None
+            stage(of, search)
+            counts.append((stage.__name__, len(search.rated.states)))
+            if before is not None:
+                np.testing.assert_array_equal(search.rated.states[: len(before)], before)
+
+        return run
+
+    monkeypatch.setattr(whole_body, "STAGES", tuple(map(noting, STAGES)))
+    of = made()
+    follow(of, seen(wave(0.0)))
+    counts.clear()
+    follow(of, seen(wave(0.1)))
+    assert [name for name, _ in counts] == ["torsos", "arms", "fitted", "together"]
+    torsos, arms, fitted, together = (count for _, count in counts)
+    assert 0 < torsos < arms == fitted < together
+    assert together - fitted == ONE_CAMERA.rounds * ONE_CAMERA.together
 
 
-def test_deviations_have_a_floor_and_grow() -> None:
-    still, moving = state_stddev(np.zeros(14)), state_stddev(np.full(14, 0.3))
-    assert np.all(still > 0)
-    # Twice the spread of the torso, three times that of an arm.
-    np.testing.assert_allclose(moving[:4], np.hypot(0.6, still[:4]))
-    np.testing.assert_allclose(moving[4:12], np.hypot(0.9, still[4:12]))
+def test_a_result_is_judged_by_what_was_found() -> None:
+    of = made()
+    fit = [follow(of, seen(wave(0.0))) for _ in range(5)][-1]
+    good = fit.judged.evidence
+    assert fit.judged.chances.shape == (6,) and len(fit.judged.states) == 6
+    assert good["residual"][0] == pytest.approx(fit.cost_px / of._cost.silhouette_px)
+    assert good["left over"][0] < 0.2 and good["outside"][0] < 0.2
+    assert good["cameras"].tolist() == [0.0] * 6
+    assert {values.shape for values in good.values()} == {(6,)}
+    crowded = seen(wave(0.0))
+    crowded[20:100, 110:130] = 255
+    bad = follow(of, crowded).judged.evidence
+    assert bad["left over"][0] > good["left over"][0] + 0.1

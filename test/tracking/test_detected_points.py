@@ -9,26 +9,27 @@ from typing import Any
 import numpy as np
 import pytest
 
-from cardbox_tracker.applications.simulation.motions import wave
-from cardbox_tracker.camera.camera import Camera
-from cardbox_tracker.camera.extrinsics import Extrinsics
-from cardbox_tracker.camera.rasterisation import render
-from cardbox_tracker.camera.view import OtherCamera, View
-from cardbox_tracker.detectors.image_points import POINT_INDEX, POINT_NAMES, ImagePoints
-from cardbox_tracker.estimation.filtering.keypoint_states import HANDS, are_sure
-from cardbox_tracker.person.cardbox import cardbox_patches
-from cardbox_tracker.person.model import BodyModel
-from cardbox_tracker.person.posture import reference_posture
-from cardbox_tracker.search.config import default_preset
-from cardbox_tracker.terms.inner_cue import InnerCue
-from cardbox_tracker.terms.whole_body import WholeBodyCost
-from cardbox_tracker.terms.whole_body_config import WholeBodyCostConfig
-from cardbox_tracker.tracking.estimate import TRACKING, UNCERTAIN, Estimate
-from cardbox_tracker.tracking.observation import Observation
-from cardbox_tracker.tracking.tracker import Tracker
+from cardbox_tracker.body.cardbox import cardbox_patches
+from cardbox_tracker.body.model import BodyModel
+from cardbox_tracker.body.posture import reference_posture
+from cardbox_tracker.detection.image_points import POINT_INDEX, POINT_NAMES, ImagePoints
+from cardbox_tracker.estimation.config import default_preset
+from cardbox_tracker.estimation.cost.inner_cue import InnerCue
+from cardbox_tracker.estimation.cost.view import OtherCamera, View
+from cardbox_tracker.estimation.cost.whole_body import WholeBodyCost
+from cardbox_tracker.estimation.cost.whole_body_config import WholeBodyCostConfig
+from cardbox_tracker.estimation.estimate import TRACKING, UNCERTAIN, Estimate
+from cardbox_tracker.estimation.filtering.doubt import HANDS, Source, models
+from cardbox_tracker.estimation.observation import Observation
+from cardbox_tracker.estimation.tracker import Tracker
+from cardbox_tracker.simulation.motions import wave
+from cardbox_tracker.vision.camera import Camera
+from cardbox_tracker.vision.extrinsics import Extrinsics
+from cardbox_tracker.vision.rasterisation import render
 
 Detect = Callable[..., ImagePoints]
 
+UNCERTAIN_ABOVE = models()[Source.POINTS].uncertain_from
 CAMERA = Camera(160, 120, 165.0, 165.0, 79.5, 59.5)
 MEASURED = BodyModel.of(hip_height_m=-0.51)
 GUESSED = MEASURED.with_values(source="proportions")
@@ -117,7 +118,8 @@ def is_tracked(found: tuple[np.ndarray, list[Estimate]], body: BodyModel) -> boo
     """
     estimates = found[1]
     sure = [
-        estimate.state == TRACKING or not are_sure(estimate.keypoint_chances[HANDS])
+        estimate.state == TRACKING
+        or bool((estimate.keypoint_chances[HANDS] > UNCERTAIN_ABOVE).any())
         for estimate in estimates
     ]
     least = 0.8 * len(sure) if body is MEASURED else 0

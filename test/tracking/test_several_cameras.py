@@ -2,34 +2,44 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass, field, replace
+
 import cv2
 import numpy as np
 import pytest
 
-from cardbox_tracker.applications.simulation.motions import wave
-from cardbox_tracker.camera.camera import Camera
-from cardbox_tracker.camera.extrinsics import Extrinsics
-from cardbox_tracker.camera.view import OtherCamera, View
-from cardbox_tracker.common.errors import CameraError, InitializationError
-from cardbox_tracker.measuring.scale import (
+from cardbox_tracker.body.model import BodyModel
+from cardbox_tracker.body.posture import reference_posture
+from cardbox_tracker.detection.image_points import POINT_INDEX, ImagePoints
+from cardbox_tracker.errors import CameraError, InitializationError
+from cardbox_tracker.estimation.config import default_preset, paper_preset
+from cardbox_tracker.estimation.cost.depth import Depth, DepthTerm
+from cardbox_tracker.estimation.cost.multi_view import MultiViewCost
+from cardbox_tracker.estimation.cost.terms import (
+    ARM,
+    TRUNK,
+    Frame,
+    Posed,
+    TermObservation,
+)
+from cardbox_tracker.estimation.cost.view import OtherCamera, View
+from cardbox_tracker.estimation.cost.whole_body import WholeBodyCost
+from cardbox_tracker.estimation.cost.whole_body_config import WholeBodyCostConfig
+from cardbox_tracker.estimation.estimate import NO_PERSON, TRACKING, UNCERTAIN, Estimate
+from cardbox_tracker.estimation.filtering.arms import ARM_LIMITS
+from cardbox_tracker.estimation.filtering.whole_body import WholeBodyFilter
+from cardbox_tracker.estimation.initialization.scale import (
     DepthReference,
     depth_scale,
     measured_scale,
     scaled,
 )
-from cardbox_tracker.person.model import BodyModel
-from cardbox_tracker.person.posture import reference_posture
-from cardbox_tracker.search.arms import ARM_LIMITS
-from cardbox_tracker.search.config import default_preset, paper_preset
-from cardbox_tracker.search.whole_body import WholeBodyFilter
-from cardbox_tracker.terms.depth import Depth, DepthTerm
-from cardbox_tracker.terms.multi_view import MultiViewCost
-from cardbox_tracker.terms.term import Frame, Silence
-from cardbox_tracker.terms.whole_body import WholeBodyCost
-from cardbox_tracker.terms.whole_body_config import WholeBodyCostConfig
-from cardbox_tracker.tracking.estimate import NO_PERSON, TRACKING, UNCERTAIN, Estimate
-from cardbox_tracker.tracking.observation import Observation, stamp_of
-from cardbox_tracker.tracking.tracker import Tracker
+from cardbox_tracker.estimation.observation import Observation, stamp_of
+from cardbox_tracker.estimation.tracker import Tracker
+from cardbox_tracker.settings import Settings
+from cardbox_tracker.simulation.motions import wave
+from cardbox_tracker.vision.camera import Camera
+from cardbox_tracker.vision.extrinsics import Extrinsics
 
 BODY = BodyModel.of(hip_height_m=-0.41, lateral_m=0.05, camera_pitch_rad=0.1)
 CAMERA = Camera(160, 120, 150.0, 151.0, 79.0, 60.0).with_pitch(0.1)
@@ -146,16 +156,18 @@ def test_terms_of_each_camera_get_the_number_of_pixels_that_count() -> None:
     """Otherwise a camera whose silhouette has legs would weigh its points twice."""
     counted_px = []
 
-    class Counting(Silence):
-        def observe(self, frame: Frame) -> Silence:
+    class Counting:
+        def observe(self, frame: Frame) -> None:
             counted_px.append(frame.foreground_px)
-            return self
 
     views, state = MultiViewCost(BODY, CAMERA, [VIEW], CONFIG), state_of(0.2)
     silhouettes = both(state)
     views.see(silhouettes, state)
     views.choose((0, 1))
-    views.observe([Frame(one, 120, 10**6) for one in silhouettes], [[Counting()], [Counting()]])
+    frames = [Frame(CAMERA, {"silhouette": one}, 120, 10**6) for one in silhouettes]
+    views.observe(frames, [[Counting()], [Counting()]])
+    # A term without an observation of this frame does not count.
+    assert [cost.terms for cost in views.costs] == [(), ()]
     assert counted_px == [cost.silhouette_px for cost in views.costs]
     assert min(counted_px) > 500
 
@@ -257,18 +269,134 @@ def test_the_depth_of_the_right_place_costs_least() -> None:
     depth = np.where(silhouette > 0, hips[2] - 0.1, np.nan).astype(np.float32)
     states = np.tile(state, (5, 1))
     states[:, 12] += np.linspace(-0.4, 0.4, 5)
-    term = DepthTerm(Depth(), BODY, CAMERA)
-    observation = term.observe(Frame(silhouette, 120, 1, depth_m=depth))
-    assert np.argmin(observation.postures(states)) == 2
-    torsos = states[:, [0, 1, 2, 3, 12, 13]]
-    assert np.argmin(observation.torsos_beside(None)(torsos)) == 2
-    arms = np.tile(state[4:8], (2, 1))
-    arms[1, 1] = 1.5  # straight at the camera, where nothing is
-    costs = observation.arms_beside(torsos[2])("left", arms)
+    term, body = DepthTerm(Depth(), BODY, CAMERA), FIRST.body
+    observation = term.observe(seen_at(silhouette, depth_m=depth))
+    assert observation is not None
+    assert np.argmin(observation.rate(Posed(body, states))) == 2
+    assert np.argmin(observation.rate(Posed(body, states, TRUNK))) == 2
+    arms = np.tile(states[2], (2, 1))
+    arms[1, 5] = 1.5  # straight at the camera, where nothing is
+    costs = observation.rate(Posed(body, arms, ARM[0]))
     assert costs[0] < costs[1]
+    # Of the other arm it says the same, and of a whole body the sum of its parts.
+    parts = [observation.rate(Posed(body, arms, one)) for one in (TRUNK, *ARM)]
+    assert parts[2][0] == parts[2][1]
+    np.testing.assert_allclose(observation.rate(Posed(body, arms)), sum(parts))
     # Without a measured depth it says nothing.
-    for frame in (Frame(silhouette, 120, 1), Frame(silhouette, 120, 1, depth_m=0 * depth)):
-        np.testing.assert_array_equal(term.observe(frame).postures(states), 0.0)
+    assert term.observe(seen_at(silhouette)) is None
+    unknown = term.observe(seen_at(silhouette, depth_m=0 * depth))
+    assert unknown is not None
+    np.testing.assert_array_equal(unknown.rate(Posed(body, states)), 0.0)
+
+
+def seen_at(silhouette: np.ndarray, **channels: np.ndarray) -> Frame:
+    return Frame(CAMERA, {"silhouette": silhouette, **channels}, 120, 1)
+
+
+def depth_of(cost: WholeBodyCost, camera: Camera, state: np.ndarray) -> np.ndarray:
+    """The drawn model's depth: that of the nearest patch, metres; 0 beside it."""
+    depth_m = np.full((camera.height, camera.width), np.inf, np.float32)
+    for patch in cost.corners(state):
+        mask = np.zeros(depth_m.shape, np.uint8)
+        pixels = np.round(16 * camera.project(patch)).astype(np.int32)
+        cv2.fillConvexPoly(mask, pixels, 255, cv2.LINE_8, 4)
+        depth_m[mask > 0] = np.minimum(depth_m[mask > 0], patch[:, 2].mean())
+    return np.where(np.isfinite(depth_m), depth_m, 0.0).astype(np.float32)
+
+
+def raw_of(upright: np.ndarray, view: View, camera: Camera, nothing: float) -> np.ndarray:
+    """The image of a camera whose upright image is ``upright``."""
+    v, u = np.indices((camera.height, camera.width))
+    pixels = view.upright_px(np.stack([u, v], -1).reshape(-1, 2).astype(np.float64))
+    at = np.rint(pixels).astype(int).reshape(camera.height, camera.width, 2)
+    inside = ((at >= 0) & (at < (upright.shape[1], upright.shape[0]))).all(axis=2)
+    raw = np.full((camera.height, camera.width), nothing, upright.dtype)
+    raw[inside] = upright[at[inside][:, 1], at[inside][:, 0]]
+    return raw
+
+
+@dataclass(frozen=True)
+class Asking(Settings):
+    """A term that keeps the frames of each camera, and says nothing."""
+
+    frames: list[Frame] = field(default_factory=list)
+
+    def build(self, person: BodyModel, camera: Camera) -> Asking:
+        assert person.placement.distance_m > 0.0
+        return self
+
+    def observe(self, frame: Frame) -> TermObservation | None:
+        self.frames.append(frame)
+        return None
+
+
+def test_terms_of_each_camera_see_its_own_upright_channels() -> None:
+    """The second camera lies on its side; images, depth and points of it are turned upright."""
+    other = aside(1.57)
+    view = View.of(BODY, CAMERA, other)
+    cost = WholeBodyCost(view.body, view.camera, CONFIG)
+    asking = Asking()
+    config = replace(default_preset(), terms=(asking,), select_person=False)
+    tracker = Tracker(BODY, CAMERA, config, others=[other])
+    state = state_of(0.3)
+    there = view.states(state)
+    upright = drawn(cost, view.camera, there), depth_of(cost, view.camera, there)
+    mask, depth_m = (raw_of(one, view, other.camera, 0) for one in upright)
+    there_px = other.camera.project(moved_to(other, state))[2]
+    points = ImagePoints.of({"left_wrist": (*there_px, 0.9)})
+    px = CAMERA.project(FIRST.keypoints(state))[2]
+    first = Observation(
+        drawn(FIRST, CAMERA, state), points=ImagePoints.of({"left_wrist": (*px, 0.9)})
+    )
+    image = np.repeat(mask[..., None], 3, axis=2)
+    for _ in range(2):
+        tracker.track([first, Observation(mask, image, depth_m, points=points)])
+    one, two = asking.frames[-2:]
+    assert (one.camera, two.camera) == (tracker.camera, view.camera)
+    assert one.depth_m is None and two.depth_m is not None and two.image is not None
+    assert two.depth_m.shape == two.silhouette.shape == two.image.shape[:2] == (160, 120)
+    known = two.depth_m > 0.0
+    agrees = np.isclose(two.depth_m[known], upright[1][known], atol=0.05)
+    assert known.sum() > 500 and agrees.mean() > 0.9
+    assert ((two.silhouette > 0) == (upright[0] > 0)).mean() > 0.98
+    np.testing.assert_array_equal(two.image[..., 0], two.silhouette)
+    for frame, joints_m in ((one, FIRST.keypoints(state)), (two, cost.keypoints(there))):
+        assert frame.points is not None and frame.before is not None
+        wrist_px = frame.points.px[POINT_INDEX["left_wrist"]]
+        np.testing.assert_allclose(wrist_px, frame.camera.project(joints_m)[2], atol=1e-3)
+        # The last posture is before this camera.
+        assert np.linalg.norm(frame.before.keypoints_px[0] - frame.camera.project(joints_m)) < 60.0
+
+
+def moved_to(other: OtherCamera, state: np.ndarray) -> np.ndarray:
+    """The joints of a state of the first camera in another one's optical frame, metres."""
+    there_m: np.ndarray = FIRST.keypoints(state) @ other.extrinsics.rotation.T
+    return there_m + other.extrinsics.translation_m
+
+
+@pytest.mark.parametrize("roll_rad", [0.0, 1.57])
+def test_the_depth_of_a_second_camera_counts(roll_rad: float) -> None:
+    """It alone sees the person, so its depth says how far away from it they are."""
+    other = aside(roll_rad)
+    view = View.of(BODY, CAMERA, other)
+    cost = WholeBodyCost(view.body, view.camera, CONFIG)
+    config = default_preset().with_depth()
+    state = state_of(0.0)
+    there = view.states(state)
+    mask = raw_of(drawn(cost, view.camera, there), view, other.camera, 0)
+    depth_m = depth_of(cost, view.camera, there)
+    away_m = []
+    for factor in (1.0, 1.08):
+        raw_m = raw_of(factor * depth_m, view, other.camera, 0.0)
+        tracker = Tracker(BODY, CAMERA, config, others=[other])
+        for _ in range(12):
+            estimate = tracker.track([None, Observation(mask, depth_m=raw_m)])
+        assert estimate.keypoints_m is not None
+        pose_of = other.extrinsics
+        joints_m = estimate.keypoints_m @ pose_of.rotation.T + pose_of.translation_m
+        away_m.append(float(joints_m[[0, 3], 2].mean()))
+    # A deeper image of the same outline is a person farther away.
+    assert away_m[1] - away_m[0] > 0.04
 
 
 @pytest.mark.parametrize("guessed", [0.75, 1.3])
@@ -314,17 +442,18 @@ def test_depth_images_of_something_else_are_refused() -> None:
         depth_scale(BODY, CAMERA, unknown)
 
 
-def test_of_an_image_turned_upright_only_what_is_asked_for_is_there() -> None:
-    c, s = np.cos(0.1), np.sin(0.1)
-    roll = np.array([(c, -s, 0.0), (s, c, 0.0), (0.0, 0.0, 1.0)])
-    rolled = OtherCamera(CAMERA, Extrinsics(roll, np.array([0.1, 0.0, 0.0])))
-    view = View.of(BODY, CAMERA, rolled)
-    image = np.random.default_rng(0).integers(1, 255, (CAMERA.height, CAMERA.width, 3), np.uint8)
-    whole, part = view.upright(image), view.upright(image, box=(40, 30, 50, 60))
-    np.testing.assert_array_equal(part[30:90, 40:90], whole[30:90, 40:90])
-    part[30:90, 40:90] = 0
-    assert not part.any()
-    assert not view.upright(image, box=(0, 0, 0, 0)).any()
+def test_an_upright_image_is_continued_and_a_mask_ends() -> None:
+    view = View.of(BODY, CAMERA, aside(0.1))
+    white = np.full((120, 160), 255, np.uint8)
+    assert (view.upright(white) == 255).all()
+    mask = view.upright(white, is_mask=True)
+    assert 0.01 < (mask == 0).mean() < 0.2
+    image = np.random.default_rng(0).integers(1, 255, (120, 160, 3), np.uint8)
+    turned = view.upright(image)
+    assert turned.dtype == np.uint8 and turned.shape == image.shape
+    np.testing.assert_array_equal(turned[60, 80], image[tuple(view.turn[60, 80][::-1])])
+    depth_m = np.linspace(1.0, 3.0, 120 * 160, dtype=np.float32).reshape(120, 160)
+    assert view.upright(depth_m).dtype == np.float32
 
 
 @pytest.mark.parametrize("roll_rad", [0.0, 0.02, -0.6, 1.57, 3.1, -1.5])

@@ -1,0 +1,213 @@
+"""Fitted models of doubt: coefficients of synthetic data, weights of sources, and the table."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from cardbox_tracker.body.model import BodyModel
+from cardbox_tracker.estimation.estimate import Estimate
+from cardbox_tracker.estimation.filtering import doubt as package
+from cardbox_tracker.estimation.filtering.doubt import Doubt, Source
+from cardbox_tracker.estimation.tracker import Tracker
+from cardbox_tracker.vision.camera import Camera
+from learning import doubt
+from learning.doubt import Collector, Samples, chances, fit, fit_all, row_of, threshold_of
+
+# Intercept, and coefficients of evidence of different size, for each kind of keypoint.
+TRUE = {
+    "shoulder": (-2.0, {"area": 1.0, "spread": 0.0}),
+    "elbow": (-1.0, {"area": 0.5, "spread": 40.0}),
+    "hand": (0.5, {"area": -1.0, "spread": 80.0}),
+}
+NAMES = ("area", "spread")
+
+
+def samples(seed: int, count: int, area: float = 0.0) -> Samples:
+    """Results of a source with errors of 0.1 m or 0.5 m, by the probabilities of ``TRUE``."""
+    rng = np.random.default_rng(seed)
+    evidence = {
+        "area": rng.normal(area, 1.0, (count, 6)),
+        "spread": rng.normal(0.0, 0.02, (count, 6)),
+    }
+    chance = chances(
+        Samples(evidence, np.empty(0), np.empty((count, 6))), {**TRUE, "whole": TRUE["hand"]}
+    )
+    wrong = rng.random((count, 7)) < chance
+    off_m = np.where(wrong[:, 6:], 0.5, 0.1) * np.ones(6)
+    return Samples(evidence, np.where(wrong[:, :6], 0.5, 0.1), off_m)
+
+
+# Sources of different size, whose evidence is distributed differently.
+SOURCES = [samples(0, 12_000), samples(1, 8_000, 1.0), samples(2, 4_000, -1.0)]
+
+
+@pytest.mark.parametrize("model", ["shoulder", "elbow", "hand", "whole"])
+def test_known_coefficients_are_found(monkeypatch: pytest.MonkeyPatch, model: str) -> None:
+    true = TRUE["hand" if model == "whole" else model]
+    monkeypatch.setattr(doubt, "PENALTY", 1e-9)
+    intercept, found = fit(SOURCES, model, NAMES)
+    assert intercept == pytest.approx(true[0], abs=0.12)
+    assert found["area"] == pytest.approx(true[1]["area"], abs=0.12)
+    assert found["spread"] == pytest.approx(true[1]["spread"], abs=5.0)
+
+
+def test_the_penalty_shrinks_coefficients_alike_whatever_their_unit() -> None:
+    intercept, found = fit(SOURCES, "hand", NAMES)
+    shares = [found[name] / TRUE["hand"][1][name] for name in NAMES]
+    assert min(shares) > 0.7 and max(shares) < 1.0
+    metres = [
+        Samples(
+            {**one.evidence, "spread": one.evidence["spread"] / 1000.0}, one.aligned_m, one.off_m
+        )
+        for one in SOURCES
+    ]
+    again = fit(metres, "hand", NAMES)
+    assert again[0] == pytest.approx(intercept, rel=1e-4)
+    assert again[1]["spread"] / 1000.0 == pytest.approx(found["spread"], rel=1e-3)
+
+
+def test_evidence_that_never_changes_has_no_coefficient() -> None:
+    constant = [
+        Samples({**one.evidence, "cameras": np.zeros_like(one.off_m)}, one.aligned_m, one.off_m)
+        for one in SOURCES
+    ]
+    intercept, found = fit(constant, "elbow", (*NAMES, "cameras"))
+    assert found.pop("cameras") == 0.0
+    without = fit(SOURCES, "elbow", NAMES)
+    assert intercept == pytest.approx(without[0])
+    assert found == pytest.approx(without[1])
+
+
+def test_all_sources_weigh_the_same() -> None:
+    """Whether a source is long or short; many more results of one change nothing."""
+    first, second = SOURCES[1:]
+    longer = Samples(
+        {name: np.tile(one, (5, 1)) for name, one in second.evidence.items()},
+        np.tile(second.aligned_m, (5, 1)),
+        np.tile(second.off_m, (5, 1)),
+    )
+    expected, found = (fit([first, other], "hand", NAMES) for other in (second, longer))
+    assert found[0] == pytest.approx(expected[0], rel=1e-6)
+    assert found[1] == pytest.approx(expected[1], rel=1e-6)
+    assert fit([second], "hand", NAMES)[0] != pytest.approx(expected[0], abs=0.01)
+
+
+def test_rows_are_the_keypoints_of_a_kind_or_whole_results() -> None:
+    values = np.arange(12.0).reshape(2, 6)
+    aligned_m = np.array([[0.0, 0.31, 0.0, 0.0, 0.0, 0.0], [0.0, 0.0, 0.0, 0.0, 0.0, 0.31]])
+    off_m = np.array([[0.0, 0.0, 0.0, 0.0, 0.0, 1.9], [0.31] * 6])
+    one = Samples({"yaw": values}, aligned_m, off_m)
+    evidence, wrong = one.rows("elbow")
+    assert evidence["yaw"].tolist() == [1.0, 4.0, 7.0, 10.0] and wrong.tolist() == [1, 0, 0, 0]
+    evidence, wrong = one.rows("hand")
+    assert evidence["yaw"].tolist() == [2.0, 5.0, 8.0, 11.0] and wrong.tolist() == [0, 0, 0, 1]
+    evidence, wrong = one.rows("whole")
+    # A whole result is lost if the mean of its absolute errors is beyond 30 cm.
+    assert evidence["yaw"].tolist() == [0.0, 6.0] and wrong.tolist() == [1.0, 1.0]
+
+
+def test_chances_are_those_that_the_package_computes(monkeypatch: pytest.MonkeyPatch) -> None:
+    models = {**TRUE, "whole": (-1.0, {"area": 2.0})}
+    some = samples(5, 4)
+    found = chances(some, models)
+    own = {kind: package.Model(*model) for kind, model in models.items()}
+    monkeypatch.setattr(package, "models", lambda: dict.fromkeys(Source, package.Models(0.1, own)))
+    for number, row in enumerate(found):
+        one = Doubt()
+        evidence = {name: values[number] for name, values in some.evidence.items()}
+        judged = one.judge(evidence, Source.OUTLINE, np.zeros(6, np.bool_))
+        np.testing.assert_allclose(judged.chances, row[:6], rtol=1e-12)
+        assert one._whole == pytest.approx(row[6])
+
+
+def errors_of(aligned_m: np.ndarray) -> Samples:
+    return Samples({}, aligned_m, aligned_m)
+
+
+def test_a_row_of_the_table_by_hand() -> None:
+    aligned_m = np.full((4, 6), 0.05)
+    said = np.full((4, 7), 0.01)
+    # A lost result; an uncertain hand off by 20 cm; an uncertain elbow; a wrong tracked one.
+    said[0, 6] = 0.6
+    aligned_m[1, 2], said[1, 2] = 0.2, 0.2
+    said[2, 1] = 0.2
+    aligned_m[3, 4] = 0.4
+    row = row_of("person", errors_of(aligned_m), said, 0.1)
+    cells = [cell.strip() for cell in row.strip("|").split("|")]
+    # Two are `tracking`, one of them with a wrong joint; 22 of 24 keypoints are tracked, one of
+    # these wrong; one of two uncertain ones is off by 15 cm; 22 say 1 %, two 20 %; one is wrong.
+    assert cells == ["person", "4", "50.0", "50.0", "91.7", "4.5", "50.0", "2.6", "4.2"]
+
+
+def test_shares_of_nothing_are_empty() -> None:
+    said = np.full((2, 7), 0.9)
+    cells = row_of("person", errors_of(np.full((2, 6), 0.05)), said, 0.1).split("|")
+    assert [cell.strip() for cell in cells[3:8]] == ["0.0", "", "0.0", "", ""]
+
+
+def test_the_threshold_leaves_few_wrong_keypoints_among_tracked_ones() -> None:
+    said = np.repeat(np.linspace(0.001, 0.2, 100)[:, None], 7, axis=1)
+    aligned_m = np.full((100, 6), 0.05)
+    # Of 600 keypoints, 12 in 600 are allowed; these are wrong from 0.1 on, two of six in a row.
+    aligned_m[50:, :2] = 0.4
+    threshold = threshold_of(
+        [(errors_of(aligned_m[::2]), said[::2]), (errors_of(aligned_m[1::2]), said[1::2])]
+    )
+    tracked = said[:, :6] <= threshold
+    share = float((aligned_m > 0.3)[tracked].mean())
+    assert 0.01 < share <= 0.02
+    assert threshold == pytest.approx(0.107, abs=0.003)
+    # Never above a quarter, also if nothing is wrong.
+    assert threshold_of([(errors_of(np.full((100, 6), 0.05)), 4.0 * said)]) == 0.25
+    assert threshold_of([(errors_of(np.full((100, 6), 0.4)), said)]) == 0.0
+
+
+def test_what_is_stored_is_what_the_package_reads(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    by_source = {
+        source: {f"person {number}": [one] for number, one in enumerate(SOURCES)}
+        for source in (Source.OUTLINE, Source.PAPER)
+    }
+    stored = fit_all(by_source)
+    printed = capsys.readouterr().out
+    for name in ("outline: uncertain above", "paper: uncertain above", "| person 0 | 12000 |"):
+        assert name in printed
+    path = tmp_path / "doubt.json"
+    path.write_text(json.dumps(stored), encoding="utf-8")
+    monkeypatch.setattr(package, "_FILE", path)
+    read = package.models.__wrapped__()
+    assert set(read) == set(by_source)
+    uncertain_from, by_kind = read[Source.OUTLINE]
+    assert 0.0 <= uncertain_from <= doubt.HIGHEST
+    assert set(by_kind) == set(doubt.MODELS)
+    expected = fit(SOURCES, "hand", NAMES)
+    assert by_kind["hand"].intercept == pytest.approx(expected[0], abs=1e-4)
+    assert by_kind["hand"].coefficients == pytest.approx(expected[1], abs=1e-4)
+
+
+def test_only_results_with_truth_and_of_one_kind_are_collected() -> None:
+    truth_m = np.zeros((6, 3))
+    truth_m[:, 2] = 2.0
+    off_m = np.array([0.0, 0.0, 0.3])
+    tracker = Tracker(BodyModel(), Camera(96, 72, 99.0, 99.0, 47.5, 35.5))
+    without, having = {"yaw": np.ones(6)}, {"yaw": np.ones(6), "point distance": np.ones(6)}
+    for source, kept in ((Source.OUTLINE, without), (Source.POINTS, having)):
+        collector = Collector({7: truth_m}, source)
+        assert collector.samples() is None
+        for stamp_ns, evidence in ((7, without), (7, having), (8, kept)):
+            found = Estimate("tracking", keypoints_m=truth_m + off_m, evidence=evidence)
+            collector(0, stamp_ns, found, tracker)
+        collector(0, 7, Estimate("lost"), tracker)
+        collected = collector.samples()
+        assert collected is not None
+        assert {name: one.shape for name, one in collected.evidence.items()} == dict.fromkeys(
+            kept, (1, 6)
+        )
+        # All joints are off alike, so none is beside the shoulders.
+        np.testing.assert_allclose(collected.off_m, np.full((1, 6), 0.3))
+        np.testing.assert_allclose(collected.aligned_m, 0.0, atol=1e-12)
