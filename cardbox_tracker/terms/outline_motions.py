@@ -7,7 +7,8 @@ beyond it as one rigid body, so its twist, six numbers in the optical frame, des
 all points.
 
 With the twist (v, w) of :mod:`cardbox_tracker.person.kinematics`, a point's force
-f = d(distance)/dX and torque X x f give the derivative of its distance by a value as f . v + (X x f) . w.
+f = d(distance)/dX and torque X x f give the derivative of its distance by a value as
+f . v + (X x f) . w.
 """
 
 from __future__ import annotations

@@ -19,40 +19,44 @@ from typing import Any
 
 import numpy as np
 
-from cardbox_tracker.body.appearance import PARTS, Appearance, bins_of
-from cardbox_tracker.body.model import BodyModel
-from cardbox_tracker.detection.image_points import POINT_NAMES, ImagePoints
-from cardbox_tracker.errors import CardboxError
-from cardbox_tracker.estimation.config import PRESETS
-from cardbox_tracker.estimation.cost.compiled import CompiledSilhouette
-from cardbox_tracker.estimation.cost.depth import Depth
-from cardbox_tracker.estimation.cost.drawn_body import body_tuple
-from cardbox_tracker.estimation.cost.inner_cue import InnerCue
-from cardbox_tracker.estimation.cost.outline import Outline, signed_distances
-from cardbox_tracker.estimation.cost.terms import Frame, Posed
-from cardbox_tracker.estimation.cost.view import OtherCamera
-from cardbox_tracker.estimation.cost.whole_body import WholeBodyCost
-from cardbox_tracker.estimation.cost.whole_body_config import WholeBodyCostConfig
-from cardbox_tracker.estimation.observation import Observation
-from cardbox_tracker.estimation.person_region import PersonRegion
-from cardbox_tracker.estimation.precompile import quickest
-from cardbox_tracker.estimation.still_things import StillThings
-from cardbox_tracker.estimation.tracked_camera import TrackedCamera
-from cardbox_tracker.estimation.tracker import Tracker
-from cardbox_tracker.vision.absorption import StillRegions
-from cardbox_tracker.vision.background import SilhouetteExtractor
-from cardbox_tracker.vision.camera import Camera
-from cardbox_tracker.vision.chroma import ChromaModel, ChromaScore
-from cardbox_tracker.vision.color_reader import ColorReader
-from cardbox_tracker.vision.empty_scene import BackgroundLearner, BackgroundModel
-from cardbox_tracker.vision.extrinsics import Extrinsics
-from cardbox_tracker.vision.foreground import segment_foreground
-from cardbox_tracker.vision.given_arrays import depth_from, image_from, silhouette_from
-from cardbox_tracker.vision.light import LightFollower
-from cardbox_tracker.vision.medians import median
-from cardbox_tracker.vision.regions import clean_silhouette, find_regions, remove_small_regions
-from cardbox_tracker.vision.shadows import decide_shadows
-from cardbox_tracker.vision.window import Window, window_of
+from cardbox_tracker.camera.camera import Camera
+from cardbox_tracker.camera.extrinsics import Extrinsics
+from cardbox_tracker.camera.given_arrays import depth_from, image_from, silhouette_from
+from cardbox_tracker.camera.view import OtherCamera
+from cardbox_tracker.common.errors import CardboxError
+from cardbox_tracker.detectors.image_points import POINT_NAMES, ImagePoints
+from cardbox_tracker.person.appearance import PARTS, Appearance, bins_of
+from cardbox_tracker.person.model import BodyModel
+from cardbox_tracker.search.config import PRESETS
+from cardbox_tracker.segmentation.absorption import StillRegions
+from cardbox_tracker.segmentation.background import SilhouetteExtractor
+from cardbox_tracker.segmentation.chroma import ChromaModel, ChromaScore
+from cardbox_tracker.segmentation.color_reader import ColorReader
+from cardbox_tracker.segmentation.empty_scene import BackgroundLearner, BackgroundModel
+from cardbox_tracker.segmentation.foreground import segment_foreground
+from cardbox_tracker.segmentation.light import LightFollower
+from cardbox_tracker.segmentation.medians import median
+from cardbox_tracker.segmentation.regions import (
+    clean_silhouette,
+    find_regions,
+    remove_small_regions,
+)
+from cardbox_tracker.segmentation.shadows import decide_shadows
+from cardbox_tracker.segmentation.window import Window, window_of
+from cardbox_tracker.terms.compiled import CompiledSilhouette
+from cardbox_tracker.terms.depth import Depth
+from cardbox_tracker.terms.drawn_body import body_tuple
+from cardbox_tracker.terms.inner_cue import InnerCue
+from cardbox_tracker.terms.outline import Outline, signed_distances
+from cardbox_tracker.terms.term import Frame, Posed
+from cardbox_tracker.terms.whole_body import WholeBodyCost
+from cardbox_tracker.terms.whole_body_config import WholeBodyCostConfig
+from cardbox_tracker.tracking.observation import Observation
+from cardbox_tracker.tracking.person_region import PersonRegion
+from cardbox_tracker.tracking.precompile import quickest
+from cardbox_tracker.tracking.still_things import StillThings
+from cardbox_tracker.tracking.tracked_camera import TrackedCamera
+from cardbox_tracker.tracking.tracker import Tracker
 
 CAMERA = Camera(48, 32, 50.0, 50.0, 23.5, 15.5)
 SIZE = (CAMERA.height, CAMERA.width)

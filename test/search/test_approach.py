@@ -7,19 +7,19 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from cardbox_tracker.body.model import BodyModel
-from cardbox_tracker.body.posture import reference_posture, state_limits
-from cardbox_tracker.body.skeleton import KeypointState
-from cardbox_tracker.estimation.config import default_preset
-from cardbox_tracker.estimation.cost.multi_view import MultiViewCost
-from cardbox_tracker.estimation.cost.whole_body_config import WholeBodyCostConfig
-from cardbox_tracker.estimation.estimate import LOST, TRACKING, Estimate
-from cardbox_tracker.estimation.filtering.approach import Approach, at_distances
-from cardbox_tracker.estimation.filtering.doubt import HANDS, Source, models
-from cardbox_tracker.estimation.filtering.visibility import is_trackable
-from cardbox_tracker.estimation.tracker import Tracker
-from cardbox_tracker.simulation.renderer import Renderer, Scene
-from cardbox_tracker.vision.camera import Camera
+from cardbox_tracker.applications.simulation.renderer import Renderer, Scene
+from cardbox_tracker.camera.camera import Camera
+from cardbox_tracker.person.model import BodyModel
+from cardbox_tracker.person.posture import reference_posture, state_limits
+from cardbox_tracker.person.skeleton import KeypointState
+from cardbox_tracker.search.approach import Approach, at_distances
+from cardbox_tracker.search.config import default_preset
+from cardbox_tracker.search.doubt import HANDS, Source, models
+from cardbox_tracker.search.visibility import is_trackable
+from cardbox_tracker.terms.multi_view import MultiViewCost
+from cardbox_tracker.terms.whole_body_config import WholeBodyCostConfig
+from cardbox_tracker.tracking.estimate import LOST, TRACKING, Estimate
+from cardbox_tracker.tracking.tracker import Tracker
 
 UNCERTAIN_ABOVE = models()[Source.OUTLINE].uncertain_from
 CAMERA = Camera(320, 240, 220.0, 220.0, 159.5, 119.5)

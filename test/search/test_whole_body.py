@@ -9,26 +9,21 @@ import cv2
 import numpy as np
 import pytest
 
-from cardbox_tracker.body.cardbox import cardbox_patches
-from cardbox_tracker.body.model import BodyModel
-from cardbox_tracker.body.posture import reference_posture, state_limits
-from cardbox_tracker.body.skeleton import arm_directions
-from cardbox_tracker.estimation.config import TrackerConfig, default_preset
-from cardbox_tracker.estimation.cost.compiled import CompiledSilhouette
-from cardbox_tracker.estimation.cost.whole_body import WholeBodyCost
-from cardbox_tracker.estimation.cost.whole_body_config import WholeBodyCostConfig
-from cardbox_tracker.estimation.filtering import (
-    arm_proposals,
-    state_choice,
-    torso_proposals,
-    whole_body,
-)
-from cardbox_tracker.estimation.filtering.pose_filter import Presence
-from cardbox_tracker.estimation.filtering.whole_body import STAGES, WholeBodyFilter
-from cardbox_tracker.estimation.filtering.whole_body_config import ONE_CAMERA
-from cardbox_tracker.simulation.motions import wave
-from cardbox_tracker.vision.camera import Camera
-from cardbox_tracker.vision.rasterisation import render
+from cardbox_tracker.applications.simulation.motions import wave
+from cardbox_tracker.camera.camera import Camera
+from cardbox_tracker.camera.rasterisation import render
+from cardbox_tracker.person.cardbox import cardbox_patches
+from cardbox_tracker.person.model import BodyModel
+from cardbox_tracker.person.posture import reference_posture, state_limits
+from cardbox_tracker.person.skeleton import arm_directions
+from cardbox_tracker.search import arm_proposals, state_choice, torso_proposals, whole_body
+from cardbox_tracker.search.config import TrackerConfig, default_preset
+from cardbox_tracker.search.pose_filter import Presence
+from cardbox_tracker.search.whole_body import STAGES, WholeBodyFilter
+from cardbox_tracker.search.whole_body_config import ONE_CAMERA
+from cardbox_tracker.terms.compiled import CompiledSilhouette
+from cardbox_tracker.terms.whole_body import WholeBodyCost
+from cardbox_tracker.terms.whole_body_config import WholeBodyCostConfig
 
 STATE_LIMITS = state_limits(2.0)
 CAMERA = Camera(160, 120, 165.0, 165.0, 79.5, 59.5)

@@ -9,23 +9,23 @@ from typing import Any
 import numpy as np
 import pytest
 
-from cardbox_tracker.body.cardbox import cardbox_patches
-from cardbox_tracker.body.model import BodyModel
-from cardbox_tracker.body.posture import reference_posture
-from cardbox_tracker.detection.image_points import POINT_INDEX, POINT_NAMES, ImagePoints
-from cardbox_tracker.estimation.config import default_preset
-from cardbox_tracker.estimation.cost.inner_cue import InnerCue
-from cardbox_tracker.estimation.cost.view import OtherCamera, View
-from cardbox_tracker.estimation.cost.whole_body import WholeBodyCost
-from cardbox_tracker.estimation.cost.whole_body_config import WholeBodyCostConfig
-from cardbox_tracker.estimation.estimate import TRACKING, UNCERTAIN, Estimate
-from cardbox_tracker.estimation.filtering.doubt import HANDS, Source, models
-from cardbox_tracker.estimation.observation import Observation
-from cardbox_tracker.estimation.tracker import Tracker
-from cardbox_tracker.simulation.motions import wave
-from cardbox_tracker.vision.camera import Camera
-from cardbox_tracker.vision.extrinsics import Extrinsics
-from cardbox_tracker.vision.rasterisation import render
+from cardbox_tracker.applications.simulation.motions import wave
+from cardbox_tracker.camera.camera import Camera
+from cardbox_tracker.camera.extrinsics import Extrinsics
+from cardbox_tracker.camera.rasterisation import render
+from cardbox_tracker.camera.view import OtherCamera, View
+from cardbox_tracker.detectors.image_points import POINT_INDEX, POINT_NAMES, ImagePoints
+from cardbox_tracker.person.cardbox import cardbox_patches
+from cardbox_tracker.person.model import BodyModel
+from cardbox_tracker.person.posture import reference_posture
+from cardbox_tracker.search.config import default_preset
+from cardbox_tracker.search.doubt import HANDS, Source, models
+from cardbox_tracker.terms.inner_cue import InnerCue
+from cardbox_tracker.terms.whole_body import WholeBodyCost
+from cardbox_tracker.terms.whole_body_config import WholeBodyCostConfig
+from cardbox_tracker.tracking.estimate import TRACKING, UNCERTAIN, Estimate
+from cardbox_tracker.tracking.observation import Observation
+from cardbox_tracker.tracking.tracker import Tracker
 
 Detect = Callable[..., ImagePoints]
 

@@ -5,22 +5,22 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from cardbox_tracker.body.appearance import HAND, HEAD, TORSO, Appearance, bins_of
-from cardbox_tracker.body.cardbox import cardbox_patches
-from cardbox_tracker.body.model import BodyModel
-from cardbox_tracker.body.posture import PITCH, YAW, reference_posture
-from cardbox_tracker.body.skeleton import KeypointState
-from cardbox_tracker.detection.image_points import POINT_NAMES, ImagePoints
-from cardbox_tracker.estimation.config import PRESETS
-from cardbox_tracker.estimation.cost.drawn_body import body_tuple
-from cardbox_tracker.estimation.cost.inner_cue_arms import zones_of
-from cardbox_tracker.estimation.cost.terms import Frame, Posed
-from cardbox_tracker.estimation.estimate import TRACKING, UNCERTAIN
-from cardbox_tracker.estimation.facing import Facing
-from cardbox_tracker.estimation.precompile import quickest
-from cardbox_tracker.estimation.tracker import Tracker
-from cardbox_tracker.vision.camera import Camera
-from cardbox_tracker.vision.rasterisation import render
+from cardbox_tracker.camera.camera import Camera
+from cardbox_tracker.camera.rasterisation import render
+from cardbox_tracker.detectors.image_points import POINT_NAMES, ImagePoints
+from cardbox_tracker.person.appearance import HAND, HEAD, TORSO, Appearance, bins_of
+from cardbox_tracker.person.cardbox import cardbox_patches
+from cardbox_tracker.person.model import BodyModel
+from cardbox_tracker.person.posture import PITCH, YAW, reference_posture
+from cardbox_tracker.person.skeleton import KeypointState
+from cardbox_tracker.search.config import PRESETS
+from cardbox_tracker.terms.drawn_body import body_tuple
+from cardbox_tracker.terms.inner_cue_arms import zones_of
+from cardbox_tracker.terms.term import Frame, Posed
+from cardbox_tracker.tracking.estimate import TRACKING, UNCERTAIN
+from cardbox_tracker.tracking.facing import Facing
+from cardbox_tracker.tracking.precompile import quickest
+from cardbox_tracker.tracking.tracker import Tracker
 
 CAMERA = Camera(320, 240, 300.0, 300.0, 159.5, 119.5)
 # Colours in the middle of their bins, which are 256 / 12 levels wide: bgr.

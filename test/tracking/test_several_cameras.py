@@ -8,38 +8,38 @@ import cv2
 import numpy as np
 import pytest
 
-from cardbox_tracker.body.model import BodyModel
-from cardbox_tracker.body.posture import reference_posture
-from cardbox_tracker.detection.image_points import POINT_INDEX, ImagePoints
-from cardbox_tracker.errors import CameraError, InitializationError
-from cardbox_tracker.estimation.config import default_preset, paper_preset
-from cardbox_tracker.estimation.cost.depth import Depth, DepthTerm
-from cardbox_tracker.estimation.cost.multi_view import MultiViewCost
-from cardbox_tracker.estimation.cost.terms import (
+from cardbox_tracker.applications.simulation.motions import wave
+from cardbox_tracker.camera.camera import Camera
+from cardbox_tracker.camera.extrinsics import Extrinsics
+from cardbox_tracker.camera.view import OtherCamera, View
+from cardbox_tracker.common.errors import CameraError, InitializationError
+from cardbox_tracker.common.settings import Settings
+from cardbox_tracker.detectors.image_points import POINT_INDEX, ImagePoints
+from cardbox_tracker.measuring.scale import (
+    DepthReference,
+    depth_scale,
+    measured_scale,
+    scaled,
+)
+from cardbox_tracker.person.model import BodyModel
+from cardbox_tracker.person.posture import reference_posture
+from cardbox_tracker.search.arms import ARM_LIMITS
+from cardbox_tracker.search.config import default_preset, paper_preset
+from cardbox_tracker.search.whole_body import WholeBodyFilter
+from cardbox_tracker.terms.depth import Depth, DepthTerm
+from cardbox_tracker.terms.multi_view import MultiViewCost
+from cardbox_tracker.terms.term import (
     ARM,
     TRUNK,
     Frame,
     Posed,
     TermObservation,
 )
-from cardbox_tracker.estimation.cost.view import OtherCamera, View
-from cardbox_tracker.estimation.cost.whole_body import WholeBodyCost
-from cardbox_tracker.estimation.cost.whole_body_config import WholeBodyCostConfig
-from cardbox_tracker.estimation.estimate import NO_PERSON, TRACKING, UNCERTAIN, Estimate
-from cardbox_tracker.estimation.filtering.arms import ARM_LIMITS
-from cardbox_tracker.estimation.filtering.whole_body import WholeBodyFilter
-from cardbox_tracker.estimation.initialization.scale import (
-    DepthReference,
-    depth_scale,
-    measured_scale,
-    scaled,
-)
-from cardbox_tracker.estimation.observation import Observation, stamp_of
-from cardbox_tracker.estimation.tracker import Tracker
-from cardbox_tracker.settings import Settings
-from cardbox_tracker.simulation.motions import wave
-from cardbox_tracker.vision.camera import Camera
-from cardbox_tracker.vision.extrinsics import Extrinsics
+from cardbox_tracker.terms.whole_body import WholeBodyCost
+from cardbox_tracker.terms.whole_body_config import WholeBodyCostConfig
+from cardbox_tracker.tracking.estimate import NO_PERSON, TRACKING, UNCERTAIN, Estimate
+from cardbox_tracker.tracking.observation import Observation, stamp_of
+from cardbox_tracker.tracking.tracker import Tracker
 
 BODY = BodyModel.of(hip_height_m=-0.41, lateral_m=0.05, camera_pitch_rad=0.1)
 CAMERA = Camera(160, 120, 150.0, 151.0, 79.0, 60.0).with_pitch(0.1)

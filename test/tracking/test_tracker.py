@@ -9,33 +9,33 @@ from typing import Any
 import numpy as np
 import pytest
 
-from cardbox_tracker.body.cardbox import cardbox_patches
-from cardbox_tracker.body.kinematics import pose
-from cardbox_tracker.body.model import BodyModel
-from cardbox_tracker.body.posture import JOINT_LIMITS, TORSO, reference_posture, state_limits
-from cardbox_tracker.body.skeleton import neck_rotation
-from cardbox_tracker.detection.image_points import ImagePoints
-from cardbox_tracker.estimation.config import (
+from cardbox_tracker.applications.simulation.motions import wave
+from cardbox_tracker.applications.simulation.renderer import Renderer, Scene
+from cardbox_tracker.camera.camera import Camera
+from cardbox_tracker.camera.rasterisation import render
+from cardbox_tracker.detectors.image_points import ImagePoints
+from cardbox_tracker.person.cardbox import cardbox_patches
+from cardbox_tracker.person.kinematics import pose
+from cardbox_tracker.person.model import BodyModel
+from cardbox_tracker.person.posture import JOINT_LIMITS, TORSO, reference_posture, state_limits
+from cardbox_tracker.person.skeleton import neck_rotation
+from cardbox_tracker.search.config import (
     FilterConfig,
     TrackerConfig,
     default_preset,
     paper_preset,
 )
-from cardbox_tracker.estimation.cost.compiled import CompiledObservation, CompiledSilhouette
-from cardbox_tracker.estimation.cost.terms import Frame, TorsoCosts
-from cardbox_tracker.estimation.cost.whole_body import WholeBodyCost
-from cardbox_tracker.estimation.cost.whole_body_config import WholeBodyCostConfig
-from cardbox_tracker.estimation.estimate import LOST, NO_PERSON, TRACKING, UNCERTAIN, Estimate
-from cardbox_tracker.estimation.filtering.cycles import Cycles
-from cardbox_tracker.estimation.filtering.doubt import HANDS, Source, models
-from cardbox_tracker.estimation.head import FACE_M, FACE_POINTS
-from cardbox_tracker.estimation.observation import Observation
-from cardbox_tracker.estimation.tracker import FILTERS, Tracker
-from cardbox_tracker.simulation.motions import wave
-from cardbox_tracker.simulation.renderer import Renderer, Scene
-from cardbox_tracker.vision.camera import Camera
-from cardbox_tracker.vision.rasterisation import render
-from experiments.reference import ReferenceSilhouette
+from cardbox_tracker.search.cycles import Cycles
+from cardbox_tracker.search.doubt import HANDS, Source, models
+from cardbox_tracker.terms.compiled import CompiledObservation, CompiledSilhouette
+from cardbox_tracker.terms.term import Frame, TorsoCosts
+from cardbox_tracker.terms.whole_body import WholeBodyCost
+from cardbox_tracker.terms.whole_body_config import WholeBodyCostConfig
+from cardbox_tracker.tracking.estimate import LOST, NO_PERSON, TRACKING, UNCERTAIN, Estimate
+from cardbox_tracker.tracking.head import FACE_M, FACE_POINTS
+from cardbox_tracker.tracking.observation import Observation
+from cardbox_tracker.tracking.tracker import FILTERS, Tracker
+from lab.experiments.reference import ReferenceSilhouette
 
 FOUND = (TRACKING, UNCERTAIN)
 STATE_LIMITS = state_limits(2.0)

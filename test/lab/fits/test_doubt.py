@@ -8,14 +8,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from cardbox_tracker.body.model import BodyModel
-from cardbox_tracker.estimation.estimate import Estimate
-from cardbox_tracker.estimation.filtering import doubt as package
-from cardbox_tracker.estimation.filtering.doubt import Doubt, Source
-from cardbox_tracker.estimation.tracker import Tracker
-from cardbox_tracker.vision.camera import Camera
-from learning import doubt
-from learning.doubt import Collector, Samples, chances, fit, fit_all, row_of, threshold_of
+from cardbox_tracker.camera.camera import Camera
+from cardbox_tracker.person.model import BodyModel
+from cardbox_tracker.search import doubt as package
+from cardbox_tracker.search.doubt import Doubt, Source
+from cardbox_tracker.tracking.estimate import Estimate
+from cardbox_tracker.tracking.tracker import Tracker
+from lab.fits import doubt
+from lab.fits.doubt import Collector, Samples, chances, fit, fit_all, row_of, threshold_of
 
 # Intercept, and coefficients of evidence of different size, for each kind of keypoint.
 TRUE = {
