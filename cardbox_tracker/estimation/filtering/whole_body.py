@@ -376,8 +376,9 @@ class WholeBodyFilter:
         outlines = cost.outlines(state) if frames[0].depth_m is None else []
         if self._cues:
             near = Prior(state, _LOCATED)
-            (refined,), _ = self.refine(state[None], [*outlines, *self._cues], near, 2 * steps)
-            return refined
+            located, _ = self.refine(state[None], [*outlines, *self._cues], near, 2 * steps)
+            fitted: FloatArray = located[0]
+            return fitted
         (refined,), _ = self.refine(state[None], outlines, Prior(state, _NEAR), steps)
         # Outlines alone jitter.
         before = refined - state if self._correction is None else self._correction
