@@ -29,7 +29,6 @@ from cardbox_tracker.estimation.filtering.doubt import (
     HANDS,
     KINDS,
     LOST_FROM,
-    UNCERTAIN_FROM,
     WHOLE_UNCERTAIN_FROM,
     Source,
 )
@@ -42,6 +41,8 @@ from cardbox_tracker.recordings.detector import Detector
 FloatArray = NDArray[np.float64]
 PENALTY = 0.02
 """Ridge penalty of a standardized coefficient, beside a mean log-likelihood."""
+MOST_WRONG, HIGHEST = 0.02, 0.25
+"""Largest share of wrong keypoints among tracked ones, and highest threshold."""
 MODELS = (*dict.fromkeys(KINDS), "whole")
 
 
@@ -144,14 +145,29 @@ def chances(samples: Samples, models: Mapping[str, tuple[float, dict[str, float]
     return found
 
 
-def row_of(name: str, samples: Samples, said: FloatArray) -> str:
+def threshold_of(checked: Sequence[tuple[Samples, FloatArray]]) -> float:
+    """Return the highest probability below which at most ``MOST_WRONG`` of the keypoints are wrong.
+
+    Args:
+        checked: left-out results, and their probabilities (n, 7).
+    """
+    wrong = np.concatenate([(one.aligned_m > FAR_M).ravel() for one, _ in checked])
+    said = np.concatenate([chances[:, :6].ravel() for _, chances in checked])
+    order = np.argsort(said)
+    shares = np.cumsum(wrong[order]) / np.arange(1, len(order) + 1)
+    last = np.flatnonzero(shares <= MOST_WRONG)
+    highest = float(said[order][last[-1]]) if len(last) else 0.0
+    return round(min(highest, HIGHEST), 3)
+
+
+def row_of(name: str, samples: Samples, said: FloatArray, uncertain_from: float) -> str:
     """Return a row of the table: how the states of a source compare with its errors."""
     keypoints, wrong = said[:, :6], samples.aligned_m > FAR_M
-    tracked = keypoints <= UNCERTAIN_FROM
+    tracked = keypoints <= uncertain_from
     uncertain = ~tracked & (keypoints <= LOST_FROM)
     is_tracking = tracked[:, HANDS].all(axis=1) & (said[:, 6] <= WHOLE_UNCERTAIN_FROM)
 
-    def share(of: NDArray[Any], among: NDArray[Any]) -> str:
+    def share(of: Any, among: Any) -> str:
         return f"{100.0 * float(of[among].mean()):.1f}" if among.any() else ""
 
     everything = np.ones_like(tracked)
@@ -199,7 +215,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     except CardboxError as error:
         print(f"without points: {error}")
         detector = None
-    # Clips of one person before one camera, in a folder of their own, are one source.
+    # Clips of one person are one source, also before several cameras.
     by_source: defaultdict[Source, defaultdict[str, list[Samples]]] = defaultdict(
         lambda: defaultdict(list)
     )
@@ -221,15 +237,30 @@ def fit_all(
     """Return the models of all sources, and print what left-out ones say."""
     stored: dict[str, dict[str, Any]] = {}
     for source, people in by_source.items():
-        print(f"\n{source.value}\n\n{HEADER}")
         everyone = [one for parts in people.values() for one in parts]
         names = sorted(set.intersection(*(set(one.evidence) for one in everyone)))
+        checked = []
         for left_out, own in people.items():
             others = [one for name, parts in people.items() if name != left_out for one in parts]
-            models = {model: fit(others, model, names) for model in MODELS} if others else {}
-            for one in own if models else ():
-                print(row_of(left_out, one, chances(one, models)))
-        stored[source.value] = {model: fit(everyone, model, names) for model in MODELS}
+            if others:
+                models = {model: fit(others, model, names) for model in MODELS}
+                checked += [(left_out, one, chances(one, models)) for one in own]
+        uncertain_from = threshold_of([(one, said) for _, one, said in checked])
+        print(f"\n{source.value}: uncertain above {uncertain_from}\n\n{HEADER}")
+        for name, one, said in checked:
+            print(row_of(name, one, said, uncertain_from))
+        stored[source.value] = {
+            "uncertain_from": uncertain_from,
+            "models": {
+                model: [
+                    round(intercept, 4),
+                    {name: round(value, 4) for name, value in coefficients.items()},
+                ]
+                for model, (intercept, coefficients) in (
+                    (model, fit(everyone, model, names)) for model in MODELS
+                )
+            },
+        }
     return stored
 
 

@@ -48,8 +48,8 @@ Values = Mapping[str, FloatArray]
 
 FAR_M = 0.30
 """A keypoint that is farther off is wrong, m."""
-UNCERTAIN_FROM, LOST_FROM = 0.15, 0.5
-"""Probabilities of being wrong above which a keypoint is uncertain, and rather wrong than right."""
+LOST_FROM = 0.5
+"""Probability of being wrong above which a keypoint is lost: it is rather wrong than right."""
 WHOLE_UNCERTAIN_FROM, WHOLE_LOST_FROM = 0.5, 0.9
 """Probabilities of being lost above which a result is uncertain, and counts as a poor one."""
 HANDS = [2, 5]
@@ -97,6 +97,19 @@ class Model(NamedTuple):
     coefficients: Mapping[str, float]
 
 
+class Models(NamedTuple):
+    """The models of results that rest on the same.
+
+    Attributes:
+        uncertain_from: probability of being wrong above which a keypoint is uncertain: the highest
+            one with which at most 2 % of the tracked keypoints of left-out sources are wrong.
+        by_kind: models by the names of :data:`KINDS`, and ``whole``.
+    """
+
+    uncertain_from: float
+    by_kind: Mapping[str, Model]
+
+
 class Judgement(NamedTuple):
     """The doubt about one result.
 
@@ -138,16 +151,18 @@ class Doubt:
             hidden: whether no camera sees a keypoint, (6,).
             vetoes: facts of which each makes the whole result uncertain, such as a person's back.
         """
-        of = self._models[source]
+        uncertain_from, of = self._models[source]
         chances = np.array([_chance(of[kind], evidence, i) for i, kind in enumerate(KINDS)])
         whole = _chance(of["whole"], evidence, 0)
         self._whole = whole if self._whole is None else _MEMORY * (self._whole + whole)
         is_doubted = any(vetoes) or self._whole > WHOLE_UNCERTAIN_FROM
         states = tuple(
-            _state_of(chance, is_hidden, is_doubted)
+            _state_of(chance, is_hidden, is_doubted or chance > uncertain_from)
             for chance, is_hidden in zip(chances.tolist(), hidden.tolist(), strict=True)
         )
-        is_uncertain = is_doubted or bool((chances[HANDS] > UNCERTAIN_FROM).any())
+        # The paper's filter finds hands so badly that its state only says whether it is lost.
+        needs_hands = source is not Source.PAPER
+        is_uncertain = is_doubted or (needs_hands and bool((chances[HANDS] > uncertain_from).any()))
         return Judgement(chances, states, is_uncertain, self._whole > WHOLE_LOST_FROM, evidence)
 
 
@@ -160,7 +175,7 @@ def doubted(states: Sequence[KeypointState]) -> tuple[KeypointState, ...]:
 def reasons(judgement: Judgement, source: Source) -> list[str]:
     """Return the evidence that speaks most against the most doubtful keypoint, worst first."""
     worst = int(np.argmax(judgement.chances))
-    of = models()[source][KINDS[worst]].coefficients
+    of = models()[source].by_kind[KINDS[worst]].coefficients
     weights = {
         name: coefficient * float(judgement.evidence[name][worst])
         for name, coefficient in of.items()
@@ -170,13 +185,16 @@ def reasons(judgement: Judgement, source: Source) -> list[str]:
 
 
 @cache
-def models() -> Mapping[Source, Mapping[str, Model]]:
-    """Return the package's models by source and by kind of keypoint, or ``whole``."""
+def models() -> Mapping[Source, Models]:
+    """Return the package's models by what a result rests on."""
     stored = json.loads(_FILE.read_text(encoding="utf-8"))
     return MappingProxyType(
         {
-            Source(source): {kind: Model(*one) for kind, one in kinds.items()}
-            for source, kinds in stored.items()
+            Source(source): Models(
+                one["uncertain_from"],
+                {kind: Model(*model) for kind, model in one["models"].items()},
+            )
+            for source, one in stored.items()
         }
     )
 
@@ -189,12 +207,11 @@ def _chance(model: Model, evidence: Values, index: int) -> float:
     return 1.0 / (1.0 + exp(-min(max(logit, -50.0), 50.0)))
 
 
-def _state_of(chance: float, is_hidden: bool, is_doubted: bool) -> KeypointState:
+def _state_of(chance: float, is_hidden: bool, is_uncertain: bool) -> KeypointState:
     if is_hidden:
         return KeypointState.HIDDEN
     if chance > LOST_FROM:
         return KeypointState.LOST
-    is_uncertain = is_doubted or chance > UNCERTAIN_FROM
     return KeypointState.UNCERTAIN if is_uncertain else KeypointState.TRACKED
 
 

@@ -376,9 +376,9 @@ class WholeBodyFilter:
         outlines = cost.outlines(state) if frames[0].depth_m is None else []
         if self._cues:
             near = Prior(state, _LOCATED)
-            located, _ = self.refine(state[None], [*outlines, *self._cues], near, 2 * steps)
-            fitted: FloatArray = located[0]
-            return fitted
+            found, _ = self.refine(state[None], [*outlines, *self._cues], near, 2 * steps)
+            located: FloatArray = found[0]
+            return located
         (refined,), _ = self.refine(state[None], outlines, Prior(state, _NEAR), steps)
         # Outlines alone jitter.
         before = refined - state if self._correction is None else self._correction

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from cardbox_tracker.body import parts as body_parts_module
+from cardbox_tracker.body import parts as indices
 from cardbox_tracker.body.cardbox import NECK_PATCHES, TORSO_PATCHES, cardbox_patches
 from cardbox_tracker.body.model import BodyModel
 from cardbox_tracker.body.parts import BodyParts, Part, body_parts, shape_of
@@ -193,9 +193,9 @@ def test_a_trunk_with_a_neck_is_equal(case: Case) -> None:
 
 def test_the_kernels_take_parts_and_lengths_in_their_order() -> None:
     names = [name.removesuffix("_m").upper() for name in BodyParts._fields[:6]]
-    assert [getattr(body_parts_module, name) for name in names] == list(range(6))
+    assert [getattr(indices, name) for name in names] == list(range(6))
     names = [name.removesuffix("_m").upper() for name in Part._fields]
-    assert [getattr(body_parts_module, name) for name in names] == list(range(6))
+    assert [getattr(indices, name) for name in names] == list(range(6))
     parts, shoulder = shape_of(DEFAULT_SIZES)
     expected = body_parts(DEFAULT_SIZES)
     np.testing.assert_array_equal(parts, expected[:6])

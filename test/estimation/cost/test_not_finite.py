@@ -7,8 +7,8 @@ import pytest
 
 from cardbox_tracker.body.model import BodyModel
 from cardbox_tracker.estimation.cost.compiled import CompiledSilhouette
+from cardbox_tracker.estimation.cost.outline import signed_distances
 from cardbox_tracker.estimation.cost.outline_points import distance_at
-from cardbox_tracker.estimation.filtering.outline_fit import signed_distances
 from cardbox_tracker.vision.camera import Camera
 
 CAMERA = Camera(48, 32, 50.0, 50.0, 23.5, 15.5)

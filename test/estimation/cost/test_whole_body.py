@@ -27,7 +27,7 @@ from cardbox_tracker.body.skeleton import arm_directions
 from cardbox_tracker.estimation.cost import whole_body_kernels as kernels
 from cardbox_tracker.estimation.cost.body_priors import penetration, priors
 from cardbox_tracker.estimation.cost.pose_prior import FLOOR_NATS, load_gmm, nats_of
-from cardbox_tracker.estimation.cost.terms import Silence
+from cardbox_tracker.estimation.cost.terms import Posed, TermObservation
 from cardbox_tracker.estimation.cost.whole_body import WholeBodyCost, iou_of
 from cardbox_tracker.estimation.cost.whole_body_config import WholeBodyCostConfig
 from cardbox_tracker.vision.camera import Camera
@@ -248,28 +248,57 @@ def test_rows_below_the_hips_count_but_not_the_legs() -> None:
     assert of.silhouette_px == 160 * of.counted[0] - legs * (of.counted[0] - hip_row)
 
 
-class Squares(Silence):
-    """An observation that costs 10 px for each squared rad or metre."""
+class Squares(TermObservation):
+    """An observation that costs 10 px for each squared rad or metre of the parts that count."""
 
-    def postures(self, postures: np.ndarray) -> np.ndarray:
-        return 10.0 * np.sum(postures**2, axis=1)
+    def rate(self, posed: Posed) -> np.ndarray:
+        counting = np.repeat(posed.parts, (4, 4, 4)).tolist() + [posed.parts[0]] * 2
+        return 10.0 * np.sum(posed.states[:, counting] ** 2, axis=1)
 
 
-def test_further_terms_add_their_pixels_to_arms_and_bodies() -> None:
+def test_further_terms_add_their_pixels_to_torsos_arms_and_bodies() -> None:
     of = cost()
     person = np.zeros((120, 160), np.uint8)
     cv2.circle(person, (80, 60), 30, 255, -1)
     of.see(person, state())
     states = random_states(5, 3)
-    of.fix_torso(states[0])
-    bodies, arms = of.bodies(states)[0], of.arms(states[:, 4:8].copy(), 0)[0]
-    squares = Squares()
-    of.terms = (squares,)
-    of.fix_torso(states[0])
-    more = squares.postures(states) / of.silhouette_px
-    np.testing.assert_allclose(of.bodies(states)[0], bodies + more)
-    more = squares.arms_beside(states[0, :6])("left", states[:, 4:8].copy()) / of.silhouette_px
-    np.testing.assert_allclose(of.arms(states[:, 4:8].copy(), 0)[0], arms + more)
+    arms = states[:, 4:8].copy()
+    joints = of.joints(arms, 0)
+
+    def ratings() -> list[np.ndarray]:
+        of.fix_torso(states[0])
+        return [
+            of.torsos(states, states[0]),
+            of.arms(arms, 0)[0],
+            of.arms_by_points(arms, joints, 0),
+            of.bodies(states)[0],
+        ]
+
+    without = ratings()
+    of.terms = (Squares(), Squares())
+    arm = np.sum(arms**2, axis=1)
+    torso = np.sum(states[:, [0, 1, 2, 3, 12, 13]] ** 2, axis=1)
+    squares = torso, arm, arm, np.sum(states**2, axis=1)
+    for before, after, more in zip(without, ratings(), squares, strict=True):
+        np.testing.assert_allclose(after, before + 20.0 * more / of.silhouette_px)
+
+
+def test_a_term_that_rates_torsos_knows_whose_arms_raise_the_shoulders() -> None:
+    of, asked = cost(), []
+
+    class Asking(TermObservation):
+        def rate(self, posed: Posed) -> np.ndarray:
+            asked.append((posed.parts, posed.arms_of.copy()))
+            return np.zeros(len(posed))
+
+    of.see(np.full((120, 160), 255, np.uint8), state())
+    of.terms = (Asking(),)
+    states, before = random_states(3, 1), random_states(1, 2)[0]
+    of.torsos(states, before)
+    of.bodies(states)
+    assert [parts for parts, _ in asked] == [(True, False, False), (True, True, True)]
+    np.testing.assert_array_equal(asked[0][1], before[None])
+    np.testing.assert_array_equal(asked[1][1], states)
 
 
 def test_the_median_column_is_where_the_person_is() -> None:

@@ -15,7 +15,7 @@ from cardbox_tracker.estimation.cost.multi_view import MultiViewCost
 from cardbox_tracker.estimation.cost.whole_body_config import WholeBodyCostConfig
 from cardbox_tracker.estimation.estimate import LOST, TRACKING, Estimate
 from cardbox_tracker.estimation.filtering.approach import Approach, at_distances
-from cardbox_tracker.estimation.filtering.keypoint_states import HANDS, are_sure
+from cardbox_tracker.estimation.filtering.doubt import HANDS, UNCERTAIN_FROM
 from cardbox_tracker.estimation.filtering.visibility import is_trackable
 from cardbox_tracker.estimation.tracker import Tracker
 from cardbox_tracker.simulation.renderer import Renderer, Scene
@@ -49,7 +49,9 @@ def test_a_person_who_walks_metres_is_followed(begin_m: float, end_m: float) -> 
     found = seen_at([begin_m] * 5 + way + [end_m] * 25, begin_m)
     assert distance_of(found[-1], begin_m) == pytest.approx(end_m, rel=0.06)
     # Far away a keypoint may be in doubt, and the state follows the hands.
-    assert (found[-1].state == TRACKING) == are_sure(found[-1].keypoint_chances[HANDS])
+    assert found[-1].keypoint_chances is not None and found[-1].keypoint_states is not None
+    is_sure = bool((found[-1].keypoint_chances[HANDS] <= UNCERTAIN_FROM).all())
+    assert (found[-1].state == TRACKING) == is_sure
     assert KeypointState.LOST not in found[-1].keypoint_states
 
 

@@ -14,7 +14,7 @@ from cardbox_tracker.body.posture import TORSO_X, reference_posture
 from cardbox_tracker.body.skeleton import KeypointState
 from cardbox_tracker.estimation.cost.drawn_body import body_tuple
 from cardbox_tracker.estimation.filtering import doubt
-from cardbox_tracker.estimation.filtering.doubt import Doubt, Model, Source
+from cardbox_tracker.estimation.filtering.doubt import Doubt, Model, Models, Source
 from cardbox_tracker.vision.camera import Camera
 
 CAMERA = Camera(320, 240, 300.0, 310.0, 159.5, 119.5)
@@ -32,7 +32,7 @@ def logit(chance: float) -> float:
 def by_hand(monkeypatch: pytest.MonkeyPatch) -> None:
     """Models whose evidence is the logit itself."""
     own = {kind: Model(0.0, {kind: 1.0}) for kind in ("shoulder", "elbow", "hand", "whole")}
-    monkeypatch.setattr(doubt, "models", lambda: dict.fromkeys(Source, own))
+    monkeypatch.setattr(doubt, "models", lambda: dict.fromkeys(Source, Models(0.15, own)))
 
 
 def evidence(hand: float = 0.01, whole: float = 0.01, elbow: float = 0.01) -> dict[str, np.ndarray]:
@@ -59,6 +59,12 @@ def test_states_follow_from_the_probability(by_hand: None, chance: float, state:
 def test_an_uncertain_elbow_alone_leaves_the_result_as_it_is(by_hand: None) -> None:
     judged = Doubt().judge(evidence(elbow=0.3), Source.OUTLINE, SEEN)
     assert judged.states[1] is KeypointState.UNCERTAIN and not judged.is_uncertain
+
+
+def test_the_state_of_the_papers_filter_only_says_whether_it_is_lost(by_hand: None) -> None:
+    judged = Doubt().judge(evidence(hand=0.3), Source.PAPER, SEEN)
+    assert judged.states[2] is KeypointState.UNCERTAIN and not judged.is_uncertain
+    assert Doubt().judge(evidence(hand=0.3, whole=0.6), Source.PAPER, SEEN).is_uncertain
 
 
 def test_a_veto_makes_everything_uncertain_but_what_is_hidden(by_hand: None) -> None:
@@ -93,7 +99,9 @@ def test_unknown_evidence_does_not_count(by_hand: None) -> None:
 def test_the_packages_models_give_probabilities_for_any_evidence(
     source: Source, values: list[float]
 ) -> None:
-    names = {name for model in doubt.models()[source].values() for name in model.coefficients}
+    names = {
+        name for model in doubt.models()[source].by_kind.values() for name in model.coefficients
+    }
     given_values = {name: np.resize(values, 6) for name in names}
     judged = Doubt().judge(given_values, source, SEEN)
     assert ((judged.chances >= 0.0) & (judged.chances <= 1.0)).all()

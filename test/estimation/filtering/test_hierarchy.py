@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from cardbox_tracker.body.cardbox import cardbox_patches
+from cardbox_tracker.body.kinematics import pose
 from cardbox_tracker.body.model import BodyModel
 from cardbox_tracker.body.posture import (
     JOINT_LIMITS,
@@ -19,13 +20,21 @@ from cardbox_tracker.body.posture import (
 )
 from cardbox_tracker.estimation.config import TrackerConfig, paper_preset
 from cardbox_tracker.estimation.cost.compiled import CompiledSilhouette
-from cardbox_tracker.estimation.cost.terms import ArmCosts, SumOfTerms, TorsoCosts
-from cardbox_tracker.estimation.filtering.hierarchy import HierarchicalFilter
+from cardbox_tracker.estimation.cost.drawn_body import body_tuple
+from cardbox_tracker.estimation.cost.terms import (
+    ARMS,
+    ArmCosts,
+    Posed,
+    TermObservation,
+    TorsoCosts,
+)
+from cardbox_tracker.estimation.filtering.hierarchy import HierarchicalFilter, SumOfTerms
 from cardbox_tracker.vision.camera import Camera
 from cardbox_tracker.vision.rasterisation import render
 
 CAMERA = Camera(96, 72, 99.0, 99.0, 47.5, 35.5)
 BODY = BodyModel.of(hip_height_m=-0.51)
+POSABLE = body_tuple(BODY.rigid, CAMERA)
 FRONT = reference_posture("front")
 IMAGE_PX = 320 * 240
 SEVERAL_CYCLES = TrackerConfig(cycles=2, average=20)
@@ -35,13 +44,13 @@ class FarFromRest:
     """An observation that rates angles by their squares, 10 px for each rad^2."""
 
     def torsos_beside(self, arms: np.ndarray | None) -> TorsoCosts:
-        return self.postures
+        return self.squares
 
     def arms_beside(self, torso: np.ndarray) -> ArmCosts:
-        return lambda side, arms: self.postures(arms)
+        return lambda side, arms: self.squares(arms)
 
-    def postures(self, postures: np.ndarray) -> np.ndarray:
-        return 10.0 * np.sum(postures**2, axis=1)
+    def squares(self, angles: np.ndarray) -> np.ndarray:
+        return 10.0 * np.sum(angles**2, axis=1)
 
 
 class ConstantCost:
@@ -57,9 +66,6 @@ class ConstantCost:
     def arms_beside(self, torso: np.ndarray) -> ArmCosts:
         self.calls.append(("arms_beside", torso.copy()))
         return self.rate
-
-    def postures(self, postures: np.ndarray) -> np.ndarray:
-        return self.rate("postures", postures)
 
     def rate(self, name: str, particles: np.ndarray) -> np.ndarray:
         self.calls.append((name, particles.copy()))
@@ -96,10 +102,62 @@ def on_constant_cost(
 def before_somebody(config: TrackerConfig, seed: int, posture: np.ndarray = FRONT) -> Stepped:
     term = CompiledSilhouette(BODY, CAMERA)
     frame = term.frame(render(cardbox_patches(BODY, posture), CAMERA))
-    others = (settings.build(BODY, CAMERA).observe(frame) for settings in config.terms)
     rng = np.random.default_rng(seed)
     filters = HierarchicalFilter(config, CAMERA.width * CAMERA.height, rng)
-    return Stepped(filters, SumOfTerms((term.observe(frame), *others)))
+    return Stepped(filters, SumOfTerms(term.observe(frame), (), POSABLE))
+
+
+class HandsUp(TermObservation):
+    """A term that likes high hands, and knows which parts it was asked about."""
+
+    def __init__(self) -> None:
+        self.asked: list[Posed] = []
+
+    def rate(self, posed: Posed) -> np.ndarray:
+        self.asked.append(posed)
+        rows = posed.keypoints_px[:, [2, 5], 1]
+        return 100.0 * np.nansum(rows, axis=1)
+
+
+def test_further_terms_rate_trunks_and_arms_beside_them() -> None:
+    term = CompiledSilhouette(BODY, CAMERA)
+    seen = term.look(render(cardbox_patches(BODY, FRONT), CAMERA))
+    further = HandsUp()
+    alone, both = (SumOfTerms(seen, terms, POSABLE) for terms in ((), (further, HandsUp())))
+    rng = np.random.default_rng(0)
+    torsos, arms = rng.normal(0.0, 0.1, (5, 4)), rng.normal(0.5, 0.3, (5, 4))
+    # No hand counts beside a trunk.
+    np.testing.assert_array_equal(
+        both.torsos_beside(FRONT)(torsos), alone.torsos_beside(FRONT)(torsos)
+    )
+    assert further.asked[-1].parts == (True, False, False)
+    np.testing.assert_array_equal(further.asked[-1].states[:, TORSO], torsos)
+    for side, joints in ARMS.items():
+        more = both.arms_beside(torsos[0])(side, arms) - alone.arms_beside(torsos[0])(side, arms)
+        asked = further.asked[-1]
+        assert asked.parts == (False, side == "left", side == "right")
+        np.testing.assert_array_equal(asked.states[:, joints], arms)
+        np.testing.assert_array_equal(asked.states[:, TORSO], np.tile(torsos[0], (5, 1)))
+        hands = [
+            CAMERA.project(CAMERA.reference_to_optical(pose(BODY.rigid, one[:12]).keypoints_m))[
+                2 if side == "left" else 5
+            ]
+            for one in asked.states
+        ]
+        np.testing.assert_allclose(more, 200.0 * np.array(hands)[:, 1], rtol=1e-9)
+
+
+def test_a_further_term_moves_the_estimate() -> None:
+    """It outweighs the silhouette of hanging arms."""
+    found = []
+    for terms in ((), (HandsUp(),)):
+        filters = before_somebody(SEVERAL_CYCLES, 0)
+        filters.observation = replace(filters.observation, terms=terms)
+        filters.initialize(FRONT)
+        posture = [filters.iterate() for _ in range(10)][-1]
+        hands_m = pose(BODY.rigid, posture).keypoints_m[[2, 5], 2]
+        found.append(hands_m)
+    assert (found[1] > found[0] + 0.2).all()
 
 
 def test_the_torso_is_fixed_before_the_arms_are_rated() -> None:
