@@ -129,10 +129,11 @@ def settings_below(instance: Any, before: str = "") -> Iterator[tuple[str, Any, 
         name, value = f"{before}{entry.name}", getattr(instance, entry.name)
         if isinstance(value, tuple):
             for one in value:
-                yield from settings_below(one, f"{name}.{type(one).__name__}.")
-        elif is_dataclass(value):
+                if is_dataclass(one):
+                    yield from settings_below(one, f"{name}.{type(one).__name__}.")
+        elif isinstance(value, Settings):
             yield from settings_below(value, f"{name}.")
-        else:
+        elif entry.name in known:
             yield name, value, known[entry.name]
 
 
@@ -171,14 +172,20 @@ def changed(instance: T, given: Mapping[str, Any], where: str = "") -> T:
         ValueError: a name is unknown, a value has the wrong type or is out of range; the text has
             the whole name and the expected value.
     """
-    known = {entry.name: getattr(instance, entry.name) for entry in fields(instance)}  # type: ignore[arg-type]
+    # Other fields are constants, which a program may replace but no user sets.
+    known = {
+        entry.name: getattr(instance, entry.name)
+        for entry in fields(instance)  # type: ignore[arg-type]
+        if "setting" in entry.metadata
+        or isinstance(getattr(instance, entry.name), (Settings, tuple))
+    }
     values: dict[str, Any] = {}
     for name, value in given.items():
         _check_name(name, known, where)
         before, whole = known[name], f"{where}{name}"
         if isinstance(before, tuple):
             values[name] = _changed_parts(before, value, whole)
-        elif is_dataclass(before):
+        elif isinstance(before, Settings):
             values[name] = changed(before, _mapping(value, whole), f"{whole}.")
         else:
             values[name] = _typed(before, value, whole)

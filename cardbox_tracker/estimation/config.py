@@ -27,25 +27,15 @@ from cardbox_tracker.settings import (
 FILTERS = ("hierarchical", "whole_body")
 """Allowed values of ``filter``."""
 
-# Settings of one filter, and the settings of the other filter with a similar effect.
+# Settings of one filter, and the settings of the other filter with a similar effect; ``torso`` and
+# ``arm`` stand for their settings.
 _OF_HIERARCHICAL = MappingProxyType(
     {
-        "torso.particles": "effort",
-        "arm.particles": "effort",
-        "torso.survival_rate": "survivors",
-        "arm.survival_rate": "survivors",
-        "torso.rotation_noise_rad": "yaw_noise_rad",
-        "arm.rotation_noise_rad": "arm_noise_rad",
-        "torso.translation_noise_m": "y_noise_m",
-        "torso": "effort",
-        "arm": "effort",
-        "strategy": "effort",
-        "cycles": "effort",
-        "average": "average",
-        "torso_beside_arms": "effort",
+        **dict.fromkeys(("torso", "arm", "strategy", "cycles", "torso_beside_arms"), "effort"),
+        "average": "smoothing",
     }
 )
-_OF_WHOLE_BODY = MappingProxyType({"survivors": "torso.survival_rate", "average": "average"})
+_OF_WHOLE_BODY = MappingProxyType({"smoothing": "average"})
 
 
 @dataclass(frozen=True)

@@ -53,7 +53,7 @@ class Cycles:
         self._config, self._term = config, silhouette
         body, camera = silhouette.body, silhouette.camera
         self.hierarchy = make_hierarchy(config, camera.width * camera.height, rng)
-        self._posable = body_tuple(body, camera)
+        self._posable = body_tuple(body.rigid, camera)
         self._reference = reference_posture("front")
         self._reference[TORSO_Y] = body.placement.lateral_m
         model = render(cardbox_patches(body, self._reference), camera, silhouette.rows)
