@@ -163,11 +163,11 @@ reliability: $(VENV)/package
 reliability-quick: $(VENV)/package
 	$(BIN)/python -m tools.reliability --quick
 
-# Code with bounds checks is slow, so it has a cache of its own. Only some: make bounds TESTS=test/vision
+# Only some: make bounds TESTS=test/vision
 TESTS ?= test/reliability test/vision test/body test/estimation
 .PHONY: bounds
 bounds: $(VENV)/extras
-	XDG_DATA_HOME=$(CURDIR)/$(VENV)/data NUMBA_BOUNDSCHECK=1 NUMBA_CACHE_DIR=$(CURDIR)/$(VENV)/bounds \
+	XDG_DATA_HOME=$(CURDIR)/$(VENV)/data NUMBA_BOUNDSCHECK=1 \
 		$(BIN)/python -m pytest --timeout 7200 $(TESTS)
 
 # There are 24 functions.

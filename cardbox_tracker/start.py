@@ -14,6 +14,7 @@ import sysconfig
 from collections.abc import Callable
 from functools import partial
 from importlib import import_module
+from pickle import UnpicklingError
 
 from cardbox_tracker import garbage, interrupts
 
@@ -36,10 +37,10 @@ NODES: dict[str, str] = {
 
 
 def start(name: str, main: Callable[[], int]) -> int:
-    """Run ``main`` of the program ``name``, and print an error if a package is missing.
+    """Run ``main`` of the program ``name``; a missing package or damaged code is told in words.
 
     Returns:
-        The exit code; 1 if a package is missing.
+        The exit code; 1 if a package is missing or compiled code is damaged.
     """
     try:
         return main()
@@ -54,6 +55,13 @@ def start(name: str, main: Callable[[], int]) -> int:
             "of it, 'colcon build' takes the system's Python (docs/tutorial.md)",
             file=sys.stderr,
         )
+        return 1
+    except (EOFError, UnpicklingError):
+        compiling = sys.modules.get("cardbox_tracker.compiling")
+        if compiling is None:
+            raise
+        compiling.discard()
+        print(f"{name}: start it again", file=sys.stderr)
         return 1
 
 

@@ -1,186 +1,210 @@
-"""Compiled code is kept where that is possible, and nothing fails where it is not."""
+"""Compiled code is kept where that is possible, and never outlives its sources."""
 
 from __future__ import annotations
 
 import os
+import shutil
 import subprocess
 import sys
-from collections.abc import Iterator
 from pathlib import Path
 
+import numba
 import pytest
 
+import cardbox_tracker
 from cardbox_tracker import compiling
 
 ROOT = Path(__file__).resolve().parents[1]
-MODULE = """
-from cardbox_tracker.compiling import njit
+FACTOR = "FACTOR = 2\n"
+CONSTANTS = "from cardbox_tracker.factor import FACTOR\nTWICE = FACTOR\n"
+CALLEE = """
+from cardbox_tracker.compiling import kernel
+from cardbox_tracker.constants import (
+    TWICE,
+)
 
-@njit(cache=True)
-def double(x):
-    return 2 * x
+@kernel
+def scaled(x):
+    return TWICE * x
 """
-USE = "import sys; sys.path.insert(0, '.'); import twice; print(twice.double(21))"
+CALLER = """
+from cardbox_tracker import callee
+from cardbox_tracker.compiling import kernel
+
+scaled = callee.scaled
+
+@kernel
+def double(x):
+    return scaled(x)
+
+@kernel
+def read(array, place):
+    return array[place]
+"""
 
 
 @pytest.fixture
-def module(tmp_path: Path) -> Path:
-    """A module of one compiled function, in a folder of its own."""
-    folder = tmp_path / "module"
-    folder.mkdir()
-    (folder / "twice.py").write_text(MODULE)
+def package(tmp_path: Path) -> Path:
+    """A small package of the same name, whose function ``double`` calls one of another file."""
+    folder, source = tmp_path / "cardbox_tracker", Path(compiling.__file__)
+    copy = folder / source.relative_to(Path(cardbox_tracker.__file__).parent)
+    copy.parent.mkdir(parents=True)
+    shutil.copy(source, copy)
+    texts = {"factor": FACTOR, "constants": CONSTANTS, "callee": CALLEE, "caller": CALLER}
+    for name, text in {"__init__": "", "other": "", **texts}.items():
+        (folder / f"{name}.py").write_text(text)
     return folder
 
 
-def used(module: Path, **environment: str) -> tuple[str, str]:
-    """Call the function in a new interpreter; return its output and its warnings."""
-    values = {**os.environ, "PYTHONPATH": str(ROOT), "PYTHONDONTWRITEBYTECODE": "1", **environment}
-    command = [sys.executable, "-c", USE]
-    done = subprocess.run(command, cwd=module, env=values, capture_output=True, text=True)
+def run(package: Path, program: str, **environment: str) -> tuple[str, str]:
+    """Run a program in a new interpreter; return its output and its warnings."""
+    values = {**os.environ, "PYTHONPATH": str(package.parent), "PYTHONDONTWRITEBYTECODE": "1"}
+    values.pop("NUMBA_CACHE_DIR", None)
+    done = subprocess.run(
+        [sys.executable, "-c", program],
+        env=values | environment,
+        cwd=package.parent,
+        capture_output=True,
+        text=True,
+    )
     assert done.returncode == 0, done.stderr
     return done.stdout, done.stderr
 
 
-@pytest.mark.promise("No compiled code is run that is damaged or that others may have written")
-@pytest.mark.parametrize("ending", [".nbi", ".nbc"])
-def test_a_file_that_was_cut_off_is_made_again(ending: str, module: Path) -> None:
-    assert used(module) == ("42\n", "")
-    (file,) = (module / "__pycache__").glob(f"*{ending}")
-    whole = file.read_bytes()
-    for length in (0, 1, len(whole) // 2, len(whole) - 1):
-        file.write_bytes(whole[:length])
-        out, told = used(module)
-        assert out == "42\n"
-        assert "is damaged" in told and "Traceback" not in told
-        assert used(module) == ("42\n", ""), "it was kept again"
-
-
-READER = """
-import numpy
-from cardbox_tracker.compiling import njit
-
-@njit(cache=True)
-def read(array, place):
-    return array[place]
-
-def double(place):
-    try:
-        return read(numpy.zeros(place + 1)[:place], place)
-    except IndexError:
-        return "refused"
+USE = """
+from cardbox_tracker.caller import double
+print(double(21), sum(double.stats.cache_hits.values()))
 """
 
 
-def test_code_with_bounds_checks_is_kept_apart(module: Path) -> None:
-    (module / "twice.py").write_text(READER)
-    for _ in range(2):
-        assert used(module, NUMBA_BOUNDSCHECK="0") == ("0.0\n", "")
-        assert used(module, NUMBA_BOUNDSCHECK="1") == ("refused\n", "")
-    assert len(list((module / "__pycache__").glob("*.nbc"))) == 2, "neither replaces the other"
+def test_code_is_kept_until_a_source_changes(package: Path) -> None:
+    assert run(package, USE) == ("42 0\n", "")
+    (package / "other.py").write_text("CHANGED = True")
+    assert run(package, USE) == ("42 1\n", ""), "no kernel contains the other file"
+    for name, old, new in (
+        ("callee", "TWICE * x", "TWICE * x + 1"),
+        ("factor", "2", "3"),
+    ):
+        path = package / f"{name}.py"
+        path.write_text(path.read_text().replace(old, new))
+        out, _ = run(package, USE)
+        assert out == ("43 0\n" if name == "callee" else "64 0\n")
+    assert run(package, USE) == ("64 1\n", "")
 
 
-CALLEE = """
-from cardbox_tracker.compiling import njit
-{constant}
-
-@njit(cache=True)
-def scaled(x):
-    return FACTOR * x
-"""
-CALLER = """
-from cardbox_tracker.compiling import njit
-from twice.callee import scaled
-
-@njit(cache=True)
-def double(x):
-    return scaled(x)
-"""
-
-
-@pytest.mark.parametrize("changed", ["callee", "constants"])
-def test_a_caller_is_compiled_again_when_another_file_changes(changed: str, tmp_path: Path) -> None:
-    folder = tmp_path / "twice"
-    folder.mkdir()
-    (folder / "__init__.py").write_text("from twice.caller import double")
-    (folder / "caller.py").write_text(CALLER)
+def test_only_the_last_folders_are_kept(package: Path) -> None:
     found = []
-    for factor in (2, 3, 3):
-        constant = f"FACTOR = {factor}"
-        if changed == "constants":
-            (folder / "constants.py").write_text(constant)
-            constant = "from twice.constants import FACTOR"
-        (folder / "callee.py").write_text(CALLEE.format(constant=constant))
-        found.append(used(tmp_path))
-        files = sorted(path.name for path in (folder / "__pycache__").glob("*.nb?"))
-    assert found == [("42\n", ""), ("63\n", ""), ("63\n", "")]
-    assert len(files) == 4, f"an index and one version of both functions, not {files}"
+    for count in range(6):
+        (package / "factor.py").write_text(f"FACTOR = {count}")
+        found.append(compiling.choose_folder(str(package)))
+        assert found[-1] is not None
+        os.utime(found[-1], (count, count))
+    (package / "factor.py").write_text("FACTOR = 2")
+    assert compiling.choose_folder(str(package)) == found[2]
+    assert set((package / "__pycache__").iterdir()) == set(found[2:])
+
+
+BOUNDS = """
+import numpy
+from cardbox_tracker.caller import read
+try:
+    print(read(numpy.zeros(3)[:2], 2))
+except IndexError:
+    print("refused")
+"""
+
+
+def test_code_with_bounds_checks_is_kept_apart(package: Path) -> None:
+    for _ in range(2):
+        assert run(package, BOUNDS, NUMBA_BOUNDSCHECK="0") == ("0.0\n", "")
+        assert run(package, BOUNDS, NUMBA_BOUNDSCHECK="1") == ("refused\n", "")
+
+
+DAMAGED = """
+from cardbox_tracker import compiling
+from cardbox_tracker.caller import double
+try:
+    double(21)
+except compiling.DAMAGED:
+    compiling.discard()
+print(double(21), len(list(compiling.FOLDER.rglob("*.double-*"))))
+"""
+
+
+@pytest.mark.promise("A damaged cache of compiled code is made again")
+@pytest.mark.parametrize("ending", [".nbi", ".nbc"])
+def test_a_file_that_was_cut_off_is_made_again(ending: str, package: Path) -> None:
+    run(package, USE)
+    (file,) = package.rglob(f"*.double-*{ending}")
+    whole = file.read_bytes()
+    for length in (0, len(whole) // 2):
+        file.write_bytes(whole[:length])
+        out, said = run(package, DAMAGED)
+        assert out == "42 2\n"
+        assert "damaged" in said and str(file.parents[1]) in said and "Traceback" not in said
+        assert run(package, USE) == ("42 1\n", ""), "it was kept again"
 
 
 @pytest.fixture
-def nowhere(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Iterator[Path]:
-    """Numba finds no place for its cache; temporary files go to a folder of ours."""
-
-    def refuse(*_: object) -> None:
-        raise OSError(30, "Read-only file system")
-
-    from numba.core.caching import CacheImpl
-
-    for locator in CacheImpl._locator_classes:
-        if "UserProvided" not in locator.__name__:
-            monkeypatch.setattr(locator, "ensure_cache_path", refuse)
-    monkeypatch.setattr("numba.config.CACHE_DIR", "")
-    monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
-    monkeypatch.setattr(compiling, "_said", set())
-    yield tmp_path / f"cardbox_tracker-{os.geteuid()}"
+def places(package: Path, tmp_path: Path) -> dict[str, str]:
+    """Environment with a read-only package and home, and a folder for temporary files."""
+    (package / "__pycache__").touch()
+    (tmp_path / "temporary").mkdir()
+    return {
+        "XDG_CACHE_HOME": str(package / "__pycache__" / "below a file"),
+        "TMPDIR": str(tmp_path / "temporary"),
+    }
 
 
-def triple(x: int) -> int:
-    return 3 * x
+def test_the_users_folder_comes_first(package: Path, tmp_path: Path) -> None:
+    run(package, USE, NUMBA_CACHE_DIR=str(tmp_path / "mine"))
+    assert list((tmp_path / "mine").glob("cardbox_tracker-*/**/*.double-*.nbc"))
+    assert not (package / "__pycache__").exists()
 
 
-def test_a_folder_of_our_own_is_used_where_numba_has_none(nowhere: Path) -> None:
-    assert compiling.njit(cache=True)(triple)(14) == 42
-    assert list(nowhere.rglob("*.nbc"))
-    assert nowhere.stat().st_mode & 0o077 == 0
-    again = compiling.njit(cache=True)(triple)
-    assert again(14) == 42
-    assert sum(again.stats.cache_hits.values()) == 1
+def test_a_package_that_is_read_only_is_kept_elsewhere(
+    package: Path, places: dict[str, str], tmp_path: Path
+) -> None:
+    assert run(package, USE, **places) == ("42 0\n", "")
+    assert run(package, USE, **places) == ("42 1\n", "")
+    (kept,) = (tmp_path / "temporary").glob("cardbox_tracker-*")
+    assert kept.stat().st_mode & 0o077 == 0
+    home = {"XDG_CACHE_HOME": str(tmp_path / "cache")}
+    assert run(package, USE, **places | home) == ("42 0\n", "")
+    assert list((tmp_path / "cache").rglob("*.nbc"))
 
 
-@pytest.mark.promise("No compiled code is run that is damaged or that others may have written")
+@pytest.mark.promise("No cache of compiled code is used that others may write to")
 @pytest.mark.parametrize("planted", ["open to all", "a link", "somebody else's", "a file"])
 def test_a_folder_that_somebody_planted_is_not_used(
-    planted: str, nowhere: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+    planted: str, package: Path, places: dict[str, str], tmp_path: Path
 ) -> None:
+    run(package, USE, **places)
+    (folder,) = (tmp_path / "temporary").iterdir()
+    shutil.rmtree(folder)
+    program = USE
     if planted == "a link":
-        (nowhere.parent / "theirs").mkdir(mode=0o700)
-        nowhere.symlink_to(nowhere.parent / "theirs")
+        (tmp_path / "theirs").mkdir(mode=0o700)
+        folder.symlink_to(tmp_path / "theirs")
     elif planted == "a file":
-        nowhere.touch()
+        folder.touch()
     else:
-        nowhere.mkdir()
-        nowhere.chmod(0o777 if planted == "open to all" else 0o700)
+        folder.mkdir()
+        folder.chmod(0o777 if planted == "open to all" else 0o700)
     if planted == "somebody else's":
         somebody = os.geteuid() + 1
-        monkeypatch.setattr("os.geteuid", lambda: somebody)
-        nowhere.rename(nowhere.with_name(f"cardbox_tracker-{os.geteuid()}"))
-    for _ in range(2):
-        assert compiling.njit(cache=True)(triple)(14) == 42
-    assert not list(nowhere.parent.rglob("*.nb*"))
-    (record,) = caplog.records
-    assert "set NUMBA_CACHE_DIR" in record.message
+        folder.rename(folder.with_name(folder.name.replace(f"-{somebody - 1}-", f"-{somebody}-")))
+        program = f"import os\nos.geteuid = lambda: {somebody}\n{USE}"
+    out, said = run(package, program, **places)
+    assert out == "42 0\n"
+    assert "set NUMBA_CACHE_DIR" in said
+    assert not list(tmp_path.rglob("*.nb?"))
 
 
-def test_a_full_disk_does_not_end_it(
-    nowhere: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
-) -> None:
-    def full(*_: object) -> None:
-        raise OSError(28, "No space left on device")
-
-    function = compiling.njit(cache=True)(triple)
-    monkeypatch.setattr("numba.core.caching.IndexDataCacheFile._open_for_write", full)
-    assert function(14) == 42
-    assert "No space left on device" in caplog.text
+def test_other_packages_keep_their_folder() -> None:
+    before = numba.config.CACHE_DIR
+    compiling.kernel(lambda x: x)
+    assert before == numba.config.CACHE_DIR
 
 
 @pytest.mark.parametrize("command", ["urdf", "synthesize", "call"])
@@ -188,54 +212,7 @@ def test_what_needs_no_compiled_code_does_not_load_the_compiler(command: str) ->
     code = (
         "import sys\nfrom cardbox_tracker.commands.main import main\n"
         f"try: main([{command!r}, '--help'])\nexcept SystemExit: pass\n"
-        "import cardbox_tracker.body.urdf, cardbox_tracker.body.model_file\n"
+        "import cardbox_tracker.description.urdf, cardbox_tracker.body.model_file\n"
         "assert 'numba' not in sys.modules"
     )
-    environment = {**os.environ, "PYTHONPATH": str(ROOT)}
-    done = subprocess.run(
-        [sys.executable, "-c", code], env=environment, capture_output=True, text=True
-    )
-    assert done.returncode == 0, done.stderr
-
-
-SUMS = """
-import numpy
-from cardbox_tracker.compiling import njit
-
-@njit(cache=True)
-def total(values):
-    if values.any():
-        return values.sum() / values.shape[0]
-    raise ValueError("nothing to add")
-
-@njit()
-def more(values):
-    return total(values) + numpy.median(values)
-"""
-USE_SUMS = """
-import sys
-sys.path.insert(0, ".")
-import numpy, sums
-print(sums.total(numpy.arange(4.0)), "numba.np.arraymath" in sys.modules)
-try:
-    sums.total(numpy.zeros(2))
-except ValueError as error:
-    print(error)
-print(sums.more(numpy.arange(4.0)))
-"""
-
-
-def test_kept_code_is_read_without_the_compiler_which_still_works(tmp_path: Path) -> None:
-    """The modules of numba's own functions are only imported when code is compiled."""
-    (tmp_path / "sums.py").write_text(SUMS)
-    environment = {**os.environ, "PYTHONPATH": str(ROOT), "PYTHONDONTWRITEBYTECODE": "1"}
-    command = [sys.executable, "-c", USE_SUMS]
-    told = []
-    for _ in range(2):
-        done = subprocess.run(
-            command, cwd=tmp_path, env=environment, capture_output=True, text=True
-        )
-        assert (done.returncode, done.stderr) == (0, "")
-        told.append(done.stdout)
-    assert told[0] == "1.5 True\nnothing to add\n3.0\n"
-    assert told[1] == "1.5 False\nnothing to add\n3.0\n"
+    run(ROOT / "cardbox_tracker", code)

@@ -8,9 +8,12 @@ import sys
 import sysconfig
 from importlib import import_module
 from pathlib import Path
+from pickle import UnpicklingError
+from unittest.mock import Mock
 
 import pytest
 
+from cardbox_tracker import compiling
 from cardbox_tracker.start import other_package, start
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -57,6 +60,17 @@ def test_a_missing_library_of_the_robot_is_told_in_words() -> None:
 def test_another_fault_keeps_its_traceback() -> None:
     with pytest.raises(ModuleNotFoundError):
         start("tracker", lambda: import_module("cardbox_tracker.nothing").main())
+
+
+def test_damaged_compiled_code_is_removed_and_told_in_words(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    removed: list[bool] = []
+    monkeypatch.setattr(compiling, "discard", lambda: removed.append(True))
+    for error in (EOFError("Ran out of input"), UnpicklingError("pickle data was truncated")):
+        assert start("cardbox", Mock(side_effect=error)) == 1
+    assert removed == [True, True]
+    assert "cardbox: start it again" in capsys.readouterr().err
 
 
 SCRIPT = Path(sysconfig.get_path("scripts")) / "cardbox"

@@ -65,7 +65,7 @@ from cardbox_tracker.body.skeleton import (
     neck_pivot_m,
     neck_rotation,
 )
-from cardbox_tracker.compiling import copied_kernel, inlined_allocation, inlined_kernel, kernel
+from cardbox_tracker.compiling import copied_kernel, inlined_kernel, kernel
 
 # Values of ``girdle`` (3,): shoulder joint of a hanging arm in the torso's frame, metres; its rise
 # per elevation of the arm, m/rad.
@@ -464,7 +464,7 @@ class PosedArm(NamedTuple):
     """(6,): the directions with y outwards, for the arms' prior; otherwise scratch."""
 
 
-@inlined_allocation
+@inlined_kernel
 def new_arm() -> PosedArm:
     """Return the scratch arrays of one arm."""
     return PosedArm(

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from cardbox_tracker.body.model import BodyModel
 from cardbox_tracker.body.sizes import FloatArray
-from cardbox_tracker.compiling import njit
+from cardbox_tracker.compiling import kernel
 from cardbox_tracker.estimation.person_masks import Mask, PersonDrawer, PersonMasks, grown
 from cardbox_tracker.estimation.still_things import CHANGED, SAME, THING, StillThings
 from cardbox_tracker.vision.array_checks import check_array
@@ -240,7 +240,7 @@ def _distance(mask: Mask) -> FloatArray:
     return np.asarray(cv2.distanceTransform(1 - mask, cv2.DIST_L2, 3), np.float64)
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _overlaps(
     rows: Any,
     starts: Any,
@@ -273,7 +273,7 @@ def _overlaps(
             areas_px[kind, label] += count_px
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _paint(rows: Any, starts: Any, ends: Any, labels: Any, kept: Any, image: Any) -> None:
     """Set the pixels of the kept regions to 255."""
     for run in range(len(rows)):

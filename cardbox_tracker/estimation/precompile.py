@@ -9,6 +9,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from cardbox_tracker import compiling
 from cardbox_tracker.body.appearance import PARTS, Appearance, bins_of
 from cardbox_tracker.body.cardbox import cardbox_patches
 from cardbox_tracker.body.model import BodyModel
@@ -33,11 +34,21 @@ def compile_all(
 ) -> None:
     """Track a drawn person with each of ``presets``, which compiles all their kernels.
 
+    Compiled code that is damaged is made again.
+
     Args:
         presets: names of the presets.
         several_cameras: also with a further camera, if the preset allows it.
         points: also with the 2D points of a detector.
     """
+    try:
+        _call_all(presets, several_cameras, points)
+    except compiling.DAMAGED:
+        compiling.discard()
+        _call_all(presets, several_cameras, points)
+
+
+def _call_all(presets: Sequence[str], several_cameras: bool, points: bool) -> None:
     background.warm_up()
     person_region.warm_up()
     body = BodyModel()

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from cardbox_tracker.compiling import njit
+from cardbox_tracker.compiling import copied_kernel, kernel
 from cardbox_tracker.vision.array_checks import check_array
 
 ImageArray = NDArray[np.uint8]
@@ -64,7 +64,7 @@ def _planes(image: ImageArray) -> ImageArray:
     return pixels[..., None] if pixels.ndim == 2 else pixels
 
 
-@njit(cache=True, nogil=True, inline="always")
+@copied_kernel
 def _change(image: Any, looks: Any, v: Any, u: Any) -> Any:
     """Return the largest difference over the channels of a pixel."""
     largest: Any = 0
@@ -73,7 +73,7 @@ def _change(image: Any, looks: Any, v: Any, u: Any) -> Any:
     return largest
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _compare(image: Any, looks: Any, counts: Any, found: Any) -> None:
     height, width = counts.shape
     for v in range(height):
@@ -82,7 +82,7 @@ def _compare(image: Any, looks: Any, counts: Any, found: Any) -> None:
                 found[v, u] = CHANGED if _change(image, looks, v, u) > _CHANGE else SAME
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _learn(image: Any, shows: Any, looks: Any, counts: Any) -> None:
     height, width = counts.shape
     for v in range(height):

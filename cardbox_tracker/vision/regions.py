@@ -14,7 +14,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from cardbox_tracker.compiling import njit
+from cardbox_tracker.compiling import copied_kernel, kernel
 from cardbox_tracker.vision.array_checks import ANY, check_array
 from cardbox_tracker.vision.window import Window, find_edges
 
@@ -24,7 +24,6 @@ _NO_WORDS = np.zeros((1, 0), np.uint64)
 _EIGHT = np.uint64(0x0101010101010101)
 # Smallest kernel that closes a gap of one pixel in all eight directions.
 _CLOSING_KERNEL = np.ones((3, 3), np.uint8)
-_inline = njit(cache=True, nogil=True, inline="always")
 
 
 def remove_small_regions(image: ImageArray, colour: int, area_px: float) -> None:
@@ -132,7 +131,7 @@ def find_regions(image: ImageArray) -> Regions:
     return Regions(rows, starts, ends, labels, areas[:regions])
 
 
-@_inline
+@copied_kernel
 def _root(parents: Any, run: Any) -> Any:
     """Return the root run of a region, with path compression."""
     while parents[run] != run:
@@ -141,7 +140,7 @@ def _root(parents: Any, run: Any) -> Any:
     return run
 
 
-@_inline
+@copied_kernel
 def _end_of(image: Any, words: Any, v: Any, u: Any, colour: Any) -> Any:
     """Return the first column of row ``v`` from ``u`` on that is not of ``colour``."""
     # With unsigned indices, numba compiles no code for negative ones.
@@ -158,7 +157,7 @@ def _end_of(image: Any, words: Any, v: Any, u: Any, colour: Any) -> Any:
     return np.int64(column)
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _list_runs(image: Any, words: Any, colour: Any, runs: Any, firsts: Any) -> Any:
     """Write start, end, parent and area (valid at roots) of each run; return their number."""
     starts, ends, parents, areas = runs[0], runs[1], runs[2], runs[3]
@@ -196,7 +195,7 @@ def _list_runs(image: Any, words: Any, colour: Any, runs: Any, firsts: Any) -> A
     return count
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _number_regions(firsts: Any, runs: Any, rows: Any) -> Any:
     """Replace parents by region numbers and write their areas; return the number of regions."""
     parents, areas = runs[2], runs[3]
@@ -215,7 +214,7 @@ def _number_regions(firsts: Any, runs: Any, rows: Any) -> Any:
     return count
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _clean(
     part: Any,
     words: Any,
@@ -240,7 +239,7 @@ def _clean(
     return top + first, top + end, left + begin, left + last
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _recolour(image: Any, words: Any, colour: Any, area_px: float, runs: Any) -> None:
     starts, ends, parents, areas = runs[0], runs[1], runs[2], runs[3]
     height = image.shape[0]

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from cardbox_tracker.compiling import njit
+from cardbox_tracker.compiling import copied_kernel, kernel
 from cardbox_tracker.vision.array_checks import ANY, check_array
 from cardbox_tracker.vision.window import Window
 
@@ -65,7 +65,7 @@ def decide_shadows(
     decide_pixels(foreground, by_color, difference, per_level, -darkest, softest, *window)
 
 
-@njit(cache=True, nogil=True, inline="always")
+@copied_kernel
 def _is_soft(difference: Any, per_level: Any, v: Any, u: Any, softest: Any) -> Any:
     """Return whether the darkness varies by less than ``softest`` in the square around a pixel."""
     height, width = difference.shape
@@ -88,7 +88,7 @@ def _is_soft(difference: Any, per_level: Any, v: Any, u: Any, softest: Any) -> A
     return high - low < softest
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def decide_pixels(
     foreground: Any,
     colored: Any,
@@ -184,7 +184,7 @@ def decide_pixels(
             foreground[v, u] = 255 * (foreground[v, u] > 0)
 
 
-@njit(cache=True, nogil=True, inline="always")
+@copied_kernel
 def _mark(
     row: Any, by_color: Any, difference: Any, per_level: Any, darkest: Any, start: Any, size: Any
 ) -> Any:
@@ -201,7 +201,7 @@ def _mark(
     return found > 0
 
 
-@njit(cache=True, nogil=True, inline="always")
+@copied_kernel
 def _mark_word(
     seen: Any, by_color: Any, difference: Any, per_level: Any, darkest: Any, place: Any
 ) -> Any:

@@ -41,17 +41,20 @@ def test_only_the_default_preset_takes_the_whole_body_filter() -> None:
 
 
 @pytest.mark.parametrize(
-    ("values", "text"),
+    ("name", "values"),
     [
-        ({"arms": 50, "banked_arms": 40}, "arms is 50; expected .*58"),
-        ({"fresh_torsos": 17}, "fresh_torsos, .*17, 16, 70"),
-        ({"best_torsos": 71}, "best_torsos is 71; expected 1 to 70"),
-        ({"alike": 33}, "alike is 33; expected 1 to 32"),
+        ("effort", (0.2, 4.1, 0.0)),
+        ("smoothing", (-0.1, 1.0)),
+        ("smallest_person", (-0.1, 1.1)),
+        ("largest_person", (0.9, 1001.0)),
     ],
 )
-def test_whole_body_values_that_do_not_go_together(values: dict[str, Any], text: str) -> None:
-    with pytest.raises(ValueError, match=text):
-        WholeBodyConfig(**values)
+def test_a_whole_body_value_out_of_range_is_named(name: str, values: tuple[float, ...]) -> None:
+    for value in (*values, float("nan")):
+        with pytest.raises(ValueError, match=f"^{name} is .*; expected .* to "):
+            WholeBodyConfig(**{name: value})
+        with pytest.raises(ValueError, match=rf"^whole_body\.{name} is .*; expected .* to "):
+            default_preset().changed({"whole_body": {name: value}})
 
 
 def test_presets_by_name() -> None:

@@ -29,7 +29,7 @@ from cardbox_tracker.body.parts import (
     TORSO,
     UPPER_ARM,
 )
-from cardbox_tracker.compiling import inlined_allocation, inlined_kernel, kernel
+from cardbox_tracker.compiling import inlined_kernel, kernel
 from cardbox_tracker.estimation.cost.kernel_arguments import Body, BodyTuple, Floats, body_of
 from cardbox_tracker.estimation.cost.rasterisation import Workspace, new_workspace
 
@@ -151,7 +151,7 @@ def place_arm(arm: PosedArm, p: int, drawn: Floats, corners: Floats) -> None:
     _place_limb(arm, 1, (fore_m, thin, hand_cap), p + _LIMB_PATCHES, corners)
 
 
-@inlined_allocation
+@inlined_kernel
 def new_scratch() -> tuple[Workspace, PosedArm]:
     """Return the scratch arrays of :func:`place_patches`."""
     return new_workspace(BODY_PATCHES, 1), new_arm()

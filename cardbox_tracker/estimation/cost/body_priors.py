@@ -21,7 +21,7 @@ from cardbox_tracker.body.parts import (
     WAIST,
 )
 from cardbox_tracker.body.posture import PITCH, ROLL, TORSO_X, TORSO_Z, YAW
-from cardbox_tracker.compiling import borrowing_kernel, inlined_kernel, kernel
+from cardbox_tracker.compiling import inlined_kernel, kernel
 from cardbox_tracker.estimation.cost.kernel_arguments import BodyTuple, Floats, body_of
 from cardbox_tracker.estimation.cost.pose_prior import nats_of
 from cardbox_tracker.estimation.cost.whole_body_config import WholeBodyCostConfig
@@ -120,7 +120,7 @@ def _depth_inside(x: float, y: float, z: float, parts: Floats, margin: float) ->
     return max(deep, 1.0 - sqrt(a * a + b * b + c * c))
 
 
-@borrowing_kernel
+@kernel
 def penetration(points: Floats, parts: Floats) -> float:
     """Return the sum of the depths of hand, mid-forearm and elbow (3, 3) inside trunk or head."""
     margin = parts[FOREARM, TOP_WIDTH] / 2

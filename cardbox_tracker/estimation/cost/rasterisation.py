@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from cardbox_tracker.compiling import borrowing_kernel, inlined_allocation, inlined_kernel
+from cardbox_tracker.compiling import inlined_kernel, kernel
 from cardbox_tracker.estimation.cost.kernel_arguments import Counts, Floats, Intrinsics, Whole
 from cardbox_tracker.vision.rasterisation import (
     CROSSING_BITS,
@@ -73,9 +73,12 @@ class Workspace(NamedTuple):
     """(3,): middle of the hips, and shoulder or elbow, in the optical frame, metres."""
 
 
-@inlined_allocation
+@inlined_kernel
 def new_workspace(patches: int, rows: int) -> Workspace:
-    """Return the workspace for a number of patches and rows; ``shape`` is zero."""
+    """Return the workspace for a number of patches and rows; ``shape`` is zero.
+
+    numba compiles a version for each constant; callers pass ``int(CONSTANT)``, which is none.
+    """
     return Workspace(
         shape=np.zeros((3, 4 * patches)),
         corners=np.zeros((3, 4 * patches)),
@@ -183,7 +186,7 @@ def _cross(edges: Whole, e: int, p: int, side: _Index, sides: Whole, width: int)
         sides[k, side, base + _index(i)] = min(max(u, np.int32(0)), limit)
 
 
-@borrowing_kernel
+@kernel
 def _draw_cut(work: Workspace, p: int, camera: Intrinsics, rows: int, width: int) -> None:
     """Write sides and extent of patch ``p`` after clipping at the near plane.
 

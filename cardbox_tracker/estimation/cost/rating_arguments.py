@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from cardbox_tracker.body.kinematics import PosedArm, new_arm
-from cardbox_tracker.compiling import inlined_allocation
+from cardbox_tracker.compiling import inlined_kernel
 from cardbox_tracker.estimation.cost.bit_masks import Masks, new_masks
 from cardbox_tracker.estimation.cost.bit_planes import Planes
 from cardbox_tracker.estimation.cost.body_priors import Prior
@@ -65,7 +65,7 @@ class Scratch(NamedTuple):
     logs: Floats
 
 
-@inlined_allocation
+@inlined_kernel
 def new_scratch(patches: int, seen: Observed, given: Prior) -> Scratch:
     """Return the scratch arrays for a number of patches."""
     return Scratch(

@@ -148,14 +148,14 @@ def _sum_many(
 
 
 @inlined_kernel
-def sum_union(work: Workspace, count: int, row_sums: RowSums) -> tuple[np.int64, np.int64]:
-    """Return sum of (1 - 2 f) and area, px, of the union of the first ``count`` patches.
+def sum_union(work: Workspace, row_sums: RowSums) -> tuple[np.int64, np.int64]:
+    """Return sum of (1 - 2 f) and area, px, of the union of all patches.
 
     The rows are divided into bands that meet the same patches, so that no row has to test all
     patches.
     """
     sides, extent, active, joined = work.sides, work.extent, work.active, work.joined
-    rows = row_sums.shape[0]
+    rows, count = row_sums.shape[0], extent.shape[0]
     v = rows
     for k in range(count):
         if extent[k, 0] < extent[k, 1]:

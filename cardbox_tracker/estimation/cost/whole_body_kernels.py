@@ -19,7 +19,7 @@ from cardbox_tracker.body.kinematics import (
     state_pose,
     turn_arm,
 )
-from cardbox_tracker.compiling import borrowing_kernel, inlined_kernel, kernel
+from cardbox_tracker.compiling import inlined_kernel, kernel
 from cardbox_tracker.estimation.cost.bit_masks import cover_masks, new_masks, sum_masks
 from cardbox_tracker.estimation.cost.bit_planes import Planes
 from cardbox_tracker.estimation.cost.body_outline import (
@@ -90,7 +90,7 @@ def rate_trunks(
     _rate_trunks(states, body_of(body), seen, given, scratch, ratings)
 
 
-@borrowing_kernel
+@kernel
 def _rate_trunks(
     states: Floats, of: Body, seen: Observed, given: Prior, scratch: Scratch, ratings: Floats
 ) -> None:
@@ -124,7 +124,7 @@ def rate_arms(
     _rate_arms(arms, side, torso, body_of(body), seen, given, scratch, ratings, joints_m)
 
 
-@borrowing_kernel
+@kernel
 def _rate_arms(
     arms: Floats,
     side: float,
@@ -175,7 +175,7 @@ def rate_bodies(
     _rate_bodies(states, body_of(body), seen, given, scratch, ratings, pixels, Points(*points))
 
 
-@borrowing_kernel
+@kernel
 def _rate_bodies(
     states: Floats,
     of: Body,
@@ -219,7 +219,7 @@ def rate_pairs(
     _rate_pairs(states, body_of(body), seen, given, scratch, ratings, Points(*points))
 
 
-@borrowing_kernel
+@kernel
 def _rate_pairs(
     states: Floats,
     of: Body,
