@@ -94,7 +94,7 @@ def layout(
     views = rerun().blueprint
     # The heights of plots with joints, errors and states.
     error, shares = ([_plot(shown, ERROR, "error [cm]")], [2]) if has_truth else ([], [])
-    units = ("deg", "deg", "deg", "deg", "m")
+    units = ("deg", "deg", "deg", "deg", "m", "m")
     plots = [
         _plot(shown, f"{JOINTS}/{name}", f"{name.replace('_', ' ')} [{unit}]")
         for name, unit in zip(GROUPS, units, strict=True)
