@@ -9,14 +9,13 @@ from typing import Any
 
 import numpy as np
 
-from cardbox_tracker.estimation.filtering.outline_fit import OutlineFit
-from cardbox_tracker.search import whole_body
-from cardbox_tracker.search.arm_search import ArmSearch
-from cardbox_tracker.search.config import default_preset
-from cardbox_tracker.search.whole_body import WholeBodyFilter
-from cardbox_tracker.tracking.tracker import Tracker
-from lab.benchmarks.scene import BenchmarkScene
-from lab.benchmarks.tools import WARM_UP, summary
+from benchmarks.scene import BenchmarkScene
+from benchmarks.tools import WARM_UP, summary
+from cardbox_tracker.estimation.config import default_preset
+from cardbox_tracker.estimation.filtering import whole_body
+from cardbox_tracker.estimation.filtering.doubt import Doubt
+from cardbox_tracker.estimation.filtering.whole_body import WholeBodyFilter
+from cardbox_tracker.estimation.tracker import Tracker
 
 WHOLE = "the whole frame"
 # No part contains another one, so that the rest is the difference to the whole.
@@ -24,17 +23,15 @@ _PARTS: dict[str, tuple[Any, str]] = {
     "region of the person": (Tracker, "_frames_of"),
     "silhouette as bits, presence": (WholeBodyFilter, "look"),
     "place of the person": (WholeBodyFilter, "_observe"),
-    "search of torsos": (WholeBodyFilter, "_torsos"),
-    "search of both arms": (ArmSearch, "__call__"),
-    "search of all joints together": (WholeBodyFilter, "_together"),
-    "fit to the outline": (OutlineFit, "__call__"),
-    "states of the keypoints": (whole_body, "judged"),
+    "fit to the cues": (WholeBodyFilter, "_refined"),
+    "states of the keypoints": (Doubt, "judge"),
 }
+_STAGES = {f"search: {stage.__name__}": stage for stage in whole_body.STAGES}
 
 
 def measure_default_stages(scene: BenchmarkScene) -> dict[str, dict[str, float]]:
     """Return the times of the parts, of the rest and of the whole frame, ms."""
-    times_ms: dict[str, list[float]] = {name: [] for name in _PARTS}
+    times_ms: dict[str, list[float]] = {name: [] for name in (*_STAGES, *_PARTS)}
     whole_ms: list[float] = []
     with _timed(times_ms):
         tracker = Tracker(scene.body, scene.camera, default_preset())
@@ -55,9 +52,11 @@ def _timed(times_ms: dict[str, list[float]]) -> Iterator[None]:
     before = {name: getattr(*place) for name, place in _PARTS.items()}
     for name, (owner, called) in _PARTS.items():
         setattr(owner, called, _timing(before[name], times_ms[name]))
+    whole_body.STAGES = tuple(_timing(stage, times_ms[name]) for name, stage in _STAGES.items())
     try:
         yield
     finally:
+        whole_body.STAGES = tuple(_STAGES.values())
         for name, (owner, called) in _PARTS.items():
             setattr(owner, called, before[name])
 

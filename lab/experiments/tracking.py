@@ -28,6 +28,8 @@ AXES = ("lateral", "vertical", "depth")
 """The axes x, y and z of the camera optical frame."""
 
 RUNS_A_CALL = 10
+# More frames than any session has.
+_NEVER = 1_000_000
 
 
 @dataclass(frozen=True)
@@ -63,8 +65,8 @@ class Runs(NamedTuple):
 
 def comparable(config: TrackerConfig) -> TrackerConfig:
     """Return ``config`` without the states that would leave out images."""
-    never_lost = replace(config.whole_body, lost_from=1.0, largest_person=1000.0)
-    return replace(config, lost_iou=0.0, whole_body=never_lost)
+    any_size = replace(config.whole_body, largest_person=1000.0)
+    return replace(config, lost_iou=0.0, lost_frames=_NEVER, whole_body=any_size)
 
 
 def calls_of(session: Session, setting: Setting, runs: int) -> list[Call]:

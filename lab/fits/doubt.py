@@ -173,7 +173,7 @@ def row_of(name: str, samples: Samples, said: FloatArray, uncertain_from: float)
     everything = np.ones_like(tracked)
     return (
         f"| {name} | {len(said)} | {share(is_tracking, np.ones(len(said), bool))} "
-        f"| {share(wrong.any(axis=1), is_tracking)} | {share(tracked, everything)} "
+        f"| {share(np.asarray(wrong.any(axis=1)), is_tracking)} | {share(tracked, everything)} "
         f"| {share(wrong, tracked)} | {share(samples.aligned_m > 0.15, uncertain)} "
         f"| {100.0 * float(keypoints.mean()):.1f} | {share(wrong, everything)} |"
     )

@@ -115,7 +115,7 @@ def _settings_section() -> list[str]:
         "parameter `settings_file` of the tracker take a YAML file, in which each part before a",
         "dot is a level of its own:",
         "",
-        *("```yaml", "whole_body:", "  effort: 0.5", "  cost:", "    yaw_deg: 20.0", "```", ""),
+        *("```yaml", "whole_body:", "  effort: 0.5", "  smoothing: 0.2", "```", ""),
         "`torso`, `arm`, `strategy`, `cycles`, `average` and `torso_beside_arms` are of the preset",
         "`paper`, `whole_body` of the preset `default`; those of the other preset are refused.",
         "",

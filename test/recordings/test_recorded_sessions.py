@@ -9,13 +9,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-from cardbox_tracker.applications.evaluation.truth import load_ground_truth, tracking_error
+from cardbox_tracker.body.model_file import load_body_model
+from cardbox_tracker.body.skeleton import KEYPOINT_NAMES
 from cardbox_tracker.commands.main import main
-from cardbox_tracker.measuring.config import InitializationResult
-from cardbox_tracker.measuring.measure import initialize_body
-from cardbox_tracker.person.model_file import load_body_model
-from cardbox_tracker.person.skeleton import KEYPOINT_NAMES
-from cardbox_tracker.search.doubt import UNCERTAIN_FROM
+from cardbox_tracker.estimation.initialization.config import InitializationResult
+from cardbox_tracker.estimation.initialization.measure import initialize_body
+from cardbox_tracker.evaluation.truth import load_ground_truth, tracking_error
 
 DATA = Path(__file__).resolve().parents[3] / "shared" / "data"
 MEAN_ERROR_M = 0.15
@@ -66,10 +65,7 @@ def test_a_recorded_session_is_measured_and_tracked_to_its_end(
         stamp_ns = int(row["stamp_ns"])
         states[stamp_ns] = row["state"]
         if row["state"] in ("tracking", "uncertain"):
-            if (
-                max(float(row[f"{side}_hand_chance"]) for side in ("left", "right"))
-                > UNCERTAIN_FROM
-            ):
+            if any(row[f"{side}_hand_state"] != "tracked" for side in ("left", "right")):
                 doubted.add(stamp_ns)
             points = [float(row[f"{joint}_{axis}"]) for joint in KEYPOINT_NAMES for axis in "xyz"]
             estimates_m[stamp_ns] = np.array(points).reshape(6, 3)

@@ -56,8 +56,8 @@ def test_a_reference_is_held_for_two_seconds(name: str, side_turn: str) -> None:
 @pytest.mark.parametrize("motion", ["wave", "bend", "bow"])
 def test_a_motion_stays_within_the_joint_limits(motion: str) -> None:
     """The tracker looks for nothing beyond them; only the side reference turns further."""
-    duration_s, pose = MOTIONS[motion]
-    path = np.array([pose(t) for t in np.arange(0.0, duration_s, STEP_S)])
+    duration_s, posture_at = MOTIONS[motion]
+    path = np.array([posture_at(t) for t in np.arange(0.0, duration_s, STEP_S)])
     assert np.all((path >= JOINT_LIMITS[:, 0]) & (path <= JOINT_LIMITS[:, 1]))
 
 
@@ -73,8 +73,8 @@ def test_joints_move_smoothly(motion: str) -> None:
 @pytest.mark.parametrize("motion", ["wave", "bend", "bow"])
 def test_arms_stay_beside_the_torso(motion: str) -> None:
     """No hand or elbow comes before the chest, where a silhouette would not show it."""
-    _, pose = MOTIONS[motion]
-    path = np.array([pose(t) for t in np.arange(0.0, MOTIONS[motion][0], 0.1)])
+    _, posture_at = MOTIONS[motion]
+    path = np.array([posture_at(t) for t in np.arange(0.0, MOTIONS[motion][0], 0.1)])
     patches = cardbox_patches(BODY, path)
     sagittal_half = BODY.size("torso_top_width") / 2
     for patch_range, side in ((LEFT_ARM_PATCHES, 1.0), (RIGHT_ARM_PATCHES, -1.0)):

@@ -102,7 +102,8 @@ def test_images_of_other_segments_or_without_a_person_do_not_count(session: Sess
 
 
 def test_no_image_is_left_out_as_lost() -> None:
-    assert comparable(default_preset()).lost_iou == 0.0
+    config = comparable(default_preset())
+    assert (config.lost_iou, config.lost_frames) == (0.0, 1_000_000)
     assert comparable(paper_preset()).torso == paper_preset().torso
 
 
