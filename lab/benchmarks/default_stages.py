@@ -9,13 +9,13 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.scene import BenchmarkScene
-from benchmarks.tools import WARM_UP, summary
-from cardbox_tracker.estimation.config import default_preset
-from cardbox_tracker.estimation.filtering import whole_body
-from cardbox_tracker.estimation.filtering.doubt import Doubt
-from cardbox_tracker.estimation.filtering.whole_body import WholeBodyFilter
-from cardbox_tracker.estimation.tracker import Tracker
+from cardbox_tracker.search import whole_body
+from cardbox_tracker.search.config import default_preset
+from cardbox_tracker.search.doubt import Doubt
+from cardbox_tracker.search.whole_body import WholeBodyFilter
+from cardbox_tracker.tracking.tracker import Tracker
+from lab.benchmarks.scene import BenchmarkScene
+from lab.benchmarks.tools import WARM_UP, summary
 
 WHOLE = "the whole frame"
 # No part contains another one, so that the rest is the difference to the whole.
