@@ -12,10 +12,8 @@ import numpy as np
 from benchmarks.scene import BenchmarkScene
 from benchmarks.tools import WARM_UP, summary
 from cardbox_tracker.estimation.config import default_preset
-from cardbox_tracker.estimation.filtering import whole_body
-from cardbox_tracker.estimation.filtering.arm_search import ArmSearch
-from cardbox_tracker.estimation.filtering.outline_fit import OutlineFit
-from cardbox_tracker.estimation.filtering.whole_body import WholeBodyFilter
+from cardbox_tracker.estimation.filtering import doubt, whole_body
+from cardbox_tracker.estimation.filtering.whole_body import STAGES, WholeBodyFilter
 from cardbox_tracker.estimation.tracker import Tracker
 
 WHOLE = "the whole frame"
@@ -24,17 +22,16 @@ _PARTS: dict[str, tuple[Any, str]] = {
     "region of the person": (Tracker, "_frames_of"),
     "silhouette as bits, presence": (WholeBodyFilter, "look"),
     "place of the person": (WholeBodyFilter, "_observe"),
-    "search of torsos": (WholeBodyFilter, "_torsos"),
-    "search of both arms": (ArmSearch, "__call__"),
-    "search of all joints together": (WholeBodyFilter, "_together"),
-    "fit to the outline": (OutlineFit, "__call__"),
-    "states of the keypoints": (whole_body, "judged"),
+    "refinement": (WholeBodyFilter, "_refined"),
+    "evidence": (doubt, "evidence_of_search"),
+    "doubt": (doubt.Doubt, "judge"),
 }
+_SEARCH = tuple(f"search: {stage.__name__}" for stage in STAGES)
 
 
 def measure_default_stages(scene: BenchmarkScene) -> dict[str, dict[str, float]]:
     """Return the times of the parts, of the rest and of the whole frame, ms."""
-    times_ms: dict[str, list[float]] = {name: [] for name in _PARTS}
+    times_ms: dict[str, list[float]] = {name: [] for name in (*_PARTS, *_SEARCH)}
     whole_ms: list[float] = []
     with _timed(times_ms):
         tracker = Tracker(scene.body, scene.camera, default_preset())
@@ -55,11 +52,14 @@ def _timed(times_ms: dict[str, list[float]]) -> Iterator[None]:
     before = {name: getattr(*place) for name, place in _PARTS.items()}
     for name, (owner, called) in _PARTS.items():
         setattr(owner, called, _timing(before[name], times_ms[name]))
+    named = zip(_SEARCH, STAGES, strict=True)
+    whole_body.STAGES = tuple(_timing(stage, times_ms[name]) for name, stage in named)
     try:
         yield
     finally:
         for name, (owner, called) in _PARTS.items():
             setattr(owner, called, before[name])
+        whole_body.STAGES = STAGES
 
 
 def _timing(call: Callable[..., Any], times_ms: list[float]) -> Callable[..., Any]:
