@@ -9,10 +9,9 @@ from typing import Any
 
 import numpy as np
 
-from cardbox_tracker.search import whole_body
+from cardbox_tracker.search import doubt, whole_body
 from cardbox_tracker.search.config import default_preset
-from cardbox_tracker.search.doubt import Doubt
-from cardbox_tracker.search.whole_body import WholeBodyFilter
+from cardbox_tracker.search.whole_body import STAGES, WholeBodyFilter
 from cardbox_tracker.tracking.tracker import Tracker
 from lab.benchmarks.scene import BenchmarkScene
 from lab.benchmarks.tools import WARM_UP, summary
@@ -23,15 +22,16 @@ _PARTS: dict[str, tuple[Any, str]] = {
     "region of the person": (Tracker, "_frames_of"),
     "silhouette as bits, presence": (WholeBodyFilter, "look"),
     "place of the person": (WholeBodyFilter, "_observe"),
-    "fit to the cues": (WholeBodyFilter, "_refined"),
-    "states of the keypoints": (Doubt, "judge"),
+    "refinement": (WholeBodyFilter, "_refined"),
+    "evidence": (doubt, "evidence_of_search"),
+    "doubt": (doubt.Doubt, "judge"),
 }
-_STAGES = {f"search: {stage.__name__}": stage for stage in whole_body.STAGES}
+_SEARCH = tuple(f"search: {stage.__name__}" for stage in STAGES)
 
 
 def measure_default_stages(scene: BenchmarkScene) -> dict[str, dict[str, float]]:
     """Return the times of the parts, of the rest and of the whole frame, ms."""
-    times_ms: dict[str, list[float]] = {name: [] for name in (*_STAGES, *_PARTS)}
+    times_ms: dict[str, list[float]] = {name: [] for name in (*_PARTS, *_SEARCH)}
     whole_ms: list[float] = []
     with _timed(times_ms):
         tracker = Tracker(scene.body, scene.camera, default_preset())
@@ -52,13 +52,14 @@ def _timed(times_ms: dict[str, list[float]]) -> Iterator[None]:
     before = {name: getattr(*place) for name, place in _PARTS.items()}
     for name, (owner, called) in _PARTS.items():
         setattr(owner, called, _timing(before[name], times_ms[name]))
-    whole_body.STAGES = tuple(_timing(stage, times_ms[name]) for name, stage in _STAGES.items())
+    named = zip(_SEARCH, STAGES, strict=True)
+    whole_body.STAGES = tuple(_timing(stage, times_ms[name]) for name, stage in named)
     try:
         yield
     finally:
-        whole_body.STAGES = tuple(_STAGES.values())
         for name, (owner, called) in _PARTS.items():
             setattr(owner, called, before[name])
+        whole_body.STAGES = STAGES
 
 
 def _timing(call: Callable[..., Any], times_ms: list[float]) -> Callable[..., Any]:
