@@ -9,6 +9,7 @@ import pytest
 from numpy.typing import NDArray
 
 from cardbox_tracker.body.cardbox import LEFT_ARM_PATCHES, RIGHT_ARM_PATCHES, cardbox_patches
+from cardbox_tracker.body.kinematics import pose
 from cardbox_tracker.body.model import BodyModel
 from cardbox_tracker.body.posture import JOINT_LIMITS, reference_posture
 from cardbox_tracker.errors import CardboxError
