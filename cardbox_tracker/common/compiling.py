@@ -37,6 +37,7 @@ DAMAGED = (EOFError, UnpicklingError)
 F = TypeVar("F", bound=Callable[..., Any])
 
 _LOG = logging.getLogger(__name__)
+_CONFIG: Any = numba.config
 _LOCK = threading.Lock()
 _IMPORT = re.compile(rb"^from cardbox_tracker\.?(\S*) import (\([^)]*\)|.*)", re.MULTILINE)
 # Another branch, or a version with bounds checks, is then not compiled anew at each change.
@@ -79,7 +80,7 @@ def choose_folder(package: str) -> Path | None:
     Args:
         package: folder of the package.
     """
-    digest = hashlib.sha256(repr(numba.config.BOUNDSCHECK).encode())
+    digest = hashlib.sha256(repr(_CONFIG.BOUNDSCHECK).encode())
     for path, text in sources_of_kernels(package).items():
         digest.update(os.path.relpath(path, package).encode() + b"\0" + text + b"\0")
     prefix = f"cardbox_tracker-{os.geteuid()}-"
@@ -100,8 +101,8 @@ def choose_folder(package: str) -> Path | None:
 
 
 def _places(package: str) -> Iterator[Path]:
-    if numba.config.CACHE_DIR:
-        yield Path(numba.config.CACHE_DIR).absolute()
+    if _CONFIG.CACHE_DIR:
+        yield Path(_CONFIG.CACHE_DIR).absolute()
     yield Path(package, "__pycache__")
     with suppress(RuntimeError):  # there is no home folder
         yield Path(os.environ.get("XDG_CACHE_HOME") or "~/.cache").expanduser()
@@ -137,16 +138,16 @@ def njit(**options: Any) -> Callable[[F], F]:
     compiled: Any = partial(numba.njit, nogil=True, error_model="numpy", **options)
 
     def decorate(function: F) -> F:
-        config: Any = numba.config
         # numba chooses the folder of a function now, and other packages keep theirs.
         with _LOCK:
-            before, config.CACHE_DIR = config.CACHE_DIR, str(FOLDER)
+            before, _CONFIG.CACHE_DIR = _CONFIG.CACHE_DIR, str(FOLDER)
             try:
-                return compiled(cache=FOLDER is not None)(function)
+                made: F = compiled(cache=FOLDER is not None)(function)
             except RuntimeError:  # the function has no file, or the folder is full
-                return compiled()(function)
+                made = compiled()(function)
             finally:
-                config.CACHE_DIR = before
+                _CONFIG.CACHE_DIR = before
+        return made
 
     return decorate
 

@@ -2,8 +2,8 @@
 
 ``python -m lab.tools.endurance day`` tracks a day of images at 30 Hz through the core, without
 nodes; ``hour`` runs the background and tracker nodes live at 15 Hz while the person comes and goes
-and the light changes; ``eight`` runs trackers in eight namespaces and compares what was sent, answered and
-told. Each writes ``endurance-RUN.json`` while it runs, and at its end, also by Ctrl-C, the page
+and the light changes; ``eight`` runs trackers in eight namespaces and compares what was sent,
+answered and reported. Each writes ``endurance-RUN.json`` while it runs, and at its end, also by Ctrl-C, the page
 ``endurance.md`` and its picture.
 """
 

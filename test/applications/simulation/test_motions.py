@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from cardbox_tracker.applications.simulation.motions import MOTIONS, smooth, timeline
 from cardbox_tracker.common.errors import CardboxError
 from cardbox_tracker.person.cardbox import LEFT_ARM_PATCHES, RIGHT_ARM_PATCHES, cardbox_patches
+from cardbox_tracker.person.kinematics import pose
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.posture import JOINT_LIMITS, reference_posture
 
