@@ -109,7 +109,7 @@ links: $(VENV)/extras
 demo: setup
 	$(BIN)/cardbox demo --output demo_output
 
-# These are the commands of the README, with the times of the synthetic session.
+# These are the commands of the tutorial, with the times of the synthetic session.
 .PHONY: example
 example: setup
 	@mkdir -p example
@@ -122,14 +122,12 @@ example: setup
 .PHONY: benchmark
 benchmark: setup
 	$(BIN)/cardbox benchmark --json docs/benchmarks.json --report docs/benchmarks.md
-	$(BIN)/python -m lab.tools.readme_figures
 
 # Fewer runs: make experiments RUNS=2
 RUNS ?= 100
 .PHONY: experiments
 experiments: setup
 	$(BIN)/cardbox evaluate --runs $(RUNS) --output docs/evaluation --force
-	$(BIN)/python -m lab.tools.readme_figures
 
 # This compares the recorded sessions of one camera beside the checkout with their ground truth.
 DATA ?= ../shared/data
@@ -138,7 +136,8 @@ SESSIONS = $(filter-out $(DATA)/real_% $(DATA)/stereo_% $(DATA)/two_%,\
 .PHONY: sessions
 sessions: setup
 	@if [ -z "$(SESSIONS)" ]; then echo "skipped: no recorded sessions in $(DATA)"; else \
-		$(BIN)/cardbox evaluate --sessions $(SESSIONS) --recovery --output docs/evaluation --force; fi
+		$(BIN)/cardbox evaluate --sessions $(SESSIONS) --recovery --output docs/evaluation --force; \
+		$(BIN)/python -m lab.tools.readme_figures; fi
 
 # The pictures come first, because the document shows them.
 PEOPLE = $(patsubst %/ground_truth.json,%,\
@@ -151,7 +150,8 @@ people: setup $(VENV)/extras
 		$(BIN)/python -m lab.tools.people_sheet $(PEOPLE) --output docs/images/real-people.jpg; \
 		$(BIN)/cardbox evaluate --sessions $(PEOPLE) --detector none mediapipe --output docs/evaluation --force; \
 		$(BIN)/python -m lab.tools.real_report --session $(DATA)/real_signs --output $(REPORT) \
-			--sheet docs/images/real.jpg; fi
+			--sheet docs/images/real.jpg; \
+		$(BIN)/python -m lab.tools.readme_figures; fi
 
 # Fewer examples: make reliability EXAMPLES=1000
 EXAMPLES ?= 100000

@@ -218,7 +218,14 @@ def test_joint_limits_of_the_conventions_are_those_of_the_code() -> None:
     import numpy as np
 
     from cardbox_tracker.person.posture import TURNING_LIMITS, place_limits
-    from cardbox_tracker.person.skeleton import JOINT_NAMES, NECK_LIMITS, NECK_NAMES, PLACE_NAMES
+    from cardbox_tracker.person.skeleton import (
+        JOINT_NAMES,
+        NECK_LIMITS,
+        NECK_NAMES,
+        PLACE_NAMES,
+        Group,
+        joints_of,
+    )
 
     rows = re.findall(
         r"(?m)^\| `(\w+)`.*\| (-?[\d.]+) to ([\d.]+) \|$", text_of(Path("docs/conventions.md"))
@@ -227,6 +234,7 @@ def test_joint_limits_of_the_conventions_are_those_of_the_code() -> None:
     limits["torso_y"] = TURNING_LIMITS[0]
     limits |= dict(zip(PLACE_NAMES, place_limits(2.0), strict=True))
     limits |= dict(zip(NECK_NAMES, np.degrees(NECK_LIMITS), strict=True))
-    assert len(rows) == 12
+    limits |= {joint.name: joint.limits for joint in joints_of(Group.CLAVICLES)}
+    assert len(rows) == 13
     for name, lowest, highest in rows:
         assert (float(lowest), float(highest)) == pytest.approx(tuple(limits[name])), name

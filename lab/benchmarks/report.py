@@ -1,4 +1,4 @@
-"""The benchmark's report in Markdown, and the README's figures of speed, from its JSON file."""
+"""The benchmark's report in Markdown, from its JSON file."""
 
 from __future__ import annotations
 
@@ -9,12 +9,9 @@ from typing import Any
 from cardbox_tracker.common.files import atomic_path
 from lab.benchmarks.nodes import PERCENTILES
 
-BEGIN, END = "<!-- benchmark:begin -->", "<!-- benchmark:end -->"
 COMMAND = "make benchmark"
 PICTURE_OF_WAY = "images/way.png"
 """Plot of the steps of an image's way, relative to the report."""
-
-_STREAM = "mono8 320x240 at 30 Hz"
 
 _FRAMES = {
     "paper": "silhouette to posture, the paper's settings",
@@ -69,31 +66,6 @@ def report(results: Mapping[str, Any]) -> str:
         f"{results['after_pauses']['with_ms']:.1f} ms after each thirtieth of a second.",
     ]
     return "\n\n".join(parts) + "\n"
-
-
-def readme_section(results: Mapping[str, Any]) -> str:
-    """Return the README's table of speed."""
-    rows = [
-        (
-            "silhouette to posture, 600 particles, one core",
-            _ms(results["frames"]["paper"])[0],
-        ),
-        (
-            "the same with OpenCV drawing the patches takes",
-            f"{results['ratio_opencv']:.0f} times as long",
-        ),
-        ("particles per image that one core manages at 30 Hz", f"{results['particles_at_30hz']:,}"),
-    ]
-    nodes = results["nodes"]
-    for words, measured in (
-        (("all nodes in one process", nodes["single_process"]), ("each in its own", nodes))
-        if nodes
-        else ()
-    ):
-        stream = measured["streams"][_STREAM]
-        text = f"{stream['p50_ms']:.1f} ms median, {stream['p95_ms']:.1f} ms p95"
-        rows.append((f"image stamp to JointState over DDS, {_STREAM}, {words}", text))
-    return _table(("speed", f"on {results['cpu']}"), rows)
 
 
 def _ratios(ratios: Mapping[str, Any] | None) -> list[str]:

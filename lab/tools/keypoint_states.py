@@ -23,11 +23,11 @@ from cardbox_tracker.common.files import atomic_path
 _TEXT = """\
 # States of the keypoints
 
-A keypoint is wrong if it is off by more than 30 cm. The tracker gives each keypoint a probability
-of being wrong and, from it, a [state](../conventions.md#states). The tables compare both with the
-truth; all errors are absolute, so a wrong distance of the person counts. Made by
-`python -m lab.tools.keypoint_states` from the figures of [sessions](sessions.md) and
-[real people](real-people.md).
+A keypoint is wrong if it is off by more than 30 cm relative to the middle of the shoulders, so the
+error of the person's distance does not count. The tracker gives each keypoint a probability of
+being wrong and, from it, a [state](../conventions.md#states). The tables compare both with the
+truth. `python -m lab.tools.keypoint_states` makes this page from the figures of
+[sessions](sessions.md) and [real people](real-people.md).
 
 ![Reliability diagrams](../images/keypoint-states.png)
 

@@ -131,7 +131,7 @@ print(double(21), len(list(compiling.FOLDER.rglob("*.double-*"))))
 """
 
 
-@pytest.mark.promise("A damaged cache of compiled code is made again")
+@pytest.mark.promise("No compiled code is run that is damaged or that others may have written")
 @pytest.mark.parametrize("ending", [".nbi", ".nbc"])
 def test_a_file_that_was_cut_off_is_made_again(ending: str, package: Path) -> None:
     run(package, USE)
@@ -174,7 +174,7 @@ def test_a_package_that_is_read_only_is_kept_elsewhere(
     assert list((tmp_path / "cache").rglob("*.nbc"))
 
 
-@pytest.mark.promise("No cache of compiled code is used that others may write to")
+@pytest.mark.promise("No compiled code is run that is damaged or that others may have written")
 @pytest.mark.parametrize("planted", ["open to all", "a link", "somebody else's", "a file"])
 def test_a_folder_that_somebody_planted_is_not_used(
     planted: str, package: Path, places: dict[str, str], tmp_path: Path

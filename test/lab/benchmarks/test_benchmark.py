@@ -20,9 +20,9 @@ from lab.benchmarks.scene import make_scene
 from lab.benchmarks.silhouette import WITHOUT, colored, measure_silhouettes
 from lab.benchmarks.views import measure_two_views
 from lab.benchmarks.way import STEPS, steps_of
-from lab.tools.readme_figures import BENCHMARKS
 
 ROOT = Path(__file__).parents[3]
+BENCHMARKS = "docs/benchmarks.json"
 PROMISED = (
     "frame_ms_median",
     "frame_ms_p95",
@@ -193,9 +193,6 @@ def test_files_hold_what_is_promised(
     assert ("| posture | 4.00 ms, 4.00 ms |" in text) == (nodes is not None)
     assert (tmp_path / benchmark_report.PICTURE_OF_WAY).exists() == (nodes is not None)
     assert "times faster" in capsys.readouterr().out
-    section = benchmark_report.readme_section(results)
-    for text in ("5.0 ms median, 7.0 ms p95", "4.0 ms median, 6.0 ms p95"):
-        assert (text in section) == (nodes is not None)
 
 
 def test_a_folder_that_is_not_there_is_told_before_anything_is_measured(
