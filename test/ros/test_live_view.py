@@ -36,9 +36,8 @@ class Feed:
 
 @pytest.fixture
 def node(monkeypatch: pytest.MonkeyPatch) -> Iterator[Any]:
-    monkeypatch.setattr(live_view, "Feed", Feed)
     rclpy.init(args=[])
-    made = live_view.LiveView(None)  # type: ignore[arg-type]
+    made = live_view.LiveView(Feed(None))  # type: ignore[arg-type]
     yield made
     made.destroy_node()
     rclpy.shutdown()

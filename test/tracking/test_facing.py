@@ -2,32 +2,33 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
-from cardbox_tracker.body.appearance import HAND, HEAD, TORSO, Appearance, bins_of
-from cardbox_tracker.body.cardbox import cardbox_patches
-from cardbox_tracker.body.keypoint_state import KeypointState
-from cardbox_tracker.body.model import BodyModel
-from cardbox_tracker.body.posture import PITCH, YAW, reference_posture
-from cardbox_tracker.detection.image_points import POINT_NAMES, ImagePoints
-from cardbox_tracker.estimation.config import PRESETS
-from cardbox_tracker.estimation.cost.inner_cue_arms import ArmView
-from cardbox_tracker.estimation.cost.terms import Frame
-from cardbox_tracker.estimation.estimate import UNCERTAIN
-from cardbox_tracker.estimation.facing import Facing
-from cardbox_tracker.estimation.precompile import quickest
-from cardbox_tracker.estimation.tracker import Tracker
-from cardbox_tracker.vision.camera import Camera
-from cardbox_tracker.vision.rasterisation import render
+from cardbox_tracker.camera.camera import Camera
+from cardbox_tracker.camera.rasterisation import render
+from cardbox_tracker.detectors.image_points import POINT_NAMES, ImagePoints
+from cardbox_tracker.person.appearance import HAND, HEAD, TORSO, Appearance, bins_of
+from cardbox_tracker.person.cardbox import cardbox_patches
+from cardbox_tracker.person.model import BodyModel
+from cardbox_tracker.person.posture import PITCH, YAW, reference_posture
+from cardbox_tracker.person.skeleton import KeypointState
+from cardbox_tracker.search.config import PRESETS
+from cardbox_tracker.terms.drawn_body import body_tuple
+from cardbox_tracker.terms.inner_cue_arms import zones_of
+from cardbox_tracker.terms.term import Frame, Posed
+from cardbox_tracker.tracking.estimate import UNCERTAIN
+from cardbox_tracker.tracking.facing import Facing
+from cardbox_tracker.tracking.precompile import quickest
+from cardbox_tracker.tracking.tracker import Tracker
 
 CAMERA = Camera(320, 240, 300.0, 300.0, 159.5, 119.5)
 # Colours in the middle of their bins, which are 256 / 12 levels wide: bgr.
 SKIN, HAIR, SHIRT = (139, 160, 203), (32, 32, 53), (117, 117, 117)
 BODY = BodyModel.of()
 STATE = BODY.reference_state()
+POSABLE = body_tuple(BODY, CAMERA)
+ZONES = zones_of(Posed(POSABLE, STATE[None]))
 INTERVAL_S = 0.2
 
 
@@ -53,8 +54,7 @@ def seen(hair: float, light: float = 1.0, hair_colour: tuple[int, ...] = HAIR) -
     """The person, with hair in a share of the face's columns, the first of eight."""
     image = np.empty((240, 320, 3), np.uint8)
     image[:] = SHIRT
-    zones = ArmView.of(BODY, CAMERA, np.zeros(2), lifts_shoulders=True).zones(STATE)
-    u, v, half_width, half_height = zones[:4]
+    u, v, half_width, half_height = ZONES[:4]
     top, bottom = int(v - half_height), int(v + half_height)
     image[top:bottom] = SKIN
     # Eight columns between -0.6 and 0.6: a border in the middle between two of them.
@@ -62,18 +62,25 @@ def seen(hair: float, light: float = 1.0, hair_colour: tuple[int, ...] = HAIR) -
     image[top:bottom, : round(border)] = hair_colour
     image = np.clip(np.rint(light * image), 0, 255).astype(np.uint8)
     silhouette = np.full((240, 320), 255, np.uint8)
-    return Frame(silhouette, 200, 1, image, interval_s=INTERVAL_S)
+    channels = {"silhouette": silhouette, "image": image}
+    return Frame(CAMERA, channels, 200, 1, interval_s=INTERVAL_S)
+
+
+def having(frame: Frame, **channels: object) -> Frame:
+    """The frame with other channels; None for one that is missing."""
+    both = {**frame.channels, **channels}
+    return frame.changed(channels={name: one for name, one in both.items() if one is not None})
 
 
 def facing(**values: object) -> Facing:
     values = {"appearance": appearance()} | values
-    return Facing(BODY.with_values(**values), CAMERA)
+    return Facing(BODY.with_values(**values))
 
 
 def see(asked: Facing, frame: Frame, seconds: float, state: np.ndarray = STATE) -> list[bool]:
     found = []
     for _ in range(round(seconds / INTERVAL_S)):
-        asked.see(frame, state)
+        asked.see(frame, Posed(POSABLE, state[None]))
         found.append(asked.shows_back)
     return found
 
@@ -83,9 +90,8 @@ def see(asked: Facing, frame: Frame, seconds: float, state: np.ndarray = STATE) 
 def test_the_share_of_hair_does_not_depend_on_the_light(hair: float, light: float) -> None:
     asked, frame = facing(), seen(hair, light)
     assert frame.image is not None
-    zones = asked._view.zones(STATE)
     for _ in range(20):
-        share = asked._hair(frame.image, frame.silhouette, zones)
+        share = asked._hair(frame.image, frame.silhouette, ZONES)
     assert share == hair
 
 
@@ -128,8 +134,8 @@ def test_hair_in_the_colour_of_skin_or_none_shows_nothing(hair: tuple[int, int, 
 def test_grey_images_missing_ones_and_unknown_colours_show_nothing() -> None:
     face, back = seen(0.0), seen(1.0)
     assert back.image is not None
-    grey = replace(back, image=back.image[..., 0].copy())
-    for frame in (grey, replace(back, image=None)):
+    grey = having(back, image=back.image[..., 0].copy())
+    for frame in (grey, having(back, image=None)):
         asked = facing()
         see(asked, face, 5.0)
         assert not any(see(asked, frame, 5.0))
@@ -143,12 +149,11 @@ def test_a_head_that_is_lower_than_the_models_is_no_back() -> None:
     asked = facing()
     see(asked, seen(0.0), 5.0)
     back = seen(1.0)
-    zones = ArmView.of(BODY, CAMERA, np.zeros(2), lifts_shoulders=True).zones(STATE)
     low = back.silhouette.copy()
-    low[: int(zones[1] - 0.5 * zones[3])] = 0
-    assert not any(see(asked, replace(back, silhouette=low), 5.0))
-    low[: int(zones[1] - 0.5 * zones[3])] = 255
-    assert see(asked, replace(back, silhouette=low), 2.0)[-1]
+    low[: int(ZONES[1] - 0.5 * ZONES[3])] = 0
+    assert not any(see(asked, having(back, silhouette=low), 5.0))
+    low[: int(ZONES[1] - 0.5 * ZONES[3])] = 255
+    assert see(asked, having(back, silhouette=low), 2.0)[-1]
 
 
 def test_who_leans_forward_shows_the_top_of_the_head() -> None:
@@ -166,7 +171,7 @@ def test_points_of_a_detector_are_trusted_instead() -> None:
     points = ImagePoints(
         np.full((len(POINT_NAMES), 2), 100.0, np.float32), np.ones(len(POINT_NAMES), np.float32)
     )
-    assert not any(see(asked, replace(back, points=points), 1.0))
+    assert not any(see(asked, having(back, points=points), 1.0))
 
 
 def test_a_person_who_left_may_be_another_one() -> None:
@@ -184,7 +189,7 @@ def test_nothing_is_tracking_while_a_back_is_seen(monkeypatch: pytest.MonkeyPatc
     before = [tracker.track(mask) for _ in range(3)][-1]
     assert before.keypoint_states is not None
     assert KeypointState.TRACKED in before.keypoint_states
-    monkeypatch.setattr(Facing, "see", lambda self, frame, state: setattr(self, "shows_back", True))
+    monkeypatch.setattr(Facing, "see", lambda self, frame, posed: setattr(self, "shows_back", True))
     after = tracker.track(mask)
     assert after.state == UNCERTAIN
     assert after.keypoints_m is not None

@@ -8,20 +8,20 @@ import cv2
 import numpy as np
 import pytest
 
-from cardbox_tracker.body.cardbox import cardbox_patches
-from cardbox_tracker.body.model import BodyModel
-from cardbox_tracker.body.posture import reference_posture
-from cardbox_tracker.estimation.config import default_preset, paper_preset
-from cardbox_tracker.estimation.estimate import LOST, NO_PERSON, TRACKING, UNCERTAIN
-from cardbox_tracker.estimation.person_region import PersonRegion
-from cardbox_tracker.estimation.tracker import Tracker
-from cardbox_tracker.vision.camera import Camera
-from cardbox_tracker.vision.rasterisation import render
+from cardbox_tracker.camera.camera import Camera
+from cardbox_tracker.camera.rasterisation import render
+from cardbox_tracker.person.cardbox import cardbox_patches
+from cardbox_tracker.person.model import BodyModel
+from cardbox_tracker.person.posture import reference_posture
+from cardbox_tracker.search.config import default_preset, paper_preset
+from cardbox_tracker.tracking.estimate import LOST, NO_PERSON, TRACKING, UNCERTAIN
+from cardbox_tracker.tracking.person_region import PersonRegion
+from cardbox_tracker.tracking.tracker import Tracker
 
+FOUND = (TRACKING, UNCERTAIN)
 CAMERA = Camera(160, 120, 100.0, 100.0, 79.5, 59.5)
 BODY = BodyModel.of(hip_height_m=-0.4)
 FRONT = reference_posture("front")
-FOUND = (TRACKING, UNCERTAIN)
 WALL, DOOR, CLOTH = 200, 60, 140
 
 

@@ -2,73 +2,39 @@
 
 from __future__ import annotations
 
-from types import ModuleType
+import sys
 
 import numpy as np
 import pytest
 from numba.core.registry import CPUDispatcher
 
-from cardbox_tracker.body.appearance import Appearance, bins_of
-from cardbox_tracker.body.cardbox import cardbox_patches
-from cardbox_tracker.body.model import BodyModel
-from cardbox_tracker.body.posture import reference_posture
-from cardbox_tracker.detection.image_points import POINT_NAMES, ImagePoints
-from cardbox_tracker.estimation import person_region, still_things
-from cardbox_tracker.estimation.config import PRESETS
-from cardbox_tracker.estimation.cost import (
-    arm_points,
-    body_outline,
-    body_priors,
-    cardbox_kernels,
-    inner_cue_kernels,
-    joint_points_fit,
-    joint_points_kernels,
-    kinematics,
-    outline_fit_kernels,
-    pose_prior,
-    rasterisation,
-    row_sums,
-    union,
-    whole_body_kernels,
-)
-from cardbox_tracker.estimation.cost.view import OtherCamera
-from cardbox_tracker.estimation.estimate import TRACKING, UNCERTAIN
-from cardbox_tracker.estimation.filtering import (
-    arm_proposals,
-    joint_moves,
-    mirroring,
-    particle_kernels,
-    state_choice,
-    torso_proposals,
-)
-from cardbox_tracker.estimation.observation import Observation
-from cardbox_tracker.estimation.precompile import compile_all
-from cardbox_tracker.estimation.tracker import Tracker
-from cardbox_tracker.vision import chroma, light, regions, shadows, window
-from cardbox_tracker.vision import foreground as contrast
-from cardbox_tracker.vision.background import SilhouetteExtractor
-from cardbox_tracker.vision.camera import Camera
-from cardbox_tracker.vision.empty_scene import BackgroundLearner
-from cardbox_tracker.vision.extrinsics import Extrinsics
-from cardbox_tracker.vision.rasterisation import render
+from cardbox_tracker.camera.camera import Camera
+from cardbox_tracker.camera.extrinsics import Extrinsics
+from cardbox_tracker.camera.rasterisation import render
+from cardbox_tracker.camera.view import OtherCamera
+from cardbox_tracker.detectors.image_points import POINT_NAMES, ImagePoints
+from cardbox_tracker.person.appearance import Appearance, bins_of
+from cardbox_tracker.person.cardbox import cardbox_patches
+from cardbox_tracker.person.model import BodyModel
+from cardbox_tracker.person.posture import reference_posture
+from cardbox_tracker.search.config import PRESETS
+from cardbox_tracker.segmentation.background import SilhouetteExtractor
+from cardbox_tracker.segmentation.empty_scene import BackgroundLearner
+from cardbox_tracker.tracking.estimate import TRACKING, UNCERTAIN
+from cardbox_tracker.tracking.observation import Observation
+from cardbox_tracker.tracking.precompile import compile_all
+from cardbox_tracker.tracking.tracker import Tracker
 
 CAMERA = Camera(320, 240, 300.0, 300.0, 159.5, 119.5)
 
 
 def compiled() -> dict[str, int]:
     """How many versions of each function there are."""
-    modules: tuple[ModuleType, ...] = (
-        *(kinematics, rasterisation, union, cardbox_kernels, inner_cue_kernels, row_sums),
-        *(pose_prior, body_outline, body_priors, whole_body_kernels, arm_points),
-        *(outline_fit_kernels, particle_kernels, person_region, still_things),
-        *(joint_points_fit, joint_points_kernels, mirroring),
-        *(arm_proposals, joint_moves, state_choice, torso_proposals),
-        *(contrast, regions, chroma, shadows, light, window),
-    )
     return {
-        f"{module.__name__}.{name}": len(value.signatures)
-        for module in modules
-        for name, value in vars(module).items()
+        f"{module}.{name}": len(value.signatures)
+        for module, imported in sys.modules.items()
+        if module.startswith("cardbox_tracker.")
+        for name, value in vars(imported).items()
         if isinstance(value, CPUDispatcher)
     }
 
@@ -78,8 +44,8 @@ def compiled() -> dict[str, int]:
 def test_no_image_waits_for_the_compiler(preset: str, channels: int) -> None:
     compile_all()
     before = compiled()
-    assert before["cardbox_tracker.estimation.cost.cardbox_kernels.trunk_costs"] > 0
-    assert before["cardbox_tracker.estimation.cost.inner_cue_kernels.ratio_maps"] > 0
+    assert before["cardbox_tracker.terms.cardbox_kernels.trunk_costs"] > 0
+    assert before["cardbox_tracker.terms.inner_cue_kernels.ratio_maps"] > 0
     levels = np.random.default_rng(0).integers(0, 255, (5, bins_of(channels))).astype(np.uint8)
     body = BodyModel.of(appearance=Appearance(levels, np.full(channels, 100.0)))
     person = render(cardbox_patches(body, reference_posture("front")), CAMERA)
@@ -106,7 +72,7 @@ def test_no_image_waits_for_the_compiler(preset: str, channels: int) -> None:
 def test_nor_does_one_of_several_cameras() -> None:
     compile_all()
     before = compiled()
-    assert before["cardbox_tracker.estimation.cost.arm_points.add_costs_of_arms"] > 0
+    assert before["cardbox_tracker.terms.arm_points.add_costs_of_arms"] > 0
     body = BodyModel()
     person = render(cardbox_patches(body, reference_posture("front")), CAMERA)
     beside = OtherCamera(CAMERA, Extrinsics(np.eye(3), np.array([0.2, 0.0, 0.0])))
@@ -120,7 +86,7 @@ def test_nor_does_one_of_several_cameras() -> None:
 def test_nor_do_the_first_points_of_a_detector() -> None:
     compile_all()
     before = compiled()
-    assert before["cardbox_tracker.estimation.cost.joint_points_fit.fit_states"] > 0
+    assert before["cardbox_tracker.search.refiner._add"] > 0
     body = BodyModel()
     person = render(cardbox_patches(body, reference_posture("front")), CAMERA)
     count = len(POINT_NAMES)

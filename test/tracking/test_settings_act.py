@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import fields, replace
 from functools import cache
 from typing import Any
 
@@ -12,21 +12,26 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from cardbox_tracker.body.cardbox import cardbox_patches
-from cardbox_tracker.body.kinematics import keypoints_m
-from cardbox_tracker.body.model import BodyModel
-from cardbox_tracker.body.posture import reference_posture
-from cardbox_tracker.detection.image_points import ImagePoints
-from cardbox_tracker.estimation.config import PRESETS, TrackerConfig
-from cardbox_tracker.estimation.filtering.whole_body import WholeBodyFilter
-from cardbox_tracker.estimation.filtering.whole_body_config import WholeBodyConfig
-from cardbox_tracker.estimation.initialization.part_colors import learn_appearance
-from cardbox_tracker.estimation.observation import Observation
-from cardbox_tracker.estimation.tracker import Tracker
-from cardbox_tracker.settings import NoEffectError, Setting, nested, settings_below
-from cardbox_tracker.simulation.motions import wave
-from cardbox_tracker.vision.camera import Camera
-from cardbox_tracker.vision.rasterisation import render
+from cardbox_tracker.applications.simulation.motions import wave
+from cardbox_tracker.camera.camera import Camera
+from cardbox_tracker.camera.rasterisation import render
+from cardbox_tracker.common.settings import NoEffectError, Setting, nested, settings_below
+from cardbox_tracker.detectors.image_points import ImagePoints
+from cardbox_tracker.measuring.part_colors import learn_appearance
+from cardbox_tracker.person.cardbox import cardbox_patches
+from cardbox_tracker.person.kinematics import pose
+from cardbox_tracker.person.model import BodyModel
+from cardbox_tracker.person.posture import reference_posture
+from cardbox_tracker.search.config import PRESETS, TrackerConfig
+from cardbox_tracker.search.whole_body import WholeBodyFilter
+from cardbox_tracker.search.whole_body_config import (
+    ONE_CAMERA,
+    SEVERAL_CAMERAS,
+    SearchProfile,
+    WholeBodyConfig,
+)
+from cardbox_tracker.tracking.observation import Observation
+from cardbox_tracker.tracking.tracker import Tracker
 
 CAMERA = Camera(160, 120, 165.0, 165.0, 79.5, 59.5)
 BODY = BodyModel.of(distance_m=2.0)
@@ -35,10 +40,8 @@ SHIRT, SKIN, WALL = (150, 60, 30), (110, 150, 210), (128, 128, 128)
 VALUES: dict[str, Any] = {
     "strategy": "srs",
     "filter": "whole_body",
-    "whole_body.fresh_torsos": 0,
     "whole_body.smallest_person": 1.0,
-    "whole_body.uncertain_from": 0.02,
-    "whole_body.lost_from": 0.05,
+    "lost_iou": 0.99,
 }
 
 
@@ -66,7 +69,7 @@ def body() -> BodyModel:
 
 def detected(posture: np.ndarray) -> ImagePoints:
     """The points of shoulders, elbows and knuckles."""
-    pixels = CAMERA.project(CAMERA.reference_to_optical(keypoints_m(BODY, posture)))
+    pixels = CAMERA.project(CAMERA.reference_to_optical(pose(BODY.rigid, posture).keypoints_m))
     names = [
         (f"{side}_{joint}",) if joint != "hand" else (f"{side}_index", f"{side}_little_finger")
         for side in ("left", "right")
@@ -133,35 +136,84 @@ def another(name: str, value: Any, setting: Setting) -> Any:
     return low + 0.3 * (value - low) if value > low else min(high, value + 0.3)
 
 
-COUNTS = (
-    *("survivors", "alike", "torsos", "torso_explorers", "fresh_torsos", "best_torsos", "arms"),
-    *("arm_mirrors", "arm_tips", "banked_arms", "best_arms", "arms_again", "paired_arms"),
-    *("together", "average"),
+TOTALS = ("survivors", "torsos", "arms", "arms_again", "together", "average")
+PARTS = (
+    *("alike", "torso_explorers", "fresh_torsos", "best_torsos", "arm_mirrors", "arm_tips"),
+    *("banked_arms", "best_arms", "paired_arms"),
 )
 
 
-@given(effort=st.floats(0.25, 4.0), data=st.data())
-def test_any_effort_scales_any_settings_that_go_together(
-    effort: float, data: st.DataObject
+@given(
+    st.floats(0.25, 4.0),
+    st.sampled_from((ONE_CAMERA, SEVERAL_CAMERAS)),
+    st.sampled_from((1.0, 0.25)),
+)
+def test_any_effort_scales_all_numbers_of_states(
+    effort: float, usual: SearchProfile, located: float
 ) -> None:
-    usual = WholeBodyConfig()
-    few = {name: data.draw(st.integers(1, getattr(usual, name)), name) for name in COUNTS[7:13]}
-    config = replace(usual, **few, effort=effort)
-    scaled = config.scaled()
-    assert scaled.effort == 1.0
-    for name in COUNTS:
-        wanted = effort * getattr(config, name)
-        assert abs(getattr(scaled, name) - wanted) < 1.0 or wanted < 1.0
+    """Twice, as in a frame whose points tell where joints are."""
+    profile = usual.scaled(effort)
+    for name in (*TOTALS, *PARTS):
+        wanted = effort * getattr(usual, name)
+        assert abs(getattr(profile, name) - wanted) < 1.0 or wanted < 6.0
+    scaled = profile.scaled(located)
+    rest = {
+        field.name: getattr(usual, field.name)
+        for field in fields(SearchProfile)
+        if field.name not in (*TOTALS, *PARTS)
+    }
+    assert {name: getattr(scaled, name) for name in rest} == rest
+    # Parts do not exceed their totals.
+    assert 1 <= scaled.alike <= scaled.survivors
+    assert scaled.fresh_torsos <= scaled.torso_explorers <= scaled.torsos
+    assert scaled.best_torsos <= scaled.torsos
+    assert scaled.arm_mirrors + scaled.arm_tips + scaled.banked_arms < scaled.arms
+    assert min(scaled.best_arms, scaled.paired_arms) >= 1
+    assert max(scaled.best_arms, scaled.paired_arms) <= scaled.arms + scaled.arms_again
 
 
 def test_an_effort_of_one_changes_nothing() -> None:
+    assert ONE_CAMERA.scaled(1.0) is ONE_CAMERA
+
+
+def test_several_cameras_have_constants_of_their_own_unless_some_are_given() -> None:
     config = WholeBodyConfig()
-    assert config.scaled() is config
+    assert config.profile_for(1) is ONE_CAMERA
+    assert config.profile_for(2) is config.profile_for(3) is SEVERAL_CAMERAS
+    mine = replace(ONE_CAMERA, survivors=8)
+    assert all(replace(config, profile=mine).profile_for(n) is mine for n in (1, 2))
 
 
-def test_an_effort_beyond_what_is_possible_is_named() -> None:
-    with pytest.raises(ValueError, match=r"effort is 4.*survivors is 4000"):
-        WholeBodyConfig(survivors=1000, effort=4.0)
+def test_a_given_profile_is_that_of_the_search() -> None:
+    preset = PRESETS["default"]()
+    counts = []
+    for profile in (ONE_CAMERA, replace(ONE_CAMERA, rounds=0, fits_outlines=False)):
+        config = replace(preset, whole_body=replace(preset.whole_body, profile=profile))
+        tracker = Tracker(body(), CAMERA, config, np.random.default_rng(0))
+        for image, silhouette, _ in scenes()[:3]:
+            assert tracker.track(silhouette, image).posture is not None
+        assert isinstance(tracker.filter, WholeBodyFilter)
+        counts.append(len(tracker.filter.rated.states))
+    # Two rounds of states that move all joints are left out.
+    assert counts[0] - counts[1] == 2 * ONE_CAMERA.together
+
+
+def test_the_whole_body_filter_has_four_settings() -> None:
+    names = {name for name, *_ in settings_below(PRESETS["default"]())}
+    assert {name for name in names if name.startswith("whole_body.")} == {
+        f"whole_body.{name}"
+        for name in ("effort", "smoothing", "smallest_person", "largest_person")
+    }
+    assert len(names) < 40
+
+
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [("survivors", 8), ("cost", {"weight": 0.5}), ("profile", 3), ("profile", {"arms": 9})],
+)
+def test_constants_of_the_search_are_no_settings(name: str, value: Any) -> None:
+    with pytest.raises(ValueError, match=rf"'whole_body.{name}' is no setting; .*effort"):
+        PRESETS["default"]().changed({"whole_body": {name: value}})
 
 
 @pytest.mark.parametrize("effort", [0.25, 4.0])

@@ -166,7 +166,7 @@ def test_a_quarter_of_the_person_is_needed() -> None:
     few.ravel()[pixels[: count - 1]] = 255
     enough.ravel()[pixels[:count]] = 255
     assert tracker.track(few).state == NO_PERSON
-    assert tracker.track(enough).state == TRACKING
+    assert tracker.track(enough).state in FOUND
 
 
 def test_what_is_below_the_hips_is_nobody() -> None:
@@ -180,7 +180,8 @@ def test_whom_nothing_fits_is_lost_after_as_many_images() -> None:
     tracker = make(replace(paper_preset(), lost_frames=3))
     tracker.track(seen(front()))
     states = [tracker.track(stripes()).state for _ in range(5)]
-    assert states == [TRACKING, TRACKING, LOST, LOST, LOST]
+    assert all(state in FOUND for state in states[:2])
+    assert states[2:] == [LOST, LOST, LOST]
     assert tracker.track(stripes()) == Estimate(LOST, None, None, None, None, None)
 
 
@@ -190,7 +191,7 @@ def test_one_good_image_begins_the_count_anew() -> None:
         tracker.track(silhouette).state
         for silhouette in (stripes(), seen(front()), stripes(), stripes(), seen(front()))
     ]
-    assert states == [TRACKING, TRACKING, TRACKING, LOST, TRACKING]
+    assert [state == LOST for state in states] == [False, False, False, True, False]
 
 
 def test_the_fit_that_counts_as_lost_is_a_setting() -> None:
@@ -300,7 +301,7 @@ def test_reset_forgets_the_images_that_did_not_fit() -> None:
     states = [tracker.track(stripes()).state]
     tracker.reset()
     states += [tracker.track(stripes()).state for _ in range(2)]
-    assert states == [TRACKING, TRACKING, LOST]
+    assert [state == LOST for state in states] == [False, False, True]
 
 
 def test_the_camera_is_pitched_as_the_body_model_says() -> None:
