@@ -24,7 +24,10 @@ CORE = (
     TrackerConfig,
     WholeBodyConfig,
 )
-PLAIN = {TrackerConfig: {"torso", "arm", "terms", "whole_body"}, WholeBodyConfig: {"profile"}}
+PLAIN = {
+    TrackerConfig: {"torso", "arm", "terms", "whole_body"},
+    WholeBodyConfig: {"profile", "cost"},
+}
 
 
 @dataclass(frozen=True)
@@ -96,7 +99,7 @@ def test_the_core_declares_and_checks_all_its_settings(kind: Any) -> None:
 
 
 def test_a_value_out_of_range_is_refused_by_its_whole_name() -> None:
-    with pytest.raises(ValueError, match=r"whole_body\.smoothing is 9\.0; expected 0 to "):
+    with pytest.raises(ValueError, match=r"whole_body\.smoothing is 9; expected 0 to "):
         TrackerConfig().changed({"whole_body": {"smoothing": 9.0}})
 
 
