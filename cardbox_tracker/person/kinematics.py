@@ -20,7 +20,7 @@ Matrix products are written out, because calls of BLAS are slow for such small m
 from __future__ import annotations
 
 from functools import lru_cache
-from math import acos, asin, atan2, cos, pi, sin
+from math import acos, asin, atan2, cos, hypot, pi, sin, sqrt
 from typing import NamedTuple, Protocol
 
 import numpy as np
@@ -43,10 +43,8 @@ from cardbox_tracker.person.posture import (
     ELBOW_ABDUCTION,
     ELBOW_FLEXION,
     FIRST_ANGLES,
-    LEFT_ARM,
     N_STATE,
     PITCH,
-    RIGHT_ARM,
     ROLL,
     SHOULDER_ABDUCTION,
     SHOULDER_FLEXION,
@@ -72,6 +70,8 @@ from cardbox_tracker.person.skeleton import (
 ASIDE, UPWARDS, RISE = 0, 1, 2
 TWIST = 6
 _HIP, _NECK, _HEAD, _ARMS = 0, 1, 2, 3
+# The elevation of an arm that points straight up has no derivative.
+_LEAST_SINE = 1e-6
 _N_POINTS, _N_FRAMES = len(POINT_NAMES), len(FRAME_NAMES)
 
 
@@ -256,13 +256,9 @@ def clavicles(
         posture: (12,), rad and metres.
         stddev: standard deviations of the posture, (12,).
     """
-    by_state = jacobian(body, posture)
-    deviations = [
-        # The angles of an arm move its shoulder along the clavicle's axis alone.
-        float(np.linalg.norm(by_state[shoulder, :, arm] * stddev[arm]))
-        for shoulder, arm in ((_ARMS, LEFT_ARM), (_ARMS + 3, RIGHT_ARM))
-    ]
-    return pose(body, posture).clavicles_m, np.array(deviations)
+    found = np.empty(2), np.empty(2)
+    _clavicles(posture, stddev, girdle_of(body), *found)
+    return found
 
 
 def gaze_m(parts: BodyParts[float], posed: PosedBodies, angles_rad: FloatArray) -> FloatArray:
@@ -354,6 +350,27 @@ def _pose(
                 elbow = shoulder - parts[UPPER_ARM, HEIGHT] * upper_arm[j, 2]
                 at[first, j], at[first + 1, j] = shoulder, elbow
                 at[first + 2, j] = elbow - parts[FOREARM, HEIGHT] * forearm[j, 2]
+
+
+@kernel
+def _clavicles(
+    posture: FloatArray,
+    stddev: FloatArray,
+    girdle: FloatArray,
+    rises: FloatArray,
+    deviations: FloatArray,
+) -> None:
+    """Write rises (2,) and deviations (2,); the derivative of arccos(u) is -1 / sqrt(1 - u^2)."""
+    for k in range(2):
+        angles, by = angles_in(posture, k), angles_in(stddev, k)
+        cos_a, cos_f = cos(angles[SHOULDER_ABDUCTION]), cos(angles[SHOULDER_FLEXION])
+        upright = cos_a * cos_f
+        rises[k], deviations[k] = rise_of(upright, girdle), 0.0
+        if rises[k] > 0.0:
+            by_abduction = sin(angles[SHOULDER_ABDUCTION]) * cos_f * by[SHOULDER_ABDUCTION]
+            by_flexion = sin(angles[SHOULDER_FLEXION]) * cos_a * by[SHOULDER_FLEXION]
+            per_rad = girdle[RISE] / max(sqrt(1.0 - upright**2), _LEAST_SINE)
+            deviations[k] = per_rad * hypot(by_abduction, by_flexion)
 
 
 @kernel
@@ -633,7 +650,7 @@ def _arm_twists(
     _turn_about(across, rotation, elbow, twists[ELBOW_FLEXION])
     elevation = acos(min(max(ca * cf, -1.0), 1.0))
     if elevation > RISE_FROM_RAD:
-        per_rad = girdle[RISE] / max(sin(elevation), 1e-6)
+        per_rad = girdle[RISE] / max(sin(elevation), _LEAST_SINE)
         inwards, upwards = -side * RISE_INWARDS * per_rad, RISE_UPWARDS * per_rad
         for k in range(3):
             along = rotation[k, 1] * inwards + rotation[k, 2] * upwards

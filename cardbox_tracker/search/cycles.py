@@ -53,7 +53,8 @@ class Cycles:
         self._config, self._term = config, silhouette
         body, camera = silhouette.body, silhouette.camera
         self.hierarchy = make_hierarchy(config, camera.width * camera.height, rng)
-        self._posable = body_tuple(body.rigid, camera)
+        self._rigid = body.rigid
+        self._posable = body_tuple(self._rigid, camera)
         self._reference = reference_posture("front")
         self._reference[TORSO_Y] = body.placement.lateral_m
         model = render(cardbox_patches(body, self._reference), camera, silhouette.rows)
@@ -101,8 +102,7 @@ class Cycles:
         cost_px, iou = seen.overlap(posture)
         self._iou = iou
         is_poor = iou < self._config.lost_iou
-        body, camera = self._term.body.rigid, self._term.camera
-        keypoints_m = pose(body, posture, camera.pitch_rad).keypoints_m
+        keypoints_m = pose(self._rigid, posture, self._term.camera.pitch_rad).keypoints_m
         stddev = self.hierarchy.stddev()
         area = frame.foreground_px / self._person_px
         evidence = doubt.evidence_of_particles(iou, area, posture, stddev, self._posable)

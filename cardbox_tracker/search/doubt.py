@@ -152,8 +152,9 @@ class Doubt:
             vetoes: facts of which each makes the whole result uncertain, such as a person's back.
         """
         uncertain_from, of = self._models[source]
-        chances = np.array([_chance(of[kind], evidence, i) for i, kind in enumerate(KINDS)])
-        whole = _chance(of["whole"], evidence, 0)
+        values = {name: each.tolist() for name, each in evidence.items()}
+        chances = np.array([_chance(of[kind], values, i) for i, kind in enumerate(KINDS)])
+        whole = _chance(of["whole"], values, 0)
         self._whole = whole if self._whole is None else _MEMORY * (self._whole + whole)
         is_doubted = any(vetoes) or self._whole > WHOLE_UNCERTAIN_FROM
         states = tuple(
@@ -199,11 +200,11 @@ def models() -> Mapping[Source, Models]:
     )
 
 
-def _chance(model: Model, evidence: Values, index: int) -> float:
+def _chance(model: Model, evidence: Mapping[str, Sequence[float]], index: int) -> float:
     logit = model.intercept
     for name, coefficient in model.coefficients.items():
         if name in evidence:
-            logit += coefficient * float(evidence[name][index])
+            logit += coefficient * evidence[name][index]
     return 1.0 / (1.0 + exp(-min(max(logit, -50.0), 50.0)))
 
 
@@ -255,7 +256,7 @@ def evidence_of_search(
         "pitch": abs(float(state[PITCH])),
         "freshness": exp(-age / _FRESH_FRAMES),
     }
-    found = {name: np.full(6, value) for name, value in whole.items()}
+    found = _of_all_keypoints(whole)
     found["spread"] = np.log(np.maximum(spread_m, 1e-3) / 0.1)
     found["arm spread"] = np.array(
         [left_elbow, left_elbow, left_hand, right_elbow, right_elbow, right_hand]
@@ -286,9 +287,16 @@ def evidence_of_particles(
         "yaw": abs(float(state[YAW])),
         "pitch": abs(float(state[PITCH])),
     }
-    found = {name: np.full(6, value) for name, value in whole.items()}
+    found = _of_all_keypoints(whole)
     found["spread"] = np.log(np.maximum(spread_m, 1e-3) / 0.1)
     return found
+
+
+def _of_all_keypoints(values: Mapping[str, float]) -> dict[str, FloatArray]:
+    """Return values of the whole result for each keypoint, (6,)."""
+    rows = np.empty((len(values), 6))
+    rows.T[:] = list(values.values())
+    return dict(zip(values, rows, strict=True))
 
 
 @kernel

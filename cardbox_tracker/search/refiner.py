@@ -77,17 +77,17 @@ class Refiner:
         """
         low, high = self._cost.limits.T
         states = np.ascontiguousarray(states, np.float64)
+        by_step = damping * np.ones(N_STATE)
         matrices, rights, costs = self._equations(states, cues, prior)
         for _ in range(steps):
             changes = rights.copy()
-            _solve_each(matrices, damping * np.ones(N_STATE), changes)
-            np.clip(changes, -_MOST_CHANGE, _MOST_CHANGE, out=changes)
-            moved = np.clip(states + changes, low, high)
+            _solve_each(matrices, by_step, changes)
+            moved = np.minimum(np.maximum(states + changes, low), high)
             found = self._equations(moved, cues, prior)
             is_worse = ~(found[2] <= costs)
             if is_worse.any():
                 shares = np.where(is_worse, _SHORTER, 1.0)[:, None]
-                moved = np.clip(states + shares * changes, low, high)
+                moved = np.minimum(np.maximum(states + shares * changes, low), high)
                 found = self._equations(moved, cues, prior)
                 # A state that even a short step makes worse stays.
                 kept = ~(found[2] <= costs)
@@ -101,9 +101,10 @@ class Refiner:
         self, states: FloatArray, cues: Sequence[Cue], prior: Prior
     ) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Return matrices (N, 14, 14), right sides (N, 14) and costs (N,) at states (N, 14)."""
-        away = states - prior.mean
-        matrices = np.tile(np.diag(prior.inverse), (len(states), 1, 1))
-        rights, costs = -prior.inverse * away, (prior.inverse * away**2).sum(axis=1)
+        matrices = np.zeros((len(states), N_STATE, N_STATE))
+        rights, costs = np.empty(states.shape), np.empty(len(states))
+        means = np.atleast_2d(prior.mean)
+        _begin(states, means, prior.inverse, matrices, rights, costs)
         posed: dict[int, Posed] = {}
         for number, cue in cues:
             if number not in posed:
@@ -116,6 +117,20 @@ class Refiner:
                 )
                 costs += found.costs
         return matrices, rights, costs
+
+
+@kernel
+def _begin(
+    states: Floats, means: Floats, inverse: Floats, matrices: Floats, rights: Floats, costs: Floats
+) -> None:
+    """Write the equations of the prior, whose ``means`` are (1, 14) or (N, 14)."""
+    for n in range(states.shape[0]):
+        costs[n] = 0.0
+        for i in range(N_STATE):
+            away = states[n, i] - means[n if means.shape[0] > 1 else 0, i]
+            matrices[n, i, i] = inverse[i]
+            rights[n, i] = -inverse[i] * away
+            costs[n] += inverse[i] * away**2
 
 
 @kernel
@@ -152,7 +167,7 @@ def _add(
 
 @kernel
 def _solve_each(matrices: Floats, damping: Floats, rights: Floats) -> None:
-    """Overwrite ``rights`` (N, 14) by the solutions; lower triangles of the matrices are read."""
+    """Overwrite ``rights`` (N, 14) by the changes; lower triangles of the matrices are read."""
     matrix = np.empty((N_STATE, N_STATE))
     for n in range(matrices.shape[0]):
         for i in range(N_STATE):
@@ -160,3 +175,5 @@ def _solve_each(matrices: Floats, damping: Floats, rights: Floats) -> None:
                 matrix[i, j] = matrices[n, i, j]
             matrix[i, i] += damping[i]
         solve(matrix, rights[n])
+        for i in range(N_STATE):
+            rights[n, i] = min(max(rights[n, i], -_MOST_CHANGE), _MOST_CHANGE)

@@ -68,6 +68,18 @@ _EXCHANGED, _EXCHANGED_M = 0.3, 0.1
 _BACK_S = 0.5
 
 _SIDES = tuple(ARMS)
+# Two of the detector's points for each of the ten, which is their middle.
+_ENDS = np.array(
+    [
+        [POINT_INDEX[f"{side}_{name}"] for name in ends]
+        for side in _SIDES
+        for ends in (
+            *((name, name) for name in ("shoulder", "elbow", "wrist")),
+            ("index", "little_finger"),
+        )
+    ]
+    + [[POINT_INDEX[f"{side}_{name}"] for side in _SIDES] for name in ("hip", "ear")]
+)
 
 
 @dataclass(frozen=True)
@@ -271,24 +283,10 @@ def points_of(points: ImagePoints) -> FloatArray:
     Each arm has four, the left one first: shoulder, elbow, wrist and knuckles. The middle of the
     hips and that of the ears follow. Unknown points have the score 0.
     """
-    found = np.zeros((N_POINTS, 3))
-    for arm, side in enumerate(_SIDES):
-        for joint, name in ((SHOULDER, "shoulder"), (ELBOW, "elbow"), (WRIST, "wrist")):
-            found[POINTS_OF_ARM * arm + joint] = _middle(points, f"{side}_{name}")
-        knuckles = f"{side}_index", f"{side}_little_finger"
-        found[POINTS_OF_ARM * arm + KNUCKLES] = _middle(points, *knuckles)
-    found[HIPS] = _middle(points, "left_hip", "right_hip")
-    found[EARS] = _middle(points, "left_ear", "right_ear")
+    scores = points.scores[_ENDS].min(axis=1)
+    found = np.column_stack([points.px[_ENDS].mean(axis=1), scores])
+    found[scores <= 0.0] = 0.0
     return found
-
-
-def _middle(points: ImagePoints, *names: str) -> FloatArray:
-    """Return column, row and score (3,) of the middle of points; zeros if one is unknown."""
-    indices = [POINT_INDEX[name] for name in names]
-    score = points.scores[indices].min()
-    if score <= 0.0:
-        return np.zeros(3)
-    return np.array([*points.px[indices].mean(axis=0), score])
 
 
 def bones_of(spatial_m: FloatArray, found: FloatArray) -> FloatArray:

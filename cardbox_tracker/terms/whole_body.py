@@ -226,7 +226,7 @@ class WholeBodyCost:
         ratings = np.zeros(len(joints))
         seen = self.uncovered(arm), self.counted, self._scale
         add_costs_of_arms(joints, self._torso, self.body, *seen, ratings)
-        return self._with_terms(ratings, self._with_arms(arms, arm), ARM[arm])
+        return self._with_terms_of_arms(ratings, arms, arm)
 
     def arms(self, arms: FloatArray, arm: int) -> tuple[FloatArray, FloatArray]:
         """Rate arms (N, 4), 0 left or 1 right, beside the fixed torso.
@@ -237,13 +237,15 @@ class WholeBodyCost:
         ratings, joints_m = np.empty(len(arms)), np.empty((len(arms), 3, 3))
         of_arms = 1.0 - 2.0 * arm, self._torso, self.body, *self._by_arms
         kernels.rate_arms(arms, *of_arms, ratings, joints_m)
-        return self._with_terms(ratings, self._with_arms(arms, arm), ARM[arm]), joints_m
+        return self._with_terms_of_arms(ratings, arms, arm), joints_m
 
-    def _with_arms(self, arms: FloatArray, arm: int) -> FloatArray:
-        """Return states (N, 14) of the fixed torso with arms (N, 4), 0 left or 1 right."""
+    def _with_terms_of_arms(self, ratings: FloatArray, arms: FloatArray, arm: int) -> FloatArray:
+        """Add the further terms of arms (N, 4), 0 left or 1 right, at the fixed torso."""
+        if not self.terms:
+            return ratings
         states = np.repeat(self._torso[None], len(arms), axis=0)
         states[:, ARMS[SIDES[arm]]] = arms
-        return states
+        return self._with_terms(ratings, states, ARM[arm])
 
     def _with_terms(
         self,

@@ -25,6 +25,7 @@ class TrackedCamera:
 
     Attributes:
         view: the body in the frame of a further camera; None for the first camera.
+        posable: the body before this camera, as argument of the kernels.
         terms: terms of its cost in addition to the silhouette.
         depth: check that its depth images show the view of its silhouettes.
     """
@@ -57,6 +58,7 @@ class TrackedCamera:
         self._camera = first if self.view is None else self.view.camera
         # The cost of a further camera limits the rows where the person is found.
         self._rows = rows_above_hips(body, first) if self.view is None else self._camera.height
+        self.posable = body_tuple(self._body, self._camera)
         self.configure(config)
         self._region: PersonRegion | None = None
         self.depth = DepthAgreement()
@@ -65,7 +67,6 @@ class TrackedCamera:
         """Build the terms from other settings."""
         built = (settings.build(self._body, self._camera) for settings in config.terms)
         self.terms: list[Term] = [term for term in built if term is not None]
-        self._posable = body_tuple(self._body, self._camera)
 
     def reset(self, config: TrackerConfig) -> None:
         """Forget the region of the person in the images."""
@@ -108,7 +109,7 @@ class TrackedCamera:
             channels,
             self._rows,
             cv2.countNonZero(np.ascontiguousarray(silhouette[: self._rows])),
-            None if before is None else Posed(self._posable, before[None]),
+            None if before is None else Posed(self.posable, before[None]),
             interval_s,
             None if observation is None else observation.stamp_ns,
         )

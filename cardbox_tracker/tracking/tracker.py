@@ -29,7 +29,6 @@ from cardbox_tracker.search.pose_filter import (
 )
 from cardbox_tracker.search.whole_body import WholeBodyFilter
 from cardbox_tracker.terms.compiled import CompiledSilhouette
-from cardbox_tracker.terms.drawn_body import body_tuple
 from cardbox_tracker.terms.silhouette import SilhouetteTerm
 from cardbox_tracker.terms.term import USUAL_INTERVAL_S, Frame, Image, Posed, Silhouette
 from cardbox_tracker.tracking.camera_agreement import CameraAgreement
@@ -320,8 +319,7 @@ class Tracker:
     def _is_doubtful(self, frame: Frame) -> bool:
         """Return whether poses of cameras, or a person's back, make the whole result doubtful."""
         if self._facing is not None and self._before is not None:
-            posable = body_tuple(self.body, self.camera)
-            self._facing.see(frame, Posed(posable, self._before[None]))
+            self._facing.see(frame, Posed(self._cameras[0].posable, self._before[None]))
             return self._facing.shows_back
         return self.agreement is not None and self.agreement.is_contradicted
 
