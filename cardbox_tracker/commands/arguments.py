@@ -120,7 +120,7 @@ def add_references(parser: argparse.ArgumentParser) -> None:
 
 
 def add_preset(parser: argparse.ArgumentParser) -> None:
-    """Add ``--preset``, a name of ``estimation.config.PRESETS``."""
+    """Add ``--preset``, a name of ``search.config.PRESETS``."""
     from cardbox_tracker.search.config import PRESETS
 
     parser.add_argument(

@@ -150,7 +150,7 @@ def build_parser(words: Container[str] = _EVERY_COMMAND) -> argparse.ArgumentPar
 
     Args:
         words: arguments of the command line. Only the subcommand among them gets its arguments,
-            since their choices may need slow imports; if None, all subcommands get theirs.
+            since their choices may need slow imports; by default all get theirs.
     """
     parser = argparse.ArgumentParser(
         prog="cardbox", formatter_class=_Formatter, description=_DESCRIPTION, epilog=_EPILOG

@@ -143,6 +143,11 @@ class PersonRequest:
     is_pitch_given: bool
 
 
+TABLES = ("csv", "parquet")
+FORMATS = (*TABLES, "mp4", "bag")
+"""Results of a recording: a table in one of two formats, a video, a bag."""
+
+
 class TrackFiles(NamedTuple):
     """Files to write; None for one that is not wanted.
 

@@ -7,7 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from cardbox_tracker.commands.arguments import add_force, at_least, body_beside, check_outputs
-from cardbox_tracker.commands.request import TrackFiles, add_tracking, tracking_request
+from cardbox_tracker.commands.request import FORMATS, TrackFiles, add_tracking, tracking_request
 from cardbox_tracker.commands.tracking import track
 from cardbox_tracker.common.errors import CardboxError
 from cardbox_tracker.common.files import is_written_in_place
@@ -21,8 +21,6 @@ _OF_MANY = ("output", "formats", "jobs")
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of ``cardbox track``."""
-    from cardbox_tracker.commands.track_folder import FORMATS
-
     add_tracking(parser)
     parser.add_argument(
         "--csv",

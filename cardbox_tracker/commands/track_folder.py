@@ -27,6 +27,8 @@ import numpy as np
 import cardbox_tracker
 from cardbox_tracker.commands.arguments import body_beside
 from cardbox_tracker.commands.request import (
+    FORMATS,
+    TABLES,
     TrackFiles,
     TrackingRequest,
     tracking_request,
@@ -43,15 +45,12 @@ from cardbox_tracker.recordings.result_table import check_table
 from cardbox_tracker.recordings.track import TrackSummary
 from cardbox_tracker.tracking.precompile import compile_all
 
-TABLES = ("csv", "parquet")
-FORMATS = (*TABLES, "mp4", "bag")
-"""Results of a recording: a table in one of two formats, a video, a bag."""
 TRACKED, FAILED = "tracked", "failed"
 
 _BODY = body_beside(Path("NAME.csv")).name.removeprefix("NAME")
 # Most names of recordings in a line; the table has all.
 _MOST_NAMES = 10
-_SOURCES = ("*.py", "*.json", "*.npz")
+_SOURCES = ("*.py", "*.json")
 
 
 class Row(NamedTuple):

@@ -20,7 +20,10 @@ LEVELS = {
 
 
 class KeypointStates(NamedTuple):
-    """States of the keypoints ``names``, and their probabilities of being off by over 30 cm."""
+    """States of the keypoints ``names``, and their probabilities of being wrong.
+
+    A keypoint is wrong if it is off by over 30 cm relative to the middle of the shoulders.
+    """
 
     names: tuple[str, ...]
     states: tuple[KeypointState, ...]

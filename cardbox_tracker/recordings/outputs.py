@@ -2,7 +2,8 @@
 
 :mod:`.ros.messages.results` encodes them as messages of the nodes, :mod:`.recordings.result_bag`
 as messages of a bag, and :mod:`.recordings.result_table` as rows of a table. Add a joint to
-:mod:`.person.skeleton` and ``joint_values``, a topic to ``outputs``, and a number to ``METRICS``.
+:mod:`.person.skeleton`, ``joint_values`` and ``joint_deviations``, a topic to ``outputs``, and a
+number to ``METRICS``.
 """
 
 from __future__ import annotations
@@ -108,6 +109,7 @@ class Metric:
 
 
 # The mean velocity over a longer gap is not that of the moment.
+_NECK = [JOINT_STATE_NAMES.index(name) for name in NECK_NAMES]
 _LONGEST_NS = 1_000_000_000
 
 
@@ -209,7 +211,7 @@ def _markers(estimate: Estimate, tracker: Tracker) -> Markers | None:
 def outputs(torso_place: bool = True) -> tuple[Output, ...]:
     """Return the topics of the tracker in the order of publication.
 
-    With ``torso_place``, the joints include ``torso_x``, ``torso_z`` and those of the neck.
+    With ``torso_place``, the joints include those of place, neck and clavicles.
     """
     return (
         # The states come first, so that subscribers have them when the posture arrives.
@@ -301,5 +303,5 @@ class _Motion:
         found: FloatArray = (joints.values - before[1]) / (step_ns / 1e9)
         if not (has_neck and before[2]):
             # A face that appears does not turn.
-            found[[JOINT_STATE_NAMES.index(name) for name in NECK_NAMES]] = 0.0
+            found[_NECK] = 0.0
         return found

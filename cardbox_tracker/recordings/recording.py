@@ -77,7 +77,7 @@ class FrameSet(NamedTuple):
 
 
 class Recording:
-    """The cameras of an open recording, each with a learned background.
+    """The cameras of an open recording, each with its silhouettes.
 
     Attributes:
         names: namespaces of the cameras, the first camera's first; a single camera has "".

@@ -48,8 +48,9 @@ def columns(has_points: bool = False) -> tuple[str, ...]:
 def units(has_points: bool = False) -> dict[str, str]:
     """Return the unit of each column by its name, in their order; empty for none.
 
-    The names up to the person's place are fixed, because scripts read them; the others end in their
-    unit. With ``has_points``, for recordings with points of the person, the neck is among them.
+    The names up to the person's place are fixed, because scripts read them; standard deviations end
+    in their unit. With ``has_points``, for recordings with points of the person, the neck is among
+    them.
     """
     return {
         "stamp": "s",

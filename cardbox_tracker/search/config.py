@@ -73,7 +73,7 @@ class TrackerConfig(Settings):
     Attributes:
         torso: filter of d1..d4 (Table I).
         arm: filter of each arm (Table I).
-        terms: settings of the cost's terms in addition to the silhouette (``estimation/cost``).
+        terms: settings of the cost's terms in addition to the silhouette (``terms/``).
         whole_body: settings of the filter ``whole_body``.
 
     The filter ``hierarchical`` uses all settings except ``whole_body``. The filter ``whole_body``

@@ -1,1 +1,1 @@
-"""Draws results for people: overlay, guidance, markers, video."""
+"""Draws results for people: overlay, guidance, video."""

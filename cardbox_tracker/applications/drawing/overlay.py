@@ -83,9 +83,8 @@ def draw_overlay(
         view = camera.scaled(*canvas.shape[1::-1])
         outline = UNCERTAIN_BGR if estimate.state == "uncertain" else OUTLINE_BGR
         there = estimate.placed(body)
-        draw_model(canvas, there, view, estimate.posture, outline, estimate.keypoint_states)
+        posed = draw_model(canvas, there, view, estimate.posture, outline, estimate.keypoint_states)
         if estimate.neck is not None:
-            posed = pose(there, estimate.posture)
             _draw_gaze(canvas, view, gaze_m(body_parts(there.sizes), posed, estimate.neck))
         text += f"  IoU {estimate.iou:.2f}  {estimate.cost_px} px"
     _draw_text(canvas, text, _STATE_BGR.get(estimate.state, TEXT_BGR))
@@ -140,8 +139,8 @@ def draw_model(
     posture: FloatArray,
     outline_bgr: tuple[int, int, int] = OUTLINE_BGR,
     states: Sequence[KeypointState] | None = None,
-) -> None:
-    """Draw the parts of ``posture`` (12,) into ``canvas`` (H, W, 3), in place.
+) -> PosedBodies:
+    """Draw the parts of ``posture`` (12,) into ``canvas`` (H, W, 3), and return the posed body.
 
     Patches are tinted by side, and their common outline is drawn in ``outline_bgr``. With
     ``states`` of the keypoints, bones to uncertain ones are yellow, to lost ones red, and to hidden
@@ -159,6 +158,7 @@ def draw_model(
     thickness = max(1, round(camera.width / 400))
     draw_outline(canvas, camera, patches, outline_bgr, thickness)
     _draw_skeleton(canvas, frames, camera, thickness, states)
+    return frames
 
 
 def draw_outline(

@@ -27,8 +27,7 @@ from cardbox_tracker.applications.ergonomics.rula import (
     SAMPLES,
     ScoreDistribution,
     expected,
-    neck_samples,
-    score_distribution,
+    sampled_scores,
 )
 from cardbox_tracker.common.files import write_table
 from cardbox_tracker.person.sizes import FloatArray
@@ -133,13 +132,14 @@ class RulaObserver:
 
     def __call__(self, frame: RecordedFrame, estimate: Estimate, tracker: Tracker) -> None:
         """Append the row of one image, scored for samples of its posterior."""
-        scores = necks = None
+        scores, is_measured = None, False
         if estimate.posture is not None:
             postures = tracker.sample(estimate, SAMPLES, self._rng)
-            if estimate.neck is not None and estimate.neck_stddev is not None:
-                necks = neck_samples(estimate.neck, estimate.neck_stddev, SAMPLES, self._rng)
-            scores = score_distribution(tracker.body, postures, self._config, necks)
-        row = RulaRow(frame.stamp_ns, estimate.state, scores, frame.time_s, necks is not None)
+            neck = estimate.neck, estimate.neck_stddev
+            scores, is_measured = sampled_scores(
+                tracker.body, postures, neck, self._config, self._rng
+            )
+        row = RulaRow(frame.stamp_ns, estimate.state, scores, frame.time_s, is_measured)
         self.rows.append(row)
         if self._images is not None:
             self._images.add(row, frame, estimate, tracker)

@@ -197,6 +197,24 @@ def neck_samples(
     return np.asarray(np.clip(drawn, NECK_LIMITS[:, 0], NECK_LIMITS[:, 1]))
 
 
+def sampled_scores(
+    body: BodyModel,
+    postures: FloatArray,
+    neck: tuple[FloatArray | None, FloatArray | None],
+    config: RulaConfig,
+    rng: np.random.Generator,
+) -> tuple[ScoreDistribution, bool]:
+    """Return the scores of sampled postures (n, 12), and whether the neck is measured.
+
+    ``neck`` has angles and standard deviations, (2,) each, rad; None if they are unknown.
+    """
+    angles, stddev = neck
+    if angles is None or stddev is None:
+        return score_distribution(body, postures, config), False
+    necks = neck_samples(angles, stddev, len(postures), rng)
+    return score_distribution(body, postures, config, necks), True
+
+
 def score_distribution(
     body: BodyModel, postures: FloatArray, config: RulaConfig, necks: FloatArray | None = None
 ) -> ScoreDistribution:

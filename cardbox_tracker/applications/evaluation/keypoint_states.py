@@ -23,7 +23,8 @@ def compared(off_m: FloatArray, chances: FloatArray, states: NDArray[np.str_]) -
     """Return numbers of keypoints and of wrong ones, by kind, in each state and each interval.
 
     Args:
-        off_m: distances of the keypoints from the truth, (n, 6), m; nan where they are unknown.
+        off_m: errors of the keypoints beside the middle of the shoulders, (n, 6), m; nan where they
+            are unknown.
         chances: probabilities of being off by more than ``FAR_M``, (n, 6); nan without states.
         states: (n, 6); empty without states.
 

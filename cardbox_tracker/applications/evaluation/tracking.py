@@ -76,7 +76,8 @@ class SessionRun:
         postures: (n, 12), rad and metres; nan without an estimate.
         stddevs: standard deviations, (n, 12).
         keypoint_states: states of the keypoints, (n, 6); empty without an estimate or states.
-        chances: probabilities of keypoints to be off by more than 30 cm, (n, 6); nan likewise.
+        chances: probabilities of keypoints to be off by more than 30 cm relative to the middle of
+            the shoulders, (n, 6); nan likewise.
         milliseconds: processor time of each tracked image from silhouette to posture, (m,).
         input_ms: median processor time of an image before that: decoding, silhouettes and points
             of all cameras; nan if it was not measured.

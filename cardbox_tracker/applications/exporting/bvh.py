@@ -35,7 +35,7 @@ from cardbox_tracker.person.skeleton import head_from_pivot_m, neck_pivot_m
 
 _FINGERS_TO_FOREARM = 0.25
 # Length of the clavicles in shoulder breadths: so a shoulder that turns about their inner ends is
-# within 3 mm of the line on which the model raises it.
+# within 4 mm of the line on which the model raises it.
 _CLAVICLE = 0.43
 _TURN_BOW_BEND = ("Yrotation", "Xrotation", "Zrotation")
 _SWING = ("Zrotation", "Xrotation", "Yrotation")

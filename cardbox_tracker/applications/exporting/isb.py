@@ -20,12 +20,13 @@ from cardbox_tracker.applications.exporting.markers import LABORATORY
 from cardbox_tracker.applications.exporting.motion import Motion
 from cardbox_tracker.common.files import write_table
 from cardbox_tracker.person.model import BodyModel
-from cardbox_tracker.person.posture import LEFT_ARM, PITCH, RIGHT_ARM, ROLL, TORSO_Y, YAW
+from cardbox_tracker.person.posture import LEFT_ARM, PITCH, RIGHT_ARM, ROLL, YAW
 from cardbox_tracker.person.sizes import FloatArray
 from cardbox_tracker.person.skeleton import (
     JOINT_NAMES,
     NECK_NAMES,
     PLACE_NAMES,
+    UNITS,
     arm_directions,
     rotation_x,
     rotation_y,
@@ -119,7 +120,6 @@ def write_isb(path: Path, motion: Motion, body: BodyModel | None = None) -> None
         CardboxError: the file cannot be written.
     """
     names = (*JOINT_NAMES, *PLACE_NAMES, *NECK_NAMES)
-    metres = (JOINT_NAMES[TORSO_Y], *PLACE_NAMES)
     values = np.hstack([np.degrees(isb_angles(motion.states)), motion.states, motion.neck])
     rows = (
         (str(stamp_ns), f"{time_s:.6f}", state, *("" if v != v else f"{v:.6f}" for v in row))
@@ -127,6 +127,6 @@ def write_isb(path: Path, motion: Motion, body: BodyModel | None = None) -> None
             motion.stamp_ns.tolist(), motion.time_s, motion.state, values.tolist(), strict=True
         )
     )
-    units = (f"{name}_{'m' if name in metres else 'rad'}" for name in names)
+    units = (f"{name}_{UNITS[name]}" for name in names)
     header = ("stamp_ns", "time_s", "state", *(f"{name}_deg" for name in ISB_NAMES), *units)
     write_table(path, header, rows)

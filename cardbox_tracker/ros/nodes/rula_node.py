@@ -19,9 +19,8 @@ from cardbox_tracker.applications.ergonomics.rula import (
     SAMPLES,
     ScoreDistribution,
     expected,
-    neck_samples,
     part_values,
-    score_distribution,
+    sampled_scores,
 )
 from cardbox_tracker.common.settings import settings_of
 from cardbox_tracker.person.model import BodyModel
@@ -109,14 +108,11 @@ class RulaNode(CardboxNode):
         posture, stddev = posture_of(self._joints), posture_of(message)
         postures = normal_postures(posture, stddev, SAMPLES, self._rng)
         # The tracker leaves out the deviations of a neck that it does not know.
-        neck, neck_stddev, necks = neck_of(self._joints), neck_of(message), None
-        if neck is not None and neck_stddev is not None:
-            necks = neck_samples(neck, neck_stddev, SAMPLES, self._rng)
-        config = self.parameters.value.config()
-        scores = score_distribution(self._body, postures, config, necks)
+        neck, config = (neck_of(self._joints), neck_of(message)), self.parameters.value.config()
+        scores, is_measured = sampled_scores(self._body, postures, neck, config, self._rng)
         self._score.publish(Float32(data=scores.mean))
         self._chances.publish(_chances_message(scores))
-        parts = part_values(scores, config, necks is not None)
+        parts = part_values(scores, config, is_measured)
         self._report.publish(_report_message(message, scores, parts, self.get_name()))
         self.diagnostics.working(sent_ns)
 

@@ -120,7 +120,7 @@ class TrackerNode(CardboxNode):
         self._tracker = Tracker(
             self._body, self._camera, settings.config(), rng, others=self._others
         )
-        self._report.start(self._body)
+        self._report.start(self._tracker.body)
         self.diagnostics.say(reason, f"{reason}: tracking starts from the front reference posture")
 
     def _reset(self) -> str:
