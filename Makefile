@@ -131,17 +131,19 @@ experiments: setup
 
 # This compares the recorded sessions of one camera beside the checkout with their ground truth.
 DATA ?= ../shared/data
+FIGURES = $(BIN)/python -m lab.tools.keypoint_states && $(BIN)/python -m lab.tools.readme_figures
 SESSIONS = $(filter-out $(DATA)/real_% $(DATA)/stereo_% $(DATA)/two_%,\
 	$(patsubst %/ground_truth.json,%,$(wildcard $(DATA)/*/ground_truth.json)))
 .PHONY: sessions
 sessions: setup
 	@if [ -z "$(SESSIONS)" ]; then echo "skipped: no recorded sessions in $(DATA)"; else \
 		$(BIN)/cardbox evaluate --sessions $(SESSIONS) --recovery --output docs/evaluation --force; \
-		$(BIN)/python -m lab.tools.readme_figures; fi
+		$(FIGURES); fi
 
 # The pictures come first, because the document shows them.
-PEOPLE = $(patsubst %/ground_truth.json,%,\
-	$(wildcard $(DATA)/real_gestures/*/ground_truth.json $(DATA)/real_*/ground_truth.json))
+# The evaluation reads one person.
+PEOPLE = $(filter-out $(DATA)/real_two_people,$(patsubst %/ground_truth.json,%,\
+	$(wildcard $(DATA)/real_gestures/*/ground_truth.json $(DATA)/real_*/ground_truth.json)))
 REPORT := docs/evaluation/real-people.md
 .PHONY: people
 people: export XDG_DATA_HOME := $(CURDIR)/$(VENV)/data
@@ -151,7 +153,7 @@ people: setup $(VENV)/extras
 		$(BIN)/cardbox evaluate --sessions $(PEOPLE) --detector none mediapipe --output docs/evaluation --force; \
 		$(BIN)/python -m lab.tools.real_report --session $(DATA)/real_signs --output $(REPORT) \
 			--sheet docs/images/real.jpg; \
-		$(BIN)/python -m lab.tools.readme_figures; fi
+		$(FIGURES); fi
 
 # Fewer examples: make reliability EXAMPLES=1000
 EXAMPLES ?= 100000

@@ -29,12 +29,13 @@ def test_no_error_or_cost_stands_outside_the_marks() -> None:
 def session(name: str, points: str, aligned: float, cameras: tuple[str, ...]) -> dict[str, Any]:
     peer = {} if name.startswith("P0_") else {"aligned": 9.7}
     run = {"aligned": aligned, "absolute": 2 * aligned, "ms": 3.0}
-    run |= {"tracking": 50, "tracking_beyond_30": 1}
+    run |= {"frames": 100, "tracking": 50, "tracking_beyond_30": 1}
     return {"name": name, "points": points, "cameras": cameras, "mediapipe": peer, "runs": [run]}
 
 
 def test_section_by_hand() -> None:
     films = [film for row in ROWS for film in row.films] + [("P0_2", ())]
+    films.append(("real_desk", ("cam3",)))
     people = [
         session(name, points, number + more, cameras)
         for number, (name, cameras) in enumerate(films)
@@ -54,5 +55,7 @@ def test_section_by_hand() -> None:
         ["6.5 cm", "", "7.0 cm", "7.0 cm"],
     ]
     words = " ".join(text.split())
+    assert "call 50 % of the images of real people `tracking`, of which" in words
     assert "2.0 % have a joint beyond 30 cm" in words
+    assert "from aside have 8.0 cm with the detector" in words
     assert "2.5 ms on one core, 3.0 ms with points" in words
