@@ -56,9 +56,9 @@ def start(name: str, main: Callable[[], int]) -> int:
             file=sys.stderr,
         )
         return 1
-    except (EOFError, UnpicklingError):
+    except (EOFError, UnpicklingError) as error:
         compiling = sys.modules.get("cardbox_tracker.common.compiling")
-        if compiling is None:
+        if compiling is None or not compiling.is_damage(error):
             raise
         compiling.discard()
         print(f"{name}: start it again", file=sys.stderr)

@@ -8,10 +8,10 @@ import sys
 import sysconfig
 from importlib import import_module
 from pathlib import Path
-from pickle import UnpicklingError
 from unittest.mock import Mock
 
 import pytest
+from numba.core.caching import IndexDataCacheFile
 
 from cardbox_tracker.common import compiling
 from cardbox_tracker.start import other_package, start
@@ -62,15 +62,26 @@ def test_another_fault_keeps_its_traceback() -> None:
         start("tracker", lambda: import_module("cardbox_tracker.nothing").main())
 
 
+@pytest.mark.parametrize("content", [b"", b"\x80\x04\x95\xff"])
 def test_damaged_compiled_code_is_removed_and_told_in_words(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    content: bytes,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
 ) -> None:
     removed: list[bool] = []
     monkeypatch.setattr(compiling, "discard", lambda: removed.append(True))
-    for error in (EOFError("Ran out of input"), UnpicklingError("pickle data was truncated")):
-        assert start("cardbox", Mock(side_effect=error)) == 1
-    assert removed == [True, True]
+    (tmp_path / "rate.nbi").write_bytes(content)
+    damaged = IndexDataCacheFile(str(tmp_path), "rate", "stamp")
+    assert start("cardbox", lambda: damaged.load("signature")) == 1
+    assert removed == [True]
     assert "cardbox: start it again" in capsys.readouterr().err
+
+
+def test_an_error_of_other_data_leaves_the_compiled_code(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(compiling, "discard", Mock(side_effect=AssertionError))
+    with pytest.raises(EOFError):
+        start("cardbox", Mock(side_effect=EOFError("Ran out of input")))
 
 
 SCRIPT = Path(sysconfig.get_path("scripts")) / "cardbox"

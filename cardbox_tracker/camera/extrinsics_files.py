@@ -74,7 +74,7 @@ def save_camchain(
         extrinsics: extrinsics of each further camera relative to the first one, by namespace.
 
     Raises:
-        FileWriteError: the file cannot be written.
+        CardboxError: the file cannot be written.
     """
     chain: dict[str, Any] = {}
     before = Extrinsics(np.eye(3), np.zeros(3))

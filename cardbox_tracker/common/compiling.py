@@ -20,6 +20,7 @@ import shutil
 import stat
 import tempfile
 import threading
+import traceback
 from collections.abc import Callable, Iterator
 from contextlib import suppress
 from functools import partial
@@ -123,6 +124,12 @@ def _is_own(folder: Path) -> bool:
 
 FOLDER = choose_folder(os.path.dirname(os.path.abspath(cardbox_tracker.__file__)))
 """Folder of the compiled code; None if there is none."""
+
+
+def is_damage(error: BaseException) -> bool:
+    """Return whether numba raised one of :data:`DAMAGED` while it read compiled code."""
+    frames = traceback.walk_tb(error.__traceback__)
+    return any(frame.f_globals.get("__name__") == "numba.core.caching" for frame, _ in frames)
 
 
 def discard() -> None:

@@ -1,4 +1,4 @@
-"""The person detector on the images of a recording."""
+"""The installed detector, which finds the person in image after image of one camera."""
 
 from __future__ import annotations
 

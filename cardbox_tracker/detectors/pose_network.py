@@ -89,14 +89,14 @@ class Detection(NamedTuple):
 class PoseNetwork:
     """Finds one person in image after image."""
 
-    def __init__(self, detector: Path, landmarks: Path, threads: int = 1) -> None:
+    def __init__(self, detector: Path, landmarks: Path) -> None:
         """Load both networks.
 
         Raises:
             CardboxError: LiteRT is not installed, or a file is missing or damaged.
         """
-        self._detect = _Network(detector, threads)
-        self._locate = _Network(landmarks, threads)
+        self._detect = _Network(detector)
+        self._locate = _Network(landmarks)
         self._square: Square | None = None
 
     def forget(self) -> None:
@@ -151,9 +151,9 @@ class PoseNetwork:
 
 
 class _Network:
-    """One network file on one or more threads."""
+    """One network file on one thread."""
 
-    def __init__(self, path: Path, threads: int) -> None:
+    def __init__(self, path: Path) -> None:
         try:
             from ai_edge_litert.interpreter import Interpreter
         except ImportError as error:
@@ -162,7 +162,7 @@ class _Network:
                 "pip install 'cardbox_tracker[detector]'"
             ) from None
         try:
-            self._run: Any = Interpreter(str(path), num_threads=threads)
+            self._run: Any = Interpreter(str(path), num_threads=1)
         except (ValueError, OSError, RuntimeError) as error:
             raise CardboxError(
                 f"{path} is no network that LiteRT can run ({error}); run "

@@ -79,10 +79,10 @@ def guessed_extrinsics(
     for guess in best:
         try:
             problem = PoseProblem(body, first, other, guess, sightings)
-            pose = guess
+            found = guess
             for _ in range(_STEPS):
-                pose, *_, cost = problem.step(pose)
-            improved.append((cost, pose))
+                found, cost = problem.step(found)
+            improved.append((cost, found))
         except (CameraError, np.linalg.LinAlgError):
             continue
     if not improved:

@@ -77,14 +77,10 @@ class PoseUpdate(NamedTuple):
 
     Attributes:
         extrinsics: updated pose.
-        change: change from the previous pose, (6,).
-        covariance: covariance of the change, from the scatter of the sightings, (6, 6).
         cost: mean of the sightings' weighted squared distances before the step.
     """
 
     extrinsics: Extrinsics
-    change: FloatArray
-    covariance: FloatArray
     cost: float
 
 
@@ -184,9 +180,6 @@ class PoseProblem:
         change = np.zeros(N_POSE)
         change[index] = -_RELAXATION * inverse @ right
         change *= min(1.0, _MOST_POSE_CHANGE / max(float(np.abs(change).max()), 1e-9))
-        left = np.array([(one.right + one.matrix @ change)[index] for one in equations])
-        covariance = np.zeros((N_POSE, N_POSE))
-        covariance[square] = inverse @ (left.T @ left) @ inverse
         better = moved_by(extrinsics, change)
         there = self._drawer(better)
         for number, one in enumerate(equations):
@@ -197,7 +190,7 @@ class PoseProblem:
             costs = [self._robust_cost(number, state, there) for state in tried]
             self.states[number] = tried[int(np.argmin(costs))]
         cost = float(np.mean([one.cost for one in equations]))
-        return PoseUpdate(better, change, covariance, cost)
+        return PoseUpdate(better, cost)
 
     def _equations(
         self, number: int, here: _Drawer, beside: dict[int, tuple[_Drawer, _Drawer]]

@@ -11,7 +11,8 @@
    of the torso, hands those of the face.
 
 Without references, one image of any posture teaches the colours of head, torso and legs. Forearms
-are then half bare and half in sleeves, until tracking tells (:mod:`.terms.inner_cue_sleeves`).
+are then half bare and half in sleeves, until tracking tells
+(:mod:`cardbox_tracker.terms.inner_cue_sleeves`).
 """
 
 from __future__ import annotations

@@ -20,7 +20,7 @@ Matrix products are written out, because calls of BLAS are slow for such small m
 from __future__ import annotations
 
 from functools import lru_cache
-from math import acos, asin, atan2, cos, hypot, pi, sin, sqrt
+from math import acos, asin, atan2, cos, hypot, pi, sin
 from typing import NamedTuple, Protocol
 
 import numpy as np
@@ -70,6 +70,9 @@ from cardbox_tracker.person.skeleton import (
 ASIDE, UPWARDS, RISE = 0, 1, 2
 TWIST = 6
 _HIP, _NECK, _HEAD, _ARMS = 0, 1, 2, 3
+# The nearest segment that each value of a state moves, and the segment of each of POINT_NAMES.
+_MOVED = (0, 0, 0, 0, 1, 1, 2, 2, 3, 3, 4, 4, 0, 0)
+_SEGMENTS = (0, 0, 0, 1, 1, 2, 3, 3, 4)
 # The elevation of an arm that points straight up has no derivative.
 _LEAST_SINE = 1e-6
 _N_POINTS, _N_FRAMES = len(POINT_NAMES), len(FRAME_NAMES)
@@ -360,17 +363,15 @@ def _clavicles(
     rises: FloatArray,
     deviations: FloatArray,
 ) -> None:
-    """Write rises (2,) and deviations (2,); the derivative of arccos(u) is -1 / sqrt(1 - u^2)."""
+    """Write rises (2,) and their deviations (2,) from those of the angles."""
     for k in range(2):
         angles, by = angles_in(posture, k), angles_in(stddev, k)
         cos_a, cos_f = cos(angles[SHOULDER_ABDUCTION]), cos(angles[SHOULDER_FLEXION])
         upright = cos_a * cos_f
-        rises[k], deviations[k] = rise_of(upright, girdle), 0.0
-        if rises[k] > 0.0:
-            by_abduction = sin(angles[SHOULDER_ABDUCTION]) * cos_f * by[SHOULDER_ABDUCTION]
-            by_flexion = sin(angles[SHOULDER_FLEXION]) * cos_a * by[SHOULDER_FLEXION]
-            per_rad = girdle[RISE] / max(sqrt(1.0 - upright**2), _LEAST_SINE)
-            deviations[k] = per_rad * hypot(by_abduction, by_flexion)
+        rises[k] = rise_of(upright, girdle)
+        by_abduction = sin(angles[SHOULDER_ABDUCTION]) * cos_f * by[SHOULDER_ABDUCTION]
+        by_flexion = sin(angles[SHOULDER_FLEXION]) * cos_a * by[SHOULDER_FLEXION]
+        deviations[k] = _rise_by(upright, girdle) * hypot(by_abduction, by_flexion)
 
 
 @kernel
@@ -380,24 +381,33 @@ def _jacobian(states: FloatArray, bones: BonesTuple, derivatives: FloatArray) ->
     of = Bones(parts, girdle, Place(*where), Tilt(*tilt))
     twists, at = np.empty((N_STATE, TWIST)), np.empty((1, _N_POINTS, 3))
     frames, rises = np.empty((1, _N_FRAMES, 3, 3)), np.empty((1, 2))
+    derivatives[:] = 0.0
     for i in range(states.shape[0]):
         _pose(states[i : i + 1], bones, True, rises, at, frames)
         state_twists(states[i], of, twists)
         for p in range(_N_POINTS):
-            x, y, z = at[0, p, 0], at[0, p, 1], at[0, p, 2]
-            # The joints of an arm are moved by its own angles and by the torso; an elbow's angles
-            # turn about the elbow, which stays in place.
-            arm = (p - _ARMS) // 3 if p >= _ARMS else -1
             for j in range(N_STATE):
-                of_arm = (j - FIRST_ANGLES[0]) // ARM_ANGLES
-                moves = j < FIRST_ANGLES[0] or j >= TORSO_X
-                if not moves and of_arm == arm:
-                    is_elbow = (j - FIRST_ANGLES[0]) % ARM_ANGLES >= ELBOW_ABDUCTION
-                    moves = not is_elbow or (p - _ARMS) % 3 == 2
-                t, derivative = twists[j], derivatives[i, p]
-                derivative[0, j] = t[0] + t[4] * z - t[5] * y if moves else 0.0
-                derivative[1, j] = t[1] + t[5] * x - t[3] * z if moves else 0.0
-                derivative[2, j] = t[2] + t[3] * y - t[4] * x if moves else 0.0
+                if moves(j, _SEGMENTS[p]):
+                    write_velocity(twists[j], at[0, p], derivatives[i, p, :, j])
+
+
+@inlined_kernel
+def moves(value: int, segment: int) -> bool:
+    """Return whether a value of a state moves a segment.
+
+    The segments are trunk, left upper arm, left forearm, right upper arm and right forearm. A value
+    moves the nearest one and all those beyond it as one rigid body.
+    """
+    nearest = _MOVED[value]
+    return nearest == segment or nearest == 0 or (nearest % 2 == 1 and segment == nearest + 1)
+
+
+@inlined_kernel
+def write_velocity(twist: FloatArray, point: FloatArray, velocity: FloatArray) -> None:
+    """Write the velocity v + w x X (3,) of a point X (3,) that moves with a twist (v, w), (6,)."""
+    velocity[0] = twist[0] + twist[4] * point[2] - twist[5] * point[1]
+    velocity[1] = twist[1] + twist[5] * point[0] - twist[3] * point[2]
+    velocity[2] = twist[2] + twist[3] * point[1] - twist[4] * point[0]
 
 
 @inlined_kernel
@@ -518,6 +528,16 @@ def rise_of(upright: float, girdle: FloatArray) -> float:
     elevation = acos(min(max(upright, -1.0), 1.0))
     rise: float = girdle[RISE] * max(elevation - RISE_FROM_RAD, 0.0)
     return rise
+
+
+@inlined_kernel
+def _rise_by(upright: float, girdle: FloatArray) -> float:
+    """Return the derivative of :func:`rise_of` by -``upright``."""
+    elevation = acos(min(max(upright, -1.0), 1.0))
+    if elevation <= RISE_FROM_RAD:
+        return 0.0
+    slope: float = girdle[RISE] / max(sin(elevation), _LEAST_SINE)
+    return slope
 
 
 @inlined_kernel
@@ -648,9 +668,8 @@ def _arm_twists(
     _turn_about(x, rotation, elbow, twists[ELBOW_ABDUCTION])
     across = se * sf, se * sa * cf - ce * ca, -se * ca * cf - ce * sa
     _turn_about(across, rotation, elbow, twists[ELBOW_FLEXION])
-    elevation = acos(min(max(ca * cf, -1.0), 1.0))
-    if elevation > RISE_FROM_RAD:
-        per_rad = girdle[RISE] / max(sin(elevation), _LEAST_SINE)
+    per_rad = _rise_by(ca * cf, girdle)
+    if per_rad > 0.0:
         inwards, upwards = -side * RISE_INWARDS * per_rad, RISE_UPWARDS * per_rad
         for k in range(3):
             along = rotation[k, 1] * inwards + rotation[k, 2] * upwards

@@ -1,4 +1,4 @@
-"""The 14 values of a state: their places, limits and mirror image, and the reference postures.
+"""The 14 values of a state: their places and limits, and the reference postures.
 
 A state (14,) is a posture d1..d12 followed by ``torso_x`` and ``torso_z``, the searched joints of
 the skeleton (:mod:`.skeleton`). All other modules take the places of these values from here.
@@ -18,9 +18,7 @@ from cardbox_tracker.person.sizes import FloatArray
 from cardbox_tracker.person.skeleton import (
     JOINT_NAMES,
     PLACE_NAMES,
-    PRISMATIC,
     Group,
-    Joint,
     joints_of,
 )
 
@@ -39,18 +37,6 @@ TURNS = slice(ROLL, YAW + 1)
 LEFT_ARM, RIGHT_ARM = (slice(first, first + ARM_ANGLES) for first in FIRST_ANGLES)
 POSTURE, PLACE = slice(0, N_JOINTS), slice(N_JOINTS, N_STATE)
 
-
-def _mirror_sign(joint: Joint) -> float:
-    """Return -1 for a joint in the middle of the body that moves or turns to a side."""
-    is_aside = abs(joint.axis[1]) == 1.0
-    turns_over = is_aside if joint.kind == PRISMATIC else not is_aside
-    return -1.0 if turns_over and joint.name.startswith("torso") else 1.0
-
-
-MIRRORED = np.array([*range(4), *range(8, 12), *range(4, 8), TORSO_X, TORSO_Z])
-"""Index (14,) of each value in the state of the mirror image, where the arms change places."""
-MIRROR_SIGNS = np.array([_mirror_sign(joint) for joint in joints_of(Group.POSTURE, Group.PLACE)])
-"""Factor (14,) of each value in the mirror image: aside, roll and yaw turn over."""
 
 TURNING_LIMITS: FloatArray = np.array([joint.limits for joint in joints_of(Group.POSTURE)])
 """Shape (12, 2): lowest and highest value of each joint, rad (metres for ``torso_y``), of a person

@@ -1,7 +1,7 @@
 """The skeleton as a table: a row is a joint, and everything that names joints follows from it.
 
 A row says where a joint is, what it moves, how far and about which axis, and what it is called.
-From the rows come names, limits and mirror image of postures (:mod:`.posture`), the robot
+From the rows come names and limits of postures (:mod:`.posture`), the robot
 descriptions (:mod:`.urdf`), joint states and the columns of tables. Only the kernels of
 :mod:`.kinematics` are written by hand, for speed; the robot descriptions, which are not, must agree
 with them.

@@ -33,8 +33,8 @@ from cardbox_tracker.person.parts import (
 from cardbox_tracker.terms.kernel_arguments import Body, BodyTuple, Floats, body_of
 from cardbox_tracker.terms.rasterisation import Workspace, new_workspace
 
-_TRUNK_PARTS, TRUNK_PATCHES, _LIMB_PATCHES = 4, 5, 2
-ARM_PATCHES = 2 * _LIMB_PATCHES
+_TRUNK_PARTS, TRUNK_PATCHES, LIMB_PATCHES = 4, 5, 2
+ARM_PATCHES = 2 * LIMB_PATCHES
 BODY_PATCHES = TRUNK_PATCHES + 2 * ARM_PATCHES
 # A square replaces the disc of equal area at an elbow (limbs' mean width) and at a hand's end
 # (forearm's width); half its side is sqrt(pi) / 2 = 0.886 of the radius.
@@ -148,7 +148,7 @@ def place_arm(arm: PosedArm, p: int, drawn: Floats, corners: Floats) -> None:
     elbow_cap, hand_cap = _SQUARE_OF_DISC * (half + thin) / 2, _SQUARE_OF_DISC * thin
     upper_m, fore_m = drawn[UPPER_ARM, HEIGHT], drawn[FOREARM, HEIGHT]
     _place_limb(arm, 0, (upper_m, half, elbow_cap), p, corners)
-    _place_limb(arm, 1, (fore_m, thin, hand_cap), p + _LIMB_PATCHES, corners)
+    _place_limb(arm, 1, (fore_m, thin, hand_cap), p + LIMB_PATCHES, corners)
 
 
 @inlined_kernel

@@ -20,11 +20,14 @@ from cardbox_tracker.person.kinematics import (
     TWIST,
     PosedArm,
     angles_in,
+    moves,
     new_arm,
     pose_arm,
     side_of,
     state_pose,
+    state_twists,
     turn_arm,
+    write_velocity,
 )
 from cardbox_tracker.person.parts import BOTTOM, FORWARD, HEAD, HEIGHT
 from cardbox_tracker.person.posture import N_STATE
@@ -35,11 +38,6 @@ from cardbox_tracker.terms.kernel_arguments import (
     Floats,
     Intrinsics,
     body_of,
-)
-from cardbox_tracker.terms.outline_motions import (
-    moves,
-    write_twists,
-    write_velocity,
 )
 
 # Joints with a point: four of each arm, the middle of the hips, and the middle of the ears.
@@ -245,7 +243,7 @@ def residuals(states: Floats, body: BodyTuple, evidence: EvidenceTuple, found: F
     """Write residuals, their Jacobian and the costs of states (N, 14); see ``Residuals``.
 
     A point X of a rigid segment moves by v + w x X with the twist (v, w) of each value of the state
-    that moves the segment (:mod:`.outline_motions`).
+    that moves the segment (:mod:`cardbox_tracker.person.kinematics`).
     """
     of, seen = body_of(body), Evidence(*evidence)
     values, jacobian, costs = found
@@ -254,7 +252,7 @@ def residuals(states: Floats, body: BodyTuple, evidence: EvidenceTuple, found: F
     for n in range(states.shape[0]):
         state = states[n]
         _place_body(state, state, of, scratch, posed, points)
-        write_twists(state, body, twists)
+        state_twists(state, of, twists)
         for i in range(N_POINTS):
             for d in range(N_STATE):
                 if moves(d, _SEGMENT[i]):

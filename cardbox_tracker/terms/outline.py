@@ -17,11 +17,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cardbox_tracker.camera.camera import Camera
-from cardbox_tracker.common.compiling import kernel
-from cardbox_tracker.person.kinematics import TWIST
+from cardbox_tracker.common.compiling import inlined_kernel, kernel
+from cardbox_tracker.person.kinematics import TWIST, moves, state_twists
 from cardbox_tracker.person.posture import N_STATE
 from cardbox_tracker.person.sizes import FloatArray
-from cardbox_tracker.terms.body_outline import BODY_PATCHES, new_scratch, place_patches
+from cardbox_tracker.terms.body_outline import (
+    BODY_PATCHES,
+    LIMB_PATCHES,
+    TRUNK_PATCHES,
+    new_scratch,
+    place_patches,
+)
 from cardbox_tracker.terms.distance_field import (
     FAR,
     padded_width,
@@ -29,7 +35,6 @@ from cardbox_tracker.terms.distance_field import (
 )
 from cardbox_tracker.terms.kernel_arguments import BodyTuple, Floats, body_of
 from cardbox_tracker.terms.outline_distances import ABOVE_HIPS_PX, HALF_PX, comparing
-from cardbox_tracker.terms.outline_motions import moves, segment_of, write_twists
 from cardbox_tracker.terms.outline_points import (
     POINTS,
     distance_at,
@@ -132,16 +137,24 @@ def signed_distances(
     return left, top, distances, within
 
 
+@inlined_kernel
+def _segment_of(patch: int) -> int:
+    """Return the segment of a patch, see :func:`~cardbox_tracker.person.kinematics.moves`."""
+    return 0 if patch < TRUNK_PATCHES else 1 + (patch - TRUNK_PATCHES) // LIMB_PATCHES
+
+
 @kernel
 def _residuals(states: Floats, body: BodyTuple, seen: SeenTuple, found: Found) -> None:
     """Write residuals, their Jacobian and costs of states (N, 14); see ``Residuals``.
 
     With the gradient (a, b) of the distance, px / px, and the line of sight (u, v, 1) of a point X
-    at the depth z, force and torque of :mod:`.outline_motions` are
+    at the depth z, force f = d(distance)/dX and torque X x f are
 
         f = (fx a, fy b, -fx a u - fy b v) / z,    X x f = (u, v, 1) x z f
 
-    and the distance changes by f . v + (X x f) . w with a segment's twist (v, w).
+    and the distance changes by f . v + (X x f) . w with a segment's twist (v, w). To first order a
+    point of the outline moves with its segment: where a round limb turns towards the camera, its
+    outline moves along the line of sight only.
     """
     of = body_of(body)
     lens, field, within = seen
@@ -155,7 +168,7 @@ def _residuals(states: Floats, body: BodyTuple, seen: SeenTuple, found: Found) -
         place_patches(states[n], of, work, arm)
         project_corners(work.corners, lens, corners_px)
         count = find_outline(corners_px, within, edges, points)
-        write_twists(states[n], body, twists)
+        state_twists(states[n], of, twists)
         for i in range(count):
             p = edges[i, 0]
             x, y, inverse = point_on_edge(corners_px, p, edges[i, 1], points[i, 0])
@@ -170,7 +183,7 @@ def _residuals(states: Floats, body: BodyTuple, seen: SeenTuple, found: Found) -
             outlying = 1.0 + distance**2 * _PER_HALF
             information = INFORMATION * points[i, 1]
             costs[n] += information * distance**2 / outlying
-            root, segment = sqrt(information) / outlying, segment_of(p)
+            root, segment = sqrt(information) / outlying, _segment_of(p)
             values[n, i] = root * distance
             for d in range(N_STATE):
                 if moves(d, segment):

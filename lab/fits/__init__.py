@@ -1,1 +1,1 @@
-"""Training of the pose prior that the package contains."""
+"""Fits of the prior of the arms and of the doubt, which the package ships."""

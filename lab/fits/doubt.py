@@ -21,6 +21,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from cardbox_tracker.applications.evaluation.metrics import beside_shoulders
 from cardbox_tracker.applications.evaluation.session import load_session
 from cardbox_tracker.applications.evaluation.tracking import InputSelection, track_session
 from cardbox_tracker.common.errors import CardboxError
@@ -97,7 +98,7 @@ class Collector:
         if not self._errors:
             return None
         errors = np.array(self._errors)
-        aligned = errors - errors[:, [0, 3]].mean(axis=1, keepdims=True)
+        aligned = beside_shoulders(errors)
         evidence = {name: np.array(values) for name, values in self._evidence.items()}
         return Samples(evidence, np.linalg.norm(aligned, axis=2), np.linalg.norm(errors, axis=2))
 

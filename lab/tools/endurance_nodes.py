@@ -43,7 +43,7 @@ class Line:
     def __init__(self, node: Any, space: str, topic: str, profile: Any, person: Person) -> None:
         """Publish on ``topic`` below the namespace ``space``, and subscribe to the results."""
         info = "camera_info" if topic == "image_raw" else f"{topic}/camera_info"
-        self.space, self._person = space, person
+        self._person = person
         self._images = node.create_publisher(Image, f"{space}{topic}", profile)
         self._infos = node.create_publisher(CameraInfo, f"{space}{info}", profile)
         self._answers = node.create_subscription(

@@ -24,13 +24,13 @@ from cardbox_tracker.applications.evaluation.metrics import SHOULDERS, beside_sh
 from cardbox_tracker.applications.evaluation.session import RecordedSession, load_session
 from cardbox_tracker.applications.evaluation.tracking import InputSelection, track_session
 from cardbox_tracker.commands.arguments import at_least
+from cardbox_tracker.person.kinematics import jacobian
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.posture import ARM_ANGLES, FIRST_ANGLES
 from cardbox_tracker.person.proportions import body_from_proportions
 from cardbox_tracker.search.config import PRESETS
 from cardbox_tracker.search.whole_body import WholeBodyFilter
 from cardbox_tracker.terms.body_priors import PENETRATION, WEIGHT, penetration, priors
-from cardbox_tracker.terms.outline_distances import STATE_STEP
 from cardbox_tracker.terms.whole_body import WholeBodyCost
 from cardbox_tracker.tracking.estimate import Estimate
 from cardbox_tracker.tracking.tracker import Tracker
@@ -119,15 +119,12 @@ def _fitted(
     weights = 1.0 / _STDDEV**2
     for _ in range(_STEPS):
         off = (wanted - cost.keypoints(state)).ravel()
-        jacobian = np.array(
-            [
-                (cost.keypoints(state + move) - cost.keypoints(state - move)).ravel() / (2 * step)
-                for step, move in zip(STATE_STEP, np.diag(STATE_STEP), strict=True)
-            ]
+        by_state = (
+            jacobian(cost.person, state, cost.pitch_rad)[-len(wanted) :].reshape(-1, len(state)).T
         )
-        matrix = jacobian @ jacobian.T / _SPREAD_M**2 + np.diag(weights)
+        matrix = by_state @ by_state.T / _SPREAD_M**2 + np.diag(weights)
         back = np.where(torso, weights * (found - state), 0.0)
-        change = np.linalg.solve(matrix, jacobian @ off / _SPREAD_M**2 + back)
+        change = np.linalg.solve(matrix, by_state @ off / _SPREAD_M**2 + back)
         state = np.clip(state + change, *cost.limits.T)
     return state
 

@@ -9,15 +9,11 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from cardbox_tracker.person import posture as posture_module
-from cardbox_tracker.person.kinematics import pose
-from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.posture import (
     FARTHEST_M,
     FIRST_ANGLES,
     JOINT_LIMITS,
     LEFT_ARM,
-    MIRROR_SIGNS,
-    MIRRORED,
     N_STATE,
     NEAREST_M,
     PLACE,
@@ -57,17 +53,6 @@ def test_the_indices_are_those_of_the_names() -> None:
     for side, first in zip(("left", "right"), FIRST_ANGLES, strict=True):
         for name in arm:
             assert names[first + getattr(posture_module, name)] == f"{side}_{name.lower()}"
-
-
-@given(shares=arrays(np.float64, N_STATE, elements=st.floats(0.0, 1.0)))
-def test_the_mirror_image_of_a_state_has_the_mirrored_keypoints(shares: np.ndarray) -> None:
-    low, high = state_limits(2.0).T
-    state = low + shares * (high - low)
-    body = BodyModel()
-    left, right = (
-        pose(body, one[POSTURE]).keypoints_m for one in (state, state[MIRRORED] * MIRROR_SIGNS)
-    )
-    np.testing.assert_allclose(right, left[[3, 4, 5, 0, 1, 2]] * (1.0, -1.0, 1.0), atol=1e-9)
 
 
 @pytest.mark.parametrize(
