@@ -147,7 +147,9 @@ def chances(samples: Samples, models: Mapping[str, tuple[float, dict[str, float]
 
 
 def threshold_of(checked: Sequence[tuple[Samples, FloatArray]]) -> float:
-    """Return the highest probability below which at most ``MOST_WRONG`` of the keypoints are wrong.
+    """Return the highest threshold with which ``MOST_WRONG`` of the tracked keypoints are wrong.
+
+    It has three digits and is at most ``HIGHEST``. With it, at most that share is wrong.
 
     Args:
         checked: left-out results, and their probabilities (n, 7).
@@ -155,10 +157,10 @@ def threshold_of(checked: Sequence[tuple[Samples, FloatArray]]) -> float:
     wrong = np.concatenate([(one.aligned_m > FAR_M).ravel() for one, _ in checked])
     said = np.concatenate([chances[:, :6].ravel() for _, chances in checked])
     order = np.argsort(said)
-    shares = np.cumsum(wrong[order]) / np.arange(1, len(order) + 1)
-    last = np.flatnonzero(shares <= MOST_WRONG)
-    highest = float(said[order][last[-1]]) if len(last) else 0.0
-    return round(min(highest, HIGHEST), 3)
+    thresholds = np.arange(round(1000 * HIGHEST) + 1) / 1000
+    tracked = np.searchsorted(said[order], thresholds, side="right")
+    wrong_tracked = np.concatenate([[0], np.cumsum(wrong[order])])[tracked]
+    return float(thresholds[wrong_tracked <= MOST_WRONG * tracked][-1])
 
 
 def row_of(name: str, samples: Samples, said: FloatArray, uncertain_from: float) -> str:

@@ -164,6 +164,14 @@ def test_the_threshold_leaves_few_wrong_keypoints_among_tracked_ones() -> None:
     assert threshold_of([(errors_of(np.full((40, 6), 0.4)), said)]) == 0.0
 
 
+def test_the_threshold_is_not_rounded_up_to_where_too_many_are_wrong() -> None:
+    said, aligned_m = np.full((30, 7), 0.05), np.full((30, 6), 0.05)
+    said[10:20] = 0.1006
+    # 0.101 would have these among the tracked ones.
+    said[20:], aligned_m[20:] = 0.1008, 0.4
+    assert threshold_of([(errors_of(aligned_m), said)]) == 0.1
+
+
 def test_what_is_stored_is_what_the_package_reads(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
