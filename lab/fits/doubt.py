@@ -2,10 +2,11 @@
 
     python -m lab.fits.doubt SESSION... --output cardbox_tracker/search/doubt.json
 
-A source is a person before a camera. Each is tracked by the preset ``default`` without and, if the
-detector is installed, with its points, and by ``paper`` if its person can be measured. A model is a
-ridge-penalized logistic regression in which all sources weigh the same. The printed table has, for
-each source, what the models that were fitted without it say about it.
+A source is a rendered recording, or a real person with all clips and choices of cameras. Each is
+tracked by the preset ``default`` without and, if the detector is installed, with its points, and
+before one camera by ``paper``. A model is a ridge-penalized logistic regression in which all parts
+of sources weigh the same. The printed table has, for each source, what the models that were fitted
+without it say about it.
 """
 
 from __future__ import annotations
@@ -13,7 +14,7 @@ from __future__ import annotations
 import argparse
 import json
 from collections import defaultdict
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -22,6 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cardbox_tracker.applications.evaluation.metrics import beside_shoulders
+from cardbox_tracker.applications.evaluation.plan import choices_of_cameras
 from cardbox_tracker.applications.evaluation.session import load_session
 from cardbox_tracker.applications.evaluation.tracking import InputSelection, track_session
 from cardbox_tracker.common.errors import CardboxError
@@ -187,23 +189,25 @@ HEADER = """| source | images | `tracking` % | of these a joint > 30 cm % | join
 |---|---|---|---|---|---|---|---|---|"""
 
 
-def collect(folder: Path, seeds: Sequence[int], detector: Detector | None) -> dict[Source, Samples]:
-    """Return the samples of a session by what they rest on."""
-    session = load_session(folder)
-    truth = dict(zip(session.stamps_ns.tolist(), session.keypoints_m, strict=True))
-    ways = [(Source.OUTLINE, "default", InputSelection())]
-    if detector is not None:
-        ways.append((Source.POINTS, "default", InputSelection(points=detector)))
-    if session.has_references:
-        ways.append((Source.PAPER, "paper", InputSelection()))
-    found = {}
-    for source, preset, inputs in ways:
-        collector = Collector(truth, source)
-        track_session(session, PRESETS[preset](), tuple(seeds), inputs, collector)
-        samples = collector.samples()
-        if samples is not None:
-            found[source] = samples
-    return found
+def collect(
+    folder: Path, seeds: Sequence[int], detector: Detector | None
+) -> Iterator[tuple[Source, Samples]]:
+    """Yield the samples of a session, one for each way to track it, and what they rest on."""
+    whole = load_session(folder)
+    for cameras in [()] if whole.has_references else choices_of_cameras(whole):
+        session = load_session(folder, cameras)
+        truth = dict(zip(session.stamps_ns.tolist(), session.keypoints_m, strict=True))
+        ways = [(Source.OUTLINE, "default", InputSelection())]
+        if detector is not None:
+            ways.append((Source.POINTS, "default", InputSelection(points=detector)))
+        if len(session.truth.cameras) <= 1:
+            ways.append((Source.PAPER, "paper", InputSelection()))
+        for source, preset, inputs in ways:
+            collector = Collector(truth, source)
+            track_session(session, PRESETS[preset](), tuple(seeds), inputs, collector)
+            samples = collector.samples()
+            if samples is not None:
+                yield source, samples
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
@@ -218,14 +222,14 @@ def main(arguments: Sequence[str] | None = None) -> None:
     except CardboxError as error:
         print(f"without points: {error}")
         detector = None
-    # Clips of one person are one source, also before several cameras.
+    # Clips of one person are one source, also before other cameras.
     by_source: defaultdict[Source, defaultdict[str, list[Samples]]] = defaultdict(
         lambda: defaultdict(list)
     )
     for folder in given.sessions:
         is_clip = folder.parent.name.startswith("real_")
         name = folder.parent.name if is_clip else folder.name
-        for source, samples in collect(folder, given.seeds, detector).items():
+        for source, samples in collect(folder, given.seeds, detector):
             by_source[source][name].append(samples)
         print(f"tracked {folder}", flush=True)
     stored = fit_all(by_source)
