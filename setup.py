@@ -82,7 +82,7 @@ SCRIPTS = [
 setup(
     name=NAME,
     version="0.1.0",
-    description="Upper-body posture of one person from the silhouettes of one fixed camera",
+    description="Upper-body posture of one person from silhouettes of one or more fixed cameras",
     maintainer="cardbox_tracker maintainers",
     maintainer_email="maintainers@cardbox-tracker.invalid",
     license="Apache-2.0",

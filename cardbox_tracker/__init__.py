@@ -1,4 +1,4 @@
-"""Upper-body posture of one person from the silhouettes of one fixed camera.
+"""Upper-body posture of one person from silhouettes of one or more fixed cameras.
 
 The folders follow the data: :mod:`.person` has the body model, :mod:`.camera` and
 :mod:`.segmentation` images and silhouettes, :mod:`.terms` and :mod:`.search` the search of the

@@ -1,4 +1,4 @@
-"""The rooms of the package: a module imports only what stands below it, never in a circle."""
+"""The folders of the package: a module imports only what stands below it, never in a circle."""
 
 from __future__ import annotations
 
@@ -12,13 +12,13 @@ import pytest
 PACKAGE = "cardbox_tracker"
 SOURCES = Path(__file__).resolve().parents[1] / PACKAGE
 
-# From the bottom to the top: a module imports from its own room and from the rooms before.
-ROOMS = (
+# From the bottom to the top: a module imports from its own folder and from the folders before.
+FOLDERS = (
     *("common", "person", "camera", "segmentation", "detectors", "terms", "search"),
     *("measuring", "tracking", "recordings", "applications", "ros", "commands", "start"),
 )
-# The layers inside a room; folders of one layer do not import each other, and what is not named may
-# use all of them.
+# The layers inside a folder; folders of one layer do not import each other, and what is not named
+# may use all of them.
 INSIDE: dict[str, tuple[tuple[str, ...], ...]] = {
     "applications": (
         ("drawing",),
@@ -56,12 +56,12 @@ def imports(path: Path, known: dict[str, Path]) -> set[str]:
 
 def is_upward(module: str, other: str) -> bool:
     """Return whether ``module`` must not import ``other``."""
-    (room, *inner), (other_room, *other_inner) = module.split("."), other.split(".")
-    if room != other_room:
-        if room not in ROOMS or other_room not in ROOMS:
+    (folder, *inner), (other_folder, *other_inner) = module.split("."), other.split(".")
+    if folder != other_folder:
+        if folder not in FOLDERS or other_folder not in FOLDERS:
             return True
-        return ROOMS.index(room) < ROOMS.index(other_room)
-    layers = INSIDE.get(room, ())
+        return FOLDERS.index(folder) < FOLDERS.index(other_folder)
+    layers = INSIDE.get(folder, ())
     if not inner or not other_inner or inner[0] == other_inner[0]:
         return False
 
@@ -73,7 +73,7 @@ def is_upward(module: str, other: str) -> bool:
 
 
 def upward(root: Path) -> list[str]:
-    """Return every import that points to a higher room, or to a higher layer of its own."""
+    """Return every import that points to a higher folder, or to a higher layer of its own."""
     known = modules(root)
     return [
         f"{module} -> {other}"
@@ -84,8 +84,8 @@ def upward(root: Path) -> list[str]:
     ]
 
 
-def test_every_folder_is_a_room() -> None:
-    assert {module.split(".")[0] for module in modules(SOURCES) if module} == set(ROOMS)
+def test_every_folder_has_its_place() -> None:
+    assert {module.split(".")[0] for module in modules(SOURCES) if module} == set(FOLDERS)
 
 
 def test_nothing_imports_upwards() -> None:
@@ -136,8 +136,8 @@ def test_an_upward_import_would_be_found(tmp_path: Path) -> None:
         TopologicalSorter({m: imports(p, known) for m, p in known.items()}).prepare()
 
 
-def test_the_document_has_the_rooms_in_this_order() -> None:
+def test_the_document_has_the_folders_in_this_order() -> None:
     text = (SOURCES.parent / "docs" / "architecture.md").read_text(encoding="utf-8")
     table = text.split("| layer | what |")[1].split("\n\n")[0]
     rows = [row.split("|")[1] for row in table.splitlines() if row.startswith("| `")]
-    assert [name for row in rows for name in re.findall(r"`(\w+)(?:/|\.py)`", row)] == list(ROOMS)
+    assert [name for row in rows for name in re.findall(r"`(\w+)(?:/|\.py)`", row)] == list(FOLDERS)

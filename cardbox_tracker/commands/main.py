@@ -84,8 +84,9 @@ ABSENT = {
 _EVERY_COMMAND = tuple(command.NAME for command in COMMANDS)
 _DESCRIPTION = """\
 The 3D posture of one person's upper body, from the silhouettes that one
-fixed camera sees. These commands work on recordings (rosbag2, videos, images);
-live, use the nodes background, initializer, tracker, camera and play_bag."""
+or more fixed cameras see. These commands work on recordings (rosbag2, videos,
+images); live, use the nodes background, initializer, tracker, detector, camera
+and play_bag."""
 _EPILOG = """\
 in this order, on a recording of your own or on a synthetic one:
   cardbox synthesize --motion wave --output session

@@ -1,4 +1,4 @@
-"""Common ground of all rooms: errors, files, settings, compiling, processes, progress.
+"""Common ground of all folders: errors, files, settings, compiling, processes, progress.
 
 Nothing here knows a person or a camera. A user's mistake is a :class:`.CardboxError` whose text
 has the fault, the expectation and the remedy; a file is written completely or not at all; a setting

@@ -115,10 +115,13 @@ class TrackerConfig(Settings):
         "use only the parts of the silhouette that can belong to the person, not to a door, a "
         "chair or a passer-by",
     )
-    lost_iou: float = setting(0.4, "least IoU of an image that fits", limits=(0.0, 1.0))
+    lost_iou: float = setting(
+        0.4, "least IoU of an image that fits; not used with a detector's points", limits=(0.0, 1.0)
+    )
     lost_frames: int = setting(
         5,
-        "consecutive images below lost_iou until the state is lost",
+        "consecutive images whose result does not fit (IoU below lost_iou, or probably wrong as a "
+        "whole) until the state is lost",
         limits=(1, 1_000_000),
     )
 

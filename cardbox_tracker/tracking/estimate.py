@@ -1,8 +1,8 @@
 """The result of tracking for one time.
 
-States: ``tracking``; ``uncertain`` (the posture may be wrong); ``lost`` (a person is visible, but
-the model has not fitted for several frames); ``no_person`` (too few foreground pixels for a
-person). Only ``tracking`` and ``uncertain`` have a posture.
+States: ``tracking``; ``uncertain`` (the posture may be wrong); ``lost`` (no result has fitted for
+several frames, or there is more foreground than a person can have); ``no_person`` (too few
+foreground pixels for a person). Only ``tracking`` and ``uncertain`` have a posture.
 """
 
 from __future__ import annotations

@@ -24,8 +24,9 @@ import numpy as np
 
 from cardbox_tracker.camera.camera import Camera
 from cardbox_tracker.detectors.image_points import POINT_INDEX, ImagePoints
+from cardbox_tracker.person.kinematics import pose
 from cardbox_tracker.person.model import MEASURED, BodyModel
-from cardbox_tracker.person.posture import TORSO_Y
+from cardbox_tracker.person.posture import N_JOINTS, TORSO_Y
 from cardbox_tracker.person.sizes import FloatArray
 from cardbox_tracker.person.skeleton import KeypointState
 from cardbox_tracker.search.doubt import FAR_M
@@ -48,7 +49,7 @@ UNCERTAIN_FROM = 0.1
 # Seconds and least number of images over which two sources are compared, deviations by which they
 # may differ, and the relative deviation of the distance of points (0.91 to 1.08 of the true one in
 # 24 recordings of 17 people).
-_COMPARED_S, _LEAST_COMPARED, _CONTRADICTING = 2.0, 5, 1.65
+_COMPARED_S, _LEAST_COMPARED, _CONTRADICTING = 1.5, 5, 1.65
 _POINTS_STDDEV = 0.045
 
 _TRUNK, _ARM = ("shoulder", "hip"), ("shoulder", "elbow", "wrist")
@@ -167,7 +168,7 @@ class PlaceWatch:
             rests_on = DEPTH
         elif self._is_alone:
             rests_on = self._scale
-        self._compare(estimate, distance_m, rests_on, frame)
+        self._compare(estimate, body, rests_on, frame)
         relative = hypot(SCALE_STDDEVS[rests_on], self._camera.focal_stddev)
         off_m = hypot(relative * distance_m, self._apart_m)
         aside_m = relative * abs(float(estimate.posture[TORSO_Y]))
@@ -178,7 +179,7 @@ class PlaceWatch:
         stddev_m = np.array([off_m, aside_m, height_m])
         return Place(stddev_m, chance, rests_on, self.contradiction)
 
-    def _compare(self, estimate: Estimate, distance_m: float, rests_on: str, frame: Frame) -> None:
+    def _compare(self, estimate: Estimate, body: BodyModel, rests_on: str, frame: Frame) -> None:
         """Compare the distance of the points with that of a second source, for some seconds."""
         points, stamp_ns = frame["points"], frame.stamp_ns
         is_second = rests_on in (DEPTH, SECOND_CAMERA)
@@ -192,10 +193,10 @@ class PlaceWatch:
         if found_m is None or found_m <= 0.0:
             return
         # Both are distances of the shoulders along the optical axis.
-        there_m = float(estimate.keypoints_m[[0, 3], 2].mean())
+        keypoints_m = estimate.keypoints_m
         if not is_second:
-            there_m *= self._body.placement.distance_m / distance_m
-        self._compared.append((found_m, there_m))
+            keypoints_m = pose(body, np.zeros(N_JOINTS), self._camera.pitch_rad).keypoints_m
+        self._compared.append((found_m, float(keypoints_m[[0, 3], 2].mean())))
         if len(self._compared) < _LEAST_COMPARED:
             return
         shown_m, other_m = np.median(self._compared, axis=0).tolist()

@@ -280,7 +280,8 @@ class Tracker:
     def _follow(self, frames: Sequence[Frame]) -> Estimate:
         presence = self._filter.look(frames)
         if presence is Presence.NOBODY:
-            self._before = None
+            # The next person is not lost after one poor image.
+            self._before, self._poor_frames = None, 0
             if self._facing is not None:
                 self._facing.forget()
             if self.config.relocalize:

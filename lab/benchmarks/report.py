@@ -139,8 +139,8 @@ def _beside_detector(measured: Mapping[str, Any] | None) -> list[str]:
         return []
     return [
         "### Beside the node `detector`",
-        "The tracker takes the detector's [points](detectors.md) when they come. The networks do "
-        "not recognize the drawn person; an image takes two thirds of the time of a person then.",
+        "The tracker takes the detector's [points](detectors.md) when they come. The networks find "
+        "nobody in the drawn images, so they take less time than with a real person.",
         *_streams(measured),
     ]
 

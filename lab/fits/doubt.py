@@ -2,10 +2,11 @@
 
     python -m lab.fits.doubt SESSION... --output cardbox_tracker/search/doubt.json
 
-A source is a person before a camera. Each is tracked by the preset ``default`` without and, if the
-detector is installed, with its points, and by ``paper`` if its person can be measured. A model is a
-ridge-penalized logistic regression in which all sources weigh the same. The printed table has, for
-each source, what the models that were fitted without it say about it.
+A source is a rendered recording, or a real person with all clips and choices of cameras. Each is
+tracked by the preset ``default`` without and, if the detector is installed, with its points, and
+before one camera by ``paper``. A model is a ridge-penalized logistic regression in which all parts
+of sources weigh the same. The printed table has, for each source, what the models that were fitted
+without it say about it.
 """
 
 from __future__ import annotations
@@ -13,7 +14,7 @@ from __future__ import annotations
 import argparse
 import json
 from collections import defaultdict
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -22,6 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cardbox_tracker.applications.evaluation.metrics import beside_shoulders
+from cardbox_tracker.applications.evaluation.plan import choices_of_cameras
 from cardbox_tracker.applications.evaluation.session import load_session
 from cardbox_tracker.applications.evaluation.tracking import InputSelection, track_session
 from cardbox_tracker.common.errors import CardboxError
@@ -56,17 +58,17 @@ class Samples:
     Attributes:
         evidence: by name, (n, 6).
         aligned_m: errors relative to the middle of the shoulders, (n, 6).
-        off_m: absolute errors, (n, 6).
+        whole_m: mean errors by which a whole result is wrong, (n,).
     """
 
     evidence: Mapping[str, FloatArray]
     aligned_m: FloatArray
-    off_m: FloatArray
+    whole_m: FloatArray
 
     def rows(self, model: str) -> tuple[Mapping[str, FloatArray], FloatArray]:
         """Return evidence by name, (k,), and whether a result is wrong, (k,), for a model."""
         if model == "whole":
-            wrong = self.aligned_m[:, ARMS].mean(axis=1) > FAR_M
+            wrong = self.whole_m > FAR_M
             return {name: one[:, 0] for name, one in self.evidence.items()}, wrong.astype(float)
         at = [number for number, kind in enumerate(KINDS) if kind == model]
         wrong = self.aligned_m[:, at].ravel() > FAR_M
@@ -81,6 +83,7 @@ class Collector:
     def __init__(self, truth: Mapping[int, FloatArray], source: Source) -> None:
         """Prepare for true keypoints (6, 3), metres, by stamp, and what results rest on."""
         self._truth, self._has_points = truth, source is Source.POINTS
+        self._is_paper = source is Source.PAPER
         self._evidence: defaultdict[str, list[FloatArray]] = defaultdict(list)
         self._errors: list[FloatArray] = []
 
@@ -102,7 +105,10 @@ class Collector:
         errors = np.array(self._errors)
         aligned = beside_shoulders(errors)
         evidence = {name: np.array(values) for name, values in self._evidence.items()}
-        return Samples(evidence, np.linalg.norm(aligned, axis=2), np.linalg.norm(errors, axis=2))
+        aligned_m = np.linalg.norm(aligned, axis=2)
+        # The paper's filter keeps the distance constant; its model says if the person is elsewhere.
+        whole_m = np.linalg.norm(errors, axis=2) if self._is_paper else aligned_m[:, ARMS]
+        return Samples(evidence, aligned_m, whole_m.mean(axis=1))
 
 
 def fit(
@@ -137,7 +143,7 @@ def fit(
 def chances(samples: Samples, models: Mapping[str, tuple[float, dict[str, float]]]) -> FloatArray:
     """Return the probabilities (n, 7) of the keypoints and of the whole."""
     columns = [*enumerate(KINDS), (0, "whole")]
-    found = np.empty((len(samples.off_m), len(columns)))
+    found = np.empty((len(samples.whole_m), len(columns)))
     for column, (at, model) in enumerate(columns):
         intercept, coefficients = models[model]
         logit = intercept + sum(
@@ -149,7 +155,9 @@ def chances(samples: Samples, models: Mapping[str, tuple[float, dict[str, float]
 
 
 def threshold_of(checked: Sequence[tuple[Samples, FloatArray]]) -> float:
-    """Return the highest probability below which at most ``MOST_WRONG`` of the keypoints are wrong.
+    """Return the highest threshold with which ``MOST_WRONG`` of the tracked keypoints are wrong.
+
+    It has three digits and is at most ``HIGHEST``. With it, at most that share is wrong.
 
     Args:
         checked: left-out results, and their probabilities (n, 7).
@@ -157,10 +165,10 @@ def threshold_of(checked: Sequence[tuple[Samples, FloatArray]]) -> float:
     wrong = np.concatenate([(one.aligned_m > FAR_M).ravel() for one, _ in checked])
     said = np.concatenate([chances[:, :6].ravel() for _, chances in checked])
     order = np.argsort(said)
-    shares = np.cumsum(wrong[order]) / np.arange(1, len(order) + 1)
-    last = np.flatnonzero(shares <= MOST_WRONG)
-    highest = float(said[order][last[-1]]) if len(last) else 0.0
-    return round(min(highest, HIGHEST), 3)
+    thresholds = np.arange(round(1000 * HIGHEST) + 1) / 1000
+    tracked = np.searchsorted(said[order], thresholds, side="right")
+    wrong_tracked = np.concatenate([[0], np.cumsum(wrong[order])])[tracked]
+    return float(thresholds[wrong_tracked <= MOST_WRONG * tracked][-1])
 
 
 def row_of(name: str, samples: Samples, said: FloatArray, uncertain_from: float) -> str:
@@ -187,23 +195,25 @@ HEADER = """| source | images | `tracking` % | of these a joint > 30 cm % | join
 |---|---|---|---|---|---|---|---|---|"""
 
 
-def collect(folder: Path, seeds: Sequence[int], detector: Detector | None) -> dict[Source, Samples]:
-    """Return the samples of a session by what they rest on."""
-    session = load_session(folder)
-    truth = dict(zip(session.stamps_ns.tolist(), session.keypoints_m, strict=True))
-    ways = [(Source.OUTLINE, "default", InputSelection())]
-    if detector is not None:
-        ways.append((Source.POINTS, "default", InputSelection(points=detector)))
-    if session.has_references:
-        ways.append((Source.PAPER, "paper", InputSelection()))
-    found = {}
-    for source, preset, inputs in ways:
-        collector = Collector(truth, source)
-        track_session(session, PRESETS[preset](), tuple(seeds), inputs, collector)
-        samples = collector.samples()
-        if samples is not None:
-            found[source] = samples
-    return found
+def collect(
+    folder: Path, seeds: Sequence[int], detector: Detector | None
+) -> Iterator[tuple[Source, Samples]]:
+    """Yield the samples of a session, one for each way to track it, and what they rest on."""
+    whole = load_session(folder)
+    for cameras in [()] if whole.has_references else choices_of_cameras(whole):
+        session = load_session(folder, cameras)
+        truth = dict(zip(session.stamps_ns.tolist(), session.keypoints_m, strict=True))
+        ways = [(Source.OUTLINE, "default", InputSelection())]
+        if detector is not None:
+            ways.append((Source.POINTS, "default", InputSelection(points=detector)))
+        if len(session.truth.cameras) <= 1:
+            ways.append((Source.PAPER, "paper", InputSelection()))
+        for source, preset, inputs in ways:
+            collector = Collector(truth, source)
+            track_session(session, PRESETS[preset](), tuple(seeds), inputs, collector)
+            samples = collector.samples()
+            if samples is not None:
+                yield source, samples
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
@@ -218,14 +228,14 @@ def main(arguments: Sequence[str] | None = None) -> None:
     except CardboxError as error:
         print(f"without points: {error}")
         detector = None
-    # Clips of one person are one source, also before several cameras.
+    # Clips of one person are one source, also before other cameras.
     by_source: defaultdict[Source, defaultdict[str, list[Samples]]] = defaultdict(
         lambda: defaultdict(list)
     )
     for folder in given.sessions:
         is_clip = folder.parent.name.startswith("real_")
         name = folder.parent.name if is_clip else folder.name
-        for source, samples in collect(folder, given.seeds, detector).items():
+        for source, samples in collect(folder, given.seeds, detector):
             by_source[source][name].append(samples)
         print(f"tracked {folder}", flush=True)
     stored = fit_all(by_source)

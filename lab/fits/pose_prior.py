@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Make the learned pose prior of the arms from free motion capture.
 
-    python lab/fits/pose_prior.py FOLDER...
+    python -m lab.fits.pose_prior FOLDER...
         --output cardbox_tracker/terms/pose_prior.json
         [--exclude NAME...] [--components 16] [--seed 0]
 

@@ -26,7 +26,8 @@ _TEXT = """\
 A keypoint is wrong if it is off by more than 30 cm relative to the middle of the shoulders, so the
 error of the person's distance does not count. The tracker gives each keypoint a probability of
 being wrong and, from it, a [state](../conventions.md#states). The tables compare both with the
-truth. `python -m lab.tools.keypoint_states` makes this page from the figures of
+truth; [doubt](doubt.md) does so for sources that were left out of the fit.
+`python -m lab.tools.keypoint_states` makes this page from the figures of
 [sessions](sessions.md) and [real people](real-people.md).
 
 ![Reliability diagrams](../images/keypoint-states.png)
@@ -39,7 +40,8 @@ agree. Intervals with fewer than 50 keypoints are left out.*
 `tracking` has no `uncertain` or `lost` hand. The last two columns are shares of all images: those
 that are called `tracking` with a mean error beyond 30 cm, and with a wrong hand.
 
-| recordings | images | `tracking`, % | and mean beyond 30 cm, % | and hand wrong, % |
+| recordings | images | `tracking`, % | `tracking` with a mean error beyond 30 cm, % of all \
+| `tracking` with a wrong hand, % of all |
 |---|---|---|---|---|
 """
 _STATES_HEAD = """

@@ -91,8 +91,6 @@ def markdown_text() -> str:
         for name, spec in kind.specs().items():
             first = described.setdefault((name, spec.description), node)
             description = spec.description if first == node else f"as of `{first}`"
-            if spec.was:
-                description += f" (was `{spec.was}`, which works in this version too)"
             value = default_of(kind, name)
             default = f"`{yaml_value(value)}`"
             if value == []:

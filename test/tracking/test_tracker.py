@@ -204,6 +204,13 @@ def test_the_fit_that_counts_as_lost_is_a_setting() -> None:
         assert tracker.track(silhouette).state == state
 
 
+def test_whoever_comes_after_nobody_begins_the_count_anew() -> None:
+    tracker = make(replace(STILL, lost_frames=2))
+    states = [tracker.track(silhouette).state for silhouette in (stripes(), NOBODY, stripes())]
+    assert states[1] == NO_PERSON and states[2] in FOUND
+    assert tracker.track(stripes()).state == LOST
+
+
 @pytest.mark.parametrize("seed", range(4))
 @pytest.mark.parametrize("torso_y_m", [-0.45, 0.45])
 def test_whoever_comes_back_elsewhere_is_found(seed: int, torso_y_m: float) -> None:

@@ -78,7 +78,10 @@ def ways_of(folder: Path, plan: Plan) -> list[Way]:
         CardboxError: the folder is not a session.
     """
     session = load_session(folder)
-    views = _with_references(session) if session.has_references else _without(session)
+    if session.has_references:
+        views = _with_references(session)
+    else:
+        views = [(cameras, None) for cameras in choices_of_cameras(session)]
     sources = plan.silhouettes
     if "empty" not in session.spans:
         sources = tuple(source for source in sources if source != BACKGROUND) or sources
@@ -95,10 +98,10 @@ def _with_references(session: RecordedSession) -> list[tuple[tuple[str, ...], st
     return [((), only) for only in (None, *alone, *([WITH_DEPTH] if has_depth else []))]
 
 
-def _without(session: RecordedSession) -> list[tuple[tuple[str, ...], str | None]]:
+def choices_of_cameras(session: RecordedSession) -> list[tuple[str, ...]]:
+    """Return all cameras of a session, the first with each other one, and each alone."""
     first, *others = session.truth.cameras or ("",)
     if not others:
-        return [((), None)]
+        return [()]
     pairs = [(first, other) for other in others]
-    chosen = dict.fromkeys([(first, *others), *pairs, *((name,) for name in (first, *others))])
-    return [(cameras, None) for cameras in chosen]
+    return list(dict.fromkeys([(first, *others), *pairs, *((name,) for name in (first, *others))]))

@@ -94,8 +94,8 @@ class TrackerParameters(NodeParameters):
         FilterConfig,
         "particles",
         most=MOST_MOVES,
-        more="; each particle takes about 10 us per cycle, and particles x cycles is at most "
-        f"{MOST_MOVES}",
+        more="; a cycle of the three filters takes about N x 4 us, and particles x cycles is at "
+        f"most {MOST_MOVES}",
     )
     cycles: int = _of_preset(TrackerConfig, "cycles")
     average: int = _of_preset(TrackerConfig, "average", most=MOST_MOVES)

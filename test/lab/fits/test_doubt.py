@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
+from types import SimpleNamespace
 from typing import cast
 
 import numpy as np
 import pytest
 
 from cardbox_tracker.search import doubt as package
+from cardbox_tracker.search.config import TrackerConfig
 from cardbox_tracker.search.doubt import Doubt, Source
 from cardbox_tracker.tracking.estimate import Estimate
 from cardbox_tracker.tracking.tracker import Tracker
@@ -164,6 +166,14 @@ def test_the_threshold_leaves_few_wrong_keypoints_among_tracked_ones() -> None:
     assert threshold_of([(errors_of(np.full((40, 6), 0.4)), said)]) == 0.0
 
 
+def test_the_threshold_is_not_rounded_up_to_where_too_many_are_wrong() -> None:
+    said, aligned_m = np.full((30, 7), 0.05), np.full((30, 6), 0.05)
+    said[10:20] = 0.1006
+    # 0.101 would have these among the tracked ones.
+    said[20:], aligned_m[20:] = 0.1008, 0.4
+    assert threshold_of([(errors_of(aligned_m), said)]) == 0.1
+
+
 def test_what_is_stored_is_what_the_package_reads(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -209,3 +219,25 @@ def test_only_results_with_truth_and_of_one_kind_are_collected() -> None:
         # All joints are off alike, so none is beside the shoulders.
         np.testing.assert_allclose(collected.off_m, np.full((1, 6), 0.3))
         np.testing.assert_allclose(collected.aligned_m, 0.0, atol=1e-12)
+
+
+@pytest.mark.parametrize("has_references", [True, False])
+def test_only_one_camera_is_tracked_by_the_papers_filter(
+    has_references: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Of real people, who have no reference postures, every choice of cameras is tracked."""
+    tracked = []
+
+    def load(_: Path, cameras: tuple[str, ...] = ()) -> SimpleNamespace:
+        truth = SimpleNamespace(cameras=cameras or ("a", "b"))
+        none: dict[str, np.ndarray] = {"stamps_ns": np.empty(0, int), "keypoints_m": np.empty(0)}
+        return SimpleNamespace(truth=truth, has_references=has_references, **none)
+
+    def track(session: SimpleNamespace, config: TrackerConfig, *_: object) -> None:
+        tracked.append(("".join(session.truth.cameras), config.filter))
+
+    monkeypatch.setattr(doubt, "load_session", load)
+    monkeypatch.setattr(doubt, "track_session", track)
+    assert list(doubt.collect(Path("session"), (0,), None)) == []
+    alone = [(name, preset) for name in "ab" for preset in ("whole_body", "hierarchical")]
+    assert tracked == [("ab", "whole_body"), *([] if has_references else alone)]
