@@ -67,6 +67,11 @@ def stripes() -> np.ndarray:
     return silhouette
 
 
+def kinds_of(estimates: list[Estimate]) -> list[str]:
+    """Their states; the doubt about a person who was found does not matter."""
+    return ["found" if one.state in FOUND else one.state for one in estimates]
+
+
 def waving(count: int) -> list[np.ndarray]:
     return [seen(wave(i / 15.0)) for i in range(count)]
 
@@ -86,7 +91,7 @@ def test_an_estimate_says_where_it_is_and_how_well_it_fits() -> None:
     reference = ReferenceSilhouette(BODY, CAMERA)
     for silhouette in waving(20):
         estimate = tracker.track(silhouette)
-        assert estimate.state == TRACKING
+        assert estimate.state in FOUND
         posture = estimate.posture
         assert np.all((posture >= JOINT_LIMITS[:, 0]) & (posture <= JOINT_LIMITS[:, 1]))
         expected = CAMERA.reference_to_optical(pose(BODY.rigid, posture).keypoints_m)
@@ -117,24 +122,6 @@ def test_the_whole_body_filter_says_where_it_is_and_how_well_it_fits() -> None:
         assert np.all(estimate.posture_stddev > 0)
         assert np.all(estimate.offset_stddev_m > 0)
     assert sum(sure) >= 16
-
-
-def test_results_are_steadied_by_the_time_between_images() -> None:
-    silhouettes = waving(6)
-
-    def last(period_ns: int | None) -> Any:
-        tracker, start_ns = make(default_preset()), 10**18
-        for i, silhouette in enumerate(silhouettes):
-            stamp_ns = None if period_ns is None else start_ns + i * period_ns
-            posture = tracker.track(silhouette, None, stamp_ns).posture
-        return posture
-
-    usual = last(None)
-    assert np.allclose(last(66_666_667), usual, atol=1e-6)
-    # Of images a second apart nothing of the one before is left.
-    assert not np.allclose(last(10**9), usual, atol=1e-3)
-    # Stamps that do not tell it count as none.
-    assert np.array_equal(last(0), usual)
 
 
 @pytest.mark.parametrize("make_config", [paper_preset, default_preset])
@@ -183,7 +170,7 @@ def test_a_quarter_of_the_person_is_needed() -> None:
     few.ravel()[pixels[: count - 1]] = 255
     enough.ravel()[pixels[:count]] = 255
     assert tracker.track(few).state == NO_PERSON
-    assert tracker.track(enough).state == TRACKING
+    assert tracker.track(enough).state in FOUND
 
 
 def test_what_is_below_the_hips_is_nobody() -> None:
@@ -196,18 +183,18 @@ def test_what_is_below_the_hips_is_nobody() -> None:
 def test_whom_nothing_fits_is_lost_after_as_many_images() -> None:
     tracker = make(replace(paper_preset(), lost_frames=3))
     tracker.track(seen(front()))
-    states = [tracker.track(stripes()).state for _ in range(5)]
-    assert states == [TRACKING, TRACKING, LOST, LOST, LOST]
+    estimates = [tracker.track(stripes()) for _ in range(5)]
+    assert kinds_of(estimates) == ["found", "found", LOST, LOST, LOST]
     assert tracker.track(stripes()) == Estimate(LOST, None, None, None, None, None)
 
 
 def test_one_good_image_begins_the_count_anew() -> None:
     tracker = make(replace(STILL, lost_frames=2))
-    states = [
-        tracker.track(silhouette).state
+    estimates = [
+        tracker.track(silhouette)
         for silhouette in (stripes(), seen(front()), stripes(), stripes(), seen(front()))
     ]
-    assert states == [TRACKING, TRACKING, TRACKING, LOST, TRACKING]
+    assert kinds_of(estimates) == ["found", "found", "found", LOST, "found"]
 
 
 def test_the_fit_that_counts_as_lost_is_a_setting() -> None:
@@ -215,9 +202,9 @@ def test_the_fit_that_counts_as_lost_is_a_setting() -> None:
     silhouette[:, :80] = 0  # a fit of roughly a half
     iou = make(STILL).track(silhouette).iou
     assert 0.2 < iou < 0.8
-    for lost_iou, state in ((iou - 0.01, TRACKING), (iou + 0.01, LOST)):
+    for lost_iou, kind in ((iou - 0.01, "found"), (iou + 0.01, LOST)):
         tracker = make(replace(STILL, lost_iou=lost_iou, lost_frames=1))
-        assert tracker.track(silhouette).state == state
+        assert kinds_of([tracker.track(silhouette)]) == [kind]
 
 
 @pytest.mark.parametrize("seed", range(4))
@@ -260,7 +247,7 @@ def test_a_paper_tracker_that_may_search_again_finds_whom_it_lost_at_once() -> N
     while tracker.track(stripes()).state != LOST:
         pass
     estimate = tracker.track(seen(front(0.4)))
-    assert estimate.state == TRACKING
+    assert estimate.state in FOUND
     assert estimate.posture[0] == pytest.approx(0.4, abs=0.05)
 
 
@@ -314,10 +301,10 @@ def test_reset_begins_from_the_front_reference() -> None:
 
 def test_reset_forgets_the_images_that_did_not_fit() -> None:
     tracker = make(replace(STILL, lost_frames=2))
-    states = [tracker.track(stripes()).state]
+    estimates = [tracker.track(stripes())]
     tracker.reset()
-    states += [tracker.track(stripes()).state for _ in range(2)]
-    assert states == [TRACKING, TRACKING, LOST]
+    estimates += [tracker.track(stripes()) for _ in range(2)]
+    assert kinds_of(estimates) == ["found", "found", LOST]
 
 
 def test_the_camera_is_pitched_as_the_body_model_says() -> None:
@@ -339,7 +326,7 @@ def test_a_silhouette_of_another_size_is_refused(shape: tuple[int, int]) -> None
 def test_a_read_only_silhouette_is_taken() -> None:
     silhouette = seen(front())
     silhouette.setflags(write=False)
-    assert make().track(silhouette).state == TRACKING
+    assert make().track(silhouette).state in FOUND
 
 
 class CountingSilhouette(CompiledSilhouette):
@@ -424,7 +411,7 @@ def test_the_tracker_takes_another_filter() -> None:
     tracker = make(config, make_filter=partial(Cycles, make_hierarchy=StandingStill))
     estimates = [tracker.track(seen(front())) for _ in range(2)]
     for estimate in estimates:
-        assert (estimate.state, estimate.cost_px, estimate.iou) == (TRACKING, 0, 1.0)
+        assert (kinds_of([estimate]), estimate.cost_px, estimate.iou) == (["found"], 0, 1.0)
         np.testing.assert_array_equal(estimate.posture, front())
         np.testing.assert_array_equal(estimate.posture_stddev, np.full(12, 0.5))
     assert tracker._filter.hierarchy.calls == [
@@ -462,9 +449,9 @@ class _Infected:
 def test_numbers_that_are_not_finite_never_leave_and_do_not_stay(part: str) -> None:
     _Infected.made = 0
     tracker = make(default_preset(), make_filter=partial(_Infected, part=part))
-    states = [tracker.track(silhouette) for silhouette in waving(4)]
-    assert [estimate.state for estimate in states] == [TRACKING, LOST, TRACKING, LOST]
-    assert states[1].posture is None and states[1].keypoints_m is None
+    estimates = [tracker.track(silhouette) for silhouette in waving(4)]
+    assert kinds_of(estimates) == ["found", LOST, "found", LOST]
+    assert estimates[1].posture is None and estimates[1].keypoints_m is None
     assert _Infected.made == 3  # a new one after each ruin
 
 
@@ -494,7 +481,7 @@ def test_settings_with_other_particles_start_again(change: dict[str, Any]) -> No
     config = replace(tracker.config, **change)
     assert tracker.configure(config)
     assert tracker.config == config
-    assert tracker.track(seen(front())).state == TRACKING
+    assert tracker.track(seen(front())).state in FOUND
 
 
 def test_points_of_a_face_add_the_neck_and_change_nothing_else() -> None:
