@@ -150,8 +150,8 @@ def test_a_head_turned_beyond_its_limits_is_refused() -> None:
 
 
 def frame(points: ImagePoints | None, interval_s: float = 0.1) -> Frame:
-    nothing = np.zeros((240, 320), np.uint8)
-    return Frame(nothing, 240, 0, interval_s=interval_s, points=points)
+    channels = {"silhouette": np.zeros((240, 320), np.uint8), "points": points}
+    return Frame(CAMERA, channels, 240, 0, interval_s=interval_s)
 
 
 ESTIMATE = Estimate(TRACKING, UPRIGHT, np.full(12, radians(5.0)))

@@ -41,7 +41,7 @@ VALUES: dict[str, Any] = {
     "strategy": "srs",
     "filter": "whole_body",
     "whole_body.smallest_person": 1.0,
-    "lost_iou": 0.95,
+    "lost_iou": 0.99,
 }
 
 
@@ -103,7 +103,7 @@ def scenes() -> tuple[tuple[np.ndarray, np.ndarray, ImagePoints | None], ...]:
     found.append((image, np.zeros_like(silhouette), None))
     elsewhere = reference_posture("front")
     elsewhere[0] = -0.35
-    return (*found, *[(*drawn(elsewhere), None)] * 6)
+    return (*found, *[(*drawn(elsewhere), None)] * 4)
 
 
 def result_of(config: TrackerConfig) -> list[Any]:
