@@ -238,5 +238,6 @@ def warm_up() -> None:
     color[4:12, 4:12] = 250
     grey = np.ascontiguousarray(color[..., 0])
     # Arrays over the memory of messages are read-only, which is another type to numba.
-    for image in (grey, np.frombuffer(grey.tobytes(), np.uint8).reshape(grey.shape), color):
+    for image in (grey, color):
         extractor(image)
+        extractor(np.frombuffer(image.tobytes(), np.uint8).reshape(image.shape))

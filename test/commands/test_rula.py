@@ -34,7 +34,9 @@ def test_a_recording_is_scored(files: Path, tmp_path: Path, cardbox: Callable) -
         assert float(row["score"]) >= 3  # A of at least 1 and a load of 3: row 4 of table C
     text = page.read_text(encoding="utf-8")
     assert "<h1>Packing</h1>" in text
-    assert "data:image/jpeg;base64," in text
+    # Images that may be wrong are no worst moments.
+    is_sure = any(row["state"] == "tracking" for row in rows)
+    assert ("data:image/jpeg;base64," in text) == is_sure
     with shares.open(encoding="utf-8") as file:
         grand = [float(row["share"]) for row in csv.DictReader(file) if row["part"] == "grand"]
     assert sum(grand) == pytest.approx(1, abs=0.001)

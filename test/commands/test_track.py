@@ -187,7 +187,7 @@ def test_a_film_is_tracked_with_a_stature(
     with (tmp_path / "me.csv").open(encoding="utf-8") as file:
         rows = list(csv.DictReader(file))
     assert [float(row["time_s"]) for row in rows[:3]] == pytest.approx([16.0, 16.25, 16.5])
-    assert sum(row["state"] == "tracking" for row in rows) > 0.8 * len(rows)
+    assert sum(row["state"] in ("tracking", "uncertain") for row in rows) > 0.8 * len(rows)
     body = load_body_model("me.body.yaml")
     assert body.unknown == ()
     assert body.placement.distance_m == pytest.approx(2.0, rel=0.25)

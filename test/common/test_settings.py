@@ -16,7 +16,6 @@ from cardbox_tracker.measuring.config import InitializationConfig
 from cardbox_tracker.search.config import FilterConfig, TrackerConfig
 from cardbox_tracker.search.whole_body_config import WholeBodyConfig
 from cardbox_tracker.segmentation.background_config import BackgroundConfig
-from cardbox_tracker.terms.whole_body_config import WholeBodyCostConfig
 
 CORE = (
     BackgroundConfig,
@@ -24,9 +23,11 @@ CORE = (
     FilterConfig,
     TrackerConfig,
     WholeBodyConfig,
-    WholeBodyCostConfig,
 )
-PLAIN = {TrackerConfig: {"torso", "arm", "terms", "whole_body"}, WholeBodyConfig: {"cost"}}
+PLAIN = {
+    TrackerConfig: {"torso", "arm", "terms", "whole_body"},
+    WholeBodyConfig: {"profile", "cost"},
+}
 
 
 @dataclass(frozen=True)
@@ -98,8 +99,8 @@ def test_the_core_declares_and_checks_all_its_settings(kind: Any) -> None:
 
 
 def test_a_value_out_of_range_is_refused_by_its_whole_name() -> None:
-    with pytest.raises(ValueError, match=r"whole_body\.cost\.legs is 9; expected 0 to 3"):
-        TrackerConfig().changed({"whole_body": {"cost": {"legs": 9.0}}})
+    with pytest.raises(ValueError, match=r"whole_body\.smoothing is 9; expected 0 to "):
+        TrackerConfig().changed({"whole_body": {"smoothing": 9.0}})
 
 
 def test_dotted_names_are_nested() -> None:
@@ -108,16 +109,21 @@ def test_dotted_names_are_nested() -> None:
 
 
 @dataclass(frozen=True)
+class Part(Sample, settings.Settings):
+    pass
+
+
+@dataclass(frozen=True)
 class Outer:
     parts: tuple[Inner, ...] = (Inner(),)
-    sample: Sample = Sample()
+    sample: Part = Part()
     flag: bool = setting(False, "a flag")
 
 
 def test_settings_are_changed_by_name_however_deep() -> None:
     given = {"flag": True, "parts": {"Inner": {"depth": 2}}, "sample": {"ratio": 1, "kind": "b"}}
     found = settings.changed(Outer(), given)
-    assert found == Outer((Inner(2),), Sample(ratio=1.0, kind="b"), True)
+    assert found == Outer((Inner(2),), Part(ratio=1.0, kind="b"), True)
     assert type(found.sample.ratio) is float
     assert settings.changed(Outer(), {}) == Outer()
 

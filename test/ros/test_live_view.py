@@ -36,9 +36,8 @@ class Feed:
 
 @pytest.fixture
 def node(monkeypatch: pytest.MonkeyPatch) -> Iterator[Any]:
-    monkeypatch.setattr(live_view, "Feed", Feed)
     rclpy.init(args=[])
-    made = live_view.LiveView(None)  # type: ignore[arg-type]
+    made = live_view.LiveView(Feed(None))  # type: ignore[arg-type]
     yield made
     made.destroy_node()
     rclpy.shutdown()
@@ -70,8 +69,8 @@ def test_every_result_is_shown_under_its_stamp(node: Any) -> None:
     hand(node, "body_model", String(data="yaml"))
     hand(node, "retarget/robot_description", String(data="<robot/>"))
     hand(node, "retarget/joint_states", JointState(name=["a"], position=[1.0]))
-    told = {name: values for name, *values in node._feed.told}
-    assert [name for name, *_ in node._feed.told] == [
+    told = {name: values for name, *values in node._scene.told}
+    assert [name for name, *_ in node._scene.told] == [
         *("joints", "state", "deviations", "keypoint_states", "keypoints", "image"),
         *("model", "robot", "robot_joints"),
     ]

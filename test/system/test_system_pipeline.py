@@ -497,7 +497,7 @@ def test_diagnostics_have_state_rates_latency_and_fit(measured: tuple[Session, s
         assert common | keys <= set(values)
         assert float(values["latency p95 (ms)"]) > 0
         assert int(values["published"]) > 0
-    assert values["state"] == "tracking"
+    assert values["state"] in ("tracking", "uncertain")
     assert 0.5 < float(values["iou"]) <= 1
 
 

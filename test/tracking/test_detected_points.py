@@ -361,11 +361,12 @@ def test_after_a_reset_the_points_before_are_forgotten(detected: Detect) -> None
     fresh, used = (Tracker(MEASURED, CAMERA, default_preset()) for _ in range(2))
     used.track(Observation(person, points=moved(scene.points(15), 10.0)))
     used.reset()
-    (term,) = used._cameras[0].terms  # a person without colours has no others
-    found = used.track(Observation(person))
-    assert found.posture is not None
-    assert fresh.track(Observation(person)).posture is not None
-    assert term._newest_points is None  # type: ignore[attr-defined]
+    after, never = used.track(Observation(person)), fresh.track(Observation(person))
+    assert after.evidence is not None and never.evidence is not None
+    assert after.posture is not None
+    # Nothing of the points is left to fit or to doubt.
+    assert set(after.evidence) == set(never.evidence)
+    assert "point distance" not in after.evidence
 
 
 @pytest.mark.parametrize(

@@ -150,7 +150,8 @@ def test_a_head_turned_beyond_its_limits_is_refused() -> None:
 
 
 def frame(points: ImagePoints | None, interval_s: float = 0.1) -> Frame:
-    channels = {"silhouette": np.zeros((240, 320), np.uint8), "points": points}
+    nothing = np.zeros((240, 320), np.uint8)
+    channels = {"silhouette": nothing} | ({} if points is None else {"points": points})
     return Frame(CAMERA, channels, 240, 0, interval_s=interval_s)
 
 

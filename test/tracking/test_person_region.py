@@ -14,10 +14,11 @@ from cardbox_tracker.person.cardbox import cardbox_patches
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.posture import reference_posture
 from cardbox_tracker.search.config import default_preset, paper_preset
-from cardbox_tracker.tracking.estimate import LOST, NO_PERSON, TRACKING
+from cardbox_tracker.tracking.estimate import LOST, NO_PERSON, TRACKING, UNCERTAIN
 from cardbox_tracker.tracking.person_region import PersonRegion
 from cardbox_tracker.tracking.tracker import Tracker
 
+FOUND = (TRACKING, UNCERTAIN)
 CAMERA = Camera(160, 120, 100.0, 100.0, 79.5, 59.5)
 BODY = BodyModel.of(hip_height_m=-0.4)
 FRONT = reference_posture("front")
@@ -136,13 +137,13 @@ def test_only_the_default_preset_selects() -> None:
         tracker = Tracker(BODY, CAMERA, config)
         states[name] = [tracker.track(pixels) for _ in range(3)][-1]
     assert states["off"].state == LOST
-    assert states["default"].state == TRACKING
+    assert states["default"].state in FOUND
     assert states["default"].iou > 0.7 > states["paper"].iou
 
 
 def test_a_chair_alone_is_nobody() -> None:
     tracker, chair = Tracker(BODY, CAMERA, default_preset()), box(130, 158, 30)
     grey = np.where(chair > 0, DOOR, WALL).astype(np.uint8)
-    assert [tracker.track(person() | chair, grey).state for _ in range(10)][-1] == TRACKING
+    assert [tracker.track(person() | chair, grey).state for _ in range(10)][-1] in FOUND
     assert [tracker.track(chair, grey).state for _ in range(3)] == [NO_PERSON] * 3
     assert tracker.track(person() | chair, grey).posture is not None

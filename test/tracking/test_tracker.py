@@ -43,6 +43,7 @@ UNCERTAIN_ABOVE = models()[Source.OUTLINE].uncertain_from
 CAMERA = Camera(160, 120, 165.0, 165.0, 79.5, 59.5)
 BODY = BodyModel.of(hip_height_m=-0.51)
 NOBODY = np.zeros((120, 160), np.uint8)
+FOUND = (TRACKING, UNCERTAIN)
 STILL = TrackerConfig(
     torso=FilterConfig(rotation_noise_rad=0.0), arm=FilterConfig(rotation_noise_rad=0.0)
 )
@@ -67,11 +68,6 @@ def stripes() -> np.ndarray:
     return silhouette
 
 
-def kinds_of(estimates: list[Estimate]) -> list[str]:
-    """Their states; the doubt about a person who was found does not matter."""
-    return ["found" if one.state in FOUND else one.state for one in estimates]
-
-
 def waving(count: int) -> list[np.ndarray]:
     return [seen(wave(i / 15.0)) for i in range(count)]
 
@@ -91,7 +87,7 @@ def test_an_estimate_says_where_it_is_and_how_well_it_fits() -> None:
     reference = ReferenceSilhouette(BODY, CAMERA)
     for silhouette in waving(20):
         estimate = tracker.track(silhouette)
-        assert estimate.state in FOUND
+        assert estimate.state == TRACKING
         posture = estimate.posture
         assert np.all((posture >= JOINT_LIMITS[:, 0]) & (posture <= JOINT_LIMITS[:, 1]))
         expected = CAMERA.reference_to_optical(pose(BODY.rigid, posture).keypoints_m)
@@ -183,18 +179,19 @@ def test_what_is_below_the_hips_is_nobody() -> None:
 def test_whom_nothing_fits_is_lost_after_as_many_images() -> None:
     tracker = make(replace(paper_preset(), lost_frames=3))
     tracker.track(seen(front()))
-    estimates = [tracker.track(stripes()) for _ in range(5)]
-    assert kinds_of(estimates) == ["found", "found", LOST, LOST, LOST]
+    states = [tracker.track(stripes()).state for _ in range(5)]
+    assert all(state in FOUND for state in states[:2])
+    assert states[2:] == [LOST, LOST, LOST]
     assert tracker.track(stripes()) == Estimate(LOST, None, None, None, None, None)
 
 
 def test_one_good_image_begins_the_count_anew() -> None:
     tracker = make(replace(STILL, lost_frames=2))
-    estimates = [
-        tracker.track(silhouette)
+    states = [
+        tracker.track(silhouette).state
         for silhouette in (stripes(), seen(front()), stripes(), stripes(), seen(front()))
     ]
-    assert kinds_of(estimates) == ["found", "found", "found", LOST, "found"]
+    assert [state == LOST for state in states] == [False, False, False, True, False]
 
 
 def test_the_fit_that_counts_as_lost_is_a_setting() -> None:
@@ -202,9 +199,9 @@ def test_the_fit_that_counts_as_lost_is_a_setting() -> None:
     silhouette[:, :80] = 0  # a fit of roughly a half
     iou = make(STILL).track(silhouette).iou
     assert 0.2 < iou < 0.8
-    for lost_iou, kind in ((iou - 0.01, "found"), (iou + 0.01, LOST)):
+    for lost_iou, state in ((iou - 0.01, TRACKING), (iou + 0.01, LOST)):
         tracker = make(replace(STILL, lost_iou=lost_iou, lost_frames=1))
-        assert kinds_of([tracker.track(silhouette)]) == [kind]
+        assert tracker.track(silhouette).state == state
 
 
 @pytest.mark.parametrize("seed", range(4))
@@ -247,7 +244,7 @@ def test_a_paper_tracker_that_may_search_again_finds_whom_it_lost_at_once() -> N
     while tracker.track(stripes()).state != LOST:
         pass
     estimate = tracker.track(seen(front(0.4)))
-    assert estimate.state in FOUND
+    assert estimate.state == TRACKING
     assert estimate.posture[0] == pytest.approx(0.4, abs=0.05)
 
 
@@ -301,10 +298,10 @@ def test_reset_begins_from_the_front_reference() -> None:
 
 def test_reset_forgets_the_images_that_did_not_fit() -> None:
     tracker = make(replace(STILL, lost_frames=2))
-    estimates = [tracker.track(stripes())]
+    states = [tracker.track(stripes()).state]
     tracker.reset()
-    estimates += [tracker.track(stripes()) for _ in range(2)]
-    assert kinds_of(estimates) == ["found", "found", LOST]
+    states += [tracker.track(stripes()).state for _ in range(2)]
+    assert [state == LOST for state in states] == [False, False, True]
 
 
 def test_the_camera_is_pitched_as_the_body_model_says() -> None:
@@ -326,7 +323,7 @@ def test_a_silhouette_of_another_size_is_refused(shape: tuple[int, int]) -> None
 def test_a_read_only_silhouette_is_taken() -> None:
     silhouette = seen(front())
     silhouette.setflags(write=False)
-    assert make().track(silhouette).state in FOUND
+    assert make().track(silhouette).state == TRACKING
 
 
 class CountingSilhouette(CompiledSilhouette):
@@ -411,7 +408,7 @@ def test_the_tracker_takes_another_filter() -> None:
     tracker = make(config, make_filter=partial(Cycles, make_hierarchy=StandingStill))
     estimates = [tracker.track(seen(front())) for _ in range(2)]
     for estimate in estimates:
-        assert (kinds_of([estimate]), estimate.cost_px, estimate.iou) == (["found"], 0, 1.0)
+        assert (estimate.state, estimate.cost_px, estimate.iou) == (TRACKING, 0, 1.0)
         np.testing.assert_array_equal(estimate.posture, front())
         np.testing.assert_array_equal(estimate.posture_stddev, np.full(12, 0.5))
     assert tracker._filter.hierarchy.calls == [
@@ -449,9 +446,9 @@ class _Infected:
 def test_numbers_that_are_not_finite_never_leave_and_do_not_stay(part: str) -> None:
     _Infected.made = 0
     tracker = make(default_preset(), make_filter=partial(_Infected, part=part))
-    estimates = [tracker.track(silhouette) for silhouette in waving(4)]
-    assert kinds_of(estimates) == ["found", LOST, "found", LOST]
-    assert estimates[1].posture is None and estimates[1].keypoints_m is None
+    states = [tracker.track(silhouette) for silhouette in waving(4)]
+    assert [estimate.state == LOST for estimate in states] == [False, True, False, True]
+    assert states[1].posture is None and states[1].keypoints_m is None
     assert _Infected.made == 3  # a new one after each ruin
 
 
@@ -481,7 +478,7 @@ def test_settings_with_other_particles_start_again(change: dict[str, Any]) -> No
     config = replace(tracker.config, **change)
     assert tracker.configure(config)
     assert tracker.config == config
-    assert tracker.track(seen(front())).state in FOUND
+    assert tracker.track(seen(front())).state == TRACKING
 
 
 def test_points_of_a_face_add_the_neck_and_change_nothing_else() -> None:

@@ -112,7 +112,9 @@ def test_joints_have_the_error_of_the_table_in_all_formats(
     assert errors_m["csv"].mean() < MOST_M
     for name, error_m in errors_m.items():
         # Files have places to a tenth of a millimetre and angles to a thousandth of a degree.
-        assert error_m == pytest.approx(errors_m["csv"], abs=1e-3), name
+        # The bones of a BVH file turn, while the shoulders of the tracker rise on a line.
+        most_m = 4e-3 if name == "bvh" else 1e-3
+        assert error_m == pytest.approx(errors_m["csv"], abs=most_m), name
 
 
 @pytest.mark.slow

@@ -48,6 +48,7 @@ def message(number: int, pixels: np.ndarray, encoding: str) -> Image:
     )
 
 
+FOUND = ("tracking", "uncertain")
 MASKS = (
     (PERSON.astype(np.uint8), "mono8"),
     (PERSON * np.uint8(255), "8UC1"),
@@ -77,7 +78,7 @@ def test_the_tracker_tracks_any_mask_and_stays_after_what_is_none(bus: Any) -> N
         number += 1
         bus.send("/silhouette", message(number, pixels, encoding))
         states = bus.texts("/tracking_state")
-        assert len(states) == number and states[-1] == "tracking", encoding
+        assert len(states) == number and states[-1] in FOUND, encoding
     for pixels, encoding, words in WRONG:
         number += 1
         bus.send("/silhouette", message(number, pixels, encoding))
@@ -85,7 +86,8 @@ def test_the_tracker_tracks_any_mask_and_stays_after_what_is_none(bus: Any) -> N
         assert words in status.message and "unexpected" not in status.message
     assert len(bus.texts("/tracking_state")) == len(MASKS)
     bus.send("/silhouette", message(number + 1, PERSON.astype(np.uint8), "mono8"))
-    assert bus.texts("/tracking_state")[len(MASKS) :] == ["tracking"]
+    (state,) = bus.texts("/tracking_state")[len(MASKS) :]
+    assert state in FOUND
 
 
 def test_the_initializer_says_what_is_wrong_with_a_mask(bus: Any) -> None:

@@ -148,16 +148,23 @@ def make(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Callable[.
         graph.close()
 
 
-def test_sixteen_joints_arrive(make: Callable[..., Graph]) -> None:
+CLAVICLE_NAMES = ("left_clavicle_elevation", "right_clavicle_elevation")
+
+
+def test_all_joints_arrive(make: Callable[..., Graph]) -> None:
     graph = make()
     states = graph.collect(JointState, "joint_states")
     deviations = graph.collect(JointState, "joint_states_stddev")
     graph.show_until(found(TRACKING), lambda: states and deviations)
     names = (*JOINT_NAMES, "torso_x", "torso_z")
-    assert tuple(states[-1].name) == (*names, "neck_yaw", "neck_pitch")
-    assert tuple(deviations[-1].name) == names
-    np.testing.assert_array_equal(states[-1].position, [*POSTURE, *PLACE, 0.0, 0.0])
-    np.testing.assert_array_equal(deviations[-1].position, [0.1] * 12 + [0.03, 0.01])
+    assert tuple(states[-1].name) == (
+        *names,
+        *("neck_yaw", "neck_pitch"),
+        *CLAVICLE_NAMES,
+    )
+    assert tuple(deviations[-1].name) == (*names, *CLAVICLE_NAMES)
+    np.testing.assert_array_equal(states[-1].position[:16], [*POSTURE, *PLACE, 0.0, 0.0])
+    np.testing.assert_array_equal(deviations[-1].position[:14], [0.1] * 12 + [0.03, 0.01])
 
 
 def test_the_place_can_be_left_out(make: Callable[..., Graph]) -> None:
@@ -177,7 +184,7 @@ def test_the_place_is_among_the_joints_of_rep155(make: Callable[..., Graph]) -> 
     texts = graph.collect(String, "/humans/bodies/p1/robot_description", qos.LATCHED)
     graph.show_until(found(TRACKING), lambda: humans and texts)
     joints = dict(zip(humans[-1].name, humans[-1].position, strict=True))
-    assert len(joints) == 16
+    assert len(joints) == 18
     assert (joints["x_body_p1"], joints["z_body_p1"]) == tuple(PLACE)
     for name in joints:
         assert f'<joint name="{name}"' in texts[-1].data

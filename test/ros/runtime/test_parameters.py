@@ -500,7 +500,7 @@ def test_a_parameter_without_effect_is_refused_live(make_node: Callable) -> None
 
 def test_a_settings_file_gives_what_has_no_parameter(tmp_path: Path, make_node: Callable) -> None:
     path = tmp_path / "settings.yaml"
-    path.write_text("lost_frames: 7\nwhole_body: {effort: 0.5, smoothing: 0.2}}\n")
+    path.write_text("lost_frames: 7\nwhole_body: {effort: 0.5, smoothing: 0.2}\n")
     config = TrackerParameters(settings_file=f"{path}", effort=2.0).config()
     assert (config.lost_frames, config.whole_body.effort) == (7, 2.0)
     assert config.whole_body.smoothing == 0.2
