@@ -28,7 +28,7 @@ from cardbox_tracker.search.config import (
 from cardbox_tracker.search.cycles import Cycles
 from cardbox_tracker.search.doubt import HANDS, Source, models
 from cardbox_tracker.terms.compiled import CompiledObservation, CompiledSilhouette
-from cardbox_tracker.terms.term import Frame, TorsoCosts
+from cardbox_tracker.terms.term import Frame, Posed, TermObservation, TorsoCosts
 from cardbox_tracker.terms.whole_body import WholeBodyCost
 from cardbox_tracker.terms.whole_body_config import WholeBodyCostConfig
 from cardbox_tracker.tracking.estimate import LOST, NO_PERSON, TRACKING, UNCERTAIN, Estimate
@@ -98,6 +98,63 @@ def test_an_estimate_says_where_it_is_and_how_well_it_fits() -> None:
         assert estimate.iou > 0.7
         assert estimate.posture_stddev.shape == (12,)
         assert np.all(estimate.posture_stddev > 0)
+
+
+class HandsUp(TermObservation):
+    """A term of your own: high hands are good; it keeps what it was asked."""
+
+    def __init__(self) -> None:
+        self.asked: list[Posed] = []
+
+    def build(self, person: BodyModel, camera: Camera) -> HandsUp:
+        return self
+
+    def observe(self, frame: Frame) -> HandsUp | None:
+        return self if frame.image is None else None
+
+    def rate(self, posed: Posed) -> np.ndarray:
+        self.asked.append(posed)
+        return 100.0 * np.nansum(posed.keypoints_px[:, [2, 5], 1], axis=1)
+
+
+@pytest.mark.parametrize("make_config", [paper_preset, default_preset])
+def test_a_further_term_acts_in_both_filters_with_their_own_shoulders(make_config: Any) -> None:
+    term = HandsUp()
+    # Of such a result the silhouette says that it is lost.
+    config = replace(make_config(), terms=(term,), lost_frames=1000)
+    plain, raising = make(make_config()), make(config)
+    for _ in range(8):
+        usual, found = plain.track(seen(front())), raising.track(seen(front()))
+    assert usual.keypoints_m is not None and found.keypoints_m is not None
+    # The row of the image grows downwards, and so does y.
+    assert (found.keypoints_m[[2, 5], 1] < usual.keypoints_m[[2, 5], 1] - 0.1).all()
+    body = BODY.rigid if make_config is paper_preset else BODY
+    raised = [posed for posed in term.asked if posed.parts[1]][-1]
+    arm = [0, 1, 2]
+    expected = CAMERA.reference_to_optical(pose(body, raised.states).keypoints_m)[:, arm]
+    np.testing.assert_allclose(raised.keypoints_m[:, arm], expected, atol=1e-9)
+    assert raised.states[:, 4].max() > np.radians(40.0)
+    # Of a frame without an observation it says nothing.
+    count = len(term.asked)
+    raising.track(Observation(seen(front()), np.zeros((120, 160), np.uint8)))
+    assert len(term.asked) == count
+
+
+@pytest.mark.parametrize("make_config", [paper_preset, default_preset])
+def test_doubt_about_each_keypoint_comes_with_its_evidence(make_config: Any) -> None:
+    tracker = make(make_config())
+    for silhouette in waving(3):
+        estimate = tracker.track(silhouette)
+        assert estimate.keypoint_states is not None and len(estimate.keypoint_states) == 6
+        assert estimate.keypoint_chances is not None and estimate.evidence is not None
+        assert ((estimate.keypoint_chances > 0.0) & (estimate.keypoint_chances < 1.0)).all()
+        assert {"spread", "yaw", "pitch", "area"} <= set(estimate.evidence)
+        assert all(values.shape == (6,) for values in estimate.evidence.values())
+        source = Source.PAPER if make_config is paper_preset else Source.OUTLINE
+        needed = {name for one in models()[source].by_kind.values() for name in one.coefficients}
+        # Evidence that a model knows is never missing.
+        assert needed <= set(estimate.evidence)
+    assert tracker.track(NOBODY).evidence is None
 
 
 def test_the_whole_body_filter_says_where_it_is_and_how_well_it_fits() -> None:
