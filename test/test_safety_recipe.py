@@ -25,20 +25,25 @@ def gate() -> dict[str, Any]:
 
 def test_silence_of_either_is_a_stop(gate: dict[str, Any]) -> None:
     override, old_s = gate["override"], gate["OLD_S"]
-    assert override(80, "tracking", 0.0) == override(80, "tracking", old_s) == 80
-    assert override(80, "tracking", 1.01 * old_s) == 0
+    fresh = override(80, "tracking", "tracked", 0.0), override(80, "tracking", "tracked", old_s)
+    assert fresh == (80, 80)
+    assert override(80, "tracking", "tracked", 1.01 * old_s) == 0
 
 
 @pytest.mark.parametrize(
-    ("state", "most"),
+    ("state", "place", "most"),
     [
-        (tracker.TRACKING, 100),
-        (tracker.UNCERTAIN, 20),
-        (tracker.LOST, 0),
-        (tracker.NO_PERSON, 0),
-        ("", 0),
+        (tracker.TRACKING, "tracked", 100),
+        (tracker.TRACKING, "uncertain", 20),
+        (tracker.TRACKING, "", 20),
+        (tracker.UNCERTAIN, "tracked", 20),
+        (tracker.LOST, "tracked", 0),
+        (tracker.NO_PERSON, "tracked", 0),
+        ("", "tracked", 0),
     ],
 )
-def test_the_state_limits_what_is_asked_for(gate: dict[str, Any], state: str, most: int) -> None:
-    found = [gate["override"](asked, state, 0.0) for asked in (-5, 0, 10, 100, 300)]
+def test_the_states_limit_what_is_asked_for(
+    gate: dict[str, Any], state: str, place: str, most: int
+) -> None:
+    found = [gate["override"](asked, state, place, 0.0) for asked in (-5, 0, 10, 100, 300)]
     assert found == [0, 0, min(10, most), most, most]

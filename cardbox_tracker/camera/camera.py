@@ -20,6 +20,9 @@ from cardbox_tracker.common.errors import CameraError, quoted
 
 FloatArray = NDArray[np.float64]
 
+CALIBRATED, GIVEN_FIELD_OF_VIEW = 0.005, 0.03
+"""Relative standard deviations of the focal lengths: of a calibration, and of a field of view that
+a person states."""
 DISTORTION_MODELS = ("plumb_bob", "rational_polynomial", "equidistant")
 # Largest side of a JPEG image; a CameraInfo and a file may contain any number.
 _MOST_SIDE_PX = 65535
@@ -37,6 +40,7 @@ class Camera:
         cx: principal point, px; (0, 0) is the centre of the first pixel.
         cy: principal point, px.
         pitch_rad: downward pitch of the camera, rad; the reference frame stays level.
+        focal_stddev: relative standard deviation of the focal lengths.
 
     Raises:
         CameraError: a value is impossible; the text names it.
@@ -49,6 +53,7 @@ class Camera:
     cx: float
     cy: float
     pitch_rad: float = 0.0
+    focal_stddev: float = CALIBRATED
 
     def __post_init__(self) -> None:
         """Check the values; whole numbers of another type become ``int``."""
@@ -86,6 +91,7 @@ class Camera:
             (self.cx + 0.5) * sx - 0.5,
             (self.cy + 0.5) * sy - 0.5,
             self.pitch_rad,
+            self.focal_stddev,
         )
 
     def with_pitch(self, pitch_rad: float) -> Camera:
@@ -133,6 +139,7 @@ class Calibration:
         frame_id: name of the optical frame.
         roll_rad: how far the camera is turned clockwise about its axis, seen from behind it;
             working images are turned back, so that they are level.
+        focal_stddev: relative standard deviation of the focal lengths.
     """
 
     width: int
@@ -142,6 +149,7 @@ class Calibration:
     distortion_model: str = "plumb_bob"
     frame_id: str = "camera_optical_frame"
     roll_rad: float = 0.0
+    focal_stddev: float = CALIBRATED
 
     @classmethod
     def of_fov(cls, width: int, height: int, fov_deg: float) -> Calibration:
@@ -157,7 +165,7 @@ class Calibration:
         focal_px = width / 2 / np.tan(np.radians(fov_deg) / 2)
         k = np.diag([focal_px, focal_px, 1.0])
         k[:2, 2] = (width - 1) / 2, (height - 1) / 2
-        return cls(width, height, k, np.zeros(5))
+        return cls(width, height, k, np.zeros(5), focal_stddev=GIVEN_FIELD_OF_VIEW)
 
     @property
     def is_distorted(self) -> bool:
@@ -190,7 +198,8 @@ class Calibration:
         """
         self._check()
         k = self.k
-        full = Camera(self.width, self.height, k[0, 0], k[1, 1], k[0, 2], k[1, 2], pitch_rad)
+        size, centre = (self.width, self.height), (k[0, 2], k[1, 2])
+        full = Camera(*size, k[0, 0], k[1, 1], *centre, pitch_rad, self.focal_stddev)
         return full.scaled(width, height)
 
     def rectifier(self, width: int, height: int) -> Rectifier | None:

@@ -138,12 +138,14 @@ class CameraPose:
 
     Attributes:
         pitch_rad: downward pitch, rad.
+        pitch_stddev_rad: its standard deviation, rad; it is no part of a model file.
 
     Raises:
         BodyModelError: the pitch is not finite or outside of its range.
     """
 
     pitch_rad: float = 0.0
+    pitch_stddev_rad: float = math.radians(2.0)
 
     def __post_init__(self) -> None:
         """Check the pitch."""
@@ -224,7 +226,8 @@ class BodyModel:
         if "sizes" in values:
             changed["person"] = Person(values.pop("sizes"))
         if "camera_pitch_rad" in values:
-            changed["camera_pose"] = CameraPose(values.pop("camera_pitch_rad"))
+            pitch_rad = values.pop("camera_pitch_rad")
+            changed["camera_pose"] = replace(self.camera_pose, pitch_rad=pitch_rad)
         place = {name: values.pop(name) for name in PLACEMENT if name in values}
         changed["placement"] = replace(self.placement, **place)
         return replace(self, **changed, **values)

@@ -22,7 +22,11 @@ from cardbox_tracker.person.skeleton import (
     NECK_NAMES,
     PLACE_NAMES,
 )
-from cardbox_tracker.recordings.keypoint_status import KeypointStates, keypoint_states
+from cardbox_tracker.recordings.keypoint_status import (
+    KeypointStates,
+    keypoint_states,
+    place_state,
+)
 from cardbox_tracker.recordings.markers import MarkerShape, marker_shapes
 from cardbox_tracker.tracking.estimate import Estimate
 from cardbox_tracker.tracking.tracker import Tracker
@@ -219,6 +223,7 @@ def outputs(torso_place: bool = True) -> tuple[Output, ...]:
             "tracking_state", Text, lambda estimate, _: Text(estimate.state), needs_posture=False
         ),
         Output("keypoint_states", KeypointStates, lambda found, _: keypoint_states(found)),
+        Output("place_state", KeypointStates, lambda found, _: place_state(found)),
         Output(
             "joint_states",
             JointValues,

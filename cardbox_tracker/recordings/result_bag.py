@@ -18,12 +18,7 @@ from cardbox_tracker.person.urdf import urdf_from_body
 from cardbox_tracker.recordings.bag_markers import write_markers
 from cardbox_tracker.recordings.bag_transforms import BagTransforms
 from cardbox_tracker.recordings.bag_writer import BagWriter
-from cardbox_tracker.recordings.keypoint_status import (
-    CHANCE_KEY,
-    LEVELS,
-    KeypointStates,
-    chance_text,
-)
+from cardbox_tracker.recordings.keypoint_status import LEVELS, KeypointStates
 from cardbox_tracker.recordings.outputs import (
     JointValues,
     Markers,
@@ -132,9 +127,9 @@ def _write_keypoint_states(
             name=name,
             message=str(state),
             hardware_id="",
-            values=[pair(key=CHANCE_KEY, value=chance_text(chance))],
+            values=[pair(key=key, value=text) for key, text in texts.items()],
         )
-        for name, state, chance in zip(*found, strict=True)
+        for name, state, texts in found.rows()
     ]
     message = bag.type("diagnostic_msgs/msg/DiagnosticArray")(
         header=bag.header(stamp_ns, frame_id), status=each

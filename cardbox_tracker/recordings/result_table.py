@@ -66,6 +66,9 @@ def units(has_points: bool = False) -> dict[str, str]:
         **(_units(NECK_NAMES) | _deviation_units(NECK_NAMES) if has_points else {}),
         **_units(CLAVICLE_NAMES),
         **_deviation_units(CLAVICLE_NAMES),
+        "place_state": "",
+        "place_chance": "",
+        "place_rests_on": "",
     }
 
 
@@ -98,8 +101,12 @@ def row_of(
     known |= zip(_deviation_units(stddevs), stddevs.values(), strict=True)
     states = keypoint_states(estimate)
     if states is not None:
-        for name, state, chance in zip(*states, strict=True):
+        for name, state, chance in zip(*states[:3], strict=True):
             known |= {f"{name}_state": str(state), f"{name}_chance": float(chance)}
+    if estimate.place is not None:
+        place = estimate.place
+        known |= {"place_state": str(place.state), "place_chance": place.chance}
+        known["place_rests_on"] = place.rests_on
     return [known.get(name) for name in names]
 
 
@@ -134,7 +141,8 @@ def result_table(
             yield lambda frame, estimate: rows.append(
                 row_of(frame.stamp_ns, frame.time_s, estimate, has_points)
             )
-            texts = ("state", *(f"{name}_state" for name in KEYPOINT_NAMES))
+            keypoints = (f"{name}_state" for name in KEYPOINT_NAMES)
+            texts = ("state", *keypoints, "place_state", "place_rests_on")
             types = {"stamp_ns": arrow.int64()} | dict.fromkeys(texts, arrow.string())
             schema = arrow.schema(
                 arrow.field(name, types.get(name, arrow.float64()), metadata={"unit": unit})

@@ -1,7 +1,7 @@
 """Doubt: how probably a result is wrong, joint by joint, and the deviations of a state.
 
 A keypoint is wrong if it is off by more than 30 cm relative to the middle of the shoulders; a whole
-result is lost if its keypoints are off by more than 30 cm on average. Both probabilities are
+result is lost if its elbows and hands are, on average. Both probabilities are
 logistic regressions
 
     p = 1 / (1 + exp(-(intercept + sum of coefficient * evidence)))

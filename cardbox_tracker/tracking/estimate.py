@@ -9,10 +9,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.sizes import FloatArray
 from cardbox_tracker.person.skeleton import KeypointState
+
+if TYPE_CHECKING:
+    from cardbox_tracker.tracking.place import Place
 
 TRACKING, UNCERTAIN, LOST, NO_PERSON = "tracking", "uncertain", "lost", "no_person"
 
@@ -47,6 +51,8 @@ class Estimate:
         clavicles_m: rise of the left and right shoulder with the arms, (2,), metres; None without a
             posture.
         clavicles_stddev_m: standard deviations of ``clavicles_m``, (2,), metres.
+        place: how surely distance, scale and height are known, and by what; None if the filter
+            keeps them constant. All states above are about the shape alone.
     """
 
     state: str
@@ -64,6 +70,7 @@ class Estimate:
     evidence: Mapping[str, FloatArray] | None = None
     clavicles_m: FloatArray | None = None
     clavicles_stddev_m: FloatArray | None = None
+    place: Place | None = None
 
     def placed(self, body: BodyModel) -> BodyModel:
         """Return ``body`` at the place of this estimate."""

@@ -15,7 +15,7 @@ from cardbox_tracker.camera.view import OtherCamera, View
 from cardbox_tracker.common.settings import restarts
 from cardbox_tracker.person.kinematics import clavicles
 from cardbox_tracker.person.model import BodyModel
-from cardbox_tracker.person.posture import N_STATE
+from cardbox_tracker.person.posture import N_STATE, TORSO_Y
 from cardbox_tracker.person.sizes import FloatArray
 from cardbox_tracker.search.config import TrackerConfig
 from cardbox_tracker.search.cycles import Cycles
@@ -43,6 +43,7 @@ from cardbox_tracker.tracking.facing import Facing
 from cardbox_tracker.tracking.fitting import Fitting
 from cardbox_tracker.tracking.head import HeadTracker
 from cardbox_tracker.tracking.observation import Observation, Observations, stamp_of
+from cardbox_tracker.tracking.place import PlaceWatch
 from cardbox_tracker.tracking.sampling import likely_postures
 from cardbox_tracker.tracking.tracked_camera import TrackedCamera
 
@@ -98,6 +99,7 @@ class Tracker:
             what = "several cameras need" if others else "a corrector needs"
             raise ValueError(f"{what} the filter whole_body: the preset default")
         self._fitting = None
+        self._place = PlaceWatch(body, self.camera, not others)
         self.agreement: CameraAgreement | None = None
         if body.unknown:
             fits = self._rng.spawn(1)[0]
@@ -168,7 +170,8 @@ class Tracker:
     @property
     def remarks(self) -> list[str]:
         """Warnings about images that contradict each other, for diagnostics and logs."""
-        return [text for text in (camera.depth.remark for camera in self._cameras) if text]
+        found = *(camera.depth.remark for camera in self._cameras), self._place.contradiction
+        return [text for text in found if text]
 
     def camera_ious(self) -> list[float | None]:
         """Return the IoU of the last estimate with each camera's silhouette, the first one first.
@@ -224,8 +227,18 @@ class Tracker:
                     "such as Observation(silhouette), or None"
                 )
         frames = self._frames_of(observations)
-        estimate = self._track(frames)
+        estimate = self._placed(frames[0], self._track(frames))
         return self._head.see(frames[0], estimate)
+
+    def _placed(self, frame: Frame, estimate: Estimate) -> Estimate:
+        """Return the estimate with its place, which no deviation of it is surer than."""
+        place = self._place.see(estimate, self.body, frame)
+        if place is None or estimate.posture_stddev is None or estimate.offset_stddev_m is None:
+            return estimate
+        aside = estimate.posture_stddev.copy()
+        aside[TORSO_Y] = np.hypot(aside[TORSO_Y], place.stddev_m[1])
+        offset_stddev_m = np.hypot(estimate.offset_stddev_m, place.stddev_m[[0, 2]])
+        return replace(estimate, posture_stddev=aside, offset_stddev_m=offset_stddev_m, place=place)
 
     def _frames_of(self, observations: Observations) -> list[Frame]:
         """Return the frames of all cameras; the frame of a camera without data is empty."""

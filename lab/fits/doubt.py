@@ -44,6 +44,8 @@ PENALTY = 0.02
 """Ridge penalty of a standardized coefficient, beside a mean log-likelihood."""
 MOST_WRONG, HIGHEST = 0.02, 0.25
 """Largest share of wrong keypoints among tracked ones, and highest threshold."""
+ARMS = [1, 2, 4, 5]
+"""Indices of elbows and hands among the keypoints, whose mean error says if all is wrong."""
 MODELS = (*dict.fromkeys(KINDS), "whole")
 
 
@@ -64,7 +66,7 @@ class Samples:
     def rows(self, model: str) -> tuple[Mapping[str, FloatArray], FloatArray]:
         """Return evidence by name, (k,), and whether a result is wrong, (k,), for a model."""
         if model == "whole":
-            wrong = self.off_m.mean(axis=1) > FAR_M
+            wrong = self.aligned_m[:, ARMS].mean(axis=1) > FAR_M
             return {name: one[:, 0] for name, one in self.evidence.items()}, wrong.astype(float)
         at = [number for number, kind in enumerate(KINDS) if kind == model]
         wrong = self.aligned_m[:, at].ravel() > FAR_M

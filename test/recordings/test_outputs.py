@@ -31,6 +31,7 @@ from cardbox_tracker.recordings.outputs import (
     posture_from,
 )
 from cardbox_tracker.tracking.estimate import LOST, NO_PERSON, TRACKING, UNCERTAIN, Estimate
+from cardbox_tracker.tracking.place import Place
 from cardbox_tracker.tracking.tracker import Tracker
 
 STAMP_NS = 5_000_000_000
@@ -44,6 +45,7 @@ FOUND = Estimate(
     *(TRACKING, POSTURE, np.full(12, 0.1), POINTS_M, 812, 0.87654),
     keypoint_states=STATES,
     keypoint_chances=CHANCES,
+    place=Place(np.array([0.15, 0.01, 0.05]), 0.046, "given stature", "the distance differs"),
 )
 PLACED = replace(
     FOUND,
@@ -58,7 +60,7 @@ BODY_NAMES = (*JOINT_NAMES, "torso_x", "torso_z")
 CLAVICLES = ("left_clavicle_elevation", "right_clavicle_elevation")
 ALL_NAMES = (*BODY_NAMES, "neck_yaw", "neck_pitch", *CLAVICLES)
 TOPICS = [
-    *("tracking_state", "keypoint_states", "joint_states", "joint_states_stddev"),
+    *("tracking_state", "keypoint_states", "place_state", "joint_states", "joint_states_stddev"),
     *("keypoints", "markers"),
 ]
 
@@ -75,10 +77,21 @@ def test_a_posture_is_all_topics_in_their_order() -> None:
     assert {output.topic: output.kind for output in OUTPUTS} == {
         topic: type(value) for topic, value in found.items()
     }
-    state, keypoints, joints, deviations, points, markers = cast(Any, list(found.values()))
+    state, keypoints, place, joints, deviations, points, markers = cast(Any, list(found.values()))
     assert state == Text(TRACKING)
     assert keypoints.names[:4] == ("left_shoulder", "left_elbow", "left_hand", "right_shoulder")
     assert (keypoints.states, keypoints.chances.tolist()) == (STATES, CHANCES.tolist())
+    (row,) = place.rows()
+    assert row == (
+        "place",
+        KeypointState.UNCERTAIN,
+        {
+            "chance of an error beyond 0.3 m": "0.046",
+            "rests on": "given stature",
+            "standard deviation of the distance (m)": "0.150",
+            "contradiction": "the distance differs",
+        },
+    )
     assert (joints.names, deviations.names) == (ALL_NAMES, (*BODY_NAMES, *CLAVICLES))
     np.testing.assert_array_equal(joints.values, [*POSTURE, *[0.0] * 6])
     np.testing.assert_array_equal(deviations.values, [0.1] * 12 + [0.0] * 4)

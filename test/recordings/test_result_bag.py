@@ -27,6 +27,7 @@ TYPES = {
     "/tracking_state": "std_msgs/msg/String",
     "/joint_states": "sensor_msgs/msg/JointState",
     "/keypoint_states": "diagnostic_msgs/msg/DiagnosticArray",
+    "/place_state": "diagnostic_msgs/msg/DiagnosticArray",
     "/joint_states_stddev": "sensor_msgs/msg/JointState",
     "/keypoints": "geometry_msgs/msg/PoseArray",
     "/markers": "visualization_msgs/msg/MarkerArray",

@@ -24,6 +24,7 @@ from cardbox_tracker.recordings.result_table import (
 )
 from cardbox_tracker.recordings.silhouettes import RecordedFrame
 from cardbox_tracker.tracking.estimate import Estimate
+from cardbox_tracker.tracking.place import Place
 
 ROOT = Path(__file__).parents[2]
 ANGLES = (
@@ -58,7 +59,8 @@ CLAVICLES = (
     *("left_clavicle_elevation", "right_clavicle_elevation"),
     *("left_clavicle_elevation_stddev_m", "right_clavicle_elevation_stddev_m"),
 )
-WHOLE = HEADER + NECK + CLAVICLES
+PLACE = ("place_state", "place_chance", "place_rests_on")
+WHOLE = HEADER + NECK + CLAVICLES + PLACE
 POINTS_M = np.arange(18).reshape(6, 3) / 4
 FOUND = Estimate("tracking", np.arange(12) / 10, np.arange(12) / 100, POINTS_M, 812, 0.87654)
 PLACED = replace(FOUND, offset_m=np.array([0.25, -0.05]), offset_stddev_m=np.array([0.03, 0.01]))
@@ -67,7 +69,7 @@ STAMP_NS, STAMP = 1_700_000_000_000_000_005, Decimal("1700000000.000000005")
 
 
 def test_scripts_find_the_columns_that_they_know() -> None:
-    assert columns() == HEADER + CLAVICLES
+    assert columns() == HEADER + CLAVICLES + PLACE
     assert columns(has_points=True) == WHOLE
 
 
@@ -76,7 +78,7 @@ def test_each_column_has_its_unit() -> None:
     expected = {"stamp": "s", "torso_y": "m", "torso_yaw": "rad", "left_hand_x": "m", "cost": "px"}
     assert {name: found[name] for name in expected} == expected
     for name, unit in found.items():
-        later = name not in FIXED + NECK + CLAVICLES
+        later = name not in FIXED + NECK + CLAVICLES + PLACE
         assert not (later and unit) or name.endswith(f"_{unit}")
 
 
@@ -117,16 +119,23 @@ def test_keypoints_have_states_and_chances() -> None:
 
 
 def test_the_neck_is_empty_while_the_face_is_not_seen() -> None:
-    assert row_of(42, 1.5, SEEN, has_points=True)[-8:-4] == [0.4, -0.1, 0.2, 0.3]
-    assert row_of(42, 1.5, PLACED, has_points=True)[-8:-4] == [None] * 4
+    assert row_of(42, 1.5, SEEN, has_points=True)[-11:-7] == [0.4, -0.1, 0.2, 0.3]
+    assert row_of(42, 1.5, PLACED, has_points=True)[-11:-7] == [None] * 4
 
 
-def test_the_clavicles_follow_all_other_columns() -> None:
+def test_the_clavicles_follow_the_neck() -> None:
     raised = replace(
         SEEN, clavicles_m=np.array([0.02, 0.0]), clavicles_stddev_m=np.array([0.003, 0.001])
     )
     for has_points in (False, True):
-        assert row_of(42, 1.5, raised, has_points)[-4:] == [0.02, 0.0, 0.003, 0.001]
+        assert row_of(42, 1.5, raised, has_points)[-7:-3] == [0.02, 0.0, 0.003, 0.001]
+
+
+def test_the_place_has_its_own_state() -> None:
+    place = Place(np.array([0.2, 0.0, 0.1]), 0.13, "given stature")
+    row = row_of(42, 1.5, replace(PLACED, place=place))
+    assert row[-3:] == ["uncertain", 0.13, "given stature"]
+    assert row_of(42, 1.5, PLACED)[-3:] == [None] * 3
 
 
 def write(path: Path) -> None:

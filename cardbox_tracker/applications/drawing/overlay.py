@@ -87,6 +87,8 @@ def draw_overlay(
         if estimate.neck is not None:
             _draw_gaze(canvas, view, gaze_m(body_parts(there.sizes), posed, estimate.neck))
         text += f"  IoU {estimate.iou:.2f}  {estimate.cost_px} px"
+        if estimate.place is not None and estimate.place.state is KeypointState.UNCERTAIN:
+            text += "  place uncertain"
     _draw_text(canvas, text, _STATE_BGR.get(estimate.state, TEXT_BGR))
     return canvas
 

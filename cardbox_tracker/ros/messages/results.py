@@ -16,12 +16,7 @@ from visualization_msgs.msg import Marker, MarkerArray
 
 from cardbox_tracker.common.errors import CardboxError, NotFiniteError
 from cardbox_tracker.person.sizes import FloatArray
-from cardbox_tracker.recordings.keypoint_status import (
-    CHANCE_KEY,
-    LEVELS,
-    KeypointStates,
-    chance_text,
-)
+from cardbox_tracker.recordings.keypoint_status import LEVELS, KeypointStates
 from cardbox_tracker.recordings.markers import MarkerShape, Rgba
 from cardbox_tracker.recordings.outputs import (
     JointValues,
@@ -129,9 +124,9 @@ def keypoint_states_message(header: Header, found: KeypointStates) -> Diagnostic
                 level=bytes([LEVELS[state]]),
                 name=name,
                 message=state,
-                values=[KeyValue(key=CHANCE_KEY, value=chance_text(chance))],
+                values=[KeyValue(key=key, value=text) for key, text in texts.items()],
             )
-            for name, state, chance in zip(*found, strict=True)
+            for name, state, texts in found.rows()
         ],
     )
 

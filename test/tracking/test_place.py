@@ -1,0 +1,152 @@
+"""The place of a person: what it rests on, its deviation, and sources that contradict others."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from cardbox_tracker.camera.camera import Camera
+from cardbox_tracker.detectors.image_points import POINT_INDEX, POINT_NAMES, ImagePoints
+from cardbox_tracker.person.model import BodyModel
+from cardbox_tracker.person.proportions import body_from_proportions
+from cardbox_tracker.person.skeleton import KeypointState
+from cardbox_tracker.terms.term import Frame
+from cardbox_tracker.tracking.estimate import TRACKING, Estimate
+from cardbox_tracker.tracking.place import (
+    DEPTH,
+    MEASURED_BODY,
+    SECOND_CAMERA,
+    STATURE,
+    PlaceWatch,
+    distance_of_points,
+)
+
+CAMERA = Camera(320, 240, 300.0, 300.0, 159.5, 119.5)
+TALL = body_from_proportions(1.80, 2.0)
+ARM_M = TALL.size("upper_arm_length") + TALL.size("forearm_length")
+
+
+def points_at(distance_m: float, scale: float = 1.0, turn_rad: float = 0.0) -> ImagePoints:
+    """Return points of shoulders and elbows of TALL, whose space is ``scale`` times as large."""
+    upper_m = 0.452 * ARM_M
+    there = {
+        "left_shoulder": (0.18, -0.1, 0.0),
+        "right_shoulder": (-0.18, -0.1, 0.0),
+        "left_elbow": (0.18 + 0.6 * upper_m, -0.1 + 0.8 * upper_m, 0.0),
+        "right_elbow": (-0.18, -0.1 + 0.6 * upper_m, -0.8 * upper_m),
+    }
+    c, s = np.cos(turn_rad), np.sin(turn_rad)
+    px, spatial_m = np.full((len(POINT_NAMES), 2), np.nan), np.zeros((len(POINT_NAMES), 3))
+    scores = np.zeros(len(POINT_NAMES))
+    for name, (x, y, z) in there.items():
+        turned = np.array([c * x + s * z, y, c * z - s * x])
+        px[POINT_INDEX[name]] = CAMERA.project(turned + np.array([0.1, 0.2, distance_m]))
+        spatial_m[POINT_INDEX[name]] = scale * turned
+        scores[POINT_INDEX[name]] = 1.0
+    return ImagePoints(px, scores, spatial_m=spatial_m)
+
+
+@given(st.floats(0.8, 8.0), st.floats(0.5, 2.0), st.floats(-1.0, 1.0))
+def test_the_distance_is_that_of_the_shoulders_whatever_scale_the_points_have(
+    distance_m: float, scale: float, turn_rad: float
+) -> None:
+    found = distance_of_points(points_at(distance_m, scale, turn_rad), TALL, CAMERA)
+    assert found == pytest.approx(distance_m)
+
+
+def test_a_smaller_person_of_the_same_image_is_nearer() -> None:
+    child = body_from_proportions(1.35, 2.0)
+    found = distance_of_points(points_at(2.0), child, CAMERA)
+    assert found == pytest.approx(2.0 * 1.35 / 1.80, rel=1e-3)
+
+
+def test_points_without_space_or_without_a_shoulder_show_no_distance() -> None:
+    points = points_at(2.0)
+    assert distance_of_points(replace(points, spatial_m=None), TALL, CAMERA) is None
+    scores = points.scores.copy()
+    scores[POINT_INDEX["left_shoulder"]] = 0.0
+    assert distance_of_points(replace(points, scores=scores), TALL, CAMERA) is None
+
+
+def estimate_at(distance_m: float, body: BodyModel) -> Estimate:
+    keypoints_m = np.tile([0.0, 0.0, distance_m], (6, 1))
+    offset_m = np.array([body.placement.distance_m - distance_m, 0.0])
+    return Estimate(TRACKING, np.zeros(12), np.zeros(12), keypoints_m, offset_m=offset_m)
+
+
+def frames(points: ImagePoints | None, depth: bool = False, count: int = 10) -> list[Frame]:
+    channels = {"points": points, "depth_m": np.ones((240, 320)) if depth else None}
+    return [Frame(CAMERA, channels, 240, 5000, stamp_ns=number * 10**8) for number in range(count)]
+
+
+@pytest.mark.parametrize(
+    ("body", "depth", "alone", "rests_on", "relative"),
+    [
+        (BodyModel(), False, True, MEASURED_BODY, 0.02),
+        (TALL, False, True, STATURE, 0.05),
+        (TALL, True, True, DEPTH, 0.02),
+        (TALL, False, False, SECOND_CAMERA, 0.02),
+    ],
+)
+def test_the_deviation_of_the_distance_is_that_of_what_it_rests_on(
+    body: BodyModel, depth: bool, alone: bool, rests_on: str, relative: float
+) -> None:
+    place = PlaceWatch(body, CAMERA, alone).see(
+        estimate_at(4.0, body), body, frames(None, depth)[0]
+    )
+    assert place is not None
+    assert place.rests_on == rests_on
+    assert place.stddev_m[0] == pytest.approx(4.0 * np.hypot(relative, 0.005))
+
+
+def test_a_stated_field_of_view_makes_a_far_place_uncertain() -> None:
+    stated = replace(CAMERA, focal_stddev=0.03)
+    near, far = (
+        PlaceWatch(TALL, stated, True).see(estimate_at(at_m, TALL), TALL, frames(None)[0])
+        for at_m in (2.0, 6.0)
+    )
+    assert near is not None and far is not None
+    # 2 m: 0.3 m are 2.6 deviations of 0.117 m; 6 m: 0.86 deviations of 0.35 m.
+    assert near.chance == pytest.approx(0.0101, abs=0.001)
+    assert far.chance == pytest.approx(0.391, abs=0.005)
+    assert (near.state, far.state) == (KeypointState.TRACKED, KeypointState.UNCERTAIN)
+
+
+@pytest.mark.parametrize(("stature_m", "is_told"), [(1.80, False), (1.44, True), (2.16, True)])
+def test_a_stature_that_contradicts_the_given_distance_is_told(
+    stature_m: float, is_told: bool
+) -> None:
+    body = body_from_proportions(stature_m, 2.0)
+    watch = PlaceWatch(body, CAMERA, is_alone=True)
+    for frame in frames(points_at(2.0)):
+        place = watch.see(estimate_at(2.0, body), body, frame)
+    assert place is not None
+    assert bool(place.contradiction) is is_told
+    assert place.state is (KeypointState.UNCERTAIN if is_told else KeypointState.TRACKED)
+    if is_told:
+        shown_m = f"{2.0 * stature_m / 1.80:.1f} m"
+        assert shown_m in watch.contradiction and "2.0 m" in watch.contradiction
+        # The place is off by what the two sources differ by.
+        assert place.stddev_m[0] >= abs(2.0 * stature_m / 1.80 - 2.0)
+
+
+@pytest.mark.parametrize("depth", [False, True])
+def test_a_stature_that_contradicts_depth_or_a_second_camera_is_told(depth: bool) -> None:
+    child = body_from_proportions(1.35)
+    for body, is_told in ((child, True), (body_from_proportions(1.80), False)):
+        watch = PlaceWatch(body, CAMERA, is_alone=depth)
+        for frame in frames(points_at(2.0), depth):
+            watch.see(estimate_at(2.0, body), body, frame)
+        assert bool(watch.contradiction) is is_told
+
+
+def test_without_a_second_source_nothing_contradicts() -> None:
+    child = body_from_proportions(1.35)
+    watch = PlaceWatch(child, CAMERA, is_alone=True)
+    for frame in frames(points_at(2.0)):
+        watch.see(estimate_at(2.0, child), child, frame)
+    assert watch.contradiction == ""
