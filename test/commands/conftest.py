@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -9,10 +10,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from cardbox_tracker.applications.evaluation.truth import load_ground_truth
 from cardbox_tracker.applications.simulation.session import SessionFormat, synthesize_session
 from cardbox_tracker.commands.main import main
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.model_file import save_body_model
+from cardbox_tracker.person.skeleton import KEYPOINT_NAMES
 from cardbox_tracker.recordings.bag_writer import BagWriter
 
 
@@ -83,6 +86,23 @@ def _with_value(text: str, key: str, value: str) -> str:
     ]
     assert lines != text.splitlines()
     return "\n".join(lines)
+
+
+@pytest.fixture(scope="session")
+def off_m() -> Callable[[Path, Path], np.ndarray]:
+    """Return a function: keypoints of each row of a table less those of a session, (n, 6, 3)."""
+
+    def read(table: Path, session: Path) -> np.ndarray:
+        truth, differences = load_ground_truth(session / "ground_truth.json"), []
+        with table.open(encoding="utf-8") as file:
+            for row in csv.DictReader(file):
+                places = [float(row[f"{name}_{axis}"]) for name in KEYPOINT_NAMES for axis in "xyz"]
+                stamp_ns = truth.start_ns + round(1e9 * float(row["time_s"]))
+                true_m = truth.frames[stamp_ns].keypoints_m
+                differences.append(np.reshape(places, (6, 3)) - true_m)
+        return np.array(differences)
+
+    return read
 
 
 @pytest.fixture(scope="session")

@@ -11,7 +11,7 @@ import pytest
 
 def options(files: Path) -> tuple[object, ...]:
     inputs = (files / "session", "--background", "0:3.9", "--model", files / "person.yaml")
-    return (*inputs, "--start", "20")
+    return (*inputs, "--start", "15.6")
 
 
 def test_a_recording_is_scored(files: Path, tmp_path: Path, cardbox: Callable) -> None:
@@ -34,9 +34,9 @@ def test_a_recording_is_scored(files: Path, tmp_path: Path, cardbox: Callable) -
         assert float(row["score"]) >= 3  # A of at least 1 and a load of 3: row 4 of table C
     text = page.read_text(encoding="utf-8")
     assert "<h1>Packing</h1>" in text
-    # Images that may be wrong are no worst moments.
-    is_sure = any(row["state"] == "tracking" for row in rows)
-    assert ("data:image/jpeg;base64," in text) == is_sure
+    # Images that may be wrong are no worst moments; those of hanging arms are sure.
+    assert sum(row["state"] == "tracking" for row in rows) >= 3
+    assert "data:image/jpeg;base64," in text
     with shares.open(encoding="utf-8") as file:
         grand = [float(row["share"]) for row in csv.DictReader(file) if row["part"] == "grand"]
     assert sum(grand) == pytest.approx(1, abs=0.001)

@@ -118,6 +118,8 @@ def test_code_with_bounds_checks_is_kept_apart(package: Path) -> None:
     for _ in range(2):
         assert run(package, BOUNDS, NUMBA_BOUNDSCHECK="0") == ("0.0\n", "")
         assert run(package, BOUNDS, NUMBA_BOUNDSCHECK="1") == ("refused\n", "")
+    kept = [path.parent for path in package.rglob("*.read-*.nbc")]
+    assert len(kept) == len(set(kept)) == 2, "neither replaces the other"
 
 
 DAMAGED = """
@@ -137,7 +139,7 @@ def test_a_file_that_was_cut_off_is_made_again(ending: str, package: Path) -> No
     run(package, USE)
     (file,) = package.rglob(f"*.double-*{ending}")
     whole = file.read_bytes()
-    for length in (0, len(whole) // 2):
+    for length in (0, 1, len(whole) // 2, len(whole) - 1):
         file.write_bytes(whole[:length])
         out, said = run(package, DAMAGED)
         assert out == "42 2\n"

@@ -22,6 +22,8 @@ from cardbox_tracker.person.skeleton import (
     JOINT_NAMES,
     KEYPOINT_NAMES,
     SHOULDER_RISE,
+    head_from_pivot_m,
+    neck_pivot_m,
     neck_rotation,
     rotation_x,
     rotation_y,
@@ -328,3 +330,8 @@ def test_yaw_turns_left_and_pitch_lowers_the_face() -> None:
     left, down = neck_rotation(np.array([np.pi / 2, 0.0])), neck_rotation(np.array([0.0, 0.4]))
     np.testing.assert_allclose(left[:, 0], (0.0, 1.0, 0.0), atol=1e-12)
     np.testing.assert_allclose(down[:, 0], (np.cos(0.4), 0.0, -np.sin(0.4)), atol=1e-12)
+
+
+def test_the_head_of_a_neck_at_rest_is_the_models() -> None:
+    middle = np.add(neck_pivot_m(PARTS), head_from_pivot_m(PARTS))
+    np.testing.assert_allclose(middle, (PARTS.head.forward_m, 0.0, PARTS.head.middle_m))

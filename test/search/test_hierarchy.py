@@ -145,6 +145,10 @@ def test_further_terms_rate_trunks_and_arms_beside_them() -> None:
             for one in asked.states
         ]
         np.testing.assert_allclose(more, 200.0 * np.array(hands)[:, 1], rtol=1e-9)
+    # What is rated is not written to.
+    again = np.random.default_rng(0)
+    np.testing.assert_array_equal(torsos, again.normal(0.0, 0.1, (5, 4)))
+    np.testing.assert_array_equal(arms, again.normal(0.5, 0.3, (5, 4)))
 
 
 def test_a_further_term_moves_the_estimate() -> None:

@@ -14,7 +14,7 @@ from cardbox_tracker.camera.camera import Camera
 from cardbox_tracker.camera.rasterisation import render
 from cardbox_tracker.person.cardbox import cardbox_patches
 from cardbox_tracker.person.model import BodyModel
-from cardbox_tracker.person.posture import reference_posture, state_limits
+from cardbox_tracker.person.posture import TORSO_X, reference_posture, state_limits
 from cardbox_tracker.person.skeleton import arm_directions
 from cardbox_tracker.search import arm_proposals, state_choice, torso_proposals, whole_body
 from cardbox_tracker.search.config import TrackerConfig, default_preset
@@ -235,6 +235,28 @@ def test_smoothing_is_a_share_of_the_last_result() -> None:
     second = follow(of, seen(wave(0.3)))
     mean, _ = state_choice.mean_and_spread(of.rated.states, of.rated.ratings, 150, 0.02)
     np.testing.assert_allclose(second.posture, 0.5 * first.posture + 0.5 * mean[:12])
+
+
+def test_a_result_follows_the_outline_unless_depth_was_measured() -> None:
+    of, truth = made(), upright()
+    silhouette, begin = seen(truth[:12]), upright()
+    begin[TORSO_X] += 0.08
+    follow(of, silhouette)
+    frame = CompiledSilhouette(BODY, CAMERA).frame(silhouette)
+    depth_m = np.full(silhouette.shape, 2.0, np.float32)
+    measured = frame.changed(channels={**frame.channels, "depth_m": depth_m})
+    assert measured.depth_m is not None
+    of._correction = None
+    np.testing.assert_allclose(of._refined([measured], begin), begin, atol=1e-12)
+    of._correction = None
+    found = of._refined([frame], begin)
+    assert abs(found[TORSO_X]) < 0.06 < begin[TORSO_X]
+    # A part of the last correction is left, until it is forgotten.
+    after = of._refined([frame], truth) - truth
+    of.recover()
+    alone = of._refined([frame], truth) - truth
+    assert abs(alone[TORSO_X]) < 0.02
+    np.testing.assert_allclose(after, 0.6 * (found - begin) + 0.4 * alone, atol=1e-12)
 
 
 def test_each_stage_adds_states_to_those_before(monkeypatch: pytest.MonkeyPatch) -> None:

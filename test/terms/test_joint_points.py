@@ -19,6 +19,7 @@ from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.posture import reference_posture, state_limits
 from cardbox_tracker.terms import joint_points_kernels as kernels
 from cardbox_tracker.terms.joint_points import (
+    EVIDENCE,
     JointPoints,
     JointPointsObservation,
     JointPointsTerm,
@@ -416,3 +417,56 @@ def test_points_that_stay_exchanged_show_the_persons_back(detected: Detect) -> N
     assert not shown(back)
     # A detector that is slower than the camera is right after the same time.
     assert [shown(one) for one in (None, None, back, None, back)] == [False] * 4 + [True]
+
+
+def test_evidence_of_exact_points_by_hand(detected: Detect) -> None:
+    seen = observed(detected(BODY, CAMERA, STATE))
+    found = seen.evidence(Posed(COST.body, STATE[None]))
+    assert set(found) == set(EVIDENCE)
+    np.testing.assert_allclose(found["point distance"], 0.0, atol=1e-6)
+    for name in ("point missing", "depth difference", "back"):
+        assert found[name].tolist() == [0.0] * 6
+    joints_m = COST.keypoints(STATE)
+    middle_m = np.linalg.norm((joints_m[0] + joints_m[3]) / 2)
+    assert found["distance"].tolist() == pytest.approx([middle_m] * 6)
+    # What a bone has along the optical axis, of its length; shoulders end no bone.
+    for shoulder, elbow, hand in ((0, 1, 2), (3, 4, 5)):
+        upper_arm, forearm = np.diff(joints_m[[shoulder, elbow, hand]], axis=0)
+        shares = [abs(bone[2]) / np.linalg.norm(bone) for bone in (upper_arm, forearm)]
+        assert found["foreshortened"][[elbow, hand]].tolist() == pytest.approx(shares)
+        assert found["foreshortened"][shoulder] == 0.0
+        assert found["elbow foreshortened"][hand] == pytest.approx(shares[0])
+        assert found["elbow foreshortened"][elbow] == 0.0
+
+
+def test_evidence_of_a_moved_point_and_of_a_missing_one(detected: Detect) -> None:
+    points = moved(detected(BODY, CAMERA, STATE), "left_elbow", 12.0, 5.0)
+    missing = POINT_INDEX["right_wrist"]
+    scores = points.scores.copy()
+    scores[missing] = 0.4
+    found = observed(replace(points, scores=scores)).evidence(Posed(COST.body, STATE[None]))
+    # 13 px at the depth of the elbow.
+    depth_m = COST.keypoints(STATE)[1, 2]
+    expected_m = np.eye(6)[1] * 13.0 * depth_m / CAMERA.fx
+    np.testing.assert_allclose(found["point distance"], expected_m, atol=1e-6)
+    assert found["point missing"].tolist() == [0.0, 0.0, 0.0, 0.0, 0.0, 1.0]
+
+
+def test_evidence_of_bones_is_their_difference_in_depth(detected: Detect) -> None:
+    """Bones have 0.8 of their length away from the camera for the detector, along a level sight."""
+    points = detected(GUESSED, CAMERA, STATE)
+    seen = observed(replace(points, spatial_m=np.zeros((len(POINT_NAMES), 3))), body=GUESSED)
+    pixels, deviations, bones, away = seen.seen
+    joints_m = COST.keypoints(STATE)
+    for arm in (0, 1):
+        bones[[2 * arm, 2 * arm + 1], :2] = 0.8, 0.9
+    found = replace(seen, seen=(pixels, deviations, bones, away)).evidence(
+        Posed(COST.body, STATE[None])
+    )["depth difference"]
+    for first in (0, 3):
+        vectors = np.diff(joints_m[first : first + 3], axis=0)
+        off_m = vectors @ away - 0.8 * np.linalg.norm(vectors, axis=1)
+        # A hand has the difference of the elbow, too; shoulders have none.
+        expected = [0.0, abs(off_m[0]), abs(off_m[0] + off_m[1])]
+        assert found[first : first + 3].tolist() == pytest.approx(expected)
+        assert min(expected[1:]) > 0.05

@@ -18,9 +18,12 @@ from cardbox_tracker.detectors.image_points import POINT_INDEX, POINT_NAMES, Ima
 from cardbox_tracker.person.cardbox import cardbox_patches
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.posture import reference_posture
+from cardbox_tracker.person.skeleton import KeypointState
 from cardbox_tracker.search.config import default_preset
 from cardbox_tracker.search.doubt import HANDS, Source, models
+from cardbox_tracker.search.whole_body import WholeBodyFilter
 from cardbox_tracker.terms.inner_cue import InnerCue
+from cardbox_tracker.terms.joint_points import EVIDENCE
 from cardbox_tracker.terms.whole_body import WholeBodyCost
 from cardbox_tracker.terms.whole_body_config import WholeBodyCostConfig
 from cardbox_tracker.tracking.estimate import TRACKING, UNCERTAIN, Estimate
@@ -325,6 +328,42 @@ def test_points_of_one_camera_of_two_are_enough(
         assert estimate.keypoints_m is not None
         errors_m.append(np.linalg.norm(estimate.keypoints_m - cost.keypoints(state), axis=1))
     assert np.mean(errors_m[12:], axis=0).max() < 0.06
+
+
+def test_a_person_who_turned_round_is_uncertain_until_the_points_show_the_front(
+    detected: Detect,
+) -> None:
+    """A silhouette shows no back; a detector that has exchanged the sides for long does."""
+    scene = Scene(detected)
+
+    def given(number: int) -> ImagePoints:
+        points = scene.points(number)
+        return exchanged(points) if 10 <= number < 24 else points
+
+    _, estimates = scene.track(given, count=28)
+    backs = [one.evidence is not None and bool(one.evidence["back"].any()) for one in estimates]
+    # Half a second later.
+    assert backs == [False] * 18 + [True] * 6 + [False] * 4
+    for number in range(18, 24):
+        assert estimates[number].state == UNCERTAIN
+        states = estimates[number].keypoint_states
+        assert states is not None and KeypointState.TRACKED not in states
+
+
+def test_points_leave_a_quarter_of_the_search(detected: Detect) -> None:
+    counts = []
+    scene = Scene(detected)
+    for given in (None, scene.points(0)):
+        tracker = Tracker(MEASURED, CAMERA, default_preset())
+        for _ in range(4):
+            found = tracker.track(Observation(silhouette(scene.posture(0)), points=given))
+        assert isinstance(tracker.filter, WholeBodyFilter)
+        counts.append(len(tracker.filter.rated.states))
+        # What the points say joins what the silhouette says.
+        assert found.evidence is not None
+        assert set(EVIDENCE).issubset(found.evidence) == (given is not None)
+        assert "residual" in found.evidence
+    assert 0.2 < counts[1] / counts[0] < 0.45
 
 
 def values(estimate: Estimate) -> list[bytes | None]:

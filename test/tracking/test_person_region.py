@@ -11,14 +11,14 @@ import pytest
 from cardbox_tracker.camera.camera import Camera
 from cardbox_tracker.camera.rasterisation import render
 from cardbox_tracker.person.cardbox import cardbox_patches
+from cardbox_tracker.person.kinematics import pose
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.posture import reference_posture
 from cardbox_tracker.search.config import default_preset, paper_preset
-from cardbox_tracker.tracking.estimate import LOST, NO_PERSON, TRACKING, UNCERTAIN
+from cardbox_tracker.tracking.estimate import LOST, NO_PERSON, TRACKING, UNCERTAIN, Estimate
 from cardbox_tracker.tracking.person_region import PersonRegion
 from cardbox_tracker.tracking.tracker import Tracker
 
-FOUND = (TRACKING, UNCERTAIN)
 CAMERA = Camera(160, 120, 100.0, 100.0, 79.5, 59.5)
 BODY = BodyModel.of(hip_height_m=-0.4)
 FRONT = reference_posture("front")
@@ -39,6 +39,12 @@ def box(left: int, right: int, top: int = 0, bottom: int = 120) -> np.ndarray:
 
 def region() -> PersonRegion:
     return PersonRegion(BODY, CAMERA)
+
+
+def error_m(estimate: Estimate) -> float:
+    """Mean distance of the keypoints to those of the front posture."""
+    true_m = CAMERA.reference_to_optical(pose(BODY.rigid, FRONT).keypoints_m)
+    return float(np.linalg.norm(estimate.keypoints_m - true_m, axis=1).mean())
 
 
 def common(one: np.ndarray, other: np.ndarray) -> float:
@@ -137,13 +143,17 @@ def test_only_the_default_preset_selects() -> None:
         tracker = Tracker(BODY, CAMERA, config)
         states[name] = [tracker.track(pixels) for _ in range(3)][-1]
     assert states["off"].state == LOST
-    assert states["default"].state in FOUND
-    assert states["default"].iou > 0.7 > states["paper"].iou
+    assert states["paper"].state == UNCERTAIN
+    assert states["default"].state == TRACKING
+    assert states["default"].iou > 0.9 > 0.2 > states["paper"].iou
+    assert error_m(states["default"]) < 0.03
 
 
 def test_a_chair_alone_is_nobody() -> None:
     tracker, chair = Tracker(BODY, CAMERA, default_preset()), box(130, 158, 30)
     grey = np.where(chair > 0, DOOR, WALL).astype(np.uint8)
-    assert [tracker.track(person() | chair, grey).state for _ in range(10)][-1] in FOUND
+    estimate = [tracker.track(person() | chair, grey) for _ in range(10)][-1]
+    assert estimate.state == TRACKING
+    assert error_m(estimate) < 0.03
     assert [tracker.track(chair, grey).state for _ in range(3)] == [NO_PERSON] * 3
-    assert tracker.track(person() | chair, grey).posture is not None
+    assert error_m(tracker.track(person() | chair, grey)) < 0.07

@@ -110,11 +110,16 @@ def test_joints_have_the_error_of_the_table_in_all_formats(
     means_cm = {name: 100 * error.mean() for name, error in errors_m.items()}
     print({name: f"{mean:.2f} cm" for name, mean in means_cm.items()})
     assert errors_m["csv"].mean() < MOST_M
+    # The bones of a BVH file turn, while the shoulders of the tracker rise on a line.
+    rises_m = [table[f"{side}_clavicle_elevation"] for side in ("left", "right")]
+    is_low = np.repeat(np.array(rises_m).astype(float).T < 1e-3, 3, axis=1)
+    assert 0.2 < is_low.mean() < 1.0
     for name, error_m in errors_m.items():
         # Files have places to a tenth of a millimetre and angles to a thousandth of a degree.
-        # The bones of a BVH file turn, while the shoulders of the tracker rise on a line.
-        most_m = 4e-3 if name == "bvh" else 1e-3
-        assert error_m == pytest.approx(errors_m["csv"], abs=most_m), name
+        if name == "bvh":
+            assert error_m == pytest.approx(errors_m["csv"], abs=4e-3)
+            error_m = np.where(is_low, error_m, errors_m["csv"])
+        assert error_m == pytest.approx(errors_m["csv"], abs=1e-3), name
 
 
 @pytest.mark.slow

@@ -2,10 +2,20 @@
 
 from __future__ import annotations
 
-import numpy as np
+from types import SimpleNamespace
+from typing import Any
 
+import numpy as np
+import pytest
+
+from cardbox_tracker.camera.camera import Camera
+from cardbox_tracker.camera.rasterisation import render
+from cardbox_tracker.person.cardbox import cardbox_patches
 from cardbox_tracker.person.model import BodyModel
+from cardbox_tracker.person.model_file import dumps_body_model
+from cardbox_tracker.person.posture import reference_posture
 from cardbox_tracker.ros.nodes.tracking_report import TrackingReport
+from cardbox_tracker.search.config import PRESETS
 from cardbox_tracker.tracking.estimate import LOST, NO_PERSON, TRACKING, UNCERTAIN, Estimate
 
 BODY = BodyModel()
@@ -30,11 +40,40 @@ def test_each_change_of_state_is_told_once() -> None:
     assert report.warnings() == {}
 
 
+@pytest.mark.parametrize("preset", PRESETS)
+def test_who_was_measured_is_not_fitted_with_any_preset(
+    preset: str, bus: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The shoulders of preset paper are rigid, which makes no other person of them."""
+    pytest.importorskip("rclpy", reason="rclpy is not installed")
+    from builtin_interfaces.msg import Time
+    from std_msgs.msg import Header, String
+
+    from cardbox_tracker.ros.messages.conversions import camera_info_message, image_message
+    from cardbox_tracker.ros.nodes.tracker_node import TrackerNode
+
+    node = bus.start(TrackerNode, preset=preset, use_image=False)
+    said: list[str] = []
+    log = SimpleNamespace(info=said.append, warning=said.append, error=said.append)
+    monkeypatch.setattr(node, "get_logger", lambda: log)
+    camera = Camera(96, 72, 99.0, 99.0, 47.5, 35.5)
+    person = render(cardbox_patches(BODY, reference_posture("front")), camera)
+    bus.send("/body_model", String(data=dumps_body_model(BODY)))
+    for number in range(2):
+        header = Header(frame_id="eye", stamp=Time(sec=10 + number))
+        bus.send("/silhouette/camera_info", camera_info_message(header, camera))
+        bus.send("/silhouette", image_message(header, person, "mono8"))
+    assert len(bus.texts("/tracking_state")) == 2
+    assert any("tracking starts" in text for text in said)
+    assert not [text for text in said if "fitted to the person" in text]
+
+
 def test_another_body_is_told_with_its_sizes() -> None:
     report = TrackingReport()
     report.start(BODY)
     other = BodyModel.of(hip_height_m=-0.4)
-    assert str(other) in report.add(found(TRACKING), other)["body"]
+    told = report.add(found(TRACKING), other)["body"]
+    assert told.startswith("fitted to the person") and str(other) in told
     assert "body" not in report.add(found(TRACKING), other)
 
 
