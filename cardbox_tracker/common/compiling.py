@@ -23,7 +23,7 @@ import threading
 import traceback
 from collections.abc import Callable, Iterator
 from contextlib import suppress
-from functools import partial
+from functools import cache, partial
 from pathlib import Path
 from pickle import UnpicklingError
 from typing import Any, TypeVar
@@ -140,6 +140,17 @@ def discard() -> None:
         _is_own(FOLDER)
 
 
+def _save(save: Callable[..., None], *compiled: Any) -> None:
+    """Keep compiled code; if that fails, as on a full disk, the function is used all the same."""
+    try:
+        save(*compiled)
+    except OSError as error:
+        _warn_once(f"compiled code cannot be kept in {FOLDER}: {error.strerror}; free space there")
+
+
+_warn_once = cache(_LOG.warning)
+
+
 def njit(**options: Any) -> Callable[[F], F]:
     """Return ``numba.njit`` with ``options``, a folder for its code and no interpreter lock."""
     compiled: Any = partial(numba.njit, nogil=True, error_model="numpy", **options)
@@ -154,6 +165,8 @@ def njit(**options: Any) -> Callable[[F], F]:
                 made = compiled()(function)
             finally:
                 _CONFIG.CACHE_DIR = before
+        kept: Any = made
+        kept._cache.save_overload = partial(_save, kept._cache.save_overload)
         return made
 
     return decorate

@@ -147,6 +147,22 @@ def test_a_file_that_was_cut_off_is_made_again(ending: str, package: Path) -> No
         assert run(package, USE) == ("42 1\n", ""), "it was kept again"
 
 
+FULL = """
+from numba.core import caching
+def full(*_):
+    raise OSError(28, "No space left on device")
+caching.IndexDataCacheFile._open_for_write = full
+"""
+
+
+def test_a_full_disk_does_not_end_it(package: Path) -> None:
+    """The function calls another one, which cannot be kept either; this is said once."""
+    out, said = run(package, FULL + USE)
+    assert out == "42 0\n"
+    assert said.count("No space left on device") == 1 and "Traceback" not in said
+    assert run(package, USE) == ("42 0\n", "")
+
+
 @pytest.fixture
 def places(package: Path, tmp_path: Path) -> dict[str, str]:
     """Environment with a read-only package and home, and a folder for temporary files."""
