@@ -278,8 +278,7 @@ def test_the_fit_that_counts_as_lost_is_a_setting() -> None:
     silhouette[:, :80] = 0  # a fit of roughly a half
     iou = make(STILL).track(silhouette).iou
     assert 0.2 < iou < 0.8
-    # Half a person is doubted in any case.
-    for lost_iou, state in ((iou - 0.01, UNCERTAIN), (iou + 0.01, LOST)):
+    for lost_iou, state in ((iou - 0.01, TRACKING), (iou + 0.01, LOST)):
         tracker = make(replace(STILL, lost_iou=lost_iou, lost_frames=1))
         assert tracker.track(silhouette).state == state
 
