@@ -49,7 +49,7 @@ UNCERTAIN_FROM = 0.1
 # Seconds and least number of images over which two sources are compared, deviations by which they
 # may differ, and the relative deviation of the distance of points (0.91 to 1.08 of the true one in
 # 24 recordings of 17 people).
-_COMPARED_S, _LEAST_COMPARED, _CONTRADICTING = 1.5, 5, 1.65
+_COMPARED_S, _LEAST_COMPARED, _CONTRADICTING = 1.5, 5, 1.95
 _POINTS_STDDEV = 0.045
 
 _TRUNK, _ARM = ("shoulder", "hip"), ("shoulder", "elbow", "wrist")
