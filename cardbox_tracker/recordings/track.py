@@ -34,6 +34,7 @@ class TrackSummary:
         frames_uncertain: number of tracked images whose posture may be wrong.
         remarks: warnings about extrinsics or depth that seem to be wrong.
         body: the body at the end, whose unknown values were fitted.
+        accounts: for each camera, what was used of it and what was left out.
     """
 
     frames: int
@@ -43,6 +44,7 @@ class TrackSummary:
     frames_uncertain: int = 0
     remarks: tuple[str, ...] = ()
     body: BodyModel | None = None
+    accounts: tuple[str, ...] = ()
 
 
 def track_recording(
