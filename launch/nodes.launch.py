@@ -6,6 +6,7 @@ The other launch files include it; start it alone together with your own camera 
         camera_info:=/camera/camera_info person_distance_m:=2.0
 """
 
+import atexit
 import sys
 import tempfile
 from pathlib import Path
@@ -279,7 +280,18 @@ def _typed(given: dict[str, str], node: str, camera: str = "") -> dict[str, obje
     found: dict[str, object] = {name: typed[name] for name in GIVEN[node] if typed[name] != []}
     if node == "detector":
         found["publish_silhouette"] = typed["silhouettes"] == "detector"
-    return found
+    return found | _queue(given, node, camera)
+
+
+def _queue(given: dict[str, str], node: str, camera: str) -> dict[str, object]:
+    """Return the queue of a replay, which loses no image while a node works; live has none."""
+    ending = "/compressed" * (given["image_transport"] == "compressed")
+    topics = {"background": f"{given['image']}{ending}", "tracker": "silhouette"}
+    if "bag" not in given or node not in topics:
+        return {}
+    place = "/".join(part for part in (given["namespace"].strip("/"), camera) if part)
+    topic = topics[node] if topics[node].startswith("/") else f"/{place}/{topics[node]}"
+    return {f"qos_overrides.{topic.replace('//', '/')}.subscription.depth": 5}
 
 
 def _single_process(context: LaunchContext, remappings: list[tuple[str, str]]) -> Node:
@@ -297,6 +309,7 @@ def _single_process(context: LaunchContext, remappings: list[tuple[str, str]]) -
         sections[f"/**/{name}"] = {"ros__parameters": {**kept, **own}}
     with tempfile.NamedTemporaryFile("w", suffix=".yaml", prefix="cardbox_", delete=False) as file:
         yaml.safe_dump(sections, file)
+    atexit.register(Path(file.name).unlink, missing_ok=True)
     rules = [word for old, new in remappings for word in ("-r", f"background:{old}:={new}")]
     rules += ["-r", f"tracker:camera_info:={given['camera_info']}"]
     return Node(

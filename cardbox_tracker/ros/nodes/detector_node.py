@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import sys
 import time
 from collections import deque
@@ -38,6 +39,7 @@ from cardbox_tracker.ros.runtime.parameters import LiveParameters
 from cardbox_tracker.ros.runtime.publishers import SinglePublisher
 from cardbox_tracker.segmentation.silhouettes import SilhouettePipeline
 
+_NICE = 5
 _DOES = "Find the person in a camera's images: images in, 2D points and silhouettes out."
 
 
@@ -59,8 +61,9 @@ class DetectorParameters(NodeParameters):
         effect=AT_START,
     )
     rate_hz: float = parameter(
-        0.0,
-        "most images a second to look at, to save processor time; 0: as many as it manages",
+        10.0,
+        "most images a second to look at, which leaves processor time to the tracker; 0: as many "
+        "as it manages, as always with publish_silhouette",
         unit="Hz",
         limits=(0.0, 240.0),
     )
@@ -83,6 +86,9 @@ class DetectorNode(CardboxNode):
         super().__init__("detector", **options)
         self.parameters = LiveParameters(self, DetectorParameters)
         settings = self.parameters.value
+        if person is None and not settings.publish_silhouette:
+            # The tracker goes first; the threads of the networks inherit this.
+            os.nice(_NICE)
         self._person = person or Detector.installed().start()
         self._pipeline: SilhouettePipeline | None = None
         self._looked_ns = 0
@@ -102,8 +108,6 @@ class DetectorNode(CardboxNode):
             lambda: self.parameters.value.max_megapixels,
             self._on_calibration,
             self._on_image,
-            # While the network works, only the newest image is kept.
-            qos.NEWEST,
         )
         own = (self.resolve("silhouette"),) if settings.publish_silhouette else ()
         self._single = SinglePublisher(self, own)
@@ -137,7 +141,7 @@ class DetectorNode(CardboxNode):
     def _is_due(self, at_ns: int) -> bool:
         """Return whether to look at the image with this stamp, as ``rate_hz`` says."""
         rate_hz = self.parameters.value.rate_hz
-        if rate_hz > 0.0 and at_ns:
+        if rate_hz > 0.0 and at_ns and self._silhouettes is None:
             # The image nearest to the time is taken, not the first one after it.
             early_ns = self.diagnostics.input.period_ns / 2
             if at_ns - self._looked_ns + early_ns < 1e9 / rate_hz:

@@ -60,6 +60,9 @@ class TrackerNode(CardboxNode):
         self._agreement = AgreementWatch([name.strip("/") for name in settings.cameras])
         self.diagnostics.source = f"silhouettes on {self._inputs.source}"
         self.diagnostics.extra = self._values
+        self.diagnostics.remedy = (
+            "lower the effort, take a smaller working resolution, or fewer images a second"
+        )
         if settings.model_file:
             self._use(load_body_model(user_path(settings.model_file)))
         self._wait()

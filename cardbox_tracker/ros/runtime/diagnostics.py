@@ -54,6 +54,8 @@ class NodeDiagnostics:
             Warnings of the kind "" are not logged here, because the node logs them.
         remarks: called once a second; returns warnings of common checks, such as the types of the
             topics, which write their own log messages.
+        remedy: what to do if results take longer than the period of the images; empty if that is
+            no fault of this node, which then reports nothing.
     """
 
     def __init__(self, node: Node) -> None:
@@ -63,6 +65,7 @@ class NodeDiagnostics:
         self.advice: Callable[[], dict[str, str]] = dict
         self.source = ""
         self.remarks: Callable[[], list[str]] = list
+        self.remedy = ""
         self._node = node
         self._waiting = ""
         self._problem = ""
@@ -147,17 +150,20 @@ class NodeDiagnostics:
             self._node.get_logger().warning(f"{self.source} have ceased: {why}")
         self._silence = f"{self.source}, which have ceased {silent_s:.0f} s ago: {why}"
 
-    def _slowness(self) -> dict[str, str]:
-        """Return a warning if results take longer than the period of the images."""
+    @property
+    def is_slow(self) -> bool:
+        """Whether results take longer than the period of the images."""
         if len(self._latencies_ms) < _ENOUGH:
-            return {}
-        latency_ms, period_ms = np.median(self._latencies_ms), self.input.period_ns / 1e6
-        if not 0 < period_ms < latency_ms:
+            return False
+        return 0 < self.input.period_ns / 1e6 < float(np.median(self._latencies_ms))
+
+    def _slowness(self) -> dict[str, str]:
+        if not self.remedy or not self.is_slow:
             return {}
         return {
-            "slow": f"results come {latency_ms:.0f} ms after their images, which come every "
-            f"{period_ms:.0f} ms, so images wait or are dropped; lower the effort of "
-            "the tracker, take a smaller working resolution, or fewer images a second"
+            "slow": f"results come {np.median(self._latencies_ms):.0f} ms after their images, "
+            f"which come every {self.input.period_ns / 1e6:.0f} ms, so images are left out; "
+            f"{self.remedy}"
         }
 
     def _remarks(self) -> list[str]:

@@ -52,6 +52,15 @@ def test_heavy_loss_is_seen() -> None:
     assert fed(kept).loss > 0.5
 
 
+def test_a_burst_at_the_start_is_no_loss_for_ever() -> None:
+    statistics = StreamStatistics()
+    stamps = [number * 5_000_000 for number in range(8)]
+    stamps += [stamps[-1] + number * PERIOD_NS for number in range(1, 401)]
+    for stamp in stamps:
+        statistics.add(1_000_000_000 + stamp)
+    assert (statistics.dropped, statistics.loss) == (0, 0.0)
+
+
 def test_a_pause_of_the_source_is_no_loss() -> None:
     statistics = fed([*range(20), *range(200, 220)])
     assert statistics.dropped == 0
@@ -242,12 +251,16 @@ def test_good_images_between_do_not_open_the_log(
     assert len(logged.lines) == 3
 
 
-@pytest.mark.parametrize(("periods", "slow"), [(0.5, False), (3.0, True)])
+@pytest.mark.parametrize(
+    ("periods", "remedy", "said"), [(0.5, "do X", False), (3.0, "do X", True), (3.0, "", False)]
+)
 def test_a_node_that_needs_longer_than_a_period_says_what_to_do(
-    make_node: Callable, periods: float, slow: bool
+    make_node: Callable, periods: float, remedy: str, said: bool
 ) -> None:
     diagnostics = NodeDiagnostics(make_node())
+    diagnostics.remedy = remedy
     for frame in range(40):
         diagnostics.input.add(1_000_000_000 + frame * PERIOD_NS)
         diagnostics.working(sent_ns=time.time_ns() - int(periods * PERIOD_NS))
-    assert ("effort" in diagnostics.status().message) is slow
+    assert diagnostics.status().message.endswith("left out; do X" if said else "working")
+    assert diagnostics.is_slow is (periods > 1)
