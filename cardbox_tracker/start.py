@@ -8,15 +8,27 @@ the error names the missing package.
 
 from __future__ import annotations
 
-import os
 import sys
-import sysconfig
-from collections.abc import Callable
-from functools import partial
-from importlib import import_module
-from pickle import UnpicklingError
+from types import TracebackType
 
-from cardbox_tracker.common import garbage, interrupts
+
+def _told(kind: type[BaseException], error: BaseException, trace: TracebackType | None) -> None:
+    """Write an error that ends the program, but no traceback of a Ctrl-C."""
+    if not issubclass(kind, KeyboardInterrupt):
+        sys.__excepthook__(kind, error, trace)
+
+
+# The imports below take some time, in which Ctrl-C may come.
+sys.excepthook = _told
+
+import os  # noqa: E402
+import sysconfig  # noqa: E402
+from collections.abc import Callable  # noqa: E402
+from functools import partial  # noqa: E402
+from importlib import import_module  # noqa: E402
+from pickle import UnpicklingError  # noqa: E402
+
+from cardbox_tracker.common import garbage, interrupts  # noqa: E402
 
 COMMAND = "cardbox_tracker.commands.main"
 """Module of the executable ``cardbox``."""

@@ -66,6 +66,10 @@ ARGUMENTS = {
         "", "background: read if it fits the camera, written when it is learned"
     ),
     "model_file": Argument("", "body model: read if it exists, written by every initialization"),
+    "stature": Argument(
+        *("0.0", "height of a person who is not measured, who is tracked at once", float),
+        limits=(0.0, 2.2),
+    ),
     "preset": Argument(
         "default", "tracker settings: paper or default", choices=("paper", "default")
     ),
@@ -116,7 +120,15 @@ GIVEN = {
         *("person_distance_m", "camera_pitch_deg", "side_turn", "model_file"),
         *("cameras", "extrinsics_file", "measure_distance", "depth"),
     ),
-    "tracker": ("preset", "rep155_id", "cameras", "extrinsics_file", "depth", "keypoints"),
+    "tracker": (
+        "preset",
+        "stature",
+        "rep155_id",
+        "cameras",
+        "extrinsics_file",
+        "depth",
+        "keypoints",
+    ),
     "detector": ("image_transport",),
 }
 # Nodes of cardbox_nodes; the detector always has a process of its own.

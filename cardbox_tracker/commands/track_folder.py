@@ -37,7 +37,12 @@ from cardbox_tracker.commands.request import (
 from cardbox_tracker.commands.tracking import track
 from cardbox_tracker.common import interrupts
 from cardbox_tracker.common.errors import CardboxError
-from cardbox_tracker.common.files import claimed_name, write_table
+from cardbox_tracker.common.files import (
+    UnreadableFileError,
+    claimed_name,
+    read_regular,
+    write_table,
+)
 from cardbox_tracker.common.processes import cores, results_of
 from cardbox_tracker.common.progress import SharedProgress, progress_bar, told
 from cardbox_tracker.recordings.folder import SUMMARY, recordings_in
@@ -50,6 +55,8 @@ TRACKED, FAILED = "tracked", "failed"
 _BODY = body_beside(Path("NAME.csv")).name.removeprefix("NAME")
 # Most names of recordings in a line; the table has all.
 _MOST_NAMES = 10
+# A summary of 100,000 recordings.
+_MOST_BYTES = 64 * 1024 * 1024
 _SOURCES = ("*.py", "*.json")
 
 
@@ -324,12 +331,12 @@ def _read_rows(path: Path) -> dict[str, Row]:
     if not path.exists():
         return {}
     try:
-        with path.open(newline="", encoding="utf-8") as file:
-            header, *cells = csv.reader(file)
+        text = read_regular(path, _MOST_BYTES).decode()
+        header, *cells = csv.reader(io.StringIO(text, newline=""))
         if tuple(header) != Row._fields:
             raise ValueError("it has other columns")
         rows = [Row(*row) for row in cells]
-    except (OSError, ValueError, TypeError) as error:
+    except (UnreadableFileError, csv.Error, ValueError, TypeError) as error:
         raise CardboxError(
             f"{path} is no summary of tracked recordings ({error}); remove it, or give another "
             "--output"

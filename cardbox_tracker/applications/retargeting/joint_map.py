@@ -132,7 +132,7 @@ def load_joint_map(path: str | os.PathLike[str]) -> JointMap:
         offset = np.array([math.radians(float(row.get("offset_deg", 0.0))) for row in rows])
         if not (np.isfinite(scale).all() and np.isfinite(offset).all()):
             raise ValueError("a scale or an offset is not a finite number")
-    except (SmallYamlError, KeyError, TypeError, ValueError) as error:
+    except (SmallYamlError, KeyError, TypeError, ValueError, OverflowError) as error:
         reason = " ".join(str(error).split())
         raise CardboxError(
             f"{path} is not a joint map: {reason}; see the example config/example_joint_map.yaml"

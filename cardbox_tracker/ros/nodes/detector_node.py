@@ -26,6 +26,7 @@ from cardbox_tracker.ros.messages.keypoints import (
     skeleton_message,
 )
 from cardbox_tracker.ros.nodes.camera_images import CameraImages
+from cardbox_tracker.ros.nodes.camera_pitch import CameraPitch
 from cardbox_tracker.ros.nodes.shared_parameters import (
     image_transport_parameter,
     max_megapixels_parameter,
@@ -100,6 +101,7 @@ class DetectorNode(CardboxNode):
             if self._skeleton_kind is None
             else self.advertise(self._skeleton_kind, "~/skeleton2d", qos.RESULT)
         )
+        self._pitch = CameraPitch(self)
         self._silhouettes = SilhouetteOutputs(self) if settings.publish_silhouette else None
         self.diagnostics.extra = self._values
         self._images = CameraImages(
@@ -116,6 +118,7 @@ class DetectorNode(CardboxNode):
     def _on_calibration(self, calibration: Calibration) -> None:
         settings = self.parameters.value
         self._pipeline = SilhouettePipeline(calibration, (settings.width, settings.height))
+        self._pitch.restart()
         self._person.restart()
 
     def _on_image(self, header: Header, full: ImageArray, sent_ns: int) -> None:
@@ -131,6 +134,8 @@ class DetectorNode(CardboxNode):
         found = self._person(image)
         self._took_ms.append(1e3 * (time.perf_counter() - began_s))
         self._send_points(header, found, pipeline)
+        if found is not None:
+            self._pitch.see(found, pipeline.camera)
         if self._silhouettes is not None:
             self._silhouettes.send_image(header, image)
             nobody = np.zeros(image.shape[:2], np.uint8)

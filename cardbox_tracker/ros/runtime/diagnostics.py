@@ -19,6 +19,7 @@ from rclpy.node import Node
 from rclpy.qos import QoSProfile
 
 from cardbox_tracker.camera.stamps import WINDOW, StreamStatistics
+from cardbox_tracker.common.errors import plain
 from cardbox_tracker.ros.runtime import qos
 from cardbox_tracker.ros.runtime.log_limit import LogLimit
 
@@ -89,18 +90,21 @@ class NodeDiagnostics:
 
     def wait_for(self, text: str) -> None:
         """Report that the node publishes nothing until ``text`` arrives."""
+        text = plain(text)
         self._waiting, self._problem = text, ""
         if self._log.allows(WAITING, text):
             self._node.get_logger().info(f"waiting for {text}")
 
     def problem(self, text: str, kind: str = ERROR) -> None:
         """Report an error until :meth:`working`; errors of one ``kind`` share a log limit."""
+        text = plain(text)
         self._problem, self._kind = text, kind
         if self._log.allows(kind, text):
             self._node.get_logger().error(text)
 
     def say(self, kind: str, text: str, *, warning: bool = False) -> None:
         """Log an event that other programs can cause at any rate, within the log limit."""
+        text = plain(text)
         if self._log.allows(kind, text):
             # rclpy allows only one level per line of code.
             if warning:
@@ -121,6 +125,7 @@ class NodeDiagnostics:
 
     def warn(self, text: str) -> None:
         """Add a permanent warning, such as an incompatible QoS."""
+        text = plain(text)
         if text not in self._warnings:
             self._warnings.append(text)
             self._node.get_logger().warning(text)
@@ -169,6 +174,7 @@ class NodeDiagnostics:
     def _remarks(self) -> list[str]:
         """Return all current warnings, and log each new kind."""
         found = self.input.remarks() | self._slowness() | self.advice()
+        found = {kind: plain(text) for kind, text in found.items()}
         for kind, text in found.items():
             if kind and self._log.allows(kind, kind):
                 self._node.get_logger().warning(text)
