@@ -78,9 +78,10 @@ def start(name: str, main: Callable[[], int]) -> int:
 
 
 def other_package(script: str, package: str, environment: str) -> bool:
-    """Return whether an executable of an environment runs a package from elsewhere.
+    """Return whether an executable of an environment runs another package from elsewhere.
 
-    A sourced colcon workspace does this, because ``PYTHONPATH`` precedes the environment.
+    A sourced colcon workspace does this, because ``PYTHONPATH`` precedes the environment. Where it
+    was built from the same sources, as in the tutorial, nothing is wrong.
 
     Args:
         script: path of the executable.
@@ -90,7 +91,19 @@ def other_package(script: str, package: str, environment: str) -> bool:
     own = os.path.join(environment, os.path.basename(package))
     scripts = os.path.realpath(sysconfig.get_path("scripts"))
     is_of_environment = os.path.realpath(os.path.dirname(script)) == scripts
-    return is_of_environment and os.path.isdir(own) and not os.path.samefile(own, package)
+    if not (is_of_environment and os.path.isdir(own)) or os.path.samefile(own, package):
+        return False
+    return _sources(own) != _sources(package)
+
+
+def _sources(package: str) -> dict[str, bytes]:
+    """Return the content of each source of a package by its path below it."""
+    found = {}
+    for folder, _, names in os.walk(package):
+        for path in (os.path.join(folder, name) for name in names if name.endswith(".py")):
+            with open(path, "rb") as file:
+                found[os.path.relpath(path, package)] = file.read()
+    return found
 
 
 def _run(name: str) -> int:

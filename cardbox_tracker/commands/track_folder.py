@@ -36,7 +36,7 @@ from cardbox_tracker.commands.request import (
 )
 from cardbox_tracker.commands.tracking import track
 from cardbox_tracker.common import interrupts
-from cardbox_tracker.common.errors import CardboxError
+from cardbox_tracker.common.errors import CardboxError, plain
 from cardbox_tracker.common.files import (
     UnreadableFileError,
     claimed_name,
@@ -45,7 +45,7 @@ from cardbox_tracker.common.files import (
 )
 from cardbox_tracker.common.processes import cores, results_of
 from cardbox_tracker.common.progress import SharedProgress, progress_bar, told
-from cardbox_tracker.recordings.folder import SUMMARY, recordings_in
+from cardbox_tracker.recordings.folder import FORMULA, SUMMARY, recordings_in
 from cardbox_tracker.recordings.result_table import check_table
 from cardbox_tracker.recordings.track import TrackSummary
 from cardbox_tracker.tracking.precompile import compile_all
@@ -103,7 +103,7 @@ class Row(NamedTuple):
     @classmethod
     def failed(cls, recording: str, error: Exception) -> Row:
         """Return the row of a recording that cannot be tracked, with the reason in one line."""
-        reason = " ".join(str(error).split())
+        reason = plain(" ".join(str(error).split()))
         if isinstance(error, OSError):
             reason = f"{type(error).__name__}: {reason}"
         elif not isinstance(error, CardboxError):
@@ -111,7 +111,9 @@ class Row(NamedTuple):
                 f"unexpected {type(error).__name__}: {reason}; 'cardbox track' with this recording "
                 "shows more"
             )
-        return cls(recording, FAILED, reason=reason)
+        # Spreadsheets take a path such as =1+1.mp4 for a formula.
+        shown = f"({reason})" if reason.startswith(FORMULA) else reason
+        return cls(recording, FAILED, reason=shown)
 
 
 class Job(NamedTuple):

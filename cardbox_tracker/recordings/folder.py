@@ -15,6 +15,9 @@ from cardbox_tracker.recordings.video_reader import SUFFIXES as VIDEO_ENDINGS
 SUMMARY = "_summary.csv"
 """Name of the summary in a folder of results, by which such folders are left out."""
 
+FORMULA = ("=", "+", "-", "@")
+"""What spreadsheets take for the beginning of a formula."""
+
 _DEEPEST = 50
 
 
@@ -91,5 +94,4 @@ def _found(folder: Path, left_out: Path | None, depth: int) -> Iterator[Path]:
 def _plain(name: str) -> str:
     """Return a name that a table, a terminal and a spreadsheet show as it is."""
     shown = plain(name).replace("\n", "\\n")
-    # Spreadsheets take these for the beginning of a formula.
-    return f"./{shown}" if shown.startswith(("=", "+", "-", "@")) else shown
+    return f"./{shown}" if shown.startswith(FORMULA) else shown

@@ -161,7 +161,7 @@ def _files(program: Sequence[str], port: int) -> Iterator[None]:
                 time.sleep(0.05)
             yield
         finally:
-            process.terminate()
+            process.kill()
 
 
 def _free_port() -> int:

@@ -239,6 +239,22 @@ def test_what_only_the_diagnostics_said_is_logged_once(
     assert "29 % are lost" in [value.value for value in status.values]
 
 
+def test_what_others_wrote_is_bounded_and_has_no_escape_codes(
+    make_node: Callable, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    node = make_node()
+    diagnostics = NodeDiagnostics(node)
+    logged = Logged(node, monkeypatch)
+    foreign = "\x1b[2J" + "x" * 1_000_000
+    diagnostics.advice = lambda: {"frame": foreign}
+    diagnostics.warn(foreign)
+    diagnostics.say("said", foreign)
+    diagnostics.problem(foreign)
+    texts = [*logged.lines, *(value.value for value in diagnostics.status().values)]
+    assert sum(len(text) > 1000 for text in texts) >= 5
+    assert all(len(text) < 3000 and "\x1b" not in text for text in texts)
+
+
 def test_good_images_between_do_not_open_the_log(
     make_node: Callable, monkeypatch: pytest.MonkeyPatch
 ) -> None:
