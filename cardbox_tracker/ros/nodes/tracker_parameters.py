@@ -228,6 +228,11 @@ class TrackerParameters(NodeParameters):
                 "default with several cameras or depth"
             )
         camera_names(self.cameras)
+        if self.stature and len(self.cameras) > 1:
+            raise ValueError(
+                "stature is for one camera; with several, have the person measured instead: "
+                "call initializer/initialize, or give model_file"
+            )
         if 0.0 < self.stature < STATURE_LIMITS_M[0]:
             raise ValueError(
                 f"stature is {self.stature:g} m; expected {STATURE_LIMITS_M[0]:g} to "

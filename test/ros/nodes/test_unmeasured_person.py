@@ -24,6 +24,7 @@ from cardbox_tracker.person.proportions import STATURE_M, body_from_proportions
 from cardbox_tracker.ros.messages.conversions import camera_info_message, image_message
 from cardbox_tracker.ros.nodes.camera_pitch import CameraPitch
 from cardbox_tracker.ros.nodes.tracker_node import TrackerNode
+from cardbox_tracker.ros.nodes.tracker_parameters import TrackerParameters
 from cardbox_tracker.ros.runtime.node import CardboxNode
 
 CAMERA = Camera(160, 120, 150.0, 150.0, 79.5, 59.5)
@@ -81,6 +82,14 @@ def test_the_detectors_pitch_is_used(bus: Any, start: Any) -> None:
     assert node._body.camera_pose.pitch_rad == 0.2
     bus.send("/detector/camera_pitch", Float64(data=float("nan")))
     assert node._body.camera_pose.pitch_rad == 0.2
+
+
+@pytest.mark.parametrize(
+    ("more", "expected"), [({"cameras": ["a", "b"]}, "for one camera"), ({}, "expected 1.1 to 2.2")]
+)
+def test_an_impossible_stature_is_refused(more: dict[str, Any], expected: str) -> None:
+    with pytest.raises(ValueError, match=expected):
+        TrackerParameters(stature=1.8 if more else 0.5, **more).check()
 
 
 def test_without_either_a_measured_body_is_waited_for(bus: Any, start: Any) -> None:
