@@ -34,6 +34,7 @@ class TrackSummary:
         frames_uncertain: number of tracked images whose posture may be wrong.
         remarks: warnings about extrinsics or depth that seem to be wrong.
         body: the body at the end, whose unknown values were fitted.
+        assumptions: what the results rest on, with its numbers and where they are from.
     """
 
     frames: int
@@ -43,6 +44,7 @@ class TrackSummary:
     frames_uncertain: int = 0
     remarks: tuple[str, ...] = ()
     body: BodyModel | None = None
+    assumptions: tuple[str, ...] = ()
 
 
 def track_recording(
