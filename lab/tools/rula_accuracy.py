@@ -118,16 +118,17 @@ def score_errors(
             return
         body[:] = [tracker.body]
         normal = normal_postures(estimate.posture, estimate.posture_stddev, SAMPLES, rng)
-        particles, neck = tracker.sample(estimate, SAMPLES, rng), (None, None)
-        if estimate.neck is not None and estimate.neck_stddev is not None:
-            neck = estimate.neck, estimate.neck_stddev
+        particles = tracker.sample(estimate, SAMPLES, rng)
+        angles, deviations = neck = estimate.neck, estimate.neck_stddev
         for task, rula in tasks.items():
             drawn = [
                 sampled_scores(tracker.body, estimate.posture, postures, neck, rula, rng)[0]
                 for postures in (normal, particles)
             ]
             mean = np.eye(HIGHEST)[drawn[0].of_mean - 1]
-            necks = None if neck[0] is None else neck_samples(*neck, SAMPLES, rng)
+            necks = None
+            if angles is not None and deviations is not None:
+                necks = neck_samples(angles, deviations, SAMPLES, rng)
             whole = score_distribution(tracker.body, particles, rula, necks)
             ways = ScoreDistribution(mean, mean, mean), *drawn, whole
             seen = found.setdefault(stamp_ns, {})

@@ -58,7 +58,8 @@ def video_file(path: str | os.PathLike[str], fps: float) -> Iterator[Callable[[I
                         f"cannot write the video {name}: {error}; give another name or folder"
                     ) from None
             fits = image.shape[1::-1] == size
-            write(image if fits else cv2.resize(image, size, interpolation=cv2.INTER_AREA))
+            fitting = image if fits else cv2.resize(image, size, interpolation=cv2.INTER_AREA)
+            write(np.asarray(fitting, np.uint8))
 
         yield add
 
@@ -92,9 +93,7 @@ def _encoder(
     with av.open(str(path), "w", options={"movflags": "faststart"}) as container:
         stream = container.add_stream("h264", Fraction(fps).limit_denominator(1000), _H264)
         stream.width, stream.height = size
-        yield lambda image: container.mux(
-            stream.encode(av.VideoFrame.from_ndarray(np.asarray(image, np.uint8), "bgr24"))
-        )
+        yield lambda image: container.mux(stream.encode(av.VideoFrame.from_ndarray(image, "bgr24")))
         container.mux(stream.encode())
 
 
