@@ -32,6 +32,7 @@ from cardbox_tracker.applications.ergonomics.rula import (
 )
 from cardbox_tracker.applications.evaluation.angles import comparable, true_postures
 from cardbox_tracker.applications.evaluation.marks import replaced
+from cardbox_tracker.applications.evaluation.metrics import SHOULDERS
 from cardbox_tracker.applications.evaluation.people import torso_angles
 from cardbox_tracker.applications.evaluation.session import RecordedSession, load_session
 from cardbox_tracker.applications.evaluation.tracking import (
@@ -195,6 +196,8 @@ def row(name: str, task: str, way: str, error: ScoreError) -> str:
 def load(folder: Path) -> RecordedSession:
     """Return a session; that of a real person with one camera, and the torso of hips and shoulders.
 
+    A trunk whose hips are not seen is taken as upright.
+
     Raises:
         CardboxError: the folder is not a session.
     """
@@ -202,6 +205,10 @@ def load(folder: Path) -> RecordedSession:
     if session.has_references:
         return session
     session = load_session(folder, session.truth.cameras[:1])
+    if session.hips_m is None:
+        pitch_rad = np.radians(session.truth.pitch_deg)
+        down = np.array([0.0, np.cos(pitch_rad), np.sin(pitch_rad)])
+        session = replace(session, hips_m=session.keypoints_m[:, SHOULDERS].mean(axis=1) + down)
     return replace(session, torso_rad=torso_angles(session))
 
 
