@@ -34,7 +34,7 @@ class Quality:
 
     def __init__(self) -> None:
         """Begin without an image."""
-        self._images = self._sure = self._sure_hands = 0
+        self._images = self._sure = self._sure_hands = self._sure_places = 0
         self._moments: list[_Moment] = []
         self._angles_rad: list[float] = []
         self._hands_m: list[float] = []
@@ -46,28 +46,31 @@ class Quality:
         states = estimate.keypoint_states or ()
         sure = [states[hand] == KeypointState.TRACKED for hand in _HANDS] if states else []
         self._sure_hands += sum(sure)
+        place = estimate.place
+        self._sure_places += place is not None and place.state == KeypointState.TRACKED
         if estimate.state in (UNCERTAIN, LOST):
             self._moments.append(_moment(frame.time_s, estimate))
         if estimate.posture is None or estimate.posture_stddev is None:
             return
         self._angles_rad += estimate.posture_stddev[_ANGLES].tolist()
         state = np.concatenate([estimate.posture, place_of(estimate)])
-        place = np.zeros(2) if estimate.offset_stddev_m is None else estimate.offset_stddev_m
-        moved = state + np.diag(np.concatenate([estimate.posture_stddev, place]))
+        moving = np.zeros(2) if estimate.offset_stddev_m is None else estimate.offset_stddev_m
+        moved = state + np.diag(np.concatenate([estimate.posture_stddev, moving]))
         points_m = pose(tracker.body, np.vstack([state, moved])).keypoints_m[:, _HANDS]
         self._hands_m += np.linalg.norm(points_m[1:] - points_m[0], axis=(0, 2)).tolist()
 
     def lines(self) -> Iterator[str]:
         """Yield shares of sure images and hands, typical deviations, and the worst moments.
 
-        A hand is sure in the state ``tracked``. Typical is the median over the images with a
-        posture; a hand moves with the deviations of all joints and of the place.
+        Hands and distances are sure in the state ``tracked``. Typical is the median over the images
+        with a posture; a hand moves with the deviations of all joints and of the place.
         """
         if not self._images:
             return
         yield (
             f"sure: {self._sure / self._images:.0%} of {self._images} images, "
-            f"{self._sure_hands / (2 * self._images):.0%} of the hands in them"
+            f"{self._sure_hands / (2 * self._images):.0%} of the hands in them, "
+            f"{self._sure_places / self._images:.0%} of the distances (to 0.3 m)"
         )
         if self._angles_rad:
             yield (

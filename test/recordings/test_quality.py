@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any, cast
 
 import numpy as np
@@ -11,6 +12,7 @@ from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.skeleton import JOINT_NAMES, KeypointState
 from cardbox_tracker.recordings.quality import Quality
 from cardbox_tracker.tracking.estimate import LOST, NO_PERSON, TRACKING, UNCERTAIN, Estimate
+from cardbox_tracker.tracking.place import Place
 
 SURE, UNSURE = KeypointState.TRACKED, KeypointState.UNCERTAIN
 BODY = BodyModel()
@@ -44,12 +46,14 @@ def lines(*images: tuple[float, Estimate]) -> list[str]:
 
 def test_sure_images_and_hands_are_counted() -> None:
     share, deviation, moments = lines(
-        (0.0, estimate(TRACKING)),
-        (1.0, estimate(UNCERTAIN, UNSURE, 0.3)),
+        (0.0, replace(estimate(TRACKING), place=Place(np.zeros(3), 0.01, "given"))),
+        (1.0, replace(estimate(UNCERTAIN, UNSURE, 0.3), place=Place(np.zeros(3), 0.9, "given"))),
         (5.0, Estimate(LOST)),
         (9.0, Estimate(NO_PERSON)),
     )
-    assert share == "sure: 25% of 4 images, 38% of the hands in them"
+    assert share == (
+        "sure: 25% of 4 images, 38% of the hands in them, 25% of the distances (to 0.3 m)"
+    )
     assert deviation.startswith("typical standard deviation: 8 degrees of an angle, ")
     assert moments == "least sure, look at them: 1.0 s (right hand), 5.0 s (lost)"
 
