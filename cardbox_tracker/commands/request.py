@@ -135,12 +135,14 @@ class PersonRequest:
         start_s: seconds from the recording's start at which tracking starts.
         is_pitch_given: whether ``body`` has the camera's pitch; else it is to be found from the
             person who stands upright.
+        stature_m: the stature that is given; None with ``model``.
     """
 
     body: BodyModel
     model: Path | None
     start_s: float
     is_pitch_given: bool
+    stature_m: float | None = None
 
 
 TABLES = ("csv", "parquet")
@@ -586,7 +588,7 @@ def _person(options: argparse.Namespace, problems: Problems) -> PersonRequest:
             problems.miss("--start T", "with --model, the person stands as for --front at T")
         body = problems.caught(lambda: load_body_model(options.model), body)
     is_pitch_given = options.model is not None or pitch_deg is not None
-    return PersonRequest(body, options.model, options.start or 0.0, is_pitch_given)
+    return PersonRequest(body, options.model, options.start or 0.0, is_pitch_given, options.stature)
 
 
 def _config(options: argparse.Namespace, preset: TrackerConfig) -> TrackerConfig:

@@ -35,6 +35,7 @@ class TrackSummary:
         remarks: warnings about extrinsics or depth that seem to be wrong.
         body: the body at the end, whose unknown values were fitted.
         accounts: for each camera, what was used of it and what was left out.
+        assumptions: what the results rest on, with its numbers and where they are from.
     """
 
     frames: int
@@ -45,6 +46,7 @@ class TrackSummary:
     remarks: tuple[str, ...] = ()
     body: BodyModel | None = None
     accounts: tuple[str, ...] = ()
+    assumptions: tuple[str, ...] = ()
 
 
 def track_recording(
