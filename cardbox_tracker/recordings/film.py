@@ -6,6 +6,7 @@ from pathlib import Path
 
 from cardbox_tracker.camera.camera import Calibration
 from cardbox_tracker.common.errors import BagError
+from cardbox_tracker.recordings.focal_length import equivalent_mm
 from cardbox_tracker.recordings.given_camera import GivenCamera
 from cardbox_tracker.recordings.image_recording import working_size
 
@@ -45,16 +46,26 @@ class Film:
         return self.path.name
 
     def calibration(self, camera: str | None = None) -> Calibration:
-        """Return the given calibration.
+        """Return the given calibration, or what the file tells, or that of a usual camera.
 
         Raises:
             BagError: a camera is named.
-            CameraError: no calibration is given, or it does not fit the images.
+            CameraError: the given calibration does not fit the images.
         """
         self.image_topic(camera)
-        return self._given.calibrated(self.path, *self._size)
+        return self._given.calibrated(self.path, *self._size, file=self._file)
 
     @property
     def remarks(self) -> list[str]:
         """Warnings about the field of view."""
-        return self._given.remarks(*self._size)
+        return self._given.remarks(self._file, *self._size)
+
+    @property
+    def has_guessed_lens(self) -> bool:
+        """Whether neither the user nor the file tells the field of view."""
+        return not self._given.is_calibrated and equivalent_mm(self._file) is None
+
+    @property
+    def _file(self) -> Path:
+        """The file that may tell the field of view."""
+        return self.path

@@ -3,17 +3,22 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from math import atan, degrees, radians, tan
+from math import atan, degrees, hypot, radians, tan
 from pathlib import Path
 
 from cardbox_tracker.camera.calibration_file import load_calibration
 from cardbox_tracker.camera.camera import Calibration
 from cardbox_tracker.common.errors import CameraError
+from cardbox_tracker.recordings.focal_length import FILM_DIAGONAL_MM, equivalent_mm
 
 # Largest difference of the aspect ratios of a calibration and of the images.
 _ASPECT = 0.02
 # No usual phone held upright has so large a field of view across its image, degrees.
 _UPRIGHT_DEG = 55.0
+FOV_HINT = "webcams 60 to 78, phones 60 to 75 held sideways, 36 to 46 upright"
+"""Usual fields of view across the width of an image, degrees, for texts."""
+# Field of view along the longer side that is assumed where nothing tells it, degrees.
+_GUESSED_DEG = 65.0
 
 
 @dataclass(frozen=True)
@@ -49,8 +54,18 @@ class GivenCamera:
         elif self.fov_deg is not None:
             Calibration.of_fov(4, 3, self.fov_deg)
 
-    def calibrated(self, path: Path, width: int, height: int, frame_id: str = "") -> Calibration:
+    def calibrated(
+        self, path: Path, width: int, height: int, frame_id: str = "", file: Path | None = None
+    ) -> Calibration:
         """Return the calibration of images of ``width`` x ``height`` px in the recording ``path``.
+
+        Args:
+            path: the recording, for texts.
+            width: of its images, px.
+            height: of its images, px.
+            frame_id: name of the optical frame.
+            file: film or image that may tell the field of view if none is given; if it does not,
+                a usual one is assumed. None if there is no such file.
 
         Raises:
             CameraError: neither field of view nor calibration is given, or they do not fit.
@@ -67,25 +82,47 @@ class GivenCamera:
                 )
         elif self.fov_deg is not None:
             found = Calibration.of_fov(width, height, self.fov_deg)
+        elif file is not None:
+            found = Calibration.of_fov(width, height, _fov_deg(file, width, height)[0])
         else:
             raise CameraError(
                 f"{path} does not tell the camera's field of view; give --fov DEG, across the "
-                "width of the image (webcams 60 to 78, phones 60 to 70 held sideways, 36 to 43 "
-                "upright), or --calibration FILE of camera_calibration"
+                f"width of the image ({FOV_HINT}), or --calibration FILE of camera_calibration"
             )
         return self.rolled(replace(found, frame_id=frame_id or found.frame_id))
 
-    def remarks(self, width: int, height: int) -> list[str]:
-        """Return a remark if the field of view seems to be that of the longer side."""
-        if self.fov_deg is None or height <= width or self.fov_deg < _UPRIGHT_DEG:
+    def remarks(self, file: Path, width: int, height: int) -> list[str]:
+        """Return what was assumed of the field of view of a film or image, or seems to be wrong."""
+        if self.calibration is not None:
+            return []
+        if self.fov_deg is None:
+            fov_deg, is_told = _fov_deg(file, width, height)
+            if is_told:
+                return [f"the file tells the field of view: {fov_deg:.0f} degrees across"]
+            return [
+                f"nothing tells the camera's field of view: {fov_deg:.0f} degrees across are "
+                "assumed, so distances and sizes may be wrong by a sixth; give --fov DEG "
+                f"({FOV_HINT})"
+            ]
+        if height <= width or self.fov_deg < _UPRIGHT_DEG:
             return []
         tall_deg = 2 * degrees(atan(tan(radians(self.fov_deg) / 2) * height / width))
         return [
             f"--fov {self.fov_deg:g} is across the width of these upright images, which makes "
-            f"{tall_deg:.0f} degrees from top to bottom; a phone has 60 to 70 there, for which "
-            "--fov is 36 to 43"
+            f"{tall_deg:.0f} degrees from top to bottom; a phone has 60 to 75 there, for which "
+            "--fov is 36 to 46"
         ]
 
     def rolled(self, calibration: Calibration) -> Calibration:
         """Return the calibration with the given roll."""
         return replace(calibration, roll_rad=self.roll_rad) if self.roll_rad else calibration
+
+
+def _fov_deg(file: Path, width: int, height: int) -> tuple[float, bool]:
+    """Return the field of view across an image, degrees, and whether the file tells it."""
+    focal_mm = equivalent_mm(file)
+    if focal_mm is None:
+        focal = max(width, height) / 2 / tan(radians(_GUESSED_DEG) / 2)
+    else:
+        focal = focal_mm / FILM_DIAGONAL_MM * hypot(width, height)
+    return 2 * degrees(atan(width / 2 / focal)), focal_mm is not None

@@ -47,6 +47,7 @@ class ImageFolder(Film):
         """Store the path and the camera; the folder is read on entry."""
         super().__init__(path, camera)
         self._files: list[Path] = []
+        self._first = path
 
     def __enter__(self) -> ImageFolder:
         """Read the names of the images, and the size of the first one that can be decoded."""
@@ -59,6 +60,7 @@ class ImageFolder(Film):
                 reason = reason or f" ({error})"
                 continue
             self._set_size(width, height)
+            self._first = file
             break
         else:
             raise BagError(
@@ -67,6 +69,10 @@ class ImageFolder(Film):
             )
         self.duration_s = (len(self._files) - 1) / (self._given.fps or FPS)
         return self
+
+    @property
+    def _file(self) -> Path:
+        return self._first
 
     def images(self, topic: str | None = None) -> Iterator[RecordedImage]:
         """Yield the images in order, at the given rate."""

@@ -17,6 +17,7 @@ from cardbox_tracker.common.errors import BagError, CardboxError, EncodingError
 from cardbox_tracker.detectors.detector import Detector, FindPoints
 from cardbox_tracker.detectors.image_points import ImagePoints
 from cardbox_tracker.detectors.point_table import PointTable
+from cardbox_tracker.recordings.film import Film
 from cardbox_tracker.recordings.image_recording import ImageRecording, RecordedImage
 from cardbox_tracker.segmentation.background_config import BackgroundConfig
 from cardbox_tracker.segmentation.learning import Learning
@@ -200,6 +201,11 @@ class SilhouetteSource:
             self._points = points.read(camera, self._pipeline.calibration, size)
 
     @property
+    def has_guessed_lens(self) -> bool:
+        """Whether nothing tells the camera's field of view."""
+        return isinstance(self._bag, Film) and self._bag.has_guessed_lens
+
+    @property
     def path(self) -> Path:
         """The recording."""
         return self._bag.path
@@ -281,9 +287,11 @@ class SilhouetteSource:
 
     def full_picture(self, frame: RecordedFrame) -> NDArray[np.uint8]:
         """Return the picture of a frame, undistorted, at the resolution of the recording."""
-        if frame.recorded is None:
-            return frame.picture
-        image = frame.recorded.as_sent
+        return frame.picture if frame.recorded is None else self.undistorted(frame.recorded)
+
+    def undistorted(self, recorded: RecordedImage) -> NDArray[np.uint8]:
+        """Return an image, undistorted, at the resolution of the recording."""
+        image = recorded.as_sent
         height, width = image.shape[:2]
         if self._full_size != (width, height):
             self._full_size = width, height

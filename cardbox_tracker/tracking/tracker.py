@@ -70,6 +70,7 @@ class Tracker:
         make_filter: MakeFilter | None = None,
         others: Sequence[OtherCamera] = (),
         corrector: Corrector | None = None,
+        is_guess: bool = False,
     ) -> None:
         """Set up for ``body``; the camera gets the pitch of the body model.
 
@@ -84,6 +85,8 @@ class Tracker:
             others: further cameras; they need the filter ``whole_body``.
             corrector: changes the fitted state of each frame before it becomes the result; joints
                 are kept within their limits. It needs the filter ``whole_body``.
+            is_guess: whether the camera or the person's stature is a guess, so that estimates are
+                at best ``uncertain``.
 
         Raises:
             CameraError: the person was not measured in front of one of ``others``.
@@ -94,6 +97,7 @@ class Tracker:
         self.config = config or TrackerConfig()
         self._rng = rng or np.random.default_rng(0)
         self._make_filter, self._corrector = make_filter, corrector
+        self._is_guess = is_guess
         self._others = tuple(others)
         if (others or corrector) and (make_filter or not self.config.has_several_views):
             what = "several cameras need" if others else "a corrector needs"
@@ -268,8 +272,6 @@ class Tracker:
         if estimate.posture is not None:
             there = estimate.placed(self.body)
             self._fitting.compare(silhouette, image, there, estimate.posture)
-        if self.body.unknown and estimate.state == TRACKING:
-            return replace(estimate, state=UNCERTAIN)
         return estimate
 
     def sample(self, estimate: Estimate, count: int, rng: np.random.Generator) -> FloatArray:
