@@ -45,6 +45,7 @@ def track(
         CardboxError: the recording cannot be read, or a result cannot be written.
     """
     from cardbox_tracker.common.progress import progress_bar
+    from cardbox_tracker.person.model import PLACEMENT
     from cardbox_tracker.person.model_file import save_body_model
     from cardbox_tracker.person.proportions import USUAL_STATURE_M, USUAL_STDDEV_M
     from cardbox_tracker.recordings.silhouettes import TimeSpan
@@ -59,6 +60,11 @@ def track(
         # The person may come later.
         found = placed(recording, standing, start_s + _COMES_WITHIN_S, person)
         recording, body = found.recording, body.with_values(camera_pitch_rad=found.pitch_rad)
+        if found.distance is not None and "distance_m" in body.unknown:
+            stature_m = person.stature_m or USUAL_STATURE_M
+            lowest_m, highest_m, *_ = PLACEMENT["distance_m"]
+            distance_m = min(max(found.distance * stature_m, lowest_m), highest_m)
+            body = body.with_values(distance_m=distance_m)
         is_guess = not found.is_sure or person.stature_m is None
         if person.stature_m is None:
             print_remarks(
@@ -121,11 +127,13 @@ class Placement(NamedTuple):
         pitch_rad: downward pitch, as it is given or found.
         recording: the recording with the camera's roll, unless it is given.
         is_sure: whether the pitch is given or was found surely enough for ``tracking``.
+        distance: of the person who stands upright, statures; None without one.
     """
 
     pitch_rad: float
     recording: RecordingRequest
     is_sure: bool = True
+    distance: float | None = None
 
 
 def placed(
@@ -194,9 +202,10 @@ def placed(
         )
         recording = replace(recording, camera=replace(camera, roll_rad=tilt.roll_rad))
     print_remarks(remarks)
+    distance = None if found.standing is None else found.standing.distance
     if given_rad is not None:
-        return Placement(given_rad, recording)
-    return Placement(tilt.pitch_rad, recording, deviation < _UNSURE_DEG)
+        return Placement(given_rad, recording, distance=distance)
+    return Placement(tilt.pitch_rad, recording, deviation < _UNSURE_DEG, distance)
 
 
 def _distance_remarks(person: PersonRequest, standing: StandingCamera) -> list[str]:

@@ -52,6 +52,9 @@ FILTERS: MappingProxyType[str, MakeFilter] = MappingProxyType(
 )
 """Filter classes by the values of ``TrackerConfig.filter``."""
 
+# A model that overlaps the silhouette less than this is somewhere else.
+_TOUCHING_IOU = 0.05
+
 
 class Tracker:
     """Tracks one measured person (paper, algorithm "Online Motion Tracking").
@@ -260,7 +263,9 @@ class Tracker:
         if self._fitting is None:
             return self._follow(frames)
         silhouette, image = frames[0].silhouette, frames[0].image
-        fitted = self._fitting.before(silhouette, image)
+        points = frames[0].points
+        is_detected = points is not None and points.are_certain
+        fitted = self._fitting.before(silhouette, image, is_detected)
         if fitted is not None:
             self._use(fitted, CompiledSilhouette(fitted, self.camera))
             again = self._silhouette.frame(silhouette)
@@ -300,6 +305,13 @@ class Tracker:
         if not fit.is_finite:
             # Without a reset, values that are not finite would stay in the particles.
             self.reset()
+            return Estimate(LOST)
+        is_detected = any(frame.points is not None for frame in frames)
+        if self.config.has_several_views and is_detected and fit.iou < _TOUCHING_IOU:
+            # The person is there, but not where the model is.
+            if self.config.relocalize:
+                self._before = None
+                self._filter.forget()
             return Estimate(LOST)
         self._before, self._seen_iou = np.zeros(N_STATE), fit.seen_iou
         self._before[: len(fit.seen)] = fit.seen
