@@ -9,10 +9,10 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, NamedTuple
 
 from cardbox_tracker.commands.arguments import print_remarks
+from cardbox_tracker.person.model import CameraPose
 
 if TYPE_CHECKING:
     from cardbox_tracker.commands.request import PersonRequest, RecordingRequest, TrackingRequest
-    from cardbox_tracker.measuring.standing_camera import StandingCamera
     from cardbox_tracker.recordings.recording import Recording
     from cardbox_tracker.recordings.silhouettes import TimeSpan
     from cardbox_tracker.recordings.track import Observer, TrackSummary
@@ -21,11 +21,9 @@ _STANDING_S = 1.0
 """Time for which a person of a given stature stands upright at the start, seconds."""
 _COMES_WITHIN_S = 30.0
 """Time after the start within which a person of a given stature is sought, seconds."""
-# What is given contradicts what is found from this many standard deviations on, and the pitch also
-# from this difference on, degrees. A pitch of this deviation is too unsure for ``tracking``.
-_SURE_STDDEVS, _LEAST_DEG, _UNSURE_DEG = 2.5, 6.0, 6.0
-# Standard deviation of people's lengths, of which distances are multiples, as a share of them.
-_PEOPLE = 0.06
+# A given pitch contradicts the one found from this many standard deviations on, and from this
+# difference on, degrees.
+_SURE_STDDEVS, _LEAST_DEG = 2.5, 6.0
 
 
 def track(
@@ -52,21 +50,24 @@ def track(
     from cardbox_tracker.recordings.track import track_recording
 
     recording, person, body = request.recording, request.person, request.person.body
-    start_s, is_guess = person.start_s, False
+    start_s = person.start_s
     if person.model is not None and body.doubt:
         print(f"{person.model}: {body.doubt}")
     if person.model is None:
         standing = TimeSpan(start_s, start_s + _STANDING_S)
         # The person may come later.
         found = placed(recording, standing, start_s + _COMES_WITHIN_S, person)
-        recording, body = found.recording, body.with_values(camera_pitch_rad=found.pitch_rad)
+        recording = found.recording
+        if not person.is_pitch_given:
+            tilt = {"camera_pitch_rad": found.pitch_rad, "pitch_stddev_rad": found.stddev_rad}
+            body = body.with_values(**tilt)
         if found.distance is not None and "distance_m" in body.unknown:
             stature_m = person.stature_m or USUAL_STATURE_M
             lowest_m, highest_m, *_ = PLACEMENT["distance_m"]
             distance_m = min(max(found.distance * stature_m, lowest_m), highest_m)
             body = body.with_values(distance_m=distance_m)
-        is_guess = not found.is_sure or person.stature_m is None
         if person.stature_m is None:
+            body = body.with_values(stature_stddev=USUAL_STDDEV_M / USUAL_STATURE_M)
             print_remarks(
                 [
                     f"the stature is taken as that of most adults, {USUAL_STATURE_M:g} m (standard "
@@ -77,7 +78,6 @@ def track(
     with recording.open() as source:
         early = source.first.remarks
         print_remarks(early)
-        is_guess |= source.first.has_guessed_lens
         total_s = max(1e-9, source.first.duration_s - start_s)
         with ExitStack() as stack:
             observers = (*_writers(request, source, stack), *observers)
@@ -90,7 +90,6 @@ def track(
                 start_s,
                 request.files.table,
                 (*observers, lambda frame, *_: advance((frame.time_s - start_s) / total_s)),
-                is_guess,
             )
         remarks = [remark for remark in source.first.remarks if remark not in early]
     if show is None:
@@ -126,13 +125,13 @@ class Placement(NamedTuple):
     Attributes:
         pitch_rad: downward pitch, as it is given or found.
         recording: the recording with the camera's roll, unless it is given.
-        is_sure: whether the pitch is given or was found surely enough for ``tracking``.
+        stddev_rad: standard deviation of a pitch that was found.
         distance: of the person who stands upright, statures; None without one.
     """
 
     pitch_rad: float
     recording: RecordingRequest
-    is_sure: bool = True
+    stddev_rad: float = CameraPose.pitch_stddev_rad
     distance: float | None = None
 
 
@@ -193,8 +192,6 @@ def placed(
             f"camera's pitch is taken as that of most cameras, {number}; give --camera-pitch-deg "
             "if it is known"
         )
-    if person is not None and found.standing is not None:
-        remarks += _distance_remarks(person, found.standing)
     if tilt.roll_rad and camera.roll_rad is None and len(recording.cameras) < 2:
         remarks.append(
             f"camera roll {math.degrees(tilt.roll_rad):.1f} degrees, found in the same way: the "
@@ -205,19 +202,4 @@ def placed(
     distance = None if found.standing is None else found.standing.distance
     if given_rad is not None:
         return Placement(given_rad, recording, distance=distance)
-    return Placement(tilt.pitch_rad, recording, deviation < _UNSURE_DEG, distance)
-
-
-def _distance_remarks(person: PersonRequest, standing: StandingCamera) -> list[str]:
-    """Return a remark if the given distance contradicts the size of the person in the image."""
-    if person.stature_m is None or "distance_m" in person.body.unknown:
-        return []
-    given_m, found_m = person.body.placement.distance_m, standing.distance * person.stature_m
-    deviation = math.hypot(_PEOPLE, standing.distance_stddev)
-    if abs(math.log(given_m / found_m)) < _SURE_STDDEVS * deviation:
-        return []
-    return [
-        f"--distance {given_m:g} is used, but a person of {person.stature_m:g} m of this size in "
-        f"the image is {found_m:.1f} m away (standard deviation {deviation * found_m:.1f}); check "
-        "--distance, --stature, --fov and --camera-pitch-deg"
-    ]
+    return Placement(tilt.pitch_rad, recording, tilt.pitch_stddev_rad, distance)

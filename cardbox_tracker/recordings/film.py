@@ -6,7 +6,6 @@ from pathlib import Path
 
 from cardbox_tracker.camera.camera import Calibration
 from cardbox_tracker.common.errors import BagError
-from cardbox_tracker.recordings.focal_length import equivalent_mm
 from cardbox_tracker.recordings.given_camera import GivenCamera
 from cardbox_tracker.recordings.image_recording import working_size
 
@@ -59,11 +58,6 @@ class Film:
     def remarks(self) -> list[str]:
         """Warnings about the field of view."""
         return self._given.remarks(self._file, *self._size)
-
-    @property
-    def has_guessed_lens(self) -> bool:
-        """Whether neither the user nor the file tells the field of view."""
-        return not self._given.is_calibrated and equivalent_mm(self._file) is None
 
     @property
     def _file(self) -> Path:

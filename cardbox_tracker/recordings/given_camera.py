@@ -19,6 +19,8 @@ FOV_HINT = "webcams 60 to 78, phones 60 to 75 held sideways, 36 to 46 upright"
 """Usual fields of view across the width of an image, degrees, for texts."""
 # Field of view along the longer side that is assumed where nothing tells it, degrees.
 _GUESSED_DEG = 65.0
+# Relative standard deviation of the focal length of such a guess.
+_GUESSED_STDDEV = 0.13
 
 
 @dataclass(frozen=True)
@@ -83,7 +85,10 @@ class GivenCamera:
         elif self.fov_deg is not None:
             found = Calibration.of_fov(width, height, self.fov_deg)
         elif file is not None:
-            found = Calibration.of_fov(width, height, _fov_deg(file, width, height)[0])
+            fov_deg, is_told = _fov_deg(file, width, height)
+            found = Calibration.of_fov(width, height, fov_deg)
+            if not is_told:
+                found = replace(found, focal_stddev=_GUESSED_STDDEV)
         else:
             raise CameraError(
                 f"{path} does not tell the camera's field of view; give --fov DEG, across the "

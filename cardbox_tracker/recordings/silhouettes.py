@@ -17,7 +17,6 @@ from cardbox_tracker.common.errors import BagError, CardboxError, EncodingError
 from cardbox_tracker.detectors.detector import Detector, FindPoints
 from cardbox_tracker.detectors.image_points import ImagePoints
 from cardbox_tracker.detectors.point_table import PointTable
-from cardbox_tracker.recordings.film import Film
 from cardbox_tracker.recordings.image_recording import ImageRecording, RecordedImage
 from cardbox_tracker.segmentation.background_config import BackgroundConfig
 from cardbox_tracker.segmentation.learning import Learning
@@ -199,11 +198,6 @@ class SilhouetteSource:
         elif isinstance(points, PointTable):
             size = self.camera.width, self.camera.height
             self._points = points.read(camera, self._pipeline.calibration, size)
-
-    @property
-    def has_guessed_lens(self) -> bool:
-        """Whether nothing tells the camera's field of view."""
-        return isinstance(self._bag, Film) and self._bag.has_guessed_lens
 
     @property
     def path(self) -> Path:

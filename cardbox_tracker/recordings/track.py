@@ -53,7 +53,6 @@ def track_recording(
     start_s: float,
     table: Path | None = None,
     observers: tuple[Observer, ...] = (),
-    is_guess: bool = False,
 ) -> TrackSummary:
     """Track every image from ``start_s`` on.
 
@@ -66,14 +65,12 @@ def track_recording(
             reference posture.
         table: file to write with a row for each image, see :func:`~.result_table.result_table`.
         observers: called after each image, such as a progress bar or a bag writer.
-        is_guess: see :class:`Tracker`.
 
     Raises:
         CardboxError: no image lies after ``start_s``, or a file cannot be written.
     """
     rng = np.random.default_rng(seed)
-    camera, others = recording.first.camera, recording.others
-    tracker = Tracker(body, camera, config, rng, others=others, is_guess=is_guess)
+    tracker = Tracker(body, recording.first.camera, config, rng, others=recording.others)
     costs: list[int] = []
     ious: list[float] = []
     frames = frames_uncertain = 0

@@ -54,6 +54,8 @@ FILTERS: MappingProxyType[str, MakeFilter] = MappingProxyType(
 
 # A model that overlaps the silhouette less than this is somewhere else.
 _TOUCHING_IOU = 0.05
+# Standard deviation of a pitch that is too unsure for ``tracking``, rad.
+_UNKNOWN_TILT_RAD = np.radians(6.0)
 
 
 class Tracker:
@@ -73,13 +75,13 @@ class Tracker:
         make_filter: MakeFilter | None = None,
         others: Sequence[OtherCamera] = (),
         corrector: Corrector | None = None,
-        is_guess: bool = False,
     ) -> None:
         """Set up for ``body``; the camera gets the pitch of the body model.
 
         Args:
             body: the person. Unknown values are fitted while tracking, which replaces the attribute
-                ``body``. Until then, estimates are at best ``uncertain``.
+                ``body``. Until then, or if the camera's pitch is not known to 6 degrees, estimates
+                are at best ``uncertain``.
             camera: working camera, of the silhouettes' size.
             config: settings; the paper's by default.
             rng: source of all noise; seeded with 0 by default.
@@ -88,8 +90,6 @@ class Tracker:
             others: further cameras; they need the filter ``whole_body``.
             corrector: changes the fitted state of each frame before it becomes the result; joints
                 are kept within their limits. It needs the filter ``whole_body``.
-            is_guess: whether the camera or the person's stature is a guess, so that estimates are
-                at best ``uncertain``.
 
         Raises:
             CameraError: the person was not measured in front of one of ``others``.
@@ -100,7 +100,6 @@ class Tracker:
         self.config = config or TrackerConfig()
         self._rng = rng or np.random.default_rng(0)
         self._make_filter, self._corrector = make_filter, corrector
-        self._is_guess = is_guess
         self._others = tuple(others)
         if (others or corrector) and (make_filter or not self.config.has_several_views):
             what = "several cameras need" if others else "a corrector needs"
@@ -235,6 +234,9 @@ class Tracker:
                 )
         frames = self._frames_of(observations)
         estimate = self._placed(frames[0], self._track(frames))
+        is_tilt_unknown = self.body.camera_pose.pitch_stddev_rad > _UNKNOWN_TILT_RAD
+        if estimate.state == TRACKING and (self.body.unknown or is_tilt_unknown):
+            estimate = replace(estimate, state=UNCERTAIN)
         return self._head.see(frames[0], estimate)
 
     def _placed(self, frame: Frame, estimate: Estimate) -> Estimate:
