@@ -127,7 +127,8 @@ def film_figures(
         body: the body at the end.
     """
     by_stamp = dict(zip(film.stamps_ns, estimates, strict=True))
-    run = run_of(film.session, body, "", by_stamp)
+    # The time of an image is not measured.
+    run = run_of(film.session, body, "", by_stamp, [float("nan")])
     found = people_figures(film.session, run)
     if body is not None:
         found["pitch_found_deg"] = float(np.degrees(body.camera_pose.pitch_rad))
