@@ -8,10 +8,11 @@ from __future__ import annotations
 import argparse
 import os
 from concurrent.futures import ProcessPoolExecutor
+from functools import partial
 from multiprocessing import get_context
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from cardbox_tracker.commands.arguments import (
     add_force,
@@ -22,6 +23,11 @@ from cardbox_tracker.commands.arguments import (
 )
 from cardbox_tracker.commands.checkout import from_checkout
 from cardbox_tracker.commands.request import points_named
+
+if TYPE_CHECKING:
+    from cardbox_tracker.recordings.silhouettes import RecordedFrame
+    from cardbox_tracker.tracking.estimate import Estimate
+    from cardbox_tracker.tracking.tracker import Tracker
 
 NAME = "evaluate"
 HELP = (
@@ -186,7 +192,6 @@ def _film(folder: Path, shape: str, words: list[str], seeds: range) -> list[dict
     from cardbox_tracker.applications.evaluation.films import film_figures, make_film
     from cardbox_tracker.commands.request import add_tracking, tracking_request
     from cardbox_tracker.commands.tracking import track
-    from cardbox_tracker.tracking.estimate import Estimate
 
     parser, found = argparse.ArgumentParser(), list[dict[str, Any]]()
     add_tracking(parser)
@@ -200,7 +205,7 @@ def _film(folder: Path, shape: str, words: list[str], seeds: range) -> list[dict
                 estimates: list[Estimate] = []
                 summary = track(
                     tracking_request(typed),
-                    (lambda _, estimate, __, to=estimates: to.append(estimate),),
+                    (partial(_keep, estimates),),
                     lambda _: None,
                 )
                 runs.append(film_figures(film, estimates, summary.body))
@@ -215,3 +220,7 @@ def _film(folder: Path, shape: str, words: list[str], seeds: range) -> list[dict
                 }
             )
     return found
+
+
+def _keep(estimates: list[Estimate], _: RecordedFrame, estimate: Estimate, __: Tracker) -> None:
+    estimates.append(estimate)
