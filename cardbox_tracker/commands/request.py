@@ -58,10 +58,6 @@ RETIRED = MappingProxyType(
 _MOST_ROLL_DEG, _MOST_FPS = 180.0, 1000.0
 _MOST_BYTES = 64 * 1024
 _EFFORT = "whole_body.effort"
-_FOV_HINT = (
-    "--fov is across the width of the image: webcams 60 to 78, phones 60 to 70 held sideways, 36 "
-    "to 43 upright"
-)
 # An option of a file takes the place of these, which do not go with it.
 _REPLACED = MappingProxyType(
     {
@@ -296,7 +292,9 @@ def add_recording(parser: argparse.ArgumentParser, required: bool = True) -> Non
         type=float,
         metavar="DEG",
         help="field of view across the width of the image as it is shown: webcams 60 to 78, phones "
-        "60 to 70 held sideways and 36 to 43 upright; not for bags with CameraInfo",
+        "60 to 75 held sideways and 36 to 46 upright; not for bags with CameraInfo. Without it, "
+        "what a phone wrote into the file, or else, with --detector, 65 degrees along the longer "
+        "side",
     )
     add(
         "--calibration",
@@ -342,7 +340,8 @@ def add_tracking(parser: argparse.ArgumentParser, needs_recording: bool = True) 
         type=float,
         metavar="M",
         help="in place of --model: height of the person, metres, crown to floor; sizes are the "
-        "mean ones of people of that stature",
+        "mean ones of people of that stature. Of films with --detector, the mean stature of adults "
+        "is taken without both",
     )
     add(
         "--distance",
@@ -485,19 +484,27 @@ def tracking_request(options: argparse.Namespace, faults: Iterable[str] = ()) ->
 
 
 def _camera(options: argparse.Namespace, problems: Problems) -> GivenCamera:
-    from cardbox_tracker.recordings.given_camera import GivenCamera
-    from cardbox_tracker.recordings.open_images import is_film
+    from cardbox_tracker.recordings.given_camera import FOV_HINT, GivenCamera
+    from cardbox_tracker.recordings.open_images import tells_lens
 
     roll_deg = options.camera_roll_deg
     roll_rad = None if roll_deg is None else math.radians(roll_deg)
     camera = GivenCamera(options.fov, options.calibration, roll_rad, options.fps, options.mirrored)
     if None not in (options.fov, options.calibration):
         problems.add("--fov and --calibration both describe the lens: leave one of them out")
-    elif not camera.is_calibrated and is_film(options.recording):
-        problems.miss("--fov DEG or --calibration FILE", _FOV_HINT)
+    elif not (camera.is_calibrated or _is_guessed(options) or tells_lens(options.recording)):
+        hint = f"--fov is across the width of the image: {FOV_HINT}"
+        problems.miss("--fov DEG or --calibration FILE", hint)
     else:
         problems.caught(camera.check, None)
     return camera
+
+
+def _is_guessed(options: argparse.Namespace) -> bool:
+    """Whether lens and stature that nothing tells are guessed, since a detector sees the person."""
+    from cardbox_tracker.recordings.open_images import is_film
+
+    return options.detector is not None and is_film(options.recording)
 
 
 def _silhouettes(options: argparse.Namespace, problems: Problems) -> Segmentation:
@@ -564,17 +571,17 @@ def points_named(name: str) -> Detector | PointTable:
 def _person(options: argparse.Namespace, problems: Problems) -> PersonRequest:
     from cardbox_tracker.person.model import BodyModel
     from cardbox_tracker.person.model_file import load_body_model
-    from cardbox_tracker.person.proportions import body_from_proportions
+    from cardbox_tracker.person.proportions import USUAL_STATURE_M, body_from_proportions
 
     pitch_deg, body = options.camera_pitch_deg, BodyModel()
-    if options.model is None and options.stature is None:
+    if options.model is None and options.stature is None and not _is_guessed(options):
         problems.miss("--stature M or --model FILE")
     elif None not in (options.model, options.stature):
         problems.add("--stature and --model both say who is tracked: leave one of them out")
-    elif options.stature is not None:
+    elif options.model is None:
         body = problems.caught(
             lambda: body_from_proportions(
-                options.stature,
+                USUAL_STATURE_M if options.stature is None else options.stature,
                 options.distance,
                 camera_pitch_rad=math.radians(pitch_deg or 0.0),
             ),

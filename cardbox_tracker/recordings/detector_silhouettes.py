@@ -59,12 +59,13 @@ class DetectorSilhouetteSource(SilhouetteSource):
             yield RecordedFrame(stamp_ns, time_s, *seen, points=points, recorded=recorded)
 
     def detections(
-        self, start_s: float = 0.0, end_s: float = float("inf")
+        self, start_s: float = 0.0, end_s: float = float("inf"), period_s: float = 0.0
     ) -> Iterator[tuple[PreparedImage, Detection | None]]:
-        """Yield the images of a span, each with the person in it."""
+        """Yield the images of a span, each with the person in it, at least ``period_s`` apart."""
         self._person.restart()
         for prepared in self.images():
             if prepared.time_s > end_s:
                 break
             if prepared.time_s >= start_s:
+                start_s = prepared.time_s + period_s
                 yield prepared, self._person(prepared.image)

@@ -53,6 +53,7 @@ class ImageFolder(Film):
         super().__init__(path, camera)
         self._files: list[Path] = []
         self._levels = Levels()
+        self._first = path
 
     def __enter__(self) -> ImageFolder:
         """Read the names of the images, and the size of the first one that can be decoded."""
@@ -65,6 +66,7 @@ class ImageFolder(Film):
                 reason = reason or f" ({error})"
                 continue
             self._set_size(width, height)
+            self._first = file
             break
         else:
             raise BagError(
@@ -85,6 +87,10 @@ class ImageFolder(Film):
             for kind, files in (("hidden files", hidden), ("files of other kinds", others))
             if files
         ]
+
+    @property
+    def _file(self) -> Path:
+        return self._first
 
     def images(self, topic: str | None = None) -> Iterator[RecordedImage]:
         """Yield the images in order, at the given rate."""

@@ -303,9 +303,11 @@ class SilhouetteSource:
 
     def full_picture(self, frame: RecordedFrame) -> NDArray[np.uint8]:
         """Return the picture of a frame, undistorted, at the resolution of the recording."""
-        if frame.recorded is None:
-            return frame.picture
-        image = frame.recorded.as_sent
+        return frame.picture if frame.recorded is None else self.undistorted(frame.recorded)
+
+    def undistorted(self, recorded: RecordedImage) -> NDArray[np.uint8]:
+        """Return an image, undistorted, at the resolution of the recording."""
+        image = recorded.as_sent
         height, width = image.shape[:2]
         if self._full_size != (width, height):
             self._full_size = width, height

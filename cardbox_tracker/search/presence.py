@@ -78,8 +78,9 @@ def presence_of(
         high: the same where the model is smallest.
         smallest: least share of a person.
         largest: largest share of a person.
-        is_detected: whether a detector finds the person, so that a spoilt silhouette does no harm.
+        is_detected: whether a detector finds the person, so that a spoilt silhouette does no harm,
+            and neither does a person who is smaller than expected.
     """
-    if high < smallest:
+    if high < smallest and not (is_detected and high > 0.0):
         return Presence.NOBODY
     return Presence.TOO_MUCH if low > largest and not is_detected else Presence.PERSON

@@ -51,6 +51,11 @@ FILTERS: MappingProxyType[str, MakeFilter] = MappingProxyType(
     {"hierarchical": Cycles, "whole_body": WholeBodyFilter}
 )
 """Filter classes by the values of ``TrackerConfig.filter``."""
+UNKNOWN_TILT_RAD = np.radians(6.0)
+"""Standard deviation of a pitch that is too unsure for ``tracking``, rad."""
+
+# A model that overlaps the silhouette less than this is somewhere else.
+_TOUCHING_IOU = 0.05
 
 
 class Tracker:
@@ -75,7 +80,8 @@ class Tracker:
 
         Args:
             body: the person. Unknown values are fitted while tracking, which replaces the attribute
-                ``body``. Until then, estimates are at best ``uncertain``.
+                ``body``. Until then, or if the camera's pitch is not known to 6 degrees, estimates
+                are at best ``uncertain``.
             camera: working camera, of the silhouettes' size.
             config: settings; the paper's by default.
             rng: source of all noise; seeded with 0 by default.
@@ -228,6 +234,9 @@ class Tracker:
                 )
         frames = self._frames_of(observations)
         estimate = self._placed(frames[0], self._track(frames))
+        is_tilt_unknown = self.body.camera_pose.pitch_stddev_rad > UNKNOWN_TILT_RAD
+        if estimate.state == TRACKING and (self.body.unknown or is_tilt_unknown):
+            estimate = replace(estimate, state=UNCERTAIN)
         return self._head.see(frames[0], estimate)
 
     def _placed(self, frame: Frame, estimate: Estimate) -> Estimate:
@@ -256,7 +265,9 @@ class Tracker:
         if self._fitting is None:
             return self._follow(frames)
         silhouette, image = frames[0].silhouette, frames[0].image
-        fitted = self._fitting.before(silhouette, image)
+        points = frames[0].points
+        is_detected = points is not None and points.are_certain
+        fitted = self._fitting.before(silhouette, image, is_detected)
         if fitted is not None:
             self._use(fitted, CompiledSilhouette(fitted, self.camera))
             again = self._silhouette.frame(silhouette)
@@ -268,8 +279,6 @@ class Tracker:
         if estimate.posture is not None:
             there = estimate.placed(self.body)
             self._fitting.compare(silhouette, image, there, estimate.posture)
-        if self.body.unknown and estimate.state == TRACKING:
-            return replace(estimate, state=UNCERTAIN)
         return estimate
 
     def sample(self, estimate: Estimate, count: int, rng: np.random.Generator) -> FloatArray:
@@ -298,6 +307,13 @@ class Tracker:
         if not fit.is_finite:
             # Without a reset, values that are not finite would stay in the particles.
             self.reset()
+            return Estimate(LOST)
+        is_detected = any(frame.points is not None for frame in frames)
+        if self.config.has_several_views and is_detected and fit.iou < _TOUCHING_IOU:
+            # The person is there, but not where the model is.
+            if self.config.relocalize:
+                self._before = None
+                self._filter.forget()
             return Estimate(LOST)
         self._before, self._seen_iou = np.zeros(N_STATE), fit.seen_iou
         self._before[: len(fit.seen)] = fit.seen

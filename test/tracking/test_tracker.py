@@ -169,6 +169,15 @@ def test_doubt_about_each_keypoint_comes_with_its_evidence(make_config: Any) -> 
     assert tracker.track(NOBODY).evidence is None
 
 
+def test_an_unknown_pitch_makes_every_image_uncertain() -> None:
+    states = []
+    for stddev_deg in (2.0, 7.0):
+        body = BODY.with_values(pitch_stddev_rad=np.radians(stddev_deg))
+        tracker = Tracker(body, CAMERA, paper_preset(), np.random.default_rng(0))
+        states.append({tracker.track(silhouette).state for silhouette in waving(5)})
+    assert states == [{TRACKING}, {UNCERTAIN}]
+
+
 def test_the_whole_body_filter_says_where_it_is_and_how_well_it_fits() -> None:
     tracker, sure, errors_m = make(default_preset()), [], []
     for silhouette in waving(20):
