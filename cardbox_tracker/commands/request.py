@@ -285,9 +285,10 @@ def add_recording(parser: argparse.ArgumentParser, required: bool = True) -> Non
     )
     add(
         "--detector",
-        metavar="mediapipe|FILE.csv",
+        metavar="mediapipe|FILE|FOLDER",
         help="also use 2D points of the person's joints: those of MediaPipe's networks ('cardbox "
-        "detector --install'), or a table that any detector has written (docs/detectors.md)",
+        "detector --install'), or those that any detector has written: a table FILE.csv, a file of "
+        "COCO FILE.json, or a folder of OpenPose's files (docs/detectors.md)",
     )
     add(
         "--fov",
@@ -533,10 +534,10 @@ def _silhouettes(options: argparse.Namespace, problems: Problems) -> Segmentatio
 
 
 def points_named(name: str) -> Detector | PointTable:
-    """Return the source of 2D points of a name: the detector's, or the path of a table.
+    """Return the source of 2D points of a name: the detector's, or the path of given points.
 
     Raises:
-        CardboxError: the detector is not installed, or there is no such table.
+        CardboxError: the detector is not installed, or there are no such points.
     """
     from cardbox_tracker.detectors.detector import MEDIAPIPE, Detector
     from cardbox_tracker.detectors.point_table import PointTable
@@ -544,10 +545,10 @@ def points_named(name: str) -> Detector | PointTable:
     if name == MEDIAPIPE:
         return Detector.installed()
     path = Path(name)
-    if not path.is_file():
+    if not path.exists():
         raise CardboxError(
-            f"--detector is {name!r}; expected {MEDIAPIPE}, or the file of a table of points "
-            "(docs/detectors.md)"
+            f"--detector is {name!r}; expected {MEDIAPIPE}, or points in a table, in a file of "
+            "COCO, or in a folder of OpenPose (docs/detectors.md)"
         )
     return PointTable(path)
 
@@ -662,6 +663,6 @@ def _read_options(path: Path) -> dict[str, Any]:
     for name, value in given.items():
         if isinstance(value, Path):
             given[name] = path.parent / value
-        elif name == "detector" and (path.parent / value).is_file():
+        elif name == "detector" and (path.parent / value).exists():
             given[name] = str(path.parent / value)
     return given

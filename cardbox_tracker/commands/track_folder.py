@@ -40,6 +40,7 @@ from cardbox_tracker.common.errors import CardboxError
 from cardbox_tracker.common.files import claimed_name, write_table
 from cardbox_tracker.common.processes import cores, results_of
 from cardbox_tracker.common.progress import SharedProgress, progress_bar, told
+from cardbox_tracker.detectors.point_table import PointTable
 from cardbox_tracker.recordings.folder import SUMMARY, recordings_in
 from cardbox_tracker.recordings.result_table import check_table
 from cardbox_tracker.recordings.track import TrackSummary
@@ -391,7 +392,9 @@ def digest_of_inputs(request: TrackingRequest, formats: Sequence[str], program: 
     for value in _values(replace(asked, files=TrackFiles())):
         is_file = isinstance(value, Path) and value.is_file()
         digest.update(b"\0" + (value.read_bytes() if is_file else repr(value).encode()))
-    for file in _files_of(path):
+    points = request.recording.points
+    folders = [points.path] if isinstance(points, PointTable) and points.path.is_dir() else []
+    for file in [file for folder in (path, *folders) for file in _files_of(folder)]:
         found = file.stat()
         # Names inside of a recording may be no UTF-8.
         digest.update(b"\0" + os.fsencode(file.name))

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
@@ -14,9 +13,6 @@ from cardbox_tracker.detectors.model_files import ModelFiles, installed_models
 from cardbox_tracker.detectors.pose_network import Detection, PoseNetwork
 
 Image = NDArray[np.uint8]
-
-FindPoints = Callable[[int, Image], ImagePoints | None]
-"""Takes the stamp, ns, and the image at the working size; returns the points in that image."""
 
 MEDIAPIPE = "mediapipe"
 """Name of the detector whose networks ``cardbox detector --install`` installs."""
@@ -73,7 +69,7 @@ class PersonDetector:
         self.missed += found is None
         return found
 
-    def points(self, stamp_ns: int, image: Image) -> ImagePoints | None:
-        """Return the points in an image; see ``FindPoints``."""
+    def points(self, image: Image) -> ImagePoints | None:
+        """Return the points in an image at the working size."""
         found = self(image)
         return None if found is None else image_points(found)

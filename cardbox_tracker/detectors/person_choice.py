@@ -12,6 +12,8 @@ from cardbox_tracker.detectors.image_points import ImagePoints
 
 # Joints near the outline may lie this far outside the silhouette.
 _MARGIN_PX = 5
+# Points are beside a silhouette of this share of the image or more if less of them is in it.
+_LEAST_SILHOUETTE, _LEAST_INSIDE = 0.003, 0.25
 
 
 def person_in(silhouette: NDArray[np.uint8], persons: Sequence[ImagePoints]) -> ImagePoints | None:
@@ -29,9 +31,23 @@ def person_in(silhouette: NDArray[np.uint8], persons: Sequence[ImagePoints]) -> 
     known = [person for person in persons if not person.is_empty]
     if len(known) < 2:
         return known[0] if known else None
-    kernel = np.ones((2 * _MARGIN_PX + 1, 2 * _MARGIN_PX + 1), np.uint8)
-    near = np.asarray(cv2.dilate(silhouette, kernel), np.uint8)
+    near = _near(silhouette)
     return max(known, key=lambda person: (_support(near, person), person.scores.sum()))
+
+
+def are_beside(silhouette: NDArray[np.uint8], points: ImagePoints) -> bool:
+    """Return whether points are those of nobody in the silhouette (H, W), 0 or 255.
+
+    A silhouette that is too small for a person says nothing.
+    """
+    if np.count_nonzero(silhouette) < _LEAST_SILHOUETTE * silhouette.size or points.is_empty:
+        return False
+    return _support(_near(silhouette), points) < _LEAST_INSIDE * float(points.scores.sum())
+
+
+def _near(silhouette: NDArray[np.uint8]) -> NDArray[np.uint8]:
+    kernel = np.ones((2 * _MARGIN_PX + 1, 2 * _MARGIN_PX + 1), np.uint8)
+    return np.asarray(cv2.dilate(silhouette, kernel), np.uint8)
 
 
 def _support(near: NDArray[np.uint8], person: ImagePoints) -> float:

@@ -49,10 +49,12 @@ class DetectorSilhouetteSource(SilhouetteSource):
 
         The detector starts anew at ``start_s``, so that a frame depends on the span alone.
         """
-        for (stamp_ns, time_s, image, recorded), person in self.detections(start_s, end_s):
+        self._restart_points()
+        for prepared, person in self.detections(start_s, end_s):
+            stamp_ns, time_s, image, recorded, _ = prepared
             nobody = np.zeros(image.shape[:2], np.uint8)
             silhouette = nobody if person is None else person.silhouette()
-            points = self._points(stamp_ns, image)
+            points = self._points(prepared, silhouette)
             if person is not None and self._has_own_points:
                 points = image_points(person)
             seen = brightness_of(image), silhouette, image

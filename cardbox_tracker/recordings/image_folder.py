@@ -72,7 +72,8 @@ class ImageFolder(Film):
         """Yield the images in order, at the given rate."""
         for number, file in enumerate(self._files):
             stamp_ns = round(1e9 * number / (self._given.fps or FPS))
-            yield RecordedImage(stamp_ns, "", stamp_ns, partial(_image, file, self._size))
+            decode = partial(_image, file, self._size)
+            yield RecordedImage(stamp_ns, "", stamp_ns, decode, file.name)
 
 
 def _image(file: Path, size: tuple[int, int] | None = None) -> NDArray[np.uint8]:

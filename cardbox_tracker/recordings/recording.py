@@ -125,6 +125,12 @@ class Recording:
         """The first camera, in whose frame the results are."""
         return self.sources[0]
 
+    def check_points(self) -> None:
+        """Raise CardboxError if the given points of no camera could be used in any image."""
+        faults = [source.points_fault for source in self.sources]
+        if all(faults):
+            raise CardboxError(faults[0])
+
     def frames(self, start_s: float = 0.0) -> Iterator[FrameSet]:
         """Yield synchronized frames from ``start_s`` on; each image is in exactly one set."""
         # Images slightly before the start can belong to the first set.

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from itertools import islice
 from pathlib import Path
 from typing import NamedTuple
@@ -14,9 +14,9 @@ from cardbox_tracker.camera.camera import Rectifier
 from cardbox_tracker.camera.depth_image import DepthImage
 from cardbox_tracker.camera.encodings import brightness_of
 from cardbox_tracker.common.errors import BagError, CardboxError, EncodingError
-from cardbox_tracker.detectors.detector import Detector, FindPoints
+from cardbox_tracker.detectors.detector import Detector
 from cardbox_tracker.detectors.image_points import ImagePoints
-from cardbox_tracker.detectors.point_table import PointTable
+from cardbox_tracker.detectors.point_table import GivenPoints, Image, PointTable
 from cardbox_tracker.recordings.image_recording import ImageRecording, RecordedImage
 from cardbox_tracker.segmentation.background_config import BackgroundConfig
 from cardbox_tracker.segmentation.learning import Learning
@@ -68,12 +68,18 @@ class PreparedImage(NamedTuple):
         time_s: seconds from the recording's start.
         image: (H, W, 3) bgr, or (H, W) grey, undistorted, at the working resolution.
         recorded: the image as it was recorded.
+        number: number of the image in the recording, counted from 0.
     """
 
     stamp_ns: int
     time_s: float
     image: NDArray[np.uint8]
     recorded: RecordedImage
+    number: int = 0
+
+
+FindPoints = Callable[[PreparedImage, NDArray[np.uint8]], ImagePoints | None]
+"""Takes an image and the silhouette in it; returns the points of the person."""
 
 
 class RecordedFrame(NamedTuple):
@@ -147,7 +153,7 @@ class SilhouetteSource:
         self._open(bag, size or bag.working_size, camera, config)
         self._find_points(points, camera)
         is_readable = False
-        for _, time_s, image, _ in self.images():
+        for _, time_s, image, *_ in self.images():
             is_readable = True
             if time_s > background.end_s or self._pipeline.has_enough:
                 break
@@ -192,12 +198,23 @@ class SilhouetteSource:
         """Use a source of points."""
         self._has_points = points is not None
         self._detector = points.start() if isinstance(points, Detector) else None
-        self._points: FindPoints = lambda stamp_ns, image: None
-        if self._detector is not None:
-            self._points = self._detector.points
+        self._given: GivenPoints | None = None
+        self._points: FindPoints = lambda prepared, silhouette: None
+        if (detector := self._detector) is not None:
+            self._points = lambda prepared, silhouette: detector.points(prepared.image)
         elif isinstance(points, PointTable):
+            calibration = self._pipeline.calibration
+            given = points.read(camera, (calibration.width, calibration.height))
             size = self.camera.width, self.camera.height
-            self._points = points.read(camera, self._pipeline.calibration, size)
+            self._given = given = given.placed(calibration, size, self.period_ns() // 2)
+            self._points = lambda prepared, silhouette: given.at(
+                Image(prepared.stamp_ns, prepared.number, prepared.recorded.name), silhouette
+            )
+
+    @property
+    def points_fault(self) -> str:
+        """Why the given points were used in no image that was read; empty if they were."""
+        return "" if self._given is None else self._given.fault
 
     @property
     def path(self) -> Path:
@@ -218,16 +235,21 @@ class SilhouetteSource:
         """Yield every image from ``start_s`` to ``end_s`` in order."""
         # The background adapts from the first image on, so frames do not depend on the span.
         self._pipeline.restart()
-        if self._detector is not None:
-            self._detector.restart()
-        for stamp_ns, time_s, image, recorded in self.images():
+        self._restart_points()
+        for prepared in self.images():
+            stamp_ns, time_s, image, recorded, _ = prepared
             if time_s > end_s:
                 break
             silhouette = self._pipeline.silhouette(image, stamp_ns)
             if time_s >= start_s:
-                found = self._points(stamp_ns, image)
+                found = self._points(prepared, silhouette)
                 seen = brightness_of(image), silhouette, image
                 yield RecordedFrame(stamp_ns, time_s, *seen, points=found, recorded=recorded)
+
+    def _restart_points(self) -> None:
+        for source in (self._detector, self._given):
+            if source is not None:
+                source.restart()
 
     def held(self, span: TimeSpan, what: str) -> list[RecordedFrame]:
         """Return the frames of a span in which a posture is held.
@@ -277,6 +299,8 @@ class SilhouetteSource:
             remarks.append(self._brokenness())
         if self._detector is not None and self._detector.missed:
             remarks.append(f"the detector finds nobody in {self._detector.missed} images")
+        if self._given is not None and self._given.remark:
+            remarks.append(self._given.remark)
         return remarks
 
     def full_picture(self, frame: RecordedFrame) -> NDArray[np.uint8]:
@@ -302,4 +326,4 @@ class SilhouetteSource:
                 self._broken[number] = str(error)
                 continue
             time_ns = image.stamp_ns + self._clock_ns - self._bag.start_ns
-            yield PreparedImage(image.stamp_ns, time_ns / 1e9, prepared, image)
+            yield PreparedImage(image.stamp_ns, time_ns / 1e9, prepared, image, number - 1)

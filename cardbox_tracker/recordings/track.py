@@ -94,6 +94,7 @@ def track_recording(
             raise CardboxError(
                 f"no image lies after --start {start_s:g} s; give seconds from its start"
             )
+        recording.check_points()
     mean = (float(np.mean(costs)), float(np.mean(ious))) if costs else (float("nan"),) * 2
     remarks = tracker.remarks
     if tracker.agreement is not None:

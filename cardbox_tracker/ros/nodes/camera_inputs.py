@@ -215,7 +215,9 @@ class CameraInputs:
         if received is None or seen.silhouette is None:
             return seen
         header = received.message.header
-        points = self._keypoints.points(number, header, camera, seen.silhouette)
+        period_ns = self._streams[number].statistics.period_ns
+        half_ns = period_ns // 2 or TOLERANCE_NS
+        points = self._keypoints.points(number, header, camera, seen.silhouette, half_ns)
         return seen.having(points=points)
 
     def _depth(self, received: Sequence[Received | None], camera: Camera) -> DepthImage | None:
