@@ -53,7 +53,7 @@ def track(
         pitch_rad, recording = placed(recording, standing, start_s + _COMES_WITHIN_S)
         body = body.with_values(camera_pitch_rad=pitch_rad)
     with recording.open() as source:
-        total_s = max(1e-9, source.first.duration_s - start_s)
+        total_s = max(1e-9, min(source.first.duration_s, person.end_s) - start_s)
         with ExitStack() as stack:
             observers = (*_writers(request, source, stack), *observers)
             advance = show or stack.enter_context(progress_bar("track"))
@@ -65,6 +65,7 @@ def track(
                 start_s,
                 request.files.table,
                 (*observers, lambda frame, *_: advance((frame.time_s - start_s) / total_s)),
+                person.end_s,
             )
         remarks = source.first.remarks
     if show is None:
@@ -114,11 +115,11 @@ def placed(
     standing = camera_of_standing(recording.path, detector, span, camera, name, until_s)
     advice = "give --camera-pitch-deg if it is known"
     if standing is None:
-        searched = span._replace(end_s=max(span.end_s, until_s))
+        end_s = max(span.end_s, until_s)
         print_remarks(
             [
-                f"nobody stands upright at {searched} s, so the camera's pitch is taken as 0; "
-                f"{advice}"
+                f"nobody stands upright between the seconds {span.start_s:g} and {end_s:g}, so the "
+                f"camera's pitch is taken as 0; {advice}"
             ]
         )
         return 0.0, recording
@@ -127,7 +128,7 @@ def placed(
     remarks = [
         f"camera pitch {abs(degrees):.0f} degrees {'down' if degrees >= 0 else 'up'} (standard "
         f"deviation {math.degrees(found.pitch_stddev_rad):.0f}), found from the person standing "
-        f"upright at {span} s; {advice}"
+        f"upright between the seconds {span.start_s:g} and {span.end_s:g}; {advice}"
         if found.is_pitch_found
         else f"the camera's pitch does not show without the feet and is taken as 0; {advice}"
     ]

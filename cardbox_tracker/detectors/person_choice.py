@@ -2,18 +2,68 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from math import hypot, isfinite
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from cardbox_tracker.detectors.image_points import ImagePoints
+from cardbox_tracker.detectors.pose_network import Square
 
 # Joints near the outline may lie this far outside the silhouette.
 _MARGIN_PX = 5
 # Points are beside a silhouette of this share of the image or more if less of them is in it.
 _LEAST_SILHOUETTE, _LEAST_INSIDE = 0.003, 0.25
+
+
+@dataclass(frozen=True)
+class PersonChoice:
+    """Which of several people to follow.
+
+    Attributes:
+        which: ``left`` or ``right`` in the image, ``largest``, or ``place``.
+        place: column and row of the person's hips or chest, px, for ``place``.
+    """
+
+    which: str
+    place: tuple[float, float] = (0.0, 0.0)
+
+    @classmethod
+    def parse(cls, text: str) -> PersonChoice:
+        """Read ``left``, ``right``, ``largest`` or ``X,Y``.
+
+        Raises:
+            ValueError: the text is none of these.
+        """
+        if text in ("left", "right", "largest"):
+            return cls(text)
+        try:
+            column, row = map(float, text.split(","))
+        except ValueError:
+            column = row = np.nan
+        if not (isfinite(column) and isfinite(row)):
+            raise ValueError(
+                f"expected left, right, largest, or X,Y: column and row of the person, got {text!r}"
+            )
+        return cls("place", (column, row))
+
+    def scaled(self, across: float, down: float) -> PersonChoice:
+        """Return the choice in an image whose sides are ``across`` and ``down`` times as long."""
+        return replace(self, place=(across * self.place[0], down * self.place[1]))
+
+    def __call__(self, people: Sequence[Square]) -> Square:
+        """Return one of the squares around people, see ``Choose``."""
+        column, row = self.place
+        keys: dict[str, Callable[[Square], float]] = {
+            "left": lambda one: one.u,
+            "right": lambda one: -one.u,
+            "largest": lambda one: -one.side,
+            "place": lambda one: hypot(one.u - column, one.v - row),
+        }
+        return min(people, key=keys[self.which])
 
 
 def person_in(silhouette: NDArray[np.uint8], persons: Sequence[ImagePoints]) -> ImagePoints | None:

@@ -42,7 +42,7 @@ class DetectorSilhouetteSource(SilhouetteSource):
         self._find_points(None if isinstance(points, Detector) else points, camera)
         self._has_own_points = isinstance(points, Detector)
         self._has_points = points is not None
-        self._detector = self._person = detector.start()
+        self._detector = self._person = self._started(detector)
 
     def frames(self, start_s: float = 0.0, end_s: float = float("inf")) -> Iterator[RecordedFrame]:
         """Yield every image from ``start_s`` to ``end_s``, in order, with the person's mask.

@@ -14,7 +14,7 @@ from cardbox_tracker.camera.camera import Rectifier
 from cardbox_tracker.camera.depth_image import DepthImage
 from cardbox_tracker.camera.encodings import brightness_of
 from cardbox_tracker.common.errors import BagError, CardboxError, EncodingError
-from cardbox_tracker.detectors.detector import Detector
+from cardbox_tracker.detectors.detector import Detector, PersonDetector
 from cardbox_tracker.detectors.image_points import ImagePoints
 from cardbox_tracker.detectors.point_table import GivenPoints, Image, PointTable
 from cardbox_tracker.recordings.image_recording import ImageRecording, RecordedImage
@@ -197,7 +197,7 @@ class SilhouetteSource:
     def _find_points(self, points: Detector | PointTable | None, camera: str | None) -> None:
         """Use a source of points."""
         self._has_points = points is not None
-        self._detector = points.start() if isinstance(points, Detector) else None
+        self._detector = self._started(points) if isinstance(points, Detector) else None
         self._given: GivenPoints | None = None
         self._points: FindPoints = lambda prepared, silhouette: None
         if (detector := self._detector) is not None:
@@ -210,6 +210,14 @@ class SilhouetteSource:
             self._points = lambda prepared, silhouette: given.at(
                 Image(prepared.stamp_ns, prepared.number, prepared.recorded.name), silhouette
             )
+
+    def _started(self, detector: Detector) -> PersonDetector:
+        calibration = self._pipeline.calibration
+        across, down = (
+            self.camera.width / calibration.width,
+            self.camera.height / calibration.height,
+        )
+        return detector.start(across, down)
 
     @property
     def points_fault(self) -> str:
@@ -299,6 +307,8 @@ class SilhouetteSource:
             remarks.append(self._brokenness())
         if self._detector is not None and self._detector.missed:
             remarks.append(f"the detector finds nobody in {self._detector.missed} images")
+        if self._detector is not None and self._detector.remark:
+            remarks.append(self._detector.remark)
         if self._given is not None and self._given.remark:
             remarks.append(self._given.remark)
         return remarks

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from contextlib import nullcontext
 from dataclasses import dataclass
@@ -53,8 +54,9 @@ def track_recording(
     start_s: float,
     table: Path | None = None,
     observers: tuple[Observer, ...] = (),
+    end_s: float = math.inf,
 ) -> TrackSummary:
-    """Track every image from ``start_s`` on.
+    """Track every image from ``start_s`` to ``end_s``.
 
     Args:
         recording: an open recording.
@@ -65,6 +67,7 @@ def track_recording(
             reference posture.
         table: file to write with a row for each image, see :func:`~.result_table.result_table`.
         observers: called after each image, such as a progress bar or a bag writer.
+        end_s: seconds from the recording's start after which no image is tracked.
 
     Raises:
         CardboxError: no image lies after ``start_s``, or a file cannot be written.
@@ -77,7 +80,7 @@ def track_recording(
     with (
         nullcontext() if table is None else result_table(table, recording.first.has_points)
     ) as add_row:
-        for taken in recording.frames(start_s):
+        for taken in recording.frames(start_s, end_s):
             estimate, frame = tracker.track(taken.observations), taken.first
             frames += 1
             frames_uncertain += estimate.state == UNCERTAIN

@@ -286,12 +286,12 @@ def test_somebody_is_measured_in_a_film(
             StandingCamera(np.radians(12.0), np.radians(5.0), np.radians(4.0), 2.0, True),
             (
                 "pitch 12 degrees down (standard deviation 5)",
-                "upright at 20:21 s",
+                "upright between the seconds 20 and 21",
                 "roll 4.0 degrees",
             ),
         ),
         (StandingCamera(0.0, 0.2, 0.0, 2.0, False), ("taken as 0",)),
-        (None, ("nobody stands upright at 16:46 s",)),
+        (None, ("nobody stands upright between the seconds 16 and 46",)),
     ],
 )
 def test_the_cameras_pitch_is_found_from_who_stands_upright(
