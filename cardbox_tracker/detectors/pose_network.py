@@ -192,7 +192,7 @@ class _Network:
         except ImportError as error:
             raise CardboxError(
                 f"the detector needs ai-edge-litert ({error}); install it with "
-                "pip install 'cardbox_tracker[detector]'"
+                "pip install '.[detector]' in the checkout"
             ) from None
         try:
             self._run: Any = Interpreter(str(path), num_threads=1)

@@ -190,9 +190,9 @@ def test_the_masks_of_a_detector_are_the_silhouettes(
     started: list[tuple[Path, Path]] = []
 
     class Network:
-        several = 0
-
         """Finds somebody in the upper half of images that are not flat."""
+
+        several = 0
 
         def __init__(self, *models: Path) -> None:
             started.append(models)
