@@ -75,6 +75,8 @@ def track(
             f"tracked {summary.frames_tracked} of {summary.frames} images{doubt}, "
             f"mean cost {summary.mean_cost_px:.0f} px, mean IoU {summary.mean_iou:.3f}"
         )
+        if summary.used_text:
+            print(summary.used_text)
     print_remarks(remarks, summary.remarks)
     if request.files.body is not None and summary.body is not None:
         save_body_model(summary.body, request.files.body)

@@ -193,7 +193,8 @@ class GivenPoints:
 
     def restart(self) -> None:
         """Count anew."""
-        self.images = self.used = self.beside = self._joined = self._exchanged = 0
+        self.images = self.used = self.beside = self._joined = 0
+        self._exchanged = self._mirrored = 0
         self._ends: list[Image] = []
 
     def placed(self, calibration: Calibration, size: Size, tolerance_ns: int) -> GivenPoints:
@@ -231,6 +232,9 @@ class GivenPoints:
             self.beside += 1
             exchanged = ImagePoints(person.px[:, ::-1], person.scores)
             self._exchanged += not are_beside(silhouette, exchanged)
+            mirrored = silhouette.shape[1] - 1 - person.px[:, 0], person.px[:, 1]
+            other = ImagePoints(np.stack(mirrored, axis=1), person.scores)
+            self._mirrored += not are_beside(silhouette, other)
             return None
         self.used += 1
         return person
@@ -265,6 +269,11 @@ class GivenPoints:
             return (
                 "they lie on the person when columns and rows are exchanged; expected u, v: the "
                 "column, then the row"
+            )
+        if 2 * self._mirrored > self.beside:
+            return (
+                "they lie on the person when they are mirrored; expected points of these very "
+                "images"
             )
         return f"they lie beside the person's silhouette; {REMEDY}"
 

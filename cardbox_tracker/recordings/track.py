@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from contextlib import nullcontext
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
@@ -35,6 +35,7 @@ class TrackSummary:
         frames_uncertain: number of tracked images whose posture may be wrong.
         remarks: warnings about extrinsics or depth that seem to be wrong.
         body: the body at the end, whose unknown values were fitted.
+        used: in how many images each optional input was used, by its name.
     """
 
     frames: int
@@ -44,6 +45,14 @@ class TrackSummary:
     frames_uncertain: int = 0
     remarks: tuple[str, ...] = ()
     body: BodyModel | None = None
+    used: Mapping[str, int] = field(default_factory=dict)
+
+    @property
+    def used_text(self) -> str:
+        """The optional inputs and in how many images each was used; empty without any."""
+        shares = (f"{name} in {count}" for name, count in self.used.items())
+        text = ", ".join(shares)
+        return f"used {text} of {self.frames} images" if text else ""
 
 
 def track_recording(
@@ -103,4 +112,11 @@ def track_recording(
     if tracker.agreement is not None:
         tracker.agreement.check(is_last=True)
         remarks += tracker.agreement.remarks(recording.names[1:])
-    return TrackSummary(frames, len(costs), *mean, frames_uncertain, tuple(remarks), tracker.body)
+    given = ("points", recording.first.has_points), ("depth", recording.measures_depth)
+    names = {f"camera {number}": name for number, name in enumerate(recording.names, 1)}
+    used = {name: 0 for name, is_given in given if is_given} | {
+        names.get(name, name): count for name, count in tracker.used.items()
+    }
+    return TrackSummary(
+        frames, len(costs), *mean, frames_uncertain, tuple(remarks), tracker.body, used
+    )

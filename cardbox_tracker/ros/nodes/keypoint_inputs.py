@@ -142,7 +142,7 @@ class _CameraKeypoints:
 
     def values(self) -> dict[str, str]:
         return ({} if self.topic is None else self.topic.values()) | {
-            f"{self._name} used in images": f"{self._used} of {self._images}"
+            f"{self._name} in images": f"{self._used} of {self._images}"
         }
 
     def warnings(self) -> dict[str, str]:
