@@ -12,6 +12,8 @@ from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
+import numpy as np
+
 from cardbox_tracker.common.errors import CardboxError, quoted
 from cardbox_tracker.common.files import UnreadableFileError, read_regular
 from cardbox_tracker.detectors.image_points import COCO_NAMES
@@ -39,6 +41,7 @@ _UPPER = (
     *("left_shoulder", "left_elbow", "left_wrist"),
 )
 _LEGS = tuple(f"{side}_{name}" for side in ("right", "left") for name in ("hip", "knee", "ankle"))
+_BODY_25B = (*COCO_NAMES, *_others(8))
 _FACE = ("right_eye", "left_eye", "right_ear", "left_ear")
 LAYOUTS: dict[int, tuple[str, ...]] = {
     17: COCO_NAMES,
@@ -171,4 +174,22 @@ def _named(
         flat = [float(value) for value in values]
     except (TypeError, ValueError, OverflowError):
         raise CardboxError(f"{place}, has a value that is no number") from None
+    if len(names) == len(_BODY_25B) and _is_25b(flat):
+        names = _BODY_25B
     return [(name, *flat[3 * i : 3 * i + 3]) for i, name in enumerate(names)]  # type: ignore[misc]
+
+
+def _is_25b(values: Sequence[float]) -> bool:
+    """Return whether 25 points are in the order of BODY_25B: eyes and ears follow the nose.
+
+    In BODY_25, neck and right arm follow the nose, and eyes and ears come later.
+    """
+    points = np.reshape(values, (-1, 3))
+    away = np.hypot(*(points[:, :2] - points[0, :2]).T)
+    known = points[:, 2] > 0.0
+
+    def spread(numbers: range) -> float:
+        there = known[numbers.start : numbers.stop]
+        return float(np.mean(away[numbers.start : numbers.stop][there])) if there.any() else np.inf
+
+    return bool(known[0]) and spread(range(1, 5)) < spread(range(15, 19))

@@ -21,6 +21,7 @@ from cardbox_tracker.camera.extrinsics_sources import (
     transforms_of,
 )
 from cardbox_tracker.camera.pairing import camera_names, side_by_side
+from cardbox_tracker.camera.stamps import StampSequence
 from cardbox_tracker.camera.stereo import StereoDepth, stereo_of_pair
 from cardbox_tracker.camera.view import OtherCamera
 from cardbox_tracker.common.errors import BagError, CameraError, CardboxError
@@ -120,6 +121,7 @@ class Recording:
         self._stereo = stereo_of(self.first.camera, self.others) if depth == STEREO else None
         is_alone = len(self.sources) == 1 and self._depth is None
         self._tolerance_ns = 0 if is_alone else self.first.period_ns() // 2
+        self._stuck = [0] * len(self.sources)
 
     @property
     def first(self) -> SilhouetteSource:
@@ -138,6 +140,9 @@ class Recording:
         early_s = max(0.0, start_s - self._tolerance_ns / 1e9)
         late_s = end_s + self._tolerance_ns / 1e9
         streams = [source.frames(early_s, late_s) for source in self.sources]
+        if len(streams) > 1:
+            self._stuck = [0] * len(streams)
+            streams = [self._advancing(number, stream) for number, stream in enumerate(streams)]
         depths = self._depths()
         depth = next(depths, None)
         black = np.zeros((self.first.camera.height, self.first.camera.width), np.uint8)
@@ -159,6 +164,25 @@ class Recording:
             stamp_ns, time_s, *_ = lead
             first = frames[0] or RecordedFrame(stamp_ns, time_s, black, black)
             yield FrameSet(stamp_ns, time_s, frames, first, there)
+
+    def _advancing(self, number: int, frames: Iterator[RecordedFrame]) -> Iterator[RecordedFrame]:
+        """Yield the frames of a camera whose stamps go on."""
+        order = StampSequence()
+        for frame in frames:
+            if order.add(frame.stamp_ns).is_usable:
+                yield frame
+            else:
+                self._stuck[number] += 1
+
+    @property
+    def remarks(self) -> list[str]:
+        """Warnings about cameras whose stamps stood still."""
+        return [
+            f"{count} images of {name} are not used, because their stamps are not later than those "
+            "before: is its driver or its connection stuck?"
+            for name, count in zip(self.names, self._stuck, strict=True)
+            if count
+        ]
 
     def _depths(self) -> Iterator[tuple[int, DepthImage]]:
         """Yield stamp and depth of each depth image, at the size of the first camera."""

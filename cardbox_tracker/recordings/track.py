@@ -108,7 +108,7 @@ def track_recording(
             )
         recording.check_points()
     mean = (float(np.mean(costs)), float(np.mean(ious))) if costs else (float("nan"),) * 2
-    remarks = tracker.remarks
+    remarks = [*recording.remarks, *tracker.remarks]
     if tracker.agreement is not None:
         tracker.agreement.check(is_last=True)
         remarks += tracker.agreement.remarks(recording.names[1:])

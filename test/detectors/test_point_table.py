@@ -212,7 +212,8 @@ def test_of_several_people_the_one_in_the_silhouette_is_taken(tmp_path: Path) ->
 @pytest.mark.parametrize(
     ("column", "row", "reason"),
     [
-        (100.0, 240.0, "beside the person's silhouette; expected pixels of this camera's own"),
+        (139.0, 240.0, "on the person when they are mirrored"),
+        (250.0, 240.0, "beside the person's silhouette; expected pixels of this camera's own"),
         (240.0, 500.0, "when columns and rows are exchanged; expected u, v"),
     ],
 )
@@ -239,6 +240,9 @@ def openpose(folder: Path, number: int, *people: list[float], **more: list[float
 @pytest.mark.parametrize("count", LAYOUTS)
 def test_openpose_files_name_points_by_their_number(tmp_path: Path, count: int) -> None:
     flat = [value for i in range(count) for value in (i + 1.0, 2.0 * i, 0.8)]
+    if count == 25:
+        # Eyes and ears are near the nose.
+        flat[0:2] = 17.0, 32.0
     openpose(tmp_path / "points", 12, flat)
     openpose(tmp_path / "points", 13)
     points = read(PointTable(tmp_path / "points")).at(Image(0, 12), NONE)
@@ -247,13 +251,30 @@ def test_openpose_files_name_points_by_their_number(tmp_path: Path, count: int) 
         number = {133: {"left_index": 96, "right_little_finger": 129}}.get(count, {}).get(name)
         if name in COCO_NAMES[:13]:
             number = LAYOUTS[count].index(name)
-        if number is not None:
+        if number:
             assert points.px[index] == pytest.approx((number + 1.0, 2.0 * number)), name
     # OpenPose numbers the right arm first.
     expected = {17: 9, 18: 7, 25: 7, 26: 9, 133: 9}[count]
     assert points.px[POINT_INDEX["left_wrist"], 0] == pytest.approx(expected + 1.0)
     is_hip = points.px[POINT_INDEX["right_hip"], 0] - 1.0
     assert is_hip == {17: 12, 18: 8, 25: 9, 26: 12, 133: 12}[count]
+
+
+def test_25_points_with_the_face_first_are_body_25b(tmp_path: Path) -> None:
+    """OpenPose has two orders of 25 points, which its files do not tell apart."""
+    names = (*COCO_NAMES, *("neck", "head"), *["foot"] * 6)
+    face = {"nose": (300, 100), "left_eye": (305, 95), "right_eye": (295, 95)}
+    flat = [
+        value
+        for i, name in enumerate(names)
+        for value in (*face.get(name, (300 + 3 * i, 200 + 8 * i)), 0.0 if "ear" in name else 0.9)
+    ]
+    openpose(tmp_path / "points", 0, flat)
+    points = read(PointTable(tmp_path / "points")).at(Image(0, 0), NONE)
+    assert points is not None
+    for name in ("left_shoulder", "right_wrist", "left_hip"):
+        i = COCO_NAMES.index(name)
+        assert points.px[POINT_INDEX[name]] == pytest.approx((300 + 3 * i, 200 + 8 * i))
 
 
 def test_openpose_hands_give_the_knuckles(tmp_path: Path) -> None:

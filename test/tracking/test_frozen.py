@@ -59,7 +59,7 @@ def test_a_camera_frozen_for_long_is_noticed_by_little_changes() -> None:
     first = []
     for _ in range(25):
         mask = np.array(seen(10).silhouette)
-        cv2.circle(mask, (int(rng.integers(10, 14)), 48), 1, 255, -1)
+        cv2.circle(mask, (int(rng.integers(10, 28)), 53), 1, 255, -1)
         first.append(Observation(mask))
     found, _ = used(first, [seen(30, 0)] * 25)
     assert found[:15] == "b" * 15 and found[-1] == "1"
