@@ -15,8 +15,9 @@ from cardbox_tracker.detectors.pose_network import Square
 
 # Joints near the outline may lie this far outside the silhouette.
 _MARGIN_PX = 5
-# Points are beside a silhouette of this share of the image or more if less of them is in it.
-_LEAST_SILHOUETTE, _LEAST_INSIDE = 0.003, 0.25
+_LEAST_SILHOUETTE = 0.003
+LEAST_INSIDE = 0.25
+"""Points are those of somebody else if a smaller share of them is in the silhouette."""
 
 
 @dataclass(frozen=True)
@@ -85,14 +86,25 @@ def person_in(silhouette: NDArray[np.uint8], persons: Sequence[ImagePoints]) -> 
     return max(known, key=lambda person: (_support(near, person), person.scores.sum()))
 
 
-def are_beside(silhouette: NDArray[np.uint8], points: ImagePoints) -> bool:
-    """Return whether points are those of nobody in the silhouette (H, W), 0 or 255.
+def inside(silhouette: NDArray[np.uint8], points: ImagePoints) -> float | None:
+    """Return the share of the points, by their scores, that lie in the silhouette.
 
-    A silhouette that is too small for a person says nothing.
+    Args:
+        silhouette: (H, W), 0 or 255.
+        points: px of the silhouette.
+
+    Returns:
+        None if there are no points, or the silhouette is too small for a person.
     """
     if np.count_nonzero(silhouette) < _LEAST_SILHOUETTE * silhouette.size or points.is_empty:
-        return False
-    return _support(_near(silhouette), points) < _LEAST_INSIDE * float(points.scores.sum())
+        return None
+    return _support(_near(silhouette), points) / float(points.scores.sum())
+
+
+def are_beside(silhouette: NDArray[np.uint8], points: ImagePoints) -> bool:
+    """Return whether points are those of nobody in the silhouette; see :func:`inside`."""
+    share = inside(silhouette, points)
+    return share is not None and share < LEAST_INSIDE
 
 
 def _near(silhouette: NDArray[np.uint8]) -> NDArray[np.uint8]:

@@ -6,6 +6,7 @@ import csv
 import io
 import re
 from bisect import bisect_left
+from collections import Counter
 from collections.abc import Sequence
 from pathlib import Path
 from typing import NamedTuple
@@ -18,7 +19,7 @@ from cardbox_tracker.common.errors import CardboxError, quoted
 from cardbox_tracker.common.files import UnreadableFileError, regular_file
 from cardbox_tracker.detectors.image_points import POINT_INDEX, ImagePoints
 from cardbox_tracker.detectors.keypoint_json import coco_people, openpose_people
-from cardbox_tracker.detectors.person_choice import are_beside, person_in
+from cardbox_tracker.detectors.person_choice import LEAST_INSIDE, inside, person_in
 from cardbox_tracker.detectors.point_checks import Size, check_person, check_point, person_of
 
 COLUMNS = ("stamp_ns", "joint", "u", "v", "score")
@@ -26,6 +27,12 @@ COLUMNS = ("stamp_ns", "joint", "u", "v", "score")
 FRAME, _PERSON = "frame", "person"
 # An hour of all points at 30 Hz has 100 MB.
 _MOST_BYTES = 256 * 1024 * 1024
+# Points of which less is in the silhouette are compared with others, of which as much must be.
+_MOST_DOUBTFUL, _LEAST_SURE = 0.6, 0.85
+# Images with wrong points, after which points are used only while most are right.
+_MANY = 10
+# A recording's length is stated inexactly.
+_SPAN_NS = 1_000_000_000
 
 Key = int | str
 """Stamp (ns), number or name of an image."""
@@ -194,7 +201,7 @@ class GivenPoints:
     def restart(self) -> None:
         """Count anew."""
         self.images = self.used = self.beside = self._joined = 0
-        self._exchanged = self._mirrored = 0
+        self._reasons = Counter[str]()
         self._ends: list[Image] = []
 
     def placed(self, calibration: Calibration, size: Size, tolerance_ns: int) -> GivenPoints:
@@ -228,13 +235,12 @@ class GivenPoints:
         person = person_in(silhouette, found)
         if person is None:
             return None
-        if are_beside(silhouette, person):
+        reason = _reason(silhouette, person)
+        self._reasons[reason] += 1
+        wrong = self._reasons.total() - self._reasons[""]
+        # Wrong points are on the person by chance in some images.
+        if reason or wrong > max(_MANY, self._reasons[""]):
             self.beside += 1
-            exchanged = ImagePoints(person.px[:, ::-1], person.scores)
-            self._exchanged += not are_beside(silhouette, exchanged)
-            mirrored = silhouette.shape[1] - 1 - person.px[:, 0], person.px[:, 1]
-            other = ImagePoints(np.stack(mirrored, axis=1), person.scores)
-            self._mirrored += not are_beside(silhouette, other)
             return None
         self.used += 1
         return person
@@ -245,16 +251,32 @@ class GivenPoints:
         if self.used or not self.images:
             return ""
         if not self._joined:
-            first, last = (image.key(self.kind) for image in (self._ends[0], self._ends[-1]))
-            there = sorted(self._persons, key=str if self.kind == "name" else int) or ["none"]
-            return (
-                f"0 of {len(self._persons)} points of {self._path} fit an image: their {self.kind} "
-                f"is {quoted(there[0])} to {quoted(there[-1])}, that of the images {quoted(first)} "
-                f"to {quoted(last)}; expected {_EXPECTED[self.kind]}"
-            )
+            return self._apart(self._ends[0], self._ends[-1])
         if not self.beside:
             return f"the points of {self._path} have the score 0 in all images: nobody is there"
         return f"the points of {self._path} are used in 0 of {self.images} images: {self._why}"
+
+    def check_span(self, first_ns: int, last_ns: int) -> None:
+        """Check before tracking that stamps lie between those of the first and last image.
+
+        Raises:
+            CardboxError: none does.
+        """
+        margin_ns = _SPAN_NS + (last_ns - first_ns) // 10
+        number = bisect_left(self._stamps, first_ns - margin_ns)
+        is_apart = number == len(self._stamps) or self._stamps[number] > last_ns + margin_ns
+        if self.kind == COLUMNS[0] and is_apart:
+            raise CardboxError(self._apart(Image(first_ns), Image(last_ns)))
+
+    def _apart(self, first: Image, last: Image) -> str:
+        """Return that no points fit the images from ``first`` to ``last``."""
+        there = sorted(self._persons, key=str if self.kind == "name" else int) or ["none"]
+        images = f"{quoted(first.key(self.kind))} to {quoted(last.key(self.kind))}"
+        return (
+            f"0 of {len(self._persons)} points of {self._path} fit an image: their {self.kind} is "
+            f"{quoted(there[0])} to {quoted(there[-1])}, that of the images {images}; expected "
+            f"{_EXPECTED[self.kind]}"
+        )
 
     @property
     def remark(self) -> str:
@@ -265,28 +287,44 @@ class GivenPoints:
 
     @property
     def _why(self) -> str:
-        if 2 * self._exchanged > self.beside:
-            return (
-                "they lie on the person when columns and rows are exchanged; expected u, v: the "
-                "column, then the row"
-            )
-        if 2 * self._mirrored > self.beside:
-            return (
-                "they lie on the person when they are mirrored; expected points of these very "
-                "images"
-            )
-        return f"they lie beside the person's silhouette; {REMEDY}"
+        return max(filter(None, self._reasons), key=lambda reason: self._reasons[reason])
 
 
 REMEDY = (
     "expected pixels of this camera's own images, at their full size, and the person who is tracked"
 )
 """What to give in place of points that lie beside the silhouette."""
+_BESIDE = f"they lie beside the person's silhouette; {REMEDY}"
+_EXCHANGED = (
+    "they lie on the person when columns and rows are exchanged; expected u, v: the column, then "
+    "the row"
+)
+_MIRRORED = "they lie on the person when they are mirrored; expected points of these very images"
 _EXPECTED = {
     COLUMNS[0]: "the stamp of an image, within half the time between images",
     FRAME: "the number of an image, counted from 0",
     "name": "the name of a file in a folder of images",
 }
+
+
+def _reason(silhouette: NDArray[np.uint8], person: ImagePoints) -> str:
+    """Return why points are not those of the person in a silhouette (H, W); empty if they may be.
+
+    Points that are wrong in another way than their place may lie on the person in part.
+    """
+    share = inside(silhouette, person)
+    if share is None or share >= _MOST_DOUBTFUL:
+        return ""
+    mirrored = np.stack([silhouette.shape[1] - 1 - person.px[:, 0], person.px[:, 1]], axis=1)
+    others = {_EXCHANGED: person.px[:, ::-1], _MIRRORED: mirrored}
+    shares = {
+        reason: inside(silhouette, ImagePoints(px, person.scores)) or 0.0
+        for reason, px in others.items()
+    }
+    best = max(shares, key=lambda reason: shares[reason])
+    if shares[best] >= _LEAST_SURE:
+        return best
+    return _BESIDE if share < LEAST_INSIDE else ""
 
 
 def placed(person: ImagePoints, calibration: Calibration, size: Size) -> ImagePoints:

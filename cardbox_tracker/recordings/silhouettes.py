@@ -206,6 +206,8 @@ class SilhouetteSource:
             calibration = self._pipeline.calibration
             given = points.read(camera, (calibration.width, calibration.height))
             size = self.camera.width, self.camera.height
+            first_ns = next(self._bag.images(self._topic)).stamp_ns
+            given.check_span(first_ns, first_ns + int(1e9 * self.duration_s))
             self._given = given = given.placed(calibration, size, self.period_ns() // 2)
             self._points = lambda prepared, silhouette: given.at(
                 Image(prepared.stamp_ns, prepared.number, prepared.recorded.name), silhouette

@@ -190,6 +190,11 @@ def test_points_with_another_clock_are_said_with_a_stamp_of_each(tmp_path: Path)
     assert "0 of 2 points of" in found.fault and "stamp_ns is 5 to 9" in found.fault
     assert f"that of the images {10**18} to {2 * 10**18}" in found.fault
     assert read(table(tmp_path, "5,nose,1,2,1")).fault == ""
+    # It is said before an hour of tracking, if the clocks are apart.
+    with pytest.raises(CardboxError, match=r"0 of 2 points .* fit an image: their stamp_ns is 5"):
+        found.check_span(10**18, 2 * 10**18)
+    found.check_span(0, 7)
+    found.check_span(10**9, 10**10)
 
 
 def test_a_column_with_the_number_of_the_image_takes_the_place_of_stamps(tmp_path: Path) -> None:
@@ -214,13 +219,15 @@ def test_of_several_people_the_one_in_the_silhouette_is_taken(tmp_path: Path) ->
     [
         (139.0, 240.0, "on the person when they are mirrored"),
         (250.0, 240.0, "beside the person's silhouette; expected pixels of this camera's own"),
-        (240.0, 500.0, "when columns and rows are exchanged; expected u, v"),
+        (500.0, 240.0, "when columns and rows are exchanged; expected u, v"),
     ],
 )
 def test_points_beside_the_person_are_not_used_and_the_reason_is_said(
     tmp_path: Path, column: float, row: float, reason: str
 ) -> None:
     numbers = person(column, row)
+    if "exchanged" in reason:
+        numbers[0::3], numbers[1::3] = numbers[1::3], numbers[0::3]
     (tmp_path / "results.json").write_text(
         json.dumps([{"image_id": i, "keypoints": numbers} for i in range(3)])
     )
@@ -229,6 +236,18 @@ def test_points_beside_the_person_are_not_used_and_the_reason_is_said(
     assert "used in 0 of 3 images" in found.fault and reason in found.fault
     assert "the points of 3 of 3 images are not used" in found.remark and reason in found.remark
     assert found.at(Image(0, 0), NONE) is not None  # an empty silhouette contradicts nothing
+
+
+def test_wrong_points_are_not_used_where_they_lie_on_the_person_by_chance(tmp_path: Path) -> None:
+    rows = [f"{i},nose,{500 if i in (12, 15) else 250},240,0.9" for i in range(40)]
+    found = read(table(tmp_path, *rows))
+    assert all(found.at(Image(i), silhouette(500)) is None for i in range(40))
+    # Those of the tracked person are used though somebody else's are in between.
+    rows = [f"{i},nose,{250 if 5 < i < 15 else 500},240,0.9" for i in range(40)]
+    found = read(table(tmp_path, *rows))
+    for i in range(40):
+        found.at(Image(i), silhouette(500))
+    assert (found.used, found.beside) == (31, 9)
 
 
 def openpose(folder: Path, number: int, *people: list[float], **more: list[float]) -> None:
