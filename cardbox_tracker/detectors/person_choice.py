@@ -101,12 +101,6 @@ def inside(silhouette: NDArray[np.uint8], points: ImagePoints) -> float | None:
     return _support(_near(silhouette), points) / float(points.scores.sum())
 
 
-def are_beside(silhouette: NDArray[np.uint8], points: ImagePoints) -> bool:
-    """Return whether points are those of nobody in the silhouette; see :func:`inside`."""
-    share = inside(silhouette, points)
-    return share is not None and share < LEAST_INSIDE
-
-
 def _near(silhouette: NDArray[np.uint8]) -> NDArray[np.uint8]:
     kernel = np.ones((2 * _MARGIN_PX + 1, 2 * _MARGIN_PX + 1), np.uint8)
     return np.asarray(cv2.dilate(silhouette, kernel), np.uint8)

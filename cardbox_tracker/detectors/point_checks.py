@@ -84,5 +84,6 @@ def check_places(person: ImagePoints, size: Size) -> None:
     Raises:
         CardboxError: see :func:`check_point`.
     """
-    for name, (column, row), score in zip(POINT_NAMES, person.px, person.scores, strict=True):
+    points = zip(POINT_NAMES, person.px.tolist(), person.scores.tolist(), strict=True)
+    for name, (column, row), score in points:
         check_point((name, column, row, score), size)

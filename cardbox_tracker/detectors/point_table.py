@@ -235,7 +235,7 @@ class GivenPoints:
         person = person_in(silhouette, found)
         if person is None:
             return None
-        reason = _reason(silhouette, person)
+        reason = why_not(silhouette, person)
         self._reasons[reason] += 1
         wrong = self._reasons.total() - self._reasons[""]
         # Wrong points are on the person by chance in some images.
@@ -290,11 +290,10 @@ class GivenPoints:
         return max(filter(None, self._reasons), key=lambda reason: self._reasons[reason])
 
 
-REMEDY = (
-    "expected pixels of this camera's own images, at their full size, and the person who is tracked"
+_BESIDE = (
+    "they lie beside the person's silhouette; expected pixels of this camera's own images, at "
+    "their full size, and the person who is tracked"
 )
-"""What to give in place of points that lie beside the silhouette."""
-_BESIDE = f"they lie beside the person's silhouette; {REMEDY}"
 _EXCHANGED = (
     "they lie on the person when columns and rows are exchanged; expected u, v: the column, then "
     "the row"
@@ -307,7 +306,7 @@ _EXPECTED = {
 }
 
 
-def _reason(silhouette: NDArray[np.uint8], person: ImagePoints) -> str:
+def why_not(silhouette: NDArray[np.uint8], person: ImagePoints) -> str:
     """Return why points are not those of the person in a silhouette (H, W); empty if they may be.
 
     Points that are wrong in another way than their place may lie on the person in part.

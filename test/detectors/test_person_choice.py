@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from cardbox_tracker.detectors.image_points import ImagePoints
-from cardbox_tracker.detectors.person_choice import PersonChoice, are_beside, person_in
+from cardbox_tracker.detectors.person_choice import PersonChoice, inside, person_in
 from cardbox_tracker.detectors.pose_network import Square
 
 
@@ -45,13 +45,13 @@ def test_points_outside_the_image_support_nobody() -> None:
     assert person_in(silhouette(40), [outside, here]) is here
 
 
-def test_points_beside_the_silhouette_are_of_somebody_else() -> None:
-    assert not are_beside(silhouette(40), person(40.0, 0.5))
-    assert are_beside(silhouette(40), person(150.0, 0.5))
-    # Noise, or an empty silhouette, contradicts nothing.
+def test_the_share_of_the_points_in_the_silhouette_is_known() -> None:
+    assert inside(silhouette(40), person(40.0, 0.5)) == 1.0
+    assert inside(silhouette(40), person(150.0, 0.5)) == 0.0
+    # Noise, or an empty silhouette, says nothing.
     noise = np.zeros((100, 200), np.uint8)
     noise[:5, :5] = 255
-    assert not are_beside(noise, person(150.0, 0.5))
+    assert inside(noise, person(150.0, 0.5)) is None
 
 
 @pytest.mark.parametrize(

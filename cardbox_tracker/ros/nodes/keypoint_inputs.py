@@ -13,9 +13,9 @@ from cardbox_tracker.camera.pairing import TOLERANCE_NS
 from cardbox_tracker.common.errors import CardboxError
 from cardbox_tracker.common.files import user_path
 from cardbox_tracker.detectors.image_points import ImagePoints
-from cardbox_tracker.detectors.person_choice import are_beside, person_in
+from cardbox_tracker.detectors.person_choice import person_in
 from cardbox_tracker.detectors.point_checks import check_places
-from cardbox_tracker.detectors.point_table import COLUMNS, REMEDY, Image, PointTable, placed
+from cardbox_tracker.detectors.point_table import COLUMNS, Image, PointTable, placed, why_not
 from cardbox_tracker.ros.messages.conversions import ImageArray, stamp_ns
 from cardbox_tracker.ros.nodes.keypoint_topic import KeypointTopic, Taken
 from cardbox_tracker.ros.nodes.tracker_parameters import TrackerParameters
@@ -88,7 +88,7 @@ class _CameraKeypoints:
         self.topic: KeypointTopic | None = None
         self._name = f"{camera.strip('/')} keypoints".lstrip()
         self._images = self._used = self._beside = 0
-        self._fault = ""
+        self._fault = self._reason = ""
         if settings.has_point_table:
             table = PointTable(user_path(source))
             self._given = table.read(camera.strip("/") or None)
@@ -120,7 +120,8 @@ class _CameraKeypoints:
         person = person_in(silhouette, [placed(one, calibration, size) for one in taken.persons])
         if person is None:
             return None
-        if are_beside(silhouette, person):
+        self._reason = why_not(silhouette, person)
+        if self._reason:
             self._beside += 1
             return None
         self._used, self._beside = self._used + 1, 0
@@ -151,8 +152,7 @@ class _CameraKeypoints:
             texts[f"{self._name} cannot be used"] = self._fault
         if self._beside > _BESIDE:
             texts[f"place of {self._name}"] = (
-                f"the points of the last {self._beside} images lie beside the silhouette and are "
-                f"not used; {REMEDY}"
+                f"the points of the last {self._beside} images are not used: {self._reason}"
             )
         if self._watch.current is None and time.monotonic() - self._began_s > _PATIENCE_S:
             texts[f"calibration on {self._info_topic}"] = (
