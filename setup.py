@@ -11,10 +11,12 @@ HOME = "https://github.com/cardbox-tracker/cardbox_tracker"
 
 # A ROS installation has these, so pip installs them only on request.
 ROS = ["ros-jazzy-rclpy[fastrtps]", "ros-jazzy-common-interfaces"]
+# 'cardbox track FOLDER --scheduler' on a cluster.
+CLUSTER = ["dask>=2024.5", "distributed>=2024.5"]
 TEST = [
     "bvh>=0.3,<1",
     "catkin_pkg>=1.0",
-    "dask[distributed]>=2024.5",
+    *CLUSTER,
     "hypothesis>=6.100",
     "mcap>=1.2",
     "mcap-ros2-support>=0.5.4",
@@ -38,8 +40,6 @@ PARQUET = ["pyarrow>=15,<30"]
 EXPORT = ["ezc3d>=1.5,<2"]
 # Runs the networks of the person detector; 'cardbox detector --install' gets their files.
 DETECTOR = ["ai-edge-litert>=1.4,<3"]
-# 'cardbox track FOLDER --scheduler' on a cluster.
-CLUSTER = ["dask[distributed]>=2024.5"]
 # Builds the site of the documents.
 DOCS = ["furo>=2024.5", "myst-parser>=3,<6", "sphinx>=7.3,<10", "sphinxcontrib-mermaid>=0.9,<3"]
 # Newer setuptools lack 'setup.py develop', which 'colcon build --symlink-install' calls.
