@@ -94,8 +94,8 @@ class StampSequence:
 class StreamStatistics:
     """Counts the messages of a stream and estimates the lost ones by the stamps."""
 
-    def __init__(self) -> None:
-        """Start without messages."""
+    def __init__(self, remembered: int | None = WINDOW) -> None:
+        """Start without messages; remarks are on the latest ``remembered``, None for all."""
         self.received = 0
         self.dropped = 0
         self.counts: dict[StampOrder, int] = dict.fromkeys(StampOrder, 0)
@@ -104,7 +104,7 @@ class StreamStatistics:
         self._spacings_ns: deque[int] = deque()
         # The sorted intervals, since the period is needed with every image.
         self._ordered_ns: list[int] = []
-        self._latest: deque[StampOrder] = deque(maxlen=WINDOW)
+        self._latest: deque[StampOrder] = deque(maxlen=remembered)
 
     def add(self, stamp_ns: int) -> StampOrder:
         """Count a message with this stamp, ns, and return its relation to the one before."""
@@ -166,12 +166,14 @@ class StreamStatistics:
         texts = {}
         latest = Counter(self._latest)
         count = len(self._latest)
+        # All images of a recording count, and of a stream only what happens often.
+        most, most_restarts = (0, 0) if self._latest.maxlen is None else (count // 10 + 1, 2)
         if latest[StampOrder.UNSTAMPED]:
             texts["stamps that are zero"] = (
                 "the images have no stamp (it is zero), so they are used in the order of arrival "
                 "and losses are not seen; set header.stamp in the camera's driver"
             )
-        if latest[StampOrder.REPEATED] > count // 10 + 1:
+        if latest[StampOrder.REPEATED] > most:
             texts["stamps that repeat"] = (
                 f"{latest[StampOrder.REPEATED]} of the latest {count} images repeat the stamp of "
                 "the one before and are left out; does the driver send them twice, or are there "
@@ -182,10 +184,58 @@ class StreamStatistics:
                 "the stamps jump to and fro between two times, and images of one of them are left "
                 "out; expected one camera with one clock: see 'ros2 topic info --verbose'"
             )
-        if latest[StampOrder.RESTART] > 2:
+        if latest[StampOrder.LATE] > most:
+            texts["stamps that are late"] = (
+                f"{latest[StampOrder.LATE]} of the latest {count} images have stamps that go back "
+                "by less than a second and are left out; are images sent twice, or is a recording "
+                "played in a loop?"
+            )
+        if latest[StampOrder.RESTART] > most_restarts:
             texts["stamps that go back"] = (
                 f"the stamps of the latest {count} images went back {latest[StampOrder.RESTART]} "
                 "times by more than a second, and tracking started again each time; is "
-                "the clock of the camera's computer being set?"
+                "the clock of the camera's computer being set, or a recording played in a loop?"
             )
         return texts
+
+
+class RecordedStamps:
+    """Times of a recorded stream, which always increase.
+
+    Images are left out as in a live stream. Where stamps are missing or go back, the recorder's
+    clock goes on.
+
+    Attributes:
+        statistics: order and losses by the stamps.
+    """
+
+    def __init__(self) -> None:
+        """Begin before the first message."""
+        self.statistics = StreamStatistics(remembered=None)
+        self._last: tuple[int, int] | None = None
+        self._ahead_ns = 0
+
+    def add(self, stamp_ns: int, recorded_ns: int) -> int | None:
+        """Return the time of the next message, ns; None if it is to be left out.
+
+        Args:
+            stamp_ns: its stamp; 0 if it has none.
+            recorded_ns: time at which it was recorded.
+        """
+        order = self.statistics.add(stamp_ns)
+        if not order.is_usable:
+            return None
+        is_unstamped = order is StampOrder.UNSTAMPED
+        time_ns = recorded_ns if is_unstamped else stamp_ns + self._ahead_ns
+        is_back = is_unstamped or order is StampOrder.RESTART
+        if self._last is not None and (is_back or time_ns <= self._last[0]):
+            before_ns, recorded_before_ns = self._last
+            time_ns = before_ns + max(recorded_ns - recorded_before_ns, 1)
+            if not is_unstamped:
+                self._ahead_ns = time_ns - stamp_ns
+        self._last = time_ns, recorded_ns
+        return time_ns
+
+    def remarks(self) -> list[str]:
+        """Return texts on all faults, as :meth:`StreamStatistics.remarks`."""
+        return list(self.statistics.remarks().values())

@@ -67,7 +67,8 @@ def track(
                 (*observers, lambda frame, *_: advance((frame.time_s - start_s) / total_s)),
                 person.end_s,
             )
-        remarks = source.first.remarks
+        remarks, accounts = source.first.remarks, tuple(one.account for one in source.sources)
+    summary = replace(summary, accounts=accounts)
     if show is None:
         uncertain = summary.frames_uncertain
         doubt = f" ({uncertain} of them uncertain)" if uncertain else ""

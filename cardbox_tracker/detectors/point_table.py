@@ -298,7 +298,10 @@ _EXCHANGED = (
     "they lie on the person when columns and rows are exchanged; expected u, v: the column, then "
     "the row"
 )
-_MIRRORED = "they lie on the person when they are mirrored; expected points of these very images"
+_MIRRORED = (
+    "they lie on the person only when they are mirrored; give --mirrored if the film is a mirrored "
+    "one, or points of these very images"
+)
 _EXPECTED = {
     COLUMNS[0]: "the stamp of an image, within half the time between images",
     FRAME: "the number of an image, counted from 0",
@@ -331,4 +334,6 @@ def placed(person: ImagePoints, calibration: Calibration, size: Size) -> ImagePo
     px = calibration.rectified(person.px, *size)
     # Beyond its image, a lens with distortion is not calibrated.
     is_near = ((px > -np.array(size)) & (px < 2 * np.array(size))).all(axis=1)
-    return ImagePoints(px, np.where(is_near, person.scores, 0.0))
+    found = ImagePoints(px, np.where(is_near, person.scores, 0.0))
+    # In a mirrored image, a detector takes the left side for the right one.
+    return found.exchanged() if calibration.is_mirrored else found

@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from cardbox_tracker.common.errors import CardboxError, quoted
-from cardbox_tracker.recordings.bag_reader import FILE_ENDINGS
+from cardbox_tracker.recordings.bag_files import files_of_one, is_bag_file
 from cardbox_tracker.recordings.image_folder import image_files
 from cardbox_tracker.recordings.video_reader import SUFFIXES as VIDEO_ENDINGS
 
@@ -22,14 +22,14 @@ def is_one_recording(path: Path) -> bool:
     """Return whether a path is a single recording, not a folder of them.
 
     A folder is a recording if it is a rosbag2, if its folder ``bag`` is one, or if it has exactly
-    one file of a bag. It is also one if it has images, unless such recordings are in its folders.
+    one file of a bag, or the parts of one. It is also one if it has images, unless such recordings
+    are in its folders.
     """
     if not path.is_dir() or _is_rosbag2(path):
         return True
-    inside = list(path.iterdir())
-    if sum(entry.suffix in FILE_ENDINGS and entry.is_file() for entry in inside) == 1:
+    if files_of_one(path):
         return True
-    return bool(image_files(path)) and not any(map(_is_rosbag2, inside))
+    return bool(image_files(path)) and not any(map(_is_rosbag2, path.iterdir()))
 
 
 def _is_rosbag2(path: Path) -> bool:
@@ -75,7 +75,7 @@ def _found(folder: Path, left_out: Path | None, depth: int) -> Iterator[Path]:
             return
         for path in (folder / _readable(name, folder) for name in names):
             if path.is_file():
-                if path.suffix in FILE_ENDINGS or path.suffix.lower() in VIDEO_ENDINGS:
+                if is_bag_file(path) or path.suffix.lower() in VIDEO_ENDINGS:
                     yield path
             elif path.is_dir() and path.resolve() != left_out:
                 if is_one_recording(path):

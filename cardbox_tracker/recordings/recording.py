@@ -21,7 +21,6 @@ from cardbox_tracker.camera.extrinsics_sources import (
     transforms_of,
 )
 from cardbox_tracker.camera.pairing import camera_names, side_by_side
-from cardbox_tracker.camera.stamps import StampSequence
 from cardbox_tracker.camera.stereo import StereoDepth, stereo_of_pair
 from cardbox_tracker.camera.view import OtherCamera
 from cardbox_tracker.common.errors import BagError, CameraError, CardboxError
@@ -121,7 +120,6 @@ class Recording:
         self._stereo = stereo_of(self.first.camera, self.others) if depth == STEREO else None
         is_alone = len(self.sources) == 1 and self._depth is None
         self._tolerance_ns = 0 if is_alone else self.first.period_ns() // 2
-        self._stuck = [0] * len(self.sources)
 
     @property
     def first(self) -> SilhouetteSource:
@@ -140,9 +138,6 @@ class Recording:
         early_s = max(0.0, start_s - self._tolerance_ns / 1e9)
         late_s = end_s + self._tolerance_ns / 1e9
         streams = [source.frames(early_s, late_s) for source in self.sources]
-        if len(streams) > 1:
-            self._stuck = [0] * len(streams)
-            streams = [self._advancing(number, stream) for number, stream in enumerate(streams)]
         depths = self._depths()
         depth = next(depths, None)
         black = np.zeros((self.first.camera.height, self.first.camera.width), np.uint8)
@@ -164,25 +159,6 @@ class Recording:
             stamp_ns, time_s, *_ = lead
             first = frames[0] or RecordedFrame(stamp_ns, time_s, black, black)
             yield FrameSet(stamp_ns, time_s, frames, first, there)
-
-    def _advancing(self, number: int, frames: Iterator[RecordedFrame]) -> Iterator[RecordedFrame]:
-        """Yield the frames of a camera whose stamps go on."""
-        order = StampSequence()
-        for frame in frames:
-            if order.add(frame.stamp_ns).is_usable:
-                yield frame
-            else:
-                self._stuck[number] += 1
-
-    @property
-    def remarks(self) -> list[str]:
-        """Warnings about cameras whose stamps stood still."""
-        return [
-            f"{count} images of {name} are not used, because their stamps are not later than those "
-            "before: is its driver or its connection stuck?"
-            for name, count in zip(self.names, self._stuck, strict=True)
-            if count
-        ]
 
     def _depths(self) -> Iterator[tuple[int, DepthImage]]:
         """Yield stamp and depth of each depth image, at the size of the first camera."""
@@ -247,11 +223,14 @@ def input_faults(
             "depth images can cut out the person for one camera only; several cameras need "
             "--background"
         )
-    is_given = camera is not None and (camera.is_calibrated or camera.roll_rad or camera.fps)
+    is_turned = camera is not None and (camera.roll_rad or camera.is_mirrored)
+    is_given = camera is not None and (camera.is_calibrated or is_turned or camera.fps)
+    if is_turned and (depth is not None or isinstance(background, Within)):
+        yield "depth images are not turned: leave --camera-roll-deg and --mirrored out, or --depth"
     if len(cameras) > 1 and is_given:
         yield (
-            "--fov, --calibration, --camera-roll-deg and --fps describe one camera; the recording "
-            "of several cameras needs a CameraInfo of each"
+            "--fov, --calibration, --camera-roll-deg, --mirrored and --fps describe one camera; "
+            "the recording of several cameras needs a CameraInfo of each"
         )
     if (depth is not None or isinstance(background, Within)) and not is_bag(Path(path)):
         yield f"depth images are read from a rosbag2, which {os.fspath(path)} is not"

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from cardbox_tracker.camera.camera import Rectifier
 from cardbox_tracker.camera.depth_image import DepthImage
 from cardbox_tracker.camera.encodings import brightness_of
-from cardbox_tracker.common.errors import BagError, CardboxError, EncodingError
+from cardbox_tracker.common.errors import BagError, CameraError, CardboxError, EncodingError
 from cardbox_tracker.detectors.detector import Detector, PersonDetector
 from cardbox_tracker.detectors.image_points import ImagePoints
 from cardbox_tracker.detectors.point_table import GivenPoints, Image, PointTable
@@ -24,7 +24,7 @@ from cardbox_tracker.segmentation.silhouettes import SilhouettePipeline
 
 _PERIOD_IMAGES = 60
 # A stamp that differs from the recording time by more comes from another clock.
-_OTHER_CLOCK_NS = 10_000_000_000
+_OTHER_CLOCK_NS = 1_000_000_000
 
 
 class TimeSpan(NamedTuple):
@@ -180,7 +180,7 @@ class SilhouetteSource:
     ) -> None:
         self._bag = bag
         self._broken: dict[int, str] = {}
-        self._clock_ns = 0
+        self._used = self._clock_ns = 0
         self._topic = bag.image_topic(camera)
         calibration = bag.calibration(camera)
         self._pipeline = SilhouettePipeline(calibration, size, config, learning)
@@ -315,6 +315,15 @@ class SilhouetteSource:
             remarks.append(self._given.remark)
         return remarks
 
+    @property
+    def account(self) -> str:
+        """What was read and used of this camera, and what was left out, with the reasons."""
+        left_out = self._bag.left_out(self._topic)
+        if self._broken:
+            left_out.append(f"{len(self._broken)} that cannot be read")
+        reasons = f"; left out {', '.join(left_out)}" if left_out else "; nothing left out"
+        return f"used {self._used} images of {self._topic} in {self.path}{reasons}"
+
     def full_picture(self, frame: RecordedFrame) -> NDArray[np.uint8]:
         """Return the picture of a frame, undistorted, at the resolution of the recording."""
         if frame.recorded is None:
@@ -323,19 +332,28 @@ class SilhouetteSource:
         height, width = image.shape[:2]
         if self._full_size != (width, height):
             self._full_size = width, height
-            self._full_rectifier = self._pipeline.calibration.rectifier(width, height)
+            calibration = self._pipeline.calibration
+            self._full_rectifier = calibration.rectifier(*calibration.level_size(width, height))
         return image if self._full_rectifier is None else self._full_rectifier(image)
 
     def images(self) -> Iterator[PreparedImage]:
         """Yield every image that can be decoded."""
+        used = 0
         for number, image in enumerate(self._bag.images(self._topic), 1):
             if number == 1:
                 late_ns = image.time_ns - image.stamp_ns
                 self._clock_ns = late_ns if abs(late_ns) > _OTHER_CLOCK_NS else 0
             try:
-                prepared = self._pipeline.prepare(image.as_sent)
-            except EncodingError as error:
+                sent = image.as_sent
+                height, width = sent.shape[:2]
+                calibration = self._pipeline.calibration
+                calibration.check_shape(width, height, self._topic, "the first image")
+                prepared = self._pipeline.prepare(sent)
+            except (CameraError, EncodingError) as error:
                 self._broken[number] = str(error)
                 continue
+            # Of several passes, the longest counts.
+            used += 1
+            self._used = max(self._used, used)
             time_ns = image.stamp_ns + self._clock_ns - self._bag.start_ns
             yield PreparedImage(image.stamp_ns, time_ns / 1e9, prepared, image, number - 1)

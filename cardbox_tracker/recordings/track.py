@@ -36,6 +36,7 @@ class TrackSummary:
         remarks: warnings about extrinsics or depth that seem to be wrong.
         body: the body at the end, whose unknown values were fitted.
         used: in how many images each optional input was used, by its name.
+        accounts: for each camera, what was used of it and what was left out.
     """
 
     frames: int
@@ -45,6 +46,7 @@ class TrackSummary:
     frames_uncertain: int = 0
     remarks: tuple[str, ...] = ()
     body: BodyModel | None = None
+    accounts: tuple[str, ...] = ()
     used: Mapping[str, int] = field(default_factory=dict)
 
     @property
@@ -108,7 +110,7 @@ def track_recording(
             )
         recording.check_points()
     mean = (float(np.mean(costs)), float(np.mean(ious))) if costs else (float("nan"),) * 2
-    remarks = [*recording.remarks, *tracker.remarks]
+    remarks = tracker.remarks
     if tracker.agreement is not None:
         tracker.agreement.check(is_last=True)
         remarks += tracker.agreement.remarks(recording.names[1:])
@@ -118,5 +120,5 @@ def track_recording(
         names.get(name, name): count for name, count in tracker.used.items()
     }
     return TrackSummary(
-        frames, len(costs), *mean, frames_uncertain, tuple(remarks), tracker.body, used
+        frames, len(costs), *mean, frames_uncertain, tuple(remarks), tracker.body, used=used
     )

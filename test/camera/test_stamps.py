@@ -8,7 +8,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from cardbox_tracker.camera.stamps import StampOrder, StampSequence, StreamStatistics
+from cardbox_tracker.camera.stamps import (
+    RecordedStamps,
+    StampOrder,
+    StampSequence,
+    StreamStatistics,
+)
 
 S, MS = 1_000_000_000, 1_000_000
 START = 1_000 * S
@@ -135,3 +140,58 @@ def test_losses_are_counted_from_the_first_image_on(first: int) -> None:
         if number not in lost:
             statistics.add(stamp_ns)
     assert statistics.received + statistics.dropped == len(sent)
+
+
+@given(
+    st.lists(
+        st.one_of(
+            st.integers(START, START + 20 * S),
+            st.just(0),
+            st.integers(1, 2**62),
+        ),
+        max_size=60,
+    )
+)
+def test_the_times_of_a_recorded_stream_always_increase(stamps: list[int]) -> None:
+    """Whatever the stamps: what is left out of a live stream is left out, and no more."""
+    recorded, live = RecordedStamps(), StampSequence()
+    times = []
+    for number, stamp in enumerate(stamps):
+        time_ns = recorded.add(stamp, START + number * 66 * MS)
+        assert (time_ns is None) == (not live.add(stamp).is_usable)
+        times += [] if time_ns is None else [time_ns]
+    assert times == sorted(set(times))
+
+
+def times_of(stamps: Iterable[int]) -> tuple[list[int | None], list[str]]:
+    recorded = RecordedStamps()
+    times = [recorded.add(stamp, START + 66 * MS * n) for n, stamp in enumerate(stamps)]
+    return times, recorded.remarks()
+
+
+def test_recorded_stamps_that_increase_are_the_times_without_a_remark() -> None:
+    stamps = even(30, 5 * S)
+    assert times_of(stamps) == (stamps, [])
+
+
+@pytest.mark.parametrize("first", [0, 3])
+def test_without_stamps_the_recorders_clock_counts(first: int) -> None:
+    """Also from some image on: the clock goes on from the last stamp."""
+    stamps = [*even(first), *[0] * (12 - first)]
+    times, remarks = times_of(stamps)
+    assert times == even(12)
+    assert "no stamp (it is zero)" in remarks[0]
+
+
+def test_two_passes_of_a_long_loop_are_apart() -> None:
+    once = even(150)
+    times, remarks = times_of([*once, *once])
+    assert times == even(300)
+    assert "went back 1 times" in remarks[0]
+
+
+def test_of_two_passes_of_a_short_loop_one_is_left() -> None:
+    once = even(12)
+    times, remarks = times_of([*once, *once])
+    assert times == [*once, *[None] * 12]
+    assert any("go back" in remark for remark in remarks)

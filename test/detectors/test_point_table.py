@@ -217,7 +217,7 @@ def test_of_several_people_the_one_in_the_silhouette_is_taken(tmp_path: Path) ->
 @pytest.mark.parametrize(
     ("column", "row", "reason"),
     [
-        (139.0, 240.0, "on the person when they are mirrored"),
+        (139.0, 240.0, "on the person only when they are mirrored"),
         (250.0, 240.0, "beside the person's silhouette; expected pixels of this camera's own"),
         (500.0, 240.0, "when columns and rows are exchanged; expected u, v"),
     ],

@@ -23,8 +23,7 @@ from cardbox_tracker.recordings.result_table import (
     units,
 )
 from cardbox_tracker.recordings.silhouettes import RecordedFrame
-from cardbox_tracker.tracking.estimate import Estimate
-from cardbox_tracker.tracking.place import Place
+from cardbox_tracker.tracking.estimate import Estimate, Place
 
 ROOT = Path(__file__).parents[2]
 ANGLES = (

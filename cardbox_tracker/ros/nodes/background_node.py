@@ -17,6 +17,7 @@ from cardbox_tracker.ros.messages import conversions
 from cardbox_tracker.ros.nodes.camera_images import CameraImages
 from cardbox_tracker.ros.nodes.depth_cut import DepthCut
 from cardbox_tracker.ros.nodes.shared_parameters import (
+    camera_roll_parameter,
     depth_parameter,
     image_transport_parameter,
     max_megapixels_parameter,
@@ -73,6 +74,7 @@ class BackgroundParameters(NodeParameters):
         choices=tuple(WAYS),
         effect=_NEXT_LEARNING,
     )
+    camera_roll_deg: float = camera_roll_parameter()
     max_megapixels: float = max_megapixels_parameter()
     learn_images: int = shared(BackgroundConfig, "learn_images", effect=_NEXT_LEARNING)
     threshold: float = shared(BackgroundConfig, "threshold")
@@ -95,6 +97,11 @@ class BackgroundParameters(NodeParameters):
 
     def check(self) -> None:
         """Raise ValueError if values contradict each other."""
+        if self.camera_roll_deg and self.depth:
+            raise ValueError(
+                f"camera_roll_deg is {self.camera_roll_deg:g}, but depth images are not turned; "
+                "turn the camera upright, or leave depth empty"
+            )
         if self.within_m > 0.0 and not self.depth:
             raise ValueError(
                 f"within_m is {self.within_m:g} but no depth is given; set 'depth' to a topic of "
@@ -131,6 +138,7 @@ class BackgroundNode(CardboxNode):
             lambda: self.parameters.value.max_megapixels,
             self._on_calibration,
             self._on_image,
+            roll_deg=settings.camera_roll_deg,
         )
         self._cut = DepthCut(self, settings.depth, self._send) if settings.depth else None
         self.offer("~/learn", self._learn)

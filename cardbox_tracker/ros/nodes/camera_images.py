@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 
 from rclpy.qos import QoSProfile
@@ -10,10 +11,12 @@ from std_msgs.msg import Header
 
 from cardbox_tracker.camera.calibration_watch import CalibrationWatch
 from cardbox_tracker.camera.camera import Calibration
+from cardbox_tracker.camera.levels import Levels
 from cardbox_tracker.camera.stamps import StampOrder
 from cardbox_tracker.ros.messages import conversions
 from cardbox_tracker.ros.messages.conversions import ImageArray
 from cardbox_tracker.ros.runtime import qos
+from cardbox_tracker.ros.runtime.latched import LatchedInput
 from cardbox_tracker.ros.runtime.node import CardboxNode
 from cardbox_tracker.ros.runtime.publishers import SinglePublisher
 
@@ -41,6 +44,7 @@ class CameraImages:
         changed: Callable[[Calibration], None],
         deliver: Deliver,
         profile: QoSProfile = qos.SENSOR_DATA,
+        roll_deg: float = 0.0,
     ) -> None:
         """Subscribe with ``node`` and report on its diagnostics.
 
@@ -51,6 +55,7 @@ class CameraImages:
             changed: called with the first calibration, and with another one that lasts.
             deliver: called with each image once the calibration is known.
             profile: quality of service of the images.
+            roll_deg: roll of the camera, degrees.
         """
         self._node = node
         self._most_megapixels, self._changed, self._deliver = most_megapixels, changed, deliver
@@ -58,15 +63,16 @@ class CameraImages:
         topic = "image_raw/compressed" if compressed else "image_raw"
         kind = CompressedImage if compressed else Image
         self.topic, self.info_topic = node.resolve(topic), node.resolve("camera_info")
-        self.watch = CalibrationWatch(self.info_topic, self.topic)
+        self.watch = CalibrationWatch(self.info_topic, self.topic, math.radians(roll_deg))
         self.info: CameraInfo | None = None
         self.order = StampOrder.NEXT
         self.image_bytes = 0
+        self._levels = Levels()
         self._early: tuple[Image | CompressedImage, int] | None = None
         self._single = SinglePublisher(node, (self.topic, self.info_topic))
         # Of messages that arrive together, those of the first subscription are taken first.
         node.subscribe(kind, topic, self.on_image, profile)
-        node.subscribe(CameraInfo, "camera_info", self.on_info, qos.SENSOR_DATA)
+        self._infos = LatchedInput(node, CameraInfo, "camera_info", self.on_info, qos.SENSOR_DATA)
         node.diagnostics.source = f"images on {self.topic}"
         node.diagnostics.wait_for(
             f"images on {self.topic} and their CameraInfo on {self.info_topic}"
@@ -121,8 +127,18 @@ class CameraImages:
         self, message: Image | CompressedImage, sent_ns: int, calibration: Calibration
     ) -> None:
         most = conversions.most_pixels_of(calibration, self._most_megapixels())
-        image = conversions.image_of(message, most)
-        conversions.check_shape(image, calibration, self.topic, self.info_topic)
+        changes = self._levels.changes
+        image = conversions.image_of(message, most, self._levels)
+        if self._levels.changes > changes:
+            if self._levels.text:
+                self._node.get_logger().info(f"{self.topic}: {self._levels.text}")
+            if changes:  # what was learned has another scale
+                self._changed(calibration)
+        height, width = image.shape[:2]
+        calibration.check_shape(width, height, self.topic, self.info_topic)
+        # TF knows neither an empty name nor one with a slash before it.
+        frame_id = message.header.frame_id.lstrip("/")
+        message.header.frame_id = frame_id or calibration.frame_id
         self._deliver(message.header, image, sent_ns)
 
     def remarks(self) -> dict[str, str]:

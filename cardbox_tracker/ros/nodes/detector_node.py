@@ -26,6 +26,7 @@ from cardbox_tracker.ros.messages.keypoints import (
 )
 from cardbox_tracker.ros.nodes.camera_images import CameraImages
 from cardbox_tracker.ros.nodes.shared_parameters import (
+    camera_roll_parameter,
     image_transport_parameter,
     max_megapixels_parameter,
 )
@@ -64,6 +65,7 @@ class DetectorParameters(NodeParameters):
         unit="Hz",
         limits=(0.0, 240.0),
     )
+    camera_roll_deg: float = camera_roll_parameter()
     max_megapixels: float = max_megapixels_parameter()
 
 
@@ -104,6 +106,7 @@ class DetectorNode(CardboxNode):
             self._on_image,
             # While the network works, only the newest image is kept.
             qos.NEWEST,
+            settings.camera_roll_deg,
         )
         own = (self.resolve("silhouette"),) if settings.publish_silhouette else ()
         self._single = SinglePublisher(self, own)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 
+import numpy as np
 from sensor_msgs.msg import CameraInfo
 from std_msgs.msg import Header
 
@@ -20,6 +21,7 @@ from cardbox_tracker.ros.messages.conversions import ImageArray, stamp_ns
 from cardbox_tracker.ros.nodes.keypoint_topic import KeypointTopic, Taken
 from cardbox_tracker.ros.nodes.tracker_parameters import TrackerParameters
 from cardbox_tracker.ros.runtime import qos
+from cardbox_tracker.ros.runtime.latched import LatchedInput
 from cardbox_tracker.ros.runtime.node import CardboxNode
 
 _PATIENCE_S = 3.0
@@ -100,9 +102,15 @@ class _CameraKeypoints:
             topic = source if source.startswith("/") else f"{below}{source}"
             self.topic = KeypointTopic(node, self._name, topic)
         self._info_topic = node.resolve(f"{below}camera_info")
-        self._watch = CalibrationWatch(self._info_topic, node.resolve(f"{below}image_raw"))
+        self._watch = CalibrationWatch(
+            self._info_topic,
+            node.resolve(f"{below}image_raw"),
+            np.radians(settings.camera_roll_deg),
+        )
         self._began_s = time.monotonic()
-        node.subscribe(CameraInfo, f"{below}camera_info", self._on_info, qos.SENSOR_DATA)
+        self._infos = LatchedInput(
+            node, CameraInfo, f"{below}camera_info", self._on_info, qos.SENSOR_DATA
+        )
 
     def _on_info(self, message: CameraInfo, _: int) -> None:
         if self._watch.see(message) and self.topic is not None and self._watch.current is not None:

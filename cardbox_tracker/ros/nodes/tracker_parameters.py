@@ -10,6 +10,7 @@ from typing import Any
 from cardbox_tracker.camera.pairing import camera_names
 from cardbox_tracker.common.settings import NoEffectError, nested, settings_of
 from cardbox_tracker.ros.nodes.shared_parameters import (
+    camera_roll_parameter,
     cameras_parameter,
     depth_parameter,
     extrinsics_parameter,
@@ -163,6 +164,7 @@ class TrackerParameters(NodeParameters):
     extrinsics_file: str = extrinsics_parameter()
     depth: str = depth_parameter()
     keypoints: str = keypoints_parameter()
+    camera_roll_deg: float = camera_roll_parameter()
 
     @property
     def has_point_table(self) -> bool:

@@ -101,6 +101,7 @@ class CardboxNode(Node):
         profile: QoSProfile,
         *,
         has_one_type: bool = True,
+        is_overridable: bool = True,
     ) -> Subscription | None:
         """Subscribe to a topic, bypassing DDS if a node of this process offers it.
 
@@ -110,8 +111,9 @@ class CardboxNode(Node):
             kind: class of the messages.
             topic: name of the topic.
             callback: receives each message.
-            profile: quality of service, which can be overridden.
+            profile: quality of service, which can be overridden by default.
             has_one_type: False if the caller adapts to publishers of another type.
+            is_overridable: False for a second subscription to a topic.
 
         Returns:
             The subscription; None without DDS.
@@ -138,7 +140,7 @@ class CardboxNode(Node):
             guarded,  # type: ignore[arg-type]  # rclpy leaves out its own second argument
             qos.copy_of(profile),
             event_callbacks=qos.subscription_events(self.resolve(topic), self.diagnostics.warn),
-            qos_overriding_options=qos.overridable(profile),
+            qos_overriding_options=qos.overridable(profile) if is_overridable else None,
         )
 
     def offer(self, name: str, action: Callable[[], str]) -> None:
