@@ -137,12 +137,14 @@ class PersonRequest:
         end_s: the same at which it ends; inf for the end of the recording.
         is_pitch_given: whether ``body`` has the camera's pitch; else it is to be found from the
             person who stands upright.
+        stature_m: the stature that is given; None with ``model``.
     """
 
     body: BodyModel
     model: Path | None
     start_s: float
     is_pitch_given: bool
+    stature_m: float | None = None
     end_s: float = math.inf
 
 
@@ -618,7 +620,7 @@ def _person(options: argparse.Namespace, problems: Problems) -> PersonRequest:
     start_s, end_s = options.start or 0.0, math.inf if options.end is None else options.end
     if end_s <= start_s:
         problems.add(f"--end {end_s:g} is not after --start {start_s:g}: give a later second")
-    return PersonRequest(body, options.model, start_s, is_pitch_given, end_s)
+    return PersonRequest(body, options.model, start_s, is_pitch_given, options.stature, end_s)
 
 
 def _config(options: argparse.Namespace, preset: TrackerConfig) -> TrackerConfig:

@@ -2,10 +2,15 @@
 
 from __future__ import annotations
 
+import ctypes
+import os
+import signal
+import sys
 import time
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import BrokenExecutor
 from contextlib import ExitStack, contextmanager
+from functools import partial
 from multiprocessing import resource_tracker
 from typing import TypeVar
 from warnings import catch_warnings, simplefilter
@@ -17,8 +22,19 @@ A = TypeVar("A")
 R = TypeVar("R")
 
 _CONNECT_S = 10.0
+# PR_SET_PDEATHSIG of <linux/prctl.h>.
+_DEATH_SIGNAL = 1
 _TAKEN_UP_S = 0.05
 """Time in which loky's thread puts the first calls into the queue of the processes (s)."""
+
+
+def _called(parent: int, function: Callable[[A], R], argument: A) -> R:
+    if os.getpid() != parent and sys.platform.startswith("linux"):
+        # The kernel ends this process with its parent, also if that is killed.
+        ctypes.CDLL(None).prctl(_DEATH_SIGNAL, signal.SIGKILL)
+        if os.getppid() != parent:
+            os._exit(1)
+    return function(argument)
 
 
 def cores() -> int:
@@ -52,13 +68,15 @@ def results_of(
     # Python's tracker of resources unblocks SIGINT when it starts, so it starts before.
     resource_tracker.ensure_running()
     with ExitStack() as stack:
+        call = function
         if scheduler is None:
+            call = partial(_called, os.getpid(), function)
             # numba, BLAS and OpenMP read their number of threads when a process begins.
             stack.enter_context(parallel_config("loky", inner_max_num_threads=1))
         else:
             stack.enter_context(_cluster(scheduler))
             stack.enter_context(parallel_config("dask"))
-        with _results(function, arguments, jobs if scheduler is None else -1) as results:
+        with _results(call, arguments, jobs if scheduler is None else -1) as results:
             yield results
 
 

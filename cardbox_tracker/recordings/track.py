@@ -37,6 +37,7 @@ class TrackSummary:
         body: the body at the end, whose unknown values were fitted.
         used: in how many images each optional input was used, by its name.
         accounts: for each camera, what was used of it and what was left out.
+        assumptions: what the results rest on, with its numbers and where they are from.
     """
 
     frames: int
@@ -47,6 +48,7 @@ class TrackSummary:
     remarks: tuple[str, ...] = ()
     body: BodyModel | None = None
     accounts: tuple[str, ...] = ()
+    assumptions: tuple[str, ...] = ()
     used: Mapping[str, int] = field(default_factory=dict)
 
     @property

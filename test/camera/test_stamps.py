@@ -86,6 +86,19 @@ def test_of_two_clocks_one_is_followed(offset_s: int) -> None:
     assert found[::2] == [StampOrder.NEXT] * 100, "the one that was first goes on"
 
 
+@pytest.mark.parametrize("images", [3, 10])
+def test_a_recording_of_less_than_a_second_starts_over(images: int) -> None:
+    found = orders(even(images) * 20)
+    used = [order for order in found if order.is_usable]
+    assert used.count(StampOrder.RESTART) == 19
+    assert len(used) == images + 19 * (images - 1)
+
+
+def test_a_second_copy_of_each_image_does_not_start_over() -> None:
+    copied = [stamp for pair in zip(even(40)[3:], even(40), strict=False) for stamp in pair]
+    assert StampOrder.RESTART not in orders([*even(3), *copied])
+
+
 def test_one_wrong_stamp_does_not_hold_up_for_long() -> None:
     stamps = [*even(10), START - 3600 * S, *even(20, START + 660 * MS)]
     found = orders(stamps)

@@ -11,11 +11,10 @@ from pathlib import Path
 
 import numpy as np
 
-from cardbox_tracker.applications.exporting.isb import LEAST_BENT_RAD, thorax_angles
-from cardbox_tracker.applications.exporting.markers import LABORATORY
 from cardbox_tracker.applications.exporting.motion import Motion
 from cardbox_tracker.applications.exporting.placed import frames_of
 from cardbox_tracker.common.files import atomic_path
+from cardbox_tracker.person.isb_angles import LABORATORY, LEAST_BENT_RAD, thorax_angles
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.posture import LEFT_ARM, RIGHT_ARM
 from cardbox_tracker.person.sizes import FloatArray

@@ -10,6 +10,7 @@ from sensor_msgs.msg import Image
 from std_msgs.msg import Header
 
 from cardbox_tracker.camera.camera import Calibration, Camera
+from cardbox_tracker.camera.stamps import StampOrder
 from cardbox_tracker.common.errors import BackgroundFileError, CameraError
 from cardbox_tracker.common.progress import told
 from cardbox_tracker.common.settings import settings_of
@@ -126,6 +127,7 @@ class BackgroundNode(CardboxNode):
         self._kept = KeptBackground(path, (settings.width, settings.height))
         self._pipeline: SilhouettePipeline | None = None
         self._image: conversions.ImageArray | None = None
+        self._in_this_round = 0
         self._outputs = SilhouetteOutputs(self)
         self._mean = self.advertise(Image, "~/mean", qos.LATCHED)
         self._stddev = self.advertise(Image, "~/stddev", qos.LATCHED)
@@ -143,6 +145,7 @@ class BackgroundNode(CardboxNode):
         self._cut = DepthCut(self, settings.depth, self._send) if settings.depth else None
         self.offer("~/learn", self._learn)
         self.diagnostics.extra = self._values
+        self.diagnostics.remedy = "take a smaller working resolution, or fewer images a second"
         self.diagnostics.advice = self._advice
 
     def _changed(self, settings: BackgroundParameters) -> None:
@@ -177,6 +180,12 @@ class BackgroundNode(CardboxNode):
     def _on_image(self, header: Header, full: conversions.ImageArray, sent_ns: int) -> None:
         pipeline = self._pipeline
         assert pipeline is not None
+        if self.camera_images.order is StampOrder.RESTART:
+            # A recording with fewer images than are learned needs several rounds.
+            if not pipeline.is_ready and self._in_this_round >= pipeline.learning.images:
+                pipeline.relearn()
+            self._in_this_round = 0
+        self._in_this_round += 1
         self._image = image = pipeline.prepare(full)
         within_m = self.parameters.value.within_m
         if self._cut is not None and within_m > 0.0:
@@ -241,7 +250,8 @@ class BackgroundNode(CardboxNode):
         settings = self.parameters.value
         findings = Findings(
             self.camera_images.topic,
-            self.diagnostics.input.loss,
+            # A slow node leaves images out, which are not lost on the way.
+            0.0 if self.diagnostics.is_slow else self.diagnostics.input.loss,
             self.camera_images.image_bytes,
             self._drift(),
             settings.follow and settings.clean_up,

@@ -20,8 +20,6 @@ from cardbox_tracker.detectors.point_table import COLUMNS, Image, PointTable, pl
 from cardbox_tracker.ros.messages.conversions import ImageArray, stamp_ns
 from cardbox_tracker.ros.nodes.keypoint_topic import KeypointTopic, Taken
 from cardbox_tracker.ros.nodes.tracker_parameters import TrackerParameters
-from cardbox_tracker.ros.runtime import qos
-from cardbox_tracker.ros.runtime.latched import LatchedInput
 from cardbox_tracker.ros.runtime.node import CardboxNode
 
 _PATIENCE_S = 3.0
@@ -108,9 +106,7 @@ class _CameraKeypoints:
             np.radians(settings.camera_roll_deg),
         )
         self._began_s = time.monotonic()
-        self._infos = LatchedInput(
-            node, CameraInfo, f"{below}camera_info", self._on_info, qos.SENSOR_DATA
-        )
+        node.subscribe_info(f"{below}camera_info", self._on_info)
 
     def _on_info(self, message: CameraInfo, _: int) -> None:
         if self._watch.see(message) and self.topic is not None and self._watch.current is not None:

@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from cardbox_tracker.applications.exporting.markers import LABORATORY
 from cardbox_tracker.applications.exporting.mot import ARM, LUMBAR, coordinates_of, write_mot
+from cardbox_tracker.person.isb_angles import LABORATORY
 from cardbox_tracker.person.kinematics import pose
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.posture import LEFT_ARM, RIGHT_ARM

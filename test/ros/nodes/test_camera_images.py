@@ -24,6 +24,7 @@ from cardbox_tracker.ros.messages.conversions import (  # noqa: E402
 )
 from cardbox_tracker.ros.nodes.background_node import BackgroundNode  # noqa: E402
 from cardbox_tracker.ros.nodes.camera_images import CameraImages  # noqa: E402
+from cardbox_tracker.ros.nodes.stereo_depth_node import StereoDepthNode  # noqa: E402
 from cardbox_tracker.ros.nodes.tracker_node import TrackerNode  # noqa: E402
 from cardbox_tracker.ros.runtime import qos  # noqa: E402
 from cardbox_tracker.ros.runtime.node import CardboxNode  # noqa: E402
@@ -44,6 +45,39 @@ def test_an_image_does_not_wait_for_its_camera_info(
     assert topics.index(image) < next(i for i, name in enumerate(topics) if "camera_info" in name)
 
 
+@pytest.mark.parametrize("kind", [BackgroundNode, StereoDepthNode])
+def test_a_remapping_of_the_images_holds_for_compressed_ones(
+    kind: type[CardboxNode], make_node: Callable[..., Any]
+) -> None:
+    place = "left/" if kind is StereoDepthNode else ""
+    for old, new in (
+        (f"{place}image_raw", "/eye/image/compressed"),
+        (f"{place}image_raw/compressed", "/eye/image"),
+    ):
+        words = ["--ros-args", "-r", f"{old}:=/eye/image", "-p", "image_transport:=compressed"]
+        node = kind(context=make_node().context, enable_rosout=False, cli_args=words)
+        topics = [subscription.topic_name for subscription in node.subscriptions]
+        node.destroy_node()
+        assert new in topics
+
+
+def test_a_camera_info_that_was_latched_before_is_received(make_node: Callable[..., Any]) -> None:
+    camera = make_node()
+    infos = camera.create_publisher(CameraInfo, "camera_info", qos.LATCHED)
+    infos.publish(camera_info_message(Header(frame_id="eye"), CAMERA))
+    node = CardboxNode("tested", context=camera.context, enable_rosout=False)
+    received: list[str] = []
+    node.subscribe_info("camera_info", lambda message, _: received.append(message.header.frame_id))
+    executor = SingleThreadedExecutor(context=camera.context)
+    executor.add_node(node)
+    end = time.monotonic() + 30.0
+    while not received and time.monotonic() < end:
+        executor.spin_once(timeout_sec=0.1)
+    executor.shutdown()
+    node.destroy_node()
+    assert received == ["eye"]
+
+
 @pytest.mark.parametrize("info_stamp_s", [1, 2, 3])
 def test_only_the_image_of_the_first_camera_info_is_kept_for_it(
     info_stamp_s: int, make_node: Callable[..., Any], hands: Any
@@ -56,7 +90,6 @@ def test_only_the_image_of_the_first_camera_info_is_kept_for_it(
         lambda: 1.0,
         lambda _: None,
         lambda header, *_: delivered.append(header.stamp.sec),
-        QoSProfile(depth=1),
     )
 
     def give(stamp_s: int) -> None:
