@@ -82,7 +82,7 @@ def track(
     with recording.open() as source:
         early = source.first.remarks
         print_remarks(early)
-        total_s = max(1e-9, source.first.duration_s - start_s)
+        total_s = max(1e-9, min(source.first.duration_s, person.end_s) - start_s)
         with ExitStack() as stack:
             observers = (*_writers(request, source, stack), *observers)
             advance = show or stack.enter_context(progress_bar("track"))
@@ -98,6 +98,7 @@ def track(
                     quality,
                     lambda frame, *_: advance((frame.time_s - start_s) / total_s),
                 ),
+                person.end_s,
             )
         remarks = [remark for remark in source.first.remarks if remark not in early]
         accounts = tuple(one.account for one in source.sources)
@@ -108,6 +109,8 @@ def track(
     print_remarks(remarks, summary.remarks)
     if show is None:
         print(f"assumed: {', '.join(summary.assumptions)}", *quality.lines(), sep="\n")
+        if summary.used_text:
+            print(summary.used_text)
     if request.files.body is not None and summary.body is not None:
         save_body_model(summary.body, request.files.body)
     return summary
@@ -203,7 +206,10 @@ def placed(
     pitch, deviation = math.degrees(tilt.pitch_rad), math.degrees(tilt.pitch_stddev_rad)
     sources = ["the vertical edges of the room"] if tilt.has_edges else []
     if found.span is not None:
-        sources.append(f"the person standing upright at {found.span} s")
+        first_s, last_s = found.span.start_s, found.span.end_s
+        sources.append(
+            f"the person standing upright between the seconds {first_s:g} and {last_s:g}"
+        )
     number = f"{abs(pitch):.0f} degrees {'down' if pitch >= 0 else 'up'}"
     number += f" (standard deviation {deviation:.0f})"
     remarks = []
@@ -220,11 +226,11 @@ def placed(
             "if it is known"
         )
     else:
-        searched = span._replace(end_s=max(span.end_s, until_s))
+        end_s = max(span.end_s, until_s)
         remarks.append(
-            f"nobody stands upright at {searched} s and no edges of the room are vertical, so the "
-            f"camera's pitch is taken as that of most cameras, {number}; give --camera-pitch-deg "
-            "if it is known"
+            f"nobody stands upright between the seconds {span.start_s:g} and {end_s:g} and no "
+            "edges of the room are vertical, so the camera's pitch is taken as that of most "
+            f"cameras, {number}; give --camera-pitch-deg if it is known"
         )
     if tilt.roll_rad and camera.roll_rad is None and len(recording.cameras) < 2:
         remarks.append(

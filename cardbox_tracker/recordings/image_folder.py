@@ -96,7 +96,8 @@ class ImageFolder(Film):
         """Yield the images in order, at the given rate."""
         for number, file in enumerate(self._files):
             stamp_ns = round(1e9 * number / (self._given.fps or FPS))
-            yield RecordedImage(stamp_ns, "", stamp_ns, partial(self._image, file, self._size))
+            decode = partial(self._image, file, self._size)
+            yield RecordedImage(stamp_ns, "", stamp_ns, decode, file.name)
 
     def _image(self, file: Path, size: tuple[int, int] | None = None) -> NDArray[np.uint8]:
         """Return an image (H, W) or (H, W, 3), which must have ``size`` (width, height), px."""
