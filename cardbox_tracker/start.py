@@ -8,15 +8,27 @@ the error names the missing package.
 
 from __future__ import annotations
 
-import os
 import sys
-import sysconfig
-from collections.abc import Callable
-from functools import partial
-from importlib import import_module
-from pickle import UnpicklingError
+from types import TracebackType
 
-from cardbox_tracker.common import garbage, interrupts
+
+def _told(kind: type[BaseException], error: BaseException, trace: TracebackType | None) -> None:
+    """Write an error that ends the program, but no traceback of a Ctrl-C."""
+    if not issubclass(kind, KeyboardInterrupt):
+        sys.__excepthook__(kind, error, trace)
+
+
+# The imports below take some time, in which Ctrl-C may come.
+sys.excepthook = _told
+
+import os  # noqa: E402
+import sysconfig  # noqa: E402
+from collections.abc import Callable  # noqa: E402
+from functools import partial  # noqa: E402
+from importlib import import_module  # noqa: E402
+from pickle import UnpicklingError  # noqa: E402
+
+from cardbox_tracker.common import garbage, interrupts  # noqa: E402
 
 COMMAND = "cardbox_tracker.commands.main"
 """Module of the executable ``cardbox``."""
@@ -66,9 +78,10 @@ def start(name: str, main: Callable[[], int]) -> int:
 
 
 def other_package(script: str, package: str, environment: str) -> bool:
-    """Return whether an executable of an environment runs a package from elsewhere.
+    """Return whether an executable of an environment runs another package from elsewhere.
 
-    A sourced colcon workspace does this, because ``PYTHONPATH`` precedes the environment.
+    A sourced colcon workspace does this, because ``PYTHONPATH`` precedes the environment. Where it
+    was built from the same sources, as in the tutorial, nothing is wrong.
 
     Args:
         script: path of the executable.
@@ -78,7 +91,19 @@ def other_package(script: str, package: str, environment: str) -> bool:
     own = os.path.join(environment, os.path.basename(package))
     scripts = os.path.realpath(sysconfig.get_path("scripts"))
     is_of_environment = os.path.realpath(os.path.dirname(script)) == scripts
-    return is_of_environment and os.path.isdir(own) and not os.path.samefile(own, package)
+    if not (is_of_environment and os.path.isdir(own)) or os.path.samefile(own, package):
+        return False
+    return _sources(own) != _sources(package)
+
+
+def _sources(package: str) -> dict[str, bytes]:
+    """Return the content of each source of a package by its path below it."""
+    found = {}
+    for folder, _, names in os.walk(package):
+        for path in (os.path.join(folder, name) for name in names if name.endswith(".py")):
+            with open(path, "rb") as file:
+                found[os.path.relpath(path, package)] = file.read()
+    return found
 
 
 def _run(name: str) -> int:

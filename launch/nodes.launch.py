@@ -6,6 +6,7 @@ The other launch files include it; start it alone together with your own camera 
         camera_info:=/camera/camera_info person_distance_m:=2.0
 """
 
+import atexit
 import sys
 import tempfile
 from pathlib import Path
@@ -65,6 +66,10 @@ ARGUMENTS = {
         "", "background: read if it fits the camera, written when it is learned"
     ),
     "model_file": Argument("", "body model: read if it exists, written by every initialization"),
+    "stature": Argument(
+        *("0.0", "height of a person who is not measured, who is tracked at once", float),
+        limits=(0.0, 2.2),
+    ),
     "preset": Argument(
         "default", "tracker settings: paper or default", choices=("paper", "default")
     ),
@@ -115,7 +120,15 @@ GIVEN = {
         *("person_distance_m", "camera_pitch_deg", "side_turn", "model_file"),
         *("cameras", "extrinsics_file", "measure_distance", "depth"),
     ),
-    "tracker": ("preset", "rep155_id", "cameras", "extrinsics_file", "depth", "keypoints"),
+    "tracker": (
+        "preset",
+        "stature",
+        "rep155_id",
+        "cameras",
+        "extrinsics_file",
+        "depth",
+        "keypoints",
+    ),
     "detector": ("image_transport",),
 }
 # Nodes of cardbox_nodes; the detector always has a process of its own.
@@ -279,7 +292,18 @@ def _typed(given: dict[str, str], node: str, camera: str = "") -> dict[str, obje
     found: dict[str, object] = {name: typed[name] for name in GIVEN[node] if typed[name] != []}
     if node == "detector":
         found["publish_silhouette"] = typed["silhouettes"] == "detector"
-    return found
+    return found | _queue(given, node, camera)
+
+
+def _queue(given: dict[str, str], node: str, camera: str) -> dict[str, object]:
+    """Return the queue of a replay, which loses no image while a node works; live has none."""
+    ending = "/compressed" * (given["image_transport"] == "compressed")
+    topics = {"background": f"{given['image']}{ending}", "tracker": "silhouette"}
+    if "bag" not in given or node not in topics:
+        return {}
+    place = "/".join(part for part in (given["namespace"].strip("/"), camera) if part)
+    topic = topics[node] if topics[node].startswith("/") else f"/{place}/{topics[node]}"
+    return {f"qos_overrides.{topic.replace('//', '/')}.subscription.depth": 5}
 
 
 def _single_process(context: LaunchContext, remappings: list[tuple[str, str]]) -> Node:
@@ -297,6 +321,7 @@ def _single_process(context: LaunchContext, remappings: list[tuple[str, str]]) -
         sections[f"/**/{name}"] = {"ros__parameters": {**kept, **own}}
     with tempfile.NamedTemporaryFile("w", suffix=".yaml", prefix="cardbox_", delete=False) as file:
         yaml.safe_dump(sections, file)
+    atexit.register(Path(file.name).unlink, missing_ok=True)
     rules = [word for old, new in remappings for word in ("-r", f"background:{old}:={new}")]
     rules += ["-r", f"tracker:camera_info:={given['camera_info']}"]
     return Node(

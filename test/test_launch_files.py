@@ -176,6 +176,32 @@ def test_replay_finds_the_topics_in_a_process_that_can_read_bags(
     assert nodes[-1].options["parameters"][1]["pause_at"] == [1.0, 2.5]
 
 
+def test_a_replay_has_a_queue_where_live_nodes_take_the_newest(launch: Callable[..., Any]) -> None:
+    given = {"image": "/eye/0", "camera_info": "/c", "publish_tf": "false"}
+    replay = launch("replay", bag="/nowhere", namespace="room", **given)
+    queues = {"background": "/eye/0", "tracker": "/room/silhouette"}
+    for node in replay[:-1]:
+        topic = queues.get(node.options["executable"])
+        found = {k: v for k, v in parameters_of(node).items() if k.startswith("qos_overrides")}
+        assert found == ({f"qos_overrides.{topic}.subscription.depth": 5} if topic else {})
+    for node in launch("nodes", **given):
+        assert not any(name.startswith("qos_overrides") for name in parameters_of(node))
+
+
+def test_the_parameters_of_one_process_are_removed_at_the_end(
+    launch: Callable[..., Any], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    at_end: list[Any] = []
+    monkeypatch.setattr("atexit.register", lambda call, **given: at_end.append((call, given)))
+    (node,) = launch("nodes", single_process="true", publish_tf="false")
+    words = node.options["arguments"]
+    file = Path(words[words.index("--params-file") + 1])
+    assert file.is_file()
+    ((call, given),) = at_end
+    call(**given)
+    assert not file.exists()
+
+
 def test_replay_says_why_a_bag_cannot_be_played(launch: Callable[..., Any]) -> None:
     pytest.importorskip("rclpy", reason="rclpy is not installed")
     with pytest.raises(RuntimeError, match="/nowhere/bag") as caught:

@@ -41,6 +41,9 @@ MESSAGES = (
 )
 ROS = ("rclpy", "rosbags", "launch", "launch_ros", "ament_index_python", *MESSAGES)
 
+# What setup.py requires, but rosdep has no key for.
+WITHOUT_KEY = {"av", "rosbags"}
+
 # Folders of a checkout that are not installed.
 CHECKOUT = ("lab",)
 
@@ -306,18 +309,16 @@ def test_what_tests_import_is_declared() -> None:
         for kind in ("exec_depend", "test_depend")
         for element in package_xml().findall(kind)
     }
-    # rosdep has no key for rosbags, which setup.py requires.
-    for name in sorted(outside(ROOT / "test") - {"rosbags"}):
+    for name in sorted(outside(ROOT / "test") - WITHOUT_KEY):
         assert in_xml & {name, keys.get(name, f"python3-{name}")}, f"{name} is not in package.xml"
 
 
 def test_what_pip_requires_rosdep_requires() -> None:
-    """But for rosbags, which has no key there."""
     keys = {"opencv-python-headless": "python3-opencv", "pyyaml": "python3-yaml"}
     in_xml = {element.text for element in package_xml().findall("exec_depend")}
     for line in setup_arguments()["install_requires"]:
         name = re.split(r"[<>=]", line)[0].lower()
-        if name != "rosbags":
+        if name not in WITHOUT_KEY:
             assert keys.get(name, f"python3-{name}") in in_xml
 
 

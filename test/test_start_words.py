@@ -84,6 +84,24 @@ def test_an_error_of_other_data_leaves_the_compiled_code(monkeypatch: pytest.Mon
         start("cardbox", Mock(side_effect=EOFError("Ran out of input")))
 
 
+@pytest.mark.parametrize("name", ["cardbox", "tracker"])
+def test_ctrl_c_during_the_first_imports_has_no_traceback(name: str) -> None:
+    """The finder stands for a signal that comes while a module of the standard library loads."""
+    program = f"""
+import runpy, sys
+class Finder:
+    def find_spec(self, name, *_):
+        if name == "cardbox_tracker.common.interrupts":
+            raise KeyboardInterrupt
+sys.meta_path.insert(0, Finder())
+sys.argv = ["start", "{name}"]
+runpy.run_module("cardbox_tracker.start", run_name="__main__")
+"""
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True)
+    assert done.returncode in (-2, 130)
+    assert done.stderr == ""
+
+
 SCRIPT = Path(sysconfig.get_path("scripts")) / "cardbox"
 INSTALLED = Path(sysconfig.get_path("purelib")) / "cardbox_tracker"
 
@@ -93,6 +111,9 @@ def test_only_an_executable_of_the_environment_can_run_another_package(tmp_path:
     for folder in (environment, workspace):
         (folder / "cardbox_tracker").mkdir(parents=True)
     own, other = str(environment / "cardbox_tracker"), str(workspace / "cardbox_tracker")
+    # The tutorial installs the same sources twice.
+    assert not other_package(str(SCRIPT), other, str(environment))
+    (workspace / "cardbox_tracker" / "start.py").write_text("changed = True\n")
     assert other_package(str(SCRIPT), other, str(environment))
     assert not other_package(str(SCRIPT), own, str(environment))
     assert not other_package(str(SCRIPT), other, str(tmp_path / "without a copy"))

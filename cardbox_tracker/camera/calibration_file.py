@@ -1,18 +1,43 @@
-"""Reads calibrations as camera_calibration writes them."""
+"""Reads calibrations of camera_calibration, OpenCV's FileStorage, Kalibr, and of a CameraInfo."""
 
 from __future__ import annotations
 
 import os
+import re
+from collections.abc import Iterator, Mapping
+from types import MappingProxyType
+from typing import Any
+from xml.etree import ElementTree
 
 import numpy as np
 
 from cardbox_tracker.camera.camera import Calibration
-from cardbox_tracker.common.errors import CameraError, cut
+from cardbox_tracker.common.errors import CameraError, cut, quoted
 from cardbox_tracker.common.small_yaml import SmallYamlError, parse_small_yaml, read_small_text
+
+_EXPECTED = "a file of camera_calibration, OpenCV's FileStorage or Kalibr"
+# What FileStorage adds to YAML: the directive "%YAML:1.0" and the tags of its matrices.
+_NO_YAML = re.compile(r"\A%YAML.*\n|!!opencv-matrix|\A---\s*$|^---\s*\Z", re.MULTILINE)
+# FileStorage names no model; OpenCV's sample has a switch for its fisheye.
+_FILE_STORAGE = {"distortion_model": "plumb_bob"}
+_ALIASES = MappingProxyType(
+    {
+        "image_width": ("imagewidth", "width"),
+        "image_height": ("imageheight", "height"),
+        "camera_matrix": ("cameramatrix", "k"),
+        "distortion_coefficients": ("distortioncoefficients", "distcoeffs", "d"),
+        "distortion_model": ("distortionmodel",),
+    }
+)
 
 
 def load_calibration(path: str | os.PathLike[str]) -> Calibration:
-    """Read a YAML file as camera_calibration writes it.
+    """Read a calibration of one camera.
+
+    Args:
+        path: YAML file as camera_calibration writes it; YAML, JSON or XML of OpenCV's FileStorage;
+            camchain of Kalibr with one pinhole camera; or YAML of a CameraInfo, as 'ros2 topic
+            echo' prints it.
 
     Raises:
         CameraError: the file cannot be read or lacks a key; the text names the key.
@@ -22,34 +47,93 @@ def load_calibration(path: str | os.PathLike[str]) -> Calibration:
         text = read_small_text(path)
     except SmallYamlError as error:
         raise CameraError(
-            f"cannot read the calibration {name}: {error}; give a YAML file as "
-            "camera_calibration writes it"
+            f"cannot read the calibration {name}: {error}; give {_EXPECTED}"
         ) from None
     try:
-        data = parse_small_yaml(text)
+        data = _parsed(text)
     except SmallYamlError as error:
-        raise CameraError(f"calibration {name}: {error}") from None
-    if not isinstance(data, dict):
-        raise CameraError(f"calibration {name}: expected a mapping as camera_calibration writes it")
+        raise CameraError(f"calibration {name}: {error}; give {_EXPECTED}") from None
+    if not isinstance(data, Mapping):
+        raise CameraError(f"calibration {name}: expected a mapping; give {_EXPECTED}")
     try:
-        k = np.array(data["camera_matrix"]["data"], dtype=np.float64)
-        distortion = np.array(data["distortion_coefficients"]["data"], dtype=np.float64).ravel()
-        calibration = Calibration(
-            int(data["image_width"]),
-            int(data["image_height"]),
-            k.reshape(3, 3),
-            distortion,
-            str(data["distortion_model"]),
-        )
+        calibration = _of_kalibr(data) if _is_camchain(data) else _of_matrix(data)
     except KeyError as error:
         raise CameraError(
-            f"calibration {name}: missing key {error}; expected a file as camera_calibration "
-            "writes it"
+            f"calibration {name}: missing key {error}; expected {_EXPECTED}"
         ) from None
-    except (TypeError, ValueError, OverflowError) as error:
+    except (TypeError, ValueError, OverflowError, AttributeError) as error:
         raise CameraError(f"calibration {name}: malformed value: {cut(str(error))}") from None
     try:
         calibration.camera(calibration.width, calibration.height)
     except CameraError as error:
         raise CameraError(f"calibration {name}: {error}") from None
     return calibration
+
+
+def _parsed(text: str) -> Any:
+    if not text.lstrip().startswith("<"):
+        data = parse_small_yaml(_NO_YAML.sub("", text))
+        is_storage = "opencv-matrix" in text and isinstance(data, dict)
+        return _FILE_STORAGE | data if is_storage else data
+    if "<!" in text.replace("<!--", ""):
+        raise SmallYamlError("it is XML with declarations; remove them")
+    try:
+        root = ElementTree.fromstring(text)
+    except ElementTree.ParseError as error:
+        raise SmallYamlError(f"it is not valid XML: {cut(str(error))}") from None
+    return _FILE_STORAGE | dict(_xml_values(root))
+
+
+def _xml_values(root: ElementTree.Element) -> Iterator[tuple[str, Any]]:
+    for entry in root:
+        matrix = entry.find("data")
+        values = entry if matrix is None else matrix
+        words = (values.text or "").split()
+        yield entry.tag, words[0] if matrix is None and len(words) == 1 else words
+
+
+def _of_matrix(data: Mapping[Any, Any]) -> Calibration:
+    """Return the calibration of a file with a camera matrix, whatever the spelling of its keys."""
+    plain = {str(key).lower().replace("_", ""): value for key, value in data.items()}
+
+    def value(name: str) -> Any:
+        found = next((plain[key] for key in _ALIASES[name] if key in plain), None)
+        if found is None:
+            raise KeyError(name)
+        return found["data"] if isinstance(found, Mapping) else found
+
+    size = plain.get("imagesize") or (value("image_width"), value("image_height"))
+    is_fisheye = str(plain.get("fisheyemodel", 0)) not in ("0", "False")
+    return Calibration(
+        int(size[0]),
+        int(size[1]),
+        np.array(value("camera_matrix"), dtype=np.float64).reshape(3, 3),
+        np.array(value("distortion_coefficients"), dtype=np.float64).ravel(),
+        "fisheye" if is_fisheye else str(value("distortion_model")),
+    )
+
+
+def _is_camchain(data: Mapping[Any, Any]) -> bool:
+    return all(isinstance(camera, Mapping) and "intrinsics" in camera for camera in data.values())
+
+
+def _of_kalibr(data: Mapping[Any, Any]) -> Calibration:
+    """Return the calibration of the only camera of a camchain."""
+    if len(data) != 1:
+        raise ValueError(
+            f"Kalibr's camchain has {cut(', '.join(map(str, data)))}; keep the camera in question"
+        )
+    (camera,) = data.values()
+    if camera["camera_model"] != "pinhole":
+        raise ValueError(
+            f"Kalibr's camera model is {quoted(camera['camera_model'])}; expected pinhole"
+        )
+    fx, fy, cx, cy = (float(number) for number in camera["intrinsics"])
+    width, height = (int(side) for side in camera["resolution"])
+    return Calibration(
+        width,
+        height,
+        np.array([(fx, 0.0, cx), (0.0, fy, cy), (0.0, 0.0, 1.0)]),
+        np.array(camera.get("distortion_coeffs") or [], dtype=np.float64),
+        str(camera["distortion_model"]),
+    )

@@ -6,6 +6,7 @@ that was learned with the right one.
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 from cardbox_tracker.camera.camera import Calibration
@@ -29,8 +30,15 @@ class CalibrationWatch:
         remark: description of a recently ignored message; empty if there is none.
     """
 
-    def __init__(self, topic: str, image_topic: str) -> None:
-        """Watch the calibrations on ``topic``, which belong to the images on ``image_topic``."""
+    def __init__(self, topic: str, image_topic: str, roll_rad: float = 0.0) -> None:
+        """Watch the calibrations on ``topic``, which belong to the images on ``image_topic``.
+
+        Args:
+            topic: name of the topic.
+            image_topic: name of the images' topic.
+            roll_rad: roll of the camera, see :class:`.Calibration`.
+        """
+        self._roll_rad = roll_rad
         self.current: Calibration | None = None
         self.seen = False
         self.ignored = 0
@@ -50,6 +58,7 @@ class CalibrationWatch:
         self.seen = True
         try:
             calibration = calibration_from_info(message, self._image_topic, self._topic)
+            calibration = replace(calibration, roll_rad=self._roll_rad)
             self._check(calibration)
         except CameraError as error:
             self._other = None

@@ -16,14 +16,18 @@ from cardbox_tracker.camera.camera_checks import (
     real_number,
     whole_pixels,
 )
+from cardbox_tracker.camera.lens import DISTORTION_MODELS, lens_problem, normal_lens
 from cardbox_tracker.common.errors import CameraError, quoted
 
 FloatArray = NDArray[np.float64]
 
+# Largest difference of the aspect ratios of a calibration and of the images.
+_ASPECT = 0.02
+OPTICAL_FRAME = "camera_optical_frame"
+"""Name of the optical frame of a camera that has none."""
 CALIBRATED, GIVEN_FIELD_OF_VIEW = 0.005, 0.03
 """Relative standard deviations of the focal lengths: of a calibration, and of a field of view that
 a person states."""
-DISTORTION_MODELS = ("plumb_bob", "rational_polynomial", "equidistant")
 # Largest side of a JPEG image; a CameraInfo and a file may contain any number.
 _MOST_SIDE_PX = 65535
 
@@ -134,11 +138,14 @@ class Calibration:
         width: calibrated image width, px.
         height: calibrated image height, px.
         k: intrinsic matrix (3, 3).
-        distortion: coefficients (n,) of ``distortion_model``; empty or all zero without distortion.
-        distortion_model: ``plumb_bob``, ``rational_polynomial`` or ``equidistant``.
-        frame_id: name of the optical frame.
+        distortion: coefficients (n,) of ``distortion_model``; all zero without distortion.
+        distortion_model: ``plumb_bob``, ``rational_polynomial`` or ``equidistant``; other names and
+            numbers of coefficients become those of :func:`~.lens.normal_lens`.
+        frame_id: name of the optical frame, which has no leading slash.
         roll_rad: how far the camera is turned clockwise about its axis, seen from behind it;
-            working images are turned back, so that they are level.
+            working images are turned back, so that they are level. Near a quarter turn, width and
+            height are exchanged.
+        is_mirrored: whether the images are mirrored; working images are turned back.
         focal_stddev: relative standard deviation of the focal lengths.
     """
 
@@ -147,9 +154,17 @@ class Calibration:
     k: FloatArray
     distortion: FloatArray
     distortion_model: str = "plumb_bob"
-    frame_id: str = "camera_optical_frame"
+    frame_id: str = OPTICAL_FRAME
     roll_rad: float = 0.0
     focal_stddev: float = CALIBRATED
+    is_mirrored: bool = False
+
+    def __post_init__(self) -> None:
+        """Bring the lens and the name of the frame into their usual form."""
+        model, distortion = normal_lens(self.distortion_model, self.distortion)
+        object.__setattr__(self, "distortion_model", model)
+        object.__setattr__(self, "distortion", distortion)
+        object.__setattr__(self, "frame_id", self.frame_id.lstrip("/") or OPTICAL_FRAME)
 
     @classmethod
     def of_fov(cls, width: int, height: int, fov_deg: float) -> Calibration:
@@ -179,6 +194,7 @@ class Calibration:
             and np.array_equal(self.k, other.k)
             and self._lens() == other._lens()
             and self.roll_rad == other.roll_rad
+            and self.is_mirrored == other.is_mirrored
         )
 
     def _lens(self) -> tuple[Any, ...]:
@@ -190,6 +206,46 @@ class Calibration:
         lens = self.distortion_model if self.is_distorted else "no distortion"
         return f"{self.width}x{self.height}, f {self.k[0, 0]:g} px, {lens}"
 
+    def has_shape(self, width: int, height: int) -> bool:
+        """Return whether images of ``width`` x ``height`` px have the same aspect ratio."""
+        return min(width, height) > 0 and (
+            abs(width * self.height / (height * self.width) - 1) < _ASPECT
+        )
+
+    def stretched(self, across: float, down: float) -> Calibration:
+        """Return the calibration of the same images, wider and higher by these factors."""
+        full = self.camera(round(self.width * across), round(self.height * down))
+        k = np.array([(full.fx, 0.0, full.cx), (0.0, full.fy, full.cy), (0.0, 0.0, 1.0)])
+        return replace(self, width=full.width, height=full.height, k=k)
+
+    def level_size(self, width: int, height: int) -> tuple[int, int]:
+        """Return the size of images of ``width`` x ``height`` px after they are turned level."""
+        return (height, width) if self._quarters % 2 else (width, height)
+
+    @property
+    def _quarters(self) -> int:
+        """Number of quarter turns, 0 to 3, nearest to the roll."""
+        return round(self.roll_rad / (math.pi / 2)) % 4
+
+    def check_shape(self, width: int, height: int, images: str, source: str) -> None:
+        """Check that images of ``width`` x ``height`` px have the calibration's aspect ratio.
+
+        Args:
+            width: width of the images, px.
+            height: height of the images, px.
+            images: name of the images, for the text.
+            source: where the calibration comes from, for the text.
+
+        Raises:
+            CameraError: the aspect ratios differ, so the calibration is not that of the images.
+        """
+        if min(self.width, self.height) > 0 and not self.has_shape(width, height):
+            raise CameraError(
+                f"the calibration of {source} is for images of {self.width}x{self.height}, but "
+                f"those of {images} are {width}x{height}, another shape; calibrate the camera at "
+                "the size it delivers, or with images of the same aspect ratio and orientation"
+            )
+
     def camera(self, width: int, height: int, pitch_rad: float = 0.0) -> Camera:
         """Return the pinhole camera at the working resolution ``width`` x ``height``, px.
 
@@ -197,39 +253,52 @@ class Calibration:
             CameraError: the camera is uncalibrated or its distortion model is unknown.
         """
         self._check()
-        k = self.k
-        size, centre = (self.width, self.height), (k[0, 2], k[1, 2])
-        full = Camera(*size, k[0, 0], k[1, 1], *centre, pitch_rad, self.focal_stddev)
+        w, h, k = self.width, self.height, self.k
+        cx, cy = k[0, 2], k[1, 2]
+        right, down = w - 1 - cx, h - 1 - cy
+        cx, cy = ((cx, cy), (down, cx), (right, down), (cy, right))[self._quarters]
+        fx, fy = self.level_size(k[0, 0], k[1, 1])
+        w, h = self.level_size(w, h)
+        cx = w - 1 - cx if self.is_mirrored else cx
+        full = Camera(w, h, fx, fy, cx, cy, pitch_rad, self.focal_stddev)
         return full.scaled(width, height)
 
     def rectifier(self, width: int, height: int) -> Rectifier | None:
         """Return a rectifier for images of ``width`` x ``height`` px; None if none is needed.
 
+        The size is that of the level images, see :meth:`level_size`.
+
         Raises:
             CameraError: the camera is uncalibrated or its distortion model is unknown.
         """
         self._check()
-        if not self.is_distorted and self.roll_rad == 0.0:
+        turn = self.turn()
+        if not self.is_distorted and np.array_equal(turn, np.eye(3)):
             return None
-        camera = self.camera(width, height)
-        k = np.array([(camera.fx, 0.0, camera.cx), (0.0, camera.fy, camera.cy), (0.0, 0.0, 1.0)])
-        size, turn = (width, height), self._turn()
+        sent = replace(self, roll_rad=0.0, is_mirrored=False)
+        level, k = (
+            np.array([(camera.fx, 0.0, camera.cx), (0.0, camera.fy, camera.cy), (0.0, 0.0, 1.0)])
+            for camera in (
+                self.camera(width, height),
+                sent.camera(*self.level_size(width, height)),
+            )
+        )
+        size = (width, height)
         if not self.is_distorted:
-            maps = cv2.initUndistortRectifyMap(k, np.zeros(5), turn, k, size, cv2.CV_16SC2)
+            maps = cv2.initUndistortRectifyMap(k, np.zeros(5), turn, level, size, cv2.CV_16SC2)
         elif self.distortion_model == "equidistant":
             maps = cv2.fisheye.initUndistortRectifyMap(
-                k, self.distortion[:4].reshape(4, 1), turn, k, size, cv2.CV_16SC2
+                k, self.distortion[:4].reshape(4, 1), turn, level, size, cv2.CV_16SC2
             )
         else:
-            maps = cv2.initUndistortRectifyMap(k, self.distortion, turn, k, size, cv2.CV_16SC2)
+            maps = cv2.initUndistortRectifyMap(k, self.distortion, turn, level, size, cv2.CV_16SC2)
         return Rectifier(*maps)
 
-    def _turn(self) -> FloatArray:
-        """Return the rotation (3, 3) that makes the rays of a rolled camera level."""
-        if self.roll_rad == 0.0:
-            return np.eye(3)
+    def turn(self) -> FloatArray:
+        """Return the matrix (3, 3) that makes rays of the camera level, and mirrors them back."""
         c, s = np.cos(self.roll_rad), np.sin(self.roll_rad)
-        return np.array([(c, -s, 0.0), (s, c, 0.0), (0.0, 0.0, 1.0)])
+        turn = np.array([(c, -s, 0.0), (s, c, 0.0), (0.0, 0.0, 1.0)])
+        return turn * [(-1.0,), (1.0,), (1.0,)] if self.is_mirrored else turn
 
     def rectified(self, px: FloatArray, width: int, height: int) -> FloatArray:
         """Return where pixels (N, 2) of the calibrated image lie in the working image, px.
@@ -245,8 +314,8 @@ class Calibration:
             rays[:] = cv2.fisheye.undistortPoints(px[:, None], self.k, lens).reshape(-1, 2)
         else:
             rays[:] = cv2.undistortPoints(px[:, None], self.k, self.distortion).reshape(-1, 2)
-        if self.roll_rad:
-            rays = rays @ self._turn()[:2, :2].T
+        if self.roll_rad or self.is_mirrored:
+            rays = rays @ self.turn()[:2, :2].T
         placed: FloatArray = rays * (camera.fx, camera.fy) + (camera.cx, camera.cy)
         return placed
 
@@ -276,13 +345,9 @@ class Calibration:
                 f"{', '.join(DISTORTION_MODELS)}: calibrate with one of those, or feed "
                 "rectified images with all-zero distortion"
             )
-        allowed = {"equidistant": (4,), "plumb_bob": (4, 5), "rational_polynomial": (8, 12, 14)}
-        counts = allowed.get(self.distortion_model, ())
-        if self.is_distorted and len(self.distortion) not in counts:
-            raise CameraError(
-                f"distortion model '{self.distortion_model}' has {len(self.distortion)} "
-                f"coefficients; expected {' or '.join(map(str, counts))}"
-            )
+        problem = lens_problem(self.distortion_model, self.distortion)
+        if self.is_distorted and problem:
+            raise CameraError(problem)
 
 
 class Rectifier:

@@ -5,10 +5,17 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from cardbox_tracker.camera.camera import Calibration
 from cardbox_tracker.camera.camera_checks import matrix_problem
 from cardbox_tracker.common.errors import CameraError
+
+
+def info_array(message: Any, name: str) -> NDArray[np.float64]:
+    """Return ``k``, ``d``, ``r`` or ``p`` (n,) of a CameraInfo; ROS 1 has capital letters."""
+    field = name if hasattr(message, name) else name.upper()
+    return np.array(getattr(message, field), dtype=np.float64)
 
 
 def calibration_from_info(message: Any, image_topic: str, info_topic: str) -> Calibration:
@@ -20,7 +27,7 @@ def calibration_from_info(message: Any, image_topic: str, info_topic: str) -> Ca
         CameraError: the camera is not calibrated, or K has impossible values; the text names both
             topics.
     """
-    k = np.array(message.k, dtype=np.float64).reshape(3, 3)
+    k = info_array(message, "k").reshape(3, 3)
     width, height = int(message.width), int(message.height)
     # Without a size, K cannot be checked; the size itself is refused later.
     problem = matrix_problem(k, width, height) if width > 0 < height else ""
@@ -44,7 +51,7 @@ def calibration_from_info(message: Any, image_topic: str, info_topic: str) -> Ca
         width // binning_x,
         height // binning_y,
         k,
-        np.array(message.d, dtype=np.float64),
-        message.distortion_model or "plumb_bob",
+        info_array(message, "d"),
+        message.distortion_model,
         message.header.frame_id,
     )

@@ -18,7 +18,7 @@ from cardbox_tracker.camera.camera import Camera
 from cardbox_tracker.camera.encodings import MOST_PIXELS, image_parts
 from cardbox_tracker.camera.given_arrays import depth_from
 from cardbox_tracker.camera.image_headers import check_pixels, compressed_size
-from cardbox_tracker.common.errors import EncodingError
+from cardbox_tracker.common.errors import EncodingError, quoted
 
 DepthImage = NDArray[np.float32]
 
@@ -43,7 +43,8 @@ def decode_depth(
     """
     if encoding not in _KINDS:
         raise EncodingError(
-            f"encoding '{encoding}' is no depth; expected 16UC1 (millimetres) or 32FC1 (metres)"
+            f"encoding {quoted(encoding)} is no depth; expected 16UC1 (millimetres) or "
+            "32FC1 (metres)"
         )
     check_pixels(width, height, MOST_PIXELS)
     code, metres = _KINDS[encoding]
@@ -88,7 +89,7 @@ def unpack_depth(data: Any, encoding: str) -> DepthImage:
             pixels = cv2.imdecode(packed, cv2.IMREAD_UNCHANGED)
     if kind not in _KINDS or pixels is None or pixels.dtype != np.uint16 or pixels.ndim != 2:
         raise EncodingError(
-            f"a compressed image of the format '{encoding}' is no depth that can be read; expected "
+            f"a compressed image of the format {quoted(encoding)} is no depth; expected "
             "'16UC1; compressedDepth png' or '32FC1; compressedDepth png'"
         )
     if kind != "32FC1":

@@ -15,6 +15,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from cardbox_tracker.camera.camera_info import info_array
 from cardbox_tracker.camera.extrinsics import FARTHEST_M, Extrinsics
 from cardbox_tracker.common.errors import CameraError
 
@@ -50,8 +51,8 @@ def of_rectified_pair(first: Any, other: Any, name: str) -> Extrinsics | None:
     """
     at = []
     for info in (first, other):
-        p = np.array(info.p, dtype=np.float64).reshape(3, 4)
-        r = np.array(info.r, dtype=np.float64).reshape(3, 3)
+        p = info_array(info, "p").reshape(3, 4)
+        r = info_array(info, "r").reshape(3, 3)
         if not (p[0, 0] > 0 and p[1, 1] > 0):
             return None
         at.append(

@@ -31,13 +31,16 @@ _RESTART_NS = 1_000_000_000
 def camera_names(cameras: Sequence[str]) -> list[str]:
     """Return the namespaces of cameras without leading and trailing slashes.
 
+    The root namespace is empty, and that of a camera alone.
+
     Raises:
         CardboxError: there are too many names, or a name is empty or occurs twice.
     """
     names = [camera.strip("/") for camera in cameras]
-    if len(names) > MOST_CAMERAS or len(set(names)) < len(names) or not all(names):
+    is_alone = len(names) == 1
+    if len(names) > MOST_CAMERAS or len(set(names)) < len(names) or not (is_alone or all(names)):
         raise CardboxError(
-            f"the cameras are {', '.join(names)}; expected one to {MOST_CAMERAS} "
+            f"the cameras are {', '.join(cameras)}; expected one to {MOST_CAMERAS} "
             "different namespaces"
         )
     return names

@@ -6,7 +6,7 @@ tracking with every image.
 
 from __future__ import annotations
 
-from bisect import bisect_left, insort
+from bisect import insort
 from collections import Counter, deque
 from enum import Enum
 
@@ -18,6 +18,10 @@ _RESTART_NS = 1_000_000_000
 _PATIENCE = 5
 # The period is known from this number of spacings on.
 _ENOUGH = 5
+# The period is the median of a low spacing of each group, so that one burst does not decide it.
+_GROUP = 10
+# Stamps of a recording that is shorter than _RESTART_NS.
+_REMEMBERED = 256
 
 
 class StampOrder(Enum):
@@ -52,6 +56,8 @@ class StampSequence:
         self._left_ns: int | None = None
         self._has_jumped = False
         self._foreign = 0
+        self._seen: deque[int] = deque(maxlen=_REMEMBERED)
+        self._again_ns: int | None = None
 
     def add(self, stamp_ns: int) -> StampOrder:
         """Classify the next stamp, ns; 0 means that the image has none."""
@@ -60,14 +66,16 @@ class StampSequence:
         last_ns = self._last_ns
         if last_ns is None:
             self._last_ns = stamp_ns
+            self._seen.append(stamp_ns)
             return StampOrder.NEXT
         spacing_ns = stamp_ns - last_ns
         if -_RESTART_NS <= spacing_ns < _PAUSE_NS:
             self._foreign, self._has_jumped = 0, False
-            if spacing_ns <= 0:
+            if spacing_ns <= 0 and not self._starts_over(stamp_ns):
                 return StampOrder.LATE if spacing_ns else StampOrder.REPEATED
-            self._last_ns = stamp_ns
-            return StampOrder.NEXT
+            self._last_ns, self._again_ns = stamp_ns, None
+            self._seen.append(stamp_ns)
+            return StampOrder.NEXT if spacing_ns > 0 else StampOrder.RESTART
         if self._has_jumped and self._left_ns is not None:
             if 0 < stamp_ns - self._left_ns < _PAUSE_NS:
                 self._has_jumped, self._left_ns, self._last_ns = False, last_ns, stamp_ns
@@ -76,6 +84,15 @@ class StampSequence:
             return StampOrder.FOREIGN
         self._has_jumped, self._left_ns, self._last_ns = True, last_ns, stamp_ns
         return StampOrder.GAP if spacing_ns > 0 else StampOrder.RESTART
+
+    def _starts_over(self, stamp_ns: int) -> bool:
+        """Return whether a short recording plays again: its images come again, in their order."""
+        again_ns, self._again_ns = self._again_ns, stamp_ns if stamp_ns in self._seen else None
+        if again_ns is None or self._again_ns is None or stamp_ns <= again_ns:
+            return False
+        self._seen.clear()
+        self._seen.append(again_ns)
+        return True
 
     def _is_foreign(self, stamp_ns: int) -> bool:
         """Return whether a stamp continues the stamps before the jump."""
@@ -94,17 +111,18 @@ class StampSequence:
 class StreamStatistics:
     """Counts the messages of a stream and estimates the lost ones by the stamps."""
 
-    def __init__(self) -> None:
-        """Start without messages."""
+    def __init__(self, remembered: int | None = WINDOW) -> None:
+        """Start without messages; remarks are on the latest ``remembered``, None for all."""
         self.received = 0
-        self.dropped = 0
+        self._dropped_before = 0
         self.counts: dict[StampOrder, int] = dict.fromkeys(StampOrder, 0)
         self._sequence = StampSequence()
         self._last_ns: int | None = None
         self._spacings_ns: deque[int] = deque()
-        # The sorted intervals, since the period is needed with every image.
-        self._ordered_ns: list[int] = []
-        self._latest: deque[StampOrder] = deque(maxlen=WINDOW)
+        # A low spacing of each group, since the period is needed with every image.
+        self._group_ns: list[int] = []
+        self._low_ns: deque[int] = deque(maxlen=WINDOW // _GROUP)
+        self._latest: deque[StampOrder] = deque(maxlen=remembered)
 
     def add(self, stamp_ns: int) -> StampOrder:
         """Count a message with this stamp, ns, and return its relation to the one before."""
@@ -116,22 +134,29 @@ class StreamStatistics:
             return order
         last_ns, self._last_ns = self._last_ns, stamp_ns
         if order is StampOrder.RESTART:
+            self._dropped_before = self.dropped
             self._spacings_ns.clear()
-            self._ordered_ns.clear()
+            self._low_ns.clear()
+            self._group_ns.clear()
         elif order is StampOrder.NEXT and last_ns is not None:
-            self._note(spacing_ns := stamp_ns - last_ns)
-            # Once the period is known, losses among the images that showed it count as well.
-            if len(self._spacings_ns) == _ENOUGH:
-                self.dropped += sum(map(self._lost_in, self._spacings_ns))
-            elif len(self._spacings_ns) > _ENOUGH:
-                self.dropped += self._lost_in(spacing_ns)
+            self._note(stamp_ns - last_ns)
         return order
 
     def _note(self, spacing_ns: int) -> None:
         if len(self._spacings_ns) == WINDOW:
-            del self._ordered_ns[bisect_left(self._ordered_ns, self._spacings_ns.popleft())]
+            self._dropped_before += self._lost_in(self._spacings_ns.popleft())
         self._spacings_ns.append(spacing_ns)
-        insort(self._ordered_ns, spacing_ns)
+        if len(self._group_ns) % _GROUP == 0:
+            self._group_ns.clear()
+            self._low_ns.append(spacing_ns)
+        insort(self._group_ns, spacing_ns)
+        self._low_ns[-1] = self._group_ns[min(1, len(self._group_ns) - 1)]
+
+    @property
+    def dropped(self) -> int:
+        """Number of lost messages, of the latest ones by the period as it is known now."""
+        is_known = len(self._spacings_ns) >= _ENOUGH
+        return self._dropped_before + is_known * sum(map(self._lost_in, self._spacings_ns))
 
     def _lost_in(self, spacing_ns: int) -> int:
         return max(round(spacing_ns / self.period_ns) - 1, 0)
@@ -148,10 +173,9 @@ class StreamStatistics:
     def period_ns(self) -> int:
         """Spacing of the stamps without losses, ns.
 
-        It is a low percentile, since the median is a multiple of the period if most images are
-        lost.
+        It is low, since the median is a multiple of the period if most images are lost.
         """
-        return self._ordered_ns[len(self._ordered_ns) // 10] if self._ordered_ns else 0
+        return sorted(self._low_ns)[(len(self._low_ns) - 1) // 2] if self._low_ns else 0
 
     @property
     def loss(self) -> float:
@@ -166,12 +190,14 @@ class StreamStatistics:
         texts = {}
         latest = Counter(self._latest)
         count = len(self._latest)
+        # All images of a recording count, and of a stream only what happens often.
+        most, most_restarts = (0, 0) if self._latest.maxlen is None else (count // 10 + 1, 2)
         if latest[StampOrder.UNSTAMPED]:
             texts["stamps that are zero"] = (
                 "the images have no stamp (it is zero), so they are used in the order of arrival "
                 "and losses are not seen; set header.stamp in the camera's driver"
             )
-        if latest[StampOrder.REPEATED] > count // 10 + 1:
+        if latest[StampOrder.REPEATED] > most:
             texts["stamps that repeat"] = (
                 f"{latest[StampOrder.REPEATED]} of the latest {count} images repeat the stamp of "
                 "the one before and are left out; does the driver send them twice, or are there "
@@ -182,10 +208,58 @@ class StreamStatistics:
                 "the stamps jump to and fro between two times, and images of one of them are left "
                 "out; expected one camera with one clock: see 'ros2 topic info --verbose'"
             )
-        if latest[StampOrder.RESTART] > 2:
+        if latest[StampOrder.LATE] > most:
+            texts["stamps that are late"] = (
+                f"{latest[StampOrder.LATE]} of the latest {count} images have stamps that go back "
+                "by less than a second and are left out; are images sent twice, or is a recording "
+                "played in a loop?"
+            )
+        if latest[StampOrder.RESTART] > most_restarts:
             texts["stamps that go back"] = (
                 f"the stamps of the latest {count} images went back {latest[StampOrder.RESTART]} "
                 "times by more than a second, and tracking started again each time; is "
-                "the clock of the camera's computer being set?"
+                "the clock of the camera's computer being set, or a recording played in a loop?"
             )
         return texts
+
+
+class RecordedStamps:
+    """Times of a recorded stream, which always increase.
+
+    Images are left out as in a live stream. Where stamps are missing or go back, the recorder's
+    clock goes on.
+
+    Attributes:
+        statistics: order and losses by the stamps.
+    """
+
+    def __init__(self) -> None:
+        """Begin before the first message."""
+        self.statistics = StreamStatistics(remembered=None)
+        self._last: tuple[int, int] | None = None
+        self._ahead_ns = 0
+
+    def add(self, stamp_ns: int, recorded_ns: int) -> int | None:
+        """Return the time of the next message, ns; None if it is to be left out.
+
+        Args:
+            stamp_ns: its stamp; 0 if it has none.
+            recorded_ns: time at which it was recorded.
+        """
+        order = self.statistics.add(stamp_ns)
+        if not order.is_usable:
+            return None
+        is_unstamped = order is StampOrder.UNSTAMPED
+        time_ns = recorded_ns if is_unstamped else stamp_ns + self._ahead_ns
+        is_back = is_unstamped or order is StampOrder.RESTART
+        if self._last is not None and (is_back or time_ns <= self._last[0]):
+            before_ns, recorded_before_ns = self._last
+            time_ns = before_ns + max(recorded_ns - recorded_before_ns, 1)
+            if not is_unstamped:
+                self._ahead_ns = time_ns - stamp_ns
+        self._last = time_ns, recorded_ns
+        return time_ns
+
+    def remarks(self) -> list[str]:
+        """Return texts on all faults, as :meth:`StreamStatistics.remarks`."""
+        return list(self.statistics.remarks().values())

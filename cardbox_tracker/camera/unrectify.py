@@ -24,8 +24,7 @@ def unrectified(calibration: Calibration, px: FloatArray, width: int, height: in
     """
     camera = calibration.camera(width, height)
     rays = (np.asarray(px, np.float64) - (camera.cx, camera.cy)) / (camera.fx, camera.fy)
-    c, s = np.cos(calibration.roll_rad), np.sin(calibration.roll_rad)
-    rays = rays @ np.array([(c, -s), (s, c)])
+    rays = rays @ calibration.turn()[:2, :2]
     k, lens = calibration.k, calibration.distortion
     if not calibration.is_distorted:
         return np.asarray(rays * k.diagonal()[:2] + k[:2, 2])

@@ -12,7 +12,7 @@ from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
-from cardbox_tracker.common.errors import CardboxError
+from cardbox_tracker.common.errors import CardboxError, plain
 from cardbox_tracker.common.files import check_writable, is_written_in_place
 from cardbox_tracker.common.settings import settings_of
 
@@ -271,4 +271,4 @@ def body_beside(table: Path) -> Path:
 def print_remarks(*remarks: Iterable[str]) -> None:
     """Print remarks on a recording on the standard error."""
     for remark in chain(*remarks):
-        print(f"cardbox: {remark}", file=sys.stderr)
+        print(f"cardbox: {plain(remark)}", file=sys.stderr)

@@ -101,8 +101,8 @@ def run(options: argparse.Namespace) -> None:
             result = initialize_with_depth(source, spans, config, show)
         else:
             result = initialize_from_cameras(source, spans, config, show)
-        remarks = source.first.remarks
+        remarks, accounts = source.first.remarks, [one.account for one in source.sources]
     print_remarks(remarks)
     save_body_model(result.body, options.output)
     print(describe(result))
-    print(f"wrote {options.output}")
+    print(f"wrote {options.output}", *accounts, sep="\n")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import io
 import os
 import signal
 import sys
@@ -28,7 +29,7 @@ from cardbox_tracker.commands import (
     view,
 )
 from cardbox_tracker.common import interrupts
-from cardbox_tracker.common.errors import CardboxError
+from cardbox_tracker.common.errors import CardboxError, plain
 
 
 class Command(Protocol):
@@ -82,6 +83,8 @@ ABSENT = {
 }
 
 _EVERY_COMMAND = tuple(command.NAME for command in COMMANDS)
+# A folder of recordings has many reasons.
+_MOST_OF_AN_ERROR = 20_000
 _DESCRIPTION = """\
 The 3D posture of one person's upper body, from the silhouettes that one
 or more fixed cameras see. These commands work on recordings (rosbag2, videos,
@@ -106,6 +109,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     Raises:
         SystemExit: the arguments are wrong (code 2), or they ask for help or the version (code 0).
     """
+    if isinstance(sys.stdout, io.TextIOWrapper):
+        # Names of files may be no UTF-8.
+        sys.stdout.reconfigure(errors="backslashreplace")
     words = sys.argv[1:] if arguments is None else list(arguments)
     name = words[0] if words else ""
     try:
@@ -119,7 +125,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
             options.run(options)
             sys.stdout.flush()
     except CardboxError as error:
-        print(f"cardbox {name}: {error}", file=sys.stderr)
+        print(f"cardbox {name}: {plain(str(error), _MOST_OF_AN_ERROR)}", file=sys.stderr)
         return 1
     except KeyboardInterrupt:
         return _interrupted(name)

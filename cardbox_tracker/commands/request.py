@@ -55,7 +55,7 @@ RETIRED = MappingProxyType(
 )
 """Options of former versions, with what to do or expect instead."""
 
-_MOST_ROLL_DEG, _MOST_FPS = 45.0, 1000.0
+_MOST_ROLL_DEG, _MOST_FPS = 180.0, 1000.0
 _MOST_BYTES = 64 * 1024
 _EFFORT = "whole_body.effort"
 # An option of a file takes the place of these, which do not go with it.
@@ -300,13 +300,20 @@ def add_recording(parser: argparse.ArgumentParser, required: bool = True) -> Non
         "--calibration",
         type=Path,
         metavar="FILE",
-        help="in place of --fov: YAML file of camera_calibration",
+        help="in place of --fov: file of camera_calibration, OpenCV's FileStorage or Kalibr",
     )
     add(
         "--camera-roll-deg",
         type=between(-_MOST_ROLL_DEG, _MOST_ROLL_DEG),
         metavar="R",
-        help="how far the camera is turned clockwise, seen from behind it; images are turned back",
+        help="how far the camera is turned clockwise, seen from behind it, 180 if its top is "
+        "below; images are turned back",
+    )
+    add(
+        "--mirrored",
+        action="store_true",
+        help="the images are mirrored, as some programs do with those of a front camera; they are "
+        "turned back",
     )
     add(
         "--fps",
@@ -482,7 +489,7 @@ def _camera(options: argparse.Namespace, problems: Problems) -> GivenCamera:
 
     roll_deg = options.camera_roll_deg
     roll_rad = None if roll_deg is None else math.radians(roll_deg)
-    camera = GivenCamera(options.fov, options.calibration, roll_rad, options.fps)
+    camera = GivenCamera(options.fov, options.calibration, roll_rad, options.fps, options.mirrored)
     if None not in (options.fov, options.calibration):
         problems.add("--fov and --calibration both describe the lens: leave one of them out")
     elif not (camera.is_calibrated or _is_guessed(options) or tells_lens(options.recording)):

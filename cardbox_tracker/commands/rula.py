@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from cardbox_tracker.applications.ergonomics.config import RulaConfig
     from cardbox_tracker.applications.ergonomics.recording import MomentImages, RulaRow
     from cardbox_tracker.applications.ergonomics.report import PageContent
-    from cardbox_tracker.person.model import BodyModel
+    from cardbox_tracker.recordings.track import TrackSummary
 
 NAME = "rula"
 HELP = "score the strain on arms, neck and trunk in a recording (RULA)"
@@ -100,7 +100,7 @@ def run(options: argparse.Namespace) -> None:
     if options.shares is not None:
         write_shares(shares, options.shares)
     if options.html is not None:
-        write_page(_content(options, config, rows, summary.body, images), options.html)
+        write_page(_content(options, config, rows, summary, images), options.html)
     for path in outputs:
         if path is not None:
             print(f"wrote {path}")
@@ -110,17 +110,18 @@ def _content(
     options: argparse.Namespace,
     config: RulaConfig,
     rows: Sequence[RulaRow],
-    body: BodyModel | None,
+    summary: TrackSummary,
     images: MomentImages | None,
 ) -> PageContent:
     from cardbox_tracker.applications.ergonomics.report import PageContent
 
     name = options.recording.resolve().name
     person = f"stature {options.stature} m" if options.model is None else options.model.name
-    if body is not None:
-        person += f"; sizes from {_SIZES_FROM[body.source]}"
+    if summary.body is not None:
+        person += f"; sizes from {_SIZES_FROM[summary.body.source]}"
     span = f"{rows[0].time_s:.1f} to {rows[-1].time_s:.1f} s, {len(rows)} images"
     facts = {"Recording": f"{name}, {span}", "Person": person}
+    facts["Assumed"] = "; ".join(summary.assumptions)
     begin_s = rows[0].stamp_ns / 1e9
     if begin_s > _LEAST_CLOCK_S:
         facts["Begin"] = f"{datetime.fromtimestamp(begin_s, UTC):%Y-%m-%d %H:%M:%S} UTC"

@@ -95,7 +95,8 @@ def _track_one(options: argparse.Namespace) -> None:
     check_outputs(
         (table, body, options.video), options.force, request.inputs, results=(options.bag,)
     )
-    track(replace(request, files=files, force=options.force))
+    summary = track(replace(request, files=files, force=options.force))
     for path in (table, body, options.video, options.bag):
         if path is not None:
             print(f"wrote {path}")
+    print(*summary.accounts, sep="\n")

@@ -36,11 +36,16 @@ from cardbox_tracker.commands.request import (
 )
 from cardbox_tracker.commands.tracking import track
 from cardbox_tracker.common import interrupts
-from cardbox_tracker.common.errors import CardboxError
-from cardbox_tracker.common.files import claimed_name, write_table
+from cardbox_tracker.common.errors import CardboxError, plain
+from cardbox_tracker.common.files import (
+    UnreadableFileError,
+    claimed_name,
+    read_regular,
+    write_table,
+)
 from cardbox_tracker.common.processes import cores, results_of
 from cardbox_tracker.common.progress import SharedProgress, progress_bar, told
-from cardbox_tracker.recordings.folder import SUMMARY, recordings_in
+from cardbox_tracker.recordings.folder import FORMULA, SUMMARY, recordings_in
 from cardbox_tracker.recordings.result_table import check_table
 from cardbox_tracker.recordings.track import TrackSummary
 from cardbox_tracker.tracking.precompile import compile_all
@@ -50,6 +55,8 @@ TRACKED, FAILED = "tracked", "failed"
 _BODY = body_beside(Path("NAME.csv")).name.removeprefix("NAME")
 # Most names of recordings in a line; the table has all.
 _MOST_NAMES = 10
+# A summary of 100,000 recordings.
+_MOST_BYTES = 64 * 1024 * 1024
 _SOURCES = ("*.py", "*.json")
 
 
@@ -96,7 +103,7 @@ class Row(NamedTuple):
     @classmethod
     def failed(cls, recording: str, error: Exception) -> Row:
         """Return the row of a recording that cannot be tracked, with the reason in one line."""
-        reason = " ".join(str(error).split())
+        reason = plain(" ".join(str(error).split()))
         if isinstance(error, OSError):
             reason = f"{type(error).__name__}: {reason}"
         elif not isinstance(error, CardboxError):
@@ -104,7 +111,9 @@ class Row(NamedTuple):
                 f"unexpected {type(error).__name__}: {reason}; 'cardbox track' with this recording "
                 "shows more"
             )
-        return cls(recording, FAILED, reason=reason)
+        # Spreadsheets take a path such as =1+1.mp4 for a formula.
+        shown = f"({reason})" if reason.startswith(FORMULA) else reason
+        return cls(recording, FAILED, reason=shown)
 
 
 class Job(NamedTuple):
@@ -324,12 +333,12 @@ def _read_rows(path: Path) -> dict[str, Row]:
     if not path.exists():
         return {}
     try:
-        with path.open(newline="", encoding="utf-8") as file:
-            header, *cells = csv.reader(file)
+        text = read_regular(path, _MOST_BYTES).decode()
+        header, *cells = csv.reader(io.StringIO(text, newline=""))
         if tuple(header) != Row._fields:
             raise ValueError("it has other columns")
         rows = [Row(*row) for row in cells]
-    except (OSError, ValueError, TypeError) as error:
+    except (UnreadableFileError, csv.Error, ValueError, TypeError) as error:
         raise CardboxError(
             f"{path} is no summary of tracked recordings ({error}); remove it, or give another "
             "--output"

@@ -12,7 +12,9 @@ from cardbox_tracker.commands.arguments import print_remarks
 from cardbox_tracker.person.model import CameraPose
 
 if TYPE_CHECKING:
+    from cardbox_tracker.camera.camera import Camera
     from cardbox_tracker.commands.request import PersonRequest, RecordingRequest, TrackingRequest
+    from cardbox_tracker.person.model import BodyModel
     from cardbox_tracker.recordings.recording import Recording
     from cardbox_tracker.recordings.silhouettes import TimeSpan
     from cardbox_tracker.recordings.track import Observer, TrackSummary
@@ -36,8 +38,8 @@ def track(
     Args:
         request: what is tracked, and the results to write.
         observers: called after each image.
-        show: receives the finished fraction, 0 to 1; if None, there are a progress bar and a line
-            with the summary.
+        show: receives the finished fraction, 0 to 1; if None, there are a progress bar and lines
+            that say what was assumed, and how good the results are.
 
     Raises:
         CardboxError: the recording cannot be read, or a result cannot be written.
@@ -46,9 +48,11 @@ def track(
     from cardbox_tracker.person.model import PLACEMENT
     from cardbox_tracker.person.model_file import save_body_model
     from cardbox_tracker.person.proportions import USUAL_STATURE_M, USUAL_STDDEV_M
+    from cardbox_tracker.recordings.quality import Quality
     from cardbox_tracker.recordings.silhouettes import TimeSpan
     from cardbox_tracker.recordings.track import track_recording
 
+    quality = Quality()
     recording, person, body = request.recording, request.person, request.person.body
     start_s = person.start_s
     if person.model is not None and body.doubt:
@@ -89,20 +93,48 @@ def track(
                 request.seed,
                 start_s,
                 request.files.table,
-                (*observers, lambda frame, *_: advance((frame.time_s - start_s) / total_s)),
+                (
+                    *observers,
+                    quality,
+                    lambda frame, *_: advance((frame.time_s - start_s) / total_s),
+                ),
             )
         remarks = [remark for remark in source.first.remarks if remark not in early]
+        accounts = tuple(one.account for one in source.sources)
+        assumptions = tuple(_assumptions(request, source.first.camera, summary.body or body))
+    summary = replace(summary, accounts=accounts, assumptions=assumptions)
     if show is None:
-        uncertain = summary.frames_uncertain
-        doubt = f" ({uncertain} of them uncertain)" if uncertain else ""
-        print(
-            f"tracked {summary.frames_tracked} of {summary.frames} images{doubt}, "
-            f"mean cost {summary.mean_cost_px:.0f} px, mean IoU {summary.mean_iou:.3f}"
-        )
+        print(f"tracked {summary.frames_tracked} of {summary.frames} images")
     print_remarks(remarks, summary.remarks)
+    if show is None:
+        print(f"assumed: {', '.join(summary.assumptions)}", *quality.lines(), sep="\n")
     if request.files.body is not None and summary.body is not None:
         save_body_model(summary.body, request.files.body)
     return summary
+
+
+def _assumptions(request: TrackingRequest, camera: Camera, body: BodyModel) -> Iterator[str]:
+    """Yield camera, place and stature with where they are from; ``body`` is that of the end."""
+    from cardbox_tracker.camera.camera import GIVEN_FIELD_OF_VIEW
+
+    person, given = request.person, request.recording.camera
+    lens = "from the recording" if given.calibration is None else f"from {given.calibration.name}"
+    if camera.focal_stddev > GIVEN_FIELD_OF_VIEW:
+        lens = "assumed"
+    fov_deg = math.degrees(2 * math.atan(camera.width / 2 / camera.fx))
+    yield f"field of view {fov_deg:.0f} degrees ({'given' if given.fov_deg else lens})"
+    source = "given" if person.model is None else f"from {person.model.name}"
+    pitch_rad = body.camera_pose.pitch_rad
+    pitch = source if person.is_pitch_given else "found" if pitch_rad else "not found, taken as 0"
+    yield f"camera pitch {math.degrees(pitch_rad):.0f} degrees down ({pitch})"
+    distance = "found" if "distance_m" in person.body.unknown else source
+    yield f"distance {body.placement.distance_m:.2f} m ({distance})"
+    if person.stature_m is not None:
+        yield f"stature {person.stature_m:.2f} m (given), sizes from proportions"
+    elif person.model is None:
+        yield "stature of most adults, sizes from proportions"
+    else:
+        yield f"sizes {source}"
 
 
 def _writers(request: TrackingRequest, source: Recording, stack: ExitStack) -> Iterator[Observer]:

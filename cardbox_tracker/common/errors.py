@@ -68,11 +68,21 @@ class RosMissingError(CardboxError):
 
 _MOST_CHARACTERS = 200
 _MOST_OF_A_VALUE = 60
+_MOST_OF_A_TEXT = 2000
 
 
 def cut(text: str, most: int = _MOST_CHARACTERS) -> str:
     """Return ``text``, or its beginning if it is long, so that foreign input cannot fill a log."""
     return text if len(text) <= most else f"{text[:most]}..."
+
+
+def plain(text: str, most: int = _MOST_OF_A_TEXT) -> str:
+    """Return a text for a log or a terminal: bounded, without control characters but line breaks.
+
+    Names and fields that others wrote may have escape codes.
+    """
+    shown = (c if c.isprintable() or c == "\n" else ascii(c)[1:-1] for c in cut(text, most))
+    return "".join(shown)
 
 
 def quoted(value: object) -> str:

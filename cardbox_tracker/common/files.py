@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import csv
+import errno
 import fcntl
 import os
 import re
@@ -22,6 +23,7 @@ from cardbox_tracker.common.errors import CardboxError
 # Part of the names of temporary files, which can remain after a crash.
 _MARK = ".unfinished-"
 _STEM_LENGTH = 100
+_FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO)
 
 
 class UnreadableFileError(CardboxError):
@@ -45,11 +47,18 @@ def atomic_path(path: str | os.PathLike[str]) -> Iterator[Path]:
         return
     target = resolved(path)
     with claimed_name(target, is_folder=False) as temporary:
-        yield temporary
-        with contextlib.suppress(OSError):
-            # The new file keeps the permissions of the previous one.
-            os.chmod(temporary, stat.S_IMODE(target.stat().st_mode))
-        os.replace(temporary, target)
+        try:
+            yield temporary
+            with contextlib.suppress(OSError):
+                # The new file keeps the permissions of the previous one.
+                os.chmod(temporary, stat.S_IMODE(target.stat().st_mode))
+            os.replace(temporary, target)
+        except OSError as error:
+            if error.errno not in _FULL:
+                raise
+            raise CardboxError(
+                f"cannot write {target}: {error.strerror}; make room, or give another folder"
+            ) from None
 
 
 @contextmanager

@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+import ctypes
+import os
+import signal
+import sys
 import time
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import BrokenExecutor
@@ -16,8 +20,19 @@ from cardbox_tracker.common.errors import CardboxError
 A = TypeVar("A")
 R = TypeVar("R")
 
+# PR_SET_PDEATHSIG of <linux/prctl.h>.
+_DEATH_SIGNAL = 1
 _TAKEN_UP_S = 0.05
 """Time in which loky's thread puts the first calls into the queue of the processes (s)."""
+
+
+def _called(parent: int, function: Callable[[A], R], argument: A) -> R:
+    if os.getpid() != parent and sys.platform.startswith("linux"):
+        # The kernel ends this process with its parent, also if that is killed.
+        ctypes.CDLL(None).prctl(_DEATH_SIGNAL, signal.SIGKILL)
+        if os.getppid() != parent:
+            os._exit(1)
+    return function(argument)
 
 
 def cores() -> int:
@@ -60,7 +75,8 @@ def results_of(
         )
         # A process may already end while others still get their calls.
         with interrupts.withheld(), _told():
-            results = parallel(delayed(function)(argument) for argument in arguments)
+            call = delayed(_called)
+            results = parallel(call(os.getpid(), function, argument) for argument in arguments)
             time.sleep(_TAKEN_UP_S)
     try:
         yield _checked(results)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 import threading
 import time
 from collections.abc import Callable, Iterator
@@ -16,8 +17,22 @@ import numpy as np
 def progress_bar(text: str, every_s: float = 1.0) -> Iterator[Callable[[float], None]]:
     """Yield a function that updates the bar to a finished fraction, 0 to 1.
 
-    The bar is drawn again every ``every_s``, because its seconds go on.
+    The bar is drawn again every ``every_s``, because its seconds go on. If errors do not go to a
+    terminal, there is a line for each tenth instead, which fits a file.
     """
+    if not sys.stderr.isatty():
+        told_tenths = -1
+
+        def tell(fraction: float) -> None:
+            nonlocal told_tenths
+            tenths = min(10, max(0, int(10 * fraction)))
+            if tenths > told_tenths:
+                told_tenths = tenths
+                print(f"{text}: {10 * tenths}%", file=sys.stderr, flush=True)
+
+        tell(0.0)
+        yield tell
+        return
     # Nodes need no bar, and tqdm imports much.
     from tqdm import tqdm
 

@@ -12,8 +12,12 @@ from dataclasses import dataclass, field, fields, is_dataclass, replace
 from functools import partial
 from typing import Any, TypeVar
 
+from cardbox_tracker.common.errors import quoted
+
 T = TypeVar("T")
 
+# Numbers below this are shown as floats, and whole ones can be one.
+_LARGE = 1e15
 _TYPE_TEXTS = {bool: "true or false", int: "a whole number", float: "a number", str: "a text"}
 
 
@@ -60,11 +64,15 @@ class Setting:
         if value is None:
             return
         if self.choices and value not in self.choices:
-            raise ValueError(f"{name} is '{value}'; expected one of {', '.join(self.choices)}")
+            raise ValueError(
+                f"{name} is {quoted(value)}; expected one of {', '.join(self.choices)}"
+            )
         if self.limits is not None:
             lowest, highest = self.limits
             if not lowest <= value <= highest:  # this form refuses NaN, too
-                raise ValueError(f"{name} is {value:g}; expected {lowest:g} to {highest:g}")
+                # A whole number may be too large for a float.
+                shown = f"{value:g}" if abs(value) < _LARGE else quoted(value)
+                raise ValueError(f"{name} is {shown}; expected {lowest:g} to {highest:g}")
 
 
 class NoEffectError(ValueError):
@@ -227,7 +235,7 @@ def _check_name(name: Any, known: Mapping[str, Any], where: str) -> None:
     if name in known:
         return
     raise ValueError(
-        f"'{where}{name}' is no setting; {suggestion(name, known)}expected one of "
+        f"{quoted(f'{where}{name}')} is no setting; {suggestion(name, known)}expected one of "
         f"{', '.join(known) or 'none'}"
     )
 
@@ -240,16 +248,16 @@ def suggestion(name: object, known: Iterable[str]) -> str:
 
 def _mapping(value: Any, where: str) -> Mapping[str, Any]:
     if not isinstance(value, Mapping):
-        raise ValueError(f"{where} is {value!r}; expected names and values below it")
+        raise ValueError(f"{where} is {quoted(value)}; expected names and values below it")
     return value
 
 
 def _typed(before: Any, value: Any, where: str) -> Any:
     """Return a value of the type of ``before``; a whole number may stand for a float."""
-    if isinstance(before, float) and type(value) is int:
+    if isinstance(before, float) and type(value) is int and abs(value) < _LARGE:
         return float(value)
     if type(value) is not type(before):
-        raise ValueError(f"{where} is {value!r}; expected {_TYPE_TEXTS[type(before)]}")
+        raise ValueError(f"{where} is {quoted(value)}; expected {_TYPE_TEXTS[type(before)]}")
     return value
 
 

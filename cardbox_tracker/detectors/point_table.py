@@ -74,7 +74,9 @@ class PointTable(NamedTuple):
         placed: dict[int, ImagePoints] = {}
         for stamp_ns, joints in found.items():
             points = ImagePoints.of(joints)
-            placed[stamp_ns] = ImagePoints(calibration.rectified(points.px, *size), points.scores)
+            points = ImagePoints(calibration.rectified(points.px, *size), points.scores)
+            # In a mirrored image, a detector takes the left side for the right one.
+            placed[stamp_ns] = points.exchanged() if calibration.is_mirrored else points
         return lambda stamp_ns, image: placed.get(stamp_ns)
 
     def _check(self, names: Sequence[str], camera: str | None) -> None:

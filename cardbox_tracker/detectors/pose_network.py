@@ -10,6 +10,10 @@ Both networks are files of the wheel ``mediapipe`` 0.10.21 (Apache-2.0), see :mo
 
 from __future__ import annotations
 
+import os
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
 from math import atan2, cos, hypot, pi, sin
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -162,13 +166,14 @@ class _Network:
                 "pip install 'cardbox_tracker[detector]'"
             ) from None
         try:
-            self._run: Any = Interpreter(str(path), num_threads=1)
+            with _silent():
+                self._run: Any = Interpreter(str(path), num_threads=1)
+                self._run.allocate_tensors()
         except (ValueError, OSError, RuntimeError) as error:
             raise CardboxError(
                 f"{path} is no network that LiteRT can run ({error}); run "
                 "'cardbox detector --install'"
             ) from None
-        self._run.allocate_tensors()
         self._input = self._run.get_input_details()[0]["index"]
         self._outputs = [detail["index"] for detail in self._run.get_output_details()]
 
@@ -177,6 +182,20 @@ class _Network:
         self._run.set_tensor(self._input, image[None])
         self._run.invoke()
         return [self._run.get_tensor(index) for index in self._outputs]
+
+
+@contextmanager
+def _silent() -> Iterator[None]:
+    """Discard what the library writes to the terminal by itself; its exceptions have the faults."""
+    sys.stderr.flush()
+    terminal = os.dup(2)
+    try:
+        with open(os.devnull, "wb") as nothing:
+            os.dup2(nothing.fileno(), 2)
+        yield
+    finally:
+        os.dup2(terminal, 2)
+        os.close(terminal)
 
 
 def _anchors() -> FloatArray:

@@ -16,6 +16,8 @@ from types import SimpleNamespace
 from typing import Any, BinaryIO
 
 import lz4.frame
+from rosbags.interfaces import MessageDefinition
+from rosbags.interfaces import MessageDefinitionFormat as _KIND
 from rosbags.rosbag2 import reader, storage_mcap
 
 from cardbox_tracker.common.errors import BagError
@@ -45,12 +47,12 @@ def check_recording(path: Path) -> None:
     if path.is_dir():
         for name in sorted(os.listdir(path)):
             inside = path / name
-            if inside.suffix in _STORAGES and not inside.is_file():
+            if inside.suffix in _STORAGES and not name.startswith(".") and not inside.is_file():
                 raise BagError(f"{inside} is not a file; give a complete copy of the recording")
         _check_metadata(path / "metadata.yaml")
     files = sorted(path.glob("*.mcap")) if path.is_dir() else [path]
     for file in files:
-        if file.suffix == ".mcap":
+        if file.suffix == ".mcap" and not file.name.startswith("."):
             _check_chunks(file)
 
 
@@ -102,6 +104,18 @@ def _too_large(path: Path, size: int) -> BagError:
         f"the recording {path} would unpack to {size / 1e6:.0f} MB, far more than its size allows; "
         "record it again with smaller chunks, or without compression"
     )
+
+
+def read_other_channels() -> None:
+    """Let rosbags, in this process, open files that also have JSON, protobuf or other channels."""
+    _MCAP.get_msgdef = _definition
+    _MCAP.read_string = lambda file: _MCAP.read_bytes(file).decode("utf-8", "replace")
+
+
+def _definition(schema: Any) -> MessageDefinition:
+    kinds = {"ros2msg": _KIND.MSG, "ros2idl": _KIND.IDL, "omgidl": _KIND.IDL}
+    kind = _KIND.NONE if schema is None else kinds.get(schema.encoding, _KIND.NONE)
+    return MessageDefinition(kind, "" if kind is _KIND.NONE else schema.data)
 
 
 def limit_decompression() -> None:

@@ -3,34 +3,52 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from functools import partial
+from itertools import islice
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 from rosbags.highlevel import AnyReader, AnyReaderError
+from rosbags.interfaces import Connection
 from rosbags.typesys import Stores, get_typestore
 
+from cardbox_tracker.camera.calibration_watch import CalibrationWatch
 from cardbox_tracker.camera.camera import Calibration
-from cardbox_tracker.camera.camera_info import calibration_from_info
 from cardbox_tracker.camera.encodings import (
     decode_as_sent,
     decode_compressed,
     image_parts,
 )
-from cardbox_tracker.common.errors import BagError, EncodingError, cut
-from cardbox_tracker.recordings.bag_limits import check_recording, limit_decompression
+from cardbox_tracker.camera.levels import Levels
+from cardbox_tracker.camera.stamps import RecordedStamps, StampOrder
+from cardbox_tracker.common.errors import BagError, CameraError, EncodingError, cut
+from cardbox_tracker.recordings.bag_files import check_parts, paths_to_open
+from cardbox_tracker.recordings.bag_limits import (
+    check_recording,
+    limit_decompression,
+    read_other_channels,
+)
 from cardbox_tracker.recordings.given_camera import GivenCamera
 from cardbox_tracker.recordings.image_recording import WORKING_SIZE, RecordedImage
 
 IMAGE_TYPES = ("sensor_msgs/msg/Image", "sensor_msgs/msg/CompressedImage")
 CAMERA_INFO_TYPE = "sensor_msgs/msg/CameraInfo"
+# Transports of image_transport with images, the preferred one first.
+_TRANSPORTS = ("compressed", "zstd", "compressedDepth")
+_LEFT_OUT = MappingProxyType(
+    {
+        StampOrder.LATE: "of an earlier time",
+        StampOrder.REPEATED: "of the one before",
+        StampOrder.FOREIGN: "of another clock",
+    }
+)
+_MOST_PERIOD_NS = 2_000_000_000
 _REPAIR = "'ros2 bag reindex' remakes lost metadata, 'mcap recover' a file that was cut off"
-FILE_ENDINGS = (".mcap", ".db3", ".bag")
-"""Endings of a recording's files."""
 
 
 class BagMessage(NamedTuple):
@@ -58,6 +76,9 @@ class BagReader:
         self.path, self.working_size = Path(path), WORKING_SIZE
         self._given = camera or GivenCamera()
         self._reader: AnyReader | None = None
+        self._stamps: dict[str, RecordedStamps] = {}
+        self._levels: dict[str, Levels] = {}
+        self._skipped: dict[str, str] = {}
 
     def __enter__(self) -> BagReader:
         """Open the recording."""
@@ -66,26 +87,31 @@ class BagReader:
             raise BagError(f"there is no recording {path}; give a rosbag2 folder or file")
         if not path.is_dir() and not path.is_file():
             raise BagError(f"{path} is a pipe or a device; give a rosbag2 folder or file")
-        if path.is_dir() and not (path / "metadata.yaml").exists():
-            files = [f for f in sorted(path.iterdir()) if f.suffix in FILE_ENDINGS]
-            if (path / "bag" / "metadata.yaml").exists():
-                path = path / "bag"
-            elif len(files) == 1:
-                path = files[0]
-            else:
+        paths = [path]
+        if path.is_dir():
+            is_inside = not (path / "metadata.yaml").exists() and (path / "bag").is_dir()
+            paths = paths_to_open(path / "bag" if is_inside else path)
+            if not paths:
                 raise BagError(
                     f"{path} is not a rosbag2 recording (it has no metadata.yaml); give the folder "
-                    "that 'ros2 bag record' or 'cardbox synthesize' made"
+                    "that 'ros2 bag record' or 'cardbox synthesize' made; 'ros2 bag reindex' "
+                    "remakes lost metadata"
                 )
-        check_recording(path)
+        for part in paths:
+            check_recording(part)
         limit_decompression()
+        read_other_channels()
         try:
             store = get_typestore(Stores.ROS2_JAZZY)
-            self._reader = AnyReader([path], default_typestore=store)
+            self._reader = AnyReader(paths, default_typestore=store)
             self._reader.open()
+            check_parts(self.path, self._reader.readers)
+        except BagError:
+            self.__exit__()
+            raise
         except Exception as error:
             # rosbags does not catch the errors of its parsers, which can be of any type.
-            self._reader = None
+            self.__exit__()
             raise BagError(
                 f"cannot read the recording {self.path}: {_reason(error)}; give a rosbag2 "
                 f"recording (mcap or sqlite3) that was closed properly: {_REPAIR}"
@@ -98,7 +124,7 @@ class BagReader:
     def __exit__(self, *_: object) -> None:
         """Close the recording."""
         if self._reader is not None:
-            with suppress(AnyReaderError):
+            with suppress(AnyReaderError, AssertionError):
                 self._reader.close()
             self._reader = None
 
@@ -107,6 +133,11 @@ class BagReader:
         if self._reader is None:
             raise BagError(f"the recording {self.path} is not open; use it in a 'with' statement")
         return self._reader
+
+    @property
+    def _connections(self) -> list[Connection]:
+        """Connections whose messages can be read; JSON, for example, cannot."""
+        return [one for one in self._open.connections if not _unread_format(one)]
 
     @property
     def start_ns(self) -> int:
@@ -122,17 +153,26 @@ class BagReader:
     @property
     def topics(self) -> dict[str, str]:
         """Message type of each topic."""
-        return {c.topic: c.msgtype for c in self._open.connections}
+        return {c.topic: c.msgtype for c in self._connections}
 
     def count(self, topics: Sequence[str] | None = None) -> int:
         """Return the number of messages on ``topics``, or on all topics."""
-        return sum(
-            c.msgcount for c in self._open.connections if topics is None or c.topic in topics
-        )
+        return sum(c.msgcount for c in self._connections if topics is None or c.topic in topics)
 
     def image_topic(self, camera: str | None = None) -> str:
-        """Return the only image topic in the namespace ``camera``, or in the recording."""
+        """Return the only image topic in the namespace ``camera``, or in the recording.
+
+        Of the transports of one camera, such as ``image_raw`` and ``image_raw/compressed``, the
+        first that has messages is taken.
+        """
         return self._only(IMAGE_TYPES, "image", camera)
+
+    @property
+    def image_topics(self) -> list[str]:
+        """Image topics, one for each camera."""
+        return chosen_transports(
+            {name: self.count([name]) for name, kind in self.topics.items() if kind in IMAGE_TYPES}
+        )
 
     def camera_info_topic(self, camera: str | None = None) -> str:
         """Return the camera_info topic that belongs to the images."""
@@ -144,9 +184,10 @@ class BagReader:
         return self._only((CAMERA_INFO_TYPE,), "CameraInfo", camera)
 
     def _only(self, types: tuple[str, ...], what: str, camera: str | None = None) -> str:
-        folder = "" if camera is None else f"/{camera.strip('/')}/"
+        folder = "" if camera is None else f"/{camera}/".replace("//", "/")
+        names = self.image_topics if types == IMAGE_TYPES else self.topics
         found = sorted(
-            name for name, kind in self.topics.items() if kind in types and name.startswith(folder)
+            name for name in names if self.topics[name] in types and name.startswith(folder)
         )
         if len(found) > 1 and camera is not None:
             # Depth and further images of the same camera can have topics in this namespace.
@@ -174,7 +215,7 @@ class BagReader:
         missing = sorted(set(topics or ()) - set(self.topics))
         if missing:
             raise BagError(f"{self.path} has no topic {', '.join(missing)}; it has {self._list()}")
-        chosen = [c for c in self._open.connections if topics is None or c.topic in topics]
+        chosen = [c for c in self._connections if topics is None or c.topic in topics]
         if not chosen:
             return
         try:
@@ -200,49 +241,102 @@ class BagReader:
     def _list(self) -> str:
         return ", ".join(f"{n} ({t})" for n, t in sorted(self.topics.items())) or "no topics"
 
-    def images(self, topic: str | None = None) -> Iterator[RecordedImage]:
-        """Yield the images of ``topic``, or of the only image topic, in order."""
-        for message in self.messages([topic or self.image_topic()]):
-            image = self.deserialize(message)
+    def stamped(self, topic: str) -> Iterator[tuple[int, BagMessage, Any]]:
+        """Yield the messages of a topic whose stamps can be used, with stamp, ns, and object.
+
+        Stamps that are zero or go back are replaced, see :class:`.RecordedStamps`.
+        """
+        stamps, before = RecordedStamps(), self._stamps.get(topic)
+        for message in self.messages([topic]):
+            decoded = self.deserialize(message)
             try:
-                frame_id, decode = str(image.header.frame_id), _decoder(image)
-                found = RecordedImage(stamp_ns_of(image), frame_id, message.time_ns, decode)
+                sent_ns = stamp_ns_of(decoded)
+                if stamps.statistics.received == 0 == sent_ns and self._begins_at_0(topic):
+                    sent_ns = 1
+                stamp_ns = stamps.add(sent_ns, message.time_ns)
             except (AttributeError, TypeError, ValueError) as error:
                 # The message type is defined by the recording and may lack fields.
+                raise self._damaged(error) from None
+            # What was read furthest counts for the remarks.
+            if before is None or stamps.statistics.received >= before.statistics.received:
+                self._stamps[topic] = stamps
+            if stamp_ns is not None:
+                yield stamp_ns, message, decoded
+
+    def _begins_at_0(self, topic: str) -> bool:
+        """Return whether the clock of the camera begins at 0, so that the first stamp is one."""
+        stamps_ns = [
+            stamp_ns_of(self.deserialize(message)) for message in islice(self.messages([topic]), 2)
+        ]
+        return len(stamps_ns) == 2 and 0 < stamps_ns[1] < _MOST_PERIOD_NS
+
+    def images(self, topic: str | None = None) -> Iterator[RecordedImage]:
+        """Yield the images of ``topic``, or of the only image topic, in order."""
+        topic = topic or self.image_topic()
+        levels = self._levels.setdefault(topic, Levels())
+        for stamp_ns, message, image in self.stamped(topic):
+            try:
+                frame_id, decode = str(image.header.frame_id), _decoder(image, levels)
+                found = RecordedImage(stamp_ns, frame_id, message.time_ns, decode)
+            except (AttributeError, TypeError, ValueError) as error:
                 raise self._damaged(error) from None
             yield found
 
     def camera_info(self, camera: str | None = None) -> Any:
-        """Return the first CameraInfo in the namespace ``camera``, or in the recording.
+        """Return the first CameraInfo with a calibration; see :meth:`calibration`."""
+        return self._info(camera)[0]
 
-        Raises:
-            BagError: the recording has no CameraInfo.
-        """
-        topic = self.camera_info_topic(camera)
-        for message in self.messages([topic]):
-            return self.deserialize(message)
-        raise BagError(f"{self.path} has no message on {topic}; record it with the images")
-
-    def calibration(self, camera: str | None = None) -> Calibration:
-        """Return the given calibration, or that in the message of :meth:`camera_info`.
+    def _info(self, camera: str | None) -> tuple[Any, Calibration]:
+        """Return the first CameraInfo of a calibrated camera, and its calibration.
 
         Raises:
             BagError: the recording has no CameraInfo.
             CameraError: the camera is not calibrated; the text names both topics.
         """
+        topic, fault = self.camera_info_topic(camera), None
+        watch = CalibrationWatch(topic, self.image_topic(camera))
+        for number, message in enumerate(self.messages([topic])):
+            info = self.deserialize(message)
+            try:
+                watch.see(info)
+            except CameraError as error:
+                fault = fault or error
+            except (AttributeError, ArithmeticError, TypeError, ValueError) as error:
+                raise self._damaged(error) from None
+            if watch.current is not None:
+                if number:
+                    self._skipped[topic] = (
+                        f"the first {number} messages on {topic} are left out, because they have "
+                        f"no calibration: {fault}"
+                    )
+                return info, watch.current
+        if fault is not None:
+            raise fault
+        raise BagError(f"{self.path} has no message on {topic}; record it with the images")
+
+    def calibration(self, camera: str | None = None) -> Calibration:
+        """Return the given calibration, or that in the first CameraInfo that has one.
+
+        Raises:
+            BagError: the recording has no CameraInfo.
+            CameraError: the camera is not calibrated, or its CameraInfo is that of images of
+                another shape; the text names both topics.
+        """
+        topic = self.image_topic(camera)
         if self._given.is_calibrated:
             return self._given_calibration(camera)
         if CAMERA_INFO_TYPE not in self.topics.values():
             raise BagError(
-                f"{self.path} has 0 CameraInfo topics; expected one for {self.image_topic(camera)}."
+                f"{self.path} has 0 CameraInfo topics; expected one for {topic}."
                 " Record it with the images, or give --fov DEG or --calibration FILE"
             )
-        topics = self.image_topic(camera), self.camera_info_topic(camera)
-        info = self.camera_info(camera)
-        try:
-            return self._given.rolled(calibration_from_info(info, *topics))
-        except (AttributeError, ArithmeticError, TypeError, ValueError) as error:
-            raise self._damaged(error) from None
+        found = self._info(camera)[1]
+        for image in self.images(topic):
+            with suppress(EncodingError):
+                height, width = image.as_sent.shape[:2]
+                found.check_shape(width, height, topic, self.camera_info_topic(camera))
+                break
+        return self._given.rolled(found)
 
     def _given_calibration(self, camera: str | None) -> Calibration:
         topic = self.image_topic(camera)
@@ -252,12 +346,55 @@ class BagReader:
                 return self._given.calibrated(self.path, width, height, image.frame_id)
         raise BagError(f"{self.path} has no image on {topic} that can be decoded; record it again")
 
+    def left_out(self, topic: str) -> list[str]:
+        """Return the images that were not used, with the reasons, and other image topics."""
+        counts = self._stamps[topic].statistics.counts if topic in self._stamps else {}
+        found = [
+            f"{count} with the stamp {_LEFT_OUT[order]}"
+            for order, count in counts.items()
+            if count and not order.is_usable
+        ]
+        others = sorted(n for n, kind in self.topics.items() if kind in IMAGE_TYPES and n != topic)
+        return found + [f"the images on {name}" for name in others]
+
     @property
     def remarks(self) -> list[str]:
-        """A remark if a given calibration replaces a CameraInfo."""
+        """Remarks on what was replaced or left out."""
+        found = [*self._skipped.values()]
         if self._given.is_calibrated and CAMERA_INFO_TYPE in self.topics.values():
-            return ["the given calibration or field of view replaces the recording's CameraInfo"]
-        return []
+            found.append(
+                "the given calibration or field of view replaces the recording's CameraInfo"
+            )
+        found += [
+            f"{one.topic} is left out: its messages are {_unread_format(one)}, not CDR"
+            for one in self._open.connections
+            if _unread_format(one)
+        ]
+        for topic, levels in self._levels.items():
+            found += [f"{topic}: {levels.text}"] if levels.text else []
+        for topic, stamps in self._stamps.items():
+            found += [f"{topic}: {text}" for text in stamps.remarks()]
+        return found
+
+
+def chosen_transports(messages: Mapping[str, int]) -> list[str]:
+    """Return one image topic for each camera, the raw one or else one of its transports.
+
+    Args:
+        messages: number of messages of each image topic.
+    """
+    groups: dict[str, list[str]] = {}
+    for topic in sorted(messages):
+        base, _, last = topic.rpartition("/")
+        is_transport = base in messages or last in _TRANSPORTS
+        groups.setdefault(base if is_transport else topic, []).append(topic)
+    order = ("", *_TRANSPORTS)
+
+    def rank(base: str, topic: str) -> tuple[bool, int, str]:
+        kind = topic.removeprefix(base).strip("/")
+        return not messages[topic], order.index(kind) if kind in order else len(order), topic
+
+    return sorted(min(topics, key=partial(rank, base)) for base, topics in sorted(groups.items()))
 
 
 def _image_names(folder: str) -> tuple[str, ...]:
@@ -276,7 +413,15 @@ def stamp_ns_of(message: Any) -> int:
     return int(stamp.sec) * 10**9 + int(stamp.nanosec)
 
 
-def _decoder(image: Any) -> Callable[[], NDArray[np.uint8]]:
+def _decoder(image: Any, levels: Levels) -> Callable[[], NDArray[np.uint8]]:
     if hasattr(image, "encoding"):
-        return partial(decode_as_sent, *image_parts(image))
-    return partial(decode_compressed, image.data)
+        return partial(decode_as_sent, *image_parts(image), levels=levels)
+    return partial(decode_compressed, image.data, levels=levels)
+
+
+def _unread_format(connection: Connection) -> str:
+    """Return the format of messages that cannot be read; empty if they can."""
+    if connection.msgtype == "__schemaless__":
+        return "without a schema"
+    written = getattr(connection.ext, "serialization_format", "cdr")
+    return "" if written == "cdr" else str(written)

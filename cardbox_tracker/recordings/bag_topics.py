@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 
 from cardbox_tracker.common.errors import CardboxError
-from cardbox_tracker.recordings.bag_reader import IMAGE_TYPES, BagReader
+from cardbox_tracker.recordings.bag_reader import BagReader
 
 _COMPRESSED = "/compressed"
 
@@ -23,7 +23,7 @@ def find_topics(bag: str, wanted: Iterable[str], cameras: Sequence[str] = ()) ->
             cameras differ.
     """
     with BagReader(bag) as reader:
-        images = sorted(name for name, kind in reader.topics.items() if kind in IMAGE_TYPES)
+        images = reader.image_topics
         if len(images) > 1 and not cameras:
             raise CardboxError(
                 f"{bag} has images on {', '.join(images)}; choose one with the launch arguments "

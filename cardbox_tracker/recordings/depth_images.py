@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from cardbox_tracker.camera.camera import Camera
 from cardbox_tracker.camera.depth_image import DepthImage, at_size, depth_from_image
 from cardbox_tracker.common.errors import BagError
-from cardbox_tracker.recordings.bag_reader import IMAGE_TYPES, BagReader, stamp_ns_of
+from cardbox_tracker.recordings.bag_reader import IMAGE_TYPES, BagReader
 
 
 def depth_images(
@@ -27,6 +27,5 @@ def depth_images(
                 f"{topic} has messages of {kind}; expected depth images: "
                 f"{' or '.join(IMAGE_TYPES)} (compressedDepth)"
             )
-        for message in bag.messages([topic]):
-            image = bag.deserialize(message)
-            yield stamp_ns_of(image), at_size(depth_from_image(image), camera.width, camera.height)
+        for stamp_ns, _, image in bag.stamped(topic):
+            yield stamp_ns, at_size(depth_from_image(image), camera.width, camera.height)

@@ -25,10 +25,11 @@ class Film:
         """Store the path and the camera; the recording is read on entry."""
         self.path, self._given = path, camera
         self.working_size, self.duration_s = (0, 0), 0.0
-        self._size = (0, 0)
+        self._size = self._stored = (0, 0)
 
     def _set_size(self, width: int, height: int) -> None:
         """Store the size of the images, px, and the working size that follows from it."""
+        self._stored = self._stored if any(self._stored) else (width, height)
         self._size, self.working_size = (width, height), working_size(width, height)
 
     def __exit__(self, *_: object) -> None:
@@ -52,7 +53,11 @@ class Film:
             CameraError: the given calibration does not fit the images.
         """
         self.image_topic(camera)
-        return self._given.calibrated(self.path, *self._size, file=self._file)
+        return self._given.calibrated(self.path, *self._size, stored=self._stored, file=self._file)
+
+    def left_out(self, topic: str) -> list[str]:
+        """Return what is no image; see ``ImageRecording``."""
+        return []
 
     @property
     def remarks(self) -> list[str]:

@@ -7,13 +7,16 @@ from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
 
-from cardbox_tracker.common.errors import CardboxError, quoted
-from cardbox_tracker.recordings.bag_reader import FILE_ENDINGS
+from cardbox_tracker.common.errors import CardboxError, plain
+from cardbox_tracker.recordings.bag_files import files_of_one, is_bag_file
 from cardbox_tracker.recordings.image_folder import image_files
 from cardbox_tracker.recordings.video_reader import SUFFIXES as VIDEO_ENDINGS
 
 SUMMARY = "_summary.csv"
 """Name of the summary in a folder of results, by which such folders are left out."""
+
+FORMULA = ("=", "+", "-", "@")
+"""What spreadsheets take for the beginning of a formula."""
 
 _DEEPEST = 50
 
@@ -22,14 +25,14 @@ def is_one_recording(path: Path) -> bool:
     """Return whether a path is a single recording, not a folder of them.
 
     A folder is a recording if it is a rosbag2, if its folder ``bag`` is one, or if it has exactly
-    one file of a bag. It is also one if it has images, unless such recordings are in its folders.
+    one file of a bag, or the parts of one. It is also one if it has images, unless such recordings
+    are in its folders.
     """
     if not path.is_dir() or _is_rosbag2(path):
         return True
-    inside = list(path.iterdir())
-    if sum(entry.suffix in FILE_ENDINGS and entry.is_file() for entry in inside) == 1:
+    if files_of_one(path):
         return True
-    return bool(image_files(path)) and not any(map(_is_rosbag2, inside))
+    return bool(image_files(path)) and not any(map(_is_rosbag2, path.iterdir()))
 
 
 def _is_rosbag2(path: Path) -> bool:
@@ -48,8 +51,7 @@ def recordings_in(folder: Path, output: Path | None = None) -> dict[str, Path]:
         output: a folder that is left out; None for none.
 
     Raises:
-        CardboxError: a folder cannot be read, folders are nested too deep, or a name is not UTF-8,
-            so that no table could name it.
+        CardboxError: a folder cannot be read, or folders are nested too deep.
     """
     left_out = None if output is None else output.resolve()
     paths = {path.relative_to(folder): path for path in _found(folder, left_out, 0)}
@@ -59,7 +61,7 @@ def recordings_in(folder: Path, output: Path | None = None) -> dict[str, Path]:
         (short[path] if count[short[path]] == 1 + (short[path] == path) else path).as_posix(): path
         for path in paths
     }
-    return {name: paths[names[name]] for name in sorted(names)}
+    return {_plain(name): paths[names[name]] for name in sorted(names)}
 
 
 def _found(folder: Path, left_out: Path | None, depth: int) -> Iterator[Path]:
@@ -73,9 +75,9 @@ def _found(folder: Path, left_out: Path | None, depth: int) -> Iterator[Path]:
             names = sorted(entry.name for entry in entries if not entry.name.startswith("."))
         if SUMMARY in names:
             return
-        for path in (folder / _readable(name, folder) for name in names):
+        for path in (folder / name for name in names):
             if path.is_file():
-                if path.suffix in FILE_ENDINGS or path.suffix.lower() in VIDEO_ENDINGS:
+                if is_bag_file(path) or path.suffix.lower() in VIDEO_ENDINGS:
                     yield path
             elif path.is_dir() and path.resolve() != left_out:
                 if is_one_recording(path):
@@ -89,12 +91,7 @@ def _found(folder: Path, left_out: Path | None, depth: int) -> Iterator[Path]:
         ) from None
 
 
-def _readable(name: str, folder: Path) -> str:
-    try:
-        name.encode()
-    except UnicodeEncodeError:
-        raise CardboxError(
-            f"{folder} has the name {quoted(name)}, which is not UTF-8; rename it, or "
-            "give another folder"
-        ) from None
-    return name
+def _plain(name: str) -> str:
+    """Return a name that a table, a terminal and a spreadsheet show as it is."""
+    shown = plain(name).replace("\n", "\\n")
+    return f"./{shown}" if shown.startswith(FORMULA) else shown

@@ -11,8 +11,6 @@ from cardbox_tracker.camera.camera import Calibration
 from cardbox_tracker.common.errors import CameraError
 from cardbox_tracker.recordings.focal_length import FILM_DIAGONAL_MM, equivalent_mm
 
-# Largest difference of the aspect ratios of a calibration and of the images.
-_ASPECT = 0.02
 # No usual phone held upright has so large a field of view across its image, degrees.
 _UPRIGHT_DEG = 55.0
 FOV_HINT = "webcams 60 to 78, phones 60 to 75 held sideways, 36 to 46 upright"
@@ -33,12 +31,14 @@ class GivenCamera:
         roll_rad: how far the camera is turned clockwise about its axis, seen from behind it; the
             images are turned back.
         fps: images a second, in place of the rate that the recording states.
+        is_mirrored: whether the images are mirrored; they are turned back.
     """
 
     fov_deg: float | None = None
     calibration: Path | None = None
     roll_rad: float | None = None
     fps: float | None = None
+    is_mirrored: bool = False
 
     @property
     def is_calibrated(self) -> bool:
@@ -57,15 +57,22 @@ class GivenCamera:
             Calibration.of_fov(4, 3, self.fov_deg)
 
     def calibrated(
-        self, path: Path, width: int, height: int, frame_id: str = "", file: Path | None = None
+        self,
+        path: Path,
+        width: int,
+        height: int,
+        frame_id: str = "",
+        stored: tuple[int, int] = (0, 0),
+        file: Path | None = None,
     ) -> Calibration:
         """Return the calibration of images of ``width`` x ``height`` px in the recording ``path``.
 
         Args:
-            path: the recording, for texts.
-            width: of its images, px.
-            height: of its images, px.
-            frame_id: name of the optical frame.
+            path: the recording.
+            width: width of the images, px.
+            height: height of the images, px.
+            frame_id: name of the camera's optical frame.
+            stored: size, px, before pixels were made square, of which a file may be; 0 if the same.
             file: film or image that may tell the field of view if none is given; if it does not,
                 a usual one is assumed. None if there is no such file.
 
@@ -74,14 +81,9 @@ class GivenCamera:
         """
         if self.calibration is not None:
             found = load_calibration(self.calibration)
-            stretch = width * found.height / (height * found.width)
-            if not 1 - _ASPECT < stretch < 1 + _ASPECT:
-                raise CameraError(
-                    f"the calibration {self.calibration} is for images of "
-                    f"{found.width}x{found.height}, but those of {path} are {width}x{height}; "
-                    "calibrate with images of the same aspect ratio and orientation, or give "
-                    "--fov DEG"
-                )
+            if stored != (width, height) and found.has_shape(*stored):
+                found = found.stretched(width / stored[0], height / stored[1])
+            found.check_shape(width, height, str(path), str(self.calibration))
         elif self.fov_deg is not None:
             found = Calibration.of_fov(width, height, self.fov_deg)
         elif file is not None:
@@ -119,8 +121,8 @@ class GivenCamera:
         ]
 
     def rolled(self, calibration: Calibration) -> Calibration:
-        """Return the calibration with the given roll."""
-        return replace(calibration, roll_rad=self.roll_rad) if self.roll_rad else calibration
+        """Return the calibration with the given roll, and mirrored if the images are."""
+        return replace(calibration, roll_rad=self.roll_rad or 0.0, is_mirrored=self.is_mirrored)
 
 
 def _fov_deg(file: Path, width: int, height: int) -> tuple[float, bool]:

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cardbox_tracker.camera.encodings import MOST_PIXELS, decode_compressed
+from cardbox_tracker.camera.levels import Levels
 from cardbox_tracker.common.errors import BagError, EncodingError
 from cardbox_tracker.common.files import UnreadableFileError, read_regular
 from cardbox_tracker.recordings.film import Film
@@ -26,9 +27,13 @@ _MOST_BYTES = 4 * MOST_PIXELS
 
 
 def image_files(folder: Path) -> list[Path]:
-    """Return the images of a folder, ordered by name; numbers in names count as numbers."""
+    """Return the images of a folder, ordered by name; numbers in names count as numbers.
+
+    Hidden files are no images, such as ``._NAME``, which a Mac writes beside each NAME.
+    """
     files = (path for path in folder.iterdir() if path.suffix.lower() in SUFFIXES)
-    return sorted((path for path in files if path.is_file()), key=_by_number)
+    seen = (path for path in files if path.is_file() and not path.name.startswith("."))
+    return sorted(seen, key=_by_number)
 
 
 def _by_number(path: Path) -> list[tuple[int, str]]:
@@ -48,6 +53,7 @@ class ImageFolder(Film):
         super().__init__(path, camera)
         self._files: list[Path] = []
         self._first = path
+        self._levels = Levels()
 
     def __enter__(self) -> ImageFolder:
         """Read the names of the images, and the size of the first one that can be decoded."""
@@ -55,7 +61,7 @@ class ImageFolder(Film):
         reason = ""
         for file in self._files:
             try:
-                height, width = _image(file).shape[:2]
+                height, width = self._image(file).shape[:2]
             except EncodingError as error:
                 reason = reason or f" ({error})"
                 continue
@@ -74,23 +80,39 @@ class ImageFolder(Film):
     def _file(self) -> Path:
         return self._first
 
+    def left_out(self, topic: str) -> list[str]:
+        """Return the files that are no images; see ``ImageRecording``."""
+        names = sorted(path.name for path in self.path.iterdir() if path.is_file())
+        hidden = [name for name in names if name.startswith(".")]
+        others = [name for name in names if name not in {path.name for path in self._files}]
+        others = [name for name in others if name not in hidden]
+        return [
+            f"{len(files)} {kind} ({files[0]})"
+            for kind, files in (("hidden files", hidden), ("files of other kinds", others))
+            if files
+        ]
+
     def images(self, topic: str | None = None) -> Iterator[RecordedImage]:
         """Yield the images in order, at the given rate."""
         for number, file in enumerate(self._files):
             stamp_ns = round(1e9 * number / (self._given.fps or FPS))
-            yield RecordedImage(stamp_ns, "", stamp_ns, partial(_image, file, self._size))
+            yield RecordedImage(stamp_ns, "", stamp_ns, partial(self._image, file, self._size))
 
+    def _image(self, file: Path, size: tuple[int, int] | None = None) -> NDArray[np.uint8]:
+        """Return an image (H, W) or (H, W, 3), which must have ``size`` (width, height), px."""
+        try:
+            image = decode_compressed(read_regular(file, _MOST_BYTES), levels=self._levels)
+        except (EncodingError, UnreadableFileError) as error:
+            raise EncodingError(f"{file.name}: {error}") from None
+        found = image.shape[1], image.shape[0]
+        if size is not None and found != size:
+            raise EncodingError(
+                f"{file.name} has {found[0]}x{found[1]} px; expected the {size[0]}x{size[1]} px of "
+                "the first image"
+            )
+        return image
 
-def _image(file: Path, size: tuple[int, int] | None = None) -> NDArray[np.uint8]:
-    """Return an image (H, W) or (H, W, 3), which must have ``size`` (width, height), px."""
-    try:
-        image = decode_compressed(read_regular(file, _MOST_BYTES))
-    except (EncodingError, UnreadableFileError) as error:
-        raise EncodingError(f"{file.name}: {error}") from None
-    found = image.shape[1], image.shape[0]
-    if size is not None and found != size:
-        raise EncodingError(
-            f"{file.name} has {found[0]}x{found[1]} px; expected the {size[0]}x{size[1]} px of the "
-            "first image"
-        )
-    return image
+    @property
+    def remarks(self) -> list[str]:
+        """Remarks on the field of view, and on the range of images of 16 bits."""
+        return [*super().remarks, *([self._levels.text] if self._levels.text else [])]

@@ -84,6 +84,9 @@ class ImageRecording(Protocol):
     def remarks(self) -> Sequence[str]:
         """Warnings about what was read so far."""
 
+    def left_out(self, topic: str) -> list[str]:
+        """Return what was read of these images so far but not used, with the reasons."""
+
     def __enter__(self) -> ImageRecording:
         """Open the recording."""
 

@@ -6,7 +6,8 @@ import os
 from pathlib import Path
 
 from cardbox_tracker.common.errors import BagError
-from cardbox_tracker.recordings.bag_reader import FILE_ENDINGS, BagReader
+from cardbox_tracker.recordings.bag_files import FILE_ENDINGS, is_bag_file
+from cardbox_tracker.recordings.bag_reader import BagReader
 from cardbox_tracker.recordings.focal_length import equivalent_mm
 from cardbox_tracker.recordings.given_camera import GivenCamera
 from cardbox_tracker.recordings.image_folder import SUFFIXES, ImageFolder, image_files
@@ -21,7 +22,7 @@ def is_bag(path: Path) -> bool:
         return path.suffix in FILE_ENDINGS
     if any((folder / "metadata.yaml").exists() for folder in (path, path / "bag")):
         return True
-    return any(file.suffix in FILE_ENDINGS for file in path.iterdir())
+    return any(map(is_bag_file, path.iterdir()))
 
 
 def check_exists(path: Path) -> None:

@@ -213,11 +213,14 @@ def input_faults(
             "depth images can cut out the person for one camera only; several cameras need "
             "--background"
         )
-    is_given = camera is not None and (camera.is_calibrated or camera.roll_rad or camera.fps)
+    is_turned = camera is not None and (camera.roll_rad or camera.is_mirrored)
+    is_given = camera is not None and (camera.is_calibrated or is_turned or camera.fps)
+    if is_turned and (depth is not None or isinstance(background, Within)):
+        yield "depth images are not turned: leave --camera-roll-deg and --mirrored out, or --depth"
     if len(cameras) > 1 and is_given:
         yield (
-            "--fov, --calibration, --camera-roll-deg and --fps describe one camera; the recording "
-            "of several cameras needs a CameraInfo of each"
+            "--fov, --calibration, --camera-roll-deg, --mirrored and --fps describe one camera; "
+            "the recording of several cameras needs a CameraInfo of each"
         )
     if (depth is not None or isinstance(background, Within)) and not is_bag(Path(path)):
         yield f"depth images are read from a rosbag2, which {os.fspath(path)} is not"

@@ -14,6 +14,7 @@ import numpy as np
 
 from cardbox_tracker.common.errors import CardboxError
 from cardbox_tracker.common.files import atomic_path
+from cardbox_tracker.person.isb_angles import ANATOMICAL_NAMES, anatomical_angles
 from cardbox_tracker.person.skeleton import (
     CLAVICLE_NAMES,
     JOINT_NAMES,
@@ -69,6 +70,7 @@ def units(has_points: bool = False) -> dict[str, str]:
         "place_state": "",
         "place_chance": "",
         "place_rests_on": "",
+        **dict.fromkeys(ANATOMICAL_NAMES, "deg"),
     }
 
 
@@ -94,6 +96,8 @@ def row_of(
     known |= positions_of(joints)
     if estimate.neck is None:
         known |= dict.fromkeys(NECK_NAMES)
+    angles = anatomical_angles(np.asarray(estimate.posture, float)).tolist()
+    known |= {name: x for name, x in zip(ANATOMICAL_NAMES, angles, strict=True) if x == x}
     points_m = np.asarray(estimate.keypoints_m, float).ravel()
     known |= zip(POINT_COLUMNS, points_m.tolist(), strict=True)
     known |= {metric.name: metric.of(estimate) for metric in METRICS}

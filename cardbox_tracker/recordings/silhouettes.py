@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from cardbox_tracker.camera.camera import Rectifier
 from cardbox_tracker.camera.depth_image import DepthImage
 from cardbox_tracker.camera.encodings import brightness_of
-from cardbox_tracker.common.errors import BagError, CardboxError, EncodingError
+from cardbox_tracker.common.errors import BagError, CameraError, CardboxError, EncodingError
 from cardbox_tracker.detectors.detector import Detector, FindPoints
 from cardbox_tracker.detectors.image_points import ImagePoints
 from cardbox_tracker.detectors.point_table import PointTable
@@ -24,7 +24,11 @@ from cardbox_tracker.segmentation.silhouettes import SilhouettePipeline
 
 _PERIOD_IMAGES = 60
 # A stamp that differs from the recording time by more comes from another clock.
-_OTHER_CLOCK_NS = 10_000_000_000
+# A remark on points that seem to be mirrored needs this many images.
+_MIRRORED_IMAGES = 10
+# Shares of the points in the outline, as they are and mirrored.
+_OUTSIDE, _INSIDE = 0.4, 0.7
+_OTHER_CLOCK_NS = 1_000_000_000
 
 
 class TimeSpan(NamedTuple):
@@ -174,7 +178,8 @@ class SilhouetteSource:
     ) -> None:
         self._bag = bag
         self._broken: dict[int, str] = {}
-        self._clock_ns = 0
+        self._used = self._clock_ns = 0
+        self._mirrored = [0, 0]
         self._topic = bag.image_topic(camera)
         calibration = bag.calibration(camera)
         self._pipeline = SilhouettePipeline(calibration, size, config, learning)
@@ -226,6 +231,7 @@ class SilhouetteSource:
             silhouette = self._pipeline.silhouette(image, stamp_ns)
             if time_s >= start_s:
                 found = self._points(stamp_ns, image)
+                self._mirrored[is_only_mirrored(found, silhouette)] += 1
                 seen = brightness_of(image), silhouette, image
                 yield RecordedFrame(stamp_ns, time_s, *seen, points=found, recorded=recorded)
 
@@ -275,9 +281,25 @@ class SilhouetteSource:
             )
         if self._broken:
             remarks.append(self._brokenness())
+        fitting, mirrored = self._mirrored
+        if mirrored > max(fitting, _MIRRORED_IMAGES):
+            remarks.append(
+                f"the points of {mirrored} images lie in the person's outline only if they are "
+                "mirrored; is the film a mirrored one of what the points were found in? Give "
+                "--mirrored, or points of these very images"
+            )
         if self._detector is not None and self._detector.missed:
             remarks.append(f"the detector finds nobody in {self._detector.missed} images")
         return remarks
+
+    @property
+    def account(self) -> str:
+        """What was read and used of this camera, and what was left out, with the reasons."""
+        left_out = self._bag.left_out(self._topic)
+        if self._broken:
+            left_out.append(f"{len(self._broken)} that cannot be read")
+        reasons = f"; left out {', '.join(left_out)}" if left_out else "; nothing left out"
+        return f"used {self._used} images of {self._topic} in {self.path}{reasons}"
 
     def full_picture(self, frame: RecordedFrame) -> NDArray[np.uint8]:
         """Return the picture of a frame, undistorted, at the resolution of the recording."""
@@ -289,19 +311,45 @@ class SilhouetteSource:
         height, width = image.shape[:2]
         if self._full_size != (width, height):
             self._full_size = width, height
-            self._full_rectifier = self._pipeline.calibration.rectifier(width, height)
+            calibration = self._pipeline.calibration
+            self._full_rectifier = calibration.rectifier(*calibration.level_size(width, height))
         return image if self._full_rectifier is None else self._full_rectifier(image)
 
     def images(self) -> Iterator[PreparedImage]:
         """Yield every image that can be decoded."""
+        used = 0
         for number, image in enumerate(self._bag.images(self._topic), 1):
             if number == 1:
                 late_ns = image.time_ns - image.stamp_ns
                 self._clock_ns = late_ns if abs(late_ns) > _OTHER_CLOCK_NS else 0
             try:
-                prepared = self._pipeline.prepare(image.as_sent)
-            except EncodingError as error:
+                sent = image.as_sent
+                height, width = sent.shape[:2]
+                calibration = self._pipeline.calibration
+                calibration.check_shape(width, height, self._topic, "the first image")
+                prepared = self._pipeline.prepare(sent)
+            except (CameraError, EncodingError) as error:
                 self._broken[number] = str(error)
                 continue
+            # Of several passes, the longest counts.
+            used += 1
+            self._used = max(self._used, used)
             time_ns = image.stamp_ns + self._clock_ns - self._bag.start_ns
             yield PreparedImage(image.stamp_ns, time_ns / 1e9, prepared, image)
+
+
+def is_only_mirrored(points: ImagePoints | None, silhouette: NDArray[np.uint8]) -> bool:
+    """Return whether points lie in a silhouette (H, W) only if the image is mirrored."""
+    if points is None or points.is_empty or not silhouette.any():
+        return False
+    height, width = silhouette.shape
+    column, row = np.rint(points.px[points.scores > 0.0]).astype(int).T
+    is_there = (column >= 0) & (column < width) & (row >= 0) & (row < height)
+    column, row = column[is_there], row[is_there]
+    if len(column) == 0:
+        return False
+    as_is, mirrored = (
+        np.count_nonzero(silhouette[row, place]) / len(column)
+        for place in (column, width - 1 - column)
+    )
+    return bool(as_is < _OUTSIDE and mirrored > _INSIDE)

@@ -34,6 +34,8 @@ class TrackSummary:
         frames_uncertain: number of tracked images whose posture may be wrong.
         remarks: warnings about extrinsics or depth that seem to be wrong.
         body: the body at the end, whose unknown values were fitted.
+        accounts: for each camera, what was used of it and what was left out.
+        assumptions: what the results rest on, with its numbers and where they are from.
     """
 
     frames: int
@@ -43,6 +45,8 @@ class TrackSummary:
     frames_uncertain: int = 0
     remarks: tuple[str, ...] = ()
     body: BodyModel | None = None
+    accounts: tuple[str, ...] = ()
+    assumptions: tuple[str, ...] = ()
 
 
 def track_recording(

@@ -10,9 +10,14 @@ from pathlib import Path
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
 from cardbox_tracker.camera.encodings import MOST_PIXELS
+from cardbox_tracker.camera.film_headers import (
+    check_times,
+    oblong,
+    shown_s,
+    with_square_pixels,
+)
 from cardbox_tracker.camera.image_headers import check_pixels
 from cardbox_tracker.common.errors import BagError, EncodingError
 from cardbox_tracker.recordings.film import Film
@@ -58,9 +63,12 @@ class VideoReader(Film):
                     f"the video {self.path} has no image that can be decoded; expected {FORMATS}: "
                     "film again, or convert it with 'ffmpeg -i INPUT OUTPUT.mp4'"
                 )
-            self._set_size(image.shape[1], image.shape[0])
+            if self._given.fps is None:
+                check_times(self.path, "give its images a second as --fps HZ")
+            self._stored = image.shape[1], image.shape[0]
+            self._set_size(*with_square_pixels(image, oblong(capture)).shape[1::-1])
             self._hz = self._given.fps or _rate(capture)
-            self._count = max(0, int(capture.get(cv2.CAP_PROP_FRAME_COUNT)))
+            self._count = max(0, _count(self.path, capture))
         self.duration_s = max(0, self._count - 1) / self._hz
         return self
 
@@ -69,7 +77,7 @@ class VideoReader(Film):
         period_ns = 1e9 / self._hz
         first_ms, stamp_ns = 0.0, -1
         with _opened(self.path) as capture:
-            number = 0
+            number, shape = 0, oblong(capture)
             while (read := capture.read())[0]:
                 if self._given.fps is None:
                     in_file_ms = capture.get(cv2.CAP_PROP_POS_MSEC)
@@ -79,10 +87,11 @@ class VideoReader(Film):
                     stamp_ns = there_ns if there_ns > stamp_ns else stamp_ns + round(period_ns)
                 else:
                     stamp_ns = round(number * period_ns)
-                decoded: NDArray[np.uint8] = np.asarray(read[1], np.uint8)
+                decoded = with_square_pixels(read[1], shape)
                 number += 1
                 yield RecordedImage(stamp_ns, "", stamp_ns, partial(np.asarray, decoded))
         self._last = number
+        self.duration_s = max(0, stamp_ns) / 1e9
 
     @property
     def remarks(self) -> list[str]:
@@ -112,6 +121,15 @@ def _opened(path: Path) -> Iterator[cv2.VideoCapture]:
         yield capture
     finally:
         capture.release()
+
+
+def _count(path: Path, capture: cv2.VideoCapture) -> int:
+    """Return how many images a film should have, from its first one on; negative if unknown."""
+    count, shown = int(capture.get(cv2.CAP_PROP_FRAME_COUNT)), shown_s(path)
+    if shown is not None:
+        return min(count, round(shown * _rate(capture)))
+    # Others count from the time 0, at which their first image need not be.
+    return count - max(0, int(capture.get(cv2.CAP_PROP_PTS)))
 
 
 def _rate(capture: cv2.VideoCapture) -> float:

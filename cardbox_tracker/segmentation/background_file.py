@@ -221,7 +221,7 @@ def _checked(arrays: dict[str, NDArray[Any]], size: tuple[int, int]) -> StoredBa
     model = BackgroundModel(
         _plane(arrays, _MEAN, mean.shape), _plane(arrays, _STDDEV, mean.shape), chroma
     )
-    if arrays[_SIZE].dtype.kind != "i":
+    if arrays[_SIZE].dtype.kind != "i" or arrays[_SIZE].shape != (2,):
         raise ValueError("its size is not two whole numbers")
     width, height = arrays[_SIZE].tolist()
     calibration = Calibration(

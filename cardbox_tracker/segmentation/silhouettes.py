@@ -44,7 +44,7 @@ class SilhouettePipeline:
         Args:
             calibration: calibration of the input images, which may have any size of its aspect
                 ratio.
-            size: working size (width, height), px.
+            size: working size (width, height), px, of the images as they are sent.
             config: settings of the background model.
             learning: the method of learning the empty scene.
 
@@ -52,9 +52,9 @@ class SilhouettePipeline:
             CameraError: the camera is uncalibrated or its distortion model is unknown.
         """
         self.calibration = calibration
-        self.camera = calibration.camera(*size)
-        self._size = size
-        self._rectifier = calibration.rectifier(*size)
+        self._size, level = size, calibration.level_size(*size)
+        self.camera = calibration.camera(*level)
+        self._rectifier = calibration.rectifier(*level)
         self._config = config or BackgroundConfig()
         self._way = learning
         self.learning = learning(self._config.learn_images)

@@ -9,16 +9,39 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.sizes import FloatArray
 from cardbox_tracker.person.skeleton import KeypointState
 
-if TYPE_CHECKING:
-    from cardbox_tracker.tracking.place import Place
-
 TRACKING, UNCERTAIN, LOST, NO_PERSON = "tracking", "uncertain", "lost", "no_person"
+
+
+PLACE_UNCERTAIN_FROM = 0.1
+"""Probability of a place that is wrong above which it is uncertain."""
+
+
+@dataclass(frozen=True)
+class Place:
+    """What is known of the place of the middle of the hips.
+
+    Attributes:
+        stddev_m: standard deviations of distance, ``torso_y`` and height, (3,), metres.
+        chance: probability that the distance is wrong by more than 30 cm.
+        rests_on: what scale and distance rest on.
+        contradiction: what contradicts it; empty if nothing does.
+    """
+
+    stddev_m: FloatArray
+    chance: float
+    rests_on: str
+    contradiction: str = ""
+
+    @property
+    def state(self) -> KeypointState:
+        """``tracked`` or ``uncertain``."""
+        is_uncertain = bool(self.contradiction) or self.chance > PLACE_UNCERTAIN_FROM
+        return KeypointState.UNCERTAIN if is_uncertain else KeypointState.TRACKED
 
 
 @dataclass(frozen=True)

@@ -15,10 +15,8 @@ or a further camera.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from itertools import pairwise
 from math import erfc, hypot, log, sqrt
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -27,13 +25,9 @@ from cardbox_tracker.detectors.image_points import POINT_INDEX, ImagePoints
 from cardbox_tracker.person.kinematics import pose
 from cardbox_tracker.person.model import MEASURED, BodyModel
 from cardbox_tracker.person.posture import N_JOINTS, TORSO_Y
-from cardbox_tracker.person.sizes import FloatArray
-from cardbox_tracker.person.skeleton import KeypointState
 from cardbox_tracker.search.doubt import FAR_M
 from cardbox_tracker.terms.term import Frame
-
-if TYPE_CHECKING:
-    from cardbox_tracker.tracking.estimate import Estimate
+from cardbox_tracker.tracking.estimate import Estimate, Place
 
 MEASURED_BODY, STATURE = "measured body", "given stature"
 DEPTH, SECOND_CAMERA = "depth", "second camera"
@@ -43,8 +37,6 @@ SCALE_STDDEVS = {MEASURED_BODY: 0.02, STATURE: 0.05, DEPTH: 0.02, SECOND_CAMERA:
 and people of one stature differ in the lengths of trunk and arms by 4 to 6 %."""
 DISTANCE_STDDEV = 0.05
 """Relative standard deviation of a given distance, which people measure or estimate."""
-UNCERTAIN_FROM = 0.1
-"""Probability of a place that is wrong above which it is uncertain."""
 
 # Seconds and least number of images over which two sources are compared, deviations by which they
 # may differ, and the relative deviation of the distance of points (0.91 to 1.08 of the true one in
@@ -57,29 +49,6 @@ _TRUNK, _ARM = ("shoulder", "hip"), ("shoulder", "elbow", "wrist")
 # parts are 0.160 and 0.2005 of the stature.
 _SHARES = {"trunk": 0.818, "upper": 0.452, "fore": 0.388}
 _LEAST_SCORE = 0.5
-
-
-@dataclass(frozen=True)
-class Place:
-    """What is known of the place of the middle of the hips.
-
-    Attributes:
-        stddev_m: standard deviations of distance, ``torso_y`` and height, (3,), metres.
-        chance: probability that the distance is wrong by more than 30 cm.
-        rests_on: what scale and distance rest on.
-        contradiction: what contradicts it; empty if nothing does.
-    """
-
-    stddev_m: FloatArray
-    chance: float
-    rests_on: str
-    contradiction: str = ""
-
-    @property
-    def state(self) -> KeypointState:
-        """``tracked`` or ``uncertain``."""
-        is_uncertain = bool(self.contradiction) or self.chance > UNCERTAIN_FROM
-        return KeypointState.UNCERTAIN if is_uncertain else KeypointState.TRACKED
 
 
 def distance_of_points(points: ImagePoints, body: BodyModel, camera: Camera) -> float | None:

@@ -192,8 +192,8 @@ def test_an_unknown_distortion_model_is_refused_with_those_that_are_known() -> N
     ("model", "count", "expected"),
     [
         ("plumb_bob", 3, "4 or 5"),
-        ("plumb_bob", 8, "4 or 5"),
-        ("rational_polynomial", 5, "8 or 12 or 14"),
+        ("plumb_bob", 15, "4 or 5"),
+        ("rational_polynomial", 15, "4 or 5, or OpenCV's 8, 12 or 14"),
         ("equidistant", 5, "4"),
     ],
 )
@@ -201,6 +201,13 @@ def test_a_wrong_count_of_coefficients_is_refused(model: str, count: int, expect
     wrong = calibration(distortion_model=model, distortion=np.full(count, 0.01))
     with pytest.raises(CameraError, match=f"'{model}' .*{count} .*; expected {expected}"):
         wrong.rectifier(320, 240)
+
+
+def test_a_calibration_of_another_shape_is_refused() -> None:
+    wide = Calibration(640, 360, np.diag([300.0, 300.0, 1.0]), np.zeros(5))
+    with pytest.raises(CameraError, match="b is for images of 640x360, but those of a are 640x480"):
+        wide.check_shape(640, 480, "a", "b")
+    wide.check_shape(320, 180, "a", "b")
 
 
 @pytest.mark.parametrize("distortion", [np.zeros(0), np.zeros(5)])

@@ -24,10 +24,23 @@ Bytes = NDArray[np.uint8]
 
 BLUE, GREEN, RED = (200, 40, 20), (30, 180, 60), (10, 50, 220)
 H, W = 6, 8
-BYTES_PER_PIXEL = {"mono16": 2, "rgb8": 3, "bgr8": 3, "rgba8": 4, "bgra8": 4} | {
+BYTES_PER_PIXEL = {"rgb8": 3, "bgr8": 3, "8UC3": 3, "rgba8": 4, "bgra8": 4, "8UC4": 4} | {
     "yuv422": 2,
     "yuv422_yuy2": 2,
+    "yuyv": 2,
+    "uyvy": 2,
+    "mono16": 2,
+    "16UC1": 2,
+    "rgb16": 6,
+    "bgr16": 6,
+    "16UC3": 6,
+    "rgba16": 8,
+    "bgra16": 8,
+    "16UC4": 8,
+    **{f"bayer_{pattern}16": 2 for pattern in ("rggb", "bggr", "gbrg", "grbg")},
 }
+# Rows of a message in rows of the image: brightness first, then colours.
+ROWS = {"nv12": 1.5, "nv21": 1.5, "nv24": 3}
 
 
 def expected_grey(bgr: tuple[int, int, int]) -> float:
@@ -61,7 +74,11 @@ def test_a_bayer_pattern_is_named_after_its_first_four_pixels(
 
 
 @pytest.mark.parametrize(
-    ("encoding", "order"), [("rgb8", "rgb"), ("bgr8", "bgr"), ("rgba8", "rgba"), ("bgra8", "bgra")]
+    ("encoding", "order"),
+    [
+        *[("rgb8", "rgb"), ("bgr8", "bgr"), ("rgba8", "rgba"), ("bgra8", "bgra")],
+        *[("8UC3", "bgr"), ("8UC4", "bgra")],
+    ],
 )
 def test_colour_channels_are_in_the_order_of_the_name(encoding: str, order: str) -> None:
     level = dict(zip("bgra", (*RED, 99), strict=True))
@@ -72,7 +89,10 @@ def test_colour_channels_are_in_the_order_of_the_name(encoding: str, order: str)
     np.testing.assert_allclose(grey, expected_grey(RED), atol=1.0)
 
 
-@pytest.mark.parametrize(("encoding", "luma", "u"), [("yuv422", 1, 0), ("yuv422_yuy2", 0, 1)])
+@pytest.mark.parametrize(
+    ("encoding", "luma", "u"),
+    [("yuv422", 1, 0), ("uyvy", 1, 0), ("yuv422_yuy2", 0, 1), ("yuyv", 0, 1)],
+)
 def test_yuv422_brightness_is_the_luma_and_u_makes_blue(encoding: str, luma: int, u: int) -> None:
     raw = np.full((H, 2 * W), 128, np.uint8)
     brightness = np.arange(40, 40 + H * W, dtype=np.uint8).reshape(H, W)
@@ -124,7 +144,7 @@ def test_padding_never_reaches_the_image(height: int, width: int, padding: int, 
 @pytest.mark.parametrize("encoding", SUPPORTED_ENCODINGS)
 def test_every_encoding_gives_bytes_of_the_images_size(encoding: str) -> None:
     step = W * BYTES_PER_PIXEL.get(encoding, 1) + 4
-    data = bytes(H * step)
+    data = bytes(int(H * ROWS.get(encoding, 1)) * step)
     grey, bgr = (decode(data, H, W, step, encoding) for decode in (decode_grey, decode_bgr))
     assert (grey.shape, grey.dtype.name) == ((H, W), "uint8")
     assert (bgr.shape, bgr.dtype.name) == ((H, W, 3), "uint8")
@@ -142,8 +162,9 @@ def test_an_unknown_encoding_is_named_with_the_supported_ones(encoding: str) -> 
 @pytest.mark.parametrize("decode", [decode_grey, decode_bgr])
 def test_too_few_bytes_are_refused_with_both_counts(encoding: str, decode: object) -> None:
     step = W * BYTES_PER_PIXEL.get(encoding, 1)
-    with pytest.raises(EncodingError, match=rf"{encoding}.*{H * step - 1}.*{H * step}"):
-        decode(bytes(H * step - 1), H, W, step, encoding)  # type: ignore[operator]
+    count = int(H * ROWS.get(encoding, 1)) * step
+    with pytest.raises(EncodingError, match=rf"{encoding}.*{count - 1}.*{count}"):
+        decode(bytes(count - 1), H, W, step, encoding)  # type: ignore[operator]
 
 
 @pytest.mark.parametrize(
@@ -223,3 +244,58 @@ def test_zeros_behind_a_jpeg_do_no_harm() -> None:
 def test_an_image_without_pixels_is_told_as_such(height: int, width: int) -> None:
     with pytest.raises(EncodingError, match=f"{width}x{height}; .*one pixel"):
         decode_grey(b"", height, width, 0, "mono8")
+
+
+def scene() -> Bytes:
+    """A smooth image of many colours, (48, 64, 3)."""
+    v, u = np.mgrid[:48, :64] / (48, 64)[0]
+    return np.clip(np.dstack([60 + 90 * u, 90 + 80 * v, 180 - 60 * u]), 0, 255).astype(np.uint8)
+
+
+def sent_as(encoding: str, bgr: Bytes) -> tuple[bytes, int]:
+    """The data of a message with the image, and the bytes of its rows."""
+    height, width = bgr.shape[:2]
+    if encoding in ("nv12", "nv21"):
+        planes = cv2.cvtColor(bgr, cv2.COLOR_BGR2YUV_I420)
+        u, v = planes[height:].reshape(2, -1)
+        pairs = np.dstack([u, v] if encoding == "nv12" else [v, u])
+        return planes[:height].tobytes() + pairs.tobytes(), width
+    y, u, v = np.moveaxis(cv2.cvtColor(bgr, cv2.COLOR_BGR2YUV), 2, 0)
+    if encoding == "nv24":
+        return y.tobytes() + np.dstack([u, v]).tobytes(), width
+    if encoding == "8UC1":
+        return cv2.cvtColor(bgr, cv2.COLOR_BGR2GRAY).tobytes(), width
+    if encoding in ("bgr16", "16UC3"):
+        return (bgr.astype("<u2") << 8).tobytes(), 6 * width
+    colours = np.empty_like(y)
+    colours[:, ::2], colours[:, 1::2] = u[:, ::2], v[:, ::2]
+    order = [y, colours] if encoding in ("yuyv", "yuv422_yuy2") else [colours, y]
+    return np.dstack(order).tobytes(), 2 * width
+
+
+@pytest.mark.parametrize(
+    "encoding",
+    [
+        *["yuyv", "uyvy", "yuv422", "yuv422_yuy2", "nv12", "nv21", "nv24"],
+        *["8UC1", "bgr16", "16UC3"],
+    ],
+)
+def test_every_encoding_gives_the_colours_of_the_scene(encoding: str) -> None:
+    bgr = scene()
+    data, step = sent_as(encoding, bgr)
+    image = decode_as_sent(data, *bgr.shape[:2], step, encoding)
+    expected = bgr if image.ndim == 3 else cv2.cvtColor(bgr, cv2.COLOR_BGR2GRAY)
+    assert np.abs(image.astype(int) - expected).mean() < (0.5 if image.ndim == 2 else 3)
+    grey = decode_grey(data, *bgr.shape[:2], step, encoding)
+    brightness = cv2.cvtColor(bgr, cv2.COLOR_BGR2GRAY)
+    assert np.abs(grey.astype(int) - brightness).mean() < 10
+
+
+@pytest.mark.parametrize("encoding", ["nv12", "nv21", "nv24"])
+def test_rows_of_two_planes_may_be_padded_or_count_the_colours(encoding: str) -> None:
+    bgr = scene()
+    data, step = sent_as(encoding, bgr)
+    expected = decode_bgr(data, 48, 64, step, encoding)
+    rows = np.frombuffer(data, np.uint8).reshape(-1, 64)
+    np.testing.assert_array_equal(decode_bgr(padded(rows, 8), 48, 64, 72, encoding), expected)
+    np.testing.assert_array_equal(decode_bgr(data, 48, 64, 96, encoding), expected)

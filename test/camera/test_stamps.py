@@ -8,7 +8,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from cardbox_tracker.camera.stamps import StampOrder, StampSequence, StreamStatistics
+from cardbox_tracker.camera.stamps import (
+    RecordedStamps,
+    StampOrder,
+    StampSequence,
+    StreamStatistics,
+)
 
 S, MS = 1_000_000_000, 1_000_000
 START = 1_000 * S
@@ -81,6 +86,19 @@ def test_of_two_clocks_one_is_followed(offset_s: int) -> None:
     assert found[::2] == [StampOrder.NEXT] * 100, "the one that was first goes on"
 
 
+@pytest.mark.parametrize("images", [3, 10])
+def test_a_recording_of_less_than_a_second_starts_over(images: int) -> None:
+    found = orders(even(images) * 20)
+    used = [order for order in found if order.is_usable]
+    assert used.count(StampOrder.RESTART) == 19
+    assert len(used) == images + 19 * (images - 1)
+
+
+def test_a_second_copy_of_each_image_does_not_start_over() -> None:
+    copied = [stamp for pair in zip(even(40)[3:], even(40), strict=False) for stamp in pair]
+    assert StampOrder.RESTART not in orders([*even(3), *copied])
+
+
 def test_one_wrong_stamp_does_not_hold_up_for_long() -> None:
     stamps = [*even(10), START - 3600 * S, *even(20, START + 660 * MS)]
     found = orders(stamps)
@@ -135,3 +153,58 @@ def test_losses_are_counted_from_the_first_image_on(first: int) -> None:
         if number not in lost:
             statistics.add(stamp_ns)
     assert statistics.received + statistics.dropped == len(sent)
+
+
+@given(
+    st.lists(
+        st.one_of(
+            st.integers(START, START + 20 * S),
+            st.just(0),
+            st.integers(1, 2**62),
+        ),
+        max_size=60,
+    )
+)
+def test_the_times_of_a_recorded_stream_always_increase(stamps: list[int]) -> None:
+    """Whatever the stamps: what is left out of a live stream is left out, and no more."""
+    recorded, live = RecordedStamps(), StampSequence()
+    times = []
+    for number, stamp in enumerate(stamps):
+        time_ns = recorded.add(stamp, START + number * 66 * MS)
+        assert (time_ns is None) == (not live.add(stamp).is_usable)
+        times += [] if time_ns is None else [time_ns]
+    assert times == sorted(set(times))
+
+
+def times_of(stamps: Iterable[int]) -> tuple[list[int | None], list[str]]:
+    recorded = RecordedStamps()
+    times = [recorded.add(stamp, START + 66 * MS * n) for n, stamp in enumerate(stamps)]
+    return times, recorded.remarks()
+
+
+def test_recorded_stamps_that_increase_are_the_times_without_a_remark() -> None:
+    stamps = even(30, 5 * S)
+    assert times_of(stamps) == (stamps, [])
+
+
+@pytest.mark.parametrize("first", [0, 3])
+def test_without_stamps_the_recorders_clock_counts(first: int) -> None:
+    """Also from some image on: the clock goes on from the last stamp."""
+    stamps = [*even(first), *[0] * (12 - first)]
+    times, remarks = times_of(stamps)
+    assert times == even(12)
+    assert "no stamp (it is zero)" in remarks[0]
+
+
+def test_two_passes_of_a_long_loop_are_apart() -> None:
+    once = even(150)
+    times, remarks = times_of([*once, *once])
+    assert times == even(300)
+    assert "went back 1 times" in remarks[0]
+
+
+def test_of_two_passes_of_a_short_loop_one_is_left() -> None:
+    once = even(12)
+    times, remarks = times_of([*once, *once])
+    assert times == [*once, *[None] * 12]
+    assert any("go back" in remark for remark in remarks)

@@ -182,7 +182,11 @@ def test_the_course_of_the_readme(
     done = cardbox(*words, "--csv", table, "--bag", bag, "--preset", "paper", *fewer)
     assert done.code == 0
     rows = table.read_text().count("\n") - 1
-    assert done.out.startswith(f"tracked {rows} of {rows} images, mean cost ")
+    assert done.out.startswith(f"tracked {rows} of {rows} images\n")
+    assert "assumed: field of view " in done.out
+    assert f"distance 2.00 m (from {model.name}), sizes from {model.name}\n" in done.out
+    assert re.search(r"(?m)^sure: \d+% of \d+ images, \d+% of the hands in them, ", done.out)
+    assert "mean cost" not in done.out
     assert f"wrote {table}\nwrote {bag}\n" in done.out
     done = cardbox("urdf", model)
     assert done.code == 0

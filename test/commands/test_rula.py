@@ -34,8 +34,8 @@ def test_a_recording_is_scored(files: Path, tmp_path: Path, cardbox: Callable) -
         assert float(row["score"]) >= 3  # A of at least 1 and a load of 3: row 4 of table C
     text = page.read_text(encoding="utf-8")
     assert "<h1>Packing</h1>" in text
-    # Images that may be wrong are no worst moments; those of hanging arms are sure.
     assert sum(row["state"] == "tracking" for row in rows) >= 3
+    assert "distance 2.00 m (from person.yaml)" in text
     assert "data:image/jpeg;base64," in text
     with shares.open(encoding="utf-8") as file:
         grand = [float(row["share"]) for row in csv.DictReader(file) if row["part"] == "grand"]

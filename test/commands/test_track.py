@@ -249,7 +249,7 @@ def test_the_body_that_exists_is_kept(
             "--distance has no effect with --model",
         ),
         (("--stature", 1.7, "--fov", 60, "--fps", 0), "--fps: expected a number above 0 to 1000"),
-        (("--stature", 1.7, "--fov", 60, "--camera-roll-deg", 90), "expected a number from -45"),
+        (("--stature", 1.7, "--fov", 60, "--camera-roll-deg", 190), "expected a number from -180"),
         (("--stature", 1.7, "--fov", 60, "--camera-pitch-deg", 95), "camera_pitch_rad is"),
         (("--stature", 1.7, "--fov", 60, "--depth", "/d", "--cameras", "a"), "a rosbag2, which"),
         (("--stature", 1.7, "--fov", 60, "--cameras", "a"), "omit --cameras"),

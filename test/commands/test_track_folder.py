@@ -18,7 +18,11 @@ import pytest
 
 from cardbox_tracker.commands import track_folder
 from cardbox_tracker.commands.main import build_parser
-from cardbox_tracker.commands.request import TrackingRequest, tracking_request
+from cardbox_tracker.commands.request import (
+    TrackingRequest,
+    tracking_request,
+    with_own_options,
+)
 from cardbox_tracker.commands.track_folder import digest_of_inputs
 from cardbox_tracker.common.errors import CardboxError
 from cardbox_tracker.recordings.folder import SUMMARY
@@ -308,6 +312,35 @@ def test_ctrl_c_ends_all_processes_without_a_traceback(files: Path, tmp_path: Pa
 
 def test_results_of_a_name_too_long_for_a_file_are_not_there(tmp_path: Path) -> None:
     track_folder._remove(tmp_path, 251 * "x")
+
+
+def test_options_beside_a_recording_name_no_code(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "evil.py").write_text("raise SystemExit('code of the data ran')")
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.syspath_prepend("")
+    typed = build_parser(["track"]).parse_args(["track", str(tmp_path)])
+    words = ("--corrector", "--detector", "--silhouettes", "--set corrector", "--preset")
+    for word in words:
+        given = word + ("=" if word.startswith("--set") else " ") + "evil:function"
+        (tmp_path / "a.options").write_text(f"{given} --stature 1.7 --background 0:1")
+        with pytest.raises(CardboxError):
+            tracking_request(with_own_options(typed, tmp_path, "a"))
+    assert "evil" not in sys.modules
+
+
+def test_a_path_that_begins_like_a_formula_is_no_cell_of_one() -> None:
+    error = CardboxError("=1+1.mp4 cannot be read\x1b[2J\udcff")
+    reason = track_folder.Row.failed("./=1+1", error).reason
+    assert reason == r"(=1+1.mp4 cannot be read\x1b[2J\udcff)"
+
+
+def test_a_huge_summary_is_not_read(tmp_path: Path) -> None:
+    with (tmp_path / SUMMARY).open("wb") as file:
+        file.truncate(10**12)
+    with pytest.raises(CardboxError, match="no summary"):
+        track_folder._read_rows(tmp_path / SUMMARY)
 
 
 def test_files_of_a_recording_may_have_any_name(tmp_path: Path) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import os
 import signal
 import stat
@@ -50,6 +51,16 @@ def test_after_an_error_the_older_file_is_left_and_nothing_else(tmp_path: Path) 
         raise RuntimeError("half way")
     assert target.read_text() == "old"
     assert os.listdir(tmp_path) == ["person.csv"]
+
+
+def test_a_full_disk_is_told_with_the_path(tmp_path: Path) -> None:
+    path = tmp_path / "out.csv"
+    with (
+        pytest.raises(CardboxError, match=rf"cannot write {path}: No space left on device"),
+        atomic_path(path),
+    ):
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+    assert not list(tmp_path.iterdir())
 
 
 def test_a_writer_that_replaced_the_temporary_file_is_fine(tmp_path: Path) -> None:

@@ -5,6 +5,8 @@ from __future__ import annotations
 import math
 import os
 import signal
+import subprocess
+import sys
 import threading
 import time
 from collections.abc import Iterator
@@ -18,6 +20,8 @@ from cardbox_tracker.common import interrupts
 from cardbox_tracker.common.errors import CardboxError
 from cardbox_tracker.common.processes import cores, results_of
 from cardbox_tracker.common.progress import SharedProgress
+
+ROOT = Path(__file__).parents[2]
 
 
 @pytest.mark.parametrize("jobs", [1, 2])
@@ -43,6 +47,41 @@ def test_a_killed_process_is_told() -> None:
         list(found)
     with results_of(math.factorial, [3, 3], 2) as found:
         assert list(found) == [6, 6]
+
+
+def test_processes_end_with_a_parent_that_is_killed(tmp_path: Path) -> None:
+    program = """
+import os, sys, time
+from pathlib import Path
+from cardbox_tracker.common.processes import results_of
+
+def wait_at(path):
+    path.with_suffix(".new").write_text(str(os.getpid()))
+    path.with_suffix(".new").rename(path)
+    time.sleep(600)
+
+with results_of(wait_at, [Path(sys.argv[1], str(n)) for n in range(2)], 2) as found:
+    list(found)
+"""
+    parent = subprocess.Popen([sys.executable, "-c", program, str(tmp_path)], cwd=ROOT)
+    end_s = time.monotonic() + 60.0
+    while len(list(tmp_path.glob("?"))) < 2 and time.monotonic() < end_s:
+        time.sleep(0.05)
+    workers = [int(path.read_text()) for path in tmp_path.glob("?")]
+    assert len(workers) == 2
+    parent.kill()
+    parent.wait()
+    while any(map(lives, workers)) and time.monotonic() < end_s:
+        time.sleep(0.05)
+    assert not any(map(lives, workers))
+
+
+def lives(process: int) -> bool:
+    try:
+        state = Path(f"/proc/{process}/stat").read_text().rpartition(")")[2].split()[0]
+    except OSError:
+        return False
+    return state != "Z"
 
 
 class Late(list[int]):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 import threading
 from typing import Any
 
@@ -46,6 +47,14 @@ def test_the_seconds_of_a_bar_go_on_while_nothing_is_finished(
         drawn.release()
 
     monkeypatch.setattr(tqdm, "refresh", seen)
+    monkeypatch.setattr(sys.stderr, "isatty", lambda: True, raising=False)
     with progress_bar("track", every_s=0.01):
         assert all(drawn.acquire(timeout=30.0) for _ in range(3))
     assert "track:   0%" in capfd.readouterr().err
+
+
+def test_a_file_gets_a_line_for_each_tenth(capfd: pytest.CaptureFixture[str]) -> None:
+    with progress_bar("track") as show:
+        for number in range(1001):
+            show(number / 1000)
+    assert capfd.readouterr().err.splitlines() == [f"track: {10 * n}%" for n in range(11)]

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -86,6 +88,17 @@ def test_a_file_that_is_no_network_is_refused(tmp_path: object) -> None:
     path.write_bytes(b"nothing")
     with pytest.raises(CardboxError, match=r"network\.tflite.*detector --install"):
         PoseNetwork(path, path)
+
+
+def test_loading_leaves_the_terminal_to_us(capfd: pytest.CaptureFixture[str]) -> None:
+    pytest.importorskip("ai_edge_litert", reason="ai-edge-litert is not installed")
+    try:
+        models = installed_models()
+    except CardboxError as error:
+        pytest.skip(str(error))
+    PoseNetwork(*models)
+    os.write(2, b"ours")
+    assert capfd.readouterr() == ("", "ours")
 
 
 @pytest.fixture(scope="module")

@@ -83,13 +83,25 @@ def test_folders_that_are_nested_too_deep_are_refused(tmp_path: Path) -> None:
     assert list(recordings_in(tmp_path)) == ["/".join("d" * 49) + "/a"]
 
 
-def test_a_name_that_no_table_can_hold_is_refused_with_its_folder(tmp_path: Path) -> None:
+def test_names_are_shown_as_tables_terminals_and_spreadsheets_can_show_them(tmp_path: Path) -> None:
+    names = ["a", "=1+1", "-b", "new\nline", "\x1b[2J"]
+    for name in names:
+        make(tmp_path, f"{name}.mp4")
+    found = recordings_in(tmp_path)
+    assert {"a", "./=1+1", "./-b", r"new\nline", r"\x1b[2J"} == set(found)
+    assert {path.stem for path in found.values()} == set(names)
+
+
+def test_a_name_that_is_not_utf_8_does_not_refuse_the_folder(tmp_path: Path) -> None:
+    make(tmp_path, "a.mp4")
+    bad = Path(os.fsdecode(os.fsencode(tmp_path) + b"/\xff.mp4"))
     try:
-        (Path(os.fsdecode(os.fsencode(tmp_path) + b"/\xff.mp4"))).touch()
+        bad.touch()
     except OSError:
         pytest.skip("this file system has UTF-8 names only")
-    with pytest.raises(CardboxError, match="not UTF-8; rename it"):
-        recordings_in(tmp_path)
+    found = recordings_in(tmp_path)
+    assert found == {"a": tmp_path / "a.mp4", r"\udcff": bad}
+    assert all(name.encode() for name in found)
 
 
 def test_a_folder_that_cannot_be_read_is_named(

@@ -30,8 +30,7 @@ from cardbox_tracker.recordings.outputs import (
     place_from,
     posture_from,
 )
-from cardbox_tracker.tracking.estimate import LOST, NO_PERSON, TRACKING, UNCERTAIN, Estimate
-from cardbox_tracker.tracking.place import Place
+from cardbox_tracker.tracking.estimate import LOST, NO_PERSON, TRACKING, UNCERTAIN, Estimate, Place
 from cardbox_tracker.tracking.tracker import Tracker
 
 STAMP_NS = 5_000_000_000

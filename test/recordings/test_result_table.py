@@ -23,8 +23,7 @@ from cardbox_tracker.recordings.result_table import (
     units,
 )
 from cardbox_tracker.recordings.silhouettes import RecordedFrame
-from cardbox_tracker.tracking.estimate import Estimate
-from cardbox_tracker.tracking.place import Place
+from cardbox_tracker.tracking.estimate import Estimate, Place
 
 ROOT = Path(__file__).parents[2]
 ANGLES = (
@@ -60,7 +59,12 @@ CLAVICLES = (
     *("left_clavicle_elevation_stddev_m", "right_clavicle_elevation_stddev_m"),
 )
 PLACE = ("place_state", "place_chance", "place_rests_on")
-WHOLE = HEADER + NECK + CLAVICLES + PLACE
+ANATOMICAL = (
+    *("left_elbow_bend_deg", "left_arm_elevation_deg", "left_arm_plane_deg"),
+    *("right_elbow_bend_deg", "right_arm_elevation_deg", "right_arm_plane_deg"),
+    *("trunk_lean_deg", "trunk_side_lean_deg"),
+)
+WHOLE = HEADER + NECK + CLAVICLES + PLACE + ANATOMICAL
 POINTS_M = np.arange(18).reshape(6, 3) / 4
 FOUND = Estimate("tracking", np.arange(12) / 10, np.arange(12) / 100, POINTS_M, 812, 0.87654)
 PLACED = replace(FOUND, offset_m=np.array([0.25, -0.05]), offset_stddev_m=np.array([0.03, 0.01]))
@@ -69,7 +73,7 @@ STAMP_NS, STAMP = 1_700_000_000_000_000_005, Decimal("1700000000.000000005")
 
 
 def test_scripts_find_the_columns_that_they_know() -> None:
-    assert columns() == HEADER + CLAVICLES + PLACE
+    assert columns() == HEADER + CLAVICLES + PLACE + ANATOMICAL
     assert columns(has_points=True) == WHOLE
 
 
@@ -119,8 +123,8 @@ def test_keypoints_have_states_and_chances() -> None:
 
 
 def test_the_neck_is_empty_while_the_face_is_not_seen() -> None:
-    assert row_of(42, 1.5, SEEN, has_points=True)[-11:-7] == [0.4, -0.1, 0.2, 0.3]
-    assert row_of(42, 1.5, PLACED, has_points=True)[-11:-7] == [None] * 4
+    assert row_of(42, 1.5, SEEN, has_points=True)[-19:-15] == [0.4, -0.1, 0.2, 0.3]
+    assert row_of(42, 1.5, PLACED, has_points=True)[-19:-15] == [None] * 4
 
 
 def test_the_clavicles_follow_the_neck() -> None:
@@ -128,14 +132,23 @@ def test_the_clavicles_follow_the_neck() -> None:
         SEEN, clavicles_m=np.array([0.02, 0.0]), clavicles_stddev_m=np.array([0.003, 0.001])
     )
     for has_points in (False, True):
-        assert row_of(42, 1.5, raised, has_points)[-7:-3] == [0.02, 0.0, 0.003, 0.001]
+        assert row_of(42, 1.5, raised, has_points)[-15:-11] == [0.02, 0.0, 0.003, 0.001]
 
 
 def test_the_place_has_its_own_state() -> None:
     place = Place(np.array([0.2, 0.0, 0.1]), 0.13, "given stature")
     row = row_of(42, 1.5, replace(PLACED, place=place))
-    assert row[-3:] == ["uncertain", 0.13, "given stature"]
-    assert row_of(42, 1.5, PLACED)[-3:] == [None] * 3
+    assert row[-11:-8] == ["uncertain", 0.13, "given stature"]
+    assert row_of(42, 1.5, PLACED)[-11:-8] == [None] * 3
+
+
+def test_anatomical_angles_are_in_degrees_and_empty_where_they_are_not_determined() -> None:
+    posture = np.zeros(12)
+    posture[[2, 4, 6]] = np.radians([10.0, 90.0, 62.0])
+    row = row_of(42, 1.5, replace(PLACED, posture=posture), has_points=True)[-8:]
+    assert row[:2] + row[3:5] + row[6:] == pytest.approx([62, 90, 0, 0, 10, 0], abs=1e-6)
+    assert row[2] == pytest.approx(0)
+    assert row[5] is None
 
 
 def write(path: Path) -> None:

@@ -165,7 +165,9 @@ def test_what_is_not_known_is_left_empty(
     assert len(empty) >= 20
     assert summary.frames_tracked <= len(rows) - len(empty)
     for row in rows:
-        values = {row[name] for name in columns() if name not in KNOWN}
+        names = [name for name in columns() if name not in KNOWN]
+        # The plane of a hanging arm is not determined.
+        values = {row[name] for name in names if not name.endswith("_plane_deg")}
         assert ("" in values) == (row["state"] in ("lost", "no_person"))
         if "" in values:
             assert values == {""}

@@ -45,6 +45,19 @@ def written(path: Path, storage: str, scene: Any) -> Path:
     return path
 
 
+def test_topics_of_the_player_itself_are_left_out(graph: Any, tmp_path: Path, scene: Any) -> None:
+    bag = tmp_path / "bag"
+    with BagWriter(bag, storage="mcap") as writer:
+        for topic in ("/image_raw", "/rosout", "/play_bag/status", "/diagnostics"):
+            writer.write_image(topic, START_NS, "optical", np.zeros((24, 32), np.uint8), "mono8")
+    images = graph.collect(Image, "image_raw", qos.REPLAY)
+    player = graph.start("play_bag", str(bag))
+    assert ended(graph, player) == 0
+    assert len(images) == 1
+    for topic in ("/rosout", "/play_bag/status", "/diagnostics"):
+        assert f"not played: {topic} is a topic of the player itself" in player.text()
+
+
 def ended(graph: Any, process: Any) -> int:
     graph.wait(lambda: process.process.poll() is not None, "the end of the bag")
     return int(process.process.returncode)

@@ -41,7 +41,10 @@ CSV_HEADER = (
     *("left_score", "right_score"),
     *(part.name for part in PARTS),
     "neck_from",
+    "mean_posture_score",
 )
+MEAN_POSTURE = "mean_posture"
+"""Name of the grand score of the mean posture among the shares."""
 SHARES_HEADER = ("part", "source", "score", "time_s", "share")
 
 MOST_MOMENTS, GAP_S = 6, 3.0
@@ -77,8 +80,8 @@ class RulaRow:
 
     @property
     def worst(self) -> float:
-        """Expected score; 0 for an image that is no candidate for the worst moments."""
-        return 0.0 if self.scores is None or self.state == UNCERTAIN else self.scores.mean
+        """Expected score; 0 without a posture."""
+        return 0.0 if self.scores is None else self.scores.mean
 
 
 class MomentImages:
@@ -137,7 +140,7 @@ class RulaObserver:
             postures = tracker.sample(estimate, SAMPLES, self._rng)
             neck = estimate.neck, estimate.neck_stddev
             scores, is_measured = sampled_scores(
-                tracker.body, postures, neck, self._config, self._rng
+                tracker.body, estimate.posture, postures, neck, self._config, self._rng
             )
         row = RulaRow(frame.stamp_ns, estimate.state, scores, frame.time_s, is_measured)
         self.rows.append(row)
@@ -150,8 +153,7 @@ def worst_moments(
 ) -> tuple[RulaRow, ...]:
     """Return up to ``most`` images with the highest expected scores, ``gap_s`` or more apart.
 
-    The earlier one of equal scores comes first. Images without a posture do not count, nor those
-    whose posture may be wrong.
+    The earlier one of equal scores comes first. Images without a posture do not count.
     """
     found: list[RulaRow] = []
     for row in sorted(rows, key=lambda row: (-row.worst, row.stamp_ns)):
@@ -170,6 +172,7 @@ class RulaSummary:
         above_s: time with a score above ``ABOVE``.
         by_level_s: time at each of ``ACTION_LEVELS``.
         mean: expected score over the measured time; nan without any.
+        of_mean: mean score of the mean postures over the same time.
         uncertain_s: part of the measured time whose postures may be wrong.
         neck_measured_s: part of the measured time with a measured neck.
     """
@@ -178,6 +181,7 @@ class RulaSummary:
     above_s: float
     by_level_s: tuple[float, ...]
     mean: float
+    of_mean: float
     uncertain_s: float
     neck_measured_s: float
 
@@ -197,6 +201,7 @@ def summarize(rows: Sequence[RulaRow]) -> RulaSummary:
         float(time_s[ABOVE:].sum()),
         tuple(float(time_s[low - 1 : high].sum()) for low, high, _ in ACTION_LEVELS),
         expected(time_s / total_s) if total_s else float("nan"),
+        expected(_time_at(rows, MEAN_POSTURE, HIGHEST) / total_s) if total_s else float("nan"),
         float(scored_s @ np.array([row.state == UNCERTAIN for row in rows], float)),
         float(scored_s @ np.array([row.is_neck_measured for row in rows], float)),
     )
@@ -232,7 +237,11 @@ class ScoreShares(NamedTuple):
 def score_shares(rows: Sequence[RulaRow], config: RulaConfig) -> tuple[ScoreShares, ...]:
     """Return the time at each score: the grand score, measured parts and tables, declared parts."""
     grand_s = _time_at(rows, "grand", HIGHEST)
-    shares = [ScoreShares("grand", "grand score", MIXED, grand_s)]
+    of_mean_s = _time_at(rows, MEAN_POSTURE, HIGHEST)
+    shares = [
+        ScoreShares("grand", "grand score", MIXED, grand_s),
+        ScoreShares(MEAN_POSTURE, "of mean posture", MIXED, of_mean_s),
+    ]
     necks = {row.is_neck_measured for row in rows if row.scores is not None} or {False}
     neck = MIXED if len(necks) > 1 else (DECLARED, MEASURED)[necks.pop()]
     for name, words, highest, _ in PARTS:
@@ -253,10 +262,12 @@ def durations_of(rows: Sequence[RulaRow]) -> FloatArray:
 
 
 def _time_at(rows: Sequence[RulaRow], part: str, highest: int) -> FloatArray:
-    """Return the expected time (highest,) at each score of a part, or of the grand score, s."""
+    """Return the expected time (highest,) at each score of a part, or of a grand score, s."""
     found = np.zeros((len(rows), highest))
     for chances, row in zip(found, rows, strict=True):
-        if row.scores is not None:
+        if row.scores is not None and part == MEAN_POSTURE:
+            chances[row.scores.of_mean - 1] = 1.0
+        elif row.scores is not None:
             chances[:] = row.scores.grand if part == "grand" else row.scores.parts[part]
     return np.asarray(durations_of(rows) @ found)
 
@@ -294,4 +305,5 @@ def _fields(row: RulaRow) -> list[str]:
         *(stamp, row.state, f"{scores.mean:.3f}", str(scores.likeliest)),
         *(f"{value:.3f}" for value in values),
         MEASURED if row.is_neck_measured else DECLARED,
+        str(scores.of_mean),
     ]

@@ -47,8 +47,9 @@ def report_lines(
     """Yield the lines that ``cardbox rula`` prints; only the declared inputs without a posture."""
     if summary.measured_s:
         yield (
-            f"expected RULA score {summary.mean:.1f}; above {ABOVE} for {summary.above_s:.1f} of "
-            f"{summary.measured_s:.1f} s ({summary.above_s / summary.measured_s:.0%})"
+            f"expected RULA score {summary.mean:.1f} (of the mean postures {summary.of_mean:.1f}); "
+            f"above {ABOVE} for {summary.above_s:.1f} of {summary.measured_s:.1f} s "
+            f"({summary.above_s / summary.measured_s:.0%})"
         )
         for (low, high, meaning), time_s in zip(ACTION_LEVELS, summary.by_level_s, strict=True):
             yield f"  {_span(low, high):<3} {time_s:6.1f} s  {meaning}"
@@ -115,7 +116,6 @@ def write_page(content: PageContent, path: Path) -> None:
         shares=shares,
         inputs=declared(config, summary.is_neck_always_measured),
         neck=_neck_words(summary) if summary.neck_measured_s else "",
-        left_out=sum(row.scores is not None and row.state == UNCERTAIN for row in rows),
         moments=[(row, _moment_words(row)) for row in moments],
         limits=limits(config),
     )
@@ -198,7 +198,8 @@ def _neck_words(summary: RulaSummary) -> str:
 def _moment_words(row: RulaRow) -> str:
     parts = {} if row.scores is None else row.scores.parts
     words = (f"{part.words} {expected(parts[part.name]):.1f}" for part in PARTS)
-    return f"score {row.worst:.1f} ({'; '.join(words)})"
+    doubt = ", but the posture may be wrong" if row.state == UNCERTAIN else ""
+    return f"score {row.worst:.1f}{doubt} ({'; '.join(words)})"
 
 
 def _data(content: bytes) -> str:

@@ -15,9 +15,10 @@ import numpy as np
 
 import cardbox_tracker
 from cardbox_tracker.common.errors import CardboxError
-from cardbox_tracker.common.files import atomic_path
+from cardbox_tracker.common.files import UnreadableFileError, atomic_path, read_regular
 
 _DIGITS = 6
+_MOST_BYTES = 256 * 1024 * 1024
 
 
 def provenance() -> dict[str, Any]:
@@ -78,10 +79,10 @@ def read_json(path: Path) -> dict[str, Any]:
         CardboxError: the file cannot be read or does not have results.
     """
     try:
-        data = json.loads(path.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise CardboxError(f"cannot read {path}: {error.strerror}") from None
-    except ValueError as error:
+        data = json.loads(read_regular(path, _MOST_BYTES))
+    except UnreadableFileError as error:
+        raise CardboxError(f"cannot read {path}: {error}") from None
+    except (ValueError, RecursionError) as error:
         raise CardboxError(f"{path} is not JSON: {error}") from None
     if not isinstance(data, dict):
         raise CardboxError(f"{path} has no results; expected a file of 'cardbox evaluate'")

@@ -97,10 +97,10 @@ def load_ground_truth(path: str | os.PathLike[str], camera: str | None = None) -
             if "joints_m" not in entry:
                 continue
             joints = entry["joints_m"]
-            points = np.array([joints[name] for name in KEYPOINT_NAMES])
+            points = np.array([joints[name] for name in KEYPOINT_NAMES], np.float64)
             posture = torso = None
             if "posture" in entry:
-                posture = np.array([entry["posture"][name] for name in JOINT_NAMES])
+                posture = np.array([entry["posture"][name] for name in JOINT_NAMES], np.float64)
             if "torso_rpy_deg" in entry:
                 torso = np.radians(entry["torso_rpy_deg"])
             frames[int(entry["stamp_ns"])] = TrueFrame(
@@ -133,7 +133,9 @@ def load_ground_truth(path: str | os.PathLike[str], camera: str | None = None) -
             f"cannot read the ground truth {path}: {error}; expected the "
             "ground_truth.json of a session, such as 'cardbox synthesize' writes"
         ) from None
-    except (ValueError, KeyError, IndexError, TypeError, RecursionError) as error:
+    except (
+        *(ValueError, LookupError, TypeError, AttributeError, OverflowError, RecursionError),
+    ) as error:
         raise CardboxError(
             f"{path} is not a ground truth: {cut(repr(error))}; expected the ground_truth.json of "
             "a session"

@@ -15,12 +15,9 @@ from cardbox_tracker.applications.exporting.motion import Motion
 from cardbox_tracker.applications.exporting.placed import frames_of, keypoints_in_reference
 from cardbox_tracker.common.errors import CardboxError
 from cardbox_tracker.common.files import atomic_path
+from cardbox_tracker.person.isb_angles import LABORATORY
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.sizes import FloatArray
-
-LABORATORY: FloatArray = np.array([(1.0, 0.0, 0.0), (0.0, 0.0, 1.0), (0.0, -1.0, 0.0)])
-"""Rotation from the reference frame, or the body frame, into axes forwards, up and right."""
-LABORATORY.setflags(write=False)
 
 KEYPOINT_MARKERS = ("LShoulder", "LElbow", "LHand", "RShoulder", "RElbow", "RHand")
 """Markers in the order of the keypoints."""

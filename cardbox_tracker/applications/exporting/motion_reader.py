@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import io
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -11,6 +12,7 @@ import numpy as np
 
 from cardbox_tracker.applications.exporting.motion import Motion
 from cardbox_tracker.common.errors import BagError, CardboxError, quoted
+from cardbox_tracker.common.files import UnreadableFileError, regular_file
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.posture import N_JOINTS, N_STATE
 from cardbox_tracker.person.sizes import FloatArray
@@ -25,7 +27,7 @@ _STATES = (*JOINT_NAMES, *PLACE_NAMES)
 _NEEDED = ("stamp_ns", "time_s", "state", *_STATES, *POINT_COLUMNS)
 _VALUES = N_STATE + len(NECK_NAMES) + len(POINT_COLUMNS)
 # A day at 30 Hz has 2.6 million images.
-_MOST_ROWS = 3_000_000
+_MOST_ROWS, _MOST_BYTES = 3_000_000, 4 * 1024**3
 # Rows that are read at once.
 _BATCH = 10_000
 _LATEST_NS = np.iinfo(np.int64).max
@@ -128,16 +130,24 @@ def _row_of_cells(row: Mapping[str, Any]) -> _Row:
     stamp_ns = int(row["stamp_ns"])
     if not 0 <= stamp_ns <= _LATEST_NS:
         raise ValueError(f"the stamp is {quoted(stamp_ns)} ns")
-    return _Row(stamp_ns, float(row["time_s"]), state, values)
+    time_s = float(row["time_s"])
+    if not np.isfinite(time_s):
+        raise ValueError(f"the time is {time_s} s")
+    return _Row(stamp_ns, time_s, state, values)
 
 
 def _csv_cells(path: Path) -> Iterator[Mapping[str, Any]]:
     try:
         # Spreadsheets begin a file with a byte order mark.
-        with path.open(newline="", encoding="utf-8-sig") as file:
+        with (
+            regular_file(path, _MOST_BYTES) as data,
+            io.TextIOWrapper(data, newline="", encoding="utf-8-sig") as file,
+        ):
             rows = csv.DictReader(file)
             _check(path, rows.fieldnames or ())
             yield from rows
+    except UnreadableFileError as error:
+        raise CardboxError(f"cannot read {path}: {error}; give a table or a bag") from None
     except OSError as error:
         raise CardboxError(f"cannot read {path}: {error.strerror}") from None
     except (UnicodeDecodeError, csv.Error) as error:

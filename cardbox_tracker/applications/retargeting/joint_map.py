@@ -21,7 +21,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cardbox_tracker.common.errors import CardboxError, quoted
+from cardbox_tracker.common.errors import CardboxError, cut, quoted
 from cardbox_tracker.common.small_yaml import SmallYamlError, parse_small_yaml, read_small_text
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.posture import (
@@ -132,8 +132,8 @@ def load_joint_map(path: str | os.PathLike[str]) -> JointMap:
         offset = np.array([math.radians(float(row.get("offset_deg", 0.0))) for row in rows])
         if not (np.isfinite(scale).all() and np.isfinite(offset).all()):
             raise ValueError("a scale or an offset is not a finite number")
-    except (SmallYamlError, KeyError, TypeError, ValueError) as error:
-        reason = " ".join(str(error).split())
+    except (SmallYamlError, KeyError, TypeError, ValueError, OverflowError) as error:
+        reason = cut(" ".join(str(error).split()))
         raise CardboxError(
             f"{path} is not a joint map: {reason}; see the example config/example_joint_map.yaml"
         ) from None

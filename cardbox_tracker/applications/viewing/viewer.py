@@ -11,12 +11,14 @@ import os
 import socket
 import sys
 import threading
-from collections.abc import Iterator
+import time
+from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, contextmanager, suppress
 from functools import partial
 from http.client import HTTPConnection, HTTPException
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
+from subprocess import DEVNULL, Popen
 from typing import Any
 from urllib.parse import quote
 
@@ -51,6 +53,13 @@ def rerun() -> Any:
     return module
 
 
+def rerun_program() -> tuple[str, ...]:
+    """Return the command of Rerun, without the Python program around it."""
+    import rerun_cli
+
+    return (str(Path(rerun_cli.__file__).with_name("rerun")),)
+
+
 @contextmanager
 def recording(blueprint: Any, save: Path | None, web: bool) -> Iterator[tuple[Any, str]]:
     """Context of a stream to a file, to a browser, or by default to a window.
@@ -83,7 +92,7 @@ def recording(blueprint: Any, save: Path | None, web: bool) -> Iterator[tuple[An
             if web:
                 server = rr.GrpcServerSink(bind_ip=THIS_COMPUTER)
                 sinks.append(server)
-                page = stack.enter_context(web_page(rr))
+                page = stack.enter_context(web_page(rerun_program()))
                 address = f"{page}?url={quote(server.uri, safe='')}"
             if sinks:
                 stream.set_sinks(*sinks, default_blueprint=blueprint)
@@ -104,19 +113,17 @@ def _has_display() -> bool:
 
 
 @contextmanager
-def web_page(rr: Any, port: int = PORT) -> Iterator[str]:
+def web_page(program: Sequence[str], port: int = PORT) -> Iterator[str]:
     """Context of the viewer's page; gives its address.
 
     Args:
-        rr: module rerun.
+        program: command of Rerun.
         port: port of this computer; 0 takes any free one.
 
     Raises:
         OSError: the port is in use.
     """
-    with socket.socket() as one:
-        one.bind((THIS_COMPUTER, 0))
-        files_port = one.getsockname()[1]
+    files_port = _free_port()
     try:
         server = ThreadingHTTPServer((THIS_COMPUTER, port), partial(_Page, files_port))
     except OSError as error:
@@ -124,8 +131,7 @@ def web_page(rr: Any, port: int = PORT) -> Iterator[str]:
             raise
         message = f"port {port} is in use; end the other 'cardbox view --web' or program there"
         raise OSError(error.errno, message) from error
-    with server:
-        rr.serve_web_viewer(web_port=files_port, open_browser=False)
+    with server, _files(program, files_port):
         thread = threading.Thread(target=server.serve_forever, name="web page", daemon=True)
         thread.start()
         try:
@@ -133,6 +139,40 @@ def web_page(rr: Any, port: int = PORT) -> Iterator[str]:
         finally:
             server.shutdown()
             thread.join()
+
+
+@contextmanager
+def _files(program: Sequence[str], port: int) -> Iterator[None]:
+    """Context of Rerun's server of the viewer's files, for this computer alone.
+
+    The server within a Python process would listen to all computers.
+    """
+    words = "--serve-web", "--bind", THIS_COMPUTER
+    numbers = "--web-viewer-port", str(port), "--port", str(_free_port())
+    # Rerun reports its use to its maker, but not from tests.
+    quiet = {**os.environ, "CI": "on"}
+    command = [*program, *words, *numbers]
+    with Popen(command, stdout=DEVNULL, stderr=DEVNULL, env=quiet) as process:
+        try:
+            end_s = time.monotonic() + _TIMEOUT_S
+            while not _listens(port):
+                if process.poll() is not None or time.monotonic() > end_s:
+                    raise OSError("Rerun does not serve its files; install rerun-sdk anew")
+                time.sleep(0.05)
+            yield
+        finally:
+            process.kill()
+
+
+def _free_port() -> int:
+    with socket.socket() as one:
+        one.bind((THIS_COMPUTER, 0))
+        return int(one.getsockname()[1])
+
+
+def _listens(port: int) -> bool:
+    with socket.socket() as one:
+        return one.connect_ex((THIS_COMPUTER, port)) == 0
 
 
 class _Page(BaseHTTPRequestHandler):
@@ -143,7 +183,11 @@ class _Page(BaseHTTPRequestHandler):
         super().__init__(*of_server)
 
     def do_GET(self) -> None:
-        """Answer with the file."""
+        """Answer with the file, but not to another site whose name leads to this computer."""
+        host = self.headers.get("Host", "").rpartition(":")[0] or self.headers.get("Host")
+        if host not in ("localhost", THIS_COMPUTER):
+            self.send_error(403, "give http://localhost as the address")
+            return
         connection = HTTPConnection(THIS_COMPUTER, self._files_port, timeout=_TIMEOUT_S)
         try:
             connection.request("GET", self.path)

@@ -30,6 +30,7 @@ from cardbox_tracker.ros.runtime.processes import Nodes
 
 # Without a cache, each node compiles at its start.
 _START_S = 600.0
+_QUIET_S = 3.0
 _UNRELIABLE = QoSProfile(depth=100, reliability=ReliabilityPolicy.BEST_EFFORT)
 # The bag of 'cardbox track --bag' has the same topics; /tf is derived from two of them.
 _OF_PERSON = {
@@ -82,6 +83,7 @@ class Client:
         self._bag = bag
         self._transforms = BagTransforms(bag)
         self._stamp_ns = 0
+        self._newest_ns: dict[str, int] = {}
         rclpy.init(args=[])
         self._node = rclpy.create_node("cardbox_demo", enable_rosout=False)
         self._executor = SingleThreadedExecutor()
@@ -103,7 +105,7 @@ class Client:
             message = deserialize_message(raw, kind)
             if hasattr(message, "header"):
                 stamp = message.header.stamp
-                self._stamp_ns = stamp.sec * 10**9 + stamp.nanosec
+                self._stamp_ns = self._newest_ns[topic] = stamp.sec * 10**9 + stamp.nanosec
             self._keep(topic, message)
             self._bag.write_raw(f"/{topic}", name, raw, self._stamp_ns)
 
@@ -170,10 +172,25 @@ class Client:
             _START_S,
         )
 
-    def wait_for_pause(self, time_s: float) -> None:
-        """Wait until the player pauses at ``time_s`` and its images have been processed."""
+    def wait_for_pause(self, time_s: float, stamp_ns: int) -> None:
+        """Wait until the player pauses at ``time_s`` and its images have come out as silhouettes.
+
+        Args:
+            time_s: time from the start of the bag.
+            stamp_ns: stamp of the last image before it.
+        """
         self.wait(lambda: self._player_status == f"paused at {time_s:.3f} s", f"{time_s:g} s")
+        self.wait(
+            lambda: min(self._newest_ns.get(one, 0) for one in self._silhouettes) >= stamp_ns,
+            f"the silhouette of the last image before {time_s:g} s",
+        )
         self.rest(0.5)
+
+    def rest_until_quiet(self) -> None:
+        """Spin until no joint state has come for a while, because the nodes may lag behind."""
+        began_s = time.monotonic()
+        while time.monotonic() - max([began_s, *self.arrivals_s[-1:]]) < _QUIET_S:
+            self._executor.spin_once(timeout_sec=0.05)
 
     def rest(self, duration_s: float) -> None:
         """Spin for ``duration_s``."""

@@ -14,6 +14,7 @@ from cardbox_tracker.applications.drawing.overlay import draw_overlay
 from cardbox_tracker.applications.drawing.video import video_file
 from cardbox_tracker.applications.evaluation.truth import tracking_error
 from cardbox_tracker.camera.camera import Camera
+from cardbox_tracker.common.errors import CardboxError
 from cardbox_tracker.common.files import atomic_path
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.model_file import save_body_model
@@ -33,7 +34,11 @@ _VIDEO_SCALE = 2
 def write_report(
     result: DemoResult, session: Path, output: Path, preset: str, seed: int
 ) -> dict[str, object]:
-    """Write all files to ``output``, print the table and return the content of report.json."""
+    """Write all files to ``output``, print the table and return the content of report.json.
+
+    Raises:
+        CardboxError: most images were not tracked, or a file cannot be written.
+    """
     with BagReader(session) as bag:
         first = next(iter(result.truth.cameras), None)
         height, width = next(iter(result.silhouettes.values())).shape
@@ -68,6 +73,11 @@ def write_report(
     body = PRESETS[preset]().with_shoulders(result.body)
     write_overlay(result, body, camera, estimates, session, output / "overlay.mp4")
     print_table(report, output)
+    if 2 * len(tracked) < len(expected):
+        raise CardboxError(
+            f"only {len(tracked)} of {len(expected)} images were tracked: the nodes were too slow; "
+            "end other programs on this computer and run the demo again"
+        )
     return report
 
 

@@ -49,6 +49,11 @@ def run_demo(output: Path, preset: str, seed: int, cameras: int = 1) -> None:
     write_report(result, session, output, preset, seed)
 
 
+def _last_before(truth: GroundTruth, time_s: float) -> int:
+    """Return the stamp of the last image before a time from the start of the bag, ns."""
+    return max(stamp for stamp in truth.frames if stamp < truth.start_ns + round(time_s * 1e9))
+
+
 def track_through_nodes(session: Path, output: Path, preset: str, seed: int) -> DemoResult:
     """Play ``session`` to the nodes, which measure and track the person; record ``output``/bag.
 
@@ -75,11 +80,11 @@ def track_through_nodes(session: Path, output: Path, preset: str, seed: int) -> 
                 *("--rate", f"{_RATE:g}", "--topics", *topics, "--pause-at", *stops),
             )
             for name, at_s in pauses.items():
-                client.wait_for_pause(at_s)
+                client.wait_for_pause(at_s, _last_before(truth, at_s))
                 print(f"initializer/capture_{name}", flush=True)
                 client.call(f"initializer/capture_{name}")
                 client.call("play_bag/resume")
-            client.wait_for_pause(start_s)
+            client.wait_for_pause(start_s, _last_before(truth, start_s))
             print("initializer/initialize", flush=True)
             client.call("initializer/initialize")
             client.wait(
@@ -98,7 +103,7 @@ def track_through_nodes(session: Path, output: Path, preset: str, seed: int) -> 
                     if client.postures:
                         time_s = (max(client.postures) - truth.start_ns) / 1e9
                         show((time_s - start_s) / (end_s - start_s))
-            client.rest(1.0)
+            client.rest_until_quiet()
         finally:
             client.close()
     arrivals = client.arrivals_s[first:]

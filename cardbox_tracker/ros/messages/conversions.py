@@ -25,6 +25,7 @@ from cardbox_tracker.camera.encodings import (
     image_parts,
 )
 from cardbox_tracker.camera.given_arrays import silhouette_from
+from cardbox_tracker.camera.levels import Levels
 from cardbox_tracker.common.errors import CameraError, EncodingError, quoted
 
 ImageArray = NDArray[np.uint8]
@@ -44,16 +45,25 @@ def stamp_ns(stamp: Time) -> int:
     return int(stamp.sec) * 1_000_000_000 + int(stamp.nanosec)
 
 
-def image_of(message: Image | CompressedImage, most_pixels: float = MOST_PIXELS) -> ImageArray:
+def image_of(
+    message: Image | CompressedImage,
+    most_pixels: float = MOST_PIXELS,
+    levels: Levels | None = None,
+) -> ImageArray:
     """Return an image message as (H, W, 3) bgr, or as (H, W) if it has no colours.
+
+    Args:
+        message: the message.
+        most_pixels: limit of the pixels.
+        levels: what scales 16 bits, see :func:`.decode_grey`.
 
     Raises:
         EncodingError: the encoding is not supported, the bytes do not match it, or the image has
             more than ``most_pixels``.
     """
     if isinstance(message, CompressedImage):
-        return decode_compressed(message.data, most_pixels)
-    return decode_as_sent(*image_parts(message), most_pixels)
+        return decode_compressed(message.data, most_pixels, levels)
+    return decode_as_sent(*image_parts(message), most_pixels, levels)
 
 
 def most_pixels_of(calibration: Calibration, most_megapixels: float) -> float:
@@ -135,23 +145,6 @@ def image_message(header: Header, image: NDArray[Any], encoding: str = "") -> Im
     data.frombytes(contiguous.data.cast("B"))
     message.data = data
     return message
-
-
-def check_shape(
-    image: ImageArray, calibration: Calibration, image_topic: str, info_topic: str
-) -> None:
-    """Check that an image, (H, W) or (H, W, 3), has the aspect ratio of its calibration.
-
-    Raises:
-        CameraError: the aspect ratios differ, so the CameraInfo does not belong to the image.
-    """
-    height, width = image.shape[:2]
-    if abs(width * calibration.height - height * calibration.width) > max(width, height):
-        raise CameraError(
-            f"the images on {image_topic} are {width}x{height} but {info_topic} describes "
-            f"{calibration.width}x{calibration.height}, another shape; expected the CameraInfo of "
-            "these images: calibrate the camera at the size it delivers"
-        )
 
 
 def camera_info_message(

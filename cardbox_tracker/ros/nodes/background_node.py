@@ -10,6 +10,7 @@ from sensor_msgs.msg import Image
 from std_msgs.msg import Header
 
 from cardbox_tracker.camera.camera import Calibration, Camera
+from cardbox_tracker.camera.stamps import StampOrder
 from cardbox_tracker.common.errors import BackgroundFileError, CameraError
 from cardbox_tracker.common.progress import told
 from cardbox_tracker.common.settings import settings_of
@@ -17,6 +18,7 @@ from cardbox_tracker.ros.messages import conversions
 from cardbox_tracker.ros.nodes.camera_images import CameraImages
 from cardbox_tracker.ros.nodes.depth_cut import DepthCut
 from cardbox_tracker.ros.nodes.shared_parameters import (
+    camera_roll_parameter,
     depth_parameter,
     image_transport_parameter,
     max_megapixels_parameter,
@@ -73,6 +75,7 @@ class BackgroundParameters(NodeParameters):
         choices=tuple(WAYS),
         effect=_NEXT_LEARNING,
     )
+    camera_roll_deg: float = camera_roll_parameter()
     max_megapixels: float = max_megapixels_parameter()
     learn_images: int = shared(BackgroundConfig, "learn_images", effect=_NEXT_LEARNING)
     threshold: float = shared(BackgroundConfig, "threshold")
@@ -95,6 +98,11 @@ class BackgroundParameters(NodeParameters):
 
     def check(self) -> None:
         """Raise ValueError if values contradict each other."""
+        if self.camera_roll_deg and self.depth:
+            raise ValueError(
+                f"camera_roll_deg is {self.camera_roll_deg:g}, but depth images are not turned; "
+                "turn the camera upright, or leave depth empty"
+            )
         if self.within_m > 0.0 and not self.depth:
             raise ValueError(
                 f"within_m is {self.within_m:g} but no depth is given; set 'depth' to a topic of "
@@ -119,6 +127,7 @@ class BackgroundNode(CardboxNode):
         self._kept = KeptBackground(path, (settings.width, settings.height))
         self._pipeline: SilhouettePipeline | None = None
         self._image: conversions.ImageArray | None = None
+        self._in_this_round = 0
         self._outputs = SilhouetteOutputs(self)
         self._mean = self.advertise(Image, "~/mean", qos.LATCHED)
         self._stddev = self.advertise(Image, "~/stddev", qos.LATCHED)
@@ -131,10 +140,12 @@ class BackgroundNode(CardboxNode):
             lambda: self.parameters.value.max_megapixels,
             self._on_calibration,
             self._on_image,
+            roll_deg=settings.camera_roll_deg,
         )
         self._cut = DepthCut(self, settings.depth, self._send) if settings.depth else None
         self.offer("~/learn", self._learn)
         self.diagnostics.extra = self._values
+        self.diagnostics.remedy = "take a smaller working resolution, or fewer images a second"
         self.diagnostics.advice = self._advice
 
     def _changed(self, settings: BackgroundParameters) -> None:
@@ -169,6 +180,12 @@ class BackgroundNode(CardboxNode):
     def _on_image(self, header: Header, full: conversions.ImageArray, sent_ns: int) -> None:
         pipeline = self._pipeline
         assert pipeline is not None
+        if self.camera_images.order is StampOrder.RESTART:
+            # A recording with fewer images than are learned needs several rounds.
+            if not pipeline.is_ready and self._in_this_round >= pipeline.learning.images:
+                pipeline.relearn()
+            self._in_this_round = 0
+        self._in_this_round += 1
         self._image = image = pipeline.prepare(full)
         within_m = self.parameters.value.within_m
         if self._cut is not None and within_m > 0.0:
@@ -231,7 +248,8 @@ class BackgroundNode(CardboxNode):
         settings = self.parameters.value
         findings = Findings(
             self.camera_images.topic,
-            self.diagnostics.input.loss,
+            # A slow node leaves images out, which are not lost on the way.
+            0.0 if self.diagnostics.is_slow else self.diagnostics.input.loss,
             self.camera_images.image_bytes,
             self._drift(),
             settings.follow and settings.clean_up,

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
+from typing import Any
 
-from rclpy.qos import QoSProfile
 from sensor_msgs.msg import CameraInfo, CompressedImage, Image
 from std_msgs.msg import Header
 
 from cardbox_tracker.camera.calibration_watch import CalibrationWatch
 from cardbox_tracker.camera.camera import Calibration
+from cardbox_tracker.camera.levels import Levels
 from cardbox_tracker.camera.stamps import StampOrder
 from cardbox_tracker.ros.messages import conversions
 from cardbox_tracker.ros.messages.conversions import ImageArray
@@ -19,6 +21,19 @@ from cardbox_tracker.ros.runtime.publishers import SinglePublisher
 
 Deliver = Callable[[Header, ImageArray, int], None]
 """Callback that receives header, image (H, W) or (H, W, 3), bgr, and its send time, ns."""
+
+
+def image_topic(node: CardboxNode, topic: str, transport: str) -> tuple[str, Any]:
+    """Return the full name and the type of the images; a remapping of ``topic`` holds for both.
+
+    Args:
+        node: the node that subscribes.
+        topic: name of the raw images.
+        transport: ``raw``, or ``compressed`` for those below it.
+    """
+    if transport == "compressed":
+        return node.resolve(f"{node.resolve(topic)}/compressed"), CompressedImage
+    return node.resolve(topic), Image
 
 
 class CameraImages:
@@ -40,7 +55,7 @@ class CameraImages:
         most_megapixels: Callable[[], float],
         changed: Callable[[Calibration], None],
         deliver: Deliver,
-        profile: QoSProfile = qos.SENSOR_DATA,
+        roll_deg: float = 0.0,
     ) -> None:
         """Subscribe with ``node`` and report on its diagnostics.
 
@@ -50,23 +65,23 @@ class CameraImages:
             most_megapixels: returns the limit for images, in millions of pixels.
             changed: called with the first calibration, and with another one that lasts.
             deliver: called with each image once the calibration is known.
-            profile: quality of service of the images.
+            roll_deg: roll of the camera, degrees.
         """
         self._node = node
         self._most_megapixels, self._changed, self._deliver = most_megapixels, changed, deliver
-        compressed = transport == "compressed"
-        topic = "image_raw/compressed" if compressed else "image_raw"
-        kind = CompressedImage if compressed else Image
-        self.topic, self.info_topic = node.resolve(topic), node.resolve("camera_info")
-        self.watch = CalibrationWatch(self.info_topic, self.topic)
+        self.topic, kind = image_topic(node, "image_raw", transport)
+        self.info_topic = node.resolve("camera_info")
+        self.watch = CalibrationWatch(self.info_topic, self.topic, math.radians(roll_deg))
         self.info: CameraInfo | None = None
         self.order = StampOrder.NEXT
         self.image_bytes = 0
+        self._levels = Levels()
         self._early: tuple[Image | CompressedImage, int] | None = None
         self._single = SinglePublisher(node, (self.topic, self.info_topic))
         # Of messages that arrive together, those of the first subscription are taken first.
-        node.subscribe(kind, topic, self.on_image, profile)
-        node.subscribe(CameraInfo, "camera_info", self.on_info, qos.SENSOR_DATA)
+        # While the node works, only the newest image is kept.
+        node.subscribe(kind, self.topic, self.on_image, qos.NEWEST)
+        node.subscribe_info("camera_info", self.on_info)
         node.diagnostics.source = f"images on {self.topic}"
         node.diagnostics.wait_for(
             f"images on {self.topic} and their CameraInfo on {self.info_topic}"
@@ -121,8 +136,18 @@ class CameraImages:
         self, message: Image | CompressedImage, sent_ns: int, calibration: Calibration
     ) -> None:
         most = conversions.most_pixels_of(calibration, self._most_megapixels())
-        image = conversions.image_of(message, most)
-        conversions.check_shape(image, calibration, self.topic, self.info_topic)
+        changes = self._levels.changes
+        image = conversions.image_of(message, most, self._levels)
+        if self._levels.changes > changes:
+            if self._levels.text:
+                self._node.get_logger().info(f"{self.topic}: {self._levels.text}")
+            if changes:  # what was learned has another scale
+                self._changed(calibration)
+        height, width = image.shape[:2]
+        calibration.check_shape(width, height, self.topic, self.info_topic)
+        # TF knows neither an empty name nor one with a slash before it.
+        frame_id = message.header.frame_id.lstrip("/")
+        message.header.frame_id = frame_id or calibration.frame_id
         self._deliver(message.header, image, sent_ns)
 
     def remarks(self) -> dict[str, str]:

@@ -113,7 +113,9 @@ class CameraInputs:
             if settings.use_image:
                 image = f"{topic}/image"
                 node.subscribe(Image, image, pairing.add_image, qos.SILHOUETTE_INPUT)
-            node.subscribe(Image, topic, pairing.add_silhouette, qos.SILHOUETTE_INPUT)
+            # The newest silhouette; of several streams, those of one time must be found.
+            profile = qos.SILHOUETTE if len(self._streams) == 1 else qos.SILHOUETTE_INPUT
+            node.subscribe(Image, topic, pairing.add_silhouette, profile)
         # Of messages that arrive together, silhouettes are taken before their CameraInfo.
         self._poses = CameraPoses(node, cameras, settings.extrinsics_file, self._on_poses)
         if settings.depth:
@@ -147,7 +149,7 @@ class CameraInputs:
 
     def _add(self, number: int, message: Image, image: Image | None, sent_ns: int) -> None:
         stamp_ns, received = _stamp_ns(message), Received(message, image, sent_ns)
-        is_usable = self._streams[number].arrived(stamp_ns).is_usable
+        is_usable = self._streams[number].arrived(stamp_ns, sent_ns).is_usable
         if number:
             self._clocks[number - 1].see()
         if len(self._streams) == 1:
@@ -248,8 +250,10 @@ class CameraInputs:
         if len(self._streams) == 1:
             return texts
         first, *others = self._streams
+        # If nothing comes at all, the node says so itself.
+        is_going_on = any(stream.age_s <= _SILENT_S for stream in self._streams)
         for stream in self._streams:
-            if stream.age_s > _SILENT_S:
+            if is_going_on and stream.age_s > _SILENT_S:
                 texts[f"silence of {stream.name}"] = (
                     f"nothing has come on {stream.topic} for {stream.age_s:.0f} s; tracking goes "
                     "on without it. Are that camera and its background node running?"
@@ -259,11 +263,17 @@ class CameraInputs:
         for stream, clock in zip(others, self._clocks, strict=True):
             apart_s = abs(clock.apart_s)
             if apart_s > max(_OTHER_CLOCK_S, first.statistics.period_ns / 2e9):
+                others_s = abs(clock.of_computers_s)
+                remedy = (
+                    f"the clocks of the computers that send them are {others_s:.2f} s apart: "
+                    "synchronize them, for example with chrony"
+                    if others_s > _OTHER_CLOCK_S
+                    else "one of them takes so much longer to be made: send smaller or fewer images"
+                )
                 texts[f"clock of {stream.name}"] = (
                     f"the stamps on {stream.topic} and {first.topic} are {apart_s:.2f} s "
                     "apart in images that arrive together, so images of different moments are "
-                    "paired, or none; synchronize the clocks of both computers, for example with "
-                    "chrony, unless one of them takes so much longer to send its images"
+                    f"paired, or none; {remedy}"
                 )
         return texts
 

@@ -7,6 +7,7 @@ import sys
 import threading
 import time
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import cv2
@@ -22,6 +23,7 @@ from cardbox_tracker.camera.camera_device import (
     open_device,
     open_video,
 )
+from cardbox_tracker.camera.film_headers import check_times, oblong, with_square_pixels
 from cardbox_tracker.common.files import user_path
 from cardbox_tracker.ros.messages import conversions
 from cardbox_tracker.ros.runtime import qos
@@ -63,7 +65,9 @@ class CameraParameters(NodeParameters):
         choices=("mono8", "bgr8"),
     )
     frame_id: str = parameter("camera_optical_frame", "name of the camera's optical frame")
-    calibration_file: str = parameter("", "YAML file of camera_calibration", effect=AT_START)
+    calibration_file: str = parameter(
+        "", "file of camera_calibration, OpenCV's FileStorage or Kalibr", effect=AT_START
+    )
     horizontal_fov_deg: float = parameter(
         0.0,
         "without a calibration file: assume an ideal lens of this field of view; 0: publish the "
@@ -104,7 +108,11 @@ class CameraNode(CardboxNode):
         self._images = self.advertise(Image, "image_raw", qos.CAMERA)
         self._infos = self.advertise(CameraInfo, "camera_info", qos.CAMERA)
         self._capture = open_video(settings.file) if settings.file else self._open_device()
-        self._period_s = self._period(settings) if settings.file else 0.0
+        self._period_s, self._oblong = 0.0, 1.0
+        if settings.file:
+            if not settings.rate_hz:
+                check_times(Path(settings.file).expanduser(), "set the parameter rate_hz")
+            self._period_s, self._oblong = self._period(settings), oblong(self._capture)
         self._calibration = (
             load_calibration(user_path(settings.calibration_file))
             if settings.calibration_file
@@ -184,6 +192,8 @@ class CameraNode(CardboxNode):
             image = np.asarray(cv2.cvtColor(image, cv2.COLOR_BGR2GRAY), dtype=np.uint8)
         elif settings.encoding == "bgr8" and image.ndim == 2:
             image = np.asarray(cv2.cvtColor(image, cv2.COLOR_GRAY2BGR), dtype=np.uint8)
+        if self._calibration is None:
+            image = with_square_pixels(image, self._oblong)
         height, width = image.shape[:2]
         calibration = self._calibration or assumed_calibration(
             width, height, settings.horizontal_fov_deg

@@ -37,7 +37,7 @@ class DepthInput:
         self.camera: Camera | None = None
         kind: Any = CompressedImage if topic.endswith(_PACKED) else Image
         info = f"{topic.removesuffix(_PACKED)}/camera_info"
-        node.subscribe(CameraInfo, info, self._on_info, qos.SENSOR_DATA)
+        node.subscribe_info(info, self._on_info)
         node.subscribe(kind, topic, heard, qos.SENSOR_DATA)
 
     def _on_info(self, message: CameraInfo, _: int) -> None:

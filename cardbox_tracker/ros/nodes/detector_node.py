@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import sys
 import time
 from collections import deque
@@ -25,7 +26,9 @@ from cardbox_tracker.ros.messages.keypoints import (
     skeleton_message,
 )
 from cardbox_tracker.ros.nodes.camera_images import CameraImages
+from cardbox_tracker.ros.nodes.camera_pitch import CameraPitch
 from cardbox_tracker.ros.nodes.shared_parameters import (
+    camera_roll_parameter,
     image_transport_parameter,
     max_megapixels_parameter,
 )
@@ -38,6 +41,7 @@ from cardbox_tracker.ros.runtime.parameters import LiveParameters
 from cardbox_tracker.ros.runtime.publishers import SinglePublisher
 from cardbox_tracker.segmentation.silhouettes import SilhouettePipeline
 
+_NICE = 5
 _DOES = "Find the person in a camera's images: images in, 2D points and silhouettes out."
 
 
@@ -59,11 +63,13 @@ class DetectorParameters(NodeParameters):
         effect=AT_START,
     )
     rate_hz: float = parameter(
-        0.0,
-        "most images a second to look at, to save processor time; 0: as many as it manages",
+        10.0,
+        "most images a second to look at, which leaves processor time to the tracker; 0: as many "
+        "as it manages, as always with publish_silhouette",
         unit="Hz",
         limits=(0.0, 240.0),
     )
+    camera_roll_deg: float = camera_roll_parameter()
     max_megapixels: float = max_megapixels_parameter()
 
 
@@ -83,6 +89,9 @@ class DetectorNode(CardboxNode):
         super().__init__("detector", **options)
         self.parameters = LiveParameters(self, DetectorParameters)
         settings = self.parameters.value
+        if person is None and not settings.publish_silhouette:
+            # The tracker goes first; the threads of the networks inherit this.
+            os.nice(_NICE)
         self._person = person or Detector.installed().start()
         self._pipeline: SilhouettePipeline | None = None
         self._looked_ns = 0
@@ -94,6 +103,7 @@ class DetectorNode(CardboxNode):
             if self._skeleton_kind is None
             else self.advertise(self._skeleton_kind, "~/skeleton2d", qos.RESULT)
         )
+        self._pitch = CameraPitch(self)
         self._silhouettes = SilhouetteOutputs(self) if settings.publish_silhouette else None
         self.diagnostics.extra = self._values
         self._images = CameraImages(
@@ -102,8 +112,7 @@ class DetectorNode(CardboxNode):
             lambda: self.parameters.value.max_megapixels,
             self._on_calibration,
             self._on_image,
-            # While the network works, only the newest image is kept.
-            qos.NEWEST,
+            settings.camera_roll_deg,
         )
         own = (self.resolve("silhouette"),) if settings.publish_silhouette else ()
         self._single = SinglePublisher(self, own)
@@ -112,6 +121,7 @@ class DetectorNode(CardboxNode):
     def _on_calibration(self, calibration: Calibration) -> None:
         settings = self.parameters.value
         self._pipeline = SilhouettePipeline(calibration, (settings.width, settings.height))
+        self._pitch.restart()
         self._person.restart()
 
     def _on_image(self, header: Header, full: ImageArray, sent_ns: int) -> None:
@@ -127,6 +137,8 @@ class DetectorNode(CardboxNode):
         found = self._person(image)
         self._took_ms.append(1e3 * (time.perf_counter() - began_s))
         self._send_points(header, found, pipeline)
+        if found is not None:
+            self._pitch.see(found, pipeline.camera)
         if self._silhouettes is not None:
             self._silhouettes.send_image(header, image)
             nobody = np.zeros(image.shape[:2], np.uint8)
@@ -137,7 +149,7 @@ class DetectorNode(CardboxNode):
     def _is_due(self, at_ns: int) -> bool:
         """Return whether to look at the image with this stamp, as ``rate_hz`` says."""
         rate_hz = self.parameters.value.rate_hz
-        if rate_hz > 0.0 and at_ns:
+        if rate_hz > 0.0 and at_ns and self._silhouettes is None:
             # The image nearest to the time is taken, not the first one after it.
             early_ns = self.diagnostics.input.period_ns / 2
             if at_ns - self._looked_ns + early_ns < 1e9 / rate_hz:

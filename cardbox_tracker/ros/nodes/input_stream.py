@@ -23,6 +23,7 @@ class InputStream:
         statistics: order, rate and losses by the stamps.
         problem: why the last message could not be used; empty if it could.
         newest_ns: stamp of the last message.
+        transit_s: arrival of the last message minus its send time, by the clocks of both ends.
     """
 
     def __init__(self, name: str, topic: str) -> None:
@@ -31,6 +32,7 @@ class InputStream:
         self.statistics = StreamStatistics()
         self.problem = ""
         self.newest_ns = 0
+        self.transit_s = 0.0
         self._arrived_s = self._counted_s = time.monotonic()
         self._counted = 0
 
@@ -44,8 +46,9 @@ class InputStream:
         """Arrival of the last message minus its stamp, seconds, with an unknown constant."""
         return self._arrived_s - self.newest_ns / 1e9
 
-    def arrived(self, stamp_ns: int) -> StampOrder:
+    def arrived(self, stamp_ns: int, sent_ns: int = 0) -> StampOrder:
         """Count a message, and return the relation of its stamp to the one before."""
+        self.transit_s = (time.time_ns() - sent_ns) / 1e9
         self._arrived_s, self.newest_ns = time.monotonic(), stamp_ns
         return self.statistics.add(stamp_ns)
 
@@ -71,13 +74,14 @@ class ClockDifference:
     def __init__(self, first: InputStream, other: InputStream) -> None:
         """Compare ``other`` with ``first``."""
         self._first, self._other = first, other
-        self._found: deque[float] = deque(maxlen=_COMPARED)
+        self._found: deque[tuple[float, float]] = deque(maxlen=_COMPARED)
 
     def see(self) -> None:
         """Compare the newest messages, after each message of the other stream."""
         first, other = self._first, self._other
         if first.newest_ns and other.newest_ns and first.age_s < _RECENT_S:
-            self._found.append(first.delay_s - other.delay_s)
+            transit_s = first.transit_s - other.transit_s
+            self._found.append((first.delay_s - other.delay_s, transit_s))
 
     @property
     def apart_s(self) -> float:
@@ -85,5 +89,14 @@ class ClockDifference:
 
         It is positive if the clock of the other stream is ahead.
         """
+        return self._median()[0]
+
+    @property
+    def of_computers_s(self) -> float:
+        """Difference of the clocks of the sending computers, seconds; 0 while unknown."""
+        return self._median()[1]
+
+    def _median(self) -> tuple[float, float]:
         is_known = len(self._found) >= _LEAST and self._other.age_s < _RECENT_S
-        return float(np.median(self._found)) if is_known else 0.0
+        stamps_s, computers_s = np.median(self._found, axis=0) if is_known else (0.0, 0.0)
+        return float(stamps_s), float(computers_s)

@@ -17,7 +17,6 @@ from cardbox_tracker.detectors.point_table import PointTable
 from cardbox_tracker.ros.messages.conversions import ImageArray, stamp_ns
 from cardbox_tracker.ros.nodes.keypoint_topic import KeypointTopic, Taken
 from cardbox_tracker.ros.nodes.tracker_parameters import TrackerParameters
-from cardbox_tracker.ros.runtime import qos
 from cardbox_tracker.ros.runtime.node import CardboxNode
 
 _PATIENCE_S = 3.0
@@ -89,9 +88,13 @@ class _CameraKeypoints:
             topic = source if source.startswith("/") else f"{below}{source}"
             self.topic = KeypointTopic(node, name, topic)
         self._info_topic = node.resolve(f"{below}camera_info")
-        self._watch = CalibrationWatch(self._info_topic, node.resolve(f"{below}image_raw"))
+        self._watch = CalibrationWatch(
+            self._info_topic,
+            node.resolve(f"{below}image_raw"),
+            np.radians(settings.camera_roll_deg),
+        )
         self._began_s = time.monotonic()
-        node.subscribe(CameraInfo, f"{below}camera_info", self._on_info, qos.SENSOR_DATA)
+        node.subscribe_info(f"{below}camera_info", self._on_info)
 
     def _on_info(self, message: CameraInfo, _: int) -> None:
         if self._watch.see(message) and self.topic is not None and self._watch.current is not None:

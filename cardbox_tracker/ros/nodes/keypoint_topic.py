@@ -179,7 +179,7 @@ class KeypointTopic:
             self._report(f"the fields of {self._type} are not the expected ones: {cut(str(error))}")
             return
         self.stream.problem = ""
-        self._kept.append(Taken(at_ns, str(message.header.frame_id), persons))
+        self._kept.append(Taken(at_ns, message.header.frame_id.lstrip("/"), persons))
         if len(self._kept) > _KEPT:
             oldest = self._kept.popleft()
             if self._asked_ns:

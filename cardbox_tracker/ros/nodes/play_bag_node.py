@@ -20,6 +20,7 @@ from functools import partial
 from typing import Any
 
 import yaml
+from rcl_interfaces.msg import Log
 from rclpy.duration import Duration
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.parameter import Parameter
@@ -126,12 +127,25 @@ class PlayBagNode(CardboxNode):
                 f"{', '.join(sorted(self._reader.topics))}"
             )
         classes = message_classes(self._reader.topics, settings.topics, self.diagnostics.warn)
-        self._publishers_of = {name: self._advertise(name, of) for name, of in classes.items()}
+        self._publishers_of = {
+            name: self._advertise(name, of)
+            for name, of in classes.items()
+            if not self._is_own(name, of)
+        }
         self._watched = [
             publisher
             for topic, publisher in self._publishers_of.items()
             if self._reader.topics[topic] in _IMAGES
         ] or self._all()
+
+    def _is_own(self, topic: str, of: Any) -> bool:
+        """Return whether this node itself has the topic, as its status or with another type."""
+        own = {"/rosout": Log} | {one.topic_name: one.msg_type for one in self.publishers}
+        name = self.resolve(topic)
+        is_own = name == self._status.topic_name or own.get(name, of) is not of
+        if is_own:
+            self.diagnostics.warn(f"not played: {name} is a topic of the player itself")
+        return is_own
 
     def _advertise(self, topic: str, of: Any) -> Publisher:
         latched = topic.endswith(_LATCHED_ENDINGS)

@@ -109,7 +109,7 @@ class RulaNode(CardboxNode):
         postures = normal_postures(posture, stddev, SAMPLES, self._rng)
         # The tracker leaves out the deviations of a neck that it does not know.
         neck, config = (neck_of(self._joints), neck_of(message)), self.parameters.value.config()
-        scores, is_measured = sampled_scores(self._body, postures, neck, config, self._rng)
+        scores, is_measured = sampled_scores(self._body, posture, postures, neck, config, self._rng)
         self._score.publish(Float32(data=scores.mean))
         self._chances.publish(_chances_message(scores))
         parts = part_values(scores, config, is_measured)
@@ -131,6 +131,7 @@ def _report_message(
     values = {
         "score": f"{scores.mean:.2f}",
         "likeliest score": str(scores.likeliest),
+        "score of the mean posture": str(scores.of_mean),
         f"chance above {ABOVE}": f"{scores.chance_above(ABOVE):.3f}",
         "score with the left arm": f"{expected(scores.left):.2f}",
         "score with the right arm": f"{expected(scores.right):.2f}",

@@ -49,6 +49,19 @@ def keypoints_parameter() -> Any:
     )
 
 
+def camera_roll_parameter() -> Any:
+    """Return the field of the roll of the camera."""
+    return parameter(
+        0.0,
+        "how far the camera is turned clockwise about its axis, seen from behind it: 180 if its "
+        "top is below, 90 or -90 on its side; silhouettes and results are those of the level "
+        "camera; background, detector and tracker need the same value",
+        unit="degrees",
+        limits=(-180.0, 180.0),
+        effect=AT_START,
+    )
+
+
 def image_transport_parameter() -> Any:
     """Return the field of the image topic's transport."""
     return parameter(

@@ -17,6 +17,7 @@ from cardbox_tracker.camera.resize import to_working_size
 from cardbox_tracker.camera.stereo import NEAREST_M, StereoDepth, stereo_of_pair
 from cardbox_tracker.common.errors import CameraError
 from cardbox_tracker.ros.messages import conversions
+from cardbox_tracker.ros.nodes.camera_images import image_topic
 from cardbox_tracker.ros.nodes.shared_parameters import (
     image_transport_parameter,
     max_megapixels_parameter,
@@ -80,18 +81,20 @@ class StereoDepthNode(CardboxNode):
         self._known, self._measured, self._are_swapped = 0.0, 0, False
         self._depth = self.advertise(Image, "depth", qos.SILHOUETTE)
         self._depth_info = self.advertise(CameraInfo, "depth/camera_info", qos.SILHOUETTE)
-        compressed = settings.image_transport == "compressed"
-        topic = "image_raw/compressed" if compressed else "image_raw"
-        kind = CompressedImage if compressed else Image
-        self._topics = {side: self.resolve(f"{side}/{topic}") for side in ("left", "right")}
+        images = {
+            side: image_topic(self, f"{side}/image_raw", settings.image_transport)
+            for side in ("left", "right")
+        }
+        self._topics = {side: topic for side, (topic, _) in images.items()}
         self._kept = {side: RecentImages(_KEPT) for side in ("left", "right")}
         for side in self._topics:
             heard = partial(self._on_info, side)
-            self.subscribe(CameraInfo, f"{side}/camera_info", heard, qos.SENSOR_DATA)
-        self.subscribe(kind, f"left/{topic}", self._on_left, qos.SENSOR_DATA)
-        self.subscribe(kind, f"right/{topic}", self._on_right, qos.SENSOR_DATA)
+            self.subscribe_info(f"{side}/camera_info", heard)
+        for side, on_image in (("left", self._on_left), ("right", self._on_right)):
+            self.subscribe(images[side][1], images[side][0], on_image, qos.SENSOR_DATA)
         self.diagnostics.extra = lambda: {"known (% of the image)": f"{100 * self._known:.1f}"}
         self.diagnostics.advice = self._warnings
+        self.diagnostics.remedy = "take smaller images, or fewer a second"
         self.diagnostics.source = f"images on {self._topics['left']}"
         self.diagnostics.wait_for(
             f"images on {self._topics['left']} and {self._topics['right']}, and the CameraInfo of "

@@ -20,6 +20,7 @@ from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.model_file import load_body_model, loads_body_model
 from cardbox_tracker.ros.messages import conversions
 from cardbox_tracker.ros.nodes.camera_inputs import CameraInputs, Received
+from cardbox_tracker.ros.nodes.found_body import FoundBody
 from cardbox_tracker.ros.nodes.tracker_outputs import TrackerOutputs
 from cardbox_tracker.ros.nodes.tracker_parameters import TrackerParameters
 from cardbox_tracker.ros.nodes.tracking_report import TrackingReport
@@ -60,8 +61,14 @@ class TrackerNode(CardboxNode):
         self._agreement = AgreementWatch([name.strip("/") for name in settings.cameras])
         self.diagnostics.source = f"silhouettes on {self._inputs.source}"
         self.diagnostics.extra = self._values
+        self.diagnostics.remedy = (
+            "lower the effort, take a smaller working resolution, or fewer images a second"
+        )
+        self._found: FoundBody | None = None
         if settings.model_file:
             self._use(load_body_model(user_path(settings.model_file)))
+        elif settings.guess is not None:
+            self._found = FoundBody(self, settings, settings.guess, self._use)
         self._wait()
 
     def _prepare(self, settings: TrackerParameters) -> None:
@@ -77,9 +84,13 @@ class TrackerNode(CardboxNode):
         self._prepared.add(settings.preset)
 
     def _on_model(self, message: String, _: int) -> None:
+        if self._found is not None and message.data == self._found.text:
+            return
         body = loads_body_model(message.data, source=self._model_topic)
         if body != self._body:
             self._use(body)
+        if self._found is not None:
+            self._found.replace(message.data)
 
     def _use(self, body: BodyModel) -> None:
         self._body = body
@@ -138,7 +149,7 @@ class TrackerNode(CardboxNode):
         if self._body is None:
             self.diagnostics.wait_for(
                 f"a body model on {self._model_topic} (call initializer/initialize, or give "
-                "model_file)"
+                "model_file or stature)"
             )
         elif self._camera is None:
             self.diagnostics.wait_for(
@@ -162,8 +173,11 @@ class TrackerNode(CardboxNode):
         seen = self._inputs.observed(received)
         estimate = self._tracker.track(seen.observations)
         self._outputs.publish(seen, estimate, self._tracker)
-        for kind, text in self._report.add(estimate, self._tracker.body).items():
+        news = self._report.add(estimate, self._tracker.body)
+        for kind, text in news.items():
             self.diagnostics.say(kind, text)
+        if self._found is not None and "body" in news:
+            self._found.publish(self._tracker.body, seen.header.frame_id)
         self._agreement.see(self._tracker.agreement)
         self.diagnostics.advice = self._warnings
         self.diagnostics.working(seen.sent_ns)

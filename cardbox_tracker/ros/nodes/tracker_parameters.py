@@ -9,7 +9,10 @@ from typing import Any
 
 from cardbox_tracker.camera.pairing import camera_names
 from cardbox_tracker.common.settings import NoEffectError, nested, settings_of
+from cardbox_tracker.person.model import BodyModel
+from cardbox_tracker.person.proportions import STATURE_LIMITS_M, STATURE_M, body_from_proportions
 from cardbox_tracker.ros.nodes.shared_parameters import (
+    camera_roll_parameter,
     cameras_parameter,
     depth_parameter,
     extrinsics_parameter,
@@ -129,6 +132,15 @@ class TrackerParameters(NodeParameters):
         "body model to start with; one that arrives on body_model replaces it; empty: none",
         effect=AT_START,
     )
+    stature: float = parameter(
+        0.0,
+        "height of a person who is not measured; without a measured body, the person in the image "
+        "is tracked with it, and distance and breadths are found; 0: a measured body is waited "
+        "for, or with keypoints the mean of people is taken",
+        unit="m",
+        limits=(0.0, STATURE_LIMITS_M[1]),
+        effect=AT_START,
+    )
     torso_place: bool = parameter(
         True,
         "joint_states also has the joints of place, neck and clavicles; "
@@ -163,11 +175,20 @@ class TrackerParameters(NodeParameters):
     extrinsics_file: str = extrinsics_parameter()
     depth: str = depth_parameter()
     keypoints: str = keypoints_parameter()
+    camera_roll_deg: float = camera_roll_parameter()
 
     @property
     def has_point_table(self) -> bool:
         """Whether ``keypoints`` is a table; no name of a topic has a dot."""
         return self.keypoints.endswith(".csv")
+
+    @property
+    def guess(self) -> BodyModel | None:
+        """Body of a person who is not measured; None if a measured one is waited for."""
+        stature_m = self.stature or (STATURE_M if self.keypoints else 0.0)
+        if not stature_m or self.model_file or len(self.cameras) > 1:
+            return None
+        return body_from_proportions(stature_m)
 
     def config(self) -> TrackerConfig:
         """Return the settings of the core.
@@ -209,6 +230,16 @@ class TrackerParameters(NodeParameters):
                 "default with several cameras or depth"
             )
         camera_names(self.cameras)
+        if self.stature and len(self.cameras) > 1:
+            raise ValueError(
+                "stature is for one camera; with several, have the person measured instead: "
+                "call initializer/initialize, or give model_file"
+            )
+        if 0.0 < self.stature < STATURE_LIMITS_M[0]:
+            raise ValueError(
+                f"stature is {self.stature:g} m; expected {STATURE_LIMITS_M[0]:g} to "
+                f"{STATURE_LIMITS_M[1]:g} m, or 0 if it is not known"
+            )
         if len(self.cameras) > 1 and self.keypoints.startswith("/") and not self.has_point_table:
             raise ValueError(
                 f"keypoints is '{self.keypoints}', one topic for {len(self.cameras)} cameras; "

@@ -19,6 +19,7 @@ from rclpy.node import Node
 from rclpy.qos import QoSProfile
 
 from cardbox_tracker.camera.stamps import WINDOW, StreamStatistics
+from cardbox_tracker.common.errors import plain
 from cardbox_tracker.ros.runtime import qos
 from cardbox_tracker.ros.runtime.log_limit import LogLimit
 
@@ -54,6 +55,8 @@ class NodeDiagnostics:
             Warnings of the kind "" are not logged here, because the node logs them.
         remarks: called once a second; returns warnings of common checks, such as the types of the
             topics, which write their own log messages.
+        remedy: what to do if results take longer than the period of the images; empty if that is
+            no fault of this node, which then reports nothing.
     """
 
     def __init__(self, node: Node) -> None:
@@ -63,6 +66,7 @@ class NodeDiagnostics:
         self.advice: Callable[[], dict[str, str]] = dict
         self.source = ""
         self.remarks: Callable[[], list[str]] = list
+        self.remedy = ""
         self._node = node
         self._waiting = ""
         self._problem = ""
@@ -86,18 +90,21 @@ class NodeDiagnostics:
 
     def wait_for(self, text: str) -> None:
         """Report that the node publishes nothing until ``text`` arrives."""
+        text = plain(text)
         self._waiting, self._problem = text, ""
         if self._log.allows(WAITING, text):
             self._node.get_logger().info(f"waiting for {text}")
 
     def problem(self, text: str, kind: str = ERROR) -> None:
         """Report an error until :meth:`working`; errors of one ``kind`` share a log limit."""
+        text = plain(text)
         self._problem, self._kind = text, kind
         if self._log.allows(kind, text):
             self._node.get_logger().error(text)
 
     def say(self, kind: str, text: str, *, warning: bool = False) -> None:
         """Log an event that other programs can cause at any rate, within the log limit."""
+        text = plain(text)
         if self._log.allows(kind, text):
             # rclpy allows only one level per line of code.
             if warning:
@@ -118,6 +125,7 @@ class NodeDiagnostics:
 
     def warn(self, text: str) -> None:
         """Add a permanent warning, such as an incompatible QoS."""
+        text = plain(text)
         if text not in self._warnings:
             self._warnings.append(text)
             self._node.get_logger().warning(text)
@@ -147,22 +155,26 @@ class NodeDiagnostics:
             self._node.get_logger().warning(f"{self.source} have ceased: {why}")
         self._silence = f"{self.source}, which have ceased {silent_s:.0f} s ago: {why}"
 
-    def _slowness(self) -> dict[str, str]:
-        """Return a warning if results take longer than the period of the images."""
+    @property
+    def is_slow(self) -> bool:
+        """Whether results take longer than the period of the images."""
         if len(self._latencies_ms) < _ENOUGH:
-            return {}
-        latency_ms, period_ms = np.median(self._latencies_ms), self.input.period_ns / 1e6
-        if not 0 < period_ms < latency_ms:
+            return False
+        return 0 < self.input.period_ns / 1e6 < float(np.median(self._latencies_ms))
+
+    def _slowness(self) -> dict[str, str]:
+        if not self.remedy or not self.is_slow:
             return {}
         return {
-            "slow": f"results come {latency_ms:.0f} ms after their images, which come every "
-            f"{period_ms:.0f} ms, so images wait or are dropped; lower the effort of "
-            "the tracker, take a smaller working resolution, or fewer images a second"
+            "slow": f"results come {np.median(self._latencies_ms):.0f} ms after their images, "
+            f"which come every {self.input.period_ns / 1e6:.0f} ms, so images are left out; "
+            f"{self.remedy}"
         }
 
     def _remarks(self) -> list[str]:
         """Return all current warnings, and log each new kind."""
         found = self.input.remarks() | self._slowness() | self.advice()
+        found = {kind: plain(text) for kind, text in found.items()}
         for kind, text in found.items():
             if kind and self._log.allows(kind, kind):
                 self._node.get_logger().warning(text)

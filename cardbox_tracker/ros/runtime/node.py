@@ -8,6 +8,8 @@ from collections.abc import Callable
 from typing import Any, Protocol, TypeVar
 
 import rclpy
+from rclpy.clock import Clock
+from rclpy.clock_type import ClockType
 from rclpy.exceptions import ROSInterruptException
 from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 from rclpy.logging import get_logger
@@ -16,12 +18,13 @@ from rclpy.publisher import Publisher
 from rclpy.qos import QoSProfile
 from rclpy.subscription import Subscription
 from rclpy.utilities import ok, remove_ros_args, try_shutdown
+from sensor_msgs.msg import CameraInfo
 from std_srvs.srv import Trigger
 
 from cardbox_tracker.common import garbage, interrupts
 from cardbox_tracker.common.errors import CardboxError, cut, quoted
 from cardbox_tracker.ros.runtime import qos
-from cardbox_tracker.ros.runtime.diagnostics import NodeDiagnostics
+from cardbox_tracker.ros.runtime.diagnostics import PERIOD_S, NodeDiagnostics
 from cardbox_tracker.ros.runtime.intra_process import IntraProcess, IntraProcessPublisher
 from cardbox_tracker.ros.runtime.topic_types import TopicTypes
 
@@ -101,6 +104,7 @@ class CardboxNode(Node):
         profile: QoSProfile,
         *,
         has_one_type: bool = True,
+        is_overridable: bool = True,
     ) -> Subscription | None:
         """Subscribe to a topic, bypassing DDS if a node of this process offers it.
 
@@ -110,22 +114,14 @@ class CardboxNode(Node):
             kind: class of the messages.
             topic: name of the topic.
             callback: receives each message.
-            profile: quality of service, which can be overridden.
+            profile: quality of service, which can be overridden by default.
             has_one_type: False if the caller adapts to publishers of another type.
+            is_overridable: False for a second subscription to a topic.
 
         Returns:
             The subscription; None without DDS.
         """
-
-        def guarded(message: Any, info: dict[str, Any]) -> None:
-            try:
-                callback(message, int(info["source_timestamp"]))
-            except CardboxError as error:
-                kind = f"{type(error).__name__} in {topic}"
-                self.diagnostics.problem(str(error), kind)
-            except Exception as error:
-                self._unexpected(f"a message on {self.resolve(topic)}", error)
-
+        guarded = self._guarded(topic, callback)
         if has_one_type:
             self._types.add(self.resolve(topic), kind)
         if self._intra_process is not None and self._intra_process.subscribe(
@@ -138,8 +134,38 @@ class CardboxNode(Node):
             guarded,  # type: ignore[arg-type]  # rclpy leaves out its own second argument
             qos.copy_of(profile),
             event_callbacks=qos.subscription_events(self.resolve(topic), self.diagnostics.warn),
-            qos_overriding_options=qos.overridable(profile),
+            qos_overriding_options=qos.overridable(profile) if is_overridable else None,
         )
+
+    def subscribe_info(self, topic: str, callback: Callback) -> None:
+        """Subscribe to CameraInfo, also to one that was latched before this node started."""
+        name, heard = self.resolve(topic), self._guarded(topic, callback)
+        if self.subscribe(CameraInfo, topic, callback, qos.SENSOR_DATA) is None:
+            return
+
+        def look() -> None:
+            # A publisher that latches nothing would warn of a subscriber that asks for it.
+            ends = self.get_publishers_info_by_topic(name)
+            if any(end.qos_profile.durability == qos.LATCHED.durability for end in ends):
+                timer.cancel()
+                self.create_subscription(CameraInfo, topic, heard, qos.LATCHED)  # type: ignore[arg-type]
+
+        steady = Clock(clock_type=ClockType.STEADY_TIME)
+        timer = self.create_timer(PERIOD_S, look, clock=steady)
+
+    def _guarded(self, topic: str, callback: Callback) -> Callable[[Any, dict[str, Any]], None]:
+        """Return a callback of rclpy that reports the exceptions of ``callback``."""
+
+        def guarded(message: Any, info: dict[str, Any]) -> None:
+            try:
+                callback(message, int(info["source_timestamp"]))
+            except CardboxError as error:
+                kind = f"{type(error).__name__} in {topic}"
+                self.diagnostics.problem(str(error), kind)
+            except Exception as error:
+                self._unexpected(f"a message on {self.resolve(topic)}", error)
+
+        return guarded
 
     def offer(self, name: str, action: Callable[[], str]) -> None:
         """Offer a Trigger service that returns the text of ``action`` or of its error."""

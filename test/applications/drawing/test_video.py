@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from pathlib import Path
 
 import cv2
@@ -33,6 +34,24 @@ def test_every_image_is_in_the_video(tmp_path: Path, name: str) -> None:
         assert image.mean() == pytest.approx(level, abs=4)
     assert not video.read()[0]
     video.release()
+
+
+@pytest.mark.parametrize(("has_av", "code"), [(True, "h264"), (False, "VP90")])
+def test_mp4_has_a_codec_that_browsers_play(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, has_av: bool, code: str
+) -> None:
+    if not has_av:
+        monkeypatch.setitem(sys.modules, "av", None)
+    write(tmp_path / "a.mp4")
+    video = cv2.VideoCapture(str(tmp_path / "a.mp4"))
+    assert int(video.get(cv2.CAP_PROP_FOURCC)).to_bytes(4, "little") == code.encode()
+    levels = []
+    while (read := video.read())[0]:
+        levels.append(read[1].mean())
+    assert levels == pytest.approx(LEVELS, abs=4)
+    # A browser that loads the file begins to play before its end is there.
+    content = (tmp_path / "a.mp4").read_bytes()
+    assert not has_av or content.index(b"moov") < content.index(b"mdat")
 
 
 @pytest.mark.parametrize("name", ["a.gif", "a", "mp4", "a.mp4.txt"])

@@ -19,6 +19,7 @@ from cardbox_tracker.applications.ergonomics.rula import (
     neck_samples,
     part_values,
     rula_scores,
+    sampled_scores,
     score_distribution,
 )
 from cardbox_tracker.person.posture import TURNING_LIMITS
@@ -213,3 +214,17 @@ def test_a_measured_neck_is_not_among_the_declared_inputs() -> None:
     assert "neck" not in measured["declared, not seen"]
     assert assumed["declared, not seen"].startswith("neck 2, wrist 1 (default)")
     assert assumed["legs (declared)"] == "1"
+
+
+@pytest.mark.parametrize("pitch_deg", [0.0, 5.0])
+def test_the_spread_does_not_push_the_score_up(pitch_deg: float) -> None:
+    """Deviations as of a film: the neck's is wider than its first limit."""
+    rng, mean = np.random.default_rng(0), posture(torso_pitch=pitch_deg, left_elbow_flexion=80)
+    drawn = mean + np.radians(9.0) * rng.standard_normal((SAMPLES, 12))
+    neck = np.zeros(2), np.radians([12.0, 12.0])
+    found, is_measured = sampled_scores(BODY, mean, drawn, neck, RulaConfig(), rng)
+    assert is_measured
+    assert found.of_mean == 2
+    assert found.mean == pytest.approx(2.0, abs=0.3)
+    known = score_distribution(BODY, drawn, RulaConfig(), neck_samples(*neck, SAMPLES, rng))
+    assert known.mean > 2.5

@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 import re
+import socket
 import sys
-import threading
 from collections import Counter
-from collections.abc import Iterator
-from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
 from typing import Any
 from urllib.error import HTTPError
-from urllib.request import urlopen
+from urllib.request import Request, urlopen
 
 import numpy as np
 import pytest
@@ -19,8 +17,9 @@ import pytest
 from cardbox_tracker.applications.drawing.overlay import draw_sharp_overlay
 from cardbox_tracker.applications.simulation.motions import wave
 from cardbox_tracker.applications.simulation.session import SessionFormat, synthesize_session
+from cardbox_tracker.applications.viewing import viewer
 from cardbox_tracker.applications.viewing.sources import show_together
-from cardbox_tracker.applications.viewing.viewer import THIS_COMPUTER, web_page
+from cardbox_tracker.applications.viewing.viewer import web_page
 from cardbox_tracker.camera.camera import Camera
 from cardbox_tracker.commands.main import main
 from cardbox_tracker.person.kinematics import pose
@@ -333,44 +332,36 @@ def test_without_the_library_its_extra_is_named(
     assert not (results.parent / "v.rrd").exists()
 
 
-class Files(BaseHTTPRequestHandler):
-    """Stands for the server of Rerun."""
+SERVER = """
+import sys
+from http.server import BaseHTTPRequestHandler, HTTPServer
 
-    def do_GET(self) -> None:
+class Files(BaseHTTPRequestHandler):
+    def do_GET(self):
         self.send_response(200 if self.path == "/viewer.js" else 404)
         self.send_header("Content-Type", "text/javascript")
         self.end_headers()
         self.wfile.write(b"1 + 1")
+        if self.path == "/end":
+            sys.exit()
 
-    def log_message(self, format: str, *args: object) -> None: ...
-
-
-class Library:
-    """Stands for the module rerun."""
-
-    def serve_web_viewer(self, *, web_port: int, open_browser: bool) -> None:
-        assert not open_browser
-        self.server = ThreadingHTTPServer((THIS_COMPUTER, web_port), Files)
-        threading.Thread(target=self.server.serve_forever, daemon=True).start()
+words = sys.argv[1:]
+address = words[words.index("--bind") + 1], int(words[words.index("--web-viewer-port") + 1])
+HTTPServer(address, Files).serve_forever()
+"""
+PROGRAM = (sys.executable, "-c", SERVER)
 
 
-@pytest.fixture
-def library() -> Iterator[Library]:
-    found = Library()
-    yield found
-    found.server.server_close()
-
-
-def test_files_are_passed_on_with_a_policy(library: Library) -> None:
-    with web_page(library, port=0) as address:
+def test_files_are_passed_on_with_a_policy() -> None:
+    with web_page(PROGRAM, port=0) as address:
         with urlopen(f"{address}/viewer.js") as answer:
             assert answer.read() == b"1 + 1"
             assert answer.headers["Content-Type"] == "text/javascript"
             allowed = answer.headers["Content-Security-Policy"]
         with pytest.raises(HTTPError, match="404"):
             urlopen(f"{address}/other")
-        library.server.shutdown()
-        library.server.server_close()
+        with pytest.raises(HTTPError, match="404"):
+            urlopen(f"{address}/end")
         with pytest.raises(HTTPError, match="502"):
             urlopen(f"{address}/viewer.js")
     hosts = {word for word in allowed.replace(";", "").split() if "//" in word}
@@ -378,11 +369,43 @@ def test_files_are_passed_on_with_a_policy(library: Library) -> None:
     assert "*" not in allowed.split()
 
 
-def test_a_port_in_use_is_an_error(library: Library) -> None:
-    with web_page(library, port=0) as address:
+@pytest.mark.parametrize(
+    ("host", "allowed"),
+    [("localhost:1", True), ("127.0.0.1", True), ("evil.example:9090", False), ("", False)],
+)
+def test_only_this_computer_is_answered(host: str, allowed: bool) -> None:
+    with web_page(PROGRAM, port=0) as address:
+        request = Request(f"{address}/viewer.js", headers={"Host": host})
+        if allowed:
+            assert urlopen(request).status == 200
+        else:
+            with pytest.raises(HTTPError, match="403"):
+                urlopen(request)
+
+
+def test_reruns_own_server_listens_to_this_computer_alone(monkeypatch: pytest.MonkeyPatch) -> None:
+    pytest.importorskip("rerun", reason="rerun-sdk is not installed")
+    ports: list[int] = []
+
+    def free_port() -> int:
+        ports.append(real())
+        return ports[-1]
+
+    real = viewer._free_port
+    monkeypatch.setattr(viewer, "_free_port", free_port)
+    with web_page(viewer.rerun_program(), port=0) as address:
+        assert b"<html" in urlopen(address).read().lower()
+        for port in (*ports, int(address.rpartition(":")[2])):
+            with socket.socket() as one:
+                # Another address of this computer, to which a server of 0.0.0.0 would answer.
+                assert one.connect_ex(("127.0.0.2", port)) != 0
+
+
+def test_a_port_in_use_is_an_error() -> None:
+    with web_page(PROGRAM, port=0) as address:
         port = int(address.rpartition(":")[2])
         with (
             pytest.raises(OSError, match=f"port {port} is in use; end"),
-            web_page(Library(), port=port),
+            web_page(PROGRAM, port=port),
         ):
             pass

@@ -45,6 +45,7 @@ def session() -> Any:
         keypoints_m=points,
         torso_rad=np.zeros((COUNT, 3)),
         truth=SimpleNamespace(pitch_deg=0.0),
+        has_references=True,
     )
 
 
@@ -71,7 +72,7 @@ def test_whoever_measures_the_truth_has_its_scores(monkeypatch: pytest.MonkeyPat
     errors = rula_accuracy.score_errors(session(), default_preset(), 0, {"task": RulaConfig()})[
         "task"
     ]
-    for way in ("mean posture", "normal", "particles"):
+    for way in ("mean posture", "normal", "particles", "whole deviation"):
         assert errors[way].difference == pytest.approx(0.0, abs=0.05)
         assert errors[way].equal == errors[way].within_one == 1.0
     assert errors["always the same"].equal < 1.0
@@ -85,6 +86,7 @@ def test_score_errors_are_counted() -> None:
     assert error.chance_of_truth == pytest.approx((0.5 + 0.3 + 0.2) / 3)
     assert error.difference == pytest.approx((1.3 + 0.3 + 3.7) / 3)
     assert (error.above, error.true_above) == pytest.approx((0.2, 1 / 3))
+    assert (error.low, error.true_low) == pytest.approx((0.5, 1 / 3))
 
 
 def robot_error(monkeypatch: pytest.MonkeyPatch, *changes: Any) -> retarget_accuracy.HandError:

@@ -12,6 +12,7 @@ import pytest
 
 from cardbox_tracker.applications.evaluation.truth import load_ground_truth
 from cardbox_tracker.applications.simulation.session import SessionFormat, synthesize_session
+from cardbox_tracker.common.errors import CardboxError
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.model_file import load_body_model
 from cardbox_tracker.ros.demo.report import write_report
@@ -100,6 +101,15 @@ def test_errors_and_lost_images_are_counted(
     assert report["lateral_error_m"] == pytest.approx(0.03)
     assert report["vertical_error_m"] == pytest.approx(0.0, abs=1e-9)
     assert report["depth_error_m"] == pytest.approx(0.04)
+
+
+def test_a_demo_that_missed_most_images_fails_after_its_report(
+    session: Path, result: DemoResult, tmp_path: Path
+) -> None:
+    few = replace(result, postures=dict(sorted(result.postures.items())[: LAST // 2 - 1]))
+    with pytest.raises(CardboxError, match=f"only {LAST // 2 - 1} of {LAST} images were tracked"):
+        write_report(few, session, tmp_path, "default", 0)
+    assert (tmp_path / "report.json").is_file()
 
 
 def test_an_image_without_its_silhouette_has_no_cost(

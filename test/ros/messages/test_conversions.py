@@ -156,13 +156,6 @@ def test_binning_and_region_of_interest_are_taken_into_the_camera() -> None:
     )
 
 
-def test_a_calibration_of_another_shape_is_refused() -> None:
-    calibration = Calibration(640, 360, np.diag([300.0, 300.0, 1.0]), np.zeros(5))
-    with pytest.raises(CameraError, match="640x360"):
-        conversions.check_shape(np.zeros((480, 640), np.uint8), calibration, "a", "b")
-    conversions.check_shape(np.zeros((180, 320), np.uint8), calibration, "a", "b")
-
-
 def test_distorted_silhouette_is_refused() -> None:
     with pytest.raises(CameraError, match="distortion"):
         conversions.camera_of(info(d=[0.1, 0.0, 0.0, 0.0, 0.0]))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable
 from typing import Any
 
@@ -11,7 +12,9 @@ import pytest
 rclpy = pytest.importorskip("rclpy", reason="rclpy is not installed")
 
 from builtin_interfaces.msg import Time  # noqa: E402
+from rclpy.executors import SingleThreadedExecutor  # noqa: E402
 from rclpy.qos import QoSProfile  # noqa: E402
+from sensor_msgs.msg import CameraInfo  # noqa: E402
 from std_msgs.msg import Header  # noqa: E402
 
 from cardbox_tracker.camera.camera import Camera  # noqa: E402
@@ -21,7 +24,9 @@ from cardbox_tracker.ros.messages.conversions import (  # noqa: E402
 )
 from cardbox_tracker.ros.nodes.background_node import BackgroundNode  # noqa: E402
 from cardbox_tracker.ros.nodes.camera_images import CameraImages  # noqa: E402
+from cardbox_tracker.ros.nodes.stereo_depth_node import StereoDepthNode  # noqa: E402
 from cardbox_tracker.ros.nodes.tracker_node import TrackerNode  # noqa: E402
+from cardbox_tracker.ros.runtime import qos  # noqa: E402
 from cardbox_tracker.ros.runtime.node import CardboxNode  # noqa: E402
 
 CAMERA = Camera(160, 120, 150.0, 150.0, 79.5, 59.5)
@@ -40,6 +45,39 @@ def test_an_image_does_not_wait_for_its_camera_info(
     assert topics.index(image) < next(i for i, name in enumerate(topics) if "camera_info" in name)
 
 
+@pytest.mark.parametrize("kind", [BackgroundNode, StereoDepthNode])
+def test_a_remapping_of_the_images_holds_for_compressed_ones(
+    kind: type[CardboxNode], make_node: Callable[..., Any]
+) -> None:
+    place = "left/" if kind is StereoDepthNode else ""
+    for old, new in (
+        (f"{place}image_raw", "/eye/image/compressed"),
+        (f"{place}image_raw/compressed", "/eye/image"),
+    ):
+        words = ["--ros-args", "-r", f"{old}:=/eye/image", "-p", "image_transport:=compressed"]
+        node = kind(context=make_node().context, enable_rosout=False, cli_args=words)
+        topics = [subscription.topic_name for subscription in node.subscriptions]
+        node.destroy_node()
+        assert new in topics
+
+
+def test_a_camera_info_that_was_latched_before_is_received(make_node: Callable[..., Any]) -> None:
+    camera = make_node()
+    infos = camera.create_publisher(CameraInfo, "camera_info", qos.LATCHED)
+    infos.publish(camera_info_message(Header(frame_id="eye"), CAMERA))
+    node = CardboxNode("tested", context=camera.context, enable_rosout=False)
+    received: list[str] = []
+    node.subscribe_info("camera_info", lambda message, _: received.append(message.header.frame_id))
+    executor = SingleThreadedExecutor(context=camera.context)
+    executor.add_node(node)
+    end = time.monotonic() + 30.0
+    while not received and time.monotonic() < end:
+        executor.spin_once(timeout_sec=0.1)
+    executor.shutdown()
+    node.destroy_node()
+    assert received == ["eye"]
+
+
 @pytest.mark.parametrize("info_stamp_s", [1, 2, 3])
 def test_only_the_image_of_the_first_camera_info_is_kept_for_it(
     info_stamp_s: int, make_node: Callable[..., Any], hands: Any
@@ -52,7 +90,6 @@ def test_only_the_image_of_the_first_camera_info_is_kept_for_it(
         lambda: 1.0,
         lambda _: None,
         lambda header, *_: delivered.append(header.stamp.sec),
-        QoSProfile(depth=1),
     )
 
     def give(stamp_s: int) -> None:
@@ -67,3 +104,27 @@ def test_only_the_image_of_the_first_camera_info_is_kept_for_it(
     hands.give("/camera_info", camera_info_message(Header(stamp=Time(sec=4)), CAMERA))
     node.destroy_node()
     assert delivered == ([2, 4] if info_stamp_s == 2 else [4])
+
+
+@pytest.mark.parametrize(("profile", "count"), [(qos.LATCHED, 1), (qos.CAMERA, 0)])
+def test_a_camera_info_that_was_latched_before_the_node_is_used(
+    profile: QoSProfile, count: int, make_node: Callable[..., Any]
+) -> None:
+    """The node asks only publishers that latch, since others would report a mismatch."""
+    driver = make_node(name="driver")
+    mismatches: list[str] = []
+    events = qos.publisher_events("/camera_info", mismatches.append)
+    publisher = driver.create_publisher(CameraInfo, "/camera_info", profile, event_callbacks=events)
+    publisher.publish(camera_info_message(Header(), CAMERA))
+    found: list[Any] = []
+    node = CardboxNode("tested", context=driver.context, enable_rosout=False)
+    CameraImages(node, "raw", lambda: 1.0, found.append, lambda *_: None)
+    executor = SingleThreadedExecutor(context=driver.context)
+    for one in (driver, node):
+        executor.add_node(one)
+    deadline_s = time.monotonic() + (20.0 if count else 4.0)
+    while len(found) < max(count, 1) and time.monotonic() < deadline_s:
+        executor.spin_once(0.1)
+    executor.shutdown()
+    node.destroy_node()
+    assert (len(found), mismatches) == (count, [])

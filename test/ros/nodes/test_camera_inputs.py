@@ -44,8 +44,11 @@ class Ears:
         self.callbacks[self.resolve(topic)] = callback
         self.kinds[self.resolve(topic)] = kind
 
-    def hear(self, topic: str, message: Any) -> None:
-        self.callbacks[topic](message, 1)
+    def subscribe_info(self, topic: str, callback: Any) -> None:
+        self.subscribe(CameraInfo, topic, callback, None)
+
+    def hear(self, topic: str, message: Any, sent_ns: int = 1) -> None:
+        self.callbacks[topic](message, sent_ns)
 
 
 def header(stamp_ns: int = 0, frame: str = "left_frame") -> Header:
@@ -154,10 +157,12 @@ class Watching:
         self.views.append(self.source.observed(received))
         assert self.views[-1].header.stamp == lead.message.header.stamp
 
-    def show(self, name: str, stamp_ns: int, size: tuple[int, int] = (48, 64)) -> None:
+    def show(
+        self, name: str, stamp_ns: int, size: tuple[int, int] = (48, 64), sent_ns: int = 1
+    ) -> None:
         pixels = np.full(size, 255, np.uint8)
         message = image_message(header(stamp_ns, f"{name}_frame"), pixels, "mono8")
-        self.node.hear(f"/{name}/silhouette".replace("//", "/"), message)
+        self.node.hear(f"/{name}/silhouette".replace("//", "/"), message, sent_ns)
 
     def show_depth(self, stamp_ns: int, depth_m: np.ndarray) -> None:
         pixels = depth_m.astype(np.float32)
@@ -337,6 +342,30 @@ def test_clocks_a_little_apart_or_adrift_are_told(
     texts = watching.source.warnings()
     assert list(texts) == (["clock of right"] if told else [])
     assert all(f"are {told} apart" in text for text in texts.values())
+
+
+@pytest.mark.parametrize("clock_s", [0.0, -0.5])
+def test_only_other_clocks_are_to_be_synchronized(watching: Watching, clock_s: float) -> None:
+    """The stamps are 0.5 s apart: the images take so long, or their computer's clock is behind."""
+    for number in range(20):
+        now_ns, stamp_ns = input_stream.time.time_ns(), (100 + number) * S
+        watching.show("left", stamp_ns, sent_ns=now_ns)
+        watching.show("right", stamp_ns - S // 2, sent_ns=now_ns + round(clock_s * S))
+        watching.show_depth(stamp_ns, np.ones((48, 64)))
+    text = watching.source.warnings()["clock of right"]
+    assert "0.50 s apart" in text
+    assert ("synchronize them" in text) is (clock_s != 0.0)
+    assert ("smaller or fewer images" in text) is (clock_s == 0.0)
+
+
+def test_of_nothing_at_all_it_is_not_said_that_tracking_goes_on(
+    watching: Watching, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    now_s = input_stream.time.monotonic()
+    monkeypatch.setattr(input_stream.time, "monotonic", lambda: now_s + 10.0)
+    assert not watching.source.warnings()
+    watching.show("left", S)
+    assert len(watching.source.warnings()) == 2
 
 
 @pytest.mark.promise(CLOCKS)

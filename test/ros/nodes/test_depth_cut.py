@@ -32,6 +32,9 @@ class Node:
     def resolve(self, topic: str) -> str:
         return f"/{topic}"
 
+    def subscribe_info(self, topic: str, callback: Any) -> None:
+        self.subscribe(None, topic, callback, None)
+
     def subscribe(self, kind: Any, topic: str, callback: Any, profile: Any) -> None:
         self.heard[topic] = callback
 

@@ -129,6 +129,18 @@ def test_the_rate_can_be_limited(bus: Any) -> None:
     assert np.diff(tenths).tolist()[1:] == [4] * (len(tenths) - 2)
 
 
+@pytest.mark.parametrize(("publish_silhouette", "looked"), [(False, 10), (True, 30)])
+def test_points_alone_leave_time_to_the_tracker(
+    bus: Any, publish_silhouette: bool, looked: int
+) -> None:
+    driver = Driver(bus, publish_silhouette=publish_silhouette)
+    for number in range(30):
+        header = Header(frame_id="eye", stamp=Time(sec=7, nanosec=number * 33_333_333))
+        bus.send("/image_raw", image_message(header, camera_image(100.0), "mono8"))
+    assert len(driver.network.shapes) == pytest.approx(looked, abs=1)
+    assert bus.tick().message == "working"
+
+
 def test_an_image_that_cannot_be_read_is_reported(bus: Any) -> None:
     driver = Driver(bus)
     message = image_message(Header(stamp=Time(sec=3)), camera_image(None), "mono8")

@@ -46,6 +46,9 @@ class Node:
     def subscribe(self, kind: Any, topic: str, callback: Any, profile: Any) -> None:
         self.heard[topic] = callback
 
+    def subscribe_info(self, topic: str, callback: Any) -> None:
+        self.subscribe(None, topic, callback, None)
+
     def see(self, second: int, depth_m: float) -> None:
         """Receive a depth image of uniform depth at twice the working resolution."""
         pixels = np.full((240, 320), 1000 * depth_m, np.uint16)

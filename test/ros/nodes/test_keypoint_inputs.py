@@ -15,6 +15,7 @@ rclpy = pytest.importorskip("rclpy", reason="rclpy is not installed")
 from builtin_interfaces.msg import Time  # noqa: E402
 from geometry_msgs.msg import Point32, Polygon, PolygonStamped, PoseArray  # noqa: E402
 from rclpy.context import Context  # noqa: E402
+from rclpy.qos import QoSProfile  # noqa: E402
 from sensor_msgs.msg import Image  # noqa: E402
 from std_msgs.msg import Header  # noqa: E402
 
@@ -368,7 +369,8 @@ def test_the_type_of_the_publisher_is_used_when_it_comes(
 
 def test_a_package_that_is_missing_is_named(bus: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     tracker = Tracker(bus)
-    ends = [SimpleNamespace(topic_type="yolo_msgs/msg/DetectionArray")]
+    profile = QoSProfile(depth=1)
+    ends = [SimpleNamespace(topic_type="yolo_msgs/msg/DetectionArray", qos_profile=profile)]
     monkeypatch.setattr(tracker.node, "get_publishers_info_by_topic", lambda _: ends)
     monkeypatch.setattr(keypoint_topic, "optional_class", lambda *_: None)
     bus.tick()

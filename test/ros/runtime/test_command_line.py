@@ -58,7 +58,7 @@ def test_the_help_has_every_parameter_topic_and_service(
 def test_the_help_of_the_tracker_in_words(capsys: pytest.CaptureFixture[str]) -> None:
     text = help_of("tracker", capsys)
     assert "  lost_iou (float = 0.4; 0 to 1; live: next image)\n      least IoU of" in text
-    assert "  in  silhouette (sensor_msgs/Image; reliable, 5)\n      of the background node" in text
+    assert "  in  silhouette (sensor_msgs/Image; reliable, 1)\n      of the background node" in text
     assert "  out joint_states_stddev (sensor_msgs/JointState; reliable, 10)\n" in text
     assert "  tracker/reset (std_srvs/Trigger)\n      start again from" in text
 

@@ -52,6 +52,15 @@ def test_heavy_loss_is_seen() -> None:
     assert fed(kept).loss > 0.5
 
 
+def test_a_burst_at_the_start_is_no_loss_for_ever() -> None:
+    statistics = StreamStatistics()
+    stamps = [number * 5_000_000 for number in range(8)]
+    stamps += [stamps[-1] + number * PERIOD_NS for number in range(1, 401)]
+    for stamp in stamps:
+        statistics.add(1_000_000_000 + stamp)
+    assert (statistics.dropped, statistics.loss) == (0, 0.0)
+
+
 def test_a_pause_of_the_source_is_no_loss() -> None:
     statistics = fed([*range(20), *range(200, 220)])
     assert statistics.dropped == 0
@@ -230,6 +239,22 @@ def test_what_only_the_diagnostics_said_is_logged_once(
     assert "29 % are lost" in [value.value for value in status.values]
 
 
+def test_what_others_wrote_is_bounded_and_has_no_escape_codes(
+    make_node: Callable, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    node = make_node()
+    diagnostics = NodeDiagnostics(node)
+    logged = Logged(node, monkeypatch)
+    foreign = "\x1b[2J" + "x" * 1_000_000
+    diagnostics.advice = lambda: {"frame": foreign}
+    diagnostics.warn(foreign)
+    diagnostics.say("said", foreign)
+    diagnostics.problem(foreign)
+    texts = [*logged.lines, *(value.value for value in diagnostics.status().values)]
+    assert sum(len(text) > 1000 for text in texts) >= 5
+    assert all(len(text) < 3000 and "\x1b" not in text for text in texts)
+
+
 def test_good_images_between_do_not_open_the_log(
     make_node: Callable, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -242,12 +267,16 @@ def test_good_images_between_do_not_open_the_log(
     assert len(logged.lines) == 3
 
 
-@pytest.mark.parametrize(("periods", "slow"), [(0.5, False), (3.0, True)])
+@pytest.mark.parametrize(
+    ("periods", "remedy", "said"), [(0.5, "do X", False), (3.0, "do X", True), (3.0, "", False)]
+)
 def test_a_node_that_needs_longer_than_a_period_says_what_to_do(
-    make_node: Callable, periods: float, slow: bool
+    make_node: Callable, periods: float, remedy: str, said: bool
 ) -> None:
     diagnostics = NodeDiagnostics(make_node())
+    diagnostics.remedy = remedy
     for frame in range(40):
         diagnostics.input.add(1_000_000_000 + frame * PERIOD_NS)
         diagnostics.working(sent_ns=time.time_ns() - int(periods * PERIOD_NS))
-    assert ("effort" in diagnostics.status().message) is slow
+    assert diagnostics.status().message.endswith("left out; do X" if said else "working")
+    assert diagnostics.is_slow is (periods > 1)

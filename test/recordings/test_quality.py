@@ -1,0 +1,86 @@
+"""How good results are, in words."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any, cast
+
+import numpy as np
+import pytest
+
+from cardbox_tracker.person.model import BodyModel
+from cardbox_tracker.person.skeleton import JOINT_NAMES, KeypointState
+from cardbox_tracker.recordings.quality import Quality
+from cardbox_tracker.tracking.estimate import LOST, NO_PERSON, TRACKING, UNCERTAIN, Estimate
+from cardbox_tracker.tracking.place import Place
+
+SURE, UNSURE = KeypointState.TRACKED, KeypointState.UNCERTAIN
+BODY = BodyModel()
+
+
+class Frame:
+    def __init__(self, time_s: float) -> None:
+        self.time_s = time_s
+        self.body = BODY
+
+
+def estimate(state: str, right: KeypointState = SURE, chance: float = 0.0) -> Estimate:
+    stddev = np.zeros(12)
+    stddev[JOINT_NAMES.index("torso_y")] = 0.05
+    stddev[JOINT_NAMES.index("torso_roll") :] = np.radians(8.0)
+    return Estimate(
+        state,
+        np.zeros(12),
+        stddev,
+        keypoint_states=(SURE, SURE, SURE, SURE, SURE, right),
+        keypoint_chances=np.array([0, 0, 0, 0, 0, chance]),
+    )
+
+
+def lines(*images: tuple[float, Estimate]) -> list[str]:
+    quality = Quality()
+    for time_s, one in images:
+        quality(cast(Any, Frame(time_s)), one, cast(Any, Frame(time_s)))
+    return list(quality.lines())
+
+
+def test_sure_images_and_hands_are_counted() -> None:
+    share, deviation, moments = lines(
+        (0.0, replace(estimate(TRACKING), place=Place(np.zeros(3), 0.01, "given"))),
+        (1.0, replace(estimate(UNCERTAIN, UNSURE, 0.3), place=Place(np.zeros(3), 0.9, "given"))),
+        (5.0, Estimate(LOST)),
+        (9.0, Estimate(NO_PERSON)),
+    )
+    assert share == (
+        "sure: 25% of 4 images, 38% of the hands in them, 25% of the distances (to 0.3 m)"
+    )
+    assert deviation.startswith("typical standard deviation: 8 degrees of an angle, ")
+    assert moments == "least sure, look at them: 1.0 s (right hand), 5.0 s (lost)"
+
+
+def test_a_hand_deviates_with_its_joints_and_its_place() -> None:
+    """Sideways with the torso alone: 5 cm."""
+    only = estimate(TRACKING)
+    assert only.posture_stddev is not None
+    only.posture_stddev[1:] = 0.0
+    assert lines((0.0, only))[1].endswith("0 degrees of an angle, 5 cm of a hand")
+
+
+def test_the_worst_moments_are_apart_and_in_order() -> None:
+    images = [(time_s, estimate(UNCERTAIN, UNSURE, chance)) for time_s, chance in SOME]
+    assert lines(*images)[2] == (
+        "least sure, look at them: 1.0 s (right hand), 5.0 s (right hand), 9.0 s (right hand)"
+    )
+
+
+SOME = [(1.0, 0.5), (3.0, 0.4), (5.0, 0.9), (7.0, 0.8), (9.0, 0.3)]
+
+
+def test_without_images_there_is_nothing_to_say() -> None:
+    assert lines() == []
+
+
+@pytest.mark.parametrize("count", [1, 30])
+def test_few_moments_are_named(count: int) -> None:
+    images = [(4.0 * n, estimate(UNCERTAIN, UNSURE, 0.5)) for n in range(count)]
+    assert lines(*images)[2].count("right hand") == min(count, 5)

@@ -1,0 +1,115 @@
+"""Somebody who was not measured is tracked at once, with what the images show."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+pytest.importorskip("rclpy", reason="rclpy is not installed")
+
+from builtin_interfaces.msg import Time
+from std_msgs.msg import Float64, Header, String
+
+from cardbox_tracker.camera.camera import Camera
+from cardbox_tracker.camera.rasterisation import render
+from cardbox_tracker.detectors.landmarks import LANDMARKS
+from cardbox_tracker.detectors.pose_network import Detection
+from cardbox_tracker.measuring.standing_camera import LEVELS
+from cardbox_tracker.person.cardbox import cardbox_patches
+from cardbox_tracker.person.model_file import dumps_body_model, loads_body_model
+from cardbox_tracker.person.posture import reference_posture
+from cardbox_tracker.person.proportions import STATURE_M, body_from_proportions
+from cardbox_tracker.ros.messages.conversions import camera_info_message, image_message
+from cardbox_tracker.ros.nodes.camera_pitch import CameraPitch
+from cardbox_tracker.ros.nodes.tracker_node import TrackerNode
+from cardbox_tracker.ros.nodes.tracker_parameters import TrackerParameters
+from cardbox_tracker.ros.runtime.node import CardboxNode
+
+CAMERA = Camera(160, 120, 150.0, 150.0, 79.5, 59.5)
+PERSON = body_from_proportions(1.8, 2.3, hip_height_m=-0.4).with_values(unknown=())
+OUTLINE = render(cardbox_patches(PERSON, reference_posture("front")), CAMERA)
+
+
+@pytest.fixture
+def start(bus: Any) -> Any:
+    """Return a function that starts a tracker with a camera."""
+
+    def begin(**parameters: Any) -> TrackerNode:
+        node: TrackerNode = bus.start(TrackerNode, **parameters)
+        bus.send("/silhouette/camera_info", camera_info_message(Header(frame_id="eye"), CAMERA))
+        return node
+
+    return begin
+
+
+def show(bus: Any, second: int) -> None:
+    header = Header(frame_id="eye", stamp=Time(sec=second))
+    bus.send("/silhouette", image_message(header, OUTLINE, "mono8"))
+
+
+def test_a_stature_is_enough(bus: Any, start: Any) -> None:
+    start(stature=1.8)
+    show(bus, 1)
+    assert bus.sent["/joint_states"]
+    (text,) = bus.texts("/body_model")
+    found = loads_body_model(text)
+    assert not found.unknown
+    assert found.placement.distance_m == pytest.approx(2.3, rel=0.15)
+    assert len(bus.sent["/robot_description"]) == 1
+    # The node hears what it has published itself, and goes on.
+    bus.send("/body_model", String(data=text))
+    show(bus, 2)
+    assert bus.texts("/body_model") == [text]
+
+
+def test_a_measured_body_replaces_it(bus: Any, start: Any) -> None:
+    node = start(stature=1.8)
+    show(bus, 1)
+    measured = dumps_body_model(PERSON)
+    bus.send("/body_model", String(data=measured))
+    bus.send("/detector/camera_pitch", Float64(data=0.2))
+    show(bus, 2)
+    assert node._body == loads_body_model(measured)
+    assert bus.texts("/body_model")[-1] == measured
+
+
+def test_the_detectors_pitch_is_used(bus: Any, start: Any) -> None:
+    node = start(keypoints="detector/keypoints")
+    assert node._body == body_from_proportions(STATURE_M)
+    bus.send("/detector/camera_pitch", Float64(data=0.2))
+    assert node._body.camera_pose.pitch_rad == 0.2
+    bus.send("/detector/camera_pitch", Float64(data=float("nan")))
+    assert node._body.camera_pose.pitch_rad == 0.2
+
+
+@pytest.mark.parametrize(
+    ("more", "expected"), [({"cameras": ["a", "b"]}, "for one camera"), ({}, "expected 1.1 to 2.2")]
+)
+def test_an_impossible_stature_is_refused(more: dict[str, Any], expected: str) -> None:
+    with pytest.raises(ValueError, match=expected):
+        TrackerParameters(stature=1.8 if more else 0.5, **more).check()
+
+
+def test_without_either_a_measured_body_is_waited_for(bus: Any, start: Any) -> None:
+    start()
+    show(bus, 1)
+    assert "body model" in bus.tick().message
+    assert not bus.sent["/joint_states"] and "/body_model" not in bus.sent
+
+
+@pytest.mark.parametrize("shown", [True, False])
+def test_a_standing_person_shows_the_detector_the_pitch(bus: Any, shown: bool) -> None:
+    pitch = CameraPitch(bus.start(lambda **options: CardboxNode("detector", **options)))
+    camera, px = CAMERA.with_pitch(0.2), np.zeros((33, 2))
+    for number, name in enumerate(LANDMARKS):
+        level = LEVELS.get(name.removeprefix("left_").removeprefix("right_"))
+        if level is not None:
+            there = np.array((-2.5 + 1.8 * level.forward, 0.0, 1.8 * level.height - 1.6))
+            px[number] = camera.project(camera.reference_to_optical(there))
+    scores = np.full(33, 0.9 if shown else 0.1)
+    for _ in range(40):
+        pitch.see(Detection(px, scores, np.zeros((120, 160), np.uint8)), CAMERA)
+    found = bus.texts("/detector/camera_pitch")
+    assert found == ([pytest.approx(0.2, abs=0.06)] if shown else [])
