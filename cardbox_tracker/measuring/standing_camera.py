@@ -93,7 +93,7 @@ class StandingCamera(NamedTuple):
     @property
     def is_pitch_found(self) -> bool:
         """Whether the points themselves show the pitch, as those of a whole person do."""
-        return self.pitch_stddev_rad < _FOUND
+        return bool(self.pitch_stddev_rad < _FOUND)
 
     @property
     def roll_rad(self) -> float:
