@@ -9,7 +9,7 @@ from cardbox_tracker.commands.arguments import add_force, body_beside, check_out
 from cardbox_tracker.common.errors import CardboxError
 
 NAME = "export"
-HELP = "write results as TRC, BVH or C3D, or as joint angles of the ISB"
+HELP = "write results as TRC, MOT, BVH or C3D, or as joint angles of the ISB"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -26,8 +26,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--to",
         choices=FORMATS,
         required=True,
-        help="trc: markers for OpenSim and Pose2Sim; bvh: skeleton for Blender; c3d: markers, with "
-        "ezc3d; isb: CSV with joint angles by the recommendations of the ISB (docs/export.md)",
+        help="trc: markers for OpenSim and Pose2Sim; mot: coordinates for OpenSim; bvh: skeleton "
+        "for Blender; c3d: markers, with ezc3d; isb: CSV with joint angles by the recommendations "
+        "of the ISB (docs/export.md)",
     )
     parser.add_argument(
         "--output",
@@ -40,9 +41,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--model",
         type=Path,
         metavar="MODEL.yaml",
-        help="the person with whom the results were tracked, which bvh needs; trc and c3d take "
-        "the pitch of the camera from it, and get markers at hips and neck. A bag contains it, and "
-        "OUT.body.yaml beside the table OUT.csv is found",
+        help="the person with whom the results were tracked, which bvh needs; trc, mot "
+        "and c3d take the pitch of the camera from it, and the places of hips and neck. A bag "
+        "contains it, and OUT.body.yaml beside the table OUT.csv is found",
     )
     add_force(parser)
 

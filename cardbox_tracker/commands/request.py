@@ -32,6 +32,7 @@ from cardbox_tracker.common.settings import NoEffectError, nested, settings_of
 
 if TYPE_CHECKING:
     from cardbox_tracker.detectors.detector import Detector
+    from cardbox_tracker.detectors.person_choice import PersonChoice
     from cardbox_tracker.detectors.point_table import PointTable
     from cardbox_tracker.person.model import BodyModel
     from cardbox_tracker.recordings.given_camera import GivenCamera
@@ -129,6 +130,7 @@ class PersonRequest:
         body: the person; the mean sizes of people of the given stature without ``model``.
         model: the file of a measured person; None if only the stature is given.
         start_s: seconds from the recording's start at which tracking starts.
+        end_s: the same at which it ends; inf for the end of the recording.
         is_pitch_given: whether ``body`` has the camera's pitch; else it is to be found from the
             person who stands upright.
         stature_m: the stature that is given; None with ``model``.
@@ -139,6 +141,7 @@ class PersonRequest:
     start_s: float
     is_pitch_given: bool
     stature_m: float | None = None
+    end_s: float = math.inf
 
 
 TABLES = ("csv", "parquet")
@@ -283,9 +286,17 @@ def add_recording(parser: argparse.ArgumentParser, required: bool = True) -> Non
     )
     add(
         "--detector",
-        metavar="mediapipe|FILE.csv",
+        metavar="mediapipe|FILE|FOLDER",
         help="also use 2D points of the person's joints: those of MediaPipe's networks ('cardbox "
-        "detector --install'), or a table that any detector has written (docs/detectors.md)",
+        "detector --install'), or those that any detector has written: a table FILE.csv, a file of "
+        "COCO FILE.json, or a folder of OpenPose's files (docs/detectors.md)",
+    )
+    add(
+        "--person",
+        type=_person_choice,
+        metavar="left|right|largest|X,Y",
+        help="with --detector mediapipe: whom of several people to follow: the left or right one "
+        "in the image, the largest, or the one at column X and row Y",
     )
     add(
         "--fov",
@@ -356,8 +367,9 @@ def add_tracking(parser: argparse.ArgumentParser, needs_recording: bool = True) 
         type=time,
         metavar="T",
         help="second at which the person stands as for --front; tracking starts there. With "
-        "--stature, or a body of 'cardbox body', any posture will do (default with --stature: 0)",
+        "--stature, or a body that was not measured, any posture will do (default: 0)",
     )
+    add("--end", type=time, metavar="T", help="second at which tracking ends (default: the last)")
     add_preset(parser)
     effort = settings_of(WholeBodyConfig)["effort"]
     add(
@@ -383,6 +395,15 @@ def add_tracking(parser: argparse.ArgumentParser, needs_recording: bool = True) 
     for flag in RETIRED:
         add(flag, action=_Refuse, nargs="?", help=argparse.SUPPRESS)
     add_seed(parser, "the filters")
+
+
+def _person_choice(text: str) -> PersonChoice:
+    from cardbox_tracker.detectors.person_choice import PersonChoice
+
+    try:
+        return PersonChoice.parse(text)
+    except ValueError as error:
+        raise argparse.ArgumentTypeError(str(error)) from None
 
 
 class _Refuse(argparse.Action):
@@ -429,6 +450,7 @@ def _setting(text: str) -> tuple[str, bool | int | float | str]:
 def recording_request(options: argparse.Namespace, problems: Problems) -> RecordingRequest:
     """Return what the options of :func:`add_recording` ask for; note what is wrong with them."""
     from cardbox_tracker.camera.pairing import camera_names
+    from cardbox_tracker.detectors.detector import Detector
     from cardbox_tracker.recordings.open_images import check_exists
     from cardbox_tracker.recordings.recording import input_faults
 
@@ -439,6 +461,13 @@ def recording_request(options: argparse.Namespace, problems: Problems) -> Record
     points: Detector | PointTable | None = None
     if options.detector is not None:
         points = problems.caught(lambda: points_named(options.detector), None)
+    if options.person is not None:
+        if not any(isinstance(one, Detector) for one in (silhouettes, points)):
+            problems.add("--person needs a detector that finds people: give --detector mediapipe")
+        if isinstance(silhouettes, Detector):
+            silhouettes = silhouettes._replace(person=options.person)
+        if isinstance(points, Detector):
+            points = points._replace(person=options.person)
     names: tuple[str, ...] = ()
     names = problems.caught(lambda: tuple(camera_names(options.cameras)), names)
     for fault in input_faults(path, silhouettes, names, depth, camera):
@@ -549,10 +578,10 @@ def _silhouettes(options: argparse.Namespace, problems: Problems) -> Segmentatio
 
 
 def points_named(name: str) -> Detector | PointTable:
-    """Return the source of 2D points of a name: the detector's, or the path of a table.
+    """Return the source of 2D points of a name: the detector's, or the path of given points.
 
     Raises:
-        CardboxError: the detector is not installed, or there is no such table.
+        CardboxError: the detector is not installed, or there are no such points.
     """
     from cardbox_tracker.detectors.detector import MEDIAPIPE, Detector
     from cardbox_tracker.detectors.point_table import PointTable
@@ -560,16 +589,16 @@ def points_named(name: str) -> Detector | PointTable:
     if name == MEDIAPIPE:
         return Detector.installed()
     path = Path(name)
-    if not path.is_file():
+    if not path.exists():
         raise CardboxError(
-            f"--detector is {name!r}; expected {MEDIAPIPE}, or the file of a table of points "
-            "(docs/detectors.md)"
+            f"--detector is {name!r}; expected {MEDIAPIPE}, or points in a table, in a file of "
+            "COCO, or in a folder of OpenPose (docs/detectors.md)"
         )
     return PointTable(path)
 
 
 def _person(options: argparse.Namespace, problems: Problems) -> PersonRequest:
-    from cardbox_tracker.person.model import BodyModel
+    from cardbox_tracker.person.model import MEASURED, BodyModel
     from cardbox_tracker.person.model_file import load_body_model
     from cardbox_tracker.person.proportions import USUAL_STATURE_M, body_from_proportions
 
@@ -591,11 +620,14 @@ def _person(options: argparse.Namespace, problems: Problems) -> PersonRequest:
         for flag, value in (("--distance", options.distance), ("--camera-pitch-deg", pitch_deg)):
             if value is not None:
                 problems.add(f"{flag} has no effect with --model, which contains it")
-        if options.start is None:
-            problems.miss("--start T", "with --model, the person stands as for --front at T")
         body = problems.caught(lambda: load_body_model(options.model), body)
+        if options.start is None and body.source == MEASURED:
+            problems.miss("--start T", "a measured person stands as for --front at T")
     is_pitch_given = options.model is not None or pitch_deg is not None
-    return PersonRequest(body, options.model, options.start or 0.0, is_pitch_given, options.stature)
+    start_s, end_s = options.start or 0.0, math.inf if options.end is None else options.end
+    if end_s <= start_s:
+        problems.add(f"--end {end_s:g} is not after --start {start_s:g}: give a later second")
+    return PersonRequest(body, options.model, start_s, is_pitch_given, options.stature, end_s)
 
 
 def _config(options: argparse.Namespace, preset: TrackerConfig) -> TrackerConfig:
@@ -678,6 +710,6 @@ def _read_options(path: Path) -> dict[str, Any]:
     for name, value in given.items():
         if isinstance(value, Path):
             given[name] = path.parent / value
-        elif name == "detector" and (path.parent / value).is_file():
+        elif name == "detector" and (path.parent / value).exists():
             given[name] = str(path.parent / value)
     return given

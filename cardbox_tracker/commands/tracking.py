@@ -82,7 +82,7 @@ def track(
     with recording.open() as source:
         early = source.first.remarks
         print_remarks(early)
-        total_s = max(1e-9, source.first.duration_s - start_s)
+        total_s = max(1e-9, min(source.first.duration_s, person.end_s) - start_s)
         with ExitStack() as stack:
             observers = (*_writers(request, source, stack), *observers)
             advance = show or stack.enter_context(progress_bar("track"))
@@ -98,6 +98,7 @@ def track(
                     quality,
                     lambda frame, *_: advance((frame.time_s - start_s) / total_s),
                 ),
+                person.end_s,
             )
         remarks = [remark for remark in source.first.remarks if remark not in early]
         accounts = tuple(one.account for one in source.sources)
@@ -108,6 +109,8 @@ def track(
     print_remarks(remarks, summary.remarks)
     if show is None:
         print(f"assumed: {', '.join(summary.assumptions)}", *quality.lines(), sep="\n")
+        if summary.used_text:
+            print(summary.used_text)
     if request.files.body is not None and summary.body is not None:
         save_body_model(summary.body, request.files.body)
     return summary
@@ -115,24 +118,26 @@ def track(
 
 def _assumptions(request: TrackingRequest, camera: Camera, body: BodyModel) -> Iterator[str]:
     """Yield camera, place and stature with where they are from; ``body`` is that of the end."""
-    from cardbox_tracker.camera.camera import GIVEN_FIELD_OF_VIEW
+    from cardbox_tracker.person.proportions import USUAL_STATURE_M
+    from cardbox_tracker.recordings.given_camera import GUESSED_STDDEV
 
     person, given = request.person, request.recording.camera
-    lens = "from the recording" if given.calibration is None else f"from {given.calibration.name}"
-    if camera.focal_stddev > GIVEN_FIELD_OF_VIEW:
-        lens = "assumed"
+    lens = "guessed" if camera.focal_stddev >= GUESSED_STDDEV else "from the recording"
+    if given.is_calibrated:
+        lens = "given" if given.calibration is None else f"from {given.calibration.name}"
     fov_deg = math.degrees(2 * math.atan(camera.width / 2 / camera.fx))
-    yield f"field of view {fov_deg:.0f} degrees ({'given' if given.fov_deg else lens})"
+    yield f"field of view {fov_deg:.0f} degrees ({lens})"
     source = "given" if person.model is None else f"from {person.model.name}"
-    pitch_rad = body.camera_pose.pitch_rad
-    pitch = source if person.is_pitch_given else "found" if pitch_rad else "not found, taken as 0"
-    yield f"camera pitch {math.degrees(pitch_rad):.0f} degrees down ({pitch})"
+    tilt = body.camera_pose
+    deviation = f"standard deviation {math.degrees(tilt.pitch_stddev_rad):.0f}"
+    pitch = source if person.is_pitch_given else f"found, {deviation}"
+    yield f"camera pitch {math.degrees(tilt.pitch_rad):.0f} degrees down ({pitch})"
     distance = "found" if "distance_m" in person.body.unknown else source
     yield f"distance {body.placement.distance_m:.2f} m ({distance})"
     if person.stature_m is not None:
         yield f"stature {person.stature_m:.2f} m (given), sizes from proportions"
     elif person.model is None:
-        yield "stature of most adults, sizes from proportions"
+        yield f"stature {USUAL_STATURE_M:.2f} m (the mean of adults), sizes from proportions"
     else:
         yield f"sizes {source}"
 
@@ -201,7 +206,10 @@ def placed(
     pitch, deviation = math.degrees(tilt.pitch_rad), math.degrees(tilt.pitch_stddev_rad)
     sources = ["the vertical edges of the room"] if tilt.has_edges else []
     if found.span is not None:
-        sources.append(f"the person standing upright at {found.span} s")
+        first_s, last_s = found.span.start_s, found.span.end_s
+        sources.append(
+            f"the person standing upright between the seconds {first_s:g} and {last_s:g}"
+        )
     number = f"{abs(pitch):.0f} degrees {'down' if pitch >= 0 else 'up'}"
     number += f" (standard deviation {deviation:.0f})"
     remarks = []
@@ -218,11 +226,11 @@ def placed(
             "if it is known"
         )
     else:
-        searched = span._replace(end_s=max(span.end_s, until_s))
+        end_s = max(span.end_s, until_s)
         remarks.append(
-            f"nobody stands upright at {searched} s and no edges of the room are vertical, so the "
-            f"camera's pitch is taken as that of most cameras, {number}; give --camera-pitch-deg "
-            "if it is known"
+            f"nobody stands upright between the seconds {span.start_s:g} and {end_s:g} and no "
+            "edges of the room are vertical, so the camera's pitch is taken as that of most "
+            f"cameras, {number}; give --camera-pitch-deg if it is known"
         )
     if tilt.roll_rad and camera.roll_rad is None and len(recording.cameras) < 2:
         remarks.append(

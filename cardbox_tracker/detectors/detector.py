@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
@@ -11,12 +10,10 @@ from numpy.typing import NDArray
 from cardbox_tracker.detectors.image_points import ImagePoints
 from cardbox_tracker.detectors.landmarks import image_points
 from cardbox_tracker.detectors.model_files import ModelFiles, installed_models
+from cardbox_tracker.detectors.person_choice import PersonChoice
 from cardbox_tracker.detectors.pose_network import Detection, PoseNetwork
 
 Image = NDArray[np.uint8]
-
-FindPoints = Callable[[int, Image], ImagePoints | None]
-"""Takes the stamp, ns, and the image at the working size; returns the points in that image."""
 
 MEDIAPIPE = "mediapipe"
 """Name of the detector whose networks ``cardbox detector --install`` installs."""
@@ -27,9 +24,11 @@ class Detector(NamedTuple):
 
     Attributes:
         models: its network files.
+        person: whom to follow, px of the camera's own image; None for the most certain person.
     """
 
     models: ModelFiles
+    person: PersonChoice | None = None
 
     @classmethod
     def installed(cls) -> Detector:
@@ -40,13 +39,20 @@ class Detector(NamedTuple):
         """
         return cls(installed_models())
 
-    def start(self) -> PersonDetector:
+    def start(self, across: float = 1.0, down: float = 1.0) -> PersonDetector:
         """Return a detector for the images of one camera.
+
+        Args:
+            across: width of the images that it gets, as a share of that of the camera's own image.
+            down: the same for their height.
 
         Raises:
             CardboxError: the networks cannot be loaded.
         """
-        return PersonDetector(PoseNetwork(*self.models))
+        network = PoseNetwork(*self.models)
+        if self.person is not None:
+            network.choose = self.person.scaled(across, down)
+        return PersonDetector(network)
 
 
 class PersonDetector:
@@ -73,7 +79,18 @@ class PersonDetector:
         self.missed += found is None
         return found
 
-    def points(self, stamp_ns: int, image: Image) -> ImagePoints | None:
-        """Return the points in an image; see ``FindPoints``."""
+    @property
+    def remark(self) -> str:
+        """A remark about several people in the images; empty if there were none."""
+        if not self._network.several:
+            return ""
+        whom = "the most certain one" if self._network.choose is None else "the chosen one"
+        return (
+            f"the detector sees several people and follows {whom}; --person left|right|largest|X,Y "
+            "chooses"
+        )
+
+    def points(self, image: Image) -> ImagePoints | None:
+        """Return the points in an image at the working size."""
         found = self(image)
         return None if found is None else image_points(found)

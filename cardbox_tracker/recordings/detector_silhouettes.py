@@ -42,17 +42,19 @@ class DetectorSilhouetteSource(SilhouetteSource):
         self._find_points(None if isinstance(points, Detector) else points, camera)
         self._has_own_points = isinstance(points, Detector)
         self._has_points = points is not None
-        self._detector = self._person = detector.start()
+        self._detector = self._person = self._started(detector)
 
     def frames(self, start_s: float = 0.0, end_s: float = float("inf")) -> Iterator[RecordedFrame]:
         """Yield every image from ``start_s`` to ``end_s``, in order, with the person's mask.
 
         The detector starts anew at ``start_s``, so that a frame depends on the span alone.
         """
-        for (stamp_ns, time_s, image, recorded), person in self.detections(start_s, end_s):
+        self._restart_points()
+        for prepared, person in self.detections(start_s, end_s):
+            stamp_ns, time_s, image, recorded, _ = prepared
             nobody = np.zeros(image.shape[:2], np.uint8)
             silhouette = nobody if person is None else person.silhouette()
-            points = self._points(stamp_ns, image)
+            points = self._points(prepared, silhouette)
             if person is not None and self._has_own_points:
                 points = image_points(person)
             seen = brightness_of(image), silhouette, image

@@ -17,8 +17,8 @@ FOV_HINT = "webcams 60 to 78, phones 60 to 75 held sideways, 36 to 46 upright"
 """Usual fields of view across the width of an image, degrees, for texts."""
 # Field of view along the longer side that is assumed where nothing tells it, degrees.
 _GUESSED_DEG = 65.0
-# Relative standard deviation of the focal length of such a guess.
-_GUESSED_STDDEV = 0.13
+GUESSED_STDDEV = 0.13
+"""Relative standard deviation of the focal length of such a guess."""
 
 
 @dataclass(frozen=True)
@@ -68,7 +68,7 @@ class GivenCamera:
         """Return the calibration of images of ``width`` x ``height`` px in the recording ``path``.
 
         Args:
-            path: the recording.
+            path: the recording, for texts.
             width: width of the images, px.
             height: height of the images, px.
             frame_id: name of the camera's optical frame.
@@ -90,7 +90,7 @@ class GivenCamera:
             fov_deg, is_told = _fov_deg(file, width, height)
             found = Calibration.of_fov(width, height, fov_deg)
             if not is_told:
-                found = replace(found, focal_stddev=_GUESSED_STDDEV)
+                found = replace(found, focal_stddev=GUESSED_STDDEV)
         else:
             raise CameraError(
                 f"{path} does not tell the camera's field of view; give --fov DEG, across the "

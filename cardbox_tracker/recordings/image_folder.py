@@ -52,8 +52,8 @@ class ImageFolder(Film):
         """Store the path and the camera; the folder is read on entry."""
         super().__init__(path, camera)
         self._files: list[Path] = []
-        self._first = path
         self._levels = Levels()
+        self._first = path
 
     def __enter__(self) -> ImageFolder:
         """Read the names of the images, and the size of the first one that can be decoded."""
@@ -76,10 +76,6 @@ class ImageFolder(Film):
         self.duration_s = (len(self._files) - 1) / (self._given.fps or FPS)
         return self
 
-    @property
-    def _file(self) -> Path:
-        return self._first
-
     def left_out(self, topic: str) -> list[str]:
         """Return the files that are no images; see ``ImageRecording``."""
         names = sorted(path.name for path in self.path.iterdir() if path.is_file())
@@ -92,11 +88,16 @@ class ImageFolder(Film):
             if files
         ]
 
+    @property
+    def _file(self) -> Path:
+        return self._first
+
     def images(self, topic: str | None = None) -> Iterator[RecordedImage]:
         """Yield the images in order, at the given rate."""
         for number, file in enumerate(self._files):
             stamp_ns = round(1e9 * number / (self._given.fps or FPS))
-            yield RecordedImage(stamp_ns, "", stamp_ns, partial(self._image, file, self._size))
+            decode = partial(self._image, file, self._size)
+            yield RecordedImage(stamp_ns, "", stamp_ns, decode, file.name)
 
     def _image(self, file: Path, size: tuple[int, int] | None = None) -> NDArray[np.uint8]:
         """Return an image (H, W) or (H, W, 3), which must have ``size`` (width, height), px."""

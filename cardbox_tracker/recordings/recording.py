@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, contextmanager
@@ -125,11 +126,18 @@ class Recording:
         """The first camera, in whose frame the results are."""
         return self.sources[0]
 
-    def frames(self, start_s: float = 0.0) -> Iterator[FrameSet]:
-        """Yield synchronized frames from ``start_s`` on; each image is in exactly one set."""
+    def check_points(self) -> None:
+        """Raise CardboxError if the given points of no camera could be used in any image."""
+        faults = [source.points_fault for source in self.sources]
+        if all(faults):
+            raise CardboxError(faults[0])
+
+    def frames(self, start_s: float = 0.0, end_s: float = math.inf) -> Iterator[FrameSet]:
+        """Yield synchronized frames from ``start_s`` to ``end_s``; each image is in one set."""
         # Images slightly before the start can belong to the first set.
         early_s = max(0.0, start_s - self._tolerance_ns / 1e9)
-        streams = [source.frames(early_s) for source in self.sources]
+        late_s = end_s + self._tolerance_ns / 1e9
+        streams = [source.frames(early_s, late_s) for source in self.sources]
         depths = self._depths()
         depth = next(depths, None)
         black = np.zeros((self.first.camera.height, self.first.camera.width), np.uint8)
@@ -139,6 +147,8 @@ class Recording:
                 depth = next(depths, None)
             if lead.time_s < start_s:
                 continue
+            if lead.time_s > end_s:
+                break
             there = None
             if self._cuts_by_depth and frames[0] is not None:
                 there = frames[0].depth_m

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import math
+from collections.abc import Callable, Mapping
 from contextlib import nullcontext
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
@@ -34,6 +35,7 @@ class TrackSummary:
         frames_uncertain: number of tracked images whose posture may be wrong.
         remarks: warnings about extrinsics or depth that seem to be wrong.
         body: the body at the end, whose unknown values were fitted.
+        used: in how many images each optional input was used, by its name.
         accounts: for each camera, what was used of it and what was left out.
         assumptions: what the results rest on, with its numbers and where they are from.
     """
@@ -47,6 +49,14 @@ class TrackSummary:
     body: BodyModel | None = None
     accounts: tuple[str, ...] = ()
     assumptions: tuple[str, ...] = ()
+    used: Mapping[str, int] = field(default_factory=dict)
+
+    @property
+    def used_text(self) -> str:
+        """The optional inputs and in how many images each was used; empty without any."""
+        shares = (f"{name} in {count}" for name, count in self.used.items())
+        text = ", ".join(shares)
+        return f"used {text} of {self.frames} images" if text else ""
 
 
 def track_recording(
@@ -57,8 +67,9 @@ def track_recording(
     start_s: float,
     table: Path | None = None,
     observers: tuple[Observer, ...] = (),
+    end_s: float = math.inf,
 ) -> TrackSummary:
-    """Track every image from ``start_s`` on.
+    """Track every image from ``start_s`` to ``end_s``.
 
     Args:
         recording: an open recording.
@@ -69,6 +80,7 @@ def track_recording(
             reference posture.
         table: file to write with a row for each image, see :func:`~.result_table.result_table`.
         observers: called after each image, such as a progress bar or a bag writer.
+        end_s: seconds from the recording's start after which no image is tracked.
 
     Raises:
         CardboxError: no image lies after ``start_s``, or a file cannot be written.
@@ -81,7 +93,7 @@ def track_recording(
     with (
         nullcontext() if table is None else result_table(table, recording.first.has_points)
     ) as add_row:
-        for taken in recording.frames(start_s):
+        for taken in recording.frames(start_s, end_s):
             estimate, frame = tracker.track(taken.observations), taken.first
             frames += 1
             frames_uncertain += estimate.state == UNCERTAIN
@@ -98,9 +110,17 @@ def track_recording(
             raise CardboxError(
                 f"no image lies after --start {start_s:g} s; give seconds from its start"
             )
+        recording.check_points()
     mean = (float(np.mean(costs)), float(np.mean(ious))) if costs else (float("nan"),) * 2
     remarks = tracker.remarks
     if tracker.agreement is not None:
         tracker.agreement.check(is_last=True)
         remarks += tracker.agreement.remarks(recording.names[1:])
-    return TrackSummary(frames, len(costs), *mean, frames_uncertain, tuple(remarks), tracker.body)
+    given = ("points", recording.first.has_points), ("depth", recording.measures_depth)
+    names = {f"camera {number}": name for number, name in enumerate(recording.names, 1)}
+    used = {name: 0 for name, is_given in given if is_given} | {
+        names.get(name, name): count for name, count in tracker.used.items()
+    }
+    return TrackSummary(
+        frames, len(costs), *mean, frames_uncertain, tuple(remarks), tracker.body, used=used
+    )

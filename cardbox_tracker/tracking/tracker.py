@@ -29,6 +29,7 @@ from cardbox_tracker.search.pose_filter import (
 )
 from cardbox_tracker.search.whole_body import WholeBodyFilter
 from cardbox_tracker.terms.compiled import CompiledSilhouette
+from cardbox_tracker.terms.inner_cue import InnerCueTerm
 from cardbox_tracker.terms.silhouette import SilhouetteTerm
 from cardbox_tracker.terms.term import USUAL_INTERVAL_S, Frame, Image, Posed, Silhouette
 from cardbox_tracker.tracking.camera_agreement import CameraAgreement
@@ -41,6 +42,7 @@ from cardbox_tracker.tracking.estimate import (
 )
 from cardbox_tracker.tracking.facing import Facing
 from cardbox_tracker.tracking.fitting import Fitting
+from cardbox_tracker.tracking.frozen import FrozenCameras
 from cardbox_tracker.tracking.head import HeadTracker
 from cardbox_tracker.tracking.observation import Observation, Observations, stamp_of
 from cardbox_tracker.tracking.place import PlaceWatch
@@ -51,11 +53,11 @@ FILTERS: MappingProxyType[str, MakeFilter] = MappingProxyType(
     {"hierarchical": Cycles, "whole_body": WholeBodyFilter}
 )
 """Filter classes by the values of ``TrackerConfig.filter``."""
+UNKNOWN_TILT_RAD = np.radians(6.0)
+"""Standard deviation of a pitch that is too unsure for ``tracking``, rad."""
 
 # A model that overlaps the silhouette less than this is somewhere else.
 _TOUCHING_IOU = 0.05
-# Standard deviation of a pitch that is too unsure for ``tracking``, rad.
-_UNKNOWN_TILT_RAD = np.radians(6.0)
 
 
 class Tracker:
@@ -63,6 +65,8 @@ class Tracker:
 
     Attributes:
         agreement: check of the extrinsics of several cameras; None with one camera.
+        images: number of times that were tracked.
+        used: in how many of them each optional input told of the posture, by its name.
     """
 
     def __init__(
@@ -107,6 +111,8 @@ class Tracker:
         self._fitting = None
         self._place = PlaceWatch(body, self.camera, not others)
         self.agreement: CameraAgreement | None = None
+        self._frozen = FrozenCameras(1 + len(self._others))
+        self.images, self.used = 0, dict[str, int]()
         if body.unknown:
             fits = self._rng.spawn(1)[0]
             self._fitting = Fitting(body, self.camera, self.config, fits)
@@ -176,8 +182,13 @@ class Tracker:
     @property
     def remarks(self) -> list[str]:
         """Warnings about images that contradict each other, for diagnostics and logs."""
-        found = *(camera.depth.remark for camera in self._cameras), self._place.contradiction
+        depths = (camera.depth.remark for camera in self._cameras)
+        found = *self._frozen.remarks(), *depths, self._place.contradiction
         return [text for text in found if text]
+
+    def used_texts(self) -> dict[str, str]:
+        """Return for the diagnostics in how many images each optional input was used."""
+        return {f"{name} used": f"{count} of {self.images}" for name, count in self.used.items()}
 
     def camera_ious(self) -> list[float | None]:
         """Return the IoU of the last estimate with each camera's silhouette, the first one first.
@@ -232,11 +243,14 @@ class Tracker:
                     f"an observation is of the type {type(one).__name__}; expected an Observation, "
                     "such as Observation(silhouette), or None"
                 )
+        if self._others:
+            observations = self._frozen.without(observations)
         frames = self._frames_of(observations)
         estimate = self._placed(frames[0], self._track(frames))
-        is_tilt_unknown = self.body.camera_pose.pitch_stddev_rad > _UNKNOWN_TILT_RAD
+        is_tilt_unknown = self.body.camera_pose.pitch_stddev_rad > UNKNOWN_TILT_RAD
         if estimate.state == TRACKING and (self.body.unknown or is_tilt_unknown):
             estimate = replace(estimate, state=UNCERTAIN)
+        self._count(observations, frames, estimate)
         return self._head.see(frames[0], estimate)
 
     def _placed(self, frame: Frame, estimate: Estimate) -> Estimate:
@@ -248,6 +262,33 @@ class Tracker:
         aside[TORSO_Y] = np.hypot(aside[TORSO_Y], place.stddev_m[1])
         offset_stddev_m = np.hypot(estimate.offset_stddev_m, place.stddev_m[[0, 2]])
         return replace(estimate, posture_stddev=aside, offset_stddev_m=offset_stddev_m, place=place)
+
+    def _count(
+        self, observations: Observations, frames: Sequence[Frame], estimate: Estimate
+    ) -> None:
+        """Count which optional inputs were given, and told of a posture."""
+        self.images += 1
+        given = [one for one in observations if one is not None]
+        inputs = {
+            "points": (
+                any(one.points is not None for one in given),
+                any(one.points is not None and not one.points.is_empty for one in frames),
+            ),
+            "depth": (
+                any(one.depth_m is not None for one in given),
+                any(one.depth_m is not None for one in frames),
+            ),
+            "colours": (
+                any(isinstance(term, InnerCueTerm) for term in self._cameras[0].terms),
+                frames[0].image is not None and frames[0].before is not None,
+            ),
+        }
+        for number, frame in enumerate(frames[1:], 2):
+            inputs[f"camera {number}"] = True, frame.foreground_px > 0
+        for name, (is_given, is_used) in inputs.items():
+            if is_given or name in self.used:
+                found = is_used and estimate.posture is not None
+                self.used[name] = self.used.get(name, 0) + found
 
     def _frames_of(self, observations: Observations) -> list[Frame]:
         """Return the frames of all cameras; the frame of a camera without data is empty."""

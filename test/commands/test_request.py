@@ -19,9 +19,13 @@ from cardbox_tracker.commands.request import (
     with_own_options,
 )
 from cardbox_tracker.common.errors import CardboxError
+from cardbox_tracker.detectors import detector as detector_module
+from cardbox_tracker.detectors.model_files import ModelFiles
+from cardbox_tracker.detectors.person_choice import PersonChoice
 from cardbox_tracker.detectors.point_table import PointTable
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.model_file import save_body_model
+from cardbox_tracker.person.proportions import body_from_proportions
 from cardbox_tracker.recordings.given_camera import GivenCamera
 from cardbox_tracker.recordings.person_in_view import PersonInView
 from cardbox_tracker.recordings.silhouettes import TimeSpan
@@ -80,6 +84,35 @@ def test_a_stature_leaves_the_rest_to_be_found(film: Path) -> None:
     request = asked(film, "--stature", 1.8, "--fov", 60, "--camera-pitch-deg", 10)
     assert request.person.is_pitch_given
     assert request.person.body.camera_pose.pitch_rad == pytest.approx(np.radians(10.0))
+
+
+def test_a_body_that_was_not_measured_needs_no_start(film: Path) -> None:
+    """What 'cardbox track --stature' writes tracks the same recording again."""
+    mean = film.parent / "mean.yaml"
+    save_body_model(body_from_proportions(1.7, 2.0), mean)
+    assert asked(film, "--fov", 60, "--model", mean).person.start_s == 0.0
+    assert "--start T" in refused(film, "--fov", 60, "--model", film.parent / "me.yaml")
+
+
+def test_tracking_ends_where_it_is_asked_to(film: Path) -> None:
+    assert asked(film, "--fov", 60, "--stature", 1.7).person.end_s == np.inf
+    assert asked(film, "--fov", 60, "--stature", 1.7, "--end", 3).person.end_s == 3.0
+    words = ("--fov", 60, "--stature", 1.7, "--start", 5, "--end", 5)
+    assert "--end 5 is not after --start 5" in refused(film, *words)
+
+
+def test_a_person_is_chosen_for_the_detector(film: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(detector_module, "installed_models", lambda: ModelFiles(film, film))
+    given = ("--fov", 60, "--stature", 1.7, "--person", "120,80.5")
+    for words in (("mediapipe",), ("mediapipe", "--background", "0:1")):
+        recording = asked(film, *given, "--detector", *words).recording
+        found = recording.detector
+        assert found is not None and found.person == PersonChoice("place", (120.0, 80.5))
+        assert recording.points == found
+    assert "--person needs a detector" in refused(film, *given)
+    assert "--person needs a detector" in refused(
+        film, *given, "--detector", film.parent / "points.csv"
+    )
 
 
 NEEDED = {

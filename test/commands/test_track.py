@@ -287,12 +287,18 @@ def test_somebody_is_measured_in_a_film(
             Tilt(np.radians(12.0), np.radians(5.0), np.radians(4.0), has_edges=False),
             (
                 "pitch 12 degrees down (standard deviation 5), found from the person",
-                "upright at 20:21 s",
+                "upright between the seconds 20 and 21",
                 "roll 4.0 degrees",
             ),
         ),
         (Tilt(-0.1, 0.02, 0.0, has_edges=True), ("pitch 6 degrees up", "edges of the room")),
-        (None, ("nobody stands upright at 16:46 s", "taken as that of most cameras")),
+        (
+            None,
+            (
+                "nobody stands upright between the seconds 16 and 46",
+                "taken as that of most cameras",
+            ),
+        ),
     ],
 )
 def test_the_cameras_pitch_is_found_from_who_stands_upright(

@@ -29,6 +29,7 @@ from cardbox_tracker.ros.runtime.node import CardboxNode
 from cardbox_tracker.tracking.observation import Observation
 
 _SILENT_S = 3.0
+_STUCK = 10
 # Of one clock, images from different computers or of depth may arrive this much later.
 _OTHER_CLOCK_S = 0.1
 
@@ -105,6 +106,8 @@ class CameraInputs:
         self._count = len(self._streams)
         if settings.depth:
             self._streams.append(InputStream("depth", node.resolve(settings.depth)))
+        # Messages in a row whose stamps did not go on.
+        self._stuck = [0] * len(self._streams)
         self._clocks = [ClockDifference(self._streams[0], one) for one in self._streams[1:]]
         self._is_named = bool(settings.cameras or settings.depth)
         self._arrivals: Arrivals[Received] = Arrivals(len(self._streams), TOLERANCE_NS)
@@ -156,6 +159,7 @@ class CameraInputs:
             # The node itself drops and counts repeated and late messages.
             self._deliver(received, [received])
             return
+        self._stuck[number] = 0 if is_usable else self._stuck[number] + 1
         if not is_usable:
             return
         self._arrivals.tolerance_ns = self._streams[0].statistics.period_ns // 2 or TOLERANCE_NS
@@ -217,7 +221,9 @@ class CameraInputs:
         if received is None or seen.silhouette is None:
             return seen
         header = received.message.header
-        points = self._keypoints.points(number, header, camera, seen.silhouette)
+        period_ns = self._streams[number].statistics.period_ns
+        half_ns = period_ns // 2 or TOLERANCE_NS
+        points = self._keypoints.points(number, header, camera, seen.silhouette, half_ns)
         return seen.having(points=points)
 
     def _depth(self, received: Sequence[Received | None], camera: Camera) -> DepthImage | None:
@@ -252,8 +258,13 @@ class CameraInputs:
         first, *others = self._streams
         # If nothing comes at all, the node says so itself.
         is_going_on = any(stream.age_s <= _SILENT_S for stream in self._streams)
-        for stream in self._streams:
-            if is_going_on and stream.age_s > _SILENT_S:
+        for stream, stuck in zip(self._streams, self._stuck, strict=True):
+            if stuck > _STUCK:
+                texts[f"stamps of {stream.name}"] = (
+                    f"the stamps of the last {stuck} messages on {stream.topic} stand still or go "
+                    "back, so they are not used; is that camera's driver stuck?"
+                )
+            elif is_going_on and stream.age_s > _SILENT_S:
                 texts[f"silence of {stream.name}"] = (
                     f"nothing has come on {stream.topic} for {stream.age_s:.0f} s; tracking goes "
                     "on without it. Are that camera and its background node running?"

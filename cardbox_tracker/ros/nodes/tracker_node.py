@@ -192,7 +192,8 @@ class TrackerNode(CardboxNode):
     def _values(self) -> dict[str, str]:
         """Return the values of the diagnostics."""
         ious = [] if self._tracker is None else self._tracker.camera_ious()
-        return self._report.values(self._inputs.values(ious) | self._agreement.values())
+        used = {} if self._tracker is None else self._tracker.used_texts()
+        return self._report.values(self._inputs.values(ious) | self._agreement.values() | used)
 
 
 def main(args: list[str] | None = None) -> int:
