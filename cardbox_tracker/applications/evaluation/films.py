@@ -30,6 +30,11 @@ FloatArray = NDArray[np.float64]
 SHAPES: Mapping[str, float | None] = {"across": None, "upright": 9 / 16}
 """Width of a film's images as a share of their height, by name; None: as it was recorded."""
 
+_FIGURES = (
+    *("frames", "without_estimate", "aligned", "absolute"),
+    *("tracking", "tracking_beyond_30"),
+)
+
 
 class Film(NamedTuple):
     """A session as a film.
@@ -119,7 +124,7 @@ def _turn(k: FloatArray, middle: tuple[float, float], pitch_deg: float) -> Float
 def film_figures(
     film: Film, estimates: Sequence[Estimate], body: BodyModel | None
 ) -> dict[str, Any]:
-    """Return the figures of :func:`people_figures` and the pitch that was found and is true, deg.
+    """Return figures of :func:`people_figures`, and the pitch that was found and is true, deg.
 
     Args:
         film: what was tracked.
@@ -129,7 +134,8 @@ def film_figures(
     by_stamp = dict(zip(film.stamps_ns, estimates, strict=True))
     # The time of an image is not measured.
     run = run_of(film.session, body, "", by_stamp, [float("nan")])
-    found = people_figures(film.session, run)
+    every = people_figures(film.session, run)
+    found = {name: every[name] for name in _FIGURES if name in every}
     if body is not None:
         found["pitch_found_deg"] = float(np.degrees(body.camera_pose.pitch_rad))
     return found | {"pitch_deg": film.session.truth.pitch_deg}
