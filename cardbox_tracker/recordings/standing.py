@@ -52,9 +52,9 @@ def camera_of_standing(
         CardboxError: the networks cannot be loaded.
     """
     with open_images(path, camera) as images:
-        source = DetectorSilhouetteSource(images, detector, name)
+        source = DetectorSilhouetteSource(images, detector._replace(people=0), name)
         detections = source.detections(span.start_s, max(span.end_s, until_s))
-        timed = ((prepared.time_s, person) for prepared, person in detections)
+        timed = ((prepared.time_s, (*found, None)[0]) for prepared, found in detections)
         for searched, people in _spans(timed, span):
             # Somebody who comes into view is seen in a part of the span only.
             there = [person for person in people if person is not None]

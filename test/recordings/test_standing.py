@@ -11,7 +11,9 @@ import numpy as np
 import pytest
 
 from cardbox_tracker.camera.camera import Camera
+from cardbox_tracker.detectors.detector import Detector
 from cardbox_tracker.detectors.landmarks import LANDMARKS
+from cardbox_tracker.detectors.model_files import ModelFiles
 from cardbox_tracker.detectors.pose_network import Detection
 from cardbox_tracker.measuring.standing_camera import LEVELS
 from cardbox_tracker.recordings import standing
@@ -58,7 +60,7 @@ def seen(monkeypatch: pytest.MonkeyPatch) -> dict[float, Detection | None]:
         def detections(self, start_s: float, end_s: float) -> Iterator[Any]:
             for time_s, person in people.items():
                 if start_s <= time_s <= end_s:
-                    yield SimpleNamespace(time_s=time_s), person
+                    yield SimpleNamespace(time_s=time_s), [] if person is None else [person]
 
     class Opened:
         def __enter__(self) -> None:
@@ -73,7 +75,8 @@ def seen(monkeypatch: pytest.MonkeyPatch) -> dict[float, Detection | None]:
 
 
 def find(until_s: float) -> standing.Standing | None:
-    return standing.camera_of_standing(Path("film"), None, FIRST, until_s=until_s)  # type: ignore[arg-type]
+    detector = Detector(ModelFiles(Path(), Path()))
+    return standing.camera_of_standing(Path("film"), detector, FIRST, until_s=until_s)
 
 
 def test_somebody_who_stands_at_once_is_found_there(seen: dict[float, Detection | None]) -> None:
