@@ -133,7 +133,10 @@ class PersonRequest:
         end_s: the same at which it ends; inf for the end of the recording.
         is_pitch_given: whether ``body`` has the camera's pitch; else it is to be found from the
             person who stands upright.
-        stature_m: the stature that is given; None with ``model``.
+        stature_m: the stature that is given, of the first person; None with ``model``.
+        people: number of people to track, 0 for all who come; None for one without a number.
+        others: the bodies of the second and further people.
+        number: whose results commands use that use those of one.
     """
 
     body: BodyModel
@@ -142,6 +145,9 @@ class PersonRequest:
     is_pitch_given: bool
     stature_m: float | None = None
     end_s: float = math.inf
+    people: int | None = None
+    others: tuple[BodyModel, ...] = ()
+    number: int = 1
 
 
 TABLES = ("csv", "parquet")
@@ -294,9 +300,10 @@ def add_recording(parser: argparse.ArgumentParser, required: bool = True) -> Non
     add(
         "--person",
         type=_person_choice,
-        metavar="left|right|largest|X,Y",
+        metavar="left|right|largest|X,Y|K",
         help="with --detector mediapipe: whom of several people to follow: the left or right one "
-        "in the image, the largest, or the one at column X and row Y",
+        "in the image, the largest, or the one at column X and row Y. With --people: the number of "
+        "the one whose results are used, if not all are",
     )
     add(
         "--fov",
@@ -348,11 +355,18 @@ def add_tracking(parser: argparse.ArgumentParser, needs_recording: bool = True) 
     )
     add(
         "--stature",
-        type=float,
-        metavar="M",
+        type=_statures,
+        metavar="M[,M...]",
         help="in place of --model: height of the person, metres, crown to floor; sizes are the "
-        "mean ones of people of that stature. Of films with --detector, the mean stature of adults "
-        "is taken without both",
+        "mean ones of people of that stature. With --people, one for each of them in turn, or one "
+        "for all. Of films with --detector, the mean stature of adults is taken without both",
+    )
+    add(
+        "--people",
+        type=_count,
+        metavar="N|auto",
+        help="track N people, or all who come (up to 6), with one camera; they are numbered as "
+        "they come, and from left to right if they come together",
     )
     add(
         "--distance",
@@ -397,7 +411,29 @@ def add_tracking(parser: argparse.ArgumentParser, needs_recording: bool = True) 
     add_seed(parser, "the filters")
 
 
-def _person_choice(text: str) -> PersonChoice:
+def _statures(text: str) -> tuple[float, ...]:
+    try:
+        return tuple(map(float, text.split(",")))
+    except ValueError:
+        raise argparse.ArgumentTypeError(
+            f"expected metres, or those of each person as in 1.75,1.62, got {text!r}"
+        ) from None
+
+
+def _count(text: str) -> int:
+    from cardbox_tracker.tracking.people import MOST_PEOPLE
+
+    count = 0 if text == "auto" else int(text) if text.isdecimal() else -1
+    if not (text == "auto" or 1 <= count <= MOST_PEOPLE):
+        raise argparse.ArgumentTypeError(
+            f"expected auto or a number from 1 to {MOST_PEOPLE}, got {text!r}"
+        )
+    return count
+
+
+def _person_choice(text: str) -> PersonChoice | int:
+    if text.isdecimal():
+        return int(text)
     from cardbox_tracker.detectors.person_choice import PersonChoice
 
     try:
@@ -453,6 +489,7 @@ def recording_request(options: argparse.Namespace, problems: Problems) -> Record
     from cardbox_tracker.detectors.detector import Detector
     from cardbox_tracker.recordings.open_images import check_exists
     from cardbox_tracker.recordings.recording import input_faults
+    from cardbox_tracker.tracking.people import MOST_PEOPLE
 
     path, depth = options.recording, options.depth
     problems.caught(lambda: check_exists(path), None)
@@ -461,13 +498,24 @@ def recording_request(options: argparse.Namespace, problems: Problems) -> Record
     points: Detector | PointTable | None = None
     if options.detector is not None:
         points = problems.caught(lambda: points_named(options.detector), None)
-    if options.person is not None:
+    people = getattr(options, "people", None)
+    if isinstance(options.person, int) != (people is not None) and options.person is not None:
+        problems.add(
+            "--person K is the number of one of several people, whom only --people tracks; without "
+            "--people give left, right, largest or X,Y"
+        )
+    elif options.person is not None and people is None:
         if not any(isinstance(one, Detector) for one in (silhouettes, points)):
             problems.add("--person needs a detector that finds people: give --detector mediapipe")
         if isinstance(silhouettes, Detector):
             silhouettes = silhouettes._replace(person=options.person)
         if isinstance(points, Detector):
             points = points._replace(person=options.person)
+    if people is not None:
+        if isinstance(silhouettes, Detector):
+            silhouettes = silhouettes._replace(people=people or MOST_PEOPLE)
+        if points is not None:
+            points = points._replace(people=people or MOST_PEOPLE)
     names: tuple[str, ...] = ()
     names = problems.caught(lambda: tuple(camera_names(options.cameras)), names)
     for fault in input_faults(path, silhouettes, names, depth, camera):
@@ -505,6 +553,10 @@ def tracking_request(options: argparse.Namespace, faults: Iterable[str] = ()) ->
             f"--preset {options.preset} uses the silhouette of one camera; give --preset default "
             "with several cameras or with --depth"
         )
+    if options.people is not None and is_more:
+        problems.add("--people tracks with one camera and without --depth: leave the others out")
+    if options.people is not None and options.preset != "default":
+        problems.add(f"--people needs the preset default, not {options.preset}")
     config = problems.caught(lambda: _config(options, preset), preset)
     problems.check()
     return TrackingRequest(
@@ -600,21 +652,23 @@ def points_named(name: str) -> Detector | PointTable:
 def _person(options: argparse.Namespace, problems: Problems) -> PersonRequest:
     from cardbox_tracker.person.model import MEASURED, BodyModel
     from cardbox_tracker.person.model_file import load_body_model
-    from cardbox_tracker.person.proportions import USUAL_STATURE_M, body_from_proportions
+    from cardbox_tracker.person.proportions import USUAL_STATURE_M
 
     pitch_deg, body = options.camera_pitch_deg, BodyModel()
+    others: list[BodyModel] = []
+    if options.people is None and options.stature is not None and len(options.stature) > 1:
+        problems.add("--stature has several values: give one, or --people")
+    if options.people is not None and options.model is not None:
+        problems.add("--people takes the stature of each person: give --stature, not --model")
     if options.model is None and options.stature is None and not _is_guessed(options):
         problems.miss("--stature M or --model FILE")
     elif None not in (options.model, options.stature):
         problems.add("--stature and --model both say who is tracked: leave one of them out")
     elif options.model is None:
-        body = problems.caught(
-            lambda: body_from_proportions(
-                USUAL_STATURE_M if options.stature is None else options.stature,
-                options.distance,
-                camera_pitch_rad=math.radians(pitch_deg or 0.0),
-            ),
-            body,
+        place = options.distance, math.radians(pitch_deg or 0.0)
+        statures = options.stature or [USUAL_STATURE_M]
+        body, *others = problems.caught(
+            lambda: [_of_stature(stature, *place) for stature in statures], [body]
         )
     else:
         for flag, value in (("--distance", options.distance), ("--camera-pitch-deg", pitch_deg)):
@@ -627,7 +681,18 @@ def _person(options: argparse.Namespace, problems: Problems) -> PersonRequest:
     start_s, end_s = options.start or 0.0, math.inf if options.end is None else options.end
     if end_s <= start_s:
         problems.add(f"--end {end_s:g} is not after --start {start_s:g}: give a later second")
-    return PersonRequest(body, options.model, start_s, is_pitch_given, options.stature, end_s)
+    number = options.person if isinstance(options.person, int) else 1
+    if options.people and number > options.people:
+        problems.add(f"--person {number} is none of {options.people} people")
+    stature_m = None if options.stature is None else options.stature[0]
+    several = options.people, tuple(others), number
+    return PersonRequest(body, options.model, start_s, is_pitch_given, stature_m, end_s, *several)
+
+
+def _of_stature(stature_m: float, distance_m: float | None, pitch_rad: float) -> BodyModel:
+    from cardbox_tracker.person.proportions import body_from_proportions
+
+    return body_from_proportions(stature_m, distance_m, camera_pitch_rad=pitch_rad)
 
 
 def _config(options: argparse.Namespace, preset: TrackerConfig) -> TrackerConfig:

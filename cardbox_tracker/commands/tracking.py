@@ -6,9 +6,10 @@ import math
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack
 from dataclasses import replace
+from functools import partial
 from typing import TYPE_CHECKING, NamedTuple
 
-from cardbox_tracker.commands.arguments import print_remarks
+from cardbox_tracker.commands.arguments import body_of_person, print_remarks
 from cardbox_tracker.person.model import CameraPose
 
 if TYPE_CHECKING:
@@ -16,8 +17,10 @@ if TYPE_CHECKING:
     from cardbox_tracker.commands.request import PersonRequest, RecordingRequest, TrackingRequest
     from cardbox_tracker.person.model import BodyModel
     from cardbox_tracker.recordings.recording import Recording
-    from cardbox_tracker.recordings.silhouettes import TimeSpan
+    from cardbox_tracker.recordings.silhouettes import RecordedFrame, TimeSpan
     from cardbox_tracker.recordings.track import Observer, TrackSummary
+    from cardbox_tracker.tracking.estimate import Estimate
+    from cardbox_tracker.tracking.tracker import Tracker
 
 _STANDING_S = 1.0
 """Time for which a person of a given stature stands upright at the start, seconds."""
@@ -50,13 +53,14 @@ def track(
     from cardbox_tracker.person.proportions import USUAL_STATURE_M, USUAL_STDDEV_M
     from cardbox_tracker.recordings.quality import Quality
     from cardbox_tracker.recordings.silhouettes import TimeSpan
-    from cardbox_tracker.recordings.track import track_recording
+    from cardbox_tracker.recordings.track import Crowd, track_recording
 
-    quality = Quality()
-    recording, person, body = request.recording, request.person, request.person.body
+    qualities: dict[int, Quality] = {}
+    recording, person = request.recording, request.person
+    bodies = [person.body, *person.others]
     start_s = person.start_s
-    if person.model is not None and body.doubt:
-        print(f"{person.model}: {body.doubt}")
+    if person.model is not None and person.body.doubt:
+        print(f"{person.model}: {person.body.doubt}")
     if person.model is None:
         standing = TimeSpan(start_s, start_s + _STANDING_S)
         # The person may come later.
@@ -64,14 +68,15 @@ def track(
         recording = found.recording
         if not person.is_pitch_given:
             tilt = {"camera_pitch_rad": found.pitch_rad, "pitch_stddev_rad": found.stddev_rad}
-            body = body.with_values(**tilt)
-        if found.distance is not None and "distance_m" in body.unknown:
+            bodies = [body.with_values(**tilt) for body in bodies]
+        if found.distance is not None and "distance_m" in person.body.unknown:
             stature_m = person.stature_m or USUAL_STATURE_M
             lowest_m, highest_m, *_ = PLACEMENT["distance_m"]
             distance_m = min(max(found.distance * stature_m, lowest_m), highest_m)
-            body = body.with_values(distance_m=distance_m)
+            bodies = [body.with_values(distance_m=distance_m) for body in bodies]
         if person.stature_m is None:
-            body = body.with_values(stature_stddev=USUAL_STDDEV_M / USUAL_STATURE_M)
+            unsure = USUAL_STDDEV_M / USUAL_STATURE_M
+            bodies = [body.with_values(stature_stddev=unsure) for body in bodies]
             print_remarks(
                 [
                     f"the stature is taken as that of most adults, {USUAL_STATURE_M:g} m (standard "
@@ -79,6 +84,14 @@ def track(
                     "tenth; give --stature M"
                 ]
             )
+    crowd = None
+    if person.people is not None:
+        crowd = Crowd(tuple(bodies), person.people or None)
+        observers = tuple(partial(_of_person, person.number, observe) for observe in observers)
+
+    def judge(frame: RecordedFrame, estimate: Estimate, tracker: Tracker) -> None:
+        qualities.setdefault(estimate.person or 0, Quality())(frame, estimate, tracker)
+
     with recording.open() as source:
         early = source.first.remarks
         print_remarks(early)
@@ -88,32 +101,50 @@ def track(
             advance = show or stack.enter_context(progress_bar("track"))
             summary = track_recording(
                 source,
-                body,
+                bodies[0],
                 request.config,
                 request.seed,
                 start_s,
                 request.files.table,
                 (
                     *observers,
-                    quality,
+                    judge,
                     lambda frame, *_: advance((frame.time_s - start_s) / total_s),
                 ),
                 person.end_s,
+                crowd,
             )
         remarks = [remark for remark in source.first.remarks if remark not in early]
         accounts = tuple(one.account for one in source.sources)
-        assumptions = tuple(_assumptions(request, source.first.camera, summary.body or body))
+        assumptions = tuple(_assumptions(request, source.first.camera, summary.body or bodies[0]))
     summary = replace(summary, accounts=accounts, assumptions=assumptions)
-    if show is None:
+    if show is None and not summary.people:
         print(f"tracked {summary.frames_tracked} of {summary.frames} images")
     print_remarks(remarks, summary.remarks)
     if show is None:
-        print(f"assumed: {', '.join(summary.assumptions)}", *quality.lines(), sep="\n")
+        print(f"assumed: {', '.join(summary.assumptions)}")
+        for number, quality in sorted(qualities.items()):
+            if number:
+                one = summary.people[number]
+                print(f"person {number}: tracked {one.frames_tracked} of {one.frames} images")
+            print(*quality.lines(), sep="\n")
         if summary.used_text:
             print(summary.used_text)
-    if request.files.body is not None and summary.body is not None:
-        save_body_model(summary.body, request.files.body)
-    return summary
+    for number, one in (summary.people or {1: summary}).items():
+        if request.files.body is not None and one.body is not None:
+            save_body_model(one.body, body_of_person(request.files.body, number))
+    if person.people is None:
+        return summary
+    one = summary.people.get(person.number, summary)
+    return replace(one, accounts=accounts, assumptions=assumptions)
+
+
+def _of_person(
+    number: int, observe: Observer, frame: RecordedFrame, estimate: Estimate, tracker: Tracker
+) -> None:
+    """Pass on the results of one of several people."""
+    if estimate.person == number:
+        observe(frame, estimate, tracker)
 
 
 def _assumptions(request: TrackingRequest, camera: Camera, body: BodyModel) -> Iterator[str]:

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from cardbox_tracker.detectors.image_points import ImagePoints
 from cardbox_tracker.detectors.landmarks import image_points
 from cardbox_tracker.detectors.model_files import ModelFiles, installed_models
+from cardbox_tracker.detectors.people_network import PeopleNetwork
 from cardbox_tracker.detectors.person_choice import PersonChoice
 from cardbox_tracker.detectors.pose_network import Detection, PoseNetwork
 
@@ -25,10 +26,13 @@ class Detector(NamedTuple):
     Attributes:
         models: its network files.
         person: whom to follow, px of the camera's own image; None for the most certain person.
+        people: number of people whom it finds at most, see :meth:`PersonDetector.all_in`; 0 for the
+            one whom it follows.
     """
 
     models: ModelFiles
     person: PersonChoice | None = None
+    people: int = 0
 
     @classmethod
     def installed(cls) -> Detector:
@@ -52,7 +56,7 @@ class Detector(NamedTuple):
         network = PoseNetwork(*self.models)
         if self.person is not None:
             network.choose = self.person.scaled(across, down)
-        return PersonDetector(network)
+        return PersonDetector(network, PeopleNetwork(network, self.people))
 
 
 class PersonDetector:
@@ -62,21 +66,29 @@ class PersonDetector:
         missed: number of images in which nobody was found.
     """
 
-    def __init__(self, network: PoseNetwork) -> None:
-        """Use ``network`` for one camera alone, because it follows the person."""
-        self._network = network
+    def __init__(self, network: PoseNetwork, people: PeopleNetwork | None = None) -> None:
+        """Use the networks for one camera alone, because they follow the people."""
+        self._network, self._people = network, people
         self.missed = 0
 
     def restart(self) -> None:
         """Forget the last image, so that results depend on the following images alone."""
         self._network.forget()
+        if self._people is not None:
+            self._people.forget()
         self.missed = 0
 
     def __call__(self, image: Image) -> Detection | None:
         """Return the person in an image (H, W) or (H, W, 3), bgr; None if there is nobody."""
-        color = image if image.ndim == 3 else np.repeat(image[..., None], 3, axis=2)
-        found = self._network(color)
+        found = self._network(_color(image))
         self.missed += found is None
+        return found
+
+    def all_in(self, stamp_ns: int, image: Image) -> list[Detection]:
+        """Return all people in an image as above, of a time, ns."""
+        assert self._people is not None
+        found = self._people(_color(image), stamp_ns)
+        self.missed += not found
         return found
 
     @property
@@ -87,10 +99,15 @@ class PersonDetector:
         whom = "the most certain one" if self._network.choose is None else "the chosen one"
         return (
             f"the detector sees several people and follows {whom}; --person left|right|largest|X,Y "
-            "chooses"
+            "chooses, and --people follows all"
         )
 
     def points(self, image: Image) -> ImagePoints | None:
         """Return the points in an image at the working size."""
         found = self(image)
         return None if found is None else image_points(found)
+
+
+def _color(image: Image) -> Image:
+    """Return an image (H, W) or (H, W, 3) as (H, W, 3)."""
+    return image if image.ndim == 3 else np.repeat(image[..., None], 3, axis=2)

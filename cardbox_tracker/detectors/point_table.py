@@ -51,9 +51,11 @@ class PointTable(NamedTuple):
 
     Attributes:
         path: the table, a file of COCO, or a folder of OpenPose's files.
+        people: 0 for the person in the silhouette, more for all people.
     """
 
     path: Path
+    people: int = 0
 
     def read(self, camera: str | None, size: Size | None = None) -> GivenPoints:
         """Return the points of one camera, px of its own image.
@@ -244,6 +246,15 @@ class GivenPoints:
             return None
         self.used += 1
         return person
+
+    def all_in(self, image: Image) -> list[ImagePoints]:
+        """Return the points of all people in an image."""
+        self.images += 1
+        self._ends = [*self._ends[:1], image]
+        found = self.persons(image, self._tolerance_ns)
+        self._joined += bool(found)
+        self.used += bool(found)
+        return found
 
     @property
     def fault(self) -> str:

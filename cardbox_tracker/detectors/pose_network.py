@@ -41,6 +41,8 @@ _LEAST_APART = 0.2
 _LOOK_AROUND = 30
 # A chance of one half.
 _LEAST_MASK = 128
+# Grey of pixels that the landmark network does not see.
+_UNSEEN = np.float32(0.5)
 # The square around the person is this much larger than the circle through the detected points.
 _SQUARE_SCALE = 1.25
 # Two further outputs of the landmark network say where the next square is: centre and scale.
@@ -148,9 +150,22 @@ class PoseNetwork:
     def _people(self, image: ColorImage) -> list[Square]:
         """Return the squares around the people in an rgb image, the most certain one first."""
         height, width = image.shape[:2]
-        side = max(height, width)
-        whole = Square(width / 2, height / 2, side, 0.0)
-        cut = _cut_out(image, whole, _DETECTOR_PX, cv2.BORDER_CONSTANT)
+        people = self.detected(image, Square(width / 2, height / 2, max(height, width), 0.0))
+        self.several += len(people) > 1
+        return people
+
+    def _located(self, image: ColorImage, square: Square) -> Detection | None:
+        """Return the person in a square of an rgb image, who is followed from then on."""
+        located = self.located(image, square)
+        if located is None:
+            return None
+        found, self._square = located
+        self._last = self._square
+        return found
+
+    def detected(self, image: ColorImage, view: Square) -> list[Square]:
+        """Return squares around people in a view of an rgb image, the most certain one first."""
+        cut = _cut_out(image, view, _DETECTOR_PX, cv2.BORDER_CONSTANT)
         boxes, logits = self._detect(2.0 * cut - 1.0)
         scores = _chance(logits.ravel())
         likely = np.flatnonzero(scores >= _LEAST_DETECTION)
@@ -159,16 +174,28 @@ class PoseNetwork:
         decoded.reshape(-1, 6, 2)[:, [0, 2, 3, 4, 5]] += anchors[:, None]
         people = list[Square]()
         for merged in _merged(decoded, scores[likely]):
-            square = _square_of(*whole.to_image(merged[4:8].reshape(2, 2)))
+            square = _square_of(*view.to_image(merged[4:8].reshape(2, 2)))
             least_px = _LEAST_APART * square.side
             if all(hypot(one.u - square.u, one.v - square.v) > least_px for one in people):
                 people.append(square)
-        self.several += len(people) > 1
         return people
 
-    def _located(self, image: ColorImage, square: Square) -> Detection | None:
-        """Return the points and the mask in a square of an rgb image; None if nobody is there."""
+    def located(
+        self, image: ColorImage, square: Square, others: NDArray[np.uint8] | None = None
+    ) -> tuple[Detection, Square] | None:
+        """Return the person in a square of an rgb image, and the square of the next image.
+
+        Args:
+            image: (H, W, 3).
+            square: where the person is.
+            others: (H, W), not 0 at pixels of other people, which the network does not see.
+
+        Returns:
+            None if nobody is there.
+        """
         cut = _cut_out(image, square, _LANDMARK_PX, cv2.BORDER_REPLICATE)
+        if others is not None:
+            cut[_warped(others, square, _LANDMARK_PX, cv2.BORDER_CONSTANT) > 0] = _UNSEEN
         raw, presence, mask, heat, space = self._locate(cut)
         if float(presence[0, 0]) < _LEAST_PRESENCE:
             return None
@@ -176,14 +203,14 @@ class PoseNetwork:
         points = values[:, :2] / _LANDMARK_PX
         points = _refined(points, _chance(heat[0]))
         placed = square.to_image(points)
-        self._square = self._last = _square_of(placed[_CENTRE], placed[_SCALE])
         visible, present = _chance(values[:POINTS, 3:5].T)
-        return Detection(
+        found = Detection(
             placed[:POINTS] - 0.5,
             np.minimum(visible, present),
             _mask_in_image(mask[0, :, :, 0], square, image.shape[:2]),
             _turned(space.reshape(_OUTPUTS, 3)[:POINTS].astype(np.float64), square.angle_rad),
         )
+        return found, _square_of(placed[_CENTRE], placed[_SCALE])
 
 
 class _Network:
@@ -269,6 +296,11 @@ def _square_of(centre: FloatArray, rim: FloatArray) -> Square:
 
 def _cut_out(image: ColorImage, square: Square, size: int, border: int) -> NDArray[np.float32]:
     """Return a square of the image at ``size`` pixels, values 0 to 1."""
+    return _warped(image, square, size, border).astype(np.float32) / 255.0
+
+
+def _warped(image: ColorImage, square: Square, size: int, border: int) -> NDArray[np.uint8]:
+    """Return a square of an image (H, W, ...) at ``size`` pixels."""
     turned = cv2.warpAffine(
         image,
         _to_image(square, size),
@@ -276,7 +308,7 @@ def _cut_out(image: ColorImage, square: Square, size: int, border: int) -> NDArr
         flags=cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP,
         borderMode=border,
     )
-    return turned.astype(np.float32) / 255.0
+    return np.asarray(turned, np.uint8)
 
 
 def _to_image(square: Square, size: int) -> FloatArray:

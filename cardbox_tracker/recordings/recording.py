@@ -25,13 +25,14 @@ from cardbox_tracker.camera.stereo import StereoDepth, stereo_of_pair
 from cardbox_tracker.camera.view import OtherCamera
 from cardbox_tracker.common.errors import BagError, CameraError, CardboxError
 from cardbox_tracker.detectors.detector import Detector
+from cardbox_tracker.detectors.image_points import ImagePoints
 from cardbox_tracker.detectors.point_table import PointTable
 from cardbox_tracker.recordings.bag_reader import BagReader
 from cardbox_tracker.recordings.depth_images import depth_images
 from cardbox_tracker.recordings.depth_silhouettes import DepthSilhouetteSource, Within
 from cardbox_tracker.recordings.detector_silhouettes import DetectorSilhouetteSource
 from cardbox_tracker.recordings.given_camera import GivenCamera
-from cardbox_tracker.recordings.image_recording import ImageRecording
+from cardbox_tracker.recordings.image_recording import ImageRecording, working_size
 from cardbox_tracker.recordings.open_images import is_bag, open_images
 from cardbox_tracker.recordings.person_in_view import PersonInView, PersonInViewSource
 from cardbox_tracker.recordings.silhouettes import RecordedFrame, SilhouetteSource, TimeSpan
@@ -61,6 +62,11 @@ class FrameSet(NamedTuple):
     frames: tuple[RecordedFrame | None, ...]
     first: RecordedFrame
     depth_m: DepthImage | None = None
+
+    @property
+    def people(self) -> tuple[ImagePoints, ...] | None:
+        """Joints of each person in the first camera; None without a detector of several."""
+        return self.first.people
 
     @property
     def observations(self) -> list[Observation]:
@@ -250,6 +256,11 @@ def _source(
     camera: str | None,
     points: Detector | PointTable | None,
 ) -> SilhouetteSource:
+    finds_people = any(isinstance(one, Detector) and one.people for one in (background, points))
+    if finds_people and isinstance(bag, BagReader):
+        # The networks expect square pixels.
+        calibration = bag.calibration(camera)
+        bag.working_size = working_size(calibration.width, calibration.height)
     if isinstance(background, Within):
         return DepthSilhouetteSource(bag, background, camera, points)
     if isinstance(background, Detector):

@@ -16,6 +16,7 @@ from cardbox_tracker.camera.encodings import brightness_of
 from cardbox_tracker.common.errors import BagError, CameraError, CardboxError, EncodingError
 from cardbox_tracker.detectors.detector import Detector, PersonDetector
 from cardbox_tracker.detectors.image_points import ImagePoints
+from cardbox_tracker.detectors.landmarks import image_points
 from cardbox_tracker.detectors.point_table import GivenPoints, Image, PointTable
 from cardbox_tracker.recordings.image_recording import ImageRecording, RecordedImage
 from cardbox_tracker.segmentation.background_config import BackgroundConfig
@@ -95,6 +96,7 @@ class RecordedFrame(NamedTuple):
         depth_m: (H, W), metres, from which the silhouette was cut out; None without depth.
         points: joints of the person in the image, from a detector; None without one.
         recorded: the image as it was recorded; None if it was not kept.
+        people: joints of each person, from a detector of several; None without one.
     """
 
     stamp_ns: int
@@ -105,6 +107,7 @@ class RecordedFrame(NamedTuple):
     depth_m: DepthImage | None = None
     points: ImagePoints | None = None
     recorded: RecordedImage | None = None
+    people: tuple[ImagePoints, ...] | None = None
 
     @property
     def picture(self) -> NDArray[np.uint8]:
@@ -197,6 +200,7 @@ class SilhouetteSource:
     def _find_points(self, points: Detector | PointTable | None, camera: str | None) -> None:
         """Use a source of points."""
         self._has_points = points is not None
+        self._finds_people = points is not None and points.people > 0
         self._detector = self._started(points) if isinstance(points, Detector) else None
         self._given: GivenPoints | None = None
         self._points: FindPoints = lambda prepared, silhouette: None
@@ -252,9 +256,21 @@ class SilhouetteSource:
                 break
             silhouette = self._pipeline.silhouette(image, stamp_ns)
             if time_s >= start_s:
-                found = self._points(prepared, silhouette)
                 seen = brightness_of(image), silhouette, image
-                yield RecordedFrame(stamp_ns, time_s, *seen, points=found, recorded=recorded)
+                frame = RecordedFrame(stamp_ns, time_s, *seen, recorded=recorded)
+                if self._finds_people:
+                    yield frame._replace(people=self._people(prepared))
+                else:
+                    yield frame._replace(points=self._points(prepared, silhouette))
+
+    def _people(self, prepared: PreparedImage) -> tuple[ImagePoints, ...]:
+        """Return the points of all people in an image."""
+        if self._detector is not None:
+            found = self._detector.all_in(prepared.stamp_ns, prepared.image)
+            return tuple(image_points(one) for one in found)
+        assert self._given is not None
+        image = Image(prepared.stamp_ns, prepared.number, prepared.recorded.name)
+        return tuple(self._given.all_in(image))
 
     def _restart_points(self) -> None:
         for source in (self._detector, self._given):

@@ -75,16 +75,16 @@ def placed_camera(
     upright: list[tuple[TimeSpan, dict[str, FloatArray], StandingCamera]] = []
     spans = 0
     with open_images(path, camera) as images:
-        source = DetectorSilhouetteSource(images, detector, name)
+        source = DetectorSilhouetteSource(images, detector._replace(people=0), name)
 
         def seen() -> Iterator[tuple[float, Detection | None]]:
             next_s = span.start_s
             times = span.start_s, max(span.end_s, until_s), _PERIOD_S
-            for prepared, person in source.detections(*times):
+            for prepared, found in source.detections(*times):
                 if prepared.time_s >= next_s and len(pictures) < _MOST_PICTURES:
                     pictures.append(source.undistorted(prepared.recorded))
                     next_s = prepared.time_s + _PICTURE_S
-                yield prepared.time_s, person
+                yield prepared.time_s, (*found, None)[0]
 
         for searched, people in _spans(seen(), span):
             # Somebody who comes into view is seen in a part of the span only.

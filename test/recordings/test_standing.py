@@ -12,7 +12,9 @@ import numpy as np
 import pytest
 
 from cardbox_tracker.camera.camera import Camera
+from cardbox_tracker.detectors.detector import Detector
 from cardbox_tracker.detectors.landmarks import LANDMARKS
+from cardbox_tracker.detectors.model_files import ModelFiles
 from cardbox_tracker.detectors.pose_network import Detection
 from cardbox_tracker.measuring.standing_camera import LEVELS, PITCH_PRIOR, USUAL_PITCH
 from cardbox_tracker.recordings import standing
@@ -69,7 +71,8 @@ def seen(
         def detections(self, start_s: float, end_s: float, _: float) -> Iterator[Any]:
             for time_s, person in people.items():
                 if start_s <= time_s <= end_s:
-                    yield SimpleNamespace(time_s=time_s, recorded=None), person
+                    found = [] if person is None else [person]
+                    yield SimpleNamespace(time_s=time_s, recorded=None), found
 
         def undistorted(self, _: Any) -> np.ndarray:
             return pictures.pop() if pictures else np.full((480, 640), 128, np.uint8)
@@ -100,7 +103,8 @@ def edges_seen(pitch_rad: float) -> np.ndarray:
 
 
 def find(until_s: float) -> standing.Placed:
-    return standing.placed_camera(Path("film"), None, FIRST, until_s=until_s)  # type: ignore[arg-type]
+    detector = Detector(ModelFiles(Path(), Path()))
+    return standing.placed_camera(Path("film"), detector, FIRST, until_s=until_s)
 
 
 def test_somebody_who_stands_at_once_is_found_there(seen: dict[float, Detection | None]) -> None:

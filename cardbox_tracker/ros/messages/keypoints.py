@@ -6,7 +6,8 @@ packages are read by the names of their fields, so that no package has to be ins
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from itertools import chain
 from typing import Any
 
 from geometry_msgs.msg import Point32, Polygon, PolygonStamped
@@ -56,6 +57,12 @@ def keypoints_message(header: Header, px: FloatArray, scores: FloatArray) -> Pol
     return PolygonStamped(header=header, polygon=Polygon(points=points))
 
 
+def people_message(header: Header, people: Sequence[tuple[FloatArray, FloatArray]]) -> Any:
+    """Return the message of the landmarks of several people, one after the other."""
+    one = [keypoints_message(header, *person).polygon.points for person in people]
+    return PolygonStamped(header=header, polygon=Polygon(points=list(chain(*one))))
+
+
 def skeleton_class() -> Any:
     """Return hri_msgs/Skeleton2D; None if it is not installed, or has other points."""
     kind = optional_class("hri_msgs", "Skeleton2D")
@@ -79,7 +86,9 @@ def skeleton_message(
 
 
 def persons_of_polygon(message: Any, size: Size) -> list[ImagePoints]:
-    """Return the person of a PolygonStamped, if it has points.
+    """Return the people of a PolygonStamped, each with all points of ``MESSAGE_NAMES``.
+
+    One person may lack the knuckles.
 
     Raises:
         CardboxError: the number of points is wrong, or a point is impossible.
@@ -87,13 +96,23 @@ def persons_of_polygon(message: Any, size: Size) -> list[ImagePoints]:
     points = message.polygon.points
     if not points:
         return []
-    if len(points) not in (len(COCO_NAMES), len(MESSAGE_NAMES)):
+    each = len(COCO_NAMES) if len(points) == len(COCO_NAMES) else len(MESSAGE_NAMES)
+    if len(points) % each or len(points) > each * _MOST_PERSONS:
         raise CardboxError(
             f"a person has {len(points)} points; expected the {len(COCO_NAMES)} of COCO in its "
-            f"order, or {len(MESSAGE_NAMES)} with four knuckles (docs/detectors.md)"
+            f"order, or {len(MESSAGE_NAMES)} with four knuckles, once for each person "
+            "(docs/detectors.md)"
         )
-    named = zip(MESSAGE_NAMES, points, strict=False)
-    return [person_of(((name, p.x, p.y, p.z) for name, p in named), size)]
+    return [
+        person_of(
+            (
+                (name, p.x, p.y, p.z)
+                for name, p in zip(MESSAGE_NAMES, points[begin : begin + each], strict=False)
+            ),
+            size,
+        )
+        for begin in range(0, len(points), each)
+    ]
 
 
 def persons_of_skeleton(message: Any, size: Size) -> list[ImagePoints]:

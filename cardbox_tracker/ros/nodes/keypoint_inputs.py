@@ -61,6 +61,10 @@ class KeypointInputs:
             return None
         return self._cameras[number].points(header, camera, silhouette, tolerance_ns)
 
+    def people(self, header: Header, camera: Camera) -> list[ImagePoints] | None:
+        """Return the points of all people in the image of a silhouette; None without a detector."""
+        return self._cameras[0].people(header, camera) if self._cameras else None
+
     def values(self) -> dict[str, str]:
         """Return rate, age and use of each camera's points for the diagnostics."""
         return {name: text for one in self._cameras for name, text in one.values().items()}
@@ -130,6 +134,18 @@ class _CameraKeypoints:
             return None
         self._used, self._beside = self._used + 1, 0
         return ImagePoints(person.px, person.scores, min(taken.stamp_ns, at_ns))
+
+    def people(self, header: Header, camera: Camera) -> list[ImagePoints] | None:
+        calibration, at_ns = self._watch.current, stamp_ns(header.stamp)
+        taken = self._taken(at_ns, header.frame_id, TOLERANCE_NS)
+        self._images += 1
+        if taken is None or calibration is None:
+            # Once a detector has found people, regions of the silhouette are none.
+            return [] if self._used else None
+        self._used += 1
+        size, age_ns = (camera.width, camera.height), min(taken.stamp_ns, at_ns)
+        found = (placed(one, calibration, size) for one in taken.persons)
+        return [ImagePoints(one.px, one.scores, age_ns) for one in found if not one.is_empty]
 
     def _taken(self, at_ns: int, frame_id: str, tolerance_ns: int) -> Taken | None:
         if self.topic is not None:
