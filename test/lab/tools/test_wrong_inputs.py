@@ -16,7 +16,7 @@ TRUE_M = np.tile([0.0, 0.0, 2.0], (6, 1))
 
 
 def estimate(state: str, hand_m: float, away_m: float, contradiction: str = "") -> Estimate:
-    keypoints_m = TRUE_M + (0.0, 0.0, away_m)
+    keypoints_m = TRUE_M + np.array([0.0, 0.0, away_m])
     keypoints_m[2, 0] += hand_m
     place = Place(np.full(3, 0.1), 0.05, "given stature", contradiction)
     return Estimate(state, keypoints_m=keypoints_m, place=place)
