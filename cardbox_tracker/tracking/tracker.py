@@ -15,7 +15,7 @@ from cardbox_tracker.camera.view import OtherCamera, View
 from cardbox_tracker.common.settings import restarts
 from cardbox_tracker.person.kinematics import clavicles
 from cardbox_tracker.person.model import BodyModel
-from cardbox_tracker.person.posture import N_STATE, TORSO_Y
+from cardbox_tracker.person.posture import N_STATE, PITCH, TORSO_Y
 from cardbox_tracker.person.sizes import FloatArray
 from cardbox_tracker.search.config import TrackerConfig
 from cardbox_tracker.search.cycles import Cycles
@@ -258,10 +258,12 @@ class Tracker:
         place = self._place.see(estimate, self.body, frame)
         if place is None or estimate.posture_stddev is None or estimate.offset_stddev_m is None:
             return estimate
-        aside = estimate.posture_stddev.copy()
-        aside[TORSO_Y] = np.hypot(aside[TORSO_Y], place.stddev_m[1])
-        offset_stddev_m = np.hypot(estimate.offset_stddev_m, place.stddev_m[[0, 2]])
-        return replace(estimate, posture_stddev=aside, offset_stddev_m=offset_stddev_m, place=place)
+        stddev = estimate.posture_stddev.copy()
+        stddev[TORSO_Y] = np.hypot(stddev[TORSO_Y], place.stddev_m[1])
+        # The trunk leans in the level frame, which the camera's pitch defines.
+        stddev[PITCH] = np.hypot(stddev[PITCH], self.body.camera_pose.pitch_stddev_rad)
+        moved_m = np.hypot(estimate.offset_stddev_m, place.stddev_m[[0, 2]])
+        return replace(estimate, posture_stddev=stddev, offset_stddev_m=moved_m, place=place)
 
     def _count(
         self, observations: Observations, frames: Sequence[Frame], estimate: Estimate
