@@ -27,12 +27,19 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> None:
-    """Install the files if asked to, load both networks, and print their places."""
-    from cardbox_tracker.detectors.model_files import install_models, installed_models
+    """Install the files if asked to, load the networks, and print their places."""
+    from cardbox_tracker.detectors.hand_network import HandNetwork
+    from cardbox_tracker.detectors.model_files import (
+        install_models,
+        installed_hands,
+        installed_models,
+    )
     from cardbox_tracker.detectors.pose_network import PoseNetwork
 
     models = install_models(options.wheel) if options.install else installed_models()
+    hands = installed_hands()
     PoseNetwork(*models)
-    for path in models:
+    HandNetwork(hands)
+    for path in (*models, hands):
         print(path)
     print("the detector is ready: cardbox track RECORDING --silhouettes detector ...")

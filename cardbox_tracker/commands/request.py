@@ -182,6 +182,7 @@ class TrackingRequest:
         config: settings of the tracker.
         seed: random seed of the filters.
         inputs: files and folders that are read, which no result may replace.
+        hands: network file that finds the points of hands; None if they are not measured.
         files: results to write.
         force: whether an existing bag is replaced.
     """
@@ -192,6 +193,7 @@ class TrackingRequest:
     config: TrackerConfig
     seed: int
     inputs: tuple[Path, ...]
+    hands: Path | None = None
     files: TrackFiles = TrackFiles()
     force: bool = False
 
@@ -367,6 +369,12 @@ def add_tracking(parser: argparse.ArgumentParser, needs_recording: bool = True) 
         metavar="N|auto",
         help="track N people, or all who come (up to 6), with one camera; they are numbered as "
         "they come, and from left to right if they come together",
+    )
+    add(
+        "--hands",
+        action="store_true",
+        help="with --detector mediapipe: also tell open from closed hands, and measure palms and "
+        "wrists (docs/results.md)",
     )
     add(
         "--distance",
@@ -558,10 +566,25 @@ def tracking_request(options: argparse.Namespace, faults: Iterable[str] = ()) ->
     if options.people is not None and options.preset != "default":
         problems.add(f"--people needs the preset default, not {options.preset}")
     config = problems.caught(lambda: _config(options, preset), preset)
+    hands = _hands(options, recording, problems)
     problems.check()
     return TrackingRequest(
-        recording, person, options.preset, config, options.seed, inputs_of(options)
+        recording, person, options.preset, config, options.seed, inputs_of(options), hands
     )
+
+
+def _hands(
+    options: argparse.Namespace, recording: RecordingRequest, problems: Problems
+) -> Path | None:
+    """Return the network file of hands if they are asked for."""
+    from cardbox_tracker.detectors.detector import Detector
+    from cardbox_tracker.detectors.model_files import installed_hands
+
+    if not options.hands:
+        return None
+    if not isinstance(recording.points, Detector):
+        problems.add("--hands needs the detector's wrists and knuckles: give --detector mediapipe")
+    return problems.caught(installed_hands, None)
 
 
 def _camera(options: argparse.Namespace, problems: Problems) -> GivenCamera:

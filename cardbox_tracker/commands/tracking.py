@@ -48,6 +48,7 @@ def track(
         CardboxError: the recording cannot be read, or a result cannot be written.
     """
     from cardbox_tracker.common.progress import progress_bar
+    from cardbox_tracker.detectors.hand_network import HandNetwork
     from cardbox_tracker.person.model import PLACEMENT
     from cardbox_tracker.person.model_file import save_body_model
     from cardbox_tracker.person.proportions import USUAL_STATURE_M, USUAL_STDDEV_M
@@ -113,6 +114,7 @@ def track(
                 ),
                 person.end_s,
                 crowd,
+                None if request.hands is None else HandNetwork(request.hands),
             )
         remarks = [remark for remark in source.first.remarks if remark not in early]
         accounts = tuple(one.account for one in source.sources)

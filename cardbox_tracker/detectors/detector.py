@@ -80,14 +80,14 @@ class PersonDetector:
 
     def __call__(self, image: Image) -> Detection | None:
         """Return the person in an image (H, W) or (H, W, 3), bgr; None if there is nobody."""
-        found = self._network(_color(image))
+        found = self._network(color(image))
         self.missed += found is None
         return found
 
     def all_in(self, stamp_ns: int, image: Image) -> list[Detection]:
         """Return all people in an image as above, of a time, ns."""
         assert self._people is not None
-        found = self._people(_color(image), stamp_ns)
+        found = self._people(color(image), stamp_ns)
         self.missed += not found
         return found
 
@@ -108,6 +108,6 @@ class PersonDetector:
         return None if found is None else image_points(found)
 
 
-def _color(image: Image) -> Image:
+def color(image: Image) -> Image:
     """Return an image (H, W) or (H, W, 3) as (H, W, 3)."""
     return image if image.ndim == 3 else np.repeat(image[..., None], 3, axis=2)

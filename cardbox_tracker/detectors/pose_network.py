@@ -115,8 +115,8 @@ class PoseNetwork:
         Raises:
             CardboxError: LiteRT is not installed, or a file is missing or damaged.
         """
-        self._detect = _Network(detector)
-        self._locate = _Network(landmarks)
+        self._detect = Network(detector)
+        self._locate = Network(landmarks)
         self.choose: Choose | None = None
         self.forget()
 
@@ -165,7 +165,7 @@ class PoseNetwork:
 
     def detected(self, image: ColorImage, view: Square) -> list[Square]:
         """Return squares around people in a view of an rgb image, the most certain one first."""
-        cut = _cut_out(image, view, _DETECTOR_PX, cv2.BORDER_CONSTANT)
+        cut = cut_out(image, view, _DETECTOR_PX, cv2.BORDER_CONSTANT)
         boxes, logits = self._detect(2.0 * cut - 1.0)
         scores = _chance(logits.ravel())
         likely = np.flatnonzero(scores >= _LEAST_DETECTION)
@@ -193,7 +193,7 @@ class PoseNetwork:
         Returns:
             None if nobody is there.
         """
-        cut = _cut_out(image, square, _LANDMARK_PX, cv2.BORDER_REPLICATE)
+        cut = cut_out(image, square, _LANDMARK_PX, cv2.BORDER_REPLICATE)
         if others is not None:
             cut[_warped(others, square, _LANDMARK_PX, cv2.BORDER_CONSTANT) > 0] = _UNSEEN
         raw, presence, mask, heat, space = self._locate(cut)
@@ -208,15 +208,20 @@ class PoseNetwork:
             placed[:POINTS] - 0.5,
             np.minimum(visible, present),
             _mask_in_image(mask[0, :, :, 0], square, image.shape[:2]),
-            _turned(space.reshape(_OUTPUTS, 3)[:POINTS].astype(np.float64), square.angle_rad),
+            turned_points(space.reshape(_OUTPUTS, 3)[:POINTS].astype(np.float64), square.angle_rad),
         )
         return found, _square_of(placed[_CENTRE], placed[_SCALE])
 
 
-class _Network:
+class Network:
     """One network file on one thread."""
 
     def __init__(self, path: Path) -> None:
+        """Load it.
+
+        Raises:
+            CardboxError: LiteRT is not installed, or the file is missing or damaged.
+        """
         try:
             from ai_edge_litert.interpreter import Interpreter
         except ImportError as error:
@@ -294,7 +299,7 @@ def _square_of(centre: FloatArray, rim: FloatArray) -> Square:
     return Square(float(centre[0]), float(centre[1]), 2 * _SQUARE_SCALE * hypot(du, dv), turn)
 
 
-def _cut_out(image: ColorImage, square: Square, size: int, border: int) -> NDArray[np.float32]:
+def cut_out(image: ColorImage, square: Square, size: int, border: int) -> NDArray[np.float32]:
     """Return a square of the image at ``size`` pixels, values 0 to 1."""
     return _warped(image, square, size, border).astype(np.float32) / 255.0
 
@@ -340,7 +345,7 @@ def _refined(points: FloatArray, heat: FloatArray) -> FloatArray:
     return refined
 
 
-def _turned(points: FloatArray, angle_rad: float) -> FloatArray:
+def turned_points(points: FloatArray, angle_rad: float) -> FloatArray:
     """Return points (N, 3) of a turned square in the axes of the image."""
     c, s = cos(angle_rad), sin(angle_rad)
     x, y, z = points.T

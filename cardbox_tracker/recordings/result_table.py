@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import math
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from decimal import Decimal
@@ -26,7 +27,7 @@ from cardbox_tracker.person.skeleton import (
 from cardbox_tracker.recordings.keypoint_status import keypoint_states
 from cardbox_tracker.recordings.outputs import METRICS, joint_deviations, joint_values, positions_of
 from cardbox_tracker.recordings.silhouettes import RecordedFrame
-from cardbox_tracker.tracking.estimate import Estimate
+from cardbox_tracker.tracking.estimate import Estimate, Hand
 
 Cell = int | float | str | Decimal | None
 """A value of the table; None is unknown. A Decimal keeps the nine decimals of a stamp."""
@@ -43,18 +44,29 @@ POINT_COLUMNS = tuple(f"{name}_{axis}" for name in KEYPOINT_NAMES for axis in "x
 """Columns of the keypoints, m in the optical frame of the first camera."""
 
 
+_SIDES = "left", "right"
+_WRIST = "wrist_flexion", "wrist_deviation", "forearm_rotation"
+_HAND = {"hand_open": "", **dict.fromkeys(("palm_x", "palm_y", "palm_z"), "")} | dict.fromkeys(
+    _WRIST, "rad"
+)
+
+
 @cache
-def columns(has_points: bool = False, has_people: bool = False) -> tuple[str, ...]:
+def columns(
+    has_points: bool = False, has_people: bool = False, has_hands: bool = False
+) -> tuple[str, ...]:
     """Return the names of the columns, see :func:`units`."""
-    return tuple(units(has_points, has_people))
+    return tuple(units(has_points, has_people, has_hands))
 
 
-def units(has_points: bool = False, has_people: bool = False) -> dict[str, str]:
+def units(
+    has_points: bool = False, has_people: bool = False, has_hands: bool = False
+) -> dict[str, str]:
     """Return the unit of each column by its name, in their order; empty for none.
 
     The names up to the person's place are fixed, because scripts read them; standard deviations end
     in their unit. With ``has_points``, for recordings with points of the person, the neck is among
-    them; with ``has_people``, the number of the person.
+    them; with ``has_people``, the number of the person; with ``has_hands``, both hands.
     """
     return {
         "stamp": "s",
@@ -75,7 +87,13 @@ def units(has_points: bool = False, has_people: bool = False) -> dict[str, str]:
         "place_rests_on": "",
         **dict.fromkeys(ANATOMICAL_NAMES, "deg"),
         **({PERSON: ""} if has_people else {}),
+        **(_HAND_UNITS if has_hands else {}),
     }
+
+
+_HAND_UNITS = {f"{side}_{name}": unit for side in _SIDES for name, unit in _HAND.items()} | {
+    f"{side}_{name}_stddev_rad": "rad" for side in _SIDES for name in _WRIST
+}
 
 
 def _units(joints: Iterable[str]) -> dict[str, str]:
@@ -92,9 +110,10 @@ def row_of(
     estimate: Estimate,
     has_points: bool = False,
     has_people: bool = False,
+    has_hands: bool = False,
 ) -> list[Cell]:
     """Return the row of one image, in the order of :func:`columns`."""
-    names = columns(has_points, has_people)
+    names = columns(has_points, has_people, has_hands)
     stamp = Decimal(stamp_ns).scaleb(-9)
     known: dict[str, Cell] = {"stamp": stamp, "state": estimate.state}
     known |= {"stamp_ns": stamp_ns, "time_s": time_s, PERSON: estimate.person}
@@ -119,7 +138,21 @@ def row_of(
         place = estimate.place
         known |= {"place_state": str(place.state), "place_chance": place.chance}
         known["place_rests_on"] = place.rests_on
+    for side, hand in zip(_SIDES, estimate.hands or (None, None), strict=True):
+        if hand is not None:
+            known |= _hand_cells(side, hand)
     return [known.get(name) for name in names]
+
+
+def _hand_cells(side: str, hand: Hand) -> dict[str, Cell]:
+    values = [hand.open, *hand.palm.tolist(), *map(_known, hand.wrist)]
+    cells: dict[str, Cell] = dict(zip((f"{side}_{name}" for name in _HAND), values, strict=True))
+    stddevs = zip(_WRIST, map(_known, hand.wrist_stddev), strict=True)
+    return cells | {f"{side}_{name}_stddev_rad": stddev for name, stddev in stddevs}
+
+
+def _known(value: float) -> float | None:
+    return float(value) if math.isfinite(value) else None
 
 
 def check_table(path: Path) -> None:
@@ -134,7 +167,7 @@ def check_table(path: Path) -> None:
 
 @contextmanager
 def result_table(
-    path: Path, has_points: bool, has_people: bool = False
+    path: Path, has_points: bool, has_people: bool = False, has_hands: bool = False
 ) -> Iterator[Callable[[RecordedFrame, Estimate], None]]:
     """Context of a function that adds the row of an image to a table, which appears on exit.
 
@@ -142,11 +175,12 @@ def result_table(
         path: file to write; with the suffix .parquet it is a Parquet file, else CSV.
         has_points: see :func:`columns`.
         has_people: see :func:`columns`; then each person of an image has a row.
+        has_hands: see :func:`columns`.
 
     Raises:
         CardboxError: the file cannot be written, or pyarrow is missing.
     """
-    has = has_points, has_people
+    has = has_points, has_people, has_hands
     names = columns(*has)
     if path.suffix == PARQUET:
         arrow, parquet = pyarrow_or_error()

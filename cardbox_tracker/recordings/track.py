@@ -12,15 +12,22 @@ from typing import NamedTuple
 
 import numpy as np
 
+from cardbox_tracker.camera.camera import Camera
 from cardbox_tracker.common.errors import CardboxError
+from cardbox_tracker.detectors.image_points import POINT_INDEX, ImagePoints
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.recordings.recording import FrameSet, Recording
 from cardbox_tracker.recordings.result_table import result_table
 from cardbox_tracker.recordings.silhouettes import RecordedFrame
 from cardbox_tracker.search.config import TrackerConfig
 from cardbox_tracker.tracking.estimate import UNCERTAIN, Estimate
+from cardbox_tracker.tracking.hands import HandReader, Look
 from cardbox_tracker.tracking.people import People
 from cardbox_tracker.tracking.tracker import Tracker
+
+_SHOULDERS_ELBOWS = [
+    POINT_INDEX[f"{side}_{name}"] for side in ("left", "right") for name in ("shoulder", "elbow")
+]
 
 Observer = Callable[[RecordedFrame, Estimate, Tracker], None]
 """Callback that receives each image with its estimate and the tracker."""
@@ -108,6 +115,7 @@ def track_recording(
     observers: tuple[Observer, ...] = (),
     end_s: float = math.inf,
     crowd: Crowd | None = None,
+    hands: Look | None = None,
 ) -> TrackSummary:
     """Track every image from ``start_s`` to ``end_s``.
 
@@ -123,6 +131,7 @@ def track_recording(
             or a bag writer.
         end_s: seconds from the recording's start after which no image is tracked.
         crowd: people to track in place of ``body``, with the first camera alone.
+        hands: finds the points of hands, which are then part of the estimates and the table.
 
     Raises:
         CardboxError: no image lies after ``start_s``, or a file cannot be written.
@@ -135,15 +144,21 @@ def track_recording(
     else:
         people = People(crowd.bodies, first.camera, config, rng, crowd.most)
         track = partial(_track_people, people)
-    with (
-        nullcontext() if table is None else result_table(table, first.has_points, crowd is not None)
-    ) as add_row:
+    readers: dict[int | None, HandReader] = {}
+    has = first.has_points, crowd is not None, hands is not None
+    with nullcontext() if table is None else result_table(table, *has) as add_row:
         frames = 0
         for taken in recording.frames(start_s, end_s):
             frames += 1
             for estimate, tracker in track(taken):
                 tally, _ = tallies.setdefault(estimate.person, (_Tally(), tracker))
                 tally.add(estimate)
+                if hands is not None:
+                    reader = readers.setdefault(estimate.person, HandReader(hands))
+                    picture = partial(first.full_picture, taken.first)
+                    points = _points_of(estimate, taken, first.camera)
+                    time_s = taken.stamp_ns / 1e9
+                    estimate = reader.see(picture, points, estimate, first.camera, time_s)
                 if add_row is not None:
                     add_row(taken.first, estimate)
                 for observe in observers:
@@ -185,3 +200,16 @@ def _track_one(tracker: Tracker, taken: FrameSet) -> list[tuple[Estimate, Tracke
 
 def _track_people(people: People, taken: FrameSet) -> list[tuple[Estimate, Tracker]]:
     return people.track(taken.observations[0], taken.people)
+
+
+def _points_of(estimate: Estimate, taken: FrameSet, camera: Camera) -> ImagePoints | None:
+    """Return the points of a person: of several people, those that are nearest to the estimate."""
+    if not taken.people or estimate.keypoints_m is None:
+        return taken.first.points
+    px = camera.project(np.asarray(estimate.keypoints_m)[[0, 1, 3, 4]])
+
+    def away_px(points: ImagePoints) -> float:
+        apart = points.px[_SHOULDERS_ELBOWS] - px
+        return float(np.nan_to_num(np.linalg.norm(apart, axis=1), nan=camera.width).sum())
+
+    return min(taken.people, key=away_px)

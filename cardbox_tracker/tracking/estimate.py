@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import NamedTuple
 
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.sizes import FloatArray
@@ -44,6 +45,24 @@ class Place:
         return KeypointState.UNCERTAIN if is_uncertain else KeypointState.TRACKED
 
 
+class Hand(NamedTuple):
+    """A hand, from its own points (:mod:`.hands`).
+
+    Attributes:
+        open: 1 if all fingers are open, 0 if all are closed, about 0.5 if some are: the chance that
+            it is open, plus half of the chance that it is neither. None if the hand is too small.
+        palm: normal out of the palm, unit vector (3,) in the optical frame.
+        wrist: flexion and deviation of the wrist and rotation of the forearm, (3,), rad; the
+            rotation of a straight arm is nan.
+        wrist_stddev: their standard deviations, (3,), rad.
+    """
+
+    open: float | None
+    palm: FloatArray
+    wrist: FloatArray
+    wrist_stddev: FloatArray
+
+
 @dataclass(frozen=True)
 class Estimate:
     """State of tracking and posture of the person at one time.
@@ -77,6 +96,8 @@ class Estimate:
         place: how surely distance, scale and height are known, and by what; None if the filter
             keeps them constant. All states above are about the shape alone.
         person: number of the person, 1, 2, ...; None if only one is tracked.
+        hands: the left and the right hand, None for one that is not known; None unless hands are
+            looked at.
     """
 
     state: str
@@ -96,6 +117,7 @@ class Estimate:
     clavicles_stddev_m: FloatArray | None = None
     place: Place | None = None
     person: int | None = None
+    hands: tuple[Hand | None, Hand | None] | None = None
 
     def placed(self, body: BodyModel) -> BodyModel:
         """Return ``body`` at the place of this estimate."""

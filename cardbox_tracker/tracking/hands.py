@@ -1,0 +1,275 @@
+"""Measures the hands of a tracked person: open or closed, the palm's direction, the wrist.
+
+A silhouette shows no fingers. A network finds 21 points of a hand in a square of the image, which
+the wrist and the knuckles of a detector place. One hand an image is looked at, in turn, so that the
+time for an image does not grow with the number of hands; a hand keeps its result until its turn.
+
+The angles are those between the forearm, from the detector's elbow and wrist and the depth of the
+tracked arm, and the palm. With the forearm along ``f``, the normal out of the palm ``n``, and the
+fingers' direction ``h``:
+
+- the wrist's flexion bends the palm towards the forearm's inner side, ``sin(flexion) = -n f``;
+- its deviation bends the hand towards the little finger, from ``f`` in the plane of the palm;
+- the forearm's rotation is its pronation: 0 with the palm towards the body while the elbow is bent
+  (thumb up), positive as the thumb turns inwards. It is relative to the plane of the bent arm,
+  which a straight arm does not have.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from math import exp, hypot
+from typing import NamedTuple, Protocol
+
+import cv2
+import numpy as np
+
+from cardbox_tracker.camera.camera import Camera
+from cardbox_tracker.detectors.detector import color
+from cardbox_tracker.detectors.hand_network import FINGERS, WRIST, HandPoints
+from cardbox_tracker.detectors.image_points import POINT_INDEX, ImagePoints
+from cardbox_tracker.detectors.pose_network import ColorImage, Square
+from cardbox_tracker.person.sizes import FloatArray
+from cardbox_tracker.person.skeleton import KeypointState
+from cardbox_tracker.tracking.estimate import Estimate, Hand
+
+# A finger is open if its end is bent by less than the first angle from the direction of its base,
+# and closed if by more than the second, with their spread, rad.
+_OPEN, _CLOSED, _SPREAD = np.radians([80.0, 45.0, 8.0])
+# The thumb is open if its end is straight, and far from the base of the little finger: bend and its
+# spread, rad; distance in lengths of the palm and its spread.
+_THUMB, _THUMB_SPREAD, _THUMB_FAR, _THUMB_FAR_SPREAD = *np.radians([60.0, 5.0]), 0.78, 0.057
+# A thumb that is farther from the base of the middle finger is not part of a fist.
+_THUMB_OUT, _THUMB_OUT_SPREAD = 0.74, 0.03
+# The thumb alone never makes an open hand a closed one.
+_LEAST_BY_THUMB = 0.1
+# Box around a hand relative to that around its points: a closed one, and how much less an open one.
+_BOX, _BOX_LESS = 1.35, 0.21
+LEAST_PX = 17.0
+"""A hand whose box has a smaller longer side is neither open nor closed for the network."""
+
+# Points at the bases of index, middle and little finger.
+_INDEX, _MIDDLE, _LITTLE = 5, 9, 17
+_SIDES = ("left", "right")
+_KEYPOINTS = {"left": 2, "right": 5}
+_ELBOWS = {"left": slice(6, 8), "right": slice(10, 12)}
+
+# Side of the square around a hand, in lengths from the wrist to the knuckles, and that length, m.
+_SQUARE, _PALM_M = 3.0, 0.09
+# Least score of the points that place the square.
+_LEAST_SCORE = 0.3
+# Time for which a hand keeps its result, s.
+_KEPT_S = 0.5
+# Where between elbow and knuckles the wrist is.
+_WRIST_SHARE = 0.75
+# Deviations of the palm's direction, and of the forearm beside that of its joints, rad.
+_PALM_RAD, _FOREARM_RAD = np.radians([15.0, 10.0])
+# Sine of the least bend of an elbow whose plane is known.
+_LEAST_BEND = float(np.sin(np.radians(20.0)))
+
+
+class Look(Protocol):
+    """Finds the points of a hand in a square of an image (H, W, 3), bgr."""
+
+    def __call__(self, image: ColorImage, square: Square) -> HandPoints | None:
+        """Return the points; None if there is no hand."""
+
+
+class _Seen(NamedTuple):
+    time_s: float
+    hand: Hand | None
+
+
+class HandReader:
+    """Adds the hands to the estimates of one person, from the first camera's images."""
+
+    def __init__(self, look: Look) -> None:
+        """Start without a hand."""
+        self._look = look
+        self._seen: dict[str, _Seen] = {}
+
+    def see(
+        self,
+        picture: Callable[[], ColorImage],
+        points: ImagePoints | None,
+        estimate: Estimate,
+        camera: Camera,
+        time_s: float,
+    ) -> Estimate:
+        """Return ``estimate`` with the hands that are known.
+
+        Args:
+            picture: returns the image (H, W, 3), bgr, or (H, W) at any resolution.
+            points: of the person in the image of ``camera``; None if nobody is found.
+            estimate: of the same image.
+            camera: working camera.
+            time_s: time of the image.
+        """
+        shown = {
+            side: square
+            for side in _SIDES
+            if points is not None
+            and is_tracked(estimate, side)
+            and (square := hand_square(side, points, estimate, camera)) is not None
+        }
+        if shown and points is not None:
+            side = min(shown, key=lambda one: self._seen.get(one, _Seen(-np.inf, None)).time_s)
+            image = color(picture())
+            view = camera.scaled(image.shape[1], image.shape[0])
+            found = self._look(image, _scaled(shown[side], view.width / camera.width))
+            hand = None if found is None else measured(side, found, points, estimate, camera, view)
+            self._seen[side] = _Seen(time_s, hand)
+        hands = [self._kept(side, estimate, time_s) for side in _SIDES]
+        return replace(estimate, hands=(hands[0], hands[1]))
+
+    def _kept(self, side: str, estimate: Estimate, time_s: float) -> Hand | None:
+        seen = self._seen.get(side)
+        is_new = seen is not None and 0.0 <= time_s - seen.time_s <= _KEPT_S
+        return seen.hand if seen is not None and is_new and is_tracked(estimate, side) else None
+
+
+def is_tracked(estimate: Estimate, side: str) -> bool:
+    """Return whether the hand of a side is ``tracked``."""
+    states = estimate.keypoint_states
+    return states is not None and states[_KEYPOINTS[side]] == KeypointState.TRACKED
+
+
+def _scaled(square: Square, scale: float) -> Square:
+    return square._replace(
+        u=(square.u + 0.5) * scale, v=(square.v + 0.5) * scale, side=square.side * scale
+    )
+
+
+def hand_square(
+    side: str, points: ImagePoints, estimate: Estimate, camera: Camera
+) -> Square | None:
+    """Return the square around a hand, px of ``camera``; None if its points are not known."""
+    assert estimate.keypoints_m is not None
+    names = [f"{side}_{name}" for name in ("elbow", "wrist", "index", "little_finger")]
+    chosen = [POINT_INDEX[name] for name in names]
+    elbow, wrist, *knuckles = points.px[chosen]
+    if points.scores[chosen[1]] < _LEAST_SCORE or not np.isfinite(points.px[chosen]).all():
+        return None
+    hand = np.mean(knuckles, axis=0) - wrist
+    depth_m = float(estimate.keypoints_m[_KEYPOINTS[side], 2])
+    palm_px = max(hypot(*hand), camera.fx * _PALM_M / max(depth_m, 0.1))
+    # A hand that points to the camera has no direction in the image.
+    along = hand + 0.2 * (wrist - elbow)
+    angle = float(np.arctan2(along[0], -along[1]))
+    u, v = wrist + hand
+    return Square(float(u), float(v), _SQUARE * palm_px, angle)
+
+
+def measured(
+    side: str,
+    found: HandPoints,
+    points: ImagePoints,
+    estimate: Estimate,
+    camera: Camera,
+    view: Camera,
+) -> Hand:
+    """Return what the points of a hand tell.
+
+    Args:
+        side: left or right.
+        found: the hand's points, px of ``view``.
+        points: those of the person, px of ``camera``.
+        estimate: of the same image, with a posture.
+        camera: working camera.
+        view: the same camera at the size of the picture.
+    """
+    sign = 1.0 if side == "left" else -1.0
+    turn = _ray_rotation(found.px[WRIST], view)
+    spatial = found.spatial_m @ turn.T
+    fingers = _unit(spatial[_MIDDLE] - spatial[WRIST])
+    palm = sign * _unit(
+        np.cross(spatial[_LITTLE] - spatial[WRIST], spatial[_INDEX] - spatial[WRIST])
+    )
+    assert estimate.keypoints_m is not None
+    arm = np.asarray(estimate.keypoints_m)[_KEYPOINTS[side] - 2 :][:3]
+    upper_arm = _unit(arm[1] - arm[0])
+    forearm = _forearm(side, arm, points, camera)
+    spread_rad = _FOREARM_RAD
+    if estimate.posture_stddev is not None:
+        elbow = np.asarray(estimate.posture_stddev)[_ELBOWS[side]]
+        spread_rad = hypot(_FOREARM_RAD, *elbow)
+    flexion = -float(np.arcsin(np.clip(palm @ forearm, -1.0, 1.0)))
+    straight = _unit(forearm - (forearm @ palm) * palm)
+    to_little = sign * np.cross(straight, palm)
+    deviation = float(np.arctan2(fingers @ to_little, fingers @ straight))
+    plane = sign * np.cross(upper_arm, forearm)
+    bend = float(np.linalg.norm(plane))
+    rotation, rotation_stddev = np.nan, np.nan
+    if bend >= _LEAST_BEND:
+        inner = plane / bend
+        rotation = float(np.arctan2(palm @ (sign * np.cross(forearm, inner)), palm @ inner))
+        rotation_stddev = hypot(_PALM_RAD, spread_rad / bend)
+    bent = hypot(_PALM_RAD, spread_rad)
+    return Hand(
+        opened(found),
+        palm,
+        np.array([flexion, deviation, rotation]),
+        np.array([bent, bent, rotation_stddev]),
+    )
+
+
+def opened(found: HandPoints) -> float | None:
+    """Return how open a hand is, see :class:`~.estimate.Hand`; None if it is too small."""
+    at = found.spatial_m
+    bends = [_finger_bend(at, 1 + 4 * number) for number in range(len(FINGERS))]
+    palm_m = max(float(np.linalg.norm(at[_MIDDLE] - at[WRIST])), 1e-3)
+    far, out = (float(np.linalg.norm(at[4] - at[base])) / palm_m for base in (_LITTLE, _MIDDLE))
+    fingers = np.array(bends[1:])
+    thumb = (_THUMB - bends[0]) / _THUMB_SPREAD + (far - _THUMB_FAR) / _THUMB_FAR_SPREAD
+    is_open = min(_chance((_OPEN - fingers.max()) / _SPREAD), max(_chance(thumb), _LEAST_BY_THUMB))
+    is_out = _chance((out - _THUMB_OUT) / _THUMB_OUT_SPREAD)
+    is_closed = min(
+        _chance((fingers.min() - _CLOSED) / _SPREAD), max(1.0 - is_out, _LEAST_BY_THUMB)
+    )
+    value = (1.0 + is_open - is_closed) / 2
+    return value if found.size_px * (_BOX - _BOX_LESS * value) >= LEAST_PX else None
+
+
+def _finger_bend(at: FloatArray, base: int) -> float:
+    """Return the angle from the wrist and the base to the end of a finger, rad."""
+    cosine = _unit(at[base] - at[WRIST]) @ _unit(at[base + 3] - at[base + 1])
+    return float(np.arccos(np.clip(cosine, -1.0, 1.0)))
+
+
+def _forearm(side: str, arm: FloatArray, points: ImagePoints, camera: Camera) -> FloatArray:
+    """Return the direction of the forearm (3,), in the optical frame.
+
+    The tracked arm ends at the knuckles, so it bends with the wrist; only its depth is used.
+    """
+    elbow, wrist = points.px[[POINT_INDEX[f"{side}_{name}"] for name in ("elbow", "wrist")]]
+    depths_m = arm[1, 2] + np.array([0.0, _WRIST_SHARE]) * (arm[2, 2] - arm[1, 2])
+    rays = [
+        _ray(px, camera) * depth_m for px, depth_m in zip((elbow, wrist), depths_m, strict=True)
+    ]
+    return _unit(rays[1] - rays[0])
+
+
+def _ray(px: FloatArray, camera: Camera) -> FloatArray:
+    """Return the point (3,) of a pixel's ray at the depth 1."""
+    return np.array([(px[0] - camera.cx) / camera.fx, (px[1] - camera.cy) / camera.fy, 1.0])
+
+
+def _ray_rotation(px: FloatArray, camera: Camera) -> FloatArray:
+    """Return the least rotation (3, 3) that turns the camera's axis to the ray of a pixel."""
+    rotation, _ = cv2.Rodrigues(_turn_to(_unit(_ray(px, camera))))
+    return np.asarray(rotation, np.float64)
+
+
+def _turn_to(ray: FloatArray) -> FloatArray:
+    across = np.array([-ray[1], ray[0], 0.0])
+    sine = float(np.linalg.norm(across))
+    return across * (float(np.arctan2(sine, ray[2])) / sine if sine > 0.0 else 0.0)
+
+
+def _unit(vector: FloatArray) -> FloatArray:
+    return np.asarray(vector / max(float(np.linalg.norm(vector)), 1e-9))
+
+
+def _chance(value: float) -> float:
+    return 1.0 / (1.0 + exp(-min(max(value, -60.0), 60.0)))
