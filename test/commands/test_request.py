@@ -20,6 +20,7 @@ from cardbox_tracker.commands.request import (
 )
 from cardbox_tracker.common.errors import CardboxError
 from cardbox_tracker.detectors import detector as detector_module
+from cardbox_tracker.detectors import model_files
 from cardbox_tracker.detectors.model_files import ModelFiles
 from cardbox_tracker.detectors.person_choice import PersonChoice
 from cardbox_tracker.detectors.point_table import PointTable
@@ -146,6 +147,17 @@ def test_several_people_have_a_body_each(film: Path, monkeypatch: pytest.MonkeyP
 def test_mistakes_with_several_people(words: tuple[str, ...], fault: str, film: Path) -> None:
     given = ("--fov", 60, "--detector", film.parent / "points.csv")
     assert fault in refused(film, *given, *words)
+
+
+def test_hands_need_the_detector_and_its_file(film: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(detector_module, "installed_models", lambda: ModelFiles(film, film))
+    monkeypatch.setattr(model_files, "installed_hands", lambda: film)
+    given = ("--fov", 60, "--stature", 1.7)
+    assert asked(film, *given, "--detector", "mediapipe", "--hands").hands == film
+    assert asked(film, *given, "--detector", "mediapipe").hands is None
+    points = "--detector", film.parent / "points.csv"
+    for words in ((), points, ("--silhouettes", "detector")):
+        assert "--hands needs the detector" in refused(film, *given, *words, "--hands")
 
 
 NEEDED = {

@@ -11,9 +11,18 @@ import pytest
 from cardbox_tracker.commands.main import main
 from cardbox_tracker.common.errors import CardboxError
 from cardbox_tracker.detectors import model_files
-from cardbox_tracker.detectors.model_files import install_models, installed_models, model_folder
+from cardbox_tracker.detectors.model_files import (
+    install_models,
+    installed_hands,
+    installed_models,
+    model_folder,
+)
 
-CONTENTS = {"pose_detection.tflite": b"detector", "pose_landmark_full.tflite": b"landmarks"}
+CONTENTS = {
+    "pose_detection.tflite": b"detector",
+    "pose_landmark_full.tflite": b"landmarks",
+    "hand_landmark_full.tflite": b"hands",
+}
 
 
 @pytest.fixture
@@ -37,6 +46,15 @@ def test_files_are_installed_and_found_again(wheel: Path) -> None:
     assert models == installed_models()
     assert models.detector.read_bytes() == b"detector"
     assert models.landmarks.parent == model_folder()
+    assert installed_hands().read_bytes() == b"hands"
+
+
+def test_people_are_found_where_a_former_version_installed_no_hands(wheel: Path) -> None:
+    models = install_models(wheel)
+    installed_hands().unlink()
+    assert installed_models() == models
+    with pytest.raises(CardboxError, match=r"hand_landmark_full\.tflite.*--install"):
+        installed_hands()
 
 
 def test_missing_files_are_named_with_the_remedy(wheel: Path) -> None:

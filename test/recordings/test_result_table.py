@@ -23,7 +23,7 @@ from cardbox_tracker.recordings.result_table import (
     units,
 )
 from cardbox_tracker.recordings.silhouettes import RecordedFrame
-from cardbox_tracker.tracking.estimate import Estimate, Place
+from cardbox_tracker.tracking.estimate import Estimate, Hand, Place
 
 ROOT = Path(__file__).parents[2]
 ANGLES = (
@@ -65,6 +65,15 @@ ANATOMICAL = (
     *("trunk_lean_deg", "trunk_side_lean_deg"),
 )
 WHOLE = HEADER + NECK + CLAVICLES + PLACE + ANATOMICAL
+HANDS = (
+    *("left_hand_open", "left_palm_x", "left_palm_y", "left_palm_z"),
+    *("left_wrist_flexion", "left_wrist_deviation", "left_forearm_rotation"),
+    *("right_hand_open", "right_palm_x", "right_palm_y", "right_palm_z"),
+    *("right_wrist_flexion", "right_wrist_deviation", "right_forearm_rotation"),
+    *("left_wrist_flexion_stddev_rad", "left_wrist_deviation_stddev_rad"),
+    *("left_forearm_rotation_stddev_rad", "right_wrist_flexion_stddev_rad"),
+    *("right_wrist_deviation_stddev_rad", "right_forearm_rotation_stddev_rad"),
+)
 POINTS_M = np.arange(18).reshape(6, 3) / 4
 FOUND = Estimate("tracking", np.arange(12) / 10, np.arange(12) / 100, POINTS_M, 812, 0.87654)
 PLACED = replace(FOUND, offset_m=np.array([0.25, -0.05]), offset_stddev_m=np.array([0.03, 0.01]))
@@ -151,6 +160,21 @@ def test_anatomical_angles_are_in_degrees_and_empty_where_they_are_not_determine
     assert row[5] is None
 
 
+def test_hands_follow_all_other_columns_and_are_empty_where_unknown() -> None:
+    wrist = np.array([0.1, -0.2, np.nan])
+    seen = Hand(0.9, np.array([0.0, 0.6, -0.8]), wrist, np.array([0.3, 0.4, np.nan]))
+    small = seen._replace(open=None, wrist=np.array([0.5, 0.6, 0.7]))
+    names = columns(has_points=True, has_people=True, has_hands=True)
+    assert names == (*WHOLE, "person", *HANDS)
+    cells = row_of(42, 1.5, replace(SEEN, hands=(seen, None)), has_hands=True)[-20:]
+    first = [0.9, 0.0, 0.6, -0.8, 0.1, -0.2, None]
+    assert cells == [*first, *[None] * 7, 0.3, 0.4, None, *[None] * 3]
+    cells = row_of(42, 1.5, replace(SEEN, hands=(None, small)), has_hands=True)[-20:]
+    second = [None, 0.0, 0.6, -0.8, 0.5, 0.6, 0.7]
+    assert cells == [*[None] * 7, *second, *[None] * 3, 0.3, 0.4, None]
+    assert row_of(42, 1.5, SEEN, has_hands=True)[-20:] == [None] * 20
+
+
 def write(path: Path) -> None:
     grey = np.zeros((3, 4), np.uint8)
     with result_table(path, has_points=True) as add:
@@ -193,7 +217,7 @@ def test_the_page_lists_all_columns_in_their_order() -> None:
     listed: list[str] = []
     for cell in re.findall(r"(?m)^\| (`.*?) \|", text):
         listed += re.findall(r"`([a-z_]+)`", cell)
-    assert tuple(listed) == (*WHOLE, "person")
+    assert tuple(listed) == (*WHOLE, "person", *HANDS)
 
 
 def test_of_several_people_the_number_comes_last() -> None:
