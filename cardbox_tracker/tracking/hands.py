@@ -64,7 +64,10 @@ _KEPT_S = 0.5
 # Where between elbow and knuckles the wrist is.
 _WRIST_SHARE = 0.75
 # Deviations of the palm's direction, and of the forearm beside that of its joints, rad.
-_PALM_RAD, _FOREARM_RAD = np.radians([15.0, 10.0])
+_PALM_RAD, _FOREARM_RAD = np.radians([18.0, 10.0])
+# Logarithm of the odds of fingers that bend to the palm, for a length of the palm, and usual angles
+# of flexion and deviation, rad.
+_CURL, _BENT_RAD = 4.65, np.radians([35.0, 18.0])
 # Sine of the least bend of an elbow whose plane is known.
 _LEAST_BEND = float(np.sin(np.radians(20.0)))
 
@@ -106,20 +109,19 @@ class HandReader:
             camera: working camera.
             time_s: time of the image.
         """
-        shown = {
-            side: square
-            for side in _SIDES
-            if points is not None
-            and is_tracked(estimate, side)
-            and (square := hand_square(side, points, estimate, camera)) is not None
-        }
-        if shown and points is not None:
-            side = min(shown, key=lambda one: self._seen.get(one, _Seen(-np.inf, None)).time_s)
+        tracked = [side for side in _SIDES if is_tracked(estimate, side)]
+        if tracked and points is not None:
             image = color(picture())
             view = camera.scaled(image.shape[1], image.shape[0])
-            found = self._look(image, _scaled(shown[side], view.width / camera.width))
-            hand = None if found is None else measured(side, found, points, estimate, camera, view)
-            self._seen[side] = _Seen(time_s, hand)
+            scale = np.array([view.width / camera.width, view.height / camera.height])
+            placed = replace(points, px=(points.px + 0.5) * scale - 0.5)
+            squares = {side: hand_square(side, placed, estimate, view) for side in tracked}
+            shown = {side: square for side, square in squares.items() if square is not None}
+            if shown:
+                side = min(shown, key=lambda one: self._seen.get(one, _Seen(-np.inf, None)).time_s)
+                found = self._look(image, shown[side])
+                hand = None if found is None else measured(side, found, placed, estimate, view)
+                self._seen[side] = _Seen(time_s, hand)
         hands = [self._kept(side, estimate, time_s) for side in _SIDES]
         return replace(estimate, hands=(hands[0], hands[1]))
 
@@ -133,12 +135,6 @@ def is_tracked(estimate: Estimate, side: str) -> bool:
     """Return whether the hand of a side is ``tracked``."""
     states = estimate.keypoint_states
     return states is not None and states[_KEYPOINTS[side]] == KeypointState.TRACKED
-
-
-def _scaled(square: Square, scale: float) -> Square:
-    return square._replace(
-        u=(square.u + 0.5) * scale, v=(square.v + 0.5) * scale, side=square.side * scale
-    )
 
 
 def hand_square(
@@ -157,69 +153,87 @@ def hand_square(
     # A hand that points to the camera has no direction in the image.
     along = hand + 0.2 * (wrist - elbow)
     angle = float(np.arctan2(along[0], -along[1]))
-    u, v = wrist + hand
+    u, v = wrist + hand + 0.5
     return Square(float(u), float(v), _SQUARE * palm_px, angle)
 
 
 def measured(
-    side: str,
-    found: HandPoints,
-    points: ImagePoints,
-    estimate: Estimate,
-    camera: Camera,
-    view: Camera,
+    side: str, found: HandPoints, points: ImagePoints, estimate: Estimate, camera: Camera
 ) -> Hand:
     """Return what the points of a hand tell.
 
+    The network does not know which hand it sees, and at times gives the depth of the mirror image,
+    whose fingers would bend backwards, or whose wrist would be bent too far.
+
     Args:
         side: left or right.
-        found: the hand's points, px of ``view``.
+        found: the hand's points, px of ``camera``.
         points: those of the person, px of ``camera``.
         estimate: of the same image, with a posture.
-        camera: working camera.
-        view: the same camera at the size of the picture.
+        camera: of the image.
     """
-    sign = 1.0 if side == "left" else -1.0
-    turn = _ray_rotation(found.px[WRIST], view)
-    spatial = found.spatial_m @ turn.T
-    fingers = _unit(spatial[_MIDDLE] - spatial[WRIST])
-    palm = sign * _unit(
-        np.cross(spatial[_LITTLE] - spatial[WRIST], spatial[_INDEX] - spatial[WRIST])
-    )
     assert estimate.keypoints_m is not None
+    sign = 1.0 if side == "left" else -1.0
     arm = np.asarray(estimate.keypoints_m)[_KEYPOINTS[side] - 2 :][:3]
-    upper_arm = _unit(arm[1] - arm[0])
-    forearm = _forearm(side, arm, points, camera)
+    upper_arm, forearm = _unit(arm[1] - arm[0]), _forearm(side, arm, points, camera)
+    turn = _ray_rotation(found.px[WRIST], camera)
+    best, palm, wrist = -np.inf, forearm, np.zeros(3)
+    for mirror in (1.0, -1.0):
+        at = found.spatial_m * (1.0, 1.0, mirror)
+        normal = _palm(at, sign)
+        fingers = turn @ _unit(at[_MIDDLE] - at[WRIST])
+        angles = _wrist(turn @ normal, fingers, upper_arm, forearm, sign)
+        score = _CURL * _curl(at, normal) - 0.5 * float(np.sum((angles[:2] / _BENT_RAD) ** 2))
+        if score > best:
+            best, palm, wrist = score, turn @ normal, angles
     spread_rad = _FOREARM_RAD
     if estimate.posture_stddev is not None:
         elbow = np.asarray(estimate.posture_stddev)[_ELBOWS[side]]
         spread_rad = hypot(_FOREARM_RAD, *elbow)
-    flexion = -float(np.arcsin(np.clip(palm @ forearm, -1.0, 1.0)))
-    straight = _unit(forearm - (forearm @ palm) * palm)
-    to_little = sign * np.cross(straight, palm)
-    deviation = float(np.arctan2(fingers @ to_little, fingers @ straight))
-    plane = sign * np.cross(upper_arm, forearm)
-    bend = float(np.linalg.norm(plane))
-    rotation, rotation_stddev = np.nan, np.nan
-    if bend >= _LEAST_BEND:
-        inner = plane / bend
-        rotation = float(np.arctan2(palm @ (sign * np.cross(forearm, inner)), palm @ inner))
-        rotation_stddev = hypot(_PALM_RAD, spread_rad / bend)
     bent = hypot(_PALM_RAD, spread_rad)
-    return Hand(
-        opened(found),
-        palm,
-        np.array([flexion, deviation, rotation]),
-        np.array([bent, bent, rotation_stddev]),
-    )
+    bend = float(np.linalg.norm(np.cross(upper_arm, forearm)))
+    turned = hypot(_PALM_RAD, spread_rad / bend) if bend >= _LEAST_BEND else np.nan
+    return Hand(opened(found), palm, wrist, np.array([bent, bent, turned]))
+
+
+def _wrist(
+    palm: FloatArray, fingers: FloatArray, upper_arm: FloatArray, forearm: FloatArray, sign: float
+) -> FloatArray:
+    """Return flexion, deviation and rotation (3,), rad, of unit vectors (3,)."""
+    flexion = -np.arcsin(np.clip(palm @ forearm, -1.0, 1.0))
+    straight = _unit(forearm - (forearm @ palm) * palm)
+    deviation = np.arctan2(fingers @ (sign * np.cross(straight, palm)), fingers @ straight)
+    plane = sign * np.cross(upper_arm, forearm)
+    if float(np.linalg.norm(plane)) < _LEAST_BEND:
+        return np.array([flexion, deviation, np.nan])
+    inner = _unit(plane)
+    rotation = np.arctan2(palm @ (sign * np.cross(forearm, inner)), palm @ inner)
+    return np.array([flexion, deviation, rotation])
+
+
+def _palm(at: FloatArray, sign: float) -> FloatArray:
+    """Return the normal (3,) out of the palm; ``sign`` is 1 for a left hand, -1 for a right one."""
+    return sign * _unit(np.cross(at[_LITTLE] - at[WRIST], at[_INDEX] - at[WRIST]))
+
+
+def _curl(at: FloatArray, palm: FloatArray) -> float:
+    """Return how far fingers and thumb are on the palm's side of their bases, in palm lengths."""
+    ends = [at[base + 3] - at[base] for base in range(_INDEX, _LITTLE + 1, 4)]
+    return float((np.mean(ends, axis=0) + 0.5 * (at[4] - at[_INDEX])) @ palm) / _length(at)
+
+
+def _length(at: FloatArray) -> float:
+    """Return the length of the palm, m."""
+    return max(float(np.linalg.norm(at[_MIDDLE] - at[WRIST])), 1e-3)
 
 
 def opened(found: HandPoints) -> float | None:
     """Return how open a hand is, see :class:`~.estimate.Hand`; None if it is too small."""
     at = found.spatial_m
     bends = [_finger_bend(at, 1 + 4 * number) for number in range(len(FINGERS))]
-    palm_m = max(float(np.linalg.norm(at[_MIDDLE] - at[WRIST])), 1e-3)
-    far, out = (float(np.linalg.norm(at[4] - at[base])) / palm_m for base in (_LITTLE, _MIDDLE))
+    far, out = (
+        float(np.linalg.norm(at[4] - at[base])) / _length(at) for base in (_LITTLE, _MIDDLE)
+    )
     fingers = np.array(bends[1:])
     thumb = (_THUMB - bends[0]) / _THUMB_SPREAD + (far - _THUMB_FAR) / _THUMB_FAR_SPREAD
     is_open = min(_chance((_OPEN - fingers.max()) / _SPREAD), max(_chance(thumb), _LEAST_BY_THUMB))

@@ -37,7 +37,8 @@ def hand(
     points = [np.zeros(3)]
     for number, ((aside, ahead), angle) in enumerate(zip(BASES, bent, strict=True)):
         base = aside * little + ahead * fingers
-        # A thumb folds across the palm, and points aside if it is open.
+        # A thumb folds across the palm, and lies a little before it if it is open.
+        base = base if number else base + 0.01 * palm
         straight = base / np.linalg.norm(base)
         across = palm if number else little
         joints = np.array([0.0, 0.4, 0.7, 1.0]) * (0.07 if number else 0.08)
@@ -90,8 +91,7 @@ def arm(side: str, forearm: FloatArray) -> tuple[Estimate, ImagePoints]:
 
 def angles(side: str, found: HandPoints, forearm: FloatArray) -> FloatArray:
     estimate, points = arm(side, forearm)
-    view = CAMERA.scaled(320, 240)
-    return measured(side, found, points, estimate, CAMERA, view).wrist
+    return measured(side, found, points, estimate, CAMERA).wrist
 
 
 @pytest.mark.parametrize("side", SIDES)
@@ -136,8 +136,20 @@ def test_the_palm_is_that_of_the_ray_to_the_hand() -> None:
     estimate, points = arm("left", -AHEAD)
     found = hand()
     aside = found._replace(px=found.px + np.array([150.0, 0.0]))
-    palm = measured("left", aside, points, estimate, CAMERA, CAMERA).palm
+    palm = measured("left", aside, points, estimate, CAMERA).palm
     np.testing.assert_allclose(palm, -np.array([150.0, 0.0, 300.0]) / np.hypot(150, 300), atol=1e-9)
+
+
+@pytest.mark.parametrize("side", SIDES)
+def test_the_depth_of_the_mirror_image_is_told_by_the_fingers(side: str) -> None:
+    aside = RIGHT if side == "right" else -RIGHT
+    palm = (aside - 0.5 * AHEAD) / np.sqrt(1.25)
+    found = hand((0.5,) * 5, fingers=-DOWN, palm=palm, side=side)
+    mirrored = found._replace(spatial_m=found.spatial_m * (1.0, 1.0, -1.0))
+    estimate, points = arm(side, -DOWN)
+    for one in (found, mirrored):
+        seen = measured(side, one, points, estimate, CAMERA)
+        np.testing.assert_allclose(seen.palm, palm, atol=1e-6)
 
 
 class Looks:
