@@ -371,12 +371,6 @@ def add_tracking(parser: argparse.ArgumentParser, needs_recording: bool = True) 
         "they come, and from left to right if they come together",
     )
     add(
-        "--hands",
-        action="store_true",
-        help="with --detector mediapipe: also tell open from closed hands, and measure palms and "
-        "wrists (docs/results.md)",
-    )
-    add(
         "--distance",
         type=float,
         metavar="M",
@@ -580,7 +574,7 @@ def _hands(
     from cardbox_tracker.detectors.detector import Detector
     from cardbox_tracker.detectors.model_files import installed_hands
 
-    if not options.hands:
+    if not getattr(options, "hands", False):
         return None
     if not isinstance(recording.points, Detector):
         problems.add("--hands needs the detector's wrists and knuckles: give --detector mediapipe")

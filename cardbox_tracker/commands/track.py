@@ -33,6 +33,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--bag", type=Path, metavar="OUT", help="also write the topics of the tracker"
     )
+    parser.add_argument(
+        "--hands",
+        action="store_true",
+        help="with --detector mediapipe: also tell open from closed hands, and measure palms and "
+        "wrists, in further columns and in the video (docs/results.md)",
+    )
     parser.add_argument("--video", type=Path, metavar="OUT.mp4", help="also write an overlay video")
     many = parser.add_argument_group("a folder of recordings (docs/many-recordings.md)")
     many.add_argument(

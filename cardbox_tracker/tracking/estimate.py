@@ -15,6 +15,10 @@ from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.sizes import FloatArray
 from cardbox_tracker.person.skeleton import KeypointState
 
+OPEN, CLOSED = 0.75, 0.25
+"""A hand is open above the first value of ``Hand.open``, and closed below the second."""
+HAND_KEYPOINTS = 2, 5
+"""Left and right hand among the keypoints."""
 TRACKING, UNCERTAIN, LOST, NO_PERSON = "tracking", "uncertain", "lost", "no_person"
 
 

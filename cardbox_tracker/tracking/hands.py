@@ -32,7 +32,7 @@ from cardbox_tracker.detectors.image_points import POINT_INDEX, ImagePoints
 from cardbox_tracker.detectors.pose_network import ColorImage, Square
 from cardbox_tracker.person.sizes import FloatArray
 from cardbox_tracker.person.skeleton import KeypointState
-from cardbox_tracker.tracking.estimate import Estimate, Hand
+from cardbox_tracker.tracking.estimate import HAND_KEYPOINTS, Estimate, Hand
 
 # A finger is open if its end is bent by less than the first angle from the direction of its base,
 # and closed if by more than the second, with their spread, rad.
@@ -52,7 +52,7 @@ LEAST_PX = 17.0
 # Points at the bases of index, middle and little finger.
 _INDEX, _MIDDLE, _LITTLE = 5, 9, 17
 _SIDES = ("left", "right")
-_KEYPOINTS = {"left": 2, "right": 5}
+_KEYPOINTS = dict(zip(_SIDES, HAND_KEYPOINTS, strict=True))
 _ELBOWS = {"left": slice(6, 8), "right": slice(10, 12)}
 
 # Side of the square around a hand, in lengths from the wrist to the knuckles, and that length, m.

@@ -20,6 +20,7 @@ import numpy as np
 from cardbox_tracker.detectors.hand_network import HandNetwork
 from cardbox_tracker.detectors.model_files import installed_hands
 from cardbox_tracker.detectors.pose_network import Square
+from cardbox_tracker.tracking.estimate import CLOSED, OPEN
 from cardbox_tracker.tracking.hands import opened
 
 SIZES_PX = (1000, 100, 60, 50, 40, 30, 25, 20, 17, 14, 10)
@@ -41,10 +42,10 @@ def main() -> None:
         sure = known & np.isin(fingers, (0, _ALL_OPEN))
         some = known & ~np.isin(fingers, (0, _ALL_OPEN))
         right = (value > 0.5) == (fingers == _ALL_OPEN)
-        neither = np.abs(value - 0.5) <= 0.25
+        neither = (value >= CLOSED) & (value <= OPEN)
         print(
             f"{size_px}, {len(found)}, {known.mean():.3f}, {_share(right[sure])}, "
-            f"{_share(neither[some])}, {_share(value[some] > 0.75)}",
+            f"{_share(neither[some])}, {_share(value[some] > OPEN)}",
             flush=True,
         )
 

@@ -23,7 +23,7 @@ from cardbox_tracker.person.parts import body_parts
 from cardbox_tracker.person.posture import PLACE, POSTURE
 from cardbox_tracker.person.sizes import FloatArray
 from cardbox_tracker.person.skeleton import KeypointState
-from cardbox_tracker.tracking.estimate import Estimate
+from cardbox_tracker.tracking.estimate import CLOSED, HAND_KEYPOINTS, OPEN, Estimate
 from cardbox_tracker.tracking.tracker import Tracker
 
 ImageArray = NDArray[np.uint8]
@@ -31,6 +31,7 @@ ImageArray = NDArray[np.uint8]
 OUTLINE_BGR = (60, 220, 60)
 SKELETON_BGR = (0, 140, 255)
 GAZE_BGR = (255, 230, 60)
+HAND_BGR = (255, 160, 220)
 JOINT_BGR = (255, 255, 255)
 TEXT_BGR = (255, 255, 255)
 # Colours of the markers and of the URDF: torso, left, right.
@@ -86,6 +87,7 @@ def draw_overlay(
         posed = draw_model(canvas, there, view, estimate.posture, outline, estimate.keypoint_states)
         if estimate.neck is not None:
             _draw_gaze(canvas, view, gaze_m(body_parts(there.sizes), posed, estimate.neck))
+        _draw_hands(canvas, view, estimate)
         text += f"  IoU {estimate.iou:.2f}  {estimate.cost_px} px"
         if estimate.place is not None and estimate.place.state is KeypointState.UNCERTAIN:
             text += "  place uncertain"
@@ -113,7 +115,9 @@ def draw_camera_overlay(
     if estimate.posture is not None:
         place_m = np.zeros(2) if estimate.offset_m is None else estimate.offset_m
         state = view.states(np.concatenate([estimate.posture, place_m]))
-        estimate = replace(estimate, posture=state[POSTURE], offset_m=state[PLACE])
+        # The hands' places are those in the first camera.
+        place = {"posture": state[POSTURE], "offset_m": state[PLACE]}
+        estimate = replace(estimate, **place, hands=None)
     return draw_overlay(view.upright(picture), view.body, view.camera, estimate, scale)
 
 
@@ -234,6 +238,19 @@ def _draw_gaze(canvas: ImageArray, camera: Camera, line_m: FloatArray) -> None:
     cv2.polylines(canvas, [pixels], False, GAZE_BGR, thickness + 1, cv2.LINE_AA, _SHIFT)
     radius = (thickness + 1) << _SHIFT
     cv2.circle(canvas, pixels[1].tolist(), radius, GAZE_BGR, -1, cv2.LINE_AA, _SHIFT)
+
+
+def _draw_hands(canvas: ImageArray, camera: Camera, estimate: Estimate) -> None:
+    """Draw a ring around an open hand, a disc over a closed one, and a half disc between."""
+    for hand, keypoint in zip(estimate.hands or (), HAND_KEYPOINTS, strict=False):
+        if hand is None or hand.open is None or estimate.keypoints_m is None:
+            continue
+        u, v = camera.project(estimate.keypoints_m[keypoint]).tolist()
+        centre, radius = (round(u), round(v)), max(4, round(camera.width / 50))
+        thickness = max(1, round(camera.width / 400))
+        filled = 0 if hand.open > OPEN else 360 if hand.open < CLOSED else 180
+        cv2.ellipse(canvas, centre, (radius, radius), 0, 0, filled, HAND_BGR, -1, cv2.LINE_AA)
+        cv2.circle(canvas, centre, radius, HAND_BGR, thickness, cv2.LINE_AA)
 
 
 def _draw_text(canvas: ImageArray, text: str, colour: tuple[int, int, int] = TEXT_BGR) -> None:

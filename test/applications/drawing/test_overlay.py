@@ -9,6 +9,7 @@ import pytest
 
 from cardbox_tracker.applications.drawing.overlay import (
     GAZE_BGR,
+    HAND_BGR,
     JOINT_BGR,
     OUTLINE_BGR,
     SKELETON_BGR,
@@ -30,7 +31,7 @@ from cardbox_tracker.person.skeleton import KeypointState
 from cardbox_tracker.recordings.markers import marker_shapes
 from cardbox_tracker.terms.whole_body import WholeBodyCost
 from cardbox_tracker.terms.whole_body_config import WholeBodyCostConfig
-from cardbox_tracker.tracking.estimate import NO_PERSON, TRACKING, Estimate
+from cardbox_tracker.tracking.estimate import NO_PERSON, TRACKING, Estimate, Hand
 from cardbox_tracker.tracking.tracker import Tracker
 
 BODY = BodyModel()
@@ -63,6 +64,22 @@ def test_the_skeleton_is_where_the_joints_are(scale: int) -> None:
     pixels = view.project(view.reference_to_optical(pose(BODY.rigid, FRONT).keypoints_m))
     for u, v in pixels.round().astype(int):
         assert near(overlay, JOINT_BGR)[v, u]
+
+
+def test_an_open_hand_is_a_ring_and_a_closed_one_a_disc() -> None:
+    keypoints = np.tile([0.0, 0.0, 2.0], (6, 1))
+    # In the upper corners, where nothing of the person is drawn.
+    keypoints[[2, 5], :2] = [(1.0, -0.5), (-1.0, -0.5)]
+    hand = Hand(0.9, np.array([0.0, 0.0, -1.0]), np.zeros(3), np.ones(3))
+    hands = hand, hand._replace(open=0.1)
+    overlay = draw_overlay(GREY, BODY, CAMERA, replace(FOUND, keypoints_m=keypoints, hands=hands))
+    (left, top), (right, _) = CAMERA.project(keypoints[[2, 5]]).round().astype(int)
+    assert not near(overlay, HAND_BGR)[top, left] and near(overlay, HAND_BGR)[top, left + 6]
+    assert near(overlay, HAND_BGR)[top, right]
+    some = draw_overlay(
+        GREY, BODY, CAMERA, replace(FOUND, keypoints_m=keypoints, hands=(hands[1], None))
+    )
+    assert near(some, HAND_BGR)[top, left] and not near(some, HAND_BGR)[top, right]
 
 
 def test_the_person_is_drawn_where_the_estimate_is() -> None:
