@@ -25,7 +25,8 @@ WRIST = 0
 FINGERS = ("thumb", "index", "middle", "ring", "little")
 
 _POINTS, _INPUT_PX = 21, 224
-_LEAST_PRESENCE = 0.5
+# A hand is known to be there; a fast one is blurred.
+_LEAST_PRESENCE = 0.3
 
 
 class HandPoints(NamedTuple):

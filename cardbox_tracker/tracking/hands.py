@@ -20,7 +20,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 from math import exp, hypot
-from typing import NamedTuple, Protocol
+from typing import Protocol
 
 import cv2
 import numpy as np
@@ -56,10 +56,10 @@ _KEYPOINTS = dict(zip(_SIDES, HAND_KEYPOINTS, strict=True))
 _ELBOWS = {"left": slice(6, 8), "right": slice(10, 12)}
 
 # Side of the square around a hand, in lengths from the wrist to the knuckles, and that length, m.
-_SQUARE, _PALM_M = 3.0, 0.09
+_SQUARE, _PALM_M = 2.4, 0.09
 # Least score of the points that place the square.
 _LEAST_SCORE = 0.3
-# Time for which a hand keeps its result, s.
+# Time for which a hand that is not found keeps its result, s.
 _KEPT_S = 0.5
 # Where between elbow and knuckles the wrist is.
 _WRIST_SHARE = 0.75
@@ -79,18 +79,14 @@ class Look(Protocol):
         """Return the points; None if there is no hand."""
 
 
-class _Seen(NamedTuple):
-    time_s: float
-    hand: Hand | None
-
-
 class HandReader:
     """Adds the hands to the estimates of one person, from the first camera's images."""
 
     def __init__(self, look: Look) -> None:
         """Start without a hand."""
         self._look = look
-        self._seen: dict[str, _Seen] = {}
+        self._looked_s: dict[str, float] = {}
+        self._seen: dict[str, tuple[float, Hand]] = {}
 
     def see(
         self,
@@ -118,17 +114,18 @@ class HandReader:
             squares = {side: hand_square(side, placed, estimate, view) for side in tracked}
             shown = {side: square for side, square in squares.items() if square is not None}
             if shown:
-                side = min(shown, key=lambda one: self._seen.get(one, _Seen(-np.inf, None)).time_s)
+                side = min(shown, key=lambda one: self._looked_s.get(one, -np.inf))
+                self._looked_s[side] = time_s
                 found = self._look(image, shown[side])
-                hand = None if found is None else measured(side, found, placed, estimate, view)
-                self._seen[side] = _Seen(time_s, hand)
+                if found is not None:
+                    self._seen[side] = time_s, measured(side, found, placed, estimate, view)
         hands = [self._kept(side, estimate, time_s) for side in _SIDES]
         return replace(estimate, hands=(hands[0], hands[1]))
 
     def _kept(self, side: str, estimate: Estimate, time_s: float) -> Hand | None:
-        seen = self._seen.get(side)
-        is_new = seen is not None and 0.0 <= time_s - seen.time_s <= _KEPT_S
-        return seen.hand if seen is not None and is_new and is_tracked(estimate, side) else None
+        seen_s, hand = self._seen.get(side, (-np.inf, None))
+        is_new = 0.0 <= time_s - seen_s <= _KEPT_S
+        return hand if is_new and is_tracked(estimate, side) else None
 
 
 def is_tracked(estimate: Estimate, side: str) -> bool:

@@ -202,13 +202,17 @@ def test_only_tracked_hands_are_looked_at() -> None:
     assert reader.see(lambda: PICTURE, None, estimate, CAMERA, 2.0).hands == (None, None)
 
 
-def test_a_hand_that_is_no_longer_found_is_unknown() -> None:
+def test_a_hand_that_is_not_found_keeps_its_state_for_half_a_second() -> None:
     looks, (estimate, points) = Looks(), both()
     reader = HandReader(looks)
-    for number in range(4):
+    known = []
+    for number in range(9):
         looks.sees = number < 2
         found = reader.see(lambda: PICTURE, points, estimate, CAMERA, number / 10)
-    assert found.hands == (None, None)
+        known.append([one is not None for one in found.hands or ()])
+    assert known[5:8] == [[True, True], [False, True], [False, False]]
+    # Time that goes back, as in a loop, is no reason to keep it.
+    assert reader.see(lambda: PICTURE, points, estimate, CAMERA, -1.0).hands == (None, None)
 
 
 def test_points_that_are_not_known_place_no_square() -> None:
