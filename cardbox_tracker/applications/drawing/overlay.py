@@ -115,9 +115,9 @@ def draw_camera_overlay(
     if estimate.posture is not None:
         place_m = np.zeros(2) if estimate.offset_m is None else estimate.offset_m
         state = view.states(np.concatenate([estimate.posture, place_m]))
+        posture, there = state[POSTURE], state[PLACE]
         # The hands' places are those in the first camera.
-        place = {"posture": state[POSTURE], "offset_m": state[PLACE]}
-        estimate = replace(estimate, **place, hands=None)
+        estimate = replace(estimate, posture=posture, offset_m=there, hands=None)
     return draw_overlay(view.upright(picture), view.body, view.camera, estimate, scale)
 
 
