@@ -37,6 +37,7 @@ PUBLIC = {
     "EncodingError",
     "Estimate",
     "Extrinsics",
+    "ImagePoints",
     "InitializationConfig",
     "InitializationError",
     "InitializationResult",

@@ -304,7 +304,7 @@ def test_what_launch_files_start_is_declared() -> None:
 
 
 def test_what_tests_import_is_declared() -> None:
-    keys = {"setuptools": "python3-setuptools", "yaml": "python3-yaml", "cv2": "python3-opencv"}
+    keys = {"PIL": "python3-pil", "yaml": "python3-yaml", "cv2": "python3-opencv"}
     in_xml = {
         element.text
         for kind in ("exec_depend", "test_depend")
@@ -315,7 +315,11 @@ def test_what_tests_import_is_declared() -> None:
 
 
 def test_what_pip_requires_rosdep_requires() -> None:
-    keys = {"opencv-python-headless": "python3-opencv", "pyyaml": "python3-yaml"}
+    keys = {
+        "opencv-python-headless": "python3-opencv",
+        "pillow": "python3-pil",
+        "pyyaml": "python3-yaml",
+    }
     in_xml = {element.text for element in package_xml().findall("exec_depend")}
     for line in setup_arguments()["install_requires"]:
         name = re.split(r"[<>=]", line)[0].lower()

@@ -10,7 +10,6 @@ from functools import partial
 from typing import TYPE_CHECKING, NamedTuple
 
 from cardbox_tracker.commands.arguments import body_of_person, print_remarks
-from cardbox_tracker.person.model import CameraPose
 
 if TYPE_CHECKING:
     from cardbox_tracker.camera.camera import Camera
@@ -201,7 +200,7 @@ class Placement(NamedTuple):
 
     pitch_rad: float
     recording: RecordingRequest
-    stddev_rad: float = CameraPose.pitch_stddev_rad
+    stddev_rad: float = math.radians(2.0)
     distance: float | None = None
 
 

@@ -303,7 +303,7 @@ def test_a_rolled_cameras_images_are_turned_back(tmp_path: Path) -> None:
     cv2.imwrite(str(tmp_path / "b.png"), image)
     camera = GivenCamera(60.0, roll_rad=np.radians(10.0))
     with open_recording(tmp_path, TimeSpan(0, 1), camera=camera) as recording:
-        (_, _, level, _), _ = recording.first.images()
+        (_, _, level, *_), _ = recording.first.images()
         columns = [np.average(np.arange(320), weights=level[v, :, 0] > 128) for v in (60, 180)]
         assert columns[0] == pytest.approx(columns[1], abs=1.5)
         calibration = recording.first._pipeline.calibration

@@ -182,7 +182,7 @@ def tables(tmp_path: Path) -> dict[str, tuple[Callable[[Path], Any], list[list[s
     points = [["stamp_ns", "joint", "u", "v", "score"], ["1", "nose", "3", "4", "0.5"]]
     return {
         "results": (read_motion, results),
-        "points": (lambda path: PointTable(path).read(None, CAMERA, SIZE), points),
+        "points": (lambda path: PointTable(path).read(None, SIZE), points),
     }
 
 

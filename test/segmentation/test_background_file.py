@@ -91,7 +91,7 @@ def test_another_working_size_is_refused(path: Path) -> None:
         ({"distortion": np.zeros(1000)}, "too much"),
         ({"distortion_model": np.array("x" * 1000)}, "too much"),
         ({"k": np.zeros(4)}, "reshape"),
-        ({"size": np.array([320])}, "unpack"),
+        ({"size": np.array([320])}, "size is not two whole numbers"),
     ],
 )
 def test_what_is_no_background_is_refused(path: Path, entries: Any, words: str) -> None:

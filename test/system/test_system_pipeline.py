@@ -194,9 +194,9 @@ def test_silhouette_has_the_stamp_size_and_camera_info_of_its_image(learned: Ses
 
 def test_unsupported_encoding_is_refused_in_words_and_the_node_goes_on(learned: Session) -> None:
     message = image_message(learned.header(), learned.scene.image(None), "mono8")
-    message.encoding = "16UC3"
+    message.encoding = "32SC2"
     learned.images.publish(message)
-    status = learned.graph.diagnosis("background", "16UC3")
+    status = learned.graph.diagnosis("background", "32SC2")
     assert "mono8" in status.message and "bgr8" in status.message
     learned.show(None)
 

@@ -120,5 +120,5 @@ def test_a_robot_that_is_no_arm_is_told() -> None:
 
 def test_without_the_libraries_the_extra_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "daqp", None)
-    with pytest.raises(CardboxError, match=r"pip install cardbox_tracker\[retarget\]"):
+    with pytest.raises(CardboxError, match=r"pip install '\.\[retarget\]'"):
         HandFollower(ROBOT, RetargetConfig())

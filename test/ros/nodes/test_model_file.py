@@ -6,6 +6,7 @@ import shutil
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
+from unittest.mock import Mock
 
 import numpy as np
 import pytest
@@ -42,7 +43,8 @@ def test_a_home_folder_is_known_to_every_node(
     make: Any, context: Context, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("HOME", str(tmp_path))
-    monkeypatch.setattr("cardbox_tracker.ros.nodes.camera_node.open_video", lambda _: None)
+    monkeypatch.setattr("cardbox_tracker.ros.nodes.camera_node.open_video", lambda _: Mock())
+    monkeypatch.setattr("cardbox_tracker.ros.nodes.camera_node.oblong", lambda _: 1.0)
     (tmp_path / "bad.yaml").write_text("- nothing\n")
     name = "calibration_file" if make is CameraNode else "model_file"
     more = {"file": "video", "rate_hz": 15.0} if make is CameraNode else {}
