@@ -14,6 +14,7 @@ ROS = ["ros-jazzy-rclpy[fastrtps]", "ros-jazzy-common-interfaces"]
 TEST = [
     "bvh>=0.3,<1",
     "catkin_pkg>=1.0",
+    "cma>=4,<5",
     "hypothesis>=6.100",
     "mcap>=1.2",
     "mcap-ros2-support>=0.5.4",

@@ -44,8 +44,9 @@ def report(results: Mapping[str, Any]) -> str:
             [(_FRAMES[name], *_ms(times)) for name, times in results["frames"].items()],
         ),
         f"The compiled cost is {results['ratio_opencv']:.0f} times faster than `fillConvexPoly`, "
-        f"XOR and `countNonZero`. {_ratings(results['stages'])} The preset `default` takes {results['ratio_default']:.1f} times "
-        "as long as the paper's settings, and the volumetric model of 42 planes "
+        f"XOR and `countNonZero`. {_ratings(results['stages'])} The preset `default` takes "
+        f"{results['ratio_default']:.1f} times as long as the paper's settings, and the "
+        "volumetric model of 42 planes "
         f"{results['ratio_volumetric']:.1f} times as long as the cardbox model of 15. The process "
         f"holds {results['rss_mb']:.0f} MB.",
         "## Parts of a frame with the preset `default`",

@@ -192,12 +192,20 @@ def test_quick_is_smaller_than_full_in_everything() -> None:
     quick, full = quick_plan(100), full_plan(100)
     assert (full.runs, full.bodies, full.seeds) == (100, 50, 50)
     assert full.particles[0] == 25
-    assert full.particles[-1] == 3200
-    for name in ("runs", "side_runs", "particle_runs", "model_runs", "bodies", "seeds"):
+    assert full.particles[-1] == 1600
+    for name in (
+        "runs",
+        "side_runs",
+        "particle_runs",
+        "model_runs",
+        "peer_runs",
+        "bodies",
+        "seeds",
+    ):
         assert getattr(quick, name) < getattr(full, name)
     assert set(quick.survival_rates) < set(full.survival_rates)
     assert set(quick.particles) < set(full.particles)
-    assert full_plan(5).side_runs == 5
+    assert full_plan(5).side_runs == 2
 
 
 @pytest.mark.parametrize(
