@@ -151,11 +151,9 @@ def _side_timing(
     done: Mapping[Call, Done],
     plan: Plan,
 ) -> Results:
-    """Return the times of a posture, of an image, and of each experiment."""
+    """Return the times of a posture and of each experiment."""
     session = main[0].session
     middle = session.silhouettes[len(session.silhouettes) // 2]
-    main_s = _processor_s(main, done)
-    images = sum(cell.runs * len(cell.session.silhouettes) for cell in main)
     by_name: dict[str, list[Cell]] = {}
     for cell in side:
         by_name.setdefault(cell.path[0], []).append(cell)
@@ -163,11 +161,9 @@ def _side_timing(
         "particle_us": microseconds_a_particle(
             session.body, session.camera, middle, 200, plan.timing_rounds
         ),
-        # This is measured while all cores are busy.
-        "frame_ms": 1e3 * main_s / images,
         "processor_s": {name: _processor_s(cells, done) for name, cells in by_name.items()}
         | {
-            "experiments_1_to_3": main_s,
+            "experiments_1_to_3": _processor_s(main, done),
             "initialization": sum(done[call].seconds for call in measuring),
         },
     }

@@ -27,7 +27,7 @@ def write_report(results: Results, timing: Results, folder: Path) -> None:
         lines += _models(sides["models"], timing)
     lines += _sequences(results)
     if sides is not None:
-        lines += _initialization(sides["initialization"], timing)
+        lines += _initialization(sides["initialization"])
         lines += _schemes(sides["schemes"], sides["variants"])
         lines += _tempers(sides["tempers"])
     lines += _methods(results)
@@ -173,8 +173,8 @@ def _models(results: Results, timing: Results) -> Iterator[str]:
         ),
     )
     yield from _section(
-        f"The compiled cost takes {timing['particle_us']['compiled']:.1f} us for the same posture, "
-        f"and an image with 600 particles {timing['frame_ms']:.1f} ms on one core."
+        f"The compiled cost takes {timing['particle_us']['compiled']:.1f} us for the same posture; "
+        "[benchmarks](../benchmarks.md) have the time of an image."
     )
 
 
@@ -188,16 +188,15 @@ def _sequences(results: Results) -> Iterator[str]:
     )
 
 
-def _initialization(results: Results, timing: Results) -> Iterator[str]:
-    search = timing["initialization"]
+def _initialization(results: Results) -> Iterator[str]:
     rounds = ", ".join(f"{n} {v:.0f}" for n, v in results["mean_rounds"].items())
     fits = ", ".join(f"{n} {v:.2f}" for n, v in results["mean_iou"].items())
     yield from _section(
         "## 8. Initialization",
         f"{results['bodies']} random people (1.55 to 1.9 m), measured once, and one person "
         f"measured with {results['seeds']} seeds. The held postures miss by "
-        f"{results['posture_miss_deg']:g} degrees. Rounds: {rounds}; IoU: {fits}. One search takes "
-        f"{search['median_s']:.2f} s (median; 95 % within {search['p95_s']:.2f} s). All in cm:",
+        f"{results['posture_miss_deg']:g} degrees. Rounds: {rounds}; IoU: {fits}. All in "
+        "cm:",
     )
     yield from _table(
         ["size", "mean abs. error", "bias", "spread of people", "std. dev. over seeds"],
@@ -332,8 +331,7 @@ def _origin(results: Results, timing: Results) -> Iterator[str]:
         f"- commit: {results['commit'] or 'not known'}; digest of filter, simulation and "
         f"initialization: {results['digest']}",
         f"- processor: {results['cpu']}, {timing['jobs']} processes",
-        f"- time: {sum(timing['processor_s'].values()) / 60:.1f} minutes of processor time; the "
-        f"last call of the command took {timing['wall_s'] / 60:.1f} minutes",
+        f"- time: the last call of the command took {timing['wall_s'] / 60:.1f} minutes",
         "- all numbers: `results.json`; by image: `per_frame.csv`; times: `timing.json`",
     )
 

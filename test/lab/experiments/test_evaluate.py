@@ -117,7 +117,7 @@ def test_figures_and_report_are_there(output: Path) -> None:
         assert f"({name})" in report
     for number in range(1, 11):
         assert f"\n## {number}. " in report
-    for word in ("DRS below SRS", "median", "commit", "MPJPE"):
+    for word in ("DRS below SRS", "commit", "MPJPE"):
         assert word in report
     assert "nan" not in report
 
@@ -128,7 +128,6 @@ def test_no_time_is_in_the_results(output: Path) -> None:
     assert "_us" not in text
     assert "wall" not in text
     assert timing["particle_us"]["volumetric"] > 0
-    assert timing["frame_ms"] > 0
 
 
 def test_every_image_of_every_motion_is_in_the_table(output: Path) -> None:
