@@ -6,6 +6,7 @@
 # make experiments   repeat the paper's experiments (hours); writes docs/evaluation/report.md
 # make sessions    track the recorded sessions in ../shared/data; writes docs/evaluation/sessions.md
 # make people      track the films of real people in ../shared/data; writes docs/evaluation/real-people.md
+# make wrong-inputs   shape and place where a given number is wrong; writes docs/evaluation/wrong-inputs.md
 # make reliability   hours of faults and hostile input; writes docs/reliability.md
 # make reliability-quick   the same in ten minutes, without running nodes; writes nothing
 # make bounds  tests of compiled code with bounds checks; the first run compiles for minutes
@@ -159,6 +160,12 @@ people: setup $(VENV)/extras
 		$(BIN)/python -m lab.tools.real_report --session $(DATA)/real_signs --output $(REPORT) \
 			--sheet docs/images/real.jpg; \
 		$(FIGURES); fi
+
+# This compares shape and place with the truth where stature, distance or pitch is wrong.
+.PHONY: wrong-inputs
+wrong-inputs: export XDG_DATA_HOME := $(CURDIR)/$(VENV)/data
+wrong-inputs: setup $(VENV)/extras
+	$(BIN)/python -m lab.tools.wrong_inputs $(DATA)/person_a $(PEOPLE) --output docs/evaluation/wrong-inputs.md
 
 # Fewer examples: make reliability EXAMPLES=1000
 EXAMPLES ?= 100000

@@ -11,10 +11,13 @@ HOME = "https://github.com/cardbox-tracker/cardbox_tracker"
 
 # A ROS installation has these, so pip installs them only on request.
 ROS = ["ros-jazzy-rclpy[fastrtps]", "ros-jazzy-common-interfaces"]
+# 'cardbox track FOLDER --scheduler' on a cluster.
+CLUSTER = ["dask>=2024.5", "distributed>=2024.5"]
 TEST = [
     "bvh>=0.3,<1",
     "catkin_pkg>=1.0",
     "cma>=4,<5",
+    *CLUSTER,
     "hypothesis>=6.100",
     "mcap>=1.2",
     "mcap-ros2-support>=0.5.4",
@@ -143,6 +146,7 @@ setup(
         "parquet": PARQUET,
         "docs": DOCS,
         "export": EXPORT,
+        "cluster": CLUSTER,
     },
     entry_points={"console_scripts": SCRIPTS},
     cmdclass={"install_data": InstallData},

@@ -30,6 +30,7 @@ if TYPE_CHECKING:
         NotFiniteError,
         RosMissingError,
     )
+    from cardbox_tracker.detectors.image_points import ImagePoints
     from cardbox_tracker.measuring.config import (
         InitializationConfig,
         InitializationResult,
@@ -69,6 +70,7 @@ __all__ = [
     "EncodingError",
     "Estimate",
     "Extrinsics",
+    "ImagePoints",
     "InitializationConfig",
     "InitializationError",
     "InitializationResult",
@@ -104,6 +106,7 @@ _MODULES = {
         "RosMissingError",
     ),
     "search.config": ("PRESETS", "TrackerConfig"),
+    "detectors.image_points": ("ImagePoints",),
     "terms.depth": ("Depth",),
     "camera.view": ("OtherCamera",),
     "measuring.config": ("InitializationConfig", "InitializationResult"),

@@ -283,6 +283,7 @@ def test_what_is_imported_is_declared() -> None:
         "pink": "pin-pink",
         "pinocchio": "pin",
         "rerun": "rerun-sdk",
+        "rerun_cli": "rerun-sdk",
         "yaml": "pyyaml",
     }
     from_ros = {"rclpy", "ament_index_python", "launch", "launch_ros", *MESSAGES}

@@ -53,7 +53,7 @@ def test_a_missing_library_of_the_robot_is_told_in_words() -> None:
     )
     said = done.stdout + done.stderr
     assert done.returncode == 1
-    assert "pip install cardbox_tracker[retarget]" in said and "joint_map_file" in said
+    assert "pip install '.[retarget]'" in said and "joint_map_file" in said
     assert "Traceback" not in said
 
 

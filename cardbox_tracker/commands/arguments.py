@@ -268,6 +268,23 @@ def body_beside(table: Path) -> Path:
     return table.with_name(f"{table.stem}.body.yaml")
 
 
+def add_person(parser: argparse.ArgumentParser) -> None:
+    """Add ``--person``, the number of one of several people in results."""
+    parser.add_argument(
+        "--person",
+        type=at_least(1),
+        metavar="K",
+        help="results of several people: the number of the person (default: 1)",
+    )
+
+
+def body_of_person(body: Path, number: int) -> Path:
+    """Return the file of the body of one of several people; ``body`` is that of the first."""
+    if number == 1:
+        return body
+    return body.with_name(body.name.replace(".body.yaml", f".person_{number}.body.yaml"))
+
+
 def print_remarks(*remarks: Iterable[str]) -> None:
     """Print remarks on a recording on the standard error."""
     for remark in chain(*remarks):

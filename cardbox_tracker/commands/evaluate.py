@@ -7,7 +7,12 @@ from __future__ import annotations
 
 import argparse
 import os
+from concurrent.futures import ProcessPoolExecutor
+from functools import partial
+from multiprocessing import get_context
 from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import TYPE_CHECKING, Any
 
 from cardbox_tracker.commands.arguments import (
     add_force,
@@ -18,6 +23,11 @@ from cardbox_tracker.commands.arguments import (
 )
 from cardbox_tracker.commands.checkout import from_checkout
 from cardbox_tracker.commands.request import points_named
+
+if TYPE_CHECKING:
+    from cardbox_tracker.recordings.silhouettes import RecordedFrame
+    from cardbox_tracker.tracking.estimate import Estimate
+    from cardbox_tracker.tracking.tracker import Tracker
 
 NAME = "evaluate"
 HELP = (
@@ -53,6 +63,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "paper's experiments; whoever takes the reference postures in a session is measured first",
     )
     parser.add_argument(
+        "--films",
+        type=Path,
+        nargs="+",
+        metavar="DIR",
+        help="such sessions, made into upright films and films across, and tracked as 'cardbox "
+        "track FILM --detector mediapipe' does: with field of view and stature, and with neither",
+    )
+    parser.add_argument(
         "--silhouettes",
         nargs="+",
         choices=("background", "detector"),
@@ -71,7 +89,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         type=at_least(1),
         default=3,
         metavar="N",
-        help="with --sessions: number of runs, with consecutive seeds from --seed on",
+        help="with --sessions or --films: number of runs, with consecutive seeds from --seed on",
     )
     parser.add_argument(
         "--recovery",
@@ -94,6 +112,9 @@ def run(options: argparse.Namespace) -> None:
     jobs = options.jobs or len(os.sched_getaffinity(0))
     if options.sessions:
         _sessions(options, jobs)
+        return
+    if options.films:
+        _films(options, jobs)
         return
     inputs = [options.session] if options.session else []
     check_outputs((), options.force, inputs=inputs, results=(options.output / "report.md",))
@@ -123,3 +144,83 @@ def _sessions(options: argparse.Namespace, jobs: int) -> None:
         evaluate_sessions(options.sessions, options.output, plan, jobs, show)
     for path in results:
         print(f"wrote {path} and {path.with_suffix('.json')}")
+
+
+def _films(options: argparse.Namespace, jobs: int) -> None:
+    from cardbox_tracker.applications.evaluation.films import SHAPES, films_report
+    from cardbox_tracker.applications.evaluation.results import provenance, write_json
+    from cardbox_tracker.applications.evaluation.session import load_session
+    from cardbox_tracker.common.files import atomic_path
+    from cardbox_tracker.common.progress import progress_bar
+    from cardbox_tracker.tracking.precompile import compile_all
+
+    report = options.output / "films.md"
+    check_outputs((), options.force, inputs=options.films, results=[report])
+    for folder in options.films:
+        load_session(folder)
+    options.output.mkdir(parents=True, exist_ok=True)
+    compile_all()
+    seeds = range(options.seed, options.seed + options.seeds)
+    words = ["--detector", "mediapipe", "--preset", options.preset]
+    films: list[dict[str, Any]] = []
+    with (
+        progress_bar("evaluate") as show,
+        ProcessPoolExecutor(jobs, mp_context=get_context("spawn")) as pool,
+    ):
+        work = [
+            pool.submit(_film, folder, shape, words, seeds)
+            for folder in options.films
+            for shape in SHAPES
+        ]
+        for done, future in enumerate(work, 1):
+            films += future.result()
+            show(done / len(work))
+    names = " ".join(folder.name for folder in options.films)
+    results = {
+        "command": f"cardbox evaluate --films {names} --seeds {options.seeds} --output DIR",
+        "films": sorted(films, key=lambda film: (film["given"], film["shape"])),
+        "provenance": provenance(),
+    }
+    write_json(results, report.with_suffix(".json"))
+    with atomic_path(report) as temporary:
+        temporary.write_text(films_report(results), encoding="utf-8")
+    print(f"wrote {report} and {report.with_suffix('.json')}")
+
+
+def _film(folder: Path, shape: str, words: list[str], seeds: range) -> list[dict[str, Any]]:
+    """Return the entries of one session in ``films.json``, one for all that is given."""
+    from cardbox_tracker.applications.evaluation.films import film_figures, make_film
+    from cardbox_tracker.commands.request import add_tracking, tracking_request
+    from cardbox_tracker.commands.tracking import track
+
+    parser, found = argparse.ArgumentParser(), list[dict[str, Any]]()
+    add_tracking(parser)
+    with TemporaryDirectory() as made:
+        film = make_film(folder, shape, Path(made) / f"{folder.name}.mp4")
+        known = ["--fov", f"{film.fov_deg:.1f}", "--stature", str(film.session.truth.stature_m)]
+        for given, more in {"field of view, stature": known, "nothing": []}.items():
+            runs = []
+            for seed in seeds:
+                typed = parser.parse_args([str(film.path), *words, *more, "--seed", str(seed)])
+                estimates: list[Estimate] = []
+                summary = track(
+                    tracking_request(typed),
+                    (partial(_keep, estimates),),
+                    lambda _: None,
+                )
+                runs.append(film_figures(film, estimates, summary.body))
+            found.append(
+                {
+                    "name": f"{folder.name}, {shape}",
+                    "group": folder.resolve().parent.name,
+                    "shape": shape,
+                    "given": given,
+                    "mediapipe_aligned": film.session.mediapipe.get("aligned"),
+                    "runs": runs,
+                }
+            )
+    return found
+
+
+def _keep(estimates: list[Estimate], _: RecordedFrame, estimate: Estimate, __: Tracker) -> None:
+    estimates.append(estimate)

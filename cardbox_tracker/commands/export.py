@@ -5,11 +5,17 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from cardbox_tracker.commands.arguments import add_force, body_beside, check_outputs
+from cardbox_tracker.commands.arguments import (
+    add_force,
+    add_person,
+    body_beside,
+    body_of_person,
+    check_outputs,
+)
 from cardbox_tracker.common.errors import CardboxError
 
 NAME = "export"
-HELP = "write results as TRC, BVH or C3D, or as joint angles of the ISB"
+HELP = "write results as TRC, MOT, BVH or C3D, or as joint angles of the ISB"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -26,8 +32,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--to",
         choices=FORMATS,
         required=True,
-        help="trc: markers for OpenSim and Pose2Sim; bvh: skeleton for Blender; c3d: markers, with "
-        "ezc3d; isb: CSV with joint angles by the recommendations of the ISB (docs/export.md)",
+        help="trc: markers for OpenSim and Pose2Sim; mot: coordinates for OpenSim; bvh: skeleton "
+        "for Blender; c3d: markers, with ezc3d; isb: CSV with joint angles by the recommendations "
+        "of the ISB (docs/export.md)",
     )
     parser.add_argument(
         "--output",
@@ -40,10 +47,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--model",
         type=Path,
         metavar="MODEL.yaml",
-        help="the person with whom the results were tracked, which bvh needs; trc and c3d take "
-        "the pitch of the camera from it, and get markers at hips and neck. A bag contains it, and "
-        "OUT.body.yaml beside the table OUT.csv is found",
+        help="the person with whom the results were tracked, which bvh needs; trc, mot "
+        "and c3d take the pitch of the camera from it, and the places of hips and neck. A bag "
+        "contains it, and OUT.body.yaml beside the table OUT.csv is found",
     )
+    add_person(parser)
     add_force(parser)
 
 
@@ -57,11 +65,11 @@ def run(options: argparse.Namespace) -> None:
 
     chosen = FORMATS[options.to]
     output = options.output or Path(options.results.resolve().stem + chosen.suffix)
-    beside = body_beside(options.results)
+    beside = body_of_person(body_beside(options.results), options.person or 1)
     check_outputs((output,), options.force, inputs=(options.results, options.model, beside))
     chosen.check()
     given = None if options.model is None else load_body_model(options.model)
-    motion, recorded = read_motion(options.results)
+    motion, recorded = read_motion(options.results, options.person)
     body = given or recorded
     images, seen = len(motion.state), int(motion.is_seen.sum())
     if body is not None and chosen.has_places:

@@ -32,6 +32,7 @@ from cardbox_tracker.common.settings import NoEffectError, nested, settings_of
 
 if TYPE_CHECKING:
     from cardbox_tracker.detectors.detector import Detector
+    from cardbox_tracker.detectors.person_choice import PersonChoice
     from cardbox_tracker.detectors.point_table import PointTable
     from cardbox_tracker.person.model import BodyModel
     from cardbox_tracker.recordings.given_camera import GivenCamera
@@ -58,10 +59,6 @@ RETIRED = MappingProxyType(
 _MOST_ROLL_DEG, _MOST_FPS = 180.0, 1000.0
 _MOST_BYTES = 64 * 1024
 _EFFORT = "whole_body.effort"
-_FOV_HINT = (
-    "--fov is across the width of the image: webcams 60 to 78, phones 60 to 70 held sideways, 36 "
-    "to 43 upright"
-)
 # An option of a file takes the place of these, which do not go with it.
 _REPLACED = MappingProxyType(
     {
@@ -133,9 +130,13 @@ class PersonRequest:
         body: the person; the mean sizes of people of the given stature without ``model``.
         model: the file of a measured person; None if only the stature is given.
         start_s: seconds from the recording's start at which tracking starts.
+        end_s: the same at which it ends; inf for the end of the recording.
         is_pitch_given: whether ``body`` has the camera's pitch; else it is to be found from the
             person who stands upright.
-        stature_m: the stature that is given; None with ``model``.
+        stature_m: the stature that is given, of the first person; None with ``model``.
+        people: number of people to track, 0 for all who come; None for one without a number.
+        others: the bodies of the second and further people.
+        number: whose results commands use that use those of one.
     """
 
     body: BodyModel
@@ -143,6 +144,10 @@ class PersonRequest:
     start_s: float
     is_pitch_given: bool
     stature_m: float | None = None
+    end_s: float = math.inf
+    people: int | None = None
+    others: tuple[BodyModel, ...] = ()
+    number: int = 1
 
 
 TABLES = ("csv", "parquet")
@@ -287,16 +292,27 @@ def add_recording(parser: argparse.ArgumentParser, required: bool = True) -> Non
     )
     add(
         "--detector",
-        metavar="mediapipe|FILE.csv",
+        metavar="mediapipe|FILE|FOLDER",
         help="also use 2D points of the person's joints: those of MediaPipe's networks ('cardbox "
-        "detector --install'), or a table that any detector has written (docs/detectors.md)",
+        "detector --install'), or those that any detector has written: a table FILE.csv, a file of "
+        "COCO FILE.json, or a folder of OpenPose's files (docs/detectors.md)",
+    )
+    add(
+        "--person",
+        type=_person_choice,
+        metavar="left|right|largest|X,Y|K",
+        help="with --detector mediapipe: whom of several people to follow: the left or right one "
+        "in the image, the largest, or the one at column X and row Y. With --people: the number of "
+        "the one whose results are used, if not all are",
     )
     add(
         "--fov",
         type=float,
         metavar="DEG",
         help="field of view across the width of the image as it is shown: webcams 60 to 78, phones "
-        "60 to 70 held sideways and 36 to 43 upright; not for bags with CameraInfo",
+        "60 to 75 held sideways and 36 to 46 upright; not for bags with CameraInfo. Without it, "
+        "what a phone wrote into the file, or else, with --detector, 65 degrees along the longer "
+        "side",
     )
     add(
         "--calibration",
@@ -339,10 +355,18 @@ def add_tracking(parser: argparse.ArgumentParser, needs_recording: bool = True) 
     )
     add(
         "--stature",
-        type=float,
-        metavar="M",
+        type=_statures,
+        metavar="M[,M...]",
         help="in place of --model: height of the person, metres, crown to floor; sizes are the "
-        "mean ones of people of that stature",
+        "mean ones of people of that stature. With --people, one for each of them in turn, or one "
+        "for all. Of films with --detector, the mean stature of adults is taken without both",
+    )
+    add(
+        "--people",
+        type=_count,
+        metavar="N|auto",
+        help="track N people, or all who come (up to 6), with one camera; they are numbered as "
+        "they come, and from left to right if they come together",
     )
     add(
         "--distance",
@@ -357,8 +381,9 @@ def add_tracking(parser: argparse.ArgumentParser, needs_recording: bool = True) 
         type=time,
         metavar="T",
         help="second at which the person stands as for --front; tracking starts there. With "
-        "--stature, or a body of 'cardbox body', any posture will do (default with --stature: 0)",
+        "--stature, or a body that was not measured, any posture will do (default: 0)",
     )
+    add("--end", type=time, metavar="T", help="second at which tracking ends (default: the last)")
     add_preset(parser)
     effort = settings_of(WholeBodyConfig)["effort"]
     add(
@@ -384,6 +409,37 @@ def add_tracking(parser: argparse.ArgumentParser, needs_recording: bool = True) 
     for flag in RETIRED:
         add(flag, action=_Refuse, nargs="?", help=argparse.SUPPRESS)
     add_seed(parser, "the filters")
+
+
+def _statures(text: str) -> tuple[float, ...]:
+    try:
+        return tuple(map(float, text.split(",")))
+    except ValueError:
+        raise argparse.ArgumentTypeError(
+            f"expected metres, or those of each person as in 1.75,1.62, got {text!r}"
+        ) from None
+
+
+def _count(text: str) -> int:
+    from cardbox_tracker.tracking.people import MOST_PEOPLE
+
+    count = 0 if text == "auto" else int(text) if text.isdecimal() else -1
+    if not (text == "auto" or 1 <= count <= MOST_PEOPLE):
+        raise argparse.ArgumentTypeError(
+            f"expected auto or a number from 1 to {MOST_PEOPLE}, got {text!r}"
+        )
+    return count
+
+
+def _person_choice(text: str) -> PersonChoice | int:
+    if text.isdecimal():
+        return int(text)
+    from cardbox_tracker.detectors.person_choice import PersonChoice
+
+    try:
+        return PersonChoice.parse(text)
+    except ValueError as error:
+        raise argparse.ArgumentTypeError(str(error)) from None
 
 
 class _Refuse(argparse.Action):
@@ -430,8 +486,10 @@ def _setting(text: str) -> tuple[str, bool | int | float | str]:
 def recording_request(options: argparse.Namespace, problems: Problems) -> RecordingRequest:
     """Return what the options of :func:`add_recording` ask for; note what is wrong with them."""
     from cardbox_tracker.camera.pairing import camera_names
+    from cardbox_tracker.detectors.detector import Detector
     from cardbox_tracker.recordings.open_images import check_exists
     from cardbox_tracker.recordings.recording import input_faults
+    from cardbox_tracker.tracking.people import MOST_PEOPLE
 
     path, depth = options.recording, options.depth
     problems.caught(lambda: check_exists(path), None)
@@ -440,6 +498,24 @@ def recording_request(options: argparse.Namespace, problems: Problems) -> Record
     points: Detector | PointTable | None = None
     if options.detector is not None:
         points = problems.caught(lambda: points_named(options.detector), None)
+    people = getattr(options, "people", None)
+    if isinstance(options.person, int) != (people is not None) and options.person is not None:
+        problems.add(
+            "--person K is the number of one of several people, whom only --people tracks; without "
+            "--people give left, right, largest or X,Y"
+        )
+    elif options.person is not None and people is None:
+        if not any(isinstance(one, Detector) for one in (silhouettes, points)):
+            problems.add("--person needs a detector that finds people: give --detector mediapipe")
+        if isinstance(silhouettes, Detector):
+            silhouettes = silhouettes._replace(person=options.person)
+        if isinstance(points, Detector):
+            points = points._replace(person=options.person)
+    if people is not None:
+        if isinstance(silhouettes, Detector):
+            silhouettes = silhouettes._replace(people=people or MOST_PEOPLE)
+        if points is not None:
+            points = points._replace(people=people or MOST_PEOPLE)
     names: tuple[str, ...] = ()
     names = problems.caught(lambda: tuple(camera_names(options.cameras)), names)
     for fault in input_faults(path, silhouettes, names, depth, camera):
@@ -477,6 +553,10 @@ def tracking_request(options: argparse.Namespace, faults: Iterable[str] = ()) ->
             f"--preset {options.preset} uses the silhouette of one camera; give --preset default "
             "with several cameras or with --depth"
         )
+    if options.people is not None and is_more:
+        problems.add("--people tracks with one camera and without --depth: leave the others out")
+    if options.people is not None and options.preset != "default":
+        problems.add(f"--people needs the preset default, not {options.preset}")
     config = problems.caught(lambda: _config(options, preset), preset)
     problems.check()
     return TrackingRequest(
@@ -485,19 +565,27 @@ def tracking_request(options: argparse.Namespace, faults: Iterable[str] = ()) ->
 
 
 def _camera(options: argparse.Namespace, problems: Problems) -> GivenCamera:
-    from cardbox_tracker.recordings.given_camera import GivenCamera
-    from cardbox_tracker.recordings.open_images import is_film
+    from cardbox_tracker.recordings.given_camera import FOV_HINT, GivenCamera
+    from cardbox_tracker.recordings.open_images import tells_lens
 
     roll_deg = options.camera_roll_deg
     roll_rad = None if roll_deg is None else math.radians(roll_deg)
     camera = GivenCamera(options.fov, options.calibration, roll_rad, options.fps, options.mirrored)
     if None not in (options.fov, options.calibration):
         problems.add("--fov and --calibration both describe the lens: leave one of them out")
-    elif not camera.is_calibrated and is_film(options.recording):
-        problems.miss("--fov DEG or --calibration FILE", _FOV_HINT)
+    elif not (camera.is_calibrated or _is_guessed(options) or tells_lens(options.recording)):
+        hint = f"--fov is across the width of the image: {FOV_HINT}"
+        problems.miss("--fov DEG or --calibration FILE", hint)
     else:
         problems.caught(camera.check, None)
     return camera
+
+
+def _is_guessed(options: argparse.Namespace) -> bool:
+    """Whether lens and stature that nothing tells are guessed, since a detector sees the person."""
+    from cardbox_tracker.recordings.open_images import is_film
+
+    return options.detector is not None and is_film(options.recording)
 
 
 def _silhouettes(options: argparse.Namespace, problems: Problems) -> Segmentation:
@@ -542,10 +630,10 @@ def _silhouettes(options: argparse.Namespace, problems: Problems) -> Segmentatio
 
 
 def points_named(name: str) -> Detector | PointTable:
-    """Return the source of 2D points of a name: the detector's, or the path of a table.
+    """Return the source of 2D points of a name: the detector's, or the path of given points.
 
     Raises:
-        CardboxError: the detector is not installed, or there is no such table.
+        CardboxError: the detector is not installed, or there are no such points.
     """
     from cardbox_tracker.detectors.detector import MEDIAPIPE, Detector
     from cardbox_tracker.detectors.point_table import PointTable
@@ -553,42 +641,58 @@ def points_named(name: str) -> Detector | PointTable:
     if name == MEDIAPIPE:
         return Detector.installed()
     path = Path(name)
-    if not path.is_file():
+    if not path.exists():
         raise CardboxError(
-            f"--detector is {name!r}; expected {MEDIAPIPE}, or the file of a table of points "
-            "(docs/detectors.md)"
+            f"--detector is {name!r}; expected {MEDIAPIPE}, or points in a table, in a file of "
+            "COCO, or in a folder of OpenPose (docs/detectors.md)"
         )
     return PointTable(path)
 
 
 def _person(options: argparse.Namespace, problems: Problems) -> PersonRequest:
-    from cardbox_tracker.person.model import BodyModel
+    from cardbox_tracker.person.model import MEASURED, BodyModel
     from cardbox_tracker.person.model_file import load_body_model
-    from cardbox_tracker.person.proportions import body_from_proportions
+    from cardbox_tracker.person.proportions import USUAL_STATURE_M
 
     pitch_deg, body = options.camera_pitch_deg, BodyModel()
-    if options.model is None and options.stature is None:
+    others: list[BodyModel] = []
+    if options.people is None and options.stature is not None and len(options.stature) > 1:
+        problems.add("--stature has several values: give one, or --people")
+    if options.people is not None and options.model is not None:
+        problems.add("--people takes the stature of each person: give --stature, not --model")
+    if options.model is None and options.stature is None and not _is_guessed(options):
         problems.miss("--stature M or --model FILE")
     elif None not in (options.model, options.stature):
         problems.add("--stature and --model both say who is tracked: leave one of them out")
-    elif options.stature is not None:
-        body = problems.caught(
-            lambda: body_from_proportions(
-                options.stature,
-                options.distance,
-                camera_pitch_rad=math.radians(pitch_deg or 0.0),
-            ),
-            body,
+    elif options.model is None:
+        place = options.distance, math.radians(pitch_deg or 0.0)
+        statures = options.stature or [USUAL_STATURE_M]
+        body, *others = problems.caught(
+            lambda: [_of_stature(stature, *place) for stature in statures], [body]
         )
     else:
         for flag, value in (("--distance", options.distance), ("--camera-pitch-deg", pitch_deg)):
             if value is not None:
                 problems.add(f"{flag} has no effect with --model, which contains it")
-        if options.start is None:
-            problems.miss("--start T", "with --model, the person stands as for --front at T")
         body = problems.caught(lambda: load_body_model(options.model), body)
+        if options.start is None and body.source == MEASURED:
+            problems.miss("--start T", "a measured person stands as for --front at T")
     is_pitch_given = options.model is not None or pitch_deg is not None
-    return PersonRequest(body, options.model, options.start or 0.0, is_pitch_given, options.stature)
+    start_s, end_s = options.start or 0.0, math.inf if options.end is None else options.end
+    if end_s <= start_s:
+        problems.add(f"--end {end_s:g} is not after --start {start_s:g}: give a later second")
+    number = options.person if isinstance(options.person, int) else 1
+    if options.people and number > options.people:
+        problems.add(f"--person {number} is none of {options.people} people")
+    stature_m = None if options.stature is None else options.stature[0]
+    several = options.people, tuple(others), number
+    return PersonRequest(body, options.model, start_s, is_pitch_given, stature_m, end_s, *several)
+
+
+def _of_stature(stature_m: float, distance_m: float | None, pitch_rad: float) -> BodyModel:
+    from cardbox_tracker.person.proportions import body_from_proportions
+
+    return body_from_proportions(stature_m, distance_m, camera_pitch_rad=pitch_rad)
 
 
 def _config(options: argparse.Namespace, preset: TrackerConfig) -> TrackerConfig:
@@ -671,6 +775,6 @@ def _read_options(path: Path) -> dict[str, Any]:
     for name, value in given.items():
         if isinstance(value, Path):
             given[name] = path.parent / value
-        elif name == "detector" and (path.parent / value).is_file():
+        elif name == "detector" and (path.parent / value).exists():
             given[name] = str(path.parent / value)
     return given

@@ -6,7 +6,13 @@ import argparse
 from collections import Counter
 from pathlib import Path
 
-from cardbox_tracker.commands.arguments import add_force, add_settings, check_outputs, settings_from
+from cardbox_tracker.commands.arguments import (
+    add_force,
+    add_person,
+    add_settings,
+    check_outputs,
+    settings_from,
+)
 
 NAME = "retarget"
 HELP = "move a robot arm, given by its URDF, as the measured person moves theirs"
@@ -44,6 +50,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="OUT",
         help="the results with the robot beside the person, for 'cardbox view'",
     )
+    add_person(parser)
     add_force(parser)
     add_settings(parser, RetargetConfig, "limits and mounting")
 
@@ -68,7 +75,7 @@ def run(options: argparse.Namespace) -> None:
     config = settings_from(options, RetargetConfig)
     robot, retargeter = make_retargeter(options.robot, options.map, options.hand or "", config)
     with BagReader(options.results) as bag:
-        motion = retarget_bag(bag, retargeter, config.rate_hz)
+        motion = retarget_bag(bag, retargeter, config.rate_hz, options.person)
         if options.csv is not None:
             write_csv(motion.way, retargeter.joints, options.csv)
         if options.bag is not None:

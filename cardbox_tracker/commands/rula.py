@@ -116,7 +116,15 @@ def _content(
     from cardbox_tracker.applications.ergonomics.report import PageContent
 
     name = options.recording.resolve().name
-    person = f"stature {options.stature} m" if options.model is None else options.model.name
+    number = options.person if options.people is not None and options.person else 1
+    statures = options.stature or ()
+    person = (
+        f"stature {statures[min(number, len(statures)) - 1]} m"
+        if options.model is None
+        else options.model.name
+    )
+    if options.people is not None:
+        person = f"person {number}, {person}"
     if summary.body is not None:
         person += f"; sizes from {_SIZES_FROM[summary.body.source]}"
     span = f"{rows[0].time_s:.1f} to {rows[-1].time_s:.1f} s, {len(rows)} images"

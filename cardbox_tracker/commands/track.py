@@ -16,7 +16,7 @@ NAME = "track"
 HELP = "follow the posture through a recording, or through all recordings of a folder"
 
 _OF_ONE = ("csv", "bag", "video")
-_OF_MANY = ("output", "formats", "jobs")
+_OF_MANY = ("output", "formats", "jobs", "scheduler")
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -54,6 +54,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="N",
         help="recordings that are tracked at a time, each on one core; one per core by default",
     )
+    many.add_argument(
+        "--scheduler",
+        metavar="ADDRESS",
+        help="in place of --jobs: track on the workers of this Dask cluster, such as tcp://HOST:8786",
+    )
     add_force(parser)
 
 
@@ -67,6 +72,8 @@ def run(options: argparse.Namespace) -> None:
 
         for fault in _without_effect(options, _OF_ONE, "a folder of recordings: give --formats"):
             raise CardboxError(fault)
+        if None not in (options.jobs, options.scheduler):
+            raise CardboxError("--jobs has no effect with --scheduler: its workers are as many")
         track_folder(options)
     else:
         _track_one(options)

@@ -45,6 +45,7 @@ from cardbox_tracker.common.files import (
 )
 from cardbox_tracker.common.processes import cores, results_of
 from cardbox_tracker.common.progress import SharedProgress, progress_bar, told
+from cardbox_tracker.detectors.point_table import PointTable
 from cardbox_tracker.recordings.folder import FORMULA, SUMMARY, recordings_in
 from cardbox_tracker.recordings.result_table import check_table
 from cardbox_tracker.recordings.track import TrackSummary
@@ -125,6 +126,8 @@ class Job(NamedTuple):
         inputs: see :func:`digest_of_inputs`.
         progress: the common progress.
         number: number of the job in the common progress.
+        folder: folder in which relative paths begin; None for that of the process.
+        program: see :func:`digest_of_program`; empty if the process has this program.
     """
 
     name: str
@@ -132,6 +135,8 @@ class Job(NamedTuple):
     inputs: str
     progress: SharedProgress | None = None
     number: int = 0
+    folder: Path | None = None
+    program: str = ""
 
 
 def track_folder(options: argparse.Namespace) -> None:
@@ -156,7 +161,11 @@ def track_folder(options: argparse.Namespace) -> None:
         rows |= {name: before[name] for name in kept}
         if kept:
             print(f"{len(kept)} of {len(recordings)} recordings are finished; --force does again")
-    remarks = _track_all(jobs, rows, output, formats, options.jobs)
+    if options.scheduler is not None:
+        # Workers began elsewhere, and may have another version.
+        here, program = Path.cwd(), digest_of_program()
+        jobs = [job._replace(folder=here, program=program) for job in jobs]
+    remarks = _track_all(jobs, rows, output, formats, options.jobs, options.scheduler)
     for row in rows.values():
         if row.status == FAILED:
             _remove(output, row.recording)
@@ -232,6 +241,7 @@ def _track_all(
     output: Path,
     formats: Sequence[str],
     processes: int | None,
+    scheduler: str | None,
 ) -> dict[str, list[str]]:
     """Track, and add each row to ``rows`` and to the summary; return printed lines by name."""
     # Rows of former settings go first, because their results are replaced one by one.
@@ -241,7 +251,7 @@ def _track_all(
         return remarks
     count = min(processes or cores(), len(jobs))
     with claimed_name(output / "work", is_folder=True) as work, progress_bar("track") as show:
-        if count > 1:
+        if count > 1 or scheduler is not None:
             # Else each process would compile.
             compile_all(sorted({job.request.preset for job in jobs}))
         progress = SharedProgress(work / "progress", len(jobs))
@@ -252,7 +262,7 @@ def _track_all(
         ]
         with (
             told(lambda _: show(progress.fraction()), "", every_s=1.0),
-            results_of(track_job, prepared, count) as outcomes,
+            results_of(track_job, prepared, count, scheduler) as outcomes,
         ):
             for job, row, lines in outcomes:
                 # Results without their row would be tracked again.
@@ -287,9 +297,16 @@ def _prepared(
 def track_job(job: Job) -> tuple[Job, Row, list[str]]:
     """Track one recording on one thread; return its row, also of a failure, and printed lines."""
     cv2.setNumThreads(1)
+    if job.folder is not None:
+        os.chdir(job.folder)
     show = job.progress.of_task(job.number) if job.progress else lambda _: None
     printed = io.StringIO()
     try:
+        if job.program and job.program != digest_of_program():
+            raise CardboxError(
+                "a worker of the cluster has another version of the package or its libraries; "
+                "install the same on all computers"
+            )
         with redirect_stdout(printed), redirect_stderr(printed):
             row = Row.tracked(job.name, track(job.request, show=show), job.inputs)
     except Exception as error:
@@ -400,7 +417,9 @@ def digest_of_inputs(request: TrackingRequest, formats: Sequence[str], program: 
     for value in _values(replace(asked, files=TrackFiles())):
         is_file = isinstance(value, Path) and value.is_file()
         digest.update(b"\0" + (value.read_bytes() if is_file else repr(value).encode()))
-    for file in _files_of(path):
+    points = request.recording.points
+    folders = [points.path] if isinstance(points, PointTable) and points.path.is_dir() else []
+    for file in [file for folder in (path, *folders) for file in _files_of(folder)]:
         found = file.stat()
         # Names inside of a recording may be no UTF-8.
         digest.update(b"\0" + os.fsencode(file.name))

@@ -57,6 +57,8 @@ def run(options: argparse.Namespace) -> None:
     """Show a bag of results, a recording that is tracked meanwhile, or the running nodes."""
     if options.live == (options.recording is not None):
         raise CardboxError("expected either BAG or --live")
+    if options.person is not None and options.live:
+        raise CardboxError("--person chooses in a recording or in results: leave out --live")
     inputs = *inputs_of(options), options.truth, options.beside
     check_outputs((options.save,), options.force, inputs=inputs)
     # A wrong input is reported before a missing library or display.
@@ -70,7 +72,9 @@ def run(options: argparse.Namespace) -> None:
     from cardbox_tracker.applications.viewing.sources import check_same_images
     from cardbox_tracker.applications.viewing.viewer import recording
 
-    first_ns = check_same_images(*results) if len(results) > 1 else None
+    first_ns = (
+        check_same_images(results[0], results[1], options.person) if len(results) > 1 else None
+    )
     truth = None if options.live else _truth_of(options, results)
     shown = columns(_names_of(results))
     blueprint = layout(shown, has_truth=truth is not None, is_live=options.live)
@@ -83,7 +87,9 @@ def run(options: argparse.Namespace) -> None:
             count = _track(request, Scene(stream, truth=truth))
             print(f"shown: {count} images with a posture", flush=True)
         scenes = [Scene(stream, column, first_ns, truth) for column in shown[: len(results)]]
-        for column, count in zip(shown, _show_results(results, scenes), strict=False):
+        for column, count in zip(
+            shown, _show_results(results, scenes, options.person), strict=False
+        ):
             print(column.named(f"shown: {count} images with a posture"), flush=True)
         if options.web and not options.live:
             stream.flush()
@@ -158,7 +164,7 @@ def _truth_of(
     if path is None:
         return None
     frames = load_ground_truth(path).frames
-    if not results or not frames.keys().isdisjoint(image_stamps(results[0])):
+    if not results or not frames.keys().isdisjoint(image_stamps(results[0], options.person)):
         return frames
     if options.truth is not None:
         raise CardboxError(
@@ -168,7 +174,7 @@ def _truth_of(
     return None
 
 
-def _show_results(paths: Sequence[Path], scenes: Sequence[Scene]) -> list[int]:
+def _show_results(paths: Sequence[Path], scenes: Sequence[Scene], person: int | None) -> list[int]:
     """Show the results in bags; return the number of images with a posture of each."""
     from cardbox_tracker.applications.viewing.sources import show_together
     from cardbox_tracker.common.progress import progress_bar
@@ -179,7 +185,7 @@ def _show_results(paths: Sequence[Path], scenes: Sequence[Scene]) -> list[int]:
     with ExitStack() as stack:
         bags = [stack.enter_context(BagReader(path)) for path in paths]
         show = stack.enter_context(progress_bar("view"))
-        return show_together(list(zip(bags, scenes, strict=False)), show)
+        return show_together(list(zip(bags, scenes, strict=False)), show, person)
 
 
 def _track(request: TrackingRequest, scene: Scene) -> int:

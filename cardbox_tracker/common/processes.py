@@ -1,4 +1,4 @@
-"""Independent calls in several processes of one thread each."""
+"""Independent calls in several processes of one thread each, here or on a Dask cluster."""
 
 from __future__ import annotations
 
@@ -9,7 +9,8 @@ import sys
 import time
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import BrokenExecutor
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
+from functools import partial
 from multiprocessing import resource_tracker
 from typing import TypeVar
 from warnings import catch_warnings, simplefilter
@@ -20,6 +21,7 @@ from cardbox_tracker.common.errors import CardboxError
 A = TypeVar("A")
 R = TypeVar("R")
 
+_CONNECT_S = 10.0
 # PR_SET_PDEATHSIG of <linux/prctl.h>.
 _DEATH_SIGNAL = 1
 _TAKEN_UP_S = 0.05
@@ -44,7 +46,7 @@ def cores() -> int:
 
 @contextmanager
 def results_of(
-    function: Callable[[A], R], arguments: Sequence[A], jobs: int
+    function: Callable[[A], R], arguments: Sequence[A], jobs: int, scheduler: str | None = None
 ) -> Iterator[Iterator[R]]:
     """Context of an iterator over the results of calls, in the order in which they finish.
 
@@ -54,30 +56,82 @@ def results_of(
         function: function of a module that other processes can import.
         arguments: the argument of each call; calls begin in this order.
         jobs: number of processes; with 1, the calls are done in this process.
+        scheduler: address of the scheduler of a Dask cluster, whose workers do the calls in place
+            of ``jobs`` processes.
 
     Raises:
-        CardboxError: a process ended unexpectedly; at the beginning, or from the iterator.
+        CardboxError: a process ended unexpectedly, at the beginning or from the iterator; or there
+            is no cluster of workers with one thread each.
     """
-    from joblib import Parallel, delayed, parallel_config
+    from joblib import parallel_config
 
     # Python's tracker of resources unblocks SIGINT when it starts, so it starts before.
     resource_tracker.ensure_running()
-    # numba, BLAS and OpenMP read their number of threads when a process begins.
-    with parallel_config("loky", inner_max_num_threads=1):
-        # loky's thread fails with a KeyError if it is ended while calls wait that it has not yet
-        # put into the queue of the processes: no more are given than the queue holds.
-        parallel = Parallel(
-            jobs,
-            return_as="generator_unordered",
-            batch_size=1,
-            pre_dispatch="2*n_jobs",
-            max_nbytes=None,
-        )
-        # A process may already end while others still get their calls.
-        with interrupts.withheld(), _told():
-            call = delayed(_called)
-            results = parallel(call(os.getpid(), function, argument) for argument in arguments)
-            time.sleep(_TAKEN_UP_S)
+    with ExitStack() as stack:
+        call = function
+        if scheduler is None:
+            call = partial(_called, os.getpid(), function)
+            # numba, BLAS and OpenMP read their number of threads when a process begins.
+            stack.enter_context(parallel_config("loky", inner_max_num_threads=1))
+        else:
+            stack.enter_context(_cluster(scheduler))
+            stack.enter_context(parallel_config("dask"))
+        with _results(call, arguments, jobs if scheduler is None else -1) as results:
+            yield results
+
+
+@contextmanager
+def _cluster(scheduler: str) -> Iterator[None]:
+    """Context in which a Dask cluster does the calls.
+
+    Raises:
+        CardboxError: Dask is not installed, nothing answers at the address, there are no workers,
+            or one has several threads.
+    """
+    try:
+        from distributed import Client
+    except ImportError as error:
+        raise CardboxError(
+            f"--scheduler needs Dask ({error}); install it with pip install '.[cluster]' in the "
+            "checkout"
+        ) from None
+    try:
+        client = Client(scheduler, timeout=_CONNECT_S, set_as_default=True)
+    except (OSError, ValueError) as error:
+        raise CardboxError(
+            f"no Dask scheduler answers at {scheduler}: {error}; give an address such as "
+            "tcp://HOST:8786, which 'dask scheduler' prints"
+        ) from None
+    with client:
+        threads = client.nthreads()
+        if not threads or max(threads.values()) > 1:
+            raise CardboxError(
+                f"the cluster at {scheduler} has {len(threads)} workers with "
+                f"{sum(threads.values())} threads; expected workers with one thread each, from "
+                f"'dask worker {scheduler} --nworkers N --nthreads 1'"
+            )
+        yield
+
+
+@contextmanager
+def _results(
+    function: Callable[[A], R], arguments: Sequence[A], jobs: int
+) -> Iterator[Iterator[R]]:
+    from joblib import Parallel, delayed
+
+    # loky's thread fails with a KeyError if it is ended while calls wait that it has not yet put
+    # into the queue of the processes: no more are given than the queue holds.
+    parallel = Parallel(
+        jobs,
+        return_as="generator_unordered",
+        batch_size=1,
+        pre_dispatch="2*n_jobs",
+        max_nbytes=None,
+    )
+    # A process may already end while others still get their calls.
+    with interrupts.withheld(), _told():
+        results = parallel(delayed(function)(argument) for argument in arguments)
+        time.sleep(_TAKEN_UP_S)
     try:
         yield _checked(results)
     finally:
@@ -97,7 +151,10 @@ def _told() -> Iterator[None]:
     """Context in which the unexpected end of a process is told in words."""
     try:
         yield
-    except BrokenExecutor:
+    except Exception as error:
+        # The second one is Dask's, which may not be installed.
+        if not isinstance(error, BrokenExecutor) and type(error).__name__ != "KilledWorker":
+            raise
         raise CardboxError(
             "a process ended unexpectedly, perhaps because the memory was full; give a smaller "
             "--jobs"

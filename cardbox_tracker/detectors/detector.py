@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
@@ -11,12 +10,11 @@ from numpy.typing import NDArray
 from cardbox_tracker.detectors.image_points import ImagePoints
 from cardbox_tracker.detectors.landmarks import image_points
 from cardbox_tracker.detectors.model_files import ModelFiles, installed_models
+from cardbox_tracker.detectors.people_network import PeopleNetwork
+from cardbox_tracker.detectors.person_choice import PersonChoice
 from cardbox_tracker.detectors.pose_network import Detection, PoseNetwork
 
 Image = NDArray[np.uint8]
-
-FindPoints = Callable[[int, Image], ImagePoints | None]
-"""Takes the stamp, ns, and the image at the working size; returns the points in that image."""
 
 MEDIAPIPE = "mediapipe"
 """Name of the detector whose networks ``cardbox detector --install`` installs."""
@@ -27,9 +25,14 @@ class Detector(NamedTuple):
 
     Attributes:
         models: its network files.
+        person: whom to follow, px of the camera's own image; None for the most certain person.
+        people: number of people whom it finds at most, see :meth:`PersonDetector.all_in`; 0 for the
+            one whom it follows.
     """
 
     models: ModelFiles
+    person: PersonChoice | None = None
+    people: int = 0
 
     @classmethod
     def installed(cls) -> Detector:
@@ -40,13 +43,20 @@ class Detector(NamedTuple):
         """
         return cls(installed_models())
 
-    def start(self) -> PersonDetector:
+    def start(self, across: float = 1.0, down: float = 1.0) -> PersonDetector:
         """Return a detector for the images of one camera.
+
+        Args:
+            across: width of the images that it gets, as a share of that of the camera's own image.
+            down: the same for their height.
 
         Raises:
             CardboxError: the networks cannot be loaded.
         """
-        return PersonDetector(PoseNetwork(*self.models))
+        network = PoseNetwork(*self.models)
+        if self.person is not None:
+            network.choose = self.person.scaled(across, down)
+        return PersonDetector(network, PeopleNetwork(network, self.people))
 
 
 class PersonDetector:
@@ -56,24 +66,48 @@ class PersonDetector:
         missed: number of images in which nobody was found.
     """
 
-    def __init__(self, network: PoseNetwork) -> None:
-        """Use ``network`` for one camera alone, because it follows the person."""
-        self._network = network
+    def __init__(self, network: PoseNetwork, people: PeopleNetwork | None = None) -> None:
+        """Use the networks for one camera alone, because they follow the people."""
+        self._network, self._people = network, people
         self.missed = 0
 
     def restart(self) -> None:
         """Forget the last image, so that results depend on the following images alone."""
         self._network.forget()
+        if self._people is not None:
+            self._people.forget()
         self.missed = 0
 
     def __call__(self, image: Image) -> Detection | None:
         """Return the person in an image (H, W) or (H, W, 3), bgr; None if there is nobody."""
-        color = image if image.ndim == 3 else np.repeat(image[..., None], 3, axis=2)
-        found = self._network(color)
+        found = self._network(_color(image))
         self.missed += found is None
         return found
 
-    def points(self, stamp_ns: int, image: Image) -> ImagePoints | None:
-        """Return the points in an image; see ``FindPoints``."""
+    def all_in(self, stamp_ns: int, image: Image) -> list[Detection]:
+        """Return all people in an image as above, of a time, ns."""
+        assert self._people is not None
+        found = self._people(_color(image), stamp_ns)
+        self.missed += not found
+        return found
+
+    @property
+    def remark(self) -> str:
+        """A remark about several people in the images; empty if there were none."""
+        if not self._network.several:
+            return ""
+        whom = "the most certain one" if self._network.choose is None else "the chosen one"
+        return (
+            f"the detector sees several people and follows {whom}; --person left|right|largest|X,Y "
+            "chooses, and --people follows all"
+        )
+
+    def points(self, image: Image) -> ImagePoints | None:
+        """Return the points in an image at the working size."""
         found = self(image)
         return None if found is None else image_points(found)
+
+
+def _color(image: Image) -> Image:
+    """Return an image (H, W) or (H, W, 3) as (H, W, 3)."""
+    return image if image.ndim == 3 else np.repeat(image[..., None], 3, axis=2)

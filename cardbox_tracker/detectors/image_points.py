@@ -34,6 +34,9 @@ POINT_NAMES: tuple[str, ...] = (
 """``left`` is the person's left. The first 13 are those of COCO, in its order; fingers are the
 knuckles at the base."""
 
+COCO_NAMES = (*POINT_NAMES[:13], "left_knee", "right_knee", "left_ankle", "right_ankle")
+"""The 17 points of COCO in its order."""
+
 _FARTHEST = 1e6
 # Score of a certain point, and share of certain points that shows a person.
 _CERTAIN, _SHARE = 0.5, 0.5
@@ -102,6 +105,21 @@ class ImagePoints:
                 px[place], scores[place] = (column, row), score
         return cls(px, scores, stamp_ns)
 
+    @classmethod
+    def from_coco17(cls, points: FloatArray, stamp_ns: int | None = None) -> ImagePoints:
+        """Return the points of COCO, which most detectors have; knees and ankles are not used.
+
+        Args:
+            points: column, row (px) and score, 0 to 1, of each of ``COCO_NAMES``, (17, 3); nan or
+                the score 0 where a point is missing.
+            stamp_ns: see the class.
+
+        Raises:
+            ValueError: the array has another shape or is not numeric.
+        """
+        found = _array("points", points, (len(COCO_NAMES), 3), "COCO_NAMES")
+        return cls.of(dict(zip(COCO_NAMES, found.tolist(), strict=True)), stamp_ns)
+
     def exchanged(self) -> ImagePoints:
         """Return the points with left and right exchanged."""
         return replace(
@@ -122,7 +140,9 @@ class ImagePoints:
         return not self.scores.any()
 
 
-def _array(name: str, values: FloatArray, shape: tuple[int, ...]) -> FloatArray:
+def _array(
+    name: str, values: FloatArray, shape: tuple[int, ...], order: str = "POINT_NAMES"
+) -> FloatArray:
     """Return a copy of ``values`` if it has the expected shape."""
     try:
         if np.iscomplexobj(values):
@@ -131,12 +151,11 @@ def _array(name: str, values: FloatArray, shape: tuple[int, ...]) -> FloatArray:
     except (TypeError, ValueError, OverflowError):
         raise ValueError(
             f"{name} of points is {quoted(values)}; expected numbers of the shape {shape}, ordered "
-            "as POINT_NAMES"
+            f"as {order}"
         ) from None
     if array.shape != shape:
         raise ValueError(
-            f"{name} of points has the shape {array.shape}; expected {shape}, ordered as "
-            "POINT_NAMES"
+            f"{name} of points has the shape {array.shape}; expected {shape}, ordered as {order}"
         )
     return array
 

@@ -1,47 +1,94 @@
-"""Tables of points that any detector has found in the images of a recording."""
+"""Points of people that another program has found in the images of a recording."""
 
 from __future__ import annotations
 
 import csv
 import io
+import re
+from bisect import bisect_left
+from collections import Counter
 from collections.abc import Sequence
 from pathlib import Path
 from typing import NamedTuple
 
+import numpy as np
+from numpy.typing import NDArray
+
 from cardbox_tracker.camera.camera import Calibration
 from cardbox_tracker.common.errors import CardboxError, quoted
 from cardbox_tracker.common.files import UnreadableFileError, regular_file
-from cardbox_tracker.detectors.detector import FindPoints
 from cardbox_tracker.detectors.image_points import POINT_INDEX, ImagePoints
+from cardbox_tracker.detectors.keypoint_json import coco_people, openpose_people
+from cardbox_tracker.detectors.person_choice import LEAST_INSIDE, inside, person_in
+from cardbox_tracker.detectors.point_checks import Size, check_person, check_point, person_of
 
 COLUMNS = ("stamp_ns", "joint", "u", "v", "score")
-"""Columns that a table needs."""
+"""Columns that a table needs; ``frame`` may take the place of the first."""
+FRAME, _PERSON = "frame", "person"
 # An hour of all points at 30 Hz has 100 MB.
 _MOST_BYTES = 256 * 1024 * 1024
+# Points of which less is in the silhouette are compared with others, of which as much must be.
+_MOST_DOUBTFUL, _LEAST_SURE = 0.6, 0.85
+# Images with wrong points, after which points are used only while most are right.
+_MANY = 10
+# A recording's length is stated inexactly.
+_SPAN_NS = 1_000_000_000
+
+Key = int | str
+"""Stamp (ns), number or name of an image."""
+Persons = dict[Key, list[ImagePoints]]
+"""The people in each image."""
 
 
 class PointTable(NamedTuple):
-    """A CSV table with a row for each point.
+    """Points in a CSV table with a row for each point, or in JSON files.
 
-    Its columns are ``stamp_ns`` of the image, ``joint``, one of ``POINT_NAMES`` (others are not
-    used), ``u`` and ``v``, column and row in the camera's own image, px, and ``score``, 0 to 1. A
-    recording of several cameras also needs ``camera``, the camera's namespace.
+    Columns are ``stamp_ns`` of the image, or ``frame``, its number from 0 on; ``joint``, one of
+    ``POINT_NAMES`` (others are not used); ``u`` and ``v``, column and row in the camera's own
+    image, px; and ``score``, 0 to 1. With several people, ``person`` tells them apart. A recording
+    of several cameras also needs ``camera``, the camera's namespace. For JSON see
+    :mod:`.keypoint_json`; there, each camera has a folder or file of its name.
 
     Attributes:
-        path: the file.
+        path: the table, a file of COCO, or a folder of OpenPose's files.
+        people: 0 for the person in the silhouette, more for all people.
     """
 
     path: Path
+    people: int = 0
 
-    def read(
-        self, camera: str | None, calibration: Calibration, size: tuple[int, int]
-    ) -> FindPoints:
-        """Return the points of one camera, undistorted and at the working ``size``.
+    def read(self, camera: str | None, size: Size | None = None) -> GivenPoints:
+        """Return the points of one camera, px of its own image.
+
+        Args:
+            camera: namespace of the camera; None if there is only one.
+            size: size of its image; None if it is not known, so that any place will do.
 
         Raises:
-            CardboxError: the file cannot be read, lacks a column, or has a value that is no number.
+            CardboxError: a file cannot be read, lacks a column, or has an impossible point.
         """
-        found: dict[int, dict[str, tuple[float, float, float]]] = {}
+        path = self.path
+        if path.suffix == ".json" or path.is_dir():
+            return self._read_json(path if camera is None else path / camera, size)
+        kind, persons = self._read_table(camera, size)
+        return GivenPoints(path, kind, persons)
+
+    def _read_json(self, path: Path, size: Size | None) -> GivenPoints:
+        if not path.is_dir() and path.suffix != ".json":
+            path = path.with_name(f"{path.name}.json")
+        persons: Persons = {}
+        for found in openpose_people(path) if path.is_dir() else coco_people(path):
+            try:
+                person = person_of(found.points, size)
+            except CardboxError as error:
+                raise CardboxError(f"{found.place}: {error}") from None
+            persons.setdefault(found.image, []).append(person)
+        is_named = any(isinstance(key, str) for key in persons)
+        return GivenPoints(path, "name" if is_named else FRAME, persons)
+
+    def _read_table(self, camera: str | None, size: Size | None) -> tuple[str, Persons]:
+        found: dict[tuple[Key, str], dict[str, tuple[float, float, float]]] = {}
+        first_lines: dict[tuple[Key, str], int] = {}
         try:
             # Spreadsheets begin a file with a byte order mark.
             with (
@@ -49,13 +96,28 @@ class PointTable(NamedTuple):
                 io.TextIOWrapper(data, newline="", encoding="utf-8-sig") as file,
             ):
                 rows = csv.DictReader(file)
-                self._check(rows.fieldnames or (), camera)
+                kind = self._check(rows.fieldnames or (), camera)
                 for row in rows:
                     if camera is not None and row["camera"] != camera:
                         continue
-                    if row["joint"] in POINT_INDEX:
-                        joints = found.setdefault(int(row["stamp_ns"]), {})
-                        joints[row["joint"]] = float(row["u"]), float(row["v"]), float(row["score"])
+                    image, joint = int(row[kind]), row["joint"]
+                    # A cell that is empty is missing, as in tables of pandas.
+                    u, v, score = (
+                        float("nan" if row[name] == "" else row[name]) for name in COLUMNS[2:]
+                    )
+                    if row["score"] == row["u"] == row["v"] == "":
+                        score = 0.0
+                    check_point((joint, u, v, score), size)
+                    key: tuple[Key, str] = image, row.get(_PERSON) or ""
+                    joints = found.setdefault(key, {})
+                    first_lines.setdefault(key, rows.line_num)
+                    if joint in joints:
+                        raise CardboxError(
+                            f"{kind} {image} has {joint} again; with several people, give a column "
+                            f"{_PERSON}"
+                        )
+                    if score > 0.0 and joint in POINT_INDEX:
+                        joints[joint] = u, v, score
         except UnreadableFileError as error:
             raise CardboxError(f"cannot read {self.path}: {error}; give a CSV file") from None
         except OSError as error:
@@ -68,22 +130,221 @@ class PointTable(NamedTuple):
         except (ValueError, TypeError) as error:
             raise CardboxError(
                 f"{self.path}, line {rows.line_num}, has a value that is no number "
-                f"({quoted(str(error))}); expected whole numbers in stamp_ns, and numbers in u, v "
+                f"({quoted(str(error))}); expected whole numbers in {kind}, and numbers in u, v "
                 "and score"
             ) from None
-        placed: dict[int, ImagePoints] = {}
-        for stamp_ns, joints in found.items():
-            points = ImagePoints.of(joints)
-            points = ImagePoints(calibration.rectified(points.px, *size), points.scores)
-            # In a mirrored image, a detector takes the left side for the right one.
-            placed[stamp_ns] = points.exchanged() if calibration.is_mirrored else points
-        return lambda stamp_ns, image: placed.get(stamp_ns)
+        except _TableError:
+            raise
+        except CardboxError as error:
+            raise CardboxError(f"{self.path}, line {rows.line_num}: {error}") from None
+        persons: Persons = {}
+        for key, joints in found.items():
+            try:
+                check_person(joints)
+            except CardboxError as error:
+                raise CardboxError(f"{self.path}, line {first_lines[key]}: {error}") from None
+            persons.setdefault(key[0], []).append(ImagePoints.of(joints))
+        return kind, persons
 
-    def _check(self, names: Sequence[str], camera: str | None) -> None:
-        expected = COLUMNS if camera is None else (*COLUMNS, "camera")
+    def _check(self, names: Sequence[str], camera: str | None) -> str:
+        """Return the column that names the image."""
+        kind = FRAME if FRAME in names and COLUMNS[0] not in names else COLUMNS[0]
+        expected = kind, *COLUMNS[1:], *(() if camera is None else ("camera",))
         missing = [name for name in expected if name not in names]
         if missing:
-            raise CardboxError(
+            raise _TableError(
                 f"{self.path} has no column {', '.join(missing)}; a table of points has the "
-                f"columns {', '.join(expected)}, separated by commas"
+                f"columns {', '.join(expected)}, separated by commas; {FRAME}, the image's number "
+                f"from 0 on, may take the place of {COLUMNS[0]}"
             )
+        return kind
+
+
+class _TableError(CardboxError):
+    """The table lacks a column, which is the fault of no line."""
+
+
+class Image(NamedTuple):
+    """An image to which points may belong: its stamp (ns), number from 0 on, and file name."""
+
+    stamp_ns: int
+    number: int = -1
+    name: str = ""
+
+    def key(self, kind: str) -> Key:
+        """Return by what points name the image."""
+        if kind == FRAME:
+            return self.number
+        return (self.name or self.number) if kind == "name" else self.stamp_ns
+
+
+class GivenPoints:
+    """The points of one camera, which join its images.
+
+    Points with stamps join the image whose stamp is nearest, within a tolerance, others that of
+    their number or name. Points that lie beside the person's silhouette are not used.
+
+    Attributes:
+        kind: what the points say of their image: ``stamp_ns``, ``frame`` or ``name``.
+        images: number of images for which points were asked.
+        used: number of images whose points were used.
+        beside: number of images whose points lie beside the silhouette.
+    """
+
+    def __init__(self, path: Path, kind: str, persons: Persons, tolerance_ns: int = 0) -> None:
+        """Keep the people in each image."""
+        self._path, self.kind, self._persons, self._tolerance_ns = path, kind, persons, tolerance_ns
+        self._stamps = sorted(key for key in persons if isinstance(key, int))
+        # A video's images have no names, but programs number those that they take out of it.
+        numbers = {key: re.findall(r"\d+", str(key)) for key in persons}
+        self._numbered = {int(found[-1]): persons[key] for key, found in numbers.items() if found}
+        self.restart()
+
+    def restart(self) -> None:
+        """Count anew."""
+        self.images = self.used = self.beside = self._joined = 0
+        self._reasons = Counter[str]()
+        self._ends: list[Image] = []
+
+    def placed(self, calibration: Calibration, size: Size, tolerance_ns: int) -> GivenPoints:
+        """Return the points undistorted and at the working ``size``, see :func:`placed`."""
+        persons = {
+            key: [placed(person, calibration, size) for person in there]
+            for key, there in self._persons.items()
+        }
+        return GivenPoints(self._path, self.kind, persons, tolerance_ns)
+
+    def persons(self, image: Image, tolerance_ns: int) -> list[ImagePoints]:
+        """Return the people in an image; none if no points join it."""
+        if self.kind == COLUMNS[0]:
+            return self._persons.get(self._nearest(image.stamp_ns, tolerance_ns), [])
+        if self.kind == "name" and not image.name:
+            return self._numbered.get(image.number, [])
+        return self._persons.get(image.key(self.kind), [])
+
+    def _nearest(self, at_ns: int, tolerance_ns: int) -> int:
+        number = bisect_left(self._stamps, at_ns)
+        around = self._stamps[max(number - 1, 0) : number + 1]
+        nearest = min(around, key=lambda stamp_ns: abs(stamp_ns - at_ns), default=-1)
+        return nearest if abs(nearest - at_ns) <= tolerance_ns else -1
+
+    def at(self, image: Image, silhouette: NDArray[np.uint8]) -> ImagePoints | None:
+        """Return the points of the person in the silhouette (H, W) of an image, if it has any."""
+        self.images += 1
+        self._ends = [*self._ends[:1], image]
+        found = self.persons(image, self._tolerance_ns)
+        self._joined += bool(found)
+        person = person_in(silhouette, found)
+        if person is None:
+            return None
+        reason = why_not(silhouette, person)
+        self._reasons[reason] += 1
+        wrong = self._reasons.total() - self._reasons[""]
+        # Wrong points are on the person by chance in some images.
+        if reason or wrong > max(_MANY, self._reasons[""]):
+            self.beside += 1
+            return None
+        self.used += 1
+        return person
+
+    def all_in(self, image: Image) -> list[ImagePoints]:
+        """Return the points of all people in an image."""
+        self.images += 1
+        self._ends = [*self._ends[:1], image]
+        found = self.persons(image, self._tolerance_ns)
+        self._joined += bool(found)
+        self.used += bool(found)
+        return found
+
+    @property
+    def fault(self) -> str:
+        """Why no image has points that could be used; empty if one has."""
+        if self.used or not self.images:
+            return ""
+        if not self._joined:
+            return self._apart(self._ends[0], self._ends[-1])
+        if not self.beside:
+            return f"the points of {self._path} have the score 0 in all images: nobody is there"
+        return f"the points of {self._path} are used in 0 of {self.images} images: {self._why}"
+
+    def check_span(self, first_ns: int, last_ns: int) -> None:
+        """Check before tracking that stamps lie between those of the first and last image.
+
+        Raises:
+            CardboxError: none does.
+        """
+        margin_ns = _SPAN_NS + (last_ns - first_ns) // 10
+        number = bisect_left(self._stamps, first_ns - margin_ns)
+        is_apart = number == len(self._stamps) or self._stamps[number] > last_ns + margin_ns
+        if self.kind == COLUMNS[0] and is_apart:
+            raise CardboxError(self._apart(Image(first_ns), Image(last_ns)))
+
+    def _apart(self, first: Image, last: Image) -> str:
+        """Return that no points fit the images from ``first`` to ``last``."""
+        there = sorted(self._persons, key=str if self.kind == "name" else int) or ["none"]
+        images = f"{quoted(first.key(self.kind))} to {quoted(last.key(self.kind))}"
+        return (
+            f"0 of {len(self._persons)} points of {self._path} fit an image: their {self.kind} is "
+            f"{quoted(there[0])} to {quoted(there[-1])}, that of the images {images}; expected "
+            f"{_EXPECTED[self.kind]}"
+        )
+
+    @property
+    def remark(self) -> str:
+        """A warning about points beside the silhouettes; empty if there are none."""
+        if not self.beside:
+            return ""
+        return f"the points of {self.beside} of {self.images} images are not used: {self._why}"
+
+    @property
+    def _why(self) -> str:
+        return max(filter(None, self._reasons), key=lambda reason: self._reasons[reason])
+
+
+_BESIDE = (
+    "they lie beside the person's silhouette; expected pixels of this camera's own images, at "
+    "their full size, and the person who is tracked"
+)
+_EXCHANGED = (
+    "they lie on the person when columns and rows are exchanged; expected u, v: the column, then "
+    "the row"
+)
+_MIRRORED = (
+    "they lie on the person only when they are mirrored; give --mirrored if the film is a mirrored "
+    "one, or points of these very images"
+)
+_EXPECTED = {
+    COLUMNS[0]: "the stamp of an image, within half the time between images",
+    FRAME: "the number of an image, counted from 0",
+    "name": "the name of a file in a folder of images",
+}
+
+
+def why_not(silhouette: NDArray[np.uint8], person: ImagePoints) -> str:
+    """Return why points are not those of the person in a silhouette (H, W); empty if they may be.
+
+    Points that are wrong in another way than their place may lie on the person in part.
+    """
+    share = inside(silhouette, person)
+    if share is None or share >= _MOST_DOUBTFUL:
+        return ""
+    mirrored = np.stack([silhouette.shape[1] - 1 - person.px[:, 0], person.px[:, 1]], axis=1)
+    others = {_EXCHANGED: person.px[:, ::-1], _MIRRORED: mirrored}
+    shares = {
+        reason: inside(silhouette, ImagePoints(px, person.scores)) or 0.0
+        for reason, px in others.items()
+    }
+    best = max(shares, key=lambda reason: shares[reason])
+    if shares[best] >= _LEAST_SURE:
+        return best
+    return _BESIDE if share < LEAST_INSIDE else ""
+
+
+def placed(person: ImagePoints, calibration: Calibration, size: Size) -> ImagePoints:
+    """Return points of a camera's own image undistorted and at the working ``size``."""
+    px = calibration.rectified(person.px, *size)
+    # Beyond its image, a lens with distortion is not calibrated.
+    is_near = ((px > -np.array(size)) & (px < 2 * np.array(size))).all(axis=1)
+    found = ImagePoints(px, np.where(is_near, person.scores, 0.0))
+    # In a mirrored image, a detector takes the left side for the right one.
+    return found.exchanged() if calibration.is_mirrored else found

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import os
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from math import atan2, cos, hypot, pi, sin
 from pathlib import Path
@@ -35,8 +35,14 @@ _DETECTOR_PX, _LANDMARK_PX = 224, 256
 _LAYERS = ((8, 2), (16, 2), (32, 6))
 _LEAST_DETECTION, _LEAST_PRESENCE = 0.5, 0.5
 _SAME_PERSON_IOU = 0.3
+# Hips of two people are at least this share of a square apart.
+_LEAST_APART = 0.2
+# Images between those that are also searched for further people.
+_LOOK_AROUND = 30
 # A chance of one half.
 _LEAST_MASK = 128
+# Grey of pixels that the landmark network does not see.
+_UNSEEN = np.float32(0.5)
 # The square around the person is this much larger than the circle through the detected points.
 _SQUARE_SCALE = 1.25
 # Two further outputs of the landmark network say where the next square is: centre and scale.
@@ -90,8 +96,18 @@ class Detection(NamedTuple):
         return np.where(self.mask >= _LEAST_MASK, 255, 0).astype(np.uint8)
 
 
+Choose = Callable[[Sequence[Square]], Square]
+"""Takes the squares around several people, the most certain one first; returns one of them."""
+
+
 class PoseNetwork:
-    """Finds one person in image after image."""
+    """Finds one person in image after image.
+
+    Attributes:
+        choose: chooses among several people where nobody was followed yet; None for the most
+            certain one.
+        several: number of images with several people, of those that were searched for them.
+    """
 
     def __init__(self, detector: Path, landmarks: Path) -> None:
         """Load both networks.
@@ -101,42 +117,85 @@ class PoseNetwork:
         """
         self._detect = _Network(detector)
         self._locate = _Network(landmarks)
-        self._square: Square | None = None
+        self.choose: Choose | None = None
+        self.forget()
 
     def forget(self) -> None:
         """Search the whole next image instead of around the last person."""
-        self._square = None
+        self._square: Square | None = None
+        self._last: Square | None = None
+        self._images = self.several = 0
 
     def __call__(self, image: ColorImage) -> Detection | None:
         """Return the person in ``image`` (H, W, 3), bgr; None where there is nobody."""
         image = np.ascontiguousarray(image[..., ::-1])
-        if self._square is not None and (found := self._located(image, self._square)) is not None:
-            return found
-        square = self._detected(image)
+        self._images += 1
+        if self._square is not None:
+            if self._images % _LOOK_AROUND == 0:
+                self._people(image)
+            if (found := self._located(image, self._square)) is not None:
+                return found
+        square = self._chosen(self._people(image))
         self._square = None
         return None if square is None else self._located(image, square)
 
-    def _detected(self, image: ColorImage) -> Square | None:
-        """Return the square around the most certain person of an rgb image."""
+    def _chosen(self, people: Sequence[Square]) -> Square | None:
+        """Return the most certain person, or the chosen one, who is followed from then on."""
+        if self.choose is None or not people:
+            return people[0] if people else None
+        if (last := self._last) is not None:
+            return min(people, key=lambda one: hypot(one.u - last.u, one.v - last.v))
+        return self.choose(people)
+
+    def _people(self, image: ColorImage) -> list[Square]:
+        """Return the squares around the people in an rgb image, the most certain one first."""
         height, width = image.shape[:2]
-        side = max(height, width)
-        whole = Square(width / 2, height / 2, side, 0.0)
-        cut = _cut_out(image, whole, _DETECTOR_PX, cv2.BORDER_CONSTANT)
+        people = self.detected(image, Square(width / 2, height / 2, max(height, width), 0.0))
+        self.several += len(people) > 1
+        return people
+
+    def _located(self, image: ColorImage, square: Square) -> Detection | None:
+        """Return the person in a square of an rgb image, who is followed from then on."""
+        located = self.located(image, square)
+        if located is None:
+            return None
+        found, self._square = located
+        self._last = self._square
+        return found
+
+    def detected(self, image: ColorImage, view: Square) -> list[Square]:
+        """Return squares around people in a view of an rgb image, the most certain one first."""
+        cut = _cut_out(image, view, _DETECTOR_PX, cv2.BORDER_CONSTANT)
         boxes, logits = self._detect(2.0 * cut - 1.0)
         scores = _chance(logits.ravel())
         likely = np.flatnonzero(scores >= _LEAST_DETECTION)
-        if not len(likely):
-            return None
         decoded = boxes[0, likely].astype(np.float64) / _DETECTOR_PX
         anchors = _anchors()[likely]
         decoded.reshape(-1, 6, 2)[:, [0, 2, 3, 4, 5]] += anchors[:, None]
-        merged = _merged(decoded, scores[likely])
-        hips, rim = whole.to_image(merged[4:8].reshape(2, 2))
-        return _square_of(hips, rim)
+        people = list[Square]()
+        for merged in _merged(decoded, scores[likely]):
+            square = _square_of(*view.to_image(merged[4:8].reshape(2, 2)))
+            least_px = _LEAST_APART * square.side
+            if all(hypot(one.u - square.u, one.v - square.v) > least_px for one in people):
+                people.append(square)
+        return people
 
-    def _located(self, image: ColorImage, square: Square) -> Detection | None:
-        """Return the points and the mask in a square of an rgb image; None if nobody is there."""
+    def located(
+        self, image: ColorImage, square: Square, others: NDArray[np.uint8] | None = None
+    ) -> tuple[Detection, Square] | None:
+        """Return the person in a square of an rgb image, and the square of the next image.
+
+        Args:
+            image: (H, W, 3).
+            square: where the person is.
+            others: (H, W), not 0 at pixels of other people, which the network does not see.
+
+        Returns:
+            None if nobody is there.
+        """
         cut = _cut_out(image, square, _LANDMARK_PX, cv2.BORDER_REPLICATE)
+        if others is not None:
+            cut[_warped(others, square, _LANDMARK_PX, cv2.BORDER_CONSTANT) > 0] = _UNSEEN
         raw, presence, mask, heat, space = self._locate(cut)
         if float(presence[0, 0]) < _LEAST_PRESENCE:
             return None
@@ -144,14 +203,14 @@ class PoseNetwork:
         points = values[:, :2] / _LANDMARK_PX
         points = _refined(points, _chance(heat[0]))
         placed = square.to_image(points)
-        self._square = _square_of(placed[_CENTRE], placed[_SCALE])
         visible, present = _chance(values[:POINTS, 3:5].T)
-        return Detection(
+        found = Detection(
             placed[:POINTS] - 0.5,
             np.minimum(visible, present),
             _mask_in_image(mask[0, :, :, 0], square, image.shape[:2]),
             _turned(space.reshape(_OUTPUTS, 3)[:POINTS].astype(np.float64), square.angle_rad),
         )
+        return found, _square_of(placed[_CENTRE], placed[_SCALE])
 
 
 class _Network:
@@ -163,7 +222,7 @@ class _Network:
         except ImportError as error:
             raise CardboxError(
                 f"the detector needs ai-edge-litert ({error}); install it with "
-                "pip install 'cardbox_tracker[detector]'"
+                "pip install '.[detector]' in the checkout"
             ) from None
         try:
             with _silent():
@@ -209,17 +268,22 @@ def _anchors() -> FloatArray:
     return np.concatenate(rows)
 
 
-def _merged(decoded: FloatArray, scores: FloatArray) -> FloatArray:
-    """Weighted mean of the detections that overlap the most certain one, (12,)."""
-    centre, size = decoded[:, 0:2], decoded[:, 2:4]
-    low, high = centre - size / 2, centre + size / 2
-    best = int(np.argmax(scores))
-    both = np.minimum(high, high[best]) - np.maximum(low, low[best])
-    shared = np.prod(np.maximum(both, 0.0), axis=1)
-    iou = shared / (np.prod(size, axis=1) + np.prod(size[best]) - shared)
-    same = iou > _SAME_PERSON_IOU
-    mean: FloatArray = np.average(decoded[same], axis=0, weights=scores[same])
-    return mean
+def _merged(decoded: FloatArray, scores: FloatArray) -> list[FloatArray]:
+    """Weighted means (12,) of the detections that overlap the most certain one of the rest."""
+    found = []
+    while len(scores):
+        centre, size = decoded[:, 0:2], decoded[:, 2:4]
+        low, high = centre - size / 2, centre + size / 2
+        best = int(np.argmax(scores))
+        both = np.minimum(high, high[best]) - np.maximum(low, low[best])
+        shared = np.prod(np.maximum(both, 0.0), axis=1)
+        iou = shared / (np.prod(size, axis=1) + np.prod(size[best]) - shared)
+        same = iou > _SAME_PERSON_IOU
+        # A detection without an area overlaps nothing.
+        same[best] = True
+        found.append(np.average(decoded[same], axis=0, weights=scores[same]))
+        decoded, scores = decoded[~same], scores[~same]
+    return found
 
 
 def _square_of(centre: FloatArray, rim: FloatArray) -> Square:
@@ -232,6 +296,11 @@ def _square_of(centre: FloatArray, rim: FloatArray) -> Square:
 
 def _cut_out(image: ColorImage, square: Square, size: int, border: int) -> NDArray[np.float32]:
     """Return a square of the image at ``size`` pixels, values 0 to 1."""
+    return _warped(image, square, size, border).astype(np.float32) / 255.0
+
+
+def _warped(image: ColorImage, square: Square, size: int, border: int) -> NDArray[np.uint8]:
+    """Return a square of an image (H, W, ...) at ``size`` pixels."""
     turned = cv2.warpAffine(
         image,
         _to_image(square, size),
@@ -239,7 +308,7 @@ def _cut_out(image: ColorImage, square: Square, size: int, border: int) -> NDArr
         flags=cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP,
         borderMode=border,
     )
-    return turned.astype(np.float32) / 255.0
+    return np.asarray(turned, np.uint8)
 
 
 def _to_image(square: Square, size: int) -> FloatArray:

@@ -43,10 +43,13 @@ from cardbox_tracker.terms.compiled import CompiledSilhouette
 from cardbox_tracker.terms.term import Image, Silhouette
 from cardbox_tracker.terms.whole_body import WholeBodyCost, iou_of
 
-MIN_IOU = 0.6
-"""Least IoU of the fitted body; below it the silhouette is not a person."""
+MIN_IOU, TOUCHING_IOU = 0.6, 0.2
+"""Least IoU of a fitted body; below it the silhouette may not be a person. Least IoU of a body that
+at least stands where the silhouette is."""
 
-# Distances that are tried if none is given.
+# Least share of the image of a person whom a detector finds.
+_LEAST_DETECTED = 0.001
+# Distances that are tried if none is given, beside that of the body.
 _DISTANCES_M = 0.9 * 1.2 ** np.arange(9)
 _BREADTHS = [SIZE_INDEX[name] for name in BREADTHS]
 _ROUNDS, _BODIES, _POSTURES = 6, 60, 12
@@ -60,15 +63,20 @@ _X_STEP_M = 0.06
 _PRIOR = 0.003
 
 
-def upper_body(silhouette: Silhouette) -> Silhouette | None:
+def upper_body(silhouette: Silhouette, is_detected: bool = False) -> Silhouette | None:
     """Return the person of a silhouette (H, W), which is its largest region.
+
+    Args:
+        silhouette: 0 or 255.
+        is_detected: whether a detector finds the person, who may then be small or far.
 
     Returns:
         None if the region is too small or too large, or the head is cut off.
     """
     seen = filled(silhouette)
     share = np.count_nonzero(seen) / seen.size
-    if not MIN_PERSON_FRACTION <= share <= MAX_PERSON_FRACTION or seen[0].any():
+    least = _LEAST_DETECTED if is_detected else MIN_PERSON_FRACTION
+    if not least <= share <= MAX_PERSON_FRACTION or seen[0].any():
         return None
     return seen
 
@@ -78,7 +86,8 @@ class FirstSight:
     """Result of a fit.
 
     Attributes:
-        body: fitted body without unknown values.
+        body: fitted body without unknown values; all are still unknown if the IoU is below
+            ``MIN_IOU``.
         iou: IoU of the fitted body and the silhouette.
         clothes: histogram of the torso in the image, (bins,); None if it is unknown.
     """
@@ -107,11 +116,11 @@ def fit_first_sight(
         rng: random numbers.
 
     Raises:
-        InitializationError: no body fits the silhouette.
+        InitializationError: no body stands where the silhouette is.
     """
     camera = camera.with_pitch(body.camera_pose.pitch_rad)
     found, posture, iou = _Search(body, camera, silhouette, config, rng).run()
-    if iou < MIN_IOU:
+    if iou < TOUCHING_IOU:
         raise InitializationError(
             f"no body of these proportions fits the silhouette (IoU {rounded_down(iou)}, expected "
             f"{MIN_IOU:.2f} or more)"
@@ -122,7 +131,8 @@ def fit_first_sight(
         clothes = torso_colors(*seen)
         if found.appearance is None:
             found = found.with_values(appearance=seen_appearance(*seen))
-    return FirstSight(found.with_values(unknown=()), iou, clothes)
+    unknown = () if iou >= MIN_IOU else body.unknown
+    return FirstSight(found.with_values(unknown=unknown), iou, clothes)
 
 
 class _Search:
@@ -155,7 +165,8 @@ class _Search:
         """Return the fitted body, its posture (12,), and its IoU."""
         self._base = self._prior
         if "distance_m" in self._prior.unknown:
-            placed = [self._standing(distance_m) for distance_m in _DISTANCES_M]
+            tried_m = [self._prior.placement.distance_m, *_DISTANCES_M.tolist()]
+            placed = [self._standing(distance_m) for distance_m in tried_m]
             self._base = min(placed, key=lambda body: self._postures(body)[1][0])
         else:
             self._base = self._standing(self._prior.placement.distance_m)

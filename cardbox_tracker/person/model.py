@@ -166,6 +166,8 @@ class BodyModel:
         source: one of ``SOURCES``; sizes from proportions are less exact.
         unknown: names of sizes and of ``PLACEMENT`` whose values are guesses; a tracker fits them
             to the first silhouette of a person.
+        stature_stddev: relative standard deviation of a stature that is only that of most people;
+            it is no part of a model file.
         shoulder_rise: rise of a shoulder joint per radian of elevation of its arm, in shoulder
             breadths (:mod:`.skeleton`); it is no part of a model file.
 
@@ -180,6 +182,7 @@ class BodyModel:
     appearance: Appearance | None = None
     source: str = MEASURED
     unknown: tuple[str, ...] = ()
+    stature_stddev: float = 0.0
     shoulder_rise: float = SHOULDER_RISE
 
     def __post_init__(self) -> None:
@@ -228,6 +231,10 @@ class BodyModel:
         if "camera_pitch_rad" in values:
             pitch_rad = values.pop("camera_pitch_rad")
             changed["camera_pose"] = replace(self.camera_pose, pitch_rad=pitch_rad)
+        if "pitch_stddev_rad" in values:
+            there = changed.get("camera_pose", self.camera_pose)
+            stddev_rad = values.pop("pitch_stddev_rad")
+            changed["camera_pose"] = replace(there, pitch_stddev_rad=stddev_rad)
         place = {name: values.pop(name) for name in PLACEMENT if name in values}
         changed["placement"] = replace(self.placement, **place)
         return replace(self, **changed, **values)

@@ -19,6 +19,9 @@ from cardbox_tracker.person.sizes import DEFAULT_SIZES, SIZE_INDEX, SIZES, Float
 STATURE_M = 1.72
 """Stature that ``DEFAULT_SIZES`` belongs to, metres."""
 
+USUAL_STATURE_M, USUAL_STDDEV_M = 1.69, 0.09
+"""Mean stature of adults, women and men alike, and its standard deviation, metres."""
+
 _SHARES = {"upper_arm_length": 0.160, "forearm_length": 0.2005, "shoulder_breadth": 0.197}
 
 STATURE_LIMITS_M = (1.1, 2.2)

@@ -67,12 +67,11 @@ class DepthSilhouetteSource(SilhouetteSource):
         depths = depth_images(self._bag.path, self._within.topic, self.camera)
         streams: list[Iterator[Any]] = [self.images(), depths]
         self._without = 0
-        if self._detector is not None:
-            self._detector.restart()
+        self._restart_points()
         for seen, measured in side_by_side(streams, lambda item: int(item[0]), TOLERANCE_NS):
             if seen is None:
                 continue
-            stamp_ns, time_s, image, recorded = seen
+            stamp_ns, time_s, image, recorded, _ = seen
             if time_s > end_s:
                 break
             if time_s < start_s:
@@ -81,7 +80,7 @@ class DepthSilhouetteSource(SilhouetteSource):
                 self._without += 1
                 continue
             silhouette = silhouette_within(measured[1], self._within.metres)
-            found = self._points(stamp_ns, image)
+            found = self._points(seen, silhouette)
             pictures = brightness_of(image), silhouette, image
             yield RecordedFrame(stamp_ns, time_s, *pictures, measured[1], found, recorded)
 

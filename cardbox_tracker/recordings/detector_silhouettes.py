@@ -42,29 +42,42 @@ class DetectorSilhouetteSource(SilhouetteSource):
         self._find_points(None if isinstance(points, Detector) else points, camera)
         self._has_own_points = isinstance(points, Detector)
         self._has_points = points is not None
-        self._detector = self._person = detector.start()
+        self._detector = self._person = self._started(detector)
+        self._finds_people = detector.people > 0
 
     def frames(self, start_s: float = 0.0, end_s: float = float("inf")) -> Iterator[RecordedFrame]:
         """Yield every image from ``start_s`` to ``end_s``, in order, with the person's mask.
 
         The detector starts anew at ``start_s``, so that a frame depends on the span alone.
         """
-        for (stamp_ns, time_s, image, recorded), person in self.detections(start_s, end_s):
-            nobody = np.zeros(image.shape[:2], np.uint8)
-            silhouette = nobody if person is None else person.silhouette()
-            points = self._points(stamp_ns, image)
-            if person is not None and self._has_own_points:
-                points = image_points(person)
+        self._restart_points()
+        for prepared, found in self.detections(start_s, end_s):
+            stamp_ns, time_s, image, recorded, _ = prepared
+            silhouette = np.zeros(image.shape[:2], np.uint8)
+            for one in found:
+                silhouette |= one.silhouette()
             seen = brightness_of(image), silhouette, image
-            yield RecordedFrame(stamp_ns, time_s, *seen, points=points, recorded=recorded)
+            frame = RecordedFrame(stamp_ns, time_s, *seen, recorded=recorded)
+            if self._finds_people:
+                people = tuple(image_points(one) for one in found)
+                yield frame._replace(people=people)
+            elif found and self._has_own_points:
+                yield frame._replace(points=image_points(found[0]))
+            else:
+                yield frame._replace(points=self._points(prepared, silhouette))
 
     def detections(
-        self, start_s: float = 0.0, end_s: float = float("inf")
-    ) -> Iterator[tuple[PreparedImage, Detection | None]]:
-        """Yield the images of a span, each with the person in it."""
+        self, start_s: float = 0.0, end_s: float = float("inf"), period_s: float = 0.0
+    ) -> Iterator[tuple[PreparedImage, list[Detection]]]:
+        """Yield the images of a span, each with the people in it, at least ``period_s`` apart."""
         self._person.restart()
         for prepared in self.images():
             if prepared.time_s > end_s:
                 break
             if prepared.time_s >= start_s:
-                yield prepared, self._person(prepared.image)
+                start_s = prepared.time_s + period_s
+                if self._finds_people:
+                    yield prepared, self._person.all_in(prepared.stamp_ns, prepared.image)
+                    continue
+                person = self._person(prepared.image)
+                yield prepared, [] if person is None else [person]

@@ -46,14 +46,14 @@ class Film:
         return self.path.name
 
     def calibration(self, camera: str | None = None) -> Calibration:
-        """Return the given calibration.
+        """Return the given calibration, or what the file tells, or that of a usual camera.
 
         Raises:
             BagError: a camera is named.
-            CameraError: no calibration is given, or it does not fit the images.
+            CameraError: the given calibration does not fit the images.
         """
         self.image_topic(camera)
-        return self._given.calibrated(self.path, *self._size, stored=self._stored)
+        return self._given.calibrated(self.path, *self._size, stored=self._stored, file=self._file)
 
     def left_out(self, topic: str) -> list[str]:
         """Return what is no image; see ``ImageRecording``."""
@@ -62,4 +62,9 @@ class Film:
     @property
     def remarks(self) -> list[str]:
         """Warnings about the field of view."""
-        return self._given.remarks(*self._size)
+        return self._given.remarks(self._file, *self._size)
+
+    @property
+    def _file(self) -> Path:
+        """The file that may tell the field of view."""
+        return self.path

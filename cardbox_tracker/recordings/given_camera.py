@@ -3,15 +3,22 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from math import atan, degrees, radians, tan
+from math import atan, degrees, hypot, radians, tan
 from pathlib import Path
 
 from cardbox_tracker.camera.calibration_file import load_calibration
 from cardbox_tracker.camera.camera import Calibration
 from cardbox_tracker.common.errors import CameraError
+from cardbox_tracker.recordings.focal_length import FILM_DIAGONAL_MM, equivalent_mm
 
 # No usual phone held upright has so large a field of view across its image, degrees.
 _UPRIGHT_DEG = 55.0
+FOV_HINT = "webcams 60 to 78, phones 60 to 75 held sideways, 36 to 46 upright"
+"""Usual fields of view across the width of an image, degrees, for texts."""
+# Field of view along the longer side that is assumed where nothing tells it, degrees.
+_GUESSED_DEG = 65.0
+GUESSED_STDDEV = 0.13
+"""Relative standard deviation of the focal length of such a guess."""
 
 
 @dataclass(frozen=True)
@@ -56,15 +63,18 @@ class GivenCamera:
         height: int,
         frame_id: str = "",
         stored: tuple[int, int] = (0, 0),
+        file: Path | None = None,
     ) -> Calibration:
         """Return the calibration of images of ``width`` x ``height`` px in the recording ``path``.
 
         Args:
-            path: the recording.
+            path: the recording, for texts.
             width: width of the images, px.
             height: height of the images, px.
             frame_id: name of the camera's optical frame.
             stored: size, px, before pixels were made square, of which a file may be; 0 if the same.
+            file: film or image that may tell the field of view if none is given; if it does not,
+                a usual one is assumed. None if there is no such file.
 
         Raises:
             CameraError: neither field of view nor calibration is given, or they do not fit.
@@ -76,25 +86,50 @@ class GivenCamera:
             found.check_shape(width, height, str(path), str(self.calibration))
         elif self.fov_deg is not None:
             found = Calibration.of_fov(width, height, self.fov_deg)
+        elif file is not None:
+            fov_deg, is_told = _fov_deg(file, width, height)
+            found = Calibration.of_fov(width, height, fov_deg)
+            if not is_told:
+                found = replace(found, focal_stddev=GUESSED_STDDEV)
         else:
             raise CameraError(
                 f"{path} does not tell the camera's field of view; give --fov DEG, across the "
-                "width of the image (webcams 60 to 78, phones 60 to 70 held sideways, 36 to 43 "
-                "upright), or --calibration FILE of camera_calibration"
+                f"width of the image ({FOV_HINT}), or --calibration FILE of camera_calibration"
             )
         return self.rolled(replace(found, frame_id=frame_id or found.frame_id))
 
-    def remarks(self, width: int, height: int) -> list[str]:
-        """Return a remark if the field of view seems to be that of the longer side."""
-        if self.fov_deg is None or height <= width or self.fov_deg < _UPRIGHT_DEG:
+    def remarks(self, file: Path, width: int, height: int) -> list[str]:
+        """Return what was assumed of the field of view of a film or image, or seems to be wrong."""
+        if self.calibration is not None:
+            return []
+        if self.fov_deg is None:
+            fov_deg, is_told = _fov_deg(file, width, height)
+            if is_told:
+                return [f"the file tells the field of view: {fov_deg:.0f} degrees across"]
+            return [
+                f"nothing tells the camera's field of view: {fov_deg:.0f} degrees across are "
+                "assumed, so distances and sizes may be wrong by a sixth; give --fov DEG "
+                f"({FOV_HINT})"
+            ]
+        if height <= width or self.fov_deg < _UPRIGHT_DEG:
             return []
         tall_deg = 2 * degrees(atan(tan(radians(self.fov_deg) / 2) * height / width))
         return [
             f"--fov {self.fov_deg:g} is across the width of these upright images, which makes "
-            f"{tall_deg:.0f} degrees from top to bottom; a phone has 60 to 70 there, for which "
-            "--fov is 36 to 43"
+            f"{tall_deg:.0f} degrees from top to bottom; a phone has 60 to 75 there, for which "
+            "--fov is 36 to 46"
         ]
 
     def rolled(self, calibration: Calibration) -> Calibration:
         """Return the calibration with the given roll, and mirrored if the images are."""
         return replace(calibration, roll_rad=self.roll_rad or 0.0, is_mirrored=self.is_mirrored)
+
+
+def _fov_deg(file: Path, width: int, height: int) -> tuple[float, bool]:
+    """Return the field of view across an image, degrees, and whether the file tells it."""
+    focal_mm = equivalent_mm(file)
+    if focal_mm is None:
+        focal = max(width, height) / 2 / tan(radians(_GUESSED_DEG) / 2)
+    else:
+        focal = focal_mm / FILM_DIAGONAL_MM * hypot(width, height)
+    return 2 * degrees(atan(width / 2 / focal)), focal_mm is not None

@@ -53,6 +53,7 @@ class ImageFolder(Film):
         super().__init__(path, camera)
         self._files: list[Path] = []
         self._levels = Levels()
+        self._first = path
 
     def __enter__(self) -> ImageFolder:
         """Read the names of the images, and the size of the first one that can be decoded."""
@@ -65,6 +66,7 @@ class ImageFolder(Film):
                 reason = reason or f" ({error})"
                 continue
             self._set_size(width, height)
+            self._first = file
             break
         else:
             raise BagError(
@@ -86,11 +88,16 @@ class ImageFolder(Film):
             if files
         ]
 
+    @property
+    def _file(self) -> Path:
+        return self._first
+
     def images(self, topic: str | None = None) -> Iterator[RecordedImage]:
         """Yield the images in order, at the given rate."""
         for number, file in enumerate(self._files):
             stamp_ns = round(1e9 * number / (self._given.fps or FPS))
-            yield RecordedImage(stamp_ns, "", stamp_ns, partial(self._image, file, self._size))
+            decode = partial(self._image, file, self._size)
+            yield RecordedImage(stamp_ns, "", stamp_ns, decode, file.name)
 
     def _image(self, file: Path, size: tuple[int, int] | None = None) -> NDArray[np.uint8]:
         """Return an image (H, W) or (H, W, 3), which must have ``size`` (width, height), px."""

@@ -40,12 +40,14 @@ class RecordedImage:
         stamp_ns: stamp of the image; of a video, ns from its first image.
         frame_id: name of the camera's optical frame.
         time_ns: recording time.
+        name: name of its file, if it is one.
     """
 
     stamp_ns: int
     frame_id: str
     time_ns: int
     _decode: Callable[[], NDArray[np.uint8]]
+    name: str = ""
 
     @property
     def as_sent(self) -> NDArray[np.uint8]:

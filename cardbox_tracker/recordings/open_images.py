@@ -8,6 +8,7 @@ from pathlib import Path
 from cardbox_tracker.common.errors import BagError
 from cardbox_tracker.recordings.bag_files import FILE_ENDINGS, is_bag_file
 from cardbox_tracker.recordings.bag_reader import BagReader
+from cardbox_tracker.recordings.focal_length import equivalent_mm
 from cardbox_tracker.recordings.given_camera import GivenCamera
 from cardbox_tracker.recordings.image_folder import SUFFIXES, ImageFolder, image_files
 from cardbox_tracker.recordings.image_recording import ImageRecording
@@ -38,6 +39,13 @@ def is_film(path: Path) -> bool:
     if path.is_dir():
         return not is_bag(path) and bool(image_files(path))
     return path.is_file() and path.suffix.lower() in VIDEO_SUFFIXES
+
+
+def tells_lens(path: Path) -> bool:
+    """Return whether a recording may tell its camera: a bag, or a film with a focal length."""
+    if not is_film(path):
+        return True
+    return equivalent_mm(image_files(path)[0] if path.is_dir() else path) is not None
 
 
 def open_images(path: str | os.PathLike[str], camera: GivenCamera | None = None) -> ImageRecording:

@@ -117,6 +117,11 @@ _NECK = [JOINT_STATE_NAMES.index(name) for name in NECK_NAMES]
 _LONGEST_NS = 1_000_000_000
 
 
+def person_space(number: int) -> str:
+    """Return the namespace of the topics of one of several people."""
+    return f"/person_{number}"
+
+
 def joint_values(estimate: Estimate, torso_place: bool = True) -> JointValues | None:
     """Return the joints of an estimate; None without a posture.
 

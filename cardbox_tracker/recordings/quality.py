@@ -9,7 +9,6 @@ import numpy as np
 
 from cardbox_tracker.person.kinematics import pose
 from cardbox_tracker.person.skeleton import JOINT_NAMES, KEYPOINT_NAMES, UNITS, KeypointState
-from cardbox_tracker.recordings.outputs import place_of
 from cardbox_tracker.recordings.silhouettes import RecordedFrame
 from cardbox_tracker.tracking.estimate import LOST, TRACKING, UNCERTAIN, Estimate
 from cardbox_tracker.tracking.tracker import Tracker
@@ -18,6 +17,7 @@ MOST_MOMENTS, GAP_S = 5, 3.0
 """Number of worst moments that are named, and the least time between two of them, s."""
 
 _HANDS = [KEYPOINT_NAMES.index(f"{side}_hand") for side in ("left", "right")]
+_SHOULDERS = [KEYPOINT_NAMES.index(f"{side}_shoulder") for side in ("left", "right")]
 _ANGLES = [number for number, name in enumerate(JOINT_NAMES) if UNITS[name] == "rad"]
 
 
@@ -38,6 +38,7 @@ class Quality:
         self._moments: list[_Moment] = []
         self._angles_rad: list[float] = []
         self._hands_m: list[float] = []
+        self._distances_m: list[float] = []
 
     def __call__(self, frame: RecordedFrame, estimate: Estimate, tracker: Tracker) -> None:
         """Count one image."""
@@ -53,17 +54,18 @@ class Quality:
         if estimate.posture is None or estimate.posture_stddev is None:
             return
         self._angles_rad += estimate.posture_stddev[_ANGLES].tolist()
-        state = np.concatenate([estimate.posture, place_of(estimate)])
-        moving = np.zeros(2) if estimate.offset_stddev_m is None else estimate.offset_stddev_m
-        moved = state + np.diag(np.concatenate([estimate.posture_stddev, moving]))
-        points_m = pose(tracker.body, np.vstack([state, moved])).keypoints_m[:, _HANDS]
-        self._hands_m += np.linalg.norm(points_m[1:] - points_m[0], axis=(0, 2)).tolist()
+        moved = estimate.posture + np.diag(estimate.posture_stddev)
+        points_m = pose(tracker.body, np.vstack([estimate.posture, moved])).keypoints_m
+        hands_m = points_m[:, _HANDS] - points_m[:, _SHOULDERS].mean(axis=1, keepdims=True)
+        self._hands_m += np.linalg.norm(hands_m[1:] - hands_m[0], axis=(0, 2)).tolist()
+        if place is not None:
+            self._distances_m.append(float(place.stddev_m[0]))
 
     def lines(self) -> Iterator[str]:
         """Yield shares of sure images and hands, typical deviations, and the worst moments.
 
         Hands and distances are sure in the state ``tracked``. Typical is the median over the images
-        with a posture; a hand moves with the deviations of all joints and of the place.
+        with a posture; a hand moves beside the shoulders with the deviations of all joints.
         """
         if not self._images:
             return
@@ -73,11 +75,13 @@ class Quality:
             f"{self._sure_places / self._images:.0%} of the distances (to 0.3 m)"
         )
         if self._angles_rad:
-            yield (
-                "typical standard deviation: "
-                f"{np.degrees(np.median(self._angles_rad)):.0f} degrees of an angle, "
-                f"{100 * np.median(self._hands_m):.0f} cm of a hand"
-            )
+            typical = [
+                f"{np.degrees(np.median(self._angles_rad)):.0f} degrees of an angle",
+                f"{100 * np.median(self._hands_m):.0f} cm of a hand beside the shoulders",
+            ]
+            if self._distances_m:
+                typical.append(f"{100 * np.median(self._distances_m):.0f} cm of the distance")
+            yield f"typical standard deviation: {', '.join(typical)}"
         if worst := self._worst():
             moments = (f"{one.time_s:.1f} s ({one.what})" for one in worst)
             yield f"least sure, look at them: {', '.join(moments)}"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, contextmanager
@@ -24,13 +25,14 @@ from cardbox_tracker.camera.stereo import StereoDepth, stereo_of_pair
 from cardbox_tracker.camera.view import OtherCamera
 from cardbox_tracker.common.errors import BagError, CameraError, CardboxError
 from cardbox_tracker.detectors.detector import Detector
+from cardbox_tracker.detectors.image_points import ImagePoints
 from cardbox_tracker.detectors.point_table import PointTable
 from cardbox_tracker.recordings.bag_reader import BagReader
 from cardbox_tracker.recordings.depth_images import depth_images
 from cardbox_tracker.recordings.depth_silhouettes import DepthSilhouetteSource, Within
 from cardbox_tracker.recordings.detector_silhouettes import DetectorSilhouetteSource
 from cardbox_tracker.recordings.given_camera import GivenCamera
-from cardbox_tracker.recordings.image_recording import ImageRecording
+from cardbox_tracker.recordings.image_recording import ImageRecording, working_size
 from cardbox_tracker.recordings.open_images import is_bag, open_images
 from cardbox_tracker.recordings.person_in_view import PersonInView, PersonInViewSource
 from cardbox_tracker.recordings.silhouettes import RecordedFrame, SilhouetteSource, TimeSpan
@@ -60,6 +62,11 @@ class FrameSet(NamedTuple):
     frames: tuple[RecordedFrame | None, ...]
     first: RecordedFrame
     depth_m: DepthImage | None = None
+
+    @property
+    def people(self) -> tuple[ImagePoints, ...] | None:
+        """Joints of each person in the first camera; None without a detector of several."""
+        return self.first.people
 
     @property
     def observations(self) -> list[Observation]:
@@ -125,11 +132,18 @@ class Recording:
         """The first camera, in whose frame the results are."""
         return self.sources[0]
 
-    def frames(self, start_s: float = 0.0) -> Iterator[FrameSet]:
-        """Yield synchronized frames from ``start_s`` on; each image is in exactly one set."""
+    def check_points(self) -> None:
+        """Raise CardboxError if the given points of no camera could be used in any image."""
+        faults = [source.points_fault for source in self.sources]
+        if all(faults):
+            raise CardboxError(faults[0])
+
+    def frames(self, start_s: float = 0.0, end_s: float = math.inf) -> Iterator[FrameSet]:
+        """Yield synchronized frames from ``start_s`` to ``end_s``; each image is in one set."""
         # Images slightly before the start can belong to the first set.
         early_s = max(0.0, start_s - self._tolerance_ns / 1e9)
-        streams = [source.frames(early_s) for source in self.sources]
+        late_s = end_s + self._tolerance_ns / 1e9
+        streams = [source.frames(early_s, late_s) for source in self.sources]
         depths = self._depths()
         depth = next(depths, None)
         black = np.zeros((self.first.camera.height, self.first.camera.width), np.uint8)
@@ -139,6 +153,8 @@ class Recording:
                 depth = next(depths, None)
             if lead.time_s < start_s:
                 continue
+            if lead.time_s > end_s:
+                break
             there = None
             if self._cuts_by_depth and frames[0] is not None:
                 there = frames[0].depth_m
@@ -240,6 +256,11 @@ def _source(
     camera: str | None,
     points: Detector | PointTable | None,
 ) -> SilhouetteSource:
+    finds_people = any(isinstance(one, Detector) and one.people for one in (background, points))
+    if finds_people and isinstance(bag, BagReader):
+        # The networks expect square pixels.
+        calibration = bag.calibration(camera)
+        bag.working_size = working_size(calibration.width, calibration.height)
     if isinstance(background, Within):
         return DepthSilhouetteSource(bag, background, camera, points)
     if isinstance(background, Detector):

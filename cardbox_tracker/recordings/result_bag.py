@@ -27,6 +27,7 @@ from cardbox_tracker.recordings.outputs import (
     Text,
     Value,
     joint_values,
+    person_space,
     positions_of,
 )
 from cardbox_tracker.recordings.silhouettes import RecordedFrame
@@ -69,12 +70,25 @@ def result_bag(
         BagError: ``path`` exists and may not be replaced.
     """
     with result_writer(path, overwrite) as writer:
-        yield _ResultBag(writer, frame_id, draw)
+        people: dict[int | None, _ResultBag] = {}
+
+        def observe(frame: RecordedFrame, estimate: Estimate, tracker: Tracker) -> None:
+            if estimate.person not in people:
+                space = "" if estimate.person is None else person_space(estimate.person)
+                people[estimate.person] = _ResultBag(writer, frame_id, draw, space, not people)
+            people[estimate.person](frame, estimate, tracker)
+
+        yield observe
 
 
 class _ResultBag:
-    def __init__(self, bag: BagWriter, frame_id: str, draw: Draw | None) -> None:
+    """Writes the topics of one person, and the silhouettes if ``is_first``."""
+
+    def __init__(
+        self, bag: BagWriter, frame_id: str, draw: Draw | None, space: str, is_first: bool
+    ) -> None:
         self._bag, self._frame_id, self._draw = bag, frame_id, draw
+        self._space, self._is_first = space, is_first
         self._transforms = BagTransforms(bag)
         self._described: BodyModel | None = None
         self._outputs = OutputStream()
@@ -84,18 +98,21 @@ class _ResultBag:
         stamp, optical = frame.stamp_ns, self._frame_id
         body, camera = tracker.body, tracker.camera
         if body is not self._described:
-            bag.write_string("/body_model", stamp, dumps_body_model(body))
+            bag.write_string(f"{self._space}/body_model", stamp, dumps_body_model(body))
             urdf = urdf_from_body(body, optical or None)
-            bag.write_string("/robot_description", stamp, urdf)
-            transforms.describe(urdf)
+            bag.write_string(f"{self._space}/robot_description", stamp, urdf)
+            # The links of several people have the same names.
+            if not self._space:
+                transforms.describe(urdf)
         self._described = body
-        bag.write_image("/silhouette", stamp, optical, frame.silhouette, "mono8")
-        bag.write_camera_info("/silhouette/camera_info", stamp, optical, camera)
+        if self._is_first:
+            bag.write_image("/silhouette", stamp, optical, frame.silhouette, "mono8")
+            bag.write_camera_info("/silhouette/camera_info", stamp, optical, camera)
         if self._draw is not None:
             overlay = self._draw(frame.picture, estimate, tracker)
-            bag.write_image("/overlay", stamp, optical, overlay, "bgr8")
+            bag.write_image(f"{self._space}/overlay", stamp, optical, overlay, "bgr8")
         for output, value in self._outputs.values(stamp, estimate, tracker):
-            _write_value(bag, f"/{output.topic}", stamp, optical, value)
+            _write_value(bag, f"{self._space}/{output.topic}", stamp, optical, value)
         joints = joint_values(estimate)
         if joints is not None:
             transforms.write(stamp, positions_of(joints))

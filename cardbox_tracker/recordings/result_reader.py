@@ -12,7 +12,13 @@ from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.model_file import loads_body_model
 from cardbox_tracker.person.sizes import FloatArray
 from cardbox_tracker.recordings.bag_reader import BagReader, stamp_ns_of
-from cardbox_tracker.recordings.outputs import JointValues, neck_from, place_from, posture_from
+from cardbox_tracker.recordings.outputs import (
+    JointValues,
+    neck_from,
+    person_space,
+    place_from,
+    posture_from,
+)
 from cardbox_tracker.tracking.estimate import NO_PERSON, TRACKING, UNCERTAIN
 
 MODEL = "/body_model"
@@ -50,11 +56,13 @@ def has_results(bag: BagReader) -> bool:
     return any(topic.endswith(MODEL) for topic in bag.topics)
 
 
-def namespace_of(bag: BagReader) -> str:
+def namespace_of(bag: BagReader, person: int | None = None) -> str:
     """Return the first namespace with the tracker's topics, such as "" or "/left".
 
+    With ``person``, that of one of several people.
+
     Raises:
-        BagError: the bag has no results of the tracker.
+        BagError: the bag has no results of the tracker, or of that person.
     """
     models = sorted(topic for topic in bag.topics if topic.endswith(MODEL))
     if not models:
@@ -62,7 +70,15 @@ def namespace_of(bag: BagReader) -> str:
             f"{bag.path} has no results of the tracker (no topic body_model); make them with "
             "'cardbox track BAG ... --bag RESULTS'"
         )
-    return models[0].removesuffix(MODEL)
+    spaces = [topic.removesuffix(MODEL) for topic in models]
+    if person is None:
+        return spaces[0]
+    chosen = [space for space in spaces if space.endswith(person_space(person))]
+    if not chosen:
+        raise BagError(
+            f"{bag.path} has no results of person {person}, only those on {', '.join(models)}"
+        )
+    return chosen[0]
 
 
 def joints_of(message: Any) -> JointValues:
@@ -76,13 +92,15 @@ def points_of(message: Any) -> FloatArray:
     return np.array(points, np.float64).reshape(-1, 3)
 
 
-def read_results(bag: BagReader) -> list[Result]:
+def read_results(bag: BagReader, person: int | None = None) -> list[Result]:
     """Return the results of the images in order of their stamps; the last one of each stamp.
+
+    ``person`` is as in :func:`namespace_of`.
 
     Raises:
         BagError: the bag has no results of the tracker, or is damaged.
     """
-    space = namespace_of(bag)
+    space = namespace_of(bag, person)
     topics = [space + name for name in (MODEL, _STATE, _JOINTS, _STDDEV, _KEYPOINTS)]
     found = _Results()
     for message in bag.messages([topic for topic in topics if topic in bag.topics]):

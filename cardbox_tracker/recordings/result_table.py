@@ -34,6 +34,9 @@ Cell = int | float | str | Decimal | None
 PARQUET = ".parquet"
 """Suffix of the tables that are not CSV."""
 
+PERSON = "person"
+"""Column of the number of the person; it follows the others if several people are tracked."""
+
 _BODY_NAMES = (*JOINT_NAMES, *PLACE_NAMES)
 
 POINT_COLUMNS = tuple(f"{name}_{axis}" for name in KEYPOINT_NAMES for axis in "xyz")
@@ -41,17 +44,17 @@ POINT_COLUMNS = tuple(f"{name}_{axis}" for name in KEYPOINT_NAMES for axis in "x
 
 
 @cache
-def columns(has_points: bool = False) -> tuple[str, ...]:
+def columns(has_points: bool = False, has_people: bool = False) -> tuple[str, ...]:
     """Return the names of the columns, see :func:`units`."""
-    return tuple(units(has_points))
+    return tuple(units(has_points, has_people))
 
 
-def units(has_points: bool = False) -> dict[str, str]:
+def units(has_points: bool = False, has_people: bool = False) -> dict[str, str]:
     """Return the unit of each column by its name, in their order; empty for none.
 
     The names up to the person's place are fixed, because scripts read them; standard deviations end
     in their unit. With ``has_points``, for recordings with points of the person, the neck is among
-    them.
+    them; with ``has_people``, the number of the person.
     """
     return {
         "stamp": "s",
@@ -71,6 +74,7 @@ def units(has_points: bool = False) -> dict[str, str]:
         "place_chance": "",
         "place_rests_on": "",
         **dict.fromkeys(ANATOMICAL_NAMES, "deg"),
+        **({PERSON: ""} if has_people else {}),
     }
 
 
@@ -83,13 +87,17 @@ def _deviation_units(joints: Iterable[str]) -> dict[str, str]:
 
 
 def row_of(
-    stamp_ns: int, time_s: float, estimate: Estimate, has_points: bool = False
+    stamp_ns: int,
+    time_s: float,
+    estimate: Estimate,
+    has_points: bool = False,
+    has_people: bool = False,
 ) -> list[Cell]:
     """Return the row of one image, in the order of :func:`columns`."""
-    names = columns(has_points)
+    names = columns(has_points, has_people)
     stamp = Decimal(stamp_ns).scaleb(-9)
     known: dict[str, Cell] = {"stamp": stamp, "state": estimate.state}
-    known |= {"stamp_ns": stamp_ns, "time_s": time_s}
+    known |= {"stamp_ns": stamp_ns, "time_s": time_s, PERSON: estimate.person}
     joints, deviations = joint_values(estimate), joint_deviations(estimate)
     if joints is None or estimate.keypoints_m is None:
         return [known.get(name) for name in names]
@@ -126,31 +134,34 @@ def check_table(path: Path) -> None:
 
 @contextmanager
 def result_table(
-    path: Path, has_points: bool
+    path: Path, has_points: bool, has_people: bool = False
 ) -> Iterator[Callable[[RecordedFrame, Estimate], None]]:
     """Context of a function that adds the row of an image to a table, which appears on exit.
 
     Args:
         path: file to write; with the suffix .parquet it is a Parquet file, else CSV.
         has_points: see :func:`columns`.
+        has_people: see :func:`columns`; then each person of an image has a row.
 
     Raises:
         CardboxError: the file cannot be written, or pyarrow is missing.
     """
-    names = columns(has_points)
+    has = has_points, has_people
+    names = columns(*has)
     if path.suffix == PARQUET:
         arrow, parquet = pyarrow_or_error()
         rows: list[list[Cell]] = []
         with atomic_path(path) as temporary:
             yield lambda frame, estimate: rows.append(
-                row_of(frame.stamp_ns, frame.time_s, estimate, has_points)
+                row_of(frame.stamp_ns, frame.time_s, estimate, *has)
             )
             keypoints = (f"{name}_state" for name in KEYPOINT_NAMES)
             texts = ("state", *keypoints, "place_state", "place_rests_on")
-            types = {"stamp_ns": arrow.int64()} | dict.fromkeys(texts, arrow.string())
+            whole = dict.fromkeys(("stamp_ns", PERSON), arrow.int64())
+            types = whole | dict.fromkeys(texts, arrow.string())
             schema = arrow.schema(
                 arrow.field(name, types.get(name, arrow.float64()), metadata={"unit": unit})
-                for name, unit in units(has_points).items()
+                for name, unit in units(*has).items()
             )
             for row in rows:
                 row[0] = float(row[0] or 0)
@@ -161,7 +172,7 @@ def result_table(
         table = csv.writer(file, lineterminator="\n")
         table.writerow(names)
         yield lambda frame, estimate: table.writerow(
-            map(_text, row_of(frame.stamp_ns, frame.time_s, estimate, has_points))
+            map(_text, row_of(frame.stamp_ns, frame.time_s, estimate, *has))
         )
 
 
@@ -188,6 +199,6 @@ def pyarrow_or_error() -> tuple[Any, Any]:
     except ImportError as error:
         raise CardboxError(
             f"a table in Parquet needs the library pyarrow ({error}); install it with "
-            "'pip install cardbox_tracker[parquet]', or give a name that ends in .csv"
+            "pip install '.[parquet]' in the checkout, or give a name that ends in .csv"
         ) from None
     return pyarrow, pyarrow.parquet

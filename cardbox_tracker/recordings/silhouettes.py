@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from itertools import islice
 from pathlib import Path
 from typing import NamedTuple
@@ -14,9 +14,10 @@ from cardbox_tracker.camera.camera import Rectifier
 from cardbox_tracker.camera.depth_image import DepthImage
 from cardbox_tracker.camera.encodings import brightness_of
 from cardbox_tracker.common.errors import BagError, CameraError, CardboxError, EncodingError
-from cardbox_tracker.detectors.detector import Detector, FindPoints
+from cardbox_tracker.detectors.detector import Detector, PersonDetector
 from cardbox_tracker.detectors.image_points import ImagePoints
-from cardbox_tracker.detectors.point_table import PointTable
+from cardbox_tracker.detectors.landmarks import image_points
+from cardbox_tracker.detectors.point_table import GivenPoints, Image, PointTable
 from cardbox_tracker.recordings.image_recording import ImageRecording, RecordedImage
 from cardbox_tracker.segmentation.background_config import BackgroundConfig
 from cardbox_tracker.segmentation.learning import Learning
@@ -24,10 +25,6 @@ from cardbox_tracker.segmentation.silhouettes import SilhouettePipeline
 
 _PERIOD_IMAGES = 60
 # A stamp that differs from the recording time by more comes from another clock.
-# A remark on points that seem to be mirrored needs this many images.
-_MIRRORED_IMAGES = 10
-# Shares of the points in the outline, as they are and mirrored.
-_OUTSIDE, _INSIDE = 0.4, 0.7
 _OTHER_CLOCK_NS = 1_000_000_000
 
 
@@ -72,12 +69,18 @@ class PreparedImage(NamedTuple):
         time_s: seconds from the recording's start.
         image: (H, W, 3) bgr, or (H, W) grey, undistorted, at the working resolution.
         recorded: the image as it was recorded.
+        number: number of the image in the recording, counted from 0.
     """
 
     stamp_ns: int
     time_s: float
     image: NDArray[np.uint8]
     recorded: RecordedImage
+    number: int = 0
+
+
+FindPoints = Callable[[PreparedImage, NDArray[np.uint8]], ImagePoints | None]
+"""Takes an image and the silhouette in it; returns the points of the person."""
 
 
 class RecordedFrame(NamedTuple):
@@ -93,6 +96,7 @@ class RecordedFrame(NamedTuple):
         depth_m: (H, W), metres, from which the silhouette was cut out; None without depth.
         points: joints of the person in the image, from a detector; None without one.
         recorded: the image as it was recorded; None if it was not kept.
+        people: joints of each person, from a detector of several; None without one.
     """
 
     stamp_ns: int
@@ -103,6 +107,7 @@ class RecordedFrame(NamedTuple):
     depth_m: DepthImage | None = None
     points: ImagePoints | None = None
     recorded: RecordedImage | None = None
+    people: tuple[ImagePoints, ...] | None = None
 
     @property
     def picture(self) -> NDArray[np.uint8]:
@@ -151,7 +156,7 @@ class SilhouetteSource:
         self._open(bag, size or bag.working_size, camera, config)
         self._find_points(points, camera)
         is_readable = False
-        for _, time_s, image, _ in self.images():
+        for _, time_s, image, *_ in self.images():
             is_readable = True
             if time_s > background.end_s or self._pipeline.has_enough:
                 break
@@ -179,7 +184,6 @@ class SilhouetteSource:
         self._bag = bag
         self._broken: dict[int, str] = {}
         self._used = self._clock_ns = 0
-        self._mirrored = [0, 0]
         self._topic = bag.image_topic(camera)
         calibration = bag.calibration(camera)
         self._pipeline = SilhouettePipeline(calibration, size, config, learning)
@@ -196,13 +200,35 @@ class SilhouetteSource:
     def _find_points(self, points: Detector | PointTable | None, camera: str | None) -> None:
         """Use a source of points."""
         self._has_points = points is not None
-        self._detector = points.start() if isinstance(points, Detector) else None
-        self._points: FindPoints = lambda stamp_ns, image: None
-        if self._detector is not None:
-            self._points = self._detector.points
+        self._finds_people = points is not None and points.people > 0
+        self._detector = self._started(points) if isinstance(points, Detector) else None
+        self._given: GivenPoints | None = None
+        self._points: FindPoints = lambda prepared, silhouette: None
+        if (detector := self._detector) is not None:
+            self._points = lambda prepared, silhouette: detector.points(prepared.image)
         elif isinstance(points, PointTable):
+            calibration = self._pipeline.calibration
+            given = points.read(camera, (calibration.width, calibration.height))
             size = self.camera.width, self.camera.height
-            self._points = points.read(camera, self._pipeline.calibration, size)
+            first_ns = next(self._bag.images(self._topic)).stamp_ns
+            given.check_span(first_ns, first_ns + int(1e9 * self.duration_s))
+            self._given = given = given.placed(calibration, size, self.period_ns() // 2)
+            self._points = lambda prepared, silhouette: given.at(
+                Image(prepared.stamp_ns, prepared.number, prepared.recorded.name), silhouette
+            )
+
+    def _started(self, detector: Detector) -> PersonDetector:
+        calibration = self._pipeline.calibration
+        across, down = (
+            self.camera.width / calibration.width,
+            self.camera.height / calibration.height,
+        )
+        return detector.start(across, down)
+
+    @property
+    def points_fault(self) -> str:
+        """Why the given points were used in no image that was read; empty if they were."""
+        return "" if self._given is None else self._given.fault
 
     @property
     def path(self) -> Path:
@@ -223,17 +249,33 @@ class SilhouetteSource:
         """Yield every image from ``start_s`` to ``end_s`` in order."""
         # The background adapts from the first image on, so frames do not depend on the span.
         self._pipeline.restart()
-        if self._detector is not None:
-            self._detector.restart()
-        for stamp_ns, time_s, image, recorded in self.images():
+        self._restart_points()
+        for prepared in self.images():
+            stamp_ns, time_s, image, recorded, _ = prepared
             if time_s > end_s:
                 break
             silhouette = self._pipeline.silhouette(image, stamp_ns)
             if time_s >= start_s:
-                found = self._points(stamp_ns, image)
-                self._mirrored[is_only_mirrored(found, silhouette)] += 1
                 seen = brightness_of(image), silhouette, image
-                yield RecordedFrame(stamp_ns, time_s, *seen, points=found, recorded=recorded)
+                frame = RecordedFrame(stamp_ns, time_s, *seen, recorded=recorded)
+                if self._finds_people:
+                    yield frame._replace(people=self._people(prepared))
+                else:
+                    yield frame._replace(points=self._points(prepared, silhouette))
+
+    def _people(self, prepared: PreparedImage) -> tuple[ImagePoints, ...]:
+        """Return the points of all people in an image."""
+        if self._detector is not None:
+            found = self._detector.all_in(prepared.stamp_ns, prepared.image)
+            return tuple(image_points(one) for one in found)
+        assert self._given is not None
+        image = Image(prepared.stamp_ns, prepared.number, prepared.recorded.name)
+        return tuple(self._given.all_in(image))
+
+    def _restart_points(self) -> None:
+        for source in (self._detector, self._given):
+            if source is not None:
+                source.restart()
 
     def held(self, span: TimeSpan, what: str) -> list[RecordedFrame]:
         """Return the frames of a span in which a posture is held.
@@ -281,15 +323,12 @@ class SilhouetteSource:
             )
         if self._broken:
             remarks.append(self._brokenness())
-        fitting, mirrored = self._mirrored
-        if mirrored > max(fitting, _MIRRORED_IMAGES):
-            remarks.append(
-                f"the points of {mirrored} images lie in the person's outline only if they are "
-                "mirrored; is the film a mirrored one of what the points were found in? Give "
-                "--mirrored, or points of these very images"
-            )
         if self._detector is not None and self._detector.missed:
             remarks.append(f"the detector finds nobody in {self._detector.missed} images")
+        if self._detector is not None and self._detector.remark:
+            remarks.append(self._detector.remark)
+        if self._given is not None and self._given.remark:
+            remarks.append(self._given.remark)
         return remarks
 
     @property
@@ -303,9 +342,11 @@ class SilhouetteSource:
 
     def full_picture(self, frame: RecordedFrame) -> NDArray[np.uint8]:
         """Return the picture of a frame, undistorted, at the resolution of the recording."""
-        if frame.recorded is None:
-            return frame.picture
-        image = frame.recorded.as_sent
+        return frame.picture if frame.recorded is None else self.undistorted(frame.recorded)
+
+    def undistorted(self, recorded: RecordedImage) -> NDArray[np.uint8]:
+        """Return an image, undistorted, at the resolution of the recording."""
+        image = recorded.as_sent
         height, width = image.shape[:2]
         if self._full_size != (width, height):
             self._full_size = width, height
@@ -333,21 +374,4 @@ class SilhouetteSource:
             used += 1
             self._used = max(self._used, used)
             time_ns = image.stamp_ns + self._clock_ns - self._bag.start_ns
-            yield PreparedImage(image.stamp_ns, time_ns / 1e9, prepared, image)
-
-
-def is_only_mirrored(points: ImagePoints | None, silhouette: NDArray[np.uint8]) -> bool:
-    """Return whether points lie in a silhouette (H, W) only if the image is mirrored."""
-    if points is None or points.is_empty or not silhouette.any():
-        return False
-    height, width = silhouette.shape
-    column, row = np.rint(points.px[points.scores > 0.0]).astype(int).T
-    is_there = (column >= 0) & (column < width) & (row >= 0) & (row < height)
-    column, row = column[is_there], row[is_there]
-    if len(column) == 0:
-        return False
-    as_is, mirrored = (
-        np.count_nonzero(silhouette[row, place]) / len(column)
-        for place in (column, width - 1 - column)
-    )
-    return bool(as_is < _OUTSIDE and mirrored > _INSIDE)
+            yield PreparedImage(image.stamp_ns, time_ns / 1e9, prepared, image, number - 1)

@@ -157,7 +157,10 @@ def placed_upright(
     for state in candidates:
         cost.see(silhouettes, state)
         cost.choose(seeing)
-        misfits.append(cost.bodies(state[None]).costs_px[0] / max(cost.silhouette_px, 1))
+        # A body beside the image or above the silhouette covers nothing and misses nothing.
+        is_there = cost.silhouette_px > 0
+        pixels = cost.bodies(state[None]).costs_px[0] if is_there else np.inf
+        misfits.append(pixels / max(cost.silhouette_px, 1))
     misfits[0] *= _BETTER
     best = int(np.argmin(misfits))
     cost.see(silhouettes, candidates[best])

@@ -51,19 +51,22 @@ class PersonPresence:
             frames: frames of all cameras, whose silhouettes the cost has.
             near: state (14,) of the last frame.
         """
-        found = [
-            presence_of(
-                *share, *self._limits, frame.points is not None and frame.points.are_certain
-            )
-            for share, frame in zip(self._cost.shares(near), frames, strict=True)
-        ]
+        found = []
+        for share, frame in zip(self._cost.shares(near), frames, strict=True):
+            is_detected = frame.points is not None and frame.points.are_certain
+            one = presence_of(*share, *self._limits, is_detected)
+            # Others may hide nearly all of a person whose joints are seen.
+            is_hidden = is_detected and frame["covered"] is not None
+            found.append(Presence.PERSON if is_hidden else one)
         self._too_much = self._too_much + 1 if Presence.TOO_MUCH in found else 0
         if self._is_too_long_too_much:
             found = [Presence.PERSON if one is Presence.TOO_MUCH else one for one in found]
         seeing = [number for number, one in enumerate(found) if one is Presence.PERSON]
         if seeing:
             now_px, before_px = sum(f.foreground_px for f in frames), self._foreground_px
-            self._is_sudden, self._foreground_px = before_px > _SUDDEN * now_px, now_px
+            is_covered = any(frame["covered"] is not None for frame in frames)
+            self._is_sudden = before_px > _SUDDEN * now_px and not is_covered
+            self._foreground_px = now_px
             return Presence.PERSON, seeing
         return (Presence.TOO_MUCH if Presence.TOO_MUCH in found else Presence.NOBODY), seeing
 
@@ -78,8 +81,9 @@ def presence_of(
         high: the same where the model is smallest.
         smallest: least share of a person.
         largest: largest share of a person.
-        is_detected: whether a detector finds the person, so that a spoilt silhouette does no harm.
+        is_detected: whether a detector finds the person, so that a spoilt silhouette does no harm,
+            and neither does a person who is smaller than expected.
     """
-    if high < smallest:
+    if high < smallest and not (is_detected and high > 0.0):
         return Presence.NOBODY
     return Presence.TOO_MUCH if low > largest and not is_detected else Presence.PERSON

@@ -50,12 +50,16 @@ def is_trackable(cost: MultiViewCost, state: FloatArray) -> bool:
 def are_hidden(cost: MultiViewCost, state: FloatArray) -> BoolArray:
     """Return which keypoints (6,) of a state (14,) no camera sees that sees the person.
 
-    A keypoint is hidden outside of the image and behind the trunk; shoulders are part of the trunk.
+    A keypoint is hidden outside of the image, behind the trunk and behind another person; shoulders
+    are part of the trunk.
     """
     hidden = np.ones(6, dtype=np.bool_)
     for number in cost.seeing:
         one = cost.costs[number]
-        _hide_fewer(cost.to_views[number](state), one.body, one.size, hidden)
+        own = np.ones(6, dtype=np.bool_)
+        there = cost.to_views[number](state)
+        _hide_fewer(there, one.body, one.size, own)
+        hidden &= own | one.are_covered(there)
     return hidden
 
 

@@ -173,6 +173,7 @@ class WholeBodyFilter:
 
     def look(self, frames: Sequence[Frame]) -> Presence:
         """See :class:`~.pose_filter.PoseFilter`; one camera that shows a person is enough."""
+        self._cost.cover([frame["covered"] for frame in frames])
         self._cost.see([frame.silhouette for frame in frames], self._survivors[0])
         presence, self._seeing = self._presence.see(frames, self._survivors[0])
         self._is_lost = self._is_lost or self._presence.is_elsewhere

@@ -26,6 +26,7 @@ class KeptBackground:
 
     Attributes:
         path: the file; None if there is none.
+        use: what was done with the file, in words.
     """
 
     def __init__(self, path: Path | None, size: tuple[int, int]) -> None:
@@ -37,8 +38,10 @@ class KeptBackground:
         self.path = path
         self._stored: StoredBackground | None = None
         self._before: BackgroundModel | None = None
+        self.use = "not there yet"
         if path is not None and path.exists():
             self._stored = load_background(path, size)
+            self.use = "not used yet"
 
     def carry_over(self, model: BackgroundModel | None) -> None:
         """Offer the background that was used before a change of calibration, not the file's."""
@@ -82,7 +85,7 @@ class KeptBackground:
                 "background/learn with nobody in view, which replaces the file"
             )
         pipeline.resume(stored.model, image)
-        self._stored = None
+        self._stored, self.use = None, "used"
 
     def keep(self, pipeline: SilhouettePipeline) -> str:
         """Save the background of ``pipeline`` to the file; return a text for the log.
@@ -94,4 +97,5 @@ class KeptBackground:
         if self.path is None or model is None:
             return ""
         save_background(StoredBackground(model, pipeline.calibration), self.path)
+        self.use = "written"
         return f"; saved to {self.path}"

@@ -73,6 +73,14 @@ class MultiViewCost:
         self.x_factor = 1.0
         self.anchor, self.limits = first.anchor, first.limits
 
+    def cover(self, covered: Sequence[Silhouette | None]) -> None:
+        """Set the pixels (H, W) of other people in the frames of all cameras, which do not count.
+
+        They apply from the next call of :meth:`see` on.
+        """
+        for cost, pixels in zip(self.costs, covered, strict=True):
+            cost.covered = pixels
+
     def see(self, silhouettes: Sequence[Silhouette], state: FloatArray) -> None:
         """Set the silhouettes (H, W) of all cameras; the person is near the place of ``state``."""
         for cost, to_view, silhouette in zip(self.costs, self.to_views, silhouettes, strict=True):

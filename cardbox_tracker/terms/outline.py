@@ -53,6 +53,8 @@ _APART_PX = 3.0
 _MARGIN_PX = 12
 # Border of the window, or of the image, where no point of the outline counts.
 _BORDER_PX = 3
+# Window around a pixel of another person in which no outline counts.
+_NEAR_PX = 7
 
 SeenTuple = tuple[Floats, NDArray[np.float32], Floats]
 """fx, fy, cx, cy of the image of the distances, (4,); signed distances, (H, W), px, negative
@@ -68,7 +70,13 @@ class Outline(TermObservation):
         is_empty: whether there is no foreground above the hips.
     """
 
-    def __init__(self, silhouette: Silhouette, camera: Camera, hips: tuple[float, float]) -> None:
+    def __init__(
+        self,
+        silhouette: Silhouette,
+        camera: Camera,
+        hips: tuple[float, float],
+        covered: Silhouette | None = None,
+    ) -> None:
         """Compute the distances.
 
         Args:
@@ -76,7 +84,10 @@ class Outline(TermObservation):
             camera: the working camera.
             hips: the middle of the person's hips, y and z in the optical frame, metres; legs, which
                 the model lacks, do not count.
+            covered: pixels (H, W) of other people, not 0, at which no outline is known.
         """
+        if covered is not None:
+            silhouette = silhouette | covered
         small = comparing(camera)
         if silhouette.shape != (small.height, small.width):
             size = small.width, small.height
@@ -86,6 +97,8 @@ class Outline(TermObservation):
         down_m, ahead_m = hips
         row = small.fy * down_m / max(ahead_m, 1e-3) + small.cy
         left, top, field, within = signed_distances(silhouette, row - ABOVE_HIPS_PX)
+        if covered is not None and field.size:
+            _forget(field, left, top, covered, small)
         lens = np.array([small.fx, small.fy, small.cx - left, small.cy - top])
         self._seen: SeenTuple = lens, field, within
         self.is_empty = not field.size
@@ -102,6 +115,17 @@ class Outline(TermObservation):
             posed.states, posed.body, self._seen, (found.values, found.jacobian, found.costs)
         )
         return found
+
+
+def _forget(
+    field: NDArray[np.float32], left: int, top: int, covered: Silhouette, small: Camera
+) -> None:
+    """Set the distances at and near ``covered`` pixels to 0, so that no outline pulls there."""
+    pixels = cv2.resize(covered, (small.width, small.height), interpolation=cv2.INTER_NEAREST)
+    near = np.asarray(cv2.dilate(pixels, np.ones((_NEAR_PX, _NEAR_PX), np.uint8)))
+    first = max(left, 0)
+    window = near[top : top + len(field), first : left + field.shape[1]] > 0
+    field[: window.shape[0], first - left : first - left + window.shape[1]][window] = 0.0
 
 
 def signed_distances(

@@ -11,6 +11,7 @@ from math import ceil
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from cardbox_tracker.camera.camera import Camera
 from cardbox_tracker.common.array_checks import check_array
@@ -27,6 +28,8 @@ from cardbox_tracker.terms import body_priors as priors
 from cardbox_tracker.terms import whole_body_kernels as kernels
 from cardbox_tracker.terms.arm_points import add_costs_of_arms, joints_of_arms
 from cardbox_tracker.terms.bit_planes import (
+    COUNTED,
+    FOREGROUND,
     Planes,
     fill_planes,
     leave_out,
@@ -98,6 +101,8 @@ class WholeBodyCost:
         silhouette_px: foreground pixels that count in the present silhouette.
         anchor: x and z of the last frame, the home of x, metres, and the expected yaw, rad; (4,).
         terms: observations of further terms in the present frame.
+        covered: pixels (H, W) of other people, not 0, which do not count from the next silhouette
+            on; None without any.
     """
 
     def __init__(self, body: BodyModel, camera: Camera, config: WholeBodyCostConfig) -> None:
@@ -117,6 +122,7 @@ class WholeBodyCost:
             new_planes(camera.width, camera.height) for _ in range(3)
         )
         self.terms: tuple[TermObservation, ...] = ()
+        self.covered: Silhouette | None = None
         self._outline: Outline | None = None
         self.anchor = np.zeros(4)
         self._prior: priors.PriorTuple = self.anchor, self._rules, self._gaussians
@@ -128,6 +134,8 @@ class WholeBodyCost:
         """Set the silhouette (H, W) of a person whose hips are near those of ``state`` (14,)."""
         config, camera = self._config, self._camera
         check_array("silhouette", silhouette, (camera.height, camera.width))
+        if self.covered is not None:
+            check_array("covered", self.covered, (camera.height, camera.width))
         self._silhouette, self._outline = silhouette, None
         aside_m, down_m, ahead_m = self.hips(state)
         depth_m = max(ahead_m, 1e-3)
@@ -138,9 +146,15 @@ class WholeBodyCost:
             for end in (row, row + config.below_hips_m * camera.fy / depth_m)
         )
         upper = np.ascontiguousarray(silhouette[:rows])
+        if self.covered is not None:
+            unknown = np.ascontiguousarray(self.covered[:rows])
+            fill_planes(unknown, _NO_WORDS, self._beside)
+            upper = np.where(unknown > 0, np.uint8(0), upper)
         words = upper.view(np.uint64) if camera.width % 8 == 0 else _NO_WORDS
         self.counted = rows, camera.width
         self.silhouette_px = int(fill_planes(upper, words, self._seen))
+        if self.covered is not None:
+            self._seen[COUNTED] &= ~self._beside[FOREGROUND]
         if hip_row < rows:
             half = config.legs * self._waist_m * camera.fx / depth_m
             ends = (min(max(int(end), 0), camera.width) for end in (column - half, column + half))
@@ -169,7 +183,8 @@ class WholeBodyCost:
     def outline(self, state: FloatArray) -> Outline:
         """Return the present silhouette's outline above the hips of a state (14,)."""
         if self._outline is None:
-            self._outline = Outline(self._silhouette, self._camera, self.hips(state)[1:])
+            hips = self.hips(state)[1:]
+            self._outline = Outline(self._silhouette, self._camera, hips, self.covered)
         return self._outline
 
     def see_nothing(self) -> None:
@@ -281,6 +296,16 @@ class WholeBodyCost:
     def keypoints(self, state: FloatArray) -> FloatArray:
         """Return the keypoints (6, 3) of a state (14,), metres in the optical frame."""
         return pose(self.person, state, self.pitch_rad).keypoints_m
+
+    def are_covered(self, state: FloatArray) -> NDArray[np.bool_]:
+        """Return which keypoints (6,) of a state (14,) are where other people are in the image."""
+        if self.covered is None:
+            return np.zeros(6, np.bool_)
+        width, height = self.size
+        pixels = Posed(self.body, state[None]).keypoints_px[0]
+        columns, rows = np.rint(np.clip(pixels, 0, (width - 1, height - 1))).astype(int).T
+        found: NDArray[np.bool_] = self.covered[rows, columns] > 0
+        return found
 
     def corners(self, state: FloatArray) -> FloatArray:
         """Return the drawn patches (13, 4, 3) of a state (14,), metres in the optical frame."""

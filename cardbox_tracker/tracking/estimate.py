@@ -76,6 +76,7 @@ class Estimate:
         clavicles_stddev_m: standard deviations of ``clavicles_m``, (2,), metres.
         place: how surely distance, scale and height are known, and by what; None if the filter
             keeps them constant. All states above are about the shape alone.
+        person: number of the person, 1, 2, ...; None if only one is tracked.
     """
 
     state: str
@@ -94,6 +95,7 @@ class Estimate:
     clavicles_m: FloatArray | None = None
     clavicles_stddev_m: FloatArray | None = None
     place: Place | None = None
+    person: int | None = None
 
     def placed(self, body: BodyModel) -> BodyModel:
         """Return ``body`` at the place of this estimate."""

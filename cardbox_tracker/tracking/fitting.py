@@ -56,20 +56,25 @@ class Fitting:
         self._ious: list[float] = []
         self._fitted: BodyModel | None = None
         self._last: tuple[BodyModel, float] | None = None
+        # IoU of the body that was fitted so poorly that it is only used until a better one is.
+        self._poor_iou = 0.0
 
-    def before(self, silhouette: Silhouette, image: Image | None) -> BodyModel | None:
+    def before(
+        self, silhouette: Silhouette, image: Image | None, is_detected: bool = False
+    ) -> BodyModel | None:
         """Return the body from this frame on, or None if it does not change.
 
         Args:
             silhouette: (H, W), 0 or 255.
             image: image of the same frame; None without one.
+            is_detected: whether a detector finds the person.
         """
         self._wait = max(0, self._wait - 1)
         if (body := self._last_that_fitted()) is not None:
             return body
         if not self._is_due or self._wait > 0:
             return None
-        seen = upper_body(silhouette)
+        seen = upper_body(silhouette, is_detected)
         if seen is None:
             return None
         self._wait, self._pause = self._pause, min(2 * self._pause, _LONGEST_PAUSE)
@@ -77,6 +82,11 @@ class Fitting:
             fit = fit_first_sight(self._guess, self._camera, seen, image, self._config, self._rng)
         except InitializationError:
             return None
+        if fit.body.unknown:
+            if self._fitted is not None or fit.iou <= self._poor_iou:
+                return None
+            self._poor_iou = fit.iou
+            return fit.body
         # The previous body of the same person; None for a new person.
         self._last = (self._fitted, self._usual) if self._fitted and self._ious else None
         self._fitted = fit.body

@@ -59,6 +59,7 @@ def pixels_from(given: Any, name: str, size: tuple[int, int]) -> FloatArray:
 
 CHANNELS: dict[str, Channel] = {
     "silhouette": Channel(silhouette_from, lambda view, mask: view.upright(mask, is_mask=True)),
+    "covered": Channel(silhouette_from, lambda view, mask: view.upright(mask, is_mask=True)),
     "image": Channel(image_from, View.upright),
     "depth_m": Channel(depth_from, View.upright),
     "points": Channel(
@@ -102,7 +103,8 @@ class Observation:
                 are not above 0 or not finite.
             stamp_ns: time of the data, ns; None if it is unknown.
             points: the person's joints in the image, from a detector; None without one.
-            more: further channels.
+            more: further channels, such as ``covered``: the pixels (H, W), 0 or 255, of other
+                people, which may hide this one.
 
         Raises:
             ValueError: there is no channel of a name.

@@ -139,6 +139,8 @@ class PlaceWatch:
             rests_on = self._scale
         self._compare(estimate, body, rests_on, frame)
         relative = hypot(SCALE_STDDEVS[rests_on], self._camera.focal_stddev)
+        if rests_on == STATURE:
+            relative = hypot(relative, body.stature_stddev)
         off_m = hypot(relative * distance_m, self._apart_m)
         aside_m = relative * abs(float(estimate.posture[TORSO_Y]))
         height_m = hypot(

@@ -15,7 +15,7 @@ from cardbox_tracker.camera.view import OtherCamera, View
 from cardbox_tracker.common.settings import restarts
 from cardbox_tracker.person.kinematics import clavicles
 from cardbox_tracker.person.model import BodyModel
-from cardbox_tracker.person.posture import N_STATE, TORSO_Y
+from cardbox_tracker.person.posture import N_STATE, PITCH, TORSO_Y
 from cardbox_tracker.person.sizes import FloatArray
 from cardbox_tracker.search.config import TrackerConfig
 from cardbox_tracker.search.cycles import Cycles
@@ -29,6 +29,7 @@ from cardbox_tracker.search.pose_filter import (
 )
 from cardbox_tracker.search.whole_body import WholeBodyFilter
 from cardbox_tracker.terms.compiled import CompiledSilhouette
+from cardbox_tracker.terms.inner_cue import InnerCueTerm
 from cardbox_tracker.terms.silhouette import SilhouetteTerm
 from cardbox_tracker.terms.term import USUAL_INTERVAL_S, Frame, Image, Posed, Silhouette
 from cardbox_tracker.tracking.camera_agreement import CameraAgreement
@@ -41,6 +42,7 @@ from cardbox_tracker.tracking.estimate import (
 )
 from cardbox_tracker.tracking.facing import Facing
 from cardbox_tracker.tracking.fitting import Fitting
+from cardbox_tracker.tracking.frozen import FrozenCameras
 from cardbox_tracker.tracking.head import HeadTracker
 from cardbox_tracker.tracking.observation import Observation, Observations, stamp_of
 from cardbox_tracker.tracking.place import PlaceWatch
@@ -51,6 +53,11 @@ FILTERS: MappingProxyType[str, MakeFilter] = MappingProxyType(
     {"hierarchical": Cycles, "whole_body": WholeBodyFilter}
 )
 """Filter classes by the values of ``TrackerConfig.filter``."""
+UNKNOWN_TILT_RAD = np.radians(6.0)
+"""Standard deviation of a pitch that is too unsure for ``tracking``, rad."""
+
+# A model that overlaps the silhouette less than this is somewhere else.
+_TOUCHING_IOU = 0.05
 
 
 class Tracker:
@@ -58,6 +65,8 @@ class Tracker:
 
     Attributes:
         agreement: check of the extrinsics of several cameras; None with one camera.
+        images: number of times that were tracked.
+        used: in how many of them each optional input told of the posture, by its name.
     """
 
     def __init__(
@@ -75,7 +84,8 @@ class Tracker:
 
         Args:
             body: the person. Unknown values are fitted while tracking, which replaces the attribute
-                ``body``. Until then, estimates are at best ``uncertain``.
+                ``body``. Until then, or if the camera's pitch is not known to 6 degrees, estimates
+                are at best ``uncertain``.
             camera: working camera, of the silhouettes' size.
             config: settings; the paper's by default.
             rng: source of all noise; seeded with 0 by default.
@@ -101,6 +111,8 @@ class Tracker:
         self._fitting = None
         self._place = PlaceWatch(body, self.camera, not others)
         self.agreement: CameraAgreement | None = None
+        self._frozen = FrozenCameras(1 + len(self._others))
+        self.images, self.used = 0, dict[str, int]()
         if body.unknown:
             fits = self._rng.spawn(1)[0]
             self._fitting = Fitting(body, self.camera, self.config, fits)
@@ -170,8 +182,13 @@ class Tracker:
     @property
     def remarks(self) -> list[str]:
         """Warnings about images that contradict each other, for diagnostics and logs."""
-        found = *(camera.depth.remark for camera in self._cameras), self._place.contradiction
+        depths = (camera.depth.remark for camera in self._cameras)
+        found = *self._frozen.remarks(), *depths, self._place.contradiction
         return [text for text in found if text]
+
+    def used_texts(self) -> dict[str, str]:
+        """Return for the diagnostics in how many images each optional input was used."""
+        return {f"{name} used": f"{count} of {self.images}" for name, count in self.used.items()}
 
     def camera_ious(self) -> list[float | None]:
         """Return the IoU of the last estimate with each camera's silhouette, the first one first.
@@ -226,8 +243,14 @@ class Tracker:
                     f"an observation is of the type {type(one).__name__}; expected an Observation, "
                     "such as Observation(silhouette), or None"
                 )
+        if self._others:
+            observations = self._frozen.without(observations)
         frames = self._frames_of(observations)
         estimate = self._placed(frames[0], self._track(frames))
+        is_tilt_unknown = self.body.camera_pose.pitch_stddev_rad > UNKNOWN_TILT_RAD
+        if estimate.state == TRACKING and (self.body.unknown or is_tilt_unknown):
+            estimate = replace(estimate, state=UNCERTAIN)
+        self._count(observations, frames, estimate)
         return self._head.see(frames[0], estimate)
 
     def _placed(self, frame: Frame, estimate: Estimate) -> Estimate:
@@ -235,10 +258,39 @@ class Tracker:
         place = self._place.see(estimate, self.body, frame)
         if place is None or estimate.posture_stddev is None or estimate.offset_stddev_m is None:
             return estimate
-        aside = estimate.posture_stddev.copy()
-        aside[TORSO_Y] = np.hypot(aside[TORSO_Y], place.stddev_m[1])
-        offset_stddev_m = np.hypot(estimate.offset_stddev_m, place.stddev_m[[0, 2]])
-        return replace(estimate, posture_stddev=aside, offset_stddev_m=offset_stddev_m, place=place)
+        stddev = estimate.posture_stddev.copy()
+        stddev[TORSO_Y] = np.hypot(stddev[TORSO_Y], place.stddev_m[1])
+        # The trunk leans in the level frame, which the camera's pitch defines.
+        stddev[PITCH] = np.hypot(stddev[PITCH], self.body.camera_pose.pitch_stddev_rad)
+        moved_m = np.hypot(estimate.offset_stddev_m, place.stddev_m[[0, 2]])
+        return replace(estimate, posture_stddev=stddev, offset_stddev_m=moved_m, place=place)
+
+    def _count(
+        self, observations: Observations, frames: Sequence[Frame], estimate: Estimate
+    ) -> None:
+        """Count which optional inputs were given, and told of a posture."""
+        self.images += 1
+        given = [one for one in observations if one is not None]
+        inputs = {
+            "points": (
+                any(one.points is not None for one in given),
+                any(one.points is not None and not one.points.is_empty for one in frames),
+            ),
+            "depth": (
+                any(one.depth_m is not None for one in given),
+                any(one.depth_m is not None for one in frames),
+            ),
+            "colours": (
+                any(isinstance(term, InnerCueTerm) for term in self._cameras[0].terms),
+                frames[0].image is not None and frames[0].before is not None,
+            ),
+        }
+        for number, frame in enumerate(frames[1:], 2):
+            inputs[f"camera {number}"] = True, frame.foreground_px > 0
+        for name, (is_given, is_used) in inputs.items():
+            if is_given or name in self.used:
+                found = is_used and estimate.posture is not None
+                self.used[name] = self.used.get(name, 0) + found
 
     def _frames_of(self, observations: Observations) -> list[Frame]:
         """Return the frames of all cameras; the frame of a camera without data is empty."""
@@ -256,7 +308,9 @@ class Tracker:
         if self._fitting is None:
             return self._follow(frames)
         silhouette, image = frames[0].silhouette, frames[0].image
-        fitted = self._fitting.before(silhouette, image)
+        points = frames[0].points
+        is_detected = points is not None and points.are_certain
+        fitted = self._fitting.before(silhouette, image, is_detected)
         if fitted is not None:
             self._use(fitted, CompiledSilhouette(fitted, self.camera))
             again = self._silhouette.frame(silhouette)
@@ -268,8 +322,6 @@ class Tracker:
         if estimate.posture is not None:
             there = estimate.placed(self.body)
             self._fitting.compare(silhouette, image, there, estimate.posture)
-        if self.body.unknown and estimate.state == TRACKING:
-            return replace(estimate, state=UNCERTAIN)
         return estimate
 
     def sample(self, estimate: Estimate, count: int, rng: np.random.Generator) -> FloatArray:
@@ -298,6 +350,13 @@ class Tracker:
         if not fit.is_finite:
             # Without a reset, values that are not finite would stay in the particles.
             self.reset()
+            return Estimate(LOST)
+        is_detected = any(frame.points is not None for frame in frames)
+        if self.config.has_several_views and is_detected and fit.iou < _TOUCHING_IOU:
+            # The person is there, but not where the model is.
+            if self.config.relocalize:
+                self._before = None
+                self._filter.forget()
             return Estimate(LOST)
         self._before, self._seen_iou = np.zeros(N_STATE), fit.seen_iou
         self._before[: len(fit.seen)] = fit.seen

@@ -143,7 +143,7 @@ def _recorded(path: str, background: TimeSpan, count: int) -> tuple[Images, Imag
     with open_images(path) as recording:
         source = SilhouetteSource(recording, background)
         prepared = [
-            (time_s, image) for _, time_s, image, _ in islice(source.images(), _MOST_IMAGES)
+            (time_s, image) for _, time_s, image, *_ in islice(source.images(), _MOST_IMAGES)
         ]
     empty = [image for time_s, image in prepared if background.contains(time_s)]
     after = [image for time_s, image in prepared if time_s > background.end_s]

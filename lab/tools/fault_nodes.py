@@ -78,7 +78,7 @@ class InsideNodes:
             stamp = stamp_ns(seen.header.stamp)
             self.found.append(Found(stamp, estimate.posture, estimate.offset_m))
 
-        node._outputs.publish = note  # type: ignore[method-assign, assignment]
+        node._outputs[0].publish = note  # type: ignore[method-assign, assignment]
         return node
 
     def send(self, sent: Sent) -> None:

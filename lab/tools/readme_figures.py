@@ -84,16 +84,21 @@ ROWS = (
 _ASIDE = (("cam3",), ("cam1",))
 
 
-def section(people: Mapping[str, Any], rendered: Mapping[str, Any]) -> str:
+def section(
+    people: Mapping[str, Any], rendered: Mapping[str, Any], films: Mapping[str, Any] | None = None
+) -> str:
     """Return the text between the marks.
 
     Args:
         people: ``real-people.json``.
         rendered: ``sessions.json``.
+        films: ``films.json``; None leaves out the row of films.
     """
     recordings = rendered["sessions"]
     peers = [float(one["mediapipe"]["aligned"]) for one in recordings]
     cells = [_cells(row, people["sessions"]) for row in ROWS]
+    if films is not None:
+        cells.insert(0, _film_cells(films["films"]))
     cells.append(
         (
             f"{len(recordings)} recordings of rendered people",
@@ -155,7 +160,12 @@ def _tracking(sessions: Sequence[Session]) -> str:
 def current(root: Path) -> str:
     """Return the text of the README in ``root`` with current figures."""
     folder = root / RESULTS
-    text = section(read_json(folder / "real-people.json"), read_json(folder / "sessions.json"))
+    films = folder / "films.json"
+    text = section(
+        read_json(folder / "real-people.json"),
+        read_json(folder / "sessions.json"),
+        read_json(films) if films.is_file() else None,
+    )
     text = replaced((root / "README.md").read_text(encoding="utf-8"), text, BEGIN, END)
     paper = (read_json(folder / name / "results.json") for name in ("", "person_a"))
     return replaced(text, paper_section(*paper), PAPER_BEGIN, PAPER_END)
@@ -201,6 +211,30 @@ def _cells(row: Row, sessions: Sequence[Session]) -> tuple[str, ...]:
         # MediaPipe has the images of one camera.
         _cm(peer if row.cameras == 1 else None),
         _cm(_mean(points, "absolute")),
+    )
+
+
+def _film_cells(films: Sequence[Session]) -> tuple[str, ...]:
+    """Return the row of films across with field of view and stature, a mean over the recordings."""
+    across = [one for one in films if one["shape"] == "across" and one["given"] != "nothing"]
+    groups: dict[str, list[Session]] = {}
+    for one in across:
+        groups.setdefault("gestures" if one["name"].startswith("P0_") else one["name"], []).append(
+            one
+        )
+    peers = [
+        _GESTURES_CM if name == "gestures" else of[0]["mediapipe_aligned"]
+        for name, of in groups.items()
+    ]
+    shape, place = (
+        float(np.mean([_mean(of, key) for of in groups.values()]))
+        for key in ("aligned", "absolute")
+    )
+    return (
+        "the three below as films, as people make them",
+        "film, field of view and stature",
+        "",
+        *map(_cm, (shape, float(np.mean(peers)), place)),
     )
 
 

@@ -19,12 +19,17 @@ from cardbox_tracker.commands.request import (
     with_own_options,
 )
 from cardbox_tracker.common.errors import CardboxError
+from cardbox_tracker.detectors import detector as detector_module
+from cardbox_tracker.detectors.model_files import ModelFiles
+from cardbox_tracker.detectors.person_choice import PersonChoice
 from cardbox_tracker.detectors.point_table import PointTable
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.model_file import save_body_model
+from cardbox_tracker.person.proportions import body_from_proportions
 from cardbox_tracker.recordings.given_camera import GivenCamera
 from cardbox_tracker.recordings.person_in_view import PersonInView
 from cardbox_tracker.recordings.silhouettes import TimeSpan
+from cardbox_tracker.tracking.people import MOST_PEOPLE
 
 
 @pytest.fixture
@@ -80,6 +85,67 @@ def test_a_stature_leaves_the_rest_to_be_found(film: Path) -> None:
     request = asked(film, "--stature", 1.8, "--fov", 60, "--camera-pitch-deg", 10)
     assert request.person.is_pitch_given
     assert request.person.body.camera_pose.pitch_rad == pytest.approx(np.radians(10.0))
+
+
+def test_a_body_that_was_not_measured_needs_no_start(film: Path) -> None:
+    """What 'cardbox track --stature' writes tracks the same recording again."""
+    mean = film.parent / "mean.yaml"
+    save_body_model(body_from_proportions(1.7, 2.0), mean)
+    assert asked(film, "--fov", 60, "--model", mean).person.start_s == 0.0
+    assert "--start T" in refused(film, "--fov", 60, "--model", film.parent / "me.yaml")
+
+
+def test_tracking_ends_where_it_is_asked_to(film: Path) -> None:
+    assert asked(film, "--fov", 60, "--stature", 1.7).person.end_s == np.inf
+    assert asked(film, "--fov", 60, "--stature", 1.7, "--end", 3).person.end_s == 3.0
+    words = ("--fov", 60, "--stature", 1.7, "--start", 5, "--end", 5)
+    assert "--end 5 is not after --start 5" in refused(film, *words)
+
+
+def test_a_person_is_chosen_for_the_detector(film: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(detector_module, "installed_models", lambda: ModelFiles(film, film))
+    given = ("--fov", 60, "--stature", 1.7, "--person", "120,80.5")
+    for words in (("mediapipe",), ("mediapipe", "--background", "0:1")):
+        recording = asked(film, *given, "--detector", *words).recording
+        found = recording.detector
+        assert found is not None and found.person == PersonChoice("place", (120.0, 80.5))
+        assert recording.points == found
+    assert "--person needs a detector" in refused(film, *given)
+    assert "--person needs a detector" in refused(
+        film, *given, "--detector", film.parent / "points.csv"
+    )
+
+
+def test_several_people_have_a_body_each(film: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(detector_module, "installed_models", lambda: ModelFiles(film, film))
+    given = ("--fov", 60, "--detector", "mediapipe")
+    request = asked(film, *given, "--stature", "1.8,1.6", "--people", "2", "--person", "2")
+    person = request.person
+    assert (person.people, person.number, len(person.others)) == (2, 2, 1)
+    assert person.body.size("torso_height") > person.others[0].size("torso_height")
+    assert request.recording.points is not None and request.recording.points.people == 2
+    everybody = asked(film, *given, "--stature", "1.8", "--people", "auto")
+    assert everybody.person.people == 0 and not everybody.person.others
+    assert everybody.recording.points is not None
+    assert everybody.recording.points.people == MOST_PEOPLE
+    alone = asked(film, *given, "--stature", "1.8")
+    assert alone.person.people is None and alone.recording.points == alone.recording.silhouettes
+
+
+@pytest.mark.parametrize(
+    ("words", "fault"),
+    [
+        (("--stature", "1.8,1.6"), "--stature has several values: give one, or --people"),
+        (("--stature", "1.8", "--person", "2"), "--person K is the number of one of several"),
+        (("--stature", "1.8", "--people", "2", "--person", "left"), "--person K is the number"),
+        (("--stature", "1.8", "--people", "2", "--person", "3"), "--person 3 is none of 2 people"),
+        (("--stature", "1.8", "--people", "2", "--preset", "paper"), "needs the preset default"),
+        (("--model", "me.yaml", "--people", "2"), "--people takes the stature of each person"),
+    ],
+)
+def test_mistakes_with_several_people(words: tuple[str, ...], fault: str, film: Path) -> None:
+    given = ("--fov", 60, "--detector", film.parent / "points.csv")
+    assert fault in refused(film, *given, *words)
 
 
 NEEDED = {
@@ -215,12 +281,12 @@ def test_files_change_the_command_line_and_inner_ones_the_outer(tmp_path: Path) 
     words = ("--stature", "1.7", "--effort", "2", "--silhouettes", "person_in_view")
     given = line("in", *words, "--set", "lost_frames=9", "--set", "average=3")
     wave, bow = (with_own_options(given, tmp_path, f"anna/{name}") for name in ("wave", "bow"))
-    assert (wave.stature, wave.start, wave.effort) == (1.64, 5.0, 2.0)
+    assert (wave.stature, wave.start, wave.effort) == ((1.64,), 5.0, 2.0)
     assert (wave.background, wave.silhouettes) == (TimeSpan(0.0, 2.0), None)
     assert wave.set == {"lost_frames": 9, "average": 2}
-    assert (bow.stature, bow.start, bow.background) == (1.64, 3.0, None)
+    assert (bow.stature, bow.start, bow.background) == ((1.64,), 3.0, None)
     assert bow.silhouettes == "person_in_view"
-    assert (given.stature, given.start) == (1.7, None)
+    assert (given.stature, given.start) == ((1.7,), None)
     assert given.set == bow.set == {"lost_frames": 9, "average": 3}
 
 

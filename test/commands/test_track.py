@@ -17,6 +17,7 @@ from cardbox_tracker.commands.request import RETIRED
 from cardbox_tracker.common.settings import settings_below
 from cardbox_tracker.detectors import detector as detector_module
 from cardbox_tracker.detectors.model_files import ModelFiles
+from cardbox_tracker.measuring.camera_tilt import Tilt
 from cardbox_tracker.measuring.standing_camera import StandingCamera
 from cardbox_tracker.person.model_file import load_body_model
 from cardbox_tracker.recordings import standing
@@ -283,19 +284,25 @@ def test_somebody_is_measured_in_a_film(
     ("found", "expected"),
     [
         (
-            StandingCamera(np.radians(12.0), np.radians(5.0), np.radians(4.0), 2.0, True),
+            Tilt(np.radians(12.0), np.radians(5.0), np.radians(4.0), has_edges=False),
             (
-                "pitch 12 degrees down (standard deviation 5)",
-                "upright at 20:21 s",
+                "pitch 12 degrees down (standard deviation 5), found from the person",
+                "upright between the seconds 20 and 21",
                 "roll 4.0 degrees",
             ),
         ),
-        (StandingCamera(0.0, 0.2, 0.0, 2.0, False), ("taken as 0",)),
-        (None, ("nobody stands upright at 16:46 s",)),
+        (Tilt(-0.1, 0.02, 0.0, has_edges=True), ("pitch 6 degrees up", "edges of the room")),
+        (
+            None,
+            (
+                "nobody stands upright between the seconds 16 and 46",
+                "taken as that of most cameras",
+            ),
+        ),
     ],
 )
 def test_the_cameras_pitch_is_found_from_who_stands_upright(
-    found: StandingCamera | None,
+    found: Tilt | None,
     expected: tuple[str, ...],
     film: Path,
     fov: str,
@@ -304,8 +311,13 @@ def test_the_cameras_pitch_is_found_from_who_stands_upright(
 ) -> None:
     """The detector, an optional library, is replaced by the silhouettes of the empty scene."""
     monkeypatch.setattr(detector_module, "installed_models", lambda: ModelFiles(film, film))
-    stood = None if found is None else standing.Standing(found, TimeSpan(20.0, 21.0))
-    monkeypatch.setattr(standing, "camera_of_standing", lambda *_: stood)
+    tilt = found or Tilt(np.radians(8.0), np.radians(11.0), 0.0, has_edges=False)
+    stands = found is not None and not found.has_edges
+    span = TimeSpan(20.0, 21.0) if stands else None
+    # A person of 1.72 m is 2 m away.
+    person = StandingCamera(tilt.pitch_rad, 0.1, 0.0, 0.1, 2.0 / 1.72, 0.05) if stands else None
+    placed = standing.Placed(tilt, span, person)
+    monkeypatch.setattr(standing, "placed_camera", lambda *_: placed)
 
     def opened(bag: Any, detector: Any, camera: Any, points: Any) -> SilhouetteSource:
         rolls.append(bag.calibration().roll_rad)
@@ -319,9 +331,16 @@ def test_the_cameras_pitch_is_found_from_who_stands_upright(
     for part in expected:
         assert part in done.err
     pitch_rad = load_body_model("me.body.yaml").camera_pose.pitch_rad
-    assert pitch_rad == pytest.approx(0.0 if found is None else found.pitch_rad)
-    assert rolls == [0.0 if found is None else found.roll_rad]
-    given = ("--camera-pitch-deg", 3, "--force")
-    assert "found" not in cardbox("track", film, *words, *given).err
+    assert pitch_rad == pytest.approx(tilt.pitch_rad)
+    assert rolls == [tilt.roll_rad]
+    # What is given is used; what contradicts it is said with both numbers.
+    close_deg = round(np.degrees(tilt.pitch_rad)) - 3
+    agreeing = cardbox("track", film, *words, "--camera-pitch-deg", close_deg, "--force").err
+    assert "camera-pitch-deg" not in agreeing
+    contradicted = cardbox(
+        "track", film, *words, "--camera-pitch-deg", close_deg + 40, "--force"
+    ).err
+    assert f"--camera-pitch-deg {close_deg + 40} is used, but" in contradicted
+    assert f"{abs(np.degrees(tilt.pitch_rad)):.0f} degrees" in contradicted
     pitch_rad = load_body_model("me.body.yaml").camera_pose.pitch_rad
-    assert pitch_rad == pytest.approx(np.radians(3.0))
+    assert pitch_rad == pytest.approx(np.radians(close_deg + 40))

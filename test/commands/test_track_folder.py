@@ -10,7 +10,7 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -24,6 +24,7 @@ from cardbox_tracker.commands.request import (
     with_own_options,
 )
 from cardbox_tracker.commands.track_folder import digest_of_inputs
+from cardbox_tracker.common import processes
 from cardbox_tracker.common.errors import CardboxError
 from cardbox_tracker.recordings.folder import SUMMARY
 from cardbox_tracker.recordings.track import TrackSummary
@@ -82,6 +83,75 @@ def test_two_processes_write_the_bytes_of_one_after_the_other(
     assert re.search(r"(?m)^cut +failed$", many.out)
     status = {name: row["status"] for name, row in rows(both).items()}
     assert status == {"a": "tracked", "anna/b": "tracked", "cut": "failed", "cut2": "failed"}
+
+
+@pytest.fixture(scope="module")
+def scheduler() -> Iterator[Any]:
+    """A Dask cluster of two local workers, which begin in another folder."""
+    distributed = pytest.importorskip("distributed", reason="dask is not installed")
+    with distributed.LocalCluster(
+        n_workers=2, threads_per_worker=1, dashboard_address=":0", host="127.0.0.1"
+    ) as cluster:
+        yield cluster
+
+
+def test_a_dask_cluster_writes_the_same_bytes(
+    files: Path,
+    recordings: Path,
+    tmp_path: Path,
+    scheduler: Any,
+    monkeypatch: pytest.MonkeyPatch,
+    cardbox: Callable,
+) -> None:
+    """Paths are relative to the folder of the command, not to that of the workers."""
+    monkeypatch.chdir(tmp_path)
+    folder = Path(os.path.relpath(recordings))
+    (alone, both), given = ("alone", "both"), words(files)
+    here = cardbox("track", folder, *given, "--output", alone, "--jobs=1")
+    address = ("--scheduler", scheduler.scheduler_address)
+    there = cardbox("track", folder, *given, "--output", both, *address)
+    assert here.code == there.code == 1, there.err
+    assert "2 of 4 recordings failed\n  cut, cut2: cannot read" in there.err
+    assert results(tmp_path / both) == results(tmp_path / alone)
+    monkeypatch.setattr(track_folder, "digest_of_program", lambda: "another")
+    there = cardbox("track", folder, *given, "--output", "other", *address)
+    assert "another version of the package" in there.err
+
+
+@pytest.mark.parametrize(
+    ("options", "expected"),
+    [
+        (("--jobs=2",), "--jobs has no effect with --scheduler"),
+        (("--output", "new"), "no Dask scheduler answers at tcp://127.0.0.1:9"),
+    ],
+)
+def test_a_cluster_that_is_none_is_told(
+    files: Path,
+    recordings: Path,
+    tmp_path: Path,
+    options: tuple[str, ...],
+    expected: str,
+    monkeypatch: pytest.MonkeyPatch,
+    cardbox: Callable,
+) -> None:
+    pytest.importorskip("distributed", reason="dask is not installed")
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(processes, "_CONNECT_S", 0.5)
+    given = (*words(files), "--scheduler", "tcp://127.0.0.1:9", *options)
+    done = cardbox("track", recordings, *given)
+    assert done.code == 1 and expected in done.err
+
+
+def test_workers_with_several_threads_are_refused() -> None:
+    distributed = pytest.importorskip("distributed", reason="dask is not installed")
+    with (
+        distributed.LocalCluster(
+            n_workers=1, threads_per_worker=2, processes=False, dashboard_address=":0"
+        ) as cluster,
+        pytest.raises(CardboxError, match=r"1 workers with 2 threads; expected .*--nthreads 1"),
+        processes.results_of(str, [1], 1, cluster.scheduler_address),
+    ):
+        pass
 
 
 class Tracked:

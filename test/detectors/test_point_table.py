@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 
 import cv2
@@ -10,12 +11,14 @@ import pytest
 
 from cardbox_tracker.camera.camera import Calibration
 from cardbox_tracker.common.errors import CardboxError
-from cardbox_tracker.detectors.image_points import POINT_INDEX
-from cardbox_tracker.detectors.point_table import PointTable
+from cardbox_tracker.detectors.image_points import COCO_NAMES, POINT_INDEX, ImagePoints
+from cardbox_tracker.detectors.keypoint_json import LAYOUTS
+from cardbox_tracker.detectors.point_table import GivenPoints, Image, PointTable
 
 K = np.array([(500.0, 0.0, 320.0), (0.0, 510.0, 240.0), (0.0, 0.0, 1.0)])
 PLAIN = Calibration(640, 480, K, np.zeros(5))
-NONE = np.zeros((1, 1), np.uint8)
+SIZE = (640, 480)
+NONE = np.zeros((480, 640), np.uint8)
 HEADER = "stamp_ns,joint,u,v,score"
 LENSES = {
     "plumb_bob": [-0.2, 0.05, 0.001, 0.002, 0.0],
@@ -30,24 +33,36 @@ def table(folder: Path, *rows: str, header: str = HEADER) -> PointTable:
     return PointTable(path)
 
 
+def read(
+    given: PointTable,
+    camera: str | None = None,
+    calibration: Calibration = PLAIN,
+    size: tuple[int, int] = SIZE,
+    tolerance_ns: int = 0,
+) -> GivenPoints:
+    return given.read(camera, SIZE).placed(calibration, size, tolerance_ns)
+
+
 def test_points_are_those_of_the_stamp_at_the_working_size(tmp_path: Path) -> None:
     given = table(
         tmp_path,
         "5,nose,320,240,0.9",
         "5,left_knee,1,2,0.9",
-        "5,left_wrist,nan,3,0.9",
+        "5,left_wrist,nan,3,0",
         "5,right_wrist,3,3,0",
-        "7,nose,0,0,4",
+        "5,left_ear,,,",
+        "7,nose,0,0,1",
     )
-    find = given.read(None, PLAIN, (320, 240))
-    first, second = find(5, NONE), find(7, NONE)
+    found = read(given, size=(320, 240))
+    first, second = found.at(Image(5), NONE), found.at(Image(7), NONE)
     assert first is not None and second is not None
-    assert find(6, NONE) is None
+    assert found.at(Image(6), NONE) is None
     # The centre of the first pixel is half a pixel inside the image.
     assert first.px[POINT_INDEX["nose"]] == pytest.approx((159.75, 119.75))
     assert first.scores.tolist() == [0.9, *[0.0] * 16]
     assert second.px[POINT_INDEX["nose"]] == pytest.approx((-0.25, -0.25))
     assert second.scores[POINT_INDEX["nose"]] == 1.0
+    assert (found.images, found.used) == (3, 2)
 
 
 @pytest.mark.parametrize("roll_rad", [0.0, 0.1])
@@ -66,7 +81,7 @@ def test_points_go_where_the_lens_is_undone(tmp_path: Path, model: str, roll_rad
         f"5,{name},{u},{v},0.5"
         for name, (u, v) in zip(POINT_INDEX, bent.reshape(-1, 2).tolist(), strict=True)
     ]
-    points = table(tmp_path, *rows).read(None, calibration, (320, 240))(5, NONE)
+    points = read(table(tmp_path, *rows), None, calibration, (320, 240)).at(Image(5), NONE)
     assert points is not None
     c, s = np.cos(roll_rad), np.sin(roll_rad)
     level = rays @ np.array([(c, s), (-s, c)])
@@ -91,16 +106,15 @@ def test_each_camera_has_its_own_rows(tmp_path: Path) -> None:
     rows = "5,nose,10,20,0.9,left", "5,nose,30,40,0.9,right"
     given = table(tmp_path, *rows, header=f"{HEADER},camera")
     for camera, column in (("left", 10.0), ("right", 30.0)):
-        points = given.read(camera, PLAIN, (640, 480))(5, NONE)
+        points = read(given, camera).at(Image(5), NONE)
         assert points is not None
         assert points.px[POINT_INDEX["nose"], 0] == pytest.approx(column)
-    assert given.read("top", PLAIN, (640, 480))(5, NONE) is None
+    assert read(given, "top").at(Image(5), NONE) is None
 
 
 def test_a_table_of_a_spreadsheet_may_begin_with_a_byte_order_mark(tmp_path: Path) -> None:
-    points = table(tmp_path, "5,nose,10,20,0.9", header=f"\ufeff{HEADER}").read(
-        None, PLAIN, (640, 480)
-    )(5, NONE)
+    given = table(tmp_path, "5,nose,10,20,0.9", header=f"\ufeff{HEADER}")
+    points = read(given).at(Image(5), NONE)
     assert points is not None
     assert points.px[POINT_INDEX["nose"], 0] == pytest.approx(10.0)
 
@@ -115,19 +129,250 @@ def test_a_table_of_a_spreadsheet_may_begin_with_a_byte_order_mark(tmp_path: Pat
         (HEADER, "5,nose,one,2,0.9", None, "line 2, has a value that is no number .*one"),
         (HEADER, "5.5,nose,1,2,0.9", None, r"no number .*5\.5.*whole numbers in stamp_ns"),
         (HEADER, "5,nose,1", None, "no number"),
+        (HEADER, "5,nose,nan,3,0.9", None, r"line 2: nose is at .*nan.* score 0 if the point is"),
+        (HEADER, "5,nose,1,3,nan", None, "line 2: nose has the score nan"),
+        (HEADER, "5,nose,1,3,87", None, "line 2: nose has the score 87; expected a chance"),
+        (HEADER, "5,left_knee,1,3000,0.9", None, "line 2: left_knee is at .*image of 640x480 px"),
+        (HEADER, "5,nose,1,2,1\n5,nose,2,2,1", None, "line 3: stamp_ns 5 has nose again"),
+        (
+            HEADER,
+            "5,nose,0.5,0.2,1\n5,left_eye,0.52,0.18,1\n5,left_hip,0.5,1.1,1",
+            None,
+            "line 2: all points .* shares of the image.* multiply columns by the width",
+        ),
     ],
 )
 def test_a_table_that_is_none_is_refused(
     tmp_path: Path, header: str, row: str, camera: str | None, words: str
 ) -> None:
     with pytest.raises(CardboxError, match=words):
-        table(tmp_path, row, header=header).read(camera, PLAIN, (640, 480))
+        table(tmp_path, row, header=header).read(camera, SIZE)
 
 
 def test_a_file_that_cannot_be_read_is_named(tmp_path: Path) -> None:
     with pytest.raises(CardboxError, match=r"cannot read .*missing\.csv"):
-        PointTable(tmp_path / "missing.csv").read(None, PLAIN, (640, 480))
+        PointTable(tmp_path / "missing.csv").read(None)
     binary = tmp_path / "binary.csv"
     binary.write_bytes(b"\xff\xfe\x00stamp_ns")
     with pytest.raises(CardboxError, match=r"binary\.csv is not a table in UTF-8"):
-        PointTable(binary).read(None, PLAIN, (640, 480))
+        PointTable(binary).read(None)
+
+
+def person(column: float, row: float = 240.0) -> list[float]:
+    """Return the points of COCO in a figure around a place, 200 px high, as JSON has them."""
+    around = np.random.default_rng(0).uniform((-40, -100), (40, 100), (17, 2))
+    places = around + np.array([column, row])
+    return np.column_stack([places, np.full(17, 0.9)]).ravel().tolist()
+
+
+def silhouette(column: int) -> np.ndarray:
+    image = np.zeros((480, 640), np.uint8)
+    image[130:350, column - 50 : column + 50] = 255
+    return image
+
+
+@pytest.mark.parametrize(("off_ns", "is_found"), [(1, True), (-49, True), (50, True), (51, False)])
+def test_points_join_the_nearest_image_within_the_tolerance(
+    tmp_path: Path, off_ns: int, is_found: bool
+) -> None:
+    given = table(tmp_path, f"{1000 + off_ns},nose,10,20,0.9", "1100,nose,99,20,0.9")
+    found = read(given, tolerance_ns=50)
+    points = found.at(Image(1000), NONE)
+    assert (points is not None) == is_found
+    if points is not None:
+        assert points.px[0, 0] == pytest.approx(10.0)
+
+
+def test_points_with_another_clock_are_said_with_a_stamp_of_each(tmp_path: Path) -> None:
+    found = read(table(tmp_path, "5,nose,1,2,1", "9,nose,1,2,1"), tolerance_ns=16_000_000)
+    for stamp_ns in (10**18, 2 * 10**18):
+        assert found.at(Image(stamp_ns), NONE) is None
+    assert "0 of 2 points of" in found.fault and "stamp_ns is 5 to 9" in found.fault
+    assert f"that of the images {10**18} to {2 * 10**18}" in found.fault
+    assert read(table(tmp_path, "5,nose,1,2,1")).fault == ""
+    # It is said before an hour of tracking, if the clocks are apart.
+    with pytest.raises(CardboxError, match=r"0 of 2 points .* fit an image: their stamp_ns is 5"):
+        found.check_span(10**18, 2 * 10**18)
+    found.check_span(0, 7)
+    found.check_span(10**9, 10**10)
+
+
+def test_a_column_with_the_number_of_the_image_takes_the_place_of_stamps(tmp_path: Path) -> None:
+    found = read(table(tmp_path, "0,nose,1,2,1", "2,nose,3,2,1", header="frame,joint,u,v,score"))
+    seen = [found.at(Image(10**9 * number, number), NONE) for number in range(3)]
+    assert [None if one is None else float(one.px[0, 0]) for one in seen] == [1.0, None, 3.0]
+    assert found.at(Image(0, 7), NONE) is None and found.fault == ""
+    found.restart()
+    found.at(Image(0, 7), NONE)
+    assert "frame is 0 to 2, that of the images 7 to 7" in found.fault
+
+
+def test_of_several_people_the_one_in_the_silhouette_is_taken(tmp_path: Path) -> None:
+    rows = [f"5,nose,{column},240,0.9,{who}" for column, who in ((100, "a"), (400, "b"))]
+    found = read(table(tmp_path, *rows, header=f"{HEADER},person"))
+    points = found.at(Image(5), silhouette(400))
+    assert points is not None and points.px[0, 0] == pytest.approx(400.0)
+
+
+@pytest.mark.parametrize(
+    ("column", "row", "reason"),
+    [
+        (139.0, 240.0, "on the person only when they are mirrored"),
+        (250.0, 240.0, "beside the person's silhouette; expected pixels of this camera's own"),
+        (500.0, 240.0, "when columns and rows are exchanged; expected u, v"),
+    ],
+)
+def test_points_beside_the_person_are_not_used_and_the_reason_is_said(
+    tmp_path: Path, column: float, row: float, reason: str
+) -> None:
+    numbers = person(column, row)
+    if "exchanged" in reason:
+        numbers[0::3], numbers[1::3] = numbers[1::3], numbers[0::3]
+    (tmp_path / "results.json").write_text(
+        json.dumps([{"image_id": i, "keypoints": numbers} for i in range(3)])
+    )
+    found = read(PointTable(tmp_path / "results.json"))
+    assert all(found.at(Image(0, number), silhouette(500)) is None for number in range(3))
+    assert "used in 0 of 3 images" in found.fault and reason in found.fault
+    assert "the points of 3 of 3 images are not used" in found.remark and reason in found.remark
+    assert found.at(Image(0, 0), NONE) is not None  # an empty silhouette contradicts nothing
+
+
+def test_wrong_points_are_not_used_where_they_lie_on_the_person_by_chance(tmp_path: Path) -> None:
+    rows = [f"{i},nose,{500 if i in (12, 15) else 250},240,0.9" for i in range(40)]
+    found = read(table(tmp_path, *rows))
+    assert all(found.at(Image(i), silhouette(500)) is None for i in range(40))
+    # Those of the tracked person are used though somebody else's are in between.
+    rows = [f"{i},nose,{250 if 5 < i < 15 else 500},240,0.9" for i in range(40)]
+    found = read(table(tmp_path, *rows))
+    for i in range(40):
+        found.at(Image(i), silhouette(500))
+    assert (found.used, found.beside) == (31, 9)
+
+
+def openpose(folder: Path, number: int, *people: list[float], **more: list[float]) -> None:
+    folder.mkdir(exist_ok=True)
+    content = {"people": [{"pose_keypoints_2d": one, **more} for one in people]}
+    (folder / f"film2_{number:012d}_keypoints.json").write_text(json.dumps(content))
+
+
+@pytest.mark.parametrize("count", LAYOUTS)
+def test_openpose_files_name_points_by_their_number(tmp_path: Path, count: int) -> None:
+    flat = [value for i in range(count) for value in (i + 1.0, 2.0 * i, 0.8)]
+    if count == 25:
+        # Eyes and ears are near the nose.
+        flat[0:2] = 17.0, 32.0
+    openpose(tmp_path / "points", 12, flat)
+    openpose(tmp_path / "points", 13)
+    points = read(PointTable(tmp_path / "points")).at(Image(0, 12), NONE)
+    assert points is not None
+    for name, index in POINT_INDEX.items():
+        number = {133: {"left_index": 96, "right_little_finger": 129}}.get(count, {}).get(name)
+        if name in COCO_NAMES[:13]:
+            number = LAYOUTS[count].index(name)
+        if number:
+            assert points.px[index] == pytest.approx((number + 1.0, 2.0 * number)), name
+    # OpenPose numbers the right arm first.
+    expected = {17: 9, 18: 7, 25: 7, 26: 9, 133: 9}[count]
+    assert points.px[POINT_INDEX["left_wrist"], 0] == pytest.approx(expected + 1.0)
+    is_hip = points.px[POINT_INDEX["right_hip"], 0] - 1.0
+    assert is_hip == {17: 12, 18: 8, 25: 9, 26: 12, 133: 12}[count]
+
+
+def test_25_points_with_the_face_first_are_body_25b(tmp_path: Path) -> None:
+    """OpenPose has two orders of 25 points, which its files do not tell apart."""
+    names = (*COCO_NAMES, *("neck", "head"), *["foot"] * 6)
+    face = {"nose": (300, 100), "left_eye": (305, 95), "right_eye": (295, 95)}
+    flat = [
+        value
+        for i, name in enumerate(names)
+        for value in (*face.get(name, (300 + 3 * i, 200 + 8 * i)), 0.0 if "ear" in name else 0.9)
+    ]
+    openpose(tmp_path / "points", 0, flat)
+    points = read(PointTable(tmp_path / "points")).at(Image(0, 0), NONE)
+    assert points is not None
+    for name in ("left_shoulder", "right_wrist", "left_hip"):
+        i = COCO_NAMES.index(name)
+        assert points.px[POINT_INDEX[name]] == pytest.approx((300 + 3 * i, 200 + 8 * i))
+
+
+def test_openpose_hands_give_the_knuckles(tmp_path: Path) -> None:
+    hand = [value for i in range(21) for value in (300.0 + i, 200.0, 0.7)]
+    openpose(tmp_path / "points", 0, person(320), hand_left_keypoints_2d=hand)
+    points = read(PointTable(tmp_path / "points")).at(Image(0, 0), NONE)
+    assert points is not None
+    assert points.px[POINT_INDEX["left_index"], 0] == pytest.approx(305.0)
+    assert points.px[POINT_INDEX["left_little_finger"], 0] == pytest.approx(317.0)
+    assert points.scores[POINT_INDEX["right_index"]] == 0.0
+
+
+def annotations(flags: int) -> dict[str, object]:
+    keypoints = [flags if i % 3 == 2 else value for i, value in enumerate(person(320))]
+    return {
+        "images": [{"id": 77, "file_name": "left/img_0004.png"}],
+        "annotations": [{"image_id": 77, "category_id": 1, "keypoints": keypoints}],
+    }
+
+
+def test_annotations_of_coco_join_by_the_name_of_the_file(tmp_path: Path) -> None:
+    file = tmp_path / "annotations.json"
+    for flags, score in ((2, 1.0), (1, 0.5)):
+        file.write_text(json.dumps(annotations(flags)))
+        found = read(PointTable(file))
+        points = found.at(Image(0, 9, "img_0004.png"), NONE)
+        assert points is not None and points.scores[0] == score
+        assert found.at(Image(0, 4, "img_0005.png"), NONE) is None
+        # Images of a video have no names.
+        assert found.at(Image(0, 4), NONE) is not None
+    found.restart()
+    found.at(Image(0, 9, "other.png"), NONE)
+    assert "'img_0004.png', that of the images 'other.png'" in found.fault
+
+
+def test_each_camera_has_its_folder_or_file(tmp_path: Path) -> None:
+    openpose(tmp_path / "cam0", 0, person(100))
+    (tmp_path / "cam1.json").write_text(json.dumps([{"image_id": 0, "keypoints": person(500)}]))
+    for camera, column in (("cam0", 100), ("cam1", 500)):
+        points = read(PointTable(tmp_path), camera).at(Image(0, 0), NONE)
+        assert isinstance(points, ImagePoints)
+        assert np.nanmean(points.px[:, 0]) == pytest.approx(column, abs=20)
+
+
+@pytest.mark.parametrize(
+    ("content", "words"),
+    [
+        ("{", "is no JSON"),
+        ("[" * 100_000, "is no JSON"),
+        ("{}", "has no 'annotations'"),
+        ('[{"image_id": 1}]', "entry 0 has no keypoints; expected a file of OpenPose or COCO"),
+        ("[5]", "entry 0 has no image_id"),
+        ('[{"image_id": 1, "keypoints": [1, 2]}]', "entry 0, has 2 numbers; .* 17, 18, 25, 26 or"),
+        ('[{"image_id": 1, "keypoints": 5}]', "entry 0, has no numbers"),
+        ('[{"image_id": 1, "keypoints": KEYPOINTS}]', "entry 0, has a value that is no number"),
+        ('[{"image_id": 1, "keypoints": FAR}]', "entry 0: nose is at .* px; expected a place"),
+        ('[{"image_id": 1, "keypoints": NAN}]', "entry 0: nose has the score nan"),
+        ('[{"image_id": 1, "keypoints": SHARES}]', "entry 0: all points .* shares of the image"),
+    ],
+)
+def test_json_that_has_no_points_is_refused(tmp_path: Path, content: str, words: str) -> None:
+    for name, value in (
+        ("KEYPOINTS", [[]] * 51),
+        ("FAR", [1e9, 1, 1] * 17),
+        ("NAN", [1, 1, float("nan")] * 17),
+        ("SHARES", [0.5, 0.4, 1] * 17),
+    ):
+        content = content.replace(name, json.dumps(value))
+    (tmp_path / "points.json").write_text(content)
+    with pytest.raises(CardboxError, match=words):
+        PointTable(tmp_path / "points.json").read(None, SIZE)
+
+
+def test_a_folder_without_files_of_openpose_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(CardboxError, match="has no JSON files; expected those of OpenPose"):
+        PointTable(tmp_path).read(None)
+    (tmp_path / "points.json").write_text("{}")
+    with pytest.raises(CardboxError, match="has no number; expected that of the image"):
+        PointTable(tmp_path).read(None)
+    (tmp_path / "points.json").rename(tmp_path / "points_1.json")
+    with pytest.raises(CardboxError, match="has no list 'people'"):
+        PointTable(tmp_path).read(None)

@@ -11,7 +11,9 @@ from hypothesis import strategies as st
 
 from cardbox_tracker.common.errors import CardboxError
 from cardbox_tracker.detectors import pose_network
+from cardbox_tracker.detectors.detector import PersonDetector
 from cardbox_tracker.detectors.model_files import installed_models
+from cardbox_tracker.detectors.person_choice import PersonChoice
 from cardbox_tracker.detectors.pose_network import Detection, PoseNetwork, Square
 
 
@@ -52,7 +54,8 @@ def test_overlapping_detections_are_averaged_by_their_scores() -> None:
     one, other, far = (np.full(12, value) for value in (0.5, 0.52, 0.9))
     for row in (one, other, far):
         row[2:4] = 0.2
-    merged = pose_network._merged(np.array([one, other, far]), np.array([0.9, 0.6, 0.8]))
+    merged, second = pose_network._merged(np.array([one, other, far]), np.array([0.9, 0.6, 0.8]))
+    assert second[0] == 0.9
     assert merged[0] == pytest.approx((0.9 * 0.5 + 0.6 * 0.52) / 1.5)
 
 
@@ -120,3 +123,53 @@ def test_images_of_odd_sizes_are_searched(network: PoseNetwork, shape: tuple[int
     network.forget()
     found = network(np.zeros(shape, np.uint8))
     assert found is None or isinstance(found, Detection)
+
+
+class SeveralPeople(PoseNetwork):
+    """A network before people at fixed places, of whom it loses the one it follows at times."""
+
+    def __init__(self, *columns: float) -> None:
+        self.people = [Square(column, 50.0, 60.0, 0.0) for column in columns]
+        self.loses, self.choose, self.searched = False, None, 0
+        self.forget()
+
+    def _people(self, image: np.ndarray) -> list[Square]:
+        self.searched += 1
+        self.several += len(self.people) > 1
+        return self.people
+
+    def _located(self, image: np.ndarray, square: Square) -> Detection | None:
+        if self.loses:
+            return None
+        self._square = self._last = square
+        return Detection(np.full((33, 2), square.u), np.ones(33), image[..., 0])
+
+
+def columns_of(network: PoseNetwork, images: int) -> list[float]:
+    image = np.zeros((100, 200, 3), np.uint8)
+    found = [network(image) for _ in range(images)]
+    return [-1.0 if one is None else float(one.points_px[0, 0]) for one in found]
+
+
+def test_the_chosen_person_is_followed_also_after_a_loss() -> None:
+    network = SeveralPeople(120.0, 40.0)
+    assert columns_of(network, 2) == [120.0, 120.0]
+    network.forget()
+    network.choose = PersonChoice("left")
+    assert columns_of(network, 2) == [40.0, 40.0]
+    network.loses = True
+    assert columns_of(network, 1) == [-1.0]
+    # They pass each other meanwhile, and a third one comes from the left.
+    network.loses, network.people = False, [Square(x, 50.0, 60.0, 0.0) for x in (10.0, 55.0, 150.0)]
+    assert columns_of(network, 1) == [55.0]
+
+
+def test_several_people_are_noticed_while_one_is_followed() -> None:
+    network = SeveralPeople(120.0)
+    detector = PersonDetector(network)
+    columns_of(network, 25)
+    assert detector.remark == "" and network.searched == 1
+    network.people.append(Square(30.0, 50.0, 60.0, 0.0))
+    columns_of(network, 10)
+    assert "sees several people and follows the most certain one; --person" in detector.remark
+    assert network.searched == 2

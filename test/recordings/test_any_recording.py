@@ -217,10 +217,8 @@ def test_recordings_that_are_none_are_refused(tmp_path: Path) -> None:
         pass
 
 
-def test_one_camera_needs_its_field_of_view(tmp_path: Path) -> None:
+def test_one_camera_needs_a_possible_field_of_view(tmp_path: Path) -> None:
     path = film(tmp_path / "film.mp4", pictures(20, 192, 108), 30.0)
-    with pytest.raises(CameraError, match="--fov DEG"), open_recording(path, EMPTY):
-        pass
     for fov_deg in (0.0, 180.0, float("nan")):
         with (
             pytest.raises(CameraError, match="field of view is"),

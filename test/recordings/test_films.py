@@ -13,9 +13,9 @@ import yaml
 from cardbox_tracker.camera.film_headers import check_times, oblong, shown_s, with_square_pixels
 from cardbox_tracker.common.errors import CameraError
 from cardbox_tracker.detectors.image_points import POINT_NAMES, ImagePoints
+from cardbox_tracker.detectors.point_table import why_not
 from cardbox_tracker.recordings.given_camera import GivenCamera
 from cardbox_tracker.recordings.open_images import open_images
-from cardbox_tracker.recordings.silhouettes import is_only_mirrored
 
 FOV = GivenCamera(fov_deg=60.0)
 
@@ -140,8 +140,9 @@ def test_points_of_a_mirrored_film_are_noticed() -> None:
     inside = ImagePoints(np.column_stack([40 * ones, rows]), ones)
     mirrored = ImagePoints(np.column_stack([119 * ones, rows]), ones)
     outside = ImagePoints(np.column_stack([80 * ones, rows]), ones)
-    assert is_only_mirrored(mirrored, silhouette)
-    assert not any(is_only_mirrored(points, silhouette) for points in (inside, outside, None))
+    assert "only when they are mirrored; give --mirrored" in why_not(silhouette, mirrored)
+    assert "mirrored" not in why_not(silhouette, outside)
+    assert why_not(silhouette, inside) == ""
 
 
 def test_a_folder_of_16_bits_has_one_scale(tmp_path: Path) -> None:

@@ -11,8 +11,14 @@ import pytest
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.skeleton import JOINT_NAMES, KeypointState
 from cardbox_tracker.recordings.quality import Quality
-from cardbox_tracker.tracking.estimate import LOST, NO_PERSON, TRACKING, UNCERTAIN, Estimate
-from cardbox_tracker.tracking.place import Place
+from cardbox_tracker.tracking.estimate import (
+    LOST,
+    NO_PERSON,
+    TRACKING,
+    UNCERTAIN,
+    Estimate,
+    Place,
+)
 
 SURE, UNSURE = KeypointState.TRACKED, KeypointState.UNCERTAIN
 BODY = BodyModel()
@@ -58,12 +64,21 @@ def test_sure_images_and_hands_are_counted() -> None:
     assert moments == "least sure, look at them: 1.0 s (right hand), 5.0 s (lost)"
 
 
-def test_a_hand_deviates_with_its_joints_and_its_place() -> None:
-    """Sideways with the torso alone: 5 cm."""
+def test_a_hand_deviates_with_its_joints_and_the_distance_with_the_place() -> None:
     only = estimate(TRACKING)
     assert only.posture_stddev is not None
+    # The torso's place moves the whole person, and the elbow the hand.
     only.posture_stddev[1:] = 0.0
-    assert lines((0.0, only))[1].endswith("0 degrees of an angle, 5 cm of a hand")
+    assert lines((0.0, only))[1].endswith(
+        "0 degrees of an angle, 0 cm of a hand beside the shoulders"
+    )
+    for side in ("left", "right"):
+        only.posture_stddev[JOINT_NAMES.index(f"{side}_elbow_flexion")] = 0.5
+    placed = replace(only, place=Place(np.array([0.12, 0.0, 0.4]), 0.01, "given"))
+    hand_cm = 100 * 2 * np.sin(0.25) * BODY.size("forearm_length")
+    assert lines((0.0, placed))[1].endswith(
+        f"{hand_cm:.0f} cm of a hand beside the shoulders, 12 cm of the distance"
+    )
 
 
 def test_the_worst_moments_are_apart_and_in_order() -> None:

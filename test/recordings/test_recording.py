@@ -74,6 +74,30 @@ def test_each_camera_has_its_own_silhouettes(sources: Recording, two: Path) -> N
     np.testing.assert_allclose(sources.others[0].extrinsics.centre_m, [0.5, 0.0, 0.0])
 
 
+def test_a_recording_is_read_to_its_end_or_an_earlier_one(sources: Recording) -> None:
+    sets = list(sources.frames(0.55, 0.8))
+    assert [s.stamp_ns - 10**18 for s in sets] == [i * PERIOD_NS for i in range(6, 9)]
+
+
+def test_a_camera_whose_stamps_stand_still_is_not_used(
+    two: Path, chain: Path, tmp_path: Path
+) -> None:
+    folder = tmp_path / "stuck"
+    with BagReader(two) as old, BagWriter(folder) as new:
+        for message in old.messages():
+            new.write_raw(message.topic, message.msgtype, message.raw, message.time_ns)
+        for _ in range(5):
+            stamp = 10**18 + 9 * PERIOD_NS + LATER_NS
+            image = np.zeros((48, 64), np.uint8)
+            new.write_image("/two/image_raw", stamp, "two_frame", image, "mono8")
+    with open_recording(folder, EMPTY, ["one", "two"], chain) as opened:
+        sets = list(opened.frames(0.55))
+        account = opened.sources[1].account
+    # Neither a time of its own, nor a further image of the first camera's time.
+    assert len(sets) == 4
+    assert "left out 5 " in account
+
+
 def test_what_is_missing_is_said(two: Path, chain: Path) -> None:
     with (
         pytest.raises(CameraError, match="camera two"),
@@ -191,6 +215,8 @@ def test_the_masks_of_a_detector_are_the_silhouettes(
 
     class Network:
         """Finds somebody in the upper half of images that are not flat."""
+
+        several = 0
 
         def __init__(self, *models: Path) -> None:
             started.append(models)

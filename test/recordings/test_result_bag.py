@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib.util
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -11,11 +12,15 @@ import pytest
 import yaml
 
 from cardbox_tracker.applications.drawing.overlay import draw_sharp_overlay
+from cardbox_tracker.common.errors import BagError
+from cardbox_tracker.recordings.bag_reader import BagReader
 from cardbox_tracker.recordings.recording import Recording
 from cardbox_tracker.recordings.result_bag import result_bag
+from cardbox_tracker.recordings.result_reader import namespace_of, read_results
 from cardbox_tracker.recordings.silhouettes import SilhouetteSource
 from cardbox_tracker.recordings.track import TrackSummary, track_recording
 from cardbox_tracker.search.config import default_preset
+from cardbox_tracker.tracking.tracker import Tracker
 
 # As ROS 2 Jazzy's own message packages have them.
 TYPES = {
@@ -135,3 +140,25 @@ def test_latched_topics_are_latched_when_played(results: tuple[Path, TrackSummar
     }
     assert durabilities["/body_model"] == durabilities["/robot_description"]
     assert durabilities["/body_model"] in (["transient_local"], [1])
+
+
+def test_several_people_have_a_namespace_each(
+    recording: Any, source: SilhouetteSource, tmp_path: Path
+) -> None:
+    frames = list(source.frames(0.0, 0.3))
+    tracker = Tracker(recording.body, source.camera, default_preset())
+    found = tracker.track(frames[-1].silhouette)
+    with result_bag(tmp_path / "bag", source.frame_id) as write:
+        for frame in frames:
+            for person in (1, 2):
+                write(frame, replace(found, person=person), tracker)
+    with BagReader(tmp_path / "bag") as bag:
+        names = {topic.partition("/person_")[2] for topic in bag.topics if "person" in topic}
+        assert {name.partition("/")[0] for name in names} == {"1", "2"}
+        assert "/joint_states" not in bag.topics and "/tf" not in bag.topics
+        silhouettes = list(bag.messages(["/silhouette"]))
+        assert len(silhouettes) == len(frames)
+        assert namespace_of(bag) == "/person_1" and namespace_of(bag, 2) == "/person_2"
+        assert len(read_results(bag, 2)) == len(frames)
+        with pytest.raises(BagError, match="has no results of person 3"):
+            namespace_of(bag, 3)

@@ -193,4 +193,10 @@ def test_the_page_lists_all_columns_in_their_order() -> None:
     listed: list[str] = []
     for cell in re.findall(r"(?m)^\| (`.*?) \|", text):
         listed += re.findall(r"`([a-z_]+)`", cell)
-    assert tuple(listed) == WHOLE
+    assert tuple(listed) == (*WHOLE, "person")
+
+
+def test_of_several_people_the_number_comes_last() -> None:
+    assert columns(has_people=True)[:-1] == columns() and columns(has_people=True)[-1] == "person"
+    assert row_of(42, 1.5, replace(FOUND, person=2), has_people=True)[-1] == 2
+    assert row_of(42, 1.5, Estimate("no_person", person=1), has_people=True)[-1] == 1

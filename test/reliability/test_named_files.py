@@ -52,7 +52,7 @@ READERS: dict[str, Callable[[Path], Any]] = {
     "background": lambda path: load_background(path, SIZE),
     "joint map": load_joint_map,
     "robot": load_robot,
-    "points": lambda path: PointTable(path).read(None, CAMERA, SIZE),
+    "points": lambda path: PointTable(path).read(None, SIZE),
     "truth": load_ground_truth,
     "wheel": install_models,
     "video": read_video,

@@ -56,6 +56,17 @@ def test_a_person_who_walks_metres_is_followed(begin_m: float, end_m: float) -> 
     assert KeypointState.LOST not in found[-1].keypoint_states
 
 
+def test_nobody_is_sought_where_a_steep_camera_does_not_see_the_body() -> None:
+    """7 m away, with the hips as low as here, the body would be above the image."""
+    body = BodyModel.of(distance_m=2.28, hip_height_m=-1.64, camera_pitch_rad=np.radians(30.0))
+    view = Camera(320, 240, 514.0, 514.0, 159.5, 119.5)
+    renderer = Renderer(view.with_pitch(np.radians(30.0)), Scene(), np.random.default_rng(0))
+    tracker = Tracker(body, view, default_preset(), np.random.default_rng(0))
+    found = tracker.track(renderer.silhouette(body, FRONT))
+    assert distance_of(found, 2.28) == pytest.approx(2.28, rel=0.1)
+    assert found.iou is not None and found.iou > 0.7
+
+
 @pytest.mark.parametrize("there_m", [1.4, 4.0])
 def test_a_person_who_appears_elsewhere_is_found(there_m: float) -> None:
     found = seen_at([there_m] * 20, 2.2)

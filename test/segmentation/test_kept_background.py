@@ -37,7 +37,9 @@ def path(tmp_path: Path, room: Any) -> Path:
     made = tmp_path / "background.npz"
     kept = KeptBackground(made, SIZE)
     assert kept.resume(pipeline(), room.image()) == ""
+    assert kept.use == "not there yet"
     assert kept.keep(learned(room)) == f"; saved to {made}"
+    assert kept.use == "written"
     return made
 
 
@@ -66,9 +68,9 @@ def test_a_moved_camera_is_refused_until_it_is_back(path: Path, room: Any) -> No
     kept, restarted = KeptBackground(path, SIZE), pipeline()
     with pytest.raises(BackgroundFileError, match=r"moved.*background/learn"):
         kept.resume(restarted, room.image(80, shift=(4, 0)))
-    assert not restarted.is_ready
+    assert not restarted.is_ready and kept.use == "not used yet"
     assert kept.resume(restarted, room.image(80))
-    assert restarted.is_ready
+    assert restarted.is_ready and kept.use == "used"
 
 
 def test_another_camera_is_refused(path: Path, room: Any) -> None:

@@ -10,6 +10,7 @@ import pytest
 from cardbox_tracker.applications.simulation.renderer import Renderer, Scene
 from cardbox_tracker.camera.camera import Camera
 from cardbox_tracker.common.errors import InitializationError
+from cardbox_tracker.measuring import first_sight
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.posture import reference_posture
 from cardbox_tracker.person.proportions import body_from_proportions, sizes_of_stature
@@ -131,6 +132,25 @@ def test_what_does_not_fit_is_not_tried_with_every_image(monkeypatch: pytest.Mon
         track.track(seen)
     assert 2 <= len(tries) <= 3
     assert track.body.unknown
+
+
+def test_a_poor_fit_is_used_until_a_better_one_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
+    guess, good = body_from_proportions(1.75), person(1.75, -0.62)
+    poor = [guess.with_values(distance_m=distance_m) for distance_m in (2.2, 2.4)]
+    fits = iter(
+        SimpleNamespace(body=body, iou=iou, clothes=None)
+        for body, iou in ((poor[0], 0.5), (poor[1], 0.4), (good, 0.9))
+    )
+    monkeypatch.setattr(fitting, "fit_first_sight", lambda *_: next(fits))
+    decides = fitting.Fitting(guess, CAMERA, default_preset(), np.random.default_rng(0))
+    used = [decides.before(silhouette(good), None) for _ in range(60)]
+    assert [body for body in used if body is not None] == [poor[0], good]
+
+
+def test_a_detected_person_may_be_small() -> None:
+    far = silhouette(person(1.75, -0.62).with_values(distance_m=18.0))
+    assert first_sight.upper_body(far) is None
+    assert first_sight.upper_body(far, is_detected=True) is not None
 
 
 @pytest.mark.parametrize(("usual", "is_kept"), [(0.75, True), (0.65, False)])

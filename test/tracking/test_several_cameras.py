@@ -229,6 +229,36 @@ def test_two_cameras_follow_and_any_of_them_may_drop_out() -> None:
     assert tracker.camera_ious() == [None, None]
 
 
+def test_a_second_camera_that_froze_is_not_used() -> None:
+    """The person goes on waving, nearer, while the second camera shows one moment for ever."""
+    tracker = Tracker(BODY, CAMERA, default_preset(), others=[OTHER])
+    errors = []
+    for i in range(20):
+        state = state_of(i / 5.0, 0.03 * i)
+        first, second = both(state)[0], both(state_of(min(i, 6) / 5.0, 0.03 * min(i, 6)))[1]
+        estimate = tracker.track([Observation(first), Observation(second)])
+        if i > 9:
+            assert tracker.camera_ious()[1] is None
+            errors.append(error_cm(estimate, state))
+    assert max(errors) < 20.0
+    assert any("camera 2 of 2 shows the same image" in text for text in tracker.remarks)
+    assert tracker.images == 20 and 6 <= tracker.used["camera 2"] <= 10
+    assert tracker.used_texts()["camera 2 used"] == f"{tracker.used['camera 2']} of 20"
+
+
+def test_what_told_of_a_posture_is_counted() -> None:
+    tracker = Tracker(BODY, CAMERA, default_preset().with_depth())
+    first = both(state_of(0.0))[0]
+    points = ImagePoints.of({"left_wrist": (80.0, 60.0, 0.9)})
+    depth_m = np.full(first.shape, 2.0)
+    for i in range(4):
+        more = {"points": points} if i else {}
+        tracker.track(Observation(first, depth_m=depth_m if i > 1 else None, **more))
+    tracker.track(Observation(np.zeros_like(first), points=points))
+    assert tracker.images == 5
+    assert tracker.used == {"points": 3, "depth": 2}
+
+
 def test_one_camera_is_a_list_of_one() -> None:
     trackers = [Tracker(BODY, CAMERA, default_preset()) for _ in range(3)]
     for i in range(3):

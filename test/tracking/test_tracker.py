@@ -17,7 +17,13 @@ from cardbox_tracker.detectors.image_points import ImagePoints
 from cardbox_tracker.person.cardbox import cardbox_patches
 from cardbox_tracker.person.kinematics import pose
 from cardbox_tracker.person.model import BodyModel
-from cardbox_tracker.person.posture import JOINT_LIMITS, TORSO, reference_posture, state_limits
+from cardbox_tracker.person.posture import (
+    JOINT_LIMITS,
+    PITCH,
+    TORSO,
+    reference_posture,
+    state_limits,
+)
 from cardbox_tracker.person.skeleton import KeypointState, neck_rotation
 from cardbox_tracker.search.config import (
     FilterConfig,
@@ -167,6 +173,26 @@ def test_doubt_about_each_keypoint_comes_with_its_evidence(make_config: Any) -> 
         # Evidence that a model knows is never missing.
         assert needed <= set(estimate.evidence)
     assert tracker.track(NOBODY).evidence is None
+
+
+def test_an_unknown_pitch_makes_every_image_uncertain() -> None:
+    states = []
+    for stddev_deg in (2.0, 7.0):
+        body = BODY.with_values(pitch_stddev_rad=np.radians(stddev_deg))
+        tracker = Tracker(body, CAMERA, paper_preset(), np.random.default_rng(0))
+        states.append({tracker.track(silhouette).state for silhouette in waving(5)})
+    assert states == [{TRACKING}, {UNCERTAIN}]
+
+
+def test_the_lean_of_the_trunk_is_no_surer_than_the_pitch() -> None:
+    found = []
+    for stddev_rad in (0.0, 0.2):
+        body = BODY.with_values(pitch_stddev_rad=stddev_rad)
+        tracker = Tracker(body, CAMERA, default_preset(), np.random.default_rng(0))
+        found.append(tracker.track(seen(front())).posture_stddev)
+    expected = found[0].copy()
+    expected[PITCH] = np.hypot(expected[PITCH], 0.2)
+    np.testing.assert_allclose(found[1], expected)
 
 
 def test_the_whole_body_filter_says_where_it_is_and_how_well_it_fits() -> None:

@@ -112,9 +112,20 @@ def overlay_video(path: Path, recording: Recording) -> Iterator[Observer]:
     except BagError:
         rate_hz = _USUAL_HZ
     with video_file(path, rate_hz) as add:
+        drawn: dict[int, ImageArray] = {}
 
         def observe(frame: RecordedFrame, estimate: Estimate, tracker: Tracker) -> None:
-            picture = recording.first.full_picture(frame)
-            add(draw_camera_overlay(picture, 0, estimate, tracker))
+            # Several people are drawn one after the other into the same picture.
+            if frame.stamp_ns not in drawn:
+                finish()
+                drawn[frame.stamp_ns] = recording.first.full_picture(frame)
+            picture = drawn[frame.stamp_ns]
+            drawn[frame.stamp_ns] = draw_camera_overlay(picture, 0, estimate, tracker)
+
+        def finish() -> None:
+            for picture in drawn.values():
+                add(picture)
+            drawn.clear()
 
         yield observe
+        finish()

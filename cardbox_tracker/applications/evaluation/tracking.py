@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -194,7 +194,7 @@ def track_session(
                     observe(seed, stamp_ns, estimates[stamp_ns], tracker)
     return [
         replace(
-            _run(session, tracked, failure, estimates, spent),
+            run_of(session, tracked, failure, estimates, spent),
             input_ms=float(np.median(inputs_ms)) if inputs_ms else float("nan"),
         )
         for (tracked, failure), estimates, spent in zip(bodies, found, times, strict=True)
@@ -262,13 +262,14 @@ def _measure(
         return None, str(error)
 
 
-def _run(
+def run_of(
     session: RecordedSession,
     body: BodyModel | None,
     failure: str,
-    estimates: dict[int, Estimate],
-    milliseconds: list[float],
+    estimates: Mapping[int, Estimate],
+    milliseconds: Sequence[float] = (),
 ) -> SessionRun:
+    """Return the results of one run; see :class:`SessionRun` for the values."""
     n = len(session.stamps_ns)
     states = np.full(n, "", dtype="<U16")
     keypoints = np.full((n, 6, 3), np.nan)

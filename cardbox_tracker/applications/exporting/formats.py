@@ -9,6 +9,7 @@ from typing import NamedTuple
 from cardbox_tracker.applications.exporting.bvh import write_bvh
 from cardbox_tracker.applications.exporting.isb import write_isb
 from cardbox_tracker.applications.exporting.markers import ezc3d_or_error, write_c3d, write_trc
+from cardbox_tracker.applications.exporting.mot import write_mot
 from cardbox_tracker.applications.exporting.motion import Motion
 from cardbox_tracker.person.model import BodyModel
 
@@ -35,5 +36,6 @@ FORMATS: dict[str, Format] = {
     "trc": Format(".trc", write_trc),
     "bvh": Format(".bvh", write_bvh, needs_body=True),
     "c3d": Format(".c3d", write_c3d, ezc3d_or_error),
+    "mot": Format(".mot", write_mot),
     "isb": Format(".isb.csv", write_isb, has_places=False),
 }

@@ -20,7 +20,7 @@ from cardbox_tracker.person.skeleton import JOINT_NAMES, KEYPOINT_NAMES, NECK_NA
 from cardbox_tracker.recordings.bag_reader import BagReader
 from cardbox_tracker.recordings.open_images import is_bag
 from cardbox_tracker.recordings.result_reader import Result, read_results
-from cardbox_tracker.recordings.result_table import PARQUET, POINT_COLUMNS, pyarrow_or_error
+from cardbox_tracker.recordings.result_table import PARQUET, PERSON, POINT_COLUMNS, pyarrow_or_error
 from cardbox_tracker.tracking.estimate import LOST, NO_PERSON, TRACKING, UNCERTAIN
 
 _STATES = (*JOINT_NAMES, *PLACE_NAMES)
@@ -43,13 +43,14 @@ class _Row(NamedTuple):
     values: FloatArray
 
 
-def read_motion(path: Path) -> tuple[Motion, BodyModel | None]:
+def read_motion(path: Path, person: int | None = None) -> tuple[Motion, BodyModel | None]:
     """Return the results of a recording, and the body that a bag contains.
 
     Images with the states ``tracking`` and ``uncertain`` have a posture, all others are gaps.
 
     Args:
         path: table of ``cardbox track``, or bag of ``cardbox track --bag`` or of nodes.
+        person: number of one of several people; without it, the first one counts.
 
     Raises:
         CardboxError: the file cannot be read, or contains no results or no posture.
@@ -61,11 +62,11 @@ def read_motion(path: Path) -> tuple[Motion, BodyModel | None]:
         )
     if is_bag(path):
         with BagReader(path) as bag:
-            results = read_results(bag)
+            results = read_results(bag, person)
         body = next((one.body for one in reversed(results) if one.body is not None), None)
         rows = [_row_of_result(one, results[0].stamp_ns, path) for one in results]
     elif path.is_file():
-        rows = sorted(_table_rows(path), key=lambda row: row.stamp_ns)
+        rows = sorted(_table_rows(path, person), key=lambda row: row.stamp_ns)
     else:
         raise CardboxError(f"{path} is no table and no bag; give the results of 'cardbox track'")
     # Two results with one stamp occur in tables of several runs; the last one counts.
@@ -103,10 +104,14 @@ def _row_of_result(result: Result, first_ns: int, path: Path) -> _Row:
     return _Row(result.stamp_ns, (result.stamp_ns - first_ns) / 1e9, result.state, values)
 
 
-def _table_rows(path: Path) -> Iterator[_Row]:
+def _table_rows(path: Path, person: int | None) -> Iterator[_Row]:
     cells = _parquet_cells(path) if path.suffix == PARQUET else _csv_cells(path)
     for number, row in enumerate(cells, 1):
+        if person is not None and PERSON not in row:
+            raise CardboxError(f"{path} has no column {PERSON}: it is of one person")
         try:
+            if int(row.get(PERSON) or 1) != (person or 1):
+                continue
             yield _row_of_cells(row)
         except (KeyError, TypeError, ValueError, OverflowError) as error:
             raise CardboxError(
@@ -169,7 +174,7 @@ def _parquet_cells(path: Path) -> Iterator[Mapping[str, Any]]:
                     "'cardbox track' wrote"
                 )
             _check(path, names)
-            read = [name for name in (*_NEEDED, *NECK_NAMES) if name in names]
+            read = [name for name in (*_NEEDED, *NECK_NAMES, PERSON) if name in names]
             for batch in file.iter_batches(_BATCH, columns=read):
                 yield from batch.to_pylist()
     except (OSError, arrow.ArrowException) as error:

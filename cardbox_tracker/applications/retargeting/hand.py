@@ -162,7 +162,7 @@ def _libraries() -> tuple[Any, Any]:
     except ImportError as error:
         raise CardboxError(
             f"inverse kinematics needs the libraries pin, pin-pink and daqp ({error}); install "
-            "them with 'pip install cardbox_tracker[retarget]', or give a joint map (--map, "
+            "them with pip install '.[retarget]' in the checkout, or give a joint map (--map, "
             "joint_map_file), which needs none of them"
         ) from None
     return pinocchio, pink

@@ -42,14 +42,16 @@ class Motion(NamedTuple):
     way: list[StampedMoment]
 
 
-def retarget_bag(bag: BagReader, retargeter: Retargeter, rate_hz: float) -> Motion:
-    """Return the robot's motion for a bag of results.
+def retarget_bag(
+    bag: BagReader, retargeter: Retargeter, rate_hz: float, person: int | None = None
+) -> Motion:
+    """Return the robot's motion for a bag of results, of a ``person`` if it has several.
 
     Raises:
         BagError: the bag has no results of the tracker, or is damaged.
     """
     motion = Motion([], [])
-    for found in read_results(bag):
+    for found in read_results(bag, person):
         if found.posture is not None and found.stddev is None:
             continue
         if motion.commands:

@@ -56,7 +56,9 @@ class ShownTracking:
 
 
 def show_together(
-    results: Sequence[tuple[BagReader, Scene]], progress: Callable[[float], None] = lambda _: None
+    results: Sequence[tuple[BagReader, Scene]],
+    progress: Callable[[float], None] = lambda _: None,
+    person: int | None = None,
 ) -> list[int]:
     """Show bags of results of one recording at the same time, each in its scene.
 
@@ -65,6 +67,7 @@ def show_together(
     Args:
         results: open recordings and their scenes.
         progress: called with the finished fraction, 0 to 1.
+        person: number of one of several people.
 
     Returns:
         The number of images with joints of each.
@@ -73,7 +76,7 @@ def show_together(
         BagError: a bag has no results of the tracker, or is damaged.
     """
     counts = [0] * len(results)
-    running = {number: _shown(*one) for number, one in enumerate(results)}
+    running = {number: _shown(*one, person) for number, one in enumerate(results)}
     finished = dict.fromkeys(running, 0.0)
     while running:
         number = min(running, key=finished.__getitem__)
@@ -87,9 +90,9 @@ def show_together(
     return counts
 
 
-def _shown(bag: BagReader, scene: Scene) -> Iterator[tuple[float, bool]]:
+def _shown(bag: BagReader, scene: Scene, person: int | None) -> Iterator[tuple[float, bool]]:
     """Show the messages; yield the finished fraction after each, and whether it had joints."""
-    space = namespace_of(bag)
+    space = namespace_of(bag, person)
     handlers = _handlers(bag, scene, space)
     total_s = max(bag.duration_s, 1e-9)
     for message in bag.messages([topic for topic in bag.topics if topic in handlers]):
@@ -120,7 +123,8 @@ def _handlers(
         space + _OVERLAY: lambda _, c: scene.image(stamp_ns_of(c), decode_bgr(*image_parts(c))),
     }
     for topic in bag.topics:
-        if topic.endswith(_ROBOT) and topic != space + _ROBOT:
+        is_person = topic.removesuffix(_ROBOT) + MODEL in bag.topics
+        if topic.endswith(_ROBOT) and not is_person and topic != space + _ROBOT:
             robot = topic.removesuffix(_ROBOT)
             name = robot.strip("/").replace("/", "_") or "robot"
             handlers[topic] = lambda _, c, name=name: scene.robot(name, str(c.data))  # type: ignore[misc]
@@ -130,7 +134,7 @@ def _handlers(
     return handlers
 
 
-def image_stamps(path: Path) -> list[int]:
+def image_stamps(path: Path, person: int | None = None) -> list[int]:
     """Return the stamps of the images in a bag of results, ns, ascending.
 
     Without overlays these are the images with joints.
@@ -139,14 +143,14 @@ def image_stamps(path: Path) -> list[int]:
         BagError: the bag cannot be read, or has no results of the tracker.
     """
     with BagReader(path) as bag:
-        space = namespace_of(bag)
+        space = namespace_of(bag, person)
         named = (space + _OVERLAY, space + _JOINTS)
         topic = next((topic for topic in named if topic in bag.topics), None)
         messages = [] if topic is None else bag.messages([topic])
         return sorted({stamp_ns_of(bag.deserialize(message)) for message in messages})
 
 
-def check_same_images(first: Path, second: Path) -> int:
+def check_same_images(first: Path, second: Path, person: int | None = None) -> int:
     """Check by their stamps that the images of one bag of results are among those of the other.
 
     Returns:
@@ -155,7 +159,7 @@ def check_same_images(first: Path, second: Path) -> int:
     Raises:
         CardboxError: they have other stamps, or a bag cannot be read.
     """
-    stamps = {path: set(image_stamps(path)) for path in (first, second)}
+    stamps = {path: set(image_stamps(path, person)) for path in (first, second)}
     few, many = sorted(stamps, key=lambda path: len(stamps[path]))
     others = len(stamps[few] - stamps[many])
     remedy = "; give two results of the same recording"

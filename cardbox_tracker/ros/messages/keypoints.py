@@ -6,20 +6,20 @@ packages are read by the names of their fields, so that no package has to be ins
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Sequence
+from itertools import chain
 from typing import Any
 
 from geometry_msgs.msg import Point32, Polygon, PolygonStamped
 from std_msgs.msg import Header
 
-from cardbox_tracker.common.errors import CardboxError, quoted
-from cardbox_tracker.detectors.image_points import POINT_NAMES, ImagePoints
+from cardbox_tracker.common.errors import CardboxError
+from cardbox_tracker.detectors.image_points import COCO_NAMES, POINT_NAMES, ImagePoints
 from cardbox_tracker.detectors.landmarks import LANDMARKS
+from cardbox_tracker.detectors.point_checks import Size, person_of
 from cardbox_tracker.person.sizes import FloatArray
 from cardbox_tracker.ros.messages.types import optional_class
 
-COCO_NAMES = (*POINT_NAMES[:13], "left_knee", "right_knee", "left_ankle", "right_ankle")
-"""The 17 points of COCO in its order."""
 MESSAGE_NAMES = (*COCO_NAMES, *POINT_NAMES[13:])
 """The points of a PolygonStamped: those of COCO, then the knuckles, which may be left out."""
 SKELETON_NAMES = (
@@ -36,14 +36,8 @@ SKELETON_NAMES = (
 POLYGON_STAMPED = "geometry_msgs/msg/PolygonStamped"
 """Type of the messages that need no further package."""
 
-# float32 rounds a score of 1 by less.
-_MOST_SCORE = 1.001
-# A point may lie outside the image, but by no more than this multiple of the larger side.
-_MOST_OUTSIDE = 1.0
 _MOST_PERSONS = 100
 
-Size = tuple[int, int]
-"""Width and height of the camera's image in its CameraInfo, px."""
 Convert = Callable[[Any, Size], list[ImagePoints]]
 """Takes a message; returns the points of each person. Raises CardboxError if it is malformed."""
 
@@ -61,6 +55,12 @@ def keypoints_message(header: Header, px: FloatArray, scores: FloatArray) -> Pol
         for i in map(LANDMARKS.index, MESSAGE_NAMES)
     ]
     return PolygonStamped(header=header, polygon=Polygon(points=points))
+
+
+def people_message(header: Header, people: Sequence[tuple[FloatArray, FloatArray]]) -> Any:
+    """Return the message of the landmarks of several people, one after the other."""
+    one = [keypoints_message(header, *person).polygon.points for person in people]
+    return PolygonStamped(header=header, polygon=Polygon(points=list(chain(*one))))
 
 
 def skeleton_class() -> Any:
@@ -86,7 +86,9 @@ def skeleton_message(
 
 
 def persons_of_polygon(message: Any, size: Size) -> list[ImagePoints]:
-    """Return the person of a PolygonStamped, if it has points.
+    """Return the people of a PolygonStamped, each with all points of ``MESSAGE_NAMES``.
+
+    One person may lack the knuckles.
 
     Raises:
         CardboxError: the number of points is wrong, or a point is impossible.
@@ -94,13 +96,23 @@ def persons_of_polygon(message: Any, size: Size) -> list[ImagePoints]:
     points = message.polygon.points
     if not points:
         return []
-    if len(points) not in (len(COCO_NAMES), len(MESSAGE_NAMES)):
+    each = len(COCO_NAMES) if len(points) == len(COCO_NAMES) else len(MESSAGE_NAMES)
+    if len(points) % each or len(points) > each * _MOST_PERSONS:
         raise CardboxError(
             f"a person has {len(points)} points; expected the {len(COCO_NAMES)} of COCO in its "
-            f"order, or {len(MESSAGE_NAMES)} with four knuckles (docs/detectors.md)"
+            f"order, or {len(MESSAGE_NAMES)} with four knuckles, once for each person "
+            "(docs/detectors.md)"
         )
-    named = zip(MESSAGE_NAMES, points, strict=False)
-    return [_person(((name, p.x, p.y, p.z) for name, p in named), size)]
+    return [
+        person_of(
+            (
+                (name, p.x, p.y, p.z)
+                for name, p in zip(MESSAGE_NAMES, points[begin : begin + each], strict=False)
+            ),
+            size,
+        )
+        for begin in range(0, len(points), each)
+    ]
 
 
 def persons_of_skeleton(message: Any, size: Size) -> list[ImagePoints]:
@@ -116,7 +128,7 @@ def persons_of_skeleton(message: Any, size: Size) -> list[ImagePoints]:
         )
     named = zip(SKELETON_NAMES, points, strict=True)
     placed = ((name, p.x * width - 0.5, p.y * height - 0.5, p.c) for name, p in named)
-    return [_person(placed, size)]
+    return [person_of(placed, size)]
 
 
 def persons_of_detections(message: Any, size: Size) -> list[ImagePoints]:
@@ -139,7 +151,7 @@ def persons_of_detections(message: Any, size: Size) -> list[ImagePoints]:
                 f"{len(COCO_NAMES)}; expected those of COCO, as YOLO's pose models have them"
             )
         placed = ((COCO_NAMES[p.id - 1], p.point.x, p.point.y, p.score) for p in points)
-        persons.append(_person(placed, size))
+        persons.append(person_of(placed, size))
     return persons
 
 
@@ -149,24 +161,3 @@ CONVERSIONS: dict[str, Convert] = {
     "yolo_msgs/msg/DetectionArray": persons_of_detections,
 }
 """Conversion of each type of message that can be read."""
-
-
-def _person(points: Iterable[tuple[str, float, float, float]], size: Size) -> ImagePoints:
-    """Return the points with name, column, row and score; those with the score 0 are missing."""
-    found = {}
-    far_px = _MOST_OUTSIDE * max(size)
-    for name, column, row, score in points:
-        if not 0.0 <= score <= _MOST_SCORE:
-            raise CardboxError(f"{name} has the score {score:g}; expected a chance from 0 to 1")
-        if score == 0.0:
-            continue
-        inside = (
-            -far_px <= at <= side + far_px for at, side in zip((column, row), size, strict=True)
-        )
-        if not all(inside):
-            raise CardboxError(
-                f"{name} is at {quoted((column, row))} px; expected a place in the camera's image "
-                f"of {size[0]}x{size[1]} px, or the score 0 if the point is missing"
-            )
-        found[name] = column, row, score
-    return ImagePoints.of(found)

@@ -235,6 +235,8 @@ class BackgroundNode(CardboxNode):
             "scene brightness drift (grey levels)": f"{self._drift():.1f}",
             "ignored CameraInfo": str(self.camera_images.watch.ignored),
         }
+        if self._kept.path is not None:
+            values["background file"] = self._kept.use
         if self._pipeline is not None:
             values |= self._pipeline.learning.values()
         return values

@@ -16,6 +16,7 @@ from cardbox_tracker.camera.depth_image import DepthImage
 from cardbox_tracker.camera.pairing import TOLERANCE_NS, Arrivals
 from cardbox_tracker.camera.view import OtherCamera
 from cardbox_tracker.common.errors import CameraError, CardboxError
+from cardbox_tracker.detectors.image_points import ImagePoints
 from cardbox_tracker.ros.messages import conversions
 from cardbox_tracker.ros.messages.conversions import ImageArray
 from cardbox_tracker.ros.nodes.camera_poses import CameraPoses, silhouettes_of
@@ -29,6 +30,7 @@ from cardbox_tracker.ros.runtime.node import CardboxNode
 from cardbox_tracker.tracking.observation import Observation
 
 _SILENT_S = 3.0
+_STUCK = 10
 # Of one clock, images from different computers or of depth may arrive this much later.
 _OTHER_CLOCK_S = 0.1
 
@@ -52,6 +54,8 @@ class ObservationSet:
         observations: observation of each camera, as a tracker takes them.
         sent_ns: send time of the last silhouette, ns since the epoch.
         nothing: black image (H, W) of the first camera.
+        people: points of each of several people in the first camera's image; None if none have
+            come, or only one person is tracked.
     """
 
     header: Header
@@ -59,6 +63,7 @@ class ObservationSet:
     observations: list[Observation]
     sent_ns: int
     nothing: ImageArray
+    people: list[ImagePoints] | None = None
 
     def picture(self, number: int = 0) -> ImageArray:
         """Return a camera's image, or its silhouette, or a black image."""
@@ -105,6 +110,8 @@ class CameraInputs:
         self._count = len(self._streams)
         if settings.depth:
             self._streams.append(InputStream("depth", node.resolve(settings.depth)))
+        # Messages in a row whose stamps did not go on.
+        self._stuck = [0] * len(self._streams)
         self._clocks = [ClockDifference(self._streams[0], one) for one in self._streams[1:]]
         self._is_named = bool(settings.cameras or settings.depth)
         self._arrivals: Arrivals[Received] = Arrivals(len(self._streams), TOLERANCE_NS)
@@ -121,6 +128,7 @@ class CameraInputs:
         if settings.depth:
             self._depth_input = DepthInput(node, settings.depth, self._on_depth)
         self._keypoints = KeypointInputs(node, settings)
+        self._tracks_people = settings.people > 0
 
     @property
     def source(self) -> str:
@@ -156,6 +164,7 @@ class CameraInputs:
             # The node itself drops and counts repeated and late messages.
             self._deliver(received, [received])
             return
+        self._stuck[number] = 0 if is_usable else self._stuck[number] + 1
         if not is_usable:
             return
         self._arrivals.tolerance_ns = self._streams[0].statistics.period_ns // 2 or TOLERANCE_NS
@@ -208,16 +217,19 @@ class CameraInputs:
             observations,
             max(one.sent_ns for one in messages if one is not None),
             np.zeros((first.height, first.width), np.uint8),
+            self._keypoints.people(header, first) if self._tracks_people else None,
         )
 
     def _with_points(
         self, number: int, received: Received | None, seen: Observation, camera: Camera
     ) -> Observation:
         """Return an observation with the points that have arrived; it does not wait for points."""
-        if received is None or seen.silhouette is None:
+        if received is None or seen.silhouette is None or self._tracks_people:
             return seen
         header = received.message.header
-        points = self._keypoints.points(number, header, camera, seen.silhouette)
+        period_ns = self._streams[number].statistics.period_ns
+        half_ns = period_ns // 2 or TOLERANCE_NS
+        points = self._keypoints.points(number, header, camera, seen.silhouette, half_ns)
         return seen.having(points=points)
 
     def _depth(self, received: Sequence[Received | None], camera: Camera) -> DepthImage | None:
@@ -252,8 +264,13 @@ class CameraInputs:
         first, *others = self._streams
         # If nothing comes at all, the node says so itself.
         is_going_on = any(stream.age_s <= _SILENT_S for stream in self._streams)
-        for stream in self._streams:
-            if is_going_on and stream.age_s > _SILENT_S:
+        for stream, stuck in zip(self._streams, self._stuck, strict=True):
+            if stuck > _STUCK:
+                texts[f"stamps of {stream.name}"] = (
+                    f"the stamps of the last {stuck} messages on {stream.topic} stand still or go "
+                    "back, so they are not used; is that camera's driver stuck?"
+                )
+            elif is_going_on and stream.age_s > _SILENT_S:
                 texts[f"silence of {stream.name}"] = (
                     f"nothing has come on {stream.topic} for {stream.age_s:.0f} s; tracking goes "
                     "on without it. Are that camera and its background node running?"

@@ -13,6 +13,7 @@ from cardbox_tracker.measuring.standing_camera import middles, standing_camera
 from cardbox_tracker.person.sizes import FloatArray
 from cardbox_tracker.ros.runtime import qos
 from cardbox_tracker.ros.runtime.node import CardboxNode
+from cardbox_tracker.tracking.tracker import UNKNOWN_TILT_RAD
 
 # People stand still for some time, and move about between.
 _IMAGES = 10
@@ -42,7 +43,7 @@ class CameraPitch:
             return
         standing = standing_camera(middles(self._seen), camera)
         self._seen.clear()
-        if standing is None or not standing.is_pitch_found:
+        if standing is None or standing.pitch_stddev_rad > UNKNOWN_TILT_RAD:
             return
         self._is_found = True
         self._publisher.publish(Float64(data=standing.pitch_rad))

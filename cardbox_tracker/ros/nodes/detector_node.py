@@ -6,6 +6,7 @@ import os
 import sys
 import time
 from collections import deque
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -21,7 +22,7 @@ from cardbox_tracker.detectors.landmarks import LANDMARKS
 from cardbox_tracker.detectors.pose_network import Detection
 from cardbox_tracker.ros.messages.conversions import ImageArray, stamp_ns
 from cardbox_tracker.ros.messages.keypoints import (
-    keypoints_message,
+    people_message,
     skeleton_class,
     skeleton_message,
 )
@@ -40,6 +41,7 @@ from cardbox_tracker.ros.runtime.parameter_fields import AT_START, NodeParameter
 from cardbox_tracker.ros.runtime.parameters import LiveParameters
 from cardbox_tracker.ros.runtime.publishers import SinglePublisher
 from cardbox_tracker.segmentation.silhouettes import SilhouettePipeline
+from cardbox_tracker.tracking.people import MOST_PEOPLE
 
 _NICE = 5
 _DOES = "Find the person in a camera's images: images in, 2D points and silhouettes out."
@@ -60,6 +62,12 @@ class DetectorParameters(NodeParameters):
         False,
         "also publish the person's mask on silhouette, instead of the node background, which must "
         "not run beside it",
+        effect=AT_START,
+    )
+    people: int = parameter(
+        0,
+        "number of people to find at most; 0: one, who is followed",
+        limits=(0, MOST_PEOPLE),
         effect=AT_START,
     )
     rate_hz: float = parameter(
@@ -92,7 +100,7 @@ class DetectorNode(CardboxNode):
         if person is None and not settings.publish_silhouette:
             # The tracker goes first; the threads of the networks inherit this.
             os.nice(_NICE)
-        self._person = person or Detector.installed().start()
+        self._person = person or Detector.installed()._replace(people=settings.people).start()
         self._pipeline: SilhouettePipeline | None = None
         self._looked_ns = 0
         self._took_ms: deque[float] = deque(maxlen=WINDOW)
@@ -134,17 +142,25 @@ class DetectorNode(CardboxNode):
             return
         began_s = time.perf_counter()
         image = pipeline.prepare(full)
-        found = self._person(image)
+        found = self._found(stamp_ns(header.stamp), image)
         self._took_ms.append(1e3 * (time.perf_counter() - began_s))
         self._send_points(header, found, pipeline)
-        if found is not None:
-            self._pitch.see(found, pipeline.camera)
+        for one in found:
+            self._pitch.see(one, pipeline.camera)
         if self._silhouettes is not None:
             self._silhouettes.send_image(header, image)
-            nobody = np.zeros(image.shape[:2], np.uint8)
-            silhouette = nobody if found is None else found.silhouette()
+            silhouette = np.zeros(image.shape[:2], np.uint8)
+            for one in found:
+                silhouette |= one.silhouette()
             self._silhouettes.send(header, silhouette, pipeline.camera, self._images.info)
         self.diagnostics.working(sent_ns)
+
+    def _found(self, at_ns: int, image: ImageArray) -> list[Detection]:
+        """Return the people in an image, or the one who is followed."""
+        if self.parameters.value.people:
+            return self._person.all_in(at_ns, image)
+        person = self._person(image)
+        return [] if person is None else [person]
 
     def _is_due(self, at_ns: int) -> bool:
         """Return whether to look at the image with this stamp, as ``rate_hz`` says."""
@@ -158,15 +174,19 @@ class DetectorNode(CardboxNode):
         return True
 
     def _send_points(
-        self, header: Header, found: Detection | None, pipeline: SilhouettePipeline
+        self, header: Header, found: Sequence[Detection], pipeline: SilhouettePipeline
     ) -> None:
-        """Publish the points, all with the score 0 if nobody is there."""
+        """Publish the points, all with the score 0 if nobody is there; of several as skeleton one.
+
+        The skeleton is that of the first person.
+        """
         calibration, camera = pipeline.calibration, pipeline.camera
-        px, scores = np.zeros((len(LANDMARKS), 2)), np.zeros(len(LANDMARKS))
-        if found is not None:
-            px = unrectified(calibration, found.points_px, camera.width, camera.height)
-            scores = found.scores
-        self._keypoints.publish(keypoints_message(header, px, scores))
+        size = camera.width, camera.height
+        people = [
+            (unrectified(calibration, one.points_px, *size), one.scores) for one in found
+        ] or [(np.zeros((len(LANDMARKS), 2)), np.zeros(len(LANDMARKS)))]
+        px, scores = people[0]
+        self._keypoints.publish(people_message(header, people))
         if self._skeletons is not None:
             size = calibration.width, calibration.height
             kind = self._skeleton_kind

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -21,6 +22,7 @@ from cardbox_tracker.person.model_file import load_body_model, loads_body_model
 from cardbox_tracker.ros.messages import conversions
 from cardbox_tracker.ros.nodes.camera_inputs import CameraInputs, Received
 from cardbox_tracker.ros.nodes.found_body import FoundBody
+from cardbox_tracker.ros.nodes.rep155_outputs import TrackedBodies
 from cardbox_tracker.ros.nodes.tracker_outputs import TrackerOutputs
 from cardbox_tracker.ros.nodes.tracker_parameters import TrackerParameters
 from cardbox_tracker.ros.nodes.tracking_report import TrackingReport
@@ -29,6 +31,7 @@ from cardbox_tracker.ros.runtime.command_line import plain_command_line
 from cardbox_tracker.ros.runtime.node import CardboxNode, run_node
 from cardbox_tracker.ros.runtime.parameters import LiveParameters
 from cardbox_tracker.tracking.agreement_watch import AgreementWatch
+from cardbox_tracker.tracking.people import People
 from cardbox_tracker.tracking.precompile import compile_all
 from cardbox_tracker.tracking.tracker import Tracker
 
@@ -51,10 +54,15 @@ class TrackerNode(CardboxNode):
         self._body: BodyModel | None = None
         self._camera: Camera | None = None
         self._others: Sequence[OtherCamera] = ()
+        # Of several people, the first one's.
         self._tracker: Tracker | None = None
-        self._report = TrackingReport()
-
-        self._outputs = TrackerOutputs(self, settings)
+        self._people: People | None = None
+        numbers = [None, *range(1, settings.people + 1)][settings.people > 0 :]
+        self._reports = [TrackingReport() for _ in numbers]
+        bodies = TrackedBodies(self, len(numbers)) if settings.rep155_id else None
+        self._outputs = [TrackerOutputs(self, settings, person, bodies) for person in numbers]
+        for number in range(1, settings.people + 1):
+            self.offer(f"~/person_{number}/reset", partial(self._reset_person, number))
         self._model_topic = self.resolve("body_model")
         self.subscribe(String, "body_model", self._on_model, qos.LATCHED)
         self._inputs = CameraInputs(self, settings, self._on_cameras, self._on_input)
@@ -114,7 +122,7 @@ class TrackerNode(CardboxNode):
         if self._tracker is None:
             return
         config = settings.config()
-        if restarts(self._tracker.config, config):
+        if self._people is not None or restarts(self._tracker.config, config):
             self._build("other settings of the particles")
         else:
             self._tracker.configure(config)
@@ -128,10 +136,18 @@ class TrackerNode(CardboxNode):
             return
         settings = self.parameters.value
         rng = np.random.default_rng(settings.seed)
-        self._tracker = Tracker(
-            self._body, self._camera, settings.config(), rng, others=self._others
-        )
-        self._report.start(self._tracker.body)
+        if settings.people:
+            self._people = People(
+                [self._body], self._camera, settings.config(), rng, settings.people
+            )
+            trackers = self._people.trackers
+        else:
+            trackers = [
+                Tracker(self._body, self._camera, settings.config(), rng, others=self._others)
+            ]
+        self._tracker = trackers[0]
+        for report, tracker in zip(self._reports, trackers, strict=True):
+            report.start(tracker.body)
         self.diagnostics.say(reason, f"{reason}: tracking starts from the front reference posture")
 
     def _reset(self) -> str:
@@ -143,6 +159,13 @@ class TrackerNode(CardboxNode):
             )
         self._build("reset")
         return "tracking starts again from the front reference posture"
+
+    def _reset_person(self, number: int) -> str:
+        """Answer the service ``person_N/reset``."""
+        if self._people is None:
+            return self._reset()
+        self._people.reset(number)
+        return f"person {number} is sought again"
 
     def _wait(self) -> None:
         """Report missing inputs."""
@@ -168,16 +191,22 @@ class TrackerNode(CardboxNode):
             self._inputs.check()
             self._wait()
             text = "no body model yet: call initializer/initialize"
-            self._outputs.waiting(lead.message, lead.image, text)
+            self._outputs[0].waiting(lead.message, lead.image, text)
             return
         seen = self._inputs.observed(received)
-        estimate = self._tracker.track(seen.observations)
-        self._outputs.publish(seen, estimate, self._tracker)
-        news = self._report.add(estimate, self._tracker.body)
-        for kind, text in news.items():
-            self.diagnostics.say(kind, text)
-        if self._found is not None and "body" in news:
-            self._found.publish(self._tracker.body, seen.header.frame_id)
+        if self._people is None:
+            found = [(self._tracker.track(seen.observations), self._tracker)]
+        else:
+            found = self._people.track(seen.observations[0], seen.people)
+        for outputs, report, (estimate, tracker) in zip(
+            self._outputs, self._reports, found, strict=True
+        ):
+            outputs.publish(seen, estimate, tracker)
+            news, named = report.add(estimate, tracker.body), _named(estimate.person)
+            for kind, text in news.items():
+                self.diagnostics.say(named + kind, named + text)
+            if self._found is not None and "body" in news and tracker is self._tracker:
+                self._found.publish(tracker.body, seen.header.frame_id)
         self._agreement.see(self._tracker.agreement)
         self.diagnostics.advice = self._warnings
         self.diagnostics.working(seen.sent_ns)
@@ -186,13 +215,30 @@ class TrackerNode(CardboxNode):
         """Return warnings for the diagnostics."""
         remarks = [] if self._tracker is None else self._tracker.remarks
         images = {f"images {number}": text for number, text in enumerate(remarks)}
-        told = self._inputs.warnings() | self._agreement.warnings() | self._report.warnings()
+        told = self._inputs.warnings() | self._agreement.warnings()
+        for name, report in self._named_reports():
+            told |= {name + kind: name + text for kind, text in report.warnings().items()}
         return told | images
 
     def _values(self) -> dict[str, str]:
         """Return the values of the diagnostics."""
         ious = [] if self._tracker is None else self._tracker.camera_ious()
-        return self._report.values(self._inputs.values(ious) | self._agreement.values())
+        used = {} if self._tracker is None else self._tracker.used_texts()
+        common = self._inputs.values(ious) | self._agreement.values() | used
+        values: dict[str, str] = {}
+        for name, report in self._named_reports():
+            values |= {name + key: text for key, text in report.values(common).items()}
+            common = {}
+        return values
+
+    def _named_reports(self) -> Iterator[tuple[str, TrackingReport]]:
+        for number, report in enumerate(self._reports, 1):
+            yield _named(number if self.parameters.value.people else None), report
+
+
+def _named(person: int | None) -> str:
+    """Return the beginning of texts about one of several people."""
+    return "" if person is None else f"person {person} "
 
 
 def main(args: list[str] | None = None) -> int:

@@ -8,10 +8,10 @@ from sensor_msgs.msg import Image
 from std_msgs.msg import Bool
 
 from cardbox_tracker.applications.drawing.overlay import draw_camera_overlay, draw_message
-from cardbox_tracker.recordings.outputs import Output, OutputStream, outputs
+from cardbox_tracker.recordings.outputs import Output, OutputStream, outputs, person_space
 from cardbox_tracker.ros.messages import conversions, results
 from cardbox_tracker.ros.nodes.camera_inputs import ObservationSet
-from cardbox_tracker.ros.nodes.rep155_outputs import Rep155Outputs
+from cardbox_tracker.ros.nodes.rep155_outputs import Rep155Outputs, TrackedBodies
 from cardbox_tracker.ros.nodes.tf_outputs import TfOutputs
 from cardbox_tracker.ros.nodes.tracker_parameters import TrackerParameters
 from cardbox_tracker.ros.runtime import qos
@@ -23,27 +23,46 @@ from cardbox_tracker.tracking.tracker import Tracker
 class TrackerOutputs:
     """The tracker's topics; each message is made only while the topic has a subscriber."""
 
-    def __init__(self, node: CardboxNode, settings: TrackerParameters) -> None:
+    def __init__(
+        self,
+        node: CardboxNode,
+        settings: TrackerParameters,
+        person: int | None = None,
+        bodies: TrackedBodies | None = None,
+    ) -> None:
         """Advertise the topics for ``node``; ``settings`` decide about REP-155 and TF.
+
+        Args:
+            node: the tracker.
+            settings: its parameters.
+            person: number of one of several people; None if there is only one.
+            bodies: publishes the list of people after REP-155; None without it.
 
         Raises:
             CardboxError: TF is requested, but its messages are not installed.
         """
         topics = outputs(settings.torso_place)
+        space = "" if person is None else f"{person_space(person)[1:]}/"
         self._publishers = {
             output.topic: node.advertise(
-                results.message_type(output.kind), output.topic, qos.RESULT
+                results.message_type(output.kind), space + output.topic, qos.RESULT
             )
             for output in topics
         }
         self._stream = OutputStream(topics)
-        self._overlay = node.advertise(Image, "overlay", qos.SENSOR_DATA)
+        self._overlay = node.advertise(Image, f"{space}overlay", qos.SENSOR_DATA)
         self._camera_overlays = [
             node.advertise(Image, f"{camera.rstrip('/')}/overlay", qos.SENSOR_DATA)
             for camera in settings.cameras
+            if person is None
         ]
-        self._human = Rep155Outputs(node, settings) if settings.rep155_id else None
-        self._tf = TfOutputs(node, settings) if settings.publish_tf else None
+        ending = "" if person is None else f"_{person}"
+        self._human = None
+        if bodies is not None:
+            self._human = Rep155Outputs(node, settings, settings.rep155_id + ending, bodies)
+        self._tf = None
+        if settings.publish_tf:
+            self._tf = TfOutputs(node, settings, None if person is None else f"person{ending}")
         self._guided = False
         node.subscribe(Bool, "initializer/guiding", self._on_guiding, qos.LATCHED)
 

@@ -29,6 +29,7 @@ from cardbox_tracker.search.config import PRESETS, FilterConfig, TrackerConfig
 from cardbox_tracker.search.resampling import STRATEGIES
 from cardbox_tracker.search.settings_file import read_settings
 from cardbox_tracker.search.whole_body_config import WholeBodyConfig
+from cardbox_tracker.tracking.people import MOST_PEOPLE
 
 _NEXT_START = "next start of tracking"
 
@@ -171,6 +172,13 @@ class TrackerParameters(NodeParameters):
         effect=AT_START,
     )
 
+    people: int = parameter(
+        0,
+        "number of people to track with one camera, each with topics below person_1, person_2 ...; "
+        "body_model is the body of each; 0: one person without a number",
+        limits=(0, MOST_PEOPLE),
+        effect=AT_START,
+    )
     cameras: list[str] = cameras_parameter()
     extrinsics_file: str = extrinsics_parameter()
     depth: str = depth_parameter()
@@ -228,6 +236,11 @@ class TrackerParameters(NodeParameters):
             raise ValueError(
                 f"the preset {self.preset} uses the silhouette of one camera; set preset to "
                 "default with several cameras or depth"
+            )
+        if self.people and (len(self.cameras) > 1 or self.depth or self.preset != "default"):
+            raise ValueError(
+                f"people is {self.people}; several people are tracked with one camera, without "
+                "depth, and with the preset default"
             )
         camera_names(self.cameras)
         if self.stature and len(self.cameras) > 1:

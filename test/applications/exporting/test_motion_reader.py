@@ -86,6 +86,18 @@ def test_a_table_is_read_as_it_was_written(name: str, tmp_path: Path) -> None:
     assert body is None
 
 
+def test_of_several_people_one_is_read(tmp_path: Path) -> None:
+    lines = write_table(tmp_path / "one.csv").read_text().splitlines()
+    rows = [f"{row},{person}" for row in lines[1:] for person in (1, 2)]
+    rows[-1] = rows[-1].replace(",tracking,", ",lost,").replace(",uncertain,", ",lost,")
+    (tmp_path / "two.csv").write_text("\n".join([f"{lines[0]},person", *rows]))
+    for person in (None, 1):
+        assert_is_what_was_written(read_motion(tmp_path / "two.csv", person)[0])
+    assert read_motion(tmp_path / "two.csv", 2)[0].state[-1] == "lost"
+    with pytest.raises(CardboxError, match="has no column person: it is of one person"):
+        read_motion(tmp_path / "one.csv", 2)
+
+
 def test_a_bag_is_read_with_its_body(tmp_path: Path) -> None:
     motion, body = read_motion(write_bag(tmp_path / "results"))
     assert_is_what_was_written(motion)

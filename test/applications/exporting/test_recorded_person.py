@@ -41,7 +41,7 @@ def exported(tmp_path_factory: pytest.TempPathFactory) -> Path:
     start = ("--start", f"{truth.spans['neutral'][0]}", "--csv", table)
     assert main(["track", str(SESSION), *scene, "--model", body, *start]) == 0
     has_c3d = importlib.util.find_spec("ezc3d") is not None
-    for name in ("trc", "bvh", "isb", *(["c3d"] if has_c3d else [])):
+    for name in ("trc", "mot", "bvh", "isb", *(["c3d"] if has_c3d else [])):
         output = ("--to", name, "--model", body, "--output", str(folder / f"person.{name}"))
         assert main(["export", table, *output]) == 0
     return folder

@@ -290,6 +290,19 @@ def test_silence_and_other_clocks_are_said(
     assert values["right rate (Hz)"] == "2.0"
 
 
+def test_stamps_that_stand_still_are_said(watching: Watching) -> None:
+    for number in range(15):
+        stamp_ns = 100 * S + number * S // 10
+        watching.show("left", stamp_ns)
+        watching.show("right", 100 * S)
+        watching.show_depth(stamp_ns, np.ones((48, 64)))
+    text = "; ".join(watching.source.warnings().values())
+    assert "the stamps of the last 14 messages on /right/silhouette stand still" in text
+    assert watching.views[-1].observations[1].silhouette is None
+    watching.show("right", 102 * S)
+    assert not any("stand still" in text for text in watching.source.warnings().values())
+
+
 CLOCKS = "Cameras that disagree, or that come and go, are reported"
 
 

@@ -18,10 +18,11 @@ from std_msgs.msg import Header
 from cardbox_tracker.camera.camera import Calibration
 from cardbox_tracker.common.errors import CardboxError
 from cardbox_tracker.detectors.detector import PersonDetector
+from cardbox_tracker.detectors.image_points import POINT_INDEX
 from cardbox_tracker.detectors.landmarks import LANDMARKS
 from cardbox_tracker.detectors.pose_network import Detection
 from cardbox_tracker.ros.messages.conversions import calibration_message, image_message
-from cardbox_tracker.ros.messages.keypoints import MESSAGE_NAMES
+from cardbox_tracker.ros.messages.keypoints import MESSAGE_NAMES, persons_of_polygon
 from cardbox_tracker.ros.nodes.detector_node import DetectorNode
 
 WIDTH, HEIGHT = 640, 480
@@ -200,3 +201,16 @@ def test_without_the_network_files_it_is_said_what_to_do(
 
 def test_every_point_of_the_message_is_a_landmark() -> None:
     assert set(MESSAGE_NAMES) <= set(LANDMARKS)
+
+
+def test_several_people_are_in_one_message(bus: Any) -> None:
+    driver = Driver(bus, people=2, publish_silhouette=True)
+    places = (np.full((33, 2), column / 2 - 0.25) for column in (60.0, 200.0))
+    pair = [Detection(place, np.full(33, 0.75), np.zeros((240, 320), np.uint8)) for place in places]
+    driver.node._person.all_in = lambda at_ns, image: pair  # type: ignore[method-assign]
+    driver.show(100.0)
+    (message,) = bus.sent["/detector/keypoints"]
+    people = persons_of_polygon(message, (640, 480))
+    assert len(message.polygon.points) == 42 and len(people) == 2
+    columns = [person.px[POINT_INDEX["left_elbow"], 0] for person in people]
+    assert columns == pytest.approx([60.0, 200.0], abs=1.0)

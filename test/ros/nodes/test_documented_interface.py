@@ -157,6 +157,7 @@ def nodes_called(name: str, make: Callable[..., Any], folder: Path) -> list[Any]
     if name == "tracker":
         return [
             make(TrackerNode, rep155_id="ID", keypoints="KEYPOINTS"),
+            make(TrackerNode, people=1, keypoints="KEYPOINTS"),
             make(TrackerNode, cameras=["CAMERA"], depth="DEPTH", keypoints="KEYPOINTS"),
         ]
     if name == "retarget":

@@ -256,6 +256,51 @@ def test_a_table_is_looked_up_by_the_stamp(bus: Any, tmp_path: Path) -> None:
     assert nose_of(tracker.ask(T)) == pytest.approx((9.55, 9.55))
 
 
+def test_a_table_joins_the_nearest_image_and_says_how_many(bus: Any, tmp_path: Path) -> None:
+    tracker = Tracker(bus, str(table(tmp_path, f"{T + 1},nose,100,100,0.5"))).calibrate()
+    for at_ns in (T, T + 15 * MS, T + 17 * MS):
+        tracker.ask(at_ns)
+    assert tracker.inputs.values()["keypoints in images"] == "2 of 3"
+
+
+def test_points_beside_the_silhouette_are_not_used(bus: Any) -> None:
+    tracker = Tracker(bus).calibrate()
+    silhouette = np.zeros((48, 64), np.uint8)
+    silhouette[5:40, 28:44] = 255
+    for image in range(12):
+        at_ns = T + image * 33 * MS
+        tracker.bus.send("/points", keypoints(at_ns))
+        assert tracker.inputs.points(0, header(at_ns), CAMERA, silhouette) is None
+    assert "the points of the last 12 images are not used: they lie beside" in tracker.warning()
+    assert tracker.inputs.values()["keypoints in images"] == "0 of 12"
+
+
+@pytest.mark.parametrize(
+    ("row", "words"),
+    [
+        (f"{T},nose,nan,100,0.5", "line 2: nose is at"),
+        (f"{T},nose,100,100,1.5", "line 2: nose has the score 1.5"),
+        ("\n".join(f"{T},{name},0.5,0.5,1" for name in ("nose", "left_eye", "left_ear")), "shares"),
+    ],
+)
+def test_a_table_is_checked_as_messages_are(bus: Any, tmp_path: Path, row: str, words: str) -> None:
+    with pytest.raises(CardboxError, match=words):
+        Tracker(bus, str(table(tmp_path, row)))
+
+
+def test_a_point_of_a_table_far_outside_the_image_is_not_used(bus: Any, tmp_path: Path) -> None:
+    tracker = Tracker(bus, str(table(tmp_path, f"{T},nose,9000,100,0.5"))).calibrate()
+    assert tracker.ask(T) is None
+    assert "nose is at (9000.0, 100.0) px; expected a place in the camera's" in tracker.warning()
+
+
+def test_the_node_needs_a_table_with_stamps(bus: Any, tmp_path: Path) -> None:
+    path = tmp_path / "points.csv"
+    path.write_text("frame,joint,u,v,score\n0,nose,1,1,1\n")
+    with pytest.raises(CardboxError, match="has no column stamp_ns"):
+        Tracker(bus, str(path))
+
+
 def test_a_table_of_several_cameras_names_them(bus: Any, tmp_path: Path) -> None:
     path = table(tmp_path, f"{T},nose,100,100,0.5,cam1", camera=True)
     tracker = Tracker(bus, str(path), ("cam0", "cam1")).calibrate()

@@ -17,7 +17,7 @@ from std_msgs.msg import Header
 
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.posture import reference_posture
-from cardbox_tracker.ros.nodes.rep155_outputs import Rep155Outputs
+from cardbox_tracker.ros.nodes.rep155_outputs import Rep155Outputs, TrackedBodies
 from cardbox_tracker.tracking.estimate import LOST, TRACKING, Estimate
 
 PLACE = "/humans/bodies/p1"
@@ -43,8 +43,8 @@ class Recorder:
 
 def published(*estimates: Estimate) -> Recorder:
     node: Any = Recorder()
-    settings: Any = SimpleNamespace(rep155_id="p1", torso_place=True)
-    outputs = Rep155Outputs(node, settings)
+    settings: Any = SimpleNamespace(torso_place=True)
+    outputs = Rep155Outputs(node, settings, "p1", TrackedBodies(node))
     tracker: Any = SimpleNamespace(body=BodyModel.of(distance_m=2.3))
     for estimate in estimates:
         outputs.publish(Header(frame_id="eye"), estimate, tracker)
@@ -80,3 +80,21 @@ def test_with_hri_msgs_it_is_said_who_is_there(monkeypatch: pytest.MonkeyPatch) 
     lists = node.sent["/humans/bodies/tracked"]
     assert [message.ids for message in lists] == [["p1"], [], ["p1"]]
     assert lists[0].header.frame_id == "eye"
+
+
+def test_several_people_are_in_one_list(monkeypatch: pytest.MonkeyPatch) -> None:
+    module = ModuleType("hri_msgs.msg")
+    module.__dict__["IdsList"] = IdsList
+    monkeypatch.setitem(sys.modules, "hri_msgs", ModuleType("hri_msgs"))
+    monkeypatch.setitem(sys.modules, "hri_msgs.msg", module)
+    node: Any = Recorder()
+    settings: Any = SimpleNamespace(torso_place=True)
+    bodies = TrackedBodies(node, 2)
+    people = [Rep155Outputs(node, settings, name, bodies) for name in ("p_1", "p_2")]
+    tracker: Any = SimpleNamespace(body=BodyModel.of(distance_m=2.3))
+    for found in ((FOUND, FOUND), (Estimate(LOST), FOUND)):
+        for outputs, estimate in zip(people, found, strict=True):
+            outputs.publish(Header(frame_id="eye"), estimate, tracker)
+    lists = node.sent["/humans/bodies/tracked"]
+    assert [message.ids for message in lists] == [["p_1", "p_2"], ["p_2"]]
+    assert len(node.sent["/humans/bodies/p_2/joint_states"]) == 2

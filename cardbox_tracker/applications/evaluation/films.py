@@ -1,0 +1,190 @@
+"""Recorded sessions as the films that people make, and the figures of tracking them.
+
+A film shows the motions only, is compressed, and does not tell its camera. The optical axis of a
+phone is in the middle of its image, so the images of a session are turned until theirs is; the
+truth is turned with them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from cardbox_tracker.applications.drawing.video import video_file
+from cardbox_tracker.applications.evaluation.people import people_figures
+from cardbox_tracker.applications.evaluation.session import RecordedSession, load_session
+from cardbox_tracker.applications.evaluation.tracking import run_of
+from cardbox_tracker.common.errors import CardboxError
+from cardbox_tracker.person.model import BodyModel
+from cardbox_tracker.recordings.open_images import open_images
+from cardbox_tracker.tracking.estimate import Estimate
+
+FloatArray = NDArray[np.float64]
+
+SHAPES: Mapping[str, float | None] = {"across": None, "upright": 9 / 16}
+"""Width of a film's images as a share of their height, by name; None: as it was recorded."""
+
+_FIGURES = (
+    *("frames", "without_estimate", "aligned", "absolute"),
+    *("tracking", "tracking_beyond_30"),
+)
+
+
+class Film(NamedTuple):
+    """A session as a film.
+
+    Attributes:
+        session: its truth, in the optical frame of the film.
+        shape: a name of ``SHAPES``.
+        path: the video.
+        fov_deg: field of view across its width.
+        stamps_ns: stamps of the session for the images of the film.
+    """
+
+    session: RecordedSession
+    shape: str
+    path: Path
+    fov_deg: float
+    stamps_ns: tuple[int, ...]
+
+
+def make_film(folder: Path, shape: str, path: Path) -> Film:
+    """Write a session, as its first camera sees it, as a film without its empty scene.
+
+    Args:
+        folder: the session.
+        shape: a name of ``SHAPES``.
+        path: video to write, .mp4.
+
+    Raises:
+        CardboxError: the folder is not a session, or the video cannot be written.
+    """
+    session = load_session(folder)
+    if session.truth.stature_m is None:
+        raise CardboxError(f"{folder} does not say the stature of the person")
+    name = session.truth.cameras[0] if session.truth.cameras else None
+    if name is not None:
+        session = load_session(folder, (name,))
+    with open_images(session.bag) as bag:
+        lens = bag.calibration(name)
+        share = SHAPES[shape]
+        height = lens.height // 2 * 2
+        width = lens.width // 2 * 2 if share is None else round(height * share / 2) * 2
+        begins_ns = session.truth.start_ns + round(1e9 * session.start_s)
+        images = [i for i in bag.images(bag.image_topic(name)) if i.stamp_ns >= begins_ns]
+        stamps_ns = tuple(image.stamp_ns for image in images)
+        k = lens.k.copy()
+        k[:2, 2] = (width - 1) / 2, (height - 1) / 2
+        column = (lens.width - 1) / 2
+        if share is not None:
+            # An upright phone points at the person.
+            there = session.keypoints_m.mean(axis=1) @ lens.k.T
+            column = float(np.median(there[:, 0] / there[:, 2]))
+        turn = _turn(lens.k, (column, (lens.height - 1) / 2), session.truth.pitch_deg)
+        size = (width, height)
+        maps = cv2.initUndistortRectifyMap(lens.k, lens.distortion, turn, k, size, cv2.CV_32FC1)
+        fps = round(1e9 / float(np.median(np.diff(stamps_ns))), 2)
+        with video_file(path, fps) as add:
+            for image in images:
+                shown = image.as_sent
+                color = shown if shown.ndim == 3 else cv2.cvtColor(shown, cv2.COLOR_GRAY2BGR)
+                add(cv2.remap(color, *maps, cv2.INTER_LINEAR).astype(np.uint8))
+    hips = session.hips_m
+    pitch_deg = float(np.degrees(np.arcsin(turn[2] @ _down(session.truth.pitch_deg))))
+    turned = replace(
+        session,
+        truth=replace(session.truth, pitch_deg=pitch_deg),
+        keypoints_m=session.keypoints_m @ turn.T,
+        hips_m=None if hips is None else hips @ turn.T,
+    )
+    fov_deg = float(np.degrees(2 * np.arctan(width / 2 / k[0, 0])))
+    return Film(turned, shape, path, fov_deg, stamps_ns)
+
+
+def _down(pitch_deg: float) -> FloatArray:
+    pitch_rad = np.radians(pitch_deg)
+    return np.array([0.0, np.cos(pitch_rad), np.sin(pitch_rad)])
+
+
+def _turn(k: FloatArray, middle: tuple[float, float], pitch_deg: float) -> FloatArray:
+    """Return the rotation (3, 3) to a level camera whose axis goes through a pixel."""
+    ahead = np.linalg.solve(k, [*middle, 1.0])
+    ahead /= np.linalg.norm(ahead)
+    right = np.cross(_down(pitch_deg), ahead)
+    right /= np.linalg.norm(right)
+    return np.array([right, np.cross(ahead, right), ahead])
+
+
+def film_figures(
+    film: Film, estimates: Sequence[Estimate], body: BodyModel | None
+) -> dict[str, Any]:
+    """Return figures of :func:`people_figures`, and the pitch that was found and is true, deg.
+
+    Args:
+        film: what was tracked.
+        estimates: one for each image of the film.
+        body: the body at the end.
+    """
+    by_stamp = dict(zip(film.stamps_ns, estimates, strict=True))
+    # The time of an image is not measured.
+    run = run_of(film.session, body, "", by_stamp, [float("nan")])
+    every = people_figures(film.session, run)
+    found = {name: every[name] for name in _FIGURES if name in every}
+    if body is not None:
+        found["pitch_found_deg"] = float(np.degrees(body.camera_pose.pitch_rad))
+    return found | {"pitch_deg": film.session.truth.pitch_deg}
+
+
+def films_report(results: Mapping[str, Any]) -> str:
+    """Return the report in Markdown of the contents of ``films.json``."""
+    lines = [
+        "# Sessions as films",
+        "",
+        "Each session is tracked by `cardbox track FILM --detector mediapipe` with what is given, "
+        "and without an empty scene. Errors are those of shoulders, elbows and hands, cm; "
+        "*aligned*: beside the middle of the shoulders.",
+        "",
+        "| film | given | aligned | absolute | MediaPipe aligned | `tracking`, % | of these beyond "
+        "30 cm, % | without posture, % | pitch found / true, degrees |",
+        "|---" * 9 + "|",
+    ]
+    groups: dict[tuple[str, ...], list[Mapping[str, Any]]] = {}
+    for film in results["films"]:
+        lines.append(_row(film["name"], [film]))
+        groups.setdefault((film["group"], film["shape"], film["given"]), []).append(film)
+    for (group, shape, _), films in groups.items():
+        if len(films) > 1:
+            lines.append(_row(f"**mean of {len(films)} in {group}, {shape}**", films))
+    made = f"Made by `{results['command']}` at commit {results['provenance']['commit']}."
+    return "\n".join([*lines, "", made, ""])
+
+
+def _row(name: str, films: Sequence[Mapping[str, Any]]) -> str:
+    runs = [run for film in films for run in film["runs"]]
+
+    def mean(key: str, of: Sequence[Mapping[str, Any]] = runs) -> float:
+        values = [one.get(key) for one in of]
+        return float(np.mean([np.nan if value is None else value for value in values]))
+
+    def share(part: Callable[[Mapping[str, Any]], float], whole: str) -> float:
+        total = sum(run[whole] for run in runs)
+        return 100 * sum(map(part, runs)) / total if total else float("nan")
+
+    cells = [
+        name,
+        str(films[0]["given"]),
+        f"{mean('aligned'):.1f}",
+        f"{mean('absolute'):.1f}",
+        f"{mean('mediapipe_aligned', films):.1f}",
+        f"{share(lambda run: run['tracking'], 'frames'):.0f}",
+        f"{share(lambda run: run['tracking_beyond_30'], 'tracking'):.1f}",
+        f"{share(lambda run: run['without_estimate'], 'frames'):.0f}",
+        f"{mean('pitch_found_deg'):.1f} / {mean('pitch_deg'):.1f}",
+    ]
+    return f"| {' | '.join(cells)} |".replace("nan", "")

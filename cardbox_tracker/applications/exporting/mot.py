@@ -1,0 +1,94 @@
+"""Coordinates of a tracked motion as OpenSim's MOT, in the names of its models with arms.
+
+The models' axes are X forwards, Y up, Z to the right; a left arm is the mirror image of a right
+one. The pelvis is not seen: it stays level and faces the camera, so that the lumbar joint has all
+of the trunk's rotation. The elbow's axis is taken as Z; the models lean it by 13 degrees.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from cardbox_tracker.applications.exporting.motion import Motion
+from cardbox_tracker.applications.exporting.placed import frames_of
+from cardbox_tracker.common.files import atomic_path
+from cardbox_tracker.person.isb_angles import LABORATORY, LEAST_BENT_RAD, thorax_angles
+from cardbox_tracker.person.model import BodyModel
+from cardbox_tracker.person.posture import LEFT_ARM, RIGHT_ARM
+from cardbox_tracker.person.sizes import FloatArray
+from cardbox_tracker.person.skeleton import arm_directions, rotation_x, rotation_z
+
+LUMBAR = ("lumbar_extension", "lumbar_bending", "lumbar_rotation")
+"""Rotations about Z, X' and Y''."""
+ARM = ("arm_flex", "arm_add", "arm_rot", "elbow_flex")
+"""Rotations of the upper arm about Z, X' and Y'', then of the forearm about Z."""
+PELVIS = ("pelvis_tx", "pelvis_ty", "pelvis_tz")
+"""Place of the middle of the hips, m, with the camera at the origin."""
+
+_MIRROR = np.array([1.0, 1.0, -1.0])
+
+
+def coordinates_of(states: FloatArray) -> dict[str, FloatArray]:
+    """Return the rotations, (n,), rad, by the names of the coordinates.
+
+    Args:
+        states: (n, 14), rad and metres, without gaps.
+    """
+    found = dict(zip(LUMBAR, thorax_angles(states).T, strict=True))
+    for suffix, arm, side in (("r", RIGHT_ARM, -1.0), ("l", LEFT_ARM, 1.0)):
+        directions = arm_directions(states[:, arm], side)
+        mirror = _MIRROR if side > 0 else np.ones(3)
+        angles = _arm_angles(*(one @ LABORATORY.T * mirror for one in directions))
+        found |= {f"{name}_{suffix}": angles[:, i] for i, name in enumerate(ARM)}
+    return found
+
+
+def _arm_angles(upper: FloatArray, lower: FloatArray) -> FloatArray:
+    """Return the angles of ``ARM``, (n, 4), of a right arm's unit vectors (n, 3) in the trunk.
+
+    A straight elbow does not show the rotation of the upper arm, which then stays as it was.
+    """
+    flexion = np.arctan2(upper[:, 0], -upper[:, 1])
+    adduction = np.arcsin(np.clip(-upper[:, 2], -1.0, 1.0))
+    local = np.einsum("nij,njk,nk->ni", rotation_x(-adduction), rotation_z(-flexion), lower)
+    bend = np.arctan2(np.hypot(local[:, 0], local[:, 2]), -local[:, 1])
+    is_known = bend >= LEAST_BENT_RAD
+    last = np.maximum.accumulate(np.where(is_known, np.arange(len(bend)), -1))
+    turned = np.arctan2(-local[:, 2], local[:, 0])
+    rotation = np.where(
+        last < 0, turned[np.argmax(is_known)] if is_known.any() else 0, turned[last]
+    )
+    return np.stack([flexion, adduction, np.unwrap(rotation), bend], axis=1)
+
+
+def write_mot(path: Path, motion: Motion, body: BodyModel | None) -> None:
+    """Write a row for each image with a posture: time (s), rotations (degrees), place (m).
+
+    Args:
+        path: file to write.
+        motion: the results.
+        body: the person that was tracked; without it there is no place.
+
+    Raises:
+        CardboxError: the file cannot be written.
+    """
+    seen = motion.is_seen
+    columns = {name: np.degrees(of) for name, of in coordinates_of(motion.states[seen]).items()}
+    if body is not None:
+        hips_m = (frames_of(motion, body).hip @ LABORATORY.T)[seen]
+        columns |= dict(zip(PELVIS, hips_m.T, strict=True))
+    rows = np.column_stack([motion.time_s[seen], *columns.values()])
+    header = (
+        path.stem,
+        "version=1",
+        f"nRows={len(rows)}",
+        f"nColumns={rows.shape[1]}",
+        "inDegrees=yes",
+        "endheader",
+        "\t".join(("time", *columns)),
+    )
+    with atomic_path(path) as temporary, temporary.open("w", encoding="utf-8") as file:
+        file.writelines(f"{line}\n" for line in header)
+        file.writelines("\t".join(f"{value:.6f}" for value in row) + "\n" for row in rows)

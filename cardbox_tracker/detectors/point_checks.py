@@ -1,0 +1,89 @@
+"""The check of points that another program has found, whether they come in files or messages."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from math import isfinite
+
+import numpy as np
+
+from cardbox_tracker.common.errors import CardboxError, quoted
+from cardbox_tracker.detectors.image_points import POINT_NAMES, ImagePoints
+
+Size = tuple[int, int]
+"""Width and height of the camera's image, px."""
+NamedPoint = tuple[str, float, float, float]
+"""Name, column and row (px), and score of a point."""
+
+# float32 rounds a score of 1 by less.
+_MOST_SCORE = 1.001
+# A point may lie outside the image, but by no more than this multiple of the larger side.
+_MOST_OUTSIDE = 1.0
+# No person is as small as this, px; shares of the image are from 0 to 1, and guesses beyond it.
+_SHARES, _LEAST_POINTS = 1.5, 3
+
+
+def check_point(point: NamedPoint, size: Size | None) -> None:
+    """Check one point; one with the score 0 is missing and may be anywhere.
+
+    Args:
+        point: the point.
+        size: size of the camera's image; None if it is not known, so that any place will do.
+
+    Raises:
+        CardboxError: its score is no chance, or its place is not in or near the image.
+    """
+    name, column, row, score = point
+    if not 0.0 <= score <= _MOST_SCORE:
+        raise CardboxError(f"{name} has the score {score:g}; expected a chance from 0 to 1")
+    if score == 0.0:
+        return
+    far_px = np.inf if size is None else _MOST_OUTSIDE * max(size)
+    sides = zip((column, row), size or (0, 0), strict=True)
+    if not all(isfinite(at) and -far_px <= at <= side + far_px for at, side in sides):
+        of = "" if size is None else f" of {size[0]}x{size[1]} px"
+        raise CardboxError(
+            f"{name} is at {quoted((column, row))} px; expected a place in the camera's image{of}, "
+            "or the score 0 if the point is missing"
+        )
+
+
+def person_of(points: Iterable[NamedPoint], size: Size | None) -> ImagePoints:
+    """Return the person of some points; those with the score 0 are missing.
+
+    Raises:
+        CardboxError: see :func:`check_point`; or the places are shares of the image.
+    """
+    found = {}
+    for point in points:
+        check_point(point, size)
+        if point[3] > 0.0:
+            found[point[0]] = point[1:]
+    check_person(found)
+    return ImagePoints.of(found)
+
+
+def check_person(found: dict[str, tuple[float, float, float]]) -> None:
+    """Check that the points of one person, by name, are not shares of the image.
+
+    Raises:
+        CardboxError: they are.
+    """
+    places = np.array([point[:2] for point in found.values()])
+    if len(places) >= _LEAST_POINTS and np.abs(places).max() <= _SHARES:
+        raise CardboxError(
+            f"all points of a person are within {_SHARES:g} px of the image's corner, as shares of "
+            "the image from 0 to 1 are; expected pixels: multiply columns by the width of the "
+            "image, and rows by its height"
+        )
+
+
+def check_places(person: ImagePoints, size: Size) -> None:
+    """Check the places of points that were read before the ``size`` of the image was known.
+
+    Raises:
+        CardboxError: see :func:`check_point`.
+    """
+    points = zip(POINT_NAMES, person.px.tolist(), person.scores.tolist(), strict=True)
+    for name, (column, row), score in points:
+        check_point((name, column, row, score), size)

@@ -1,0 +1,98 @@
+"""The focal length that a phone writes into a film or an image: the equivalent on 35 mm film.
+
+Images state it as EXIF ``FocalLengthIn35mmFilm``. Films have it among their QuickTime metadata, in
+``meta`` of the film or of a track: names of values in ``keys``, the values in ``ilst``.
+"""
+
+from __future__ import annotations
+
+import os
+import struct
+from collections.abc import Iterator
+from pathlib import Path
+from typing import BinaryIO
+
+from PIL import Image
+
+FILM_DIAGONAL_MM = 43.27
+"""Diagonal of the image on 35 mm film, to which the equivalent focal length belongs."""
+
+# First bytes of JPEG and PNG.
+_IMAGES = b"\xff\xd8", b"\x89PNG"
+_EXIF_IFD, _EXIF_EQUIVALENT = 0x8769, 0xA405
+_ENDING = b"focal_length.35mm_equivalent"
+_SHORTEST_MM, _LONGEST_MM = 4.0, 2000.0
+# Boxes of a film that contain boxes, and types of real numbers.
+_CONTAINERS = (b"moov", b"trak", b"udta")
+_REALS = {23: ">f", 24: ">d"}
+_MOST_BYTES = 1024 * 1024
+
+
+def equivalent_mm(path: Path) -> float | None:
+    """Return the 35 mm equivalent focal length of a film or an image, mm; None if it is unknown."""
+    try:
+        with path.open("rb") as file:
+            is_image = file.read(4).startswith(_IMAGES)
+        found = _of_image(path) if is_image else _of_film(path)
+    except (OSError, ValueError, struct.error, SyntaxError):
+        # A damaged file says nothing; those who decode it say so.
+        return None
+    return found if found is not None and _SHORTEST_MM <= found <= _LONGEST_MM else None
+
+
+def _of_image(path: Path) -> float | None:
+    with Image.open(path) as image:
+        value = image.getexif().get_ifd(_EXIF_IFD).get(_EXIF_EQUIVALENT)
+    return None if value is None else float(value)
+
+
+def _of_film(path: Path) -> float | None:
+    with path.open("rb") as film:
+        for meta in _metas(film, 0, os.fstat(film.fileno()).st_size):
+            boxes = dict(_parts(meta))
+            keys = [name for _, name in _parts(boxes.get(b"keys", b"")[8:])]
+            for number, item in _parts(boxes.get(b"ilst", b"")):
+                index = int.from_bytes(number, "big") - 1
+                value = dict(_parts(item)).get(b"data", b"")
+                if 0 <= index < len(keys) and keys[index].endswith(_ENDING):
+                    return _number(value)
+    return None
+
+
+def _metas(film: BinaryIO, start: int, end: int) -> Iterator[bytes]:
+    """Yield the contents of the boxes ``meta`` between two places of a film."""
+    while start + 8 <= end:
+        film.seek(start)
+        size, kind = struct.unpack(">I4s", film.read(8))
+        header = 8
+        if size == 1:
+            size, header = struct.unpack(">Q", film.read(8))[0], 16
+        size = size or end - start
+        if size < header:
+            return
+        if kind == b"meta":
+            content = film.read(min(size - header, _MOST_BYTES))
+            # That of MP4 begins with version and flags, that of QuickTime does not.
+            yield content[4:] if content[:4] == bytes(4) else content
+        elif kind in _CONTAINERS:
+            yield from _metas(film, start + header, start + size)
+        start += size
+
+
+def _parts(content: bytes) -> Iterator[tuple[bytes, bytes]]:
+    """Yield kind and content of each box in a row of boxes."""
+    at = 0
+    while at + 8 <= len(content):
+        size, kind = struct.unpack(">I4s", content[at : at + 8])
+        if size < 8:
+            return
+        yield kind, content[at + 8 : at + size]
+        at += size
+
+
+def _number(value: bytes) -> float | None:
+    """Return the number in the content of a box ``data``: type, language, value."""
+    kind, number = int.from_bytes(value[:4], "big"), value[8:]
+    if kind in _REALS:
+        return float(struct.unpack(_REALS[kind], number)[0])
+    return float(number) if kind == 1 else float(int.from_bytes(number, "big"))

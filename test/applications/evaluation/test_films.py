@@ -1,0 +1,88 @@
+"""Sessions as films: size, times, optical axis and truth of a film, and the report."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+
+from cardbox_tracker.applications.evaluation.films import (
+    SHAPES,
+    film_figures,
+    films_report,
+    make_film,
+)
+from cardbox_tracker.applications.evaluation.session import load_session
+from cardbox_tracker.common.errors import CardboxError
+from cardbox_tracker.person.model import BodyModel
+from cardbox_tracker.tracking.estimate import NO_PERSON, TRACKING, Estimate
+
+
+@pytest.mark.parametrize("shape", SHAPES)
+def test_a_film_shows_the_motions_with_the_axis_in_the_middle(
+    shape: str, unmeasured: Path, tmp_path: Path
+) -> None:
+    session = load_session(unmeasured)
+    film = make_film(unmeasured, shape, tmp_path / "film.mp4")
+    video = cv2.VideoCapture(str(film.path))
+    width, height = (int(video.get(p)) for p in (cv2.CAP_PROP_FRAME_WIDTH, 4))
+    assert int(video.get(cv2.CAP_PROP_FRAME_COUNT)) == len(film.stamps_ns)
+    assert (width < height) == (shape == "upright")
+    # The empty scene is cut off, and nothing of the motions.
+    begins_ns = session.truth.start_ns + 1e9 * session.start_s
+    scored = {stamp for stamp in session.stamps_ns.tolist() if stamp >= begins_ns}
+    assert film.stamps_ns[0] >= begins_ns
+    assert scored and scored <= set(film.stamps_ns)
+    # Shapes stay as they are; an upright phone points at the person.
+    turned, straight = film.session.keypoints_m, session.keypoints_m
+    np.testing.assert_allclose(
+        np.linalg.norm(turned[:, 0] - turned[:, 2], axis=1),
+        np.linalg.norm(straight[:, 0] - straight[:, 2], axis=1),
+    )
+    focal = width / 2 / np.tan(np.radians(film.fov_deg) / 2)
+    columns = focal * turned[..., 0] / turned[..., 2]
+    if shape == "upright":
+        assert abs(np.median(columns.mean(axis=1))) < 0.05 * width
+    # The person is where the truth says.
+    last = film.stamps_ns.index(int(session.stamps_ns[-1]))
+    video.set(cv2.CAP_PROP_POS_FRAMES, 0)
+    images = [video.read()[1] for _ in range(last + 1)]
+    assert images[last] is not None and np.ptp(images[last]) > 50
+
+
+def test_figures_have_the_pitch_that_was_found(unmeasured: Path, tmp_path: Path) -> None:
+    film = make_film(unmeasured, "across", tmp_path / "film.mp4")
+    truth = dict(zip(film.session.stamps_ns.tolist(), film.session.keypoints_m, strict=True))
+    estimates = [
+        Estimate(TRACKING, np.zeros(12), keypoints_m=truth[stamp] + (0.0, 0.0, 0.1))
+        if stamp in truth
+        else Estimate(NO_PERSON)
+        for stamp in film.stamps_ns
+    ]
+    body = BodyModel().with_values(camera_pitch_rad=np.radians(9.0))
+    found = film_figures(film, estimates, body)
+    assert found["absolute"] == pytest.approx(10.0)
+    assert found["aligned"] == pytest.approx(0.0, abs=1e-6)
+    seen = len(set(truth) & set(film.stamps_ns))
+    assert (found["tracking"], found["tracking_beyond_30"]) == (seen, 0)
+    assert found["pitch_found_deg"] == pytest.approx(9.0)
+    entry = {
+        "name": "waves, across",
+        "group": "people",
+        "shape": "across",
+        "given": "nothing",
+        "mediapipe_aligned": None,
+        "runs": [found],
+    }
+    results = {"films": [entry, entry], "command": "made", "provenance": {"commit": "abc"}}
+    report = films_report(results)
+    assert "| waves, across | nothing | 0.0 | 10.0 |  | " in report
+    assert f"| 9.0 / {found['pitch_deg']:.1f} |" in report
+    assert "**mean of 2 in people, across**" in report
+
+
+def test_a_film_needs_a_session(tmp_path: Path) -> None:
+    with pytest.raises(CardboxError):
+        make_film(tmp_path, "across", tmp_path / "film.mp4")

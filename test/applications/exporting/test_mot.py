@@ -1,0 +1,87 @@
+"""Coordinates for OpenSim: postures by hand, directions computed back, and the file."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from cardbox_tracker.applications.exporting.mot import ARM, LUMBAR, coordinates_of, write_mot
+from cardbox_tracker.person.isb_angles import LABORATORY
+from cardbox_tracker.person.kinematics import pose
+from cardbox_tracker.person.model import BodyModel
+from cardbox_tracker.person.posture import LEFT_ARM, RIGHT_ARM
+from cardbox_tracker.person.skeleton import arm_directions, rotation_x, rotation_y, rotation_z
+
+
+def postures(count: int = 40) -> np.ndarray:
+    rng = np.random.default_rng(0)
+    states = rng.uniform(-0.5, 0.5, (count, 14))
+    states[:, 4:12] = rng.uniform(0.4, 1.4, (count, 8))
+    return states
+
+
+def forwards(found: dict[str, np.ndarray], side: float) -> tuple[np.ndarray, np.ndarray]:
+    """Return upper arm and forearm (n, 3) in OpenSim's trunk, as its joints turn about their axes.
+
+    Those of the left arm turn about -X and -Y where those of the right one turn about X and Y.
+    """
+    sign = -side
+    flex, add, rot, bend = (found[f"{name}_{'l' if side > 0 else 'r'}"] for name in ARM)
+    humerus = rotation_z(flex) @ rotation_x(sign * add) @ rotation_y(sign * rot)
+    down = np.array([0.0, -1.0, 0.0])
+    return humerus @ down, humerus @ rotation_z(bend) @ down
+
+
+@pytest.mark.parametrize(("side", "arm"), [(1.0, LEFT_ARM), (-1.0, RIGHT_ARM)])
+def test_opensim_s_joints_bring_the_limbs_back(side: float, arm: slice) -> None:
+    states = postures()
+    for found, expected in zip(
+        forwards(coordinates_of(states), side), arm_directions(states[:, arm], side), strict=True
+    ):
+        np.testing.assert_allclose(found, expected @ LABORATORY.T, atol=1e-9)
+
+
+def test_the_lumbar_joint_has_the_rotation_of_the_trunk(body: BodyModel) -> None:
+    states = postures()
+    found = coordinates_of(states)
+    extension, bending, rotation = (found[name] for name in LUMBAR)
+    turned = rotation_z(extension) @ rotation_x(bending) @ rotation_y(rotation)
+    expected = LABORATORY @ pose(body, states).torso_rotation @ LABORATORY.T
+    np.testing.assert_allclose(turned, expected, atol=1e-9)
+
+
+def test_a_straight_elbow_keeps_the_rotation_and_angles_do_not_jump() -> None:
+    states = np.zeros((60, 14))
+    states[:, 4] = 0.3
+    states[:, 6] = 0.02 * np.sin(2.0 * np.arange(60))
+    states[:, 7] = [*np.linspace(0.0, 1.5, 20), *np.linspace(1.5, 0.0, 40)]
+    found = coordinates_of(states)
+    assert np.abs(np.diff(found["arm_rot_l"])).max() < np.radians(10)
+    assert found["elbow_flex_l"][19] == pytest.approx(1.5, abs=0.01)
+
+
+def test_the_file_has_degrees_metres_and_no_row_in_a_gap(
+    tmp_path: Path, motion_of: Callable, body: BodyModel
+) -> None:
+    states = postures(4)
+    states[1] = np.nan
+    motion = motion_of(states, body)
+    write_mot(tmp_path / "person.mot", motion, body)
+    lines = (tmp_path / "person.mot").read_text().splitlines()
+    end = lines.index("endheader")
+    assert {"version=1", "nRows=3", "nColumns=15", "inDegrees=yes"} <= set(lines[:end])
+    names = lines[end + 1].split("\t")
+    rows = np.array([line.split("\t") for line in lines[end + 2 :]], float)
+    assert rows.shape == (3, len(names)) and names[0] == "time"
+    np.testing.assert_allclose(rows[:, 0], [0.0, 0.2, 0.3])
+    column = dict(zip(names, rows.T, strict=True))
+    expected = np.degrees(coordinates_of(states[[0, 2, 3]])["arm_flex_r"])
+    np.testing.assert_allclose(column["arm_flex_r"], expected, atol=1e-5)
+    hips = pose(body, states[[0, 2, 3]]).hip
+    np.testing.assert_allclose(column["pelvis_ty"], hips[:, 2], atol=1e-5)
+    np.testing.assert_allclose(column["pelvis_tx"], hips[:, 0], atol=1e-5)
+    write_mot(tmp_path / "bare.mot", motion, None)
+    assert "pelvis" not in (tmp_path / "bare.mot").read_text()

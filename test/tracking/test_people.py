@@ -1,0 +1,174 @@
+"""Several people: identities, crossings, and pixels that belong to somebody else."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+import pytest
+
+from cardbox_tracker.camera.camera import Camera
+from cardbox_tracker.camera.rasterisation import render
+from cardbox_tracker.detectors.image_points import ImagePoints
+from cardbox_tracker.person.cardbox import cardbox_patches
+from cardbox_tracker.person.model import BodyModel
+from cardbox_tracker.person.posture import N_STATE, TORSO_Y, reference_posture
+from cardbox_tracker.person.skeleton import KeypointState
+from cardbox_tracker.search.config import default_preset
+from cardbox_tracker.terms.outline import Outline
+from cardbox_tracker.terms.term import Posed
+from cardbox_tracker.terms.whole_body import WholeBodyCost
+from cardbox_tracker.terms.whole_body_config import WholeBodyCostConfig
+from cardbox_tracker.tracking.estimate import NO_PERSON, UNCERTAIN, Estimate
+from cardbox_tracker.tracking.observation import Observation
+from cardbox_tracker.tracking.people import People
+
+CAMERA = Camera(320, 240, 260.0, 260.0, 159.5, 119.5)
+BODY = BodyModel.of(distance_m=2.6, hip_height_m=-0.25)
+RED, BLUE = (40, 40, 220), (220, 60, 40)
+STEP_NS = 66_666_667
+Detect = Callable[..., ImagePoints]
+
+
+def place(aside_m: float) -> np.ndarray:
+    state = np.zeros(N_STATE)
+    state[: len(reference_posture("front"))] = reference_posture("front")
+    state[TORSO_Y] = aside_m
+    return state
+
+
+def pixels(aside_m: float) -> np.ndarray:
+    return render(cardbox_patches(BODY, place(aside_m)[:12]), CAMERA) > 0
+
+
+class Scene:
+    """People in clothes of one colour at places; the first ones stand in front."""
+
+    def __init__(self, people: People, detected: Detect | None) -> None:
+        self.people, self.detected, self.images = people, detected, 0
+
+    def __call__(
+        self, *people: tuple[float, tuple[int, int, int]], found: Sequence[int] | None = None
+    ) -> list[Estimate]:
+        """Track people at ``aside_m`` in a colour; ``found`` are those whom the detector finds."""
+        image = np.full((CAMERA.height, CAMERA.width, 3), 128, np.uint8)
+        for aside_m, colour in reversed(people):
+            image[pixels(aside_m)] = colour
+        silhouette = np.where((image != 128).any(axis=2), np.uint8(255), np.uint8(0))
+        points = None
+        if self.detected is not None:
+            numbers = range(len(people)) if found is None else found
+            points = [self.detected(BODY, CAMERA, place(people[i][0])) for i in numbers]
+        self.images += 1
+        seen = Observation(silhouette, image, stamp_ns=self.images * STEP_NS)
+        return [estimate for estimate, _ in self.people.track(seen, points)]
+
+
+def scene(detected: Detect | None, count: int | None = 2) -> Scene:
+    return Scene(People([BODY], CAMERA, default_preset(), count=count), detected)
+
+
+def places(found: list[Estimate]) -> list[float | None]:
+    return [None if one.posture is None else float(one.posture[TORSO_Y]) for one in found]
+
+
+@pytest.mark.parametrize("has_detector", [True, False])
+def test_people_are_numbered_from_left_to_right_and_keep_their_numbers(
+    has_detector: bool, detected: Detect
+) -> None:
+    show = scene(detected if has_detector else None)
+    for _ in range(8):
+        found = show((0.6, RED), (-0.6, BLUE))
+    assert [one.person for one in found] == [1, 2]
+    assert places(found) == pytest.approx([-0.6, 0.6], abs=0.06)
+
+
+def test_before_anybody_comes_each_of_a_given_number_is_nobody(detected: Detect) -> None:
+    found = scene(detected)()
+    assert [(one.person, one.state) for one in found] == [(1, NO_PERSON), (2, NO_PERSON)]
+    assert scene(detected, None)() == []
+
+
+def test_without_a_number_all_who_come_are_tracked(detected: Detect) -> None:
+    show = scene(detected, None)
+    assert len(show((0.0, RED))) == 1
+    counts = [len(show((0.0, RED), (0.9, BLUE))) for _ in range(4)]
+    # Somebody new is seen in three images first.
+    assert counts == [1, 1, 2, 2]
+
+
+def test_somebody_who_walks_past_another_keeps_the_identity(detected: Detect) -> None:
+    show = scene(detected)
+    for i in range(25):
+        aside_m = -0.9 + 0.075 * i
+        is_hidden = abs(aside_m) < 0.15
+        found = show((aside_m, RED), (0.0, BLUE), found=[0] if is_hidden else None)
+        _, standing = found
+        assert places(found) == pytest.approx([aside_m, 0.0], abs=0.15)
+        if abs(aside_m) < 0.01:
+            assert standing.state == UNCERTAIN
+            assert set(standing.keypoint_states or ()) == {KeypointState.HIDDEN}
+    assert places(found) == pytest.approx([0.9, 0.0], abs=0.06)
+
+
+def test_who_leaves_and_returns_elsewhere_keeps_the_identity_by_the_clothes(
+    detected: Detect,
+) -> None:
+    show = scene(detected)
+    for _ in range(5):
+        show((-0.7, RED), (0.5, BLUE))
+    for _ in range(60):
+        found = show((0.5, BLUE))
+    assert found[0].state == NO_PERSON
+    for _ in range(3):
+        found = show((0.5, BLUE), (-0.2, RED))
+    assert places(found) == pytest.approx([-0.2, 0.5], abs=0.1)
+
+
+def test_somebody_else_in_the_place_of_one_who_left_is_not_that_person(detected: Detect) -> None:
+    show = scene(detected, None)
+    for _ in range(4):
+        show((0.0, RED))
+    for _ in range(60):
+        show()
+    for _ in range(4):
+        found = show((0.0, BLUE))
+    assert [one.person for one in found if one.posture is not None] == [2]
+
+
+def test_a_reset_forgets_one_person(detected: Detect) -> None:
+    show = scene(detected)
+    show((-0.6, RED), (0.6, BLUE))
+    show.people.reset(1)
+    assert places([person.estimate for person in show.people._people])[0] is None
+    assert places(show((-0.6, RED), (0.6, BLUE))) == pytest.approx([-0.6, 0.6], abs=0.1)
+
+
+def test_pixels_of_others_do_not_count() -> None:
+    cost = WholeBodyCost(BODY, CAMERA, WholeBodyCostConfig())
+    state, silhouette = place(0.0), np.where(pixels(0.0), np.uint8(255), np.uint8(0))
+    cost.see(silhouette, state)
+    whole = float(cost.bodies(state[None]).costs_px[0])
+    half, other = silhouette.copy(), np.zeros_like(silhouette)
+    half[:, :160], other[:, :160] = 0, 255
+    cost.see(half, state)
+    assert float(cost.bodies(state[None]).costs_px[0]) > whole + 1000
+    cost.covered = other
+    cost.see(half, state)
+    assert float(cost.bodies(state[None]).costs_px[0]) <= whole
+    # Left arm and shoulder are on the right in the image.
+    assert cost.are_covered(state).tolist() == [False] * 3 + [True] * 3
+
+
+def test_the_outline_of_others_does_not_pull() -> None:
+    cost = WholeBodyCost(BODY, CAMERA, WholeBodyCostConfig())
+    state, silhouette = place(0.0), np.where(pixels(0.0), np.uint8(255), np.uint8(0))
+    half, other = silhouette.copy(), np.zeros_like(silhouette)
+    half[:, :160], other[:, :160] = 0, 255
+    hips = cost.hips(state)[1:]
+    found = [
+        Outline(seen, CAMERA, hips, covered).residuals(Posed(cost.body, state[None]))
+        for seen, covered in ((half, None), (half, other), (silhouette, np.full_like(other, 255)))
+    ]
+    cut, unknown, nothing = (float(one.costs[0]) for one in found if one is not None)
+    assert unknown < cut / 2 and nothing == 0.0
