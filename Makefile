@@ -128,7 +128,12 @@ benchmark: setup
 RUNS ?= 100
 .PHONY: experiments
 experiments: setup
+	@for name in person_a person_b; do if [ -d $(DATA)/$$name ]; then \
+		$(BIN)/cardbox evaluate --runs $$(($(RUNS) < 20 ? $(RUNS) : 20)) --session $(DATA)/$$name \
+			--output docs/evaluation/$$name --force; \
+		else echo "skipped: no $(DATA)/$$name"; fi; done
 	$(BIN)/cardbox evaluate --runs $(RUNS) --output docs/evaluation --force
+	$(BIN)/python -m lab.tools.readme_figures
 
 # This compares the recorded sessions of one camera beside the checkout with their ground truth.
 DATA ?= ../shared/data

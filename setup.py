@@ -16,6 +16,7 @@ CLUSTER = ["dask>=2024.5", "distributed>=2024.5"]
 TEST = [
     "bvh>=0.3,<1",
     "catkin_pkg>=1.0",
+    "cma>=4,<5",
     *CLUSTER,
     "hypothesis>=6.100",
     "mcap>=1.2",

@@ -92,6 +92,31 @@ def test_named_files_are_there(document: Path) -> None:
                 assert any(place.exists() for place in places), f"{document}: {name}"
 
 
+def defined_in(path: Path) -> set[str]:
+    """Return the names of all functions, classes and constants of a module."""
+    found = set()
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.FunctionDef | ast.ClassDef):
+            found.add(node.name)
+        elif isinstance(node, ast.Assign | ast.AnnAssign):
+            targets = node.targets if isinstance(node, ast.Assign) else [node.target]
+            found |= {target.id for target in targets if isinstance(target, ast.Name)}
+    return found
+
+
+def test_the_page_of_the_paper_names_what_there_is() -> None:
+    text = text_of(Path("docs/paper.md"))
+    named = re.findall(r"`([\w/]+\.py):(\w+)`", text)
+    for name, what in named:
+        place = next(p for p in (ROOT / "cardbox_tracker" / name, ROOT / name) if p.exists())
+        assert what in defined_in(place), f"{name}:{what}"
+    rows = [row.split("|") for row in text.splitlines() if re.search(r"`[\w/]+\.py:", row)]
+    parts = " ".join(row[1] for row in rows if len(row) > 3)
+    for part in (*(f"({i})" for i in range(1, 14)), *(f"algorithm {i}" for i in range(1, 5))):
+        assert part in parts
+    assert "Table I" in parts
+
+
 def commands(first: str) -> list[tuple[Path, str, bool]]:
     """Return (document, command, whether it stands in a code block) of all that start so."""
     found = []

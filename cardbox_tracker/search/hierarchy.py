@@ -1,4 +1,4 @@
-"""The hierarchical particle filter: first the torso, then both arms (paper, section III-B).
+"""The hierarchical particle filter: first the torso, then both arms (paper, section IV-B).
 
 The torso filter rates torso, waist and head. Each arm filter then rates its arm beside the
 estimated torso, so the two arms do not depend on each other. All filters run in one thread, because

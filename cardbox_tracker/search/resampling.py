@@ -38,11 +38,11 @@ The others draw from weights exp(-W^2 / (2 sigma_gamma^2)). Each is a *scheme*, 
 Douc, Cappe & Moulines ("Comparison of resampling schemes for particle filtering", 2005) show that
 residual and stratified resampling never have more variance than multinomial; Gerber, Chopin &
 Whiteley ("Negative association, ordering and convergence of resampling methods", 2019) give the
-state of the theory. All four schemes share the weights, and with the paper's wide sigma_gamma they
-hardly differ (``docs/evaluation``).
+state of the theory. All four schemes share the weights and hardly differ (``docs/evaluation``).
 
 ``drs`` is the recommended strategy: with a few hundred particles it concentrates on states that
-fit. A new scheme is a function in this module and an entry in ``SCHEMES``.
+fit. The others do so, too, if sigma_gamma is far below Table I's; ``drs`` needs none. A new scheme
+is a function in this module and an entry in ``SCHEMES``.
 """
 
 from __future__ import annotations

@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from cardbox_tracker.search.config import TrackerConfig, default_preset, paper_preset
-from cardbox_tracker.search.resampling import STRATEGIES
+from cardbox_tracker.search.resampling import SCHEMES, STRATEGIES
 from lab.experiments.models import MODELS
 from lab.experiments.parallel import Call, Done
 from lab.experiments.plan import Plan
@@ -29,6 +29,9 @@ from lab.experiments.tracking import (
 
 COMPARED = ("drs", "srs")
 """The strategies that the paper compares."""
+
+TEMPER = 0.015
+"""Factor on Table I's sigma_gamma of the tempered SRS: 120 and 60 px."""
 
 
 @dataclass(frozen=True)
@@ -67,9 +70,10 @@ class CellFactory:
         runs: int,
         every: int = 1,
         model: str = "compiled",
+        peer: str | None = None,
     ) -> list[Cell]:
         """Return a cell for each motion."""
-        setting = Setting(comparable(config), self._seed, every, model)
+        setting = Setting(comparable(config), self._seed, every, model, peer)
         return [
             Cell(path, motion, session, setting, runs) for motion, session in self._sessions.items()
         ]
@@ -81,6 +85,27 @@ def main_cells(factory: CellFactory, runs: int) -> list[Cell]:
         cell
         for strategy in COMPARED
         for cell in factory.cells((strategy,), replace(paper_preset(), strategy=strategy), runs)
+    ]
+
+
+def method_cells(factory: CellFactory, plan: Plan) -> list[Cell]:
+    """Return the cells of experiment 10: the paper's filter and its peers."""
+    paper = paper_preset()
+    srs = replace(paper, strategy="srs")
+    tempered = _tempered(srs, TEMPER)
+    methods: dict[str, tuple[TrackerConfig, str | None, int]] = {
+        "DRS, Table I": (paper, None, plan.runs),
+        "SRS, Table I": (srs, None, plan.runs),
+        "SRS, tempered": (tempered, None, plan.runs),
+        "DRS, flat": (paper, "flat", plan.peer_runs),
+        "SRS, flat, tempered": (tempered, "flat", plan.peer_runs),
+        "annealed particle filter": (paper, "annealed", plan.peer_runs),
+        "CMA-ES": (paper, "cma_es", plan.model_runs),
+    }
+    return [
+        cell
+        for name, (config, peer, runs) in methods.items()
+        for cell in factory.cells(("methods", name), config, runs, peer=peer)
     ]
 
 
@@ -104,6 +129,10 @@ def side_cells(factory: CellFactory, plan: Plan) -> list[Cell]:
             config = _both(replace(paper, strategy=strategy), elite=elite)
             path = ("schemes", strategy, "elite" if elite else "no_elite")
             cells += factory.cells(path, config, plan.side_runs)
+    for strategy in SCHEMES:
+        for factor in plan.tempers:
+            config = _tempered(replace(paper, strategy=strategy), factor)
+            cells += factory.cells(("tempers", strategy, f"{factor:g}"), config, plan.side_runs)
     for name, config in {
         "paper": paper,
         "torso_rated_alone": replace(paper, torso_beside_arms=False),
@@ -111,6 +140,15 @@ def side_cells(factory: CellFactory, plan: Plan) -> list[Cell]:
     }.items():
         cells += factory.cells(("variants", name), config, plan.side_runs)
     return cells
+
+
+def _tempered(config: TrackerConfig, factor: float) -> TrackerConfig:
+    """Return ``config`` with ``factor`` times its sigma_gamma."""
+    torso, arm = (
+        replace(one, sigma_gamma_px=factor * one.sigma_gamma_px)
+        for one in (config.torso, config.arm)
+    )
+    return replace(config, torso=torso, arm=arm)
 
 
 def _both(config: TrackerConfig, **changes: Any) -> TrackerConfig:
@@ -122,22 +160,16 @@ def _both(config: TrackerConfig, **changes: Any) -> TrackerConfig:
 
 def side_results(cells: Sequence[Cell], done: Mapping[Call, Done]) -> dict[str, Any]:
     """Return the figures of all ``cells``, nested by path, then by motion and ``mean``."""
-    results: dict[str, Any] = {}
+    loaded: dict[tuple[str, ...], dict[str, MotionRuns]] = {}
     for cell in cells:
+        loaded.setdefault(cell.path, {})[cell.motion] = cell.load(done)
+    results: dict[str, Any] = {}
+    for path, motions in loaded.items():
         place = results
-        for step in cell.path:
+        for step in path:
             place = place.setdefault(step, {})
-        place[cell.motion] = brief(cell.load(done))
-    _add_means(results)
-    for model, planes in MODELS.items():
-        results["models"][model]["planes"] = planes.n_planes
+        place |= {motion: brief(runs) for motion, runs in motions.items()}
+        place["mean"] = mean_brief(list(motions.values()))
+    for model in results.get("models", ()):
+        results["models"][model]["planes"] = MODELS[model].n_planes
     return results
-
-
-def _add_means(results: dict[str, Any]) -> None:
-    values = list(results.values())
-    if all("mpjpe_m" in value for value in values):
-        results["mean"] = mean_brief(values)
-        return
-    for value in values:
-        _add_means(value)

@@ -12,7 +12,15 @@ from cardbox_tracker.applications.simulation.motions import MOTIONS
 from cardbox_tracker.common.errors import CardboxError
 from cardbox_tracker.common.progress import progress_bar
 from cardbox_tracker.tracking.precompile import compile_all
-from lab.experiments.cells import Cell, CellFactory, main_cells, side_cells, side_results
+from lab.experiments.cells import (
+    Cell,
+    CellFactory,
+    main_cells,
+    method_cells,
+    side_cells,
+    side_results,
+)
+from lab.experiments.digest import paper_digest
 from lab.experiments.measuring import person_calls, seed_calls, summarize_measuring
 from lab.experiments.models import microseconds_a_particle
 from lab.experiments.parallel import Call, Done, Progress, Runner
@@ -54,6 +62,8 @@ def evaluate(
     if plan.runs < 2:
         raise CardboxError(f"runs is {plan.runs}; expected 2 or more for a standard deviation")
     start = time.perf_counter()
+    # Who commits or edits during the hours of a measurement changes neither.
+    measured = {**provenance(), "digest": paper_digest()}
     # Compile before the processes start, which would all compile the same code.
     compile_all()
     runner = Runner(output / "parts", jobs, progress)
@@ -64,21 +74,23 @@ def evaluate(
         sessions = dict.fromkeys(read.motions, read)
     factory = CellFactory(sessions, seed)
     main = main_cells(factory, plan.runs)
+    methods = method_cells(factory, plan)
     side = side_cells(factory, plan) if session is None else []
     people = person_calls(plan.bodies, seed) if session is None else []
     seeds = seed_calls(plan.seeds, seed) if session is None else []
-    tracked = [call for cell in (*main, *side) for call in cell.calls]
+    tracked = [call for cell in (*main, *methods, *side) for call in cell.calls]
     done = runner.run("experiments", [*tracked, *people, *seeds])
 
     results, curves = _main_results(main, done)
+    results |= side_results(methods, done)
     timing: Results = {"processor_s": {"experiments_1_to_3": _processor_s(main, done)}}
     if session is None:
-        measured, timing["initialization"] = summarize_measuring(
+        sizes, timing["initialization"] = summarize_measuring(
             *([done[call].result for call in calls] for calls in (people, seeds))
         )
-        results["experiments"] = side_results(side, done) | {"initialization": measured}
+        results["experiments"] = side_results(side, done) | {"initialization": sizes}
         results["plan"] = vars(plan) | {"size": list(plan.size)}
-        timing |= _side_timing(main, side, [*people, *seeds], done, plan)
+        timing |= _side_timing(main, [*methods, *side], [*people, *seeds], done, plan)
     else:
         results["session"] = {
             "name": session.resolve().name,
@@ -90,7 +102,7 @@ def evaluate(
         "seed": seed,
         "runs": plan.runs,
         "quick": plan.quick,
-        **provenance(),
+        **measured,
     }
     timing |= {"jobs": jobs, "wall_s": time.perf_counter() - start}
     write_json(results, output / "results.json")
@@ -139,11 +151,9 @@ def _side_timing(
     done: Mapping[Call, Done],
     plan: Plan,
 ) -> Results:
-    """Return the times of a posture, of an image, and of each experiment."""
+    """Return the times of a posture and of each experiment."""
     session = main[0].session
     middle = session.silhouettes[len(session.silhouettes) // 2]
-    main_s = _processor_s(main, done)
-    images = sum(cell.runs * len(cell.session.silhouettes) for cell in main)
     by_name: dict[str, list[Cell]] = {}
     for cell in side:
         by_name.setdefault(cell.path[0], []).append(cell)
@@ -151,11 +161,9 @@ def _side_timing(
         "particle_us": microseconds_a_particle(
             session.body, session.camera, middle, 200, plan.timing_rounds
         ),
-        # This is measured while all cores are busy.
-        "frame_ms": 1e3 * main_s / images,
         "processor_s": {name: _processor_s(cells, done) for name, cells in by_name.items()}
         | {
-            "experiments_1_to_3": main_s,
+            "experiments_1_to_3": _processor_s(main, done),
             "initialization": sum(done[call].seconds for call in measuring),
         },
     }

@@ -77,9 +77,9 @@ def measure(seed: int, person: int, search_seed: int) -> Arrays:
     config = InitializationConfig(
         distance_m=DISTANCE_M, min_iou=0.0, least_iou=0.0, check_postures=False, seed=search_seed
     )
-    start = time.perf_counter()
+    start = time.process_time()
     result = initialize_body(references, camera, config)
-    search_s = time.perf_counter() - start
+    search_s = time.process_time() - start
     curves = np.empty((len(SUBSETS), ROUNDS + 1))
     for curve, subset in zip(curves, SUBSETS, strict=True):
         costs = np.array(result.costs_px[subset][0][: ROUNDS + 1])

@@ -29,7 +29,7 @@ class Call:
 
 
 class Done(NamedTuple):
-    """The result of a call and the time it took, seconds."""
+    """The result of a call and the processor time it took, seconds."""
 
     result: Any
     seconds: float
@@ -81,9 +81,9 @@ class Runner:
 
 
 def _perform(function: Callable[..., Any], arguments: tuple[Any, ...]) -> tuple[Any, float]:
-    start = time.perf_counter()
+    start = time.process_time()
     result = function(*arguments)
-    return result, time.perf_counter() - start
+    return result, time.process_time() - start
 
 
 def source_digest() -> str:

@@ -6,8 +6,9 @@ switched off, because it would leave out the images in which a strategy is worst
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -17,15 +18,24 @@ from cardbox_tracker.applications.evaluation.metrics import align, angle_errors_
 from cardbox_tracker.person.posture import N_JOINTS, TURNS
 from cardbox_tracker.person.skeleton import JOINT_NAMES, KEYPOINT_NAMES
 from cardbox_tracker.search.config import TrackerConfig
+from cardbox_tracker.search.cycles import Cycles, MakeHierarchy
+from cardbox_tracker.search.resampling import gaussian_weights
 from cardbox_tracker.tracking.tracker import Tracker
+from lab.experiments.counting import CountingSilhouette
 from lab.experiments.models import make_silhouette_term
 from lab.experiments.parallel import Call
+from lab.experiments.peers.annealed import Annealed
+from lab.experiments.peers.cma_es import CmaEs
+from lab.experiments.peers.flat import Flat
 from lab.experiments.sessions import Session
 
 FloatArray = NDArray[np.float64]
 
 AXES = ("lateral", "vertical", "depth")
 """The axes x, y and z of the camera optical frame."""
+
+PEERS: dict[str, MakeHierarchy] = {"flat": Flat, "annealed": Annealed, "cma_es": CmaEs}
+"""Searches in the place of the paper's hierarchy, by name."""
 
 RUNS_A_CALL = 10
 # More frames than any session has.
@@ -41,12 +51,14 @@ class Setting:
         seed: of the evaluation.
         every: stride through the images; 3 makes the motion three times as fast.
         model: the term of the silhouette, see ``models.make_silhouette_term``.
+        peer: one of ``PEERS``, or None for the filter of ``config``.
     """
 
     config: TrackerConfig
     seed: int
     every: int = 1
     model: str = "compiled"
+    peer: str | None = None
 
 
 class Runs(NamedTuple):
@@ -56,11 +68,16 @@ class Runs(NamedTuple):
         postures: estimates, (r, n, 12), rad and metres.
         keypoints_m: (r, n, 6, 3), metres in the optical frame.
         costs_px: equation (2) of the estimates, (r, n).
+        ratings: costs that the search computed, (r, n).
+        effective: effective sample size of the weights of torso and arms, 1 / sum w^2, mean over
+            the filters, (r, n); NaN without weights.
     """
 
     postures: FloatArray
     keypoints_m: FloatArray
     costs_px: FloatArray
+    ratings: FloatArray
+    effective: FloatArray
 
 
 def comparable(config: TrackerConfig) -> TrackerConfig:
@@ -83,19 +100,42 @@ def track_runs(session: Session, setting: Setting, first: int, end: int) -> Runs
     shape = (end - first, len(silhouettes))
     postures = np.full((*shape, N_JOINTS), np.nan)
     keypoints_m = np.full((*shape, 6, 3), np.nan)
-    costs_px = np.full(shape, np.nan)
-    cost = make_silhouette_term(setting.model, session.body, session.camera)
+    costs_px, ratings, effective = (np.full(shape, np.nan) for _ in range(3))
+    cost = CountingSilhouette(make_silhouette_term(setting.model, session.body, session.camera))
+    make_filter = None
+    if setting.peer is not None:
+        make_filter = partial(Cycles, make_hierarchy=PEERS[setting.peer])
     for run in range(first, end):
         rng = np.random.default_rng([setting.seed, run])
-        tracker = Tracker(session.body, session.camera, setting.config, rng, cost)
+        tracker = Tracker(session.body, session.camera, setting.config, rng, cost, make_filter)
         for i, silhouette in enumerate(silhouettes):
+            before = cost.ratings
             estimate = tracker.track(silhouette)
             if estimate.posture is None:
                 continue
             postures[run - first, i] = estimate.posture
             keypoints_m[run - first, i] = estimate.keypoints_m
             costs_px[run - first, i] = estimate.cost_px
-    return Runs(postures, keypoints_m, costs_px)
+            ratings[run - first, i] = cost.ratings - before
+            effective[run - first, i] = _effective(tracker, setting)
+    return Runs(postures, keypoints_m, costs_px, ratings, effective)
+
+
+def _effective(tracker: Tracker, setting: Setting) -> float:
+    """Return the mean effective sample size of the paper's filters; NaN if they have no weights."""
+    has_weights = setting.config.strategy != "drs" and setting.peer is None
+    if not has_weights or not isinstance(tracker.filter, Cycles):
+        return np.nan
+    of = tracker.filter.hierarchy
+    scale = tracker.camera.width * tracker.camera.height / (320 * 240)
+    return float(
+        np.mean(
+            [
+                1 / np.sum(gaussian_weights(one.costs, one.config.sigma_gamma_px * scale) ** 2)
+                for one in (of.torso, *of.arms.values())
+            ]
+        )
+    )
 
 
 def stacked(runs: Sequence[Runs]) -> Runs:
@@ -128,7 +168,7 @@ def select_motion(runs: Runs, session: Session, motion: str, every: int = 1) -> 
     chosen = chosen[::every] & ~np.any(np.isnan(runs.costs_px), axis=0)
     time_s = session.time_s[::every][chosen]
     return MotionRuns(
-        Runs(runs.postures[:, chosen], runs.keypoints_m[:, chosen], runs.costs_px[:, chosen]),
+        Runs(*(values[:, chosen] for values in runs)),
         time_s - time_s[0],
         session.keypoints_m[::every][chosen],
         session.postures[::every][chosen],
@@ -174,25 +214,33 @@ def stddev_over_runs(values: FloatArray) -> FloatArray:
 
 
 def brief(motion: MotionRuns) -> dict[str, float]:
-    """Return the figures that compare settings."""
+    """Return the figures that compare settings; those that a setting does not have are left out."""
     errors_m = distances_m(motion.runs.keypoints_m, motion.keypoints_m)
-    return {
+    figures = {
         "mean_cost_px": float(motion.runs.costs_px.mean()),
         "mpjpe_m": float(errors_m.mean()),
         "elbow_hand_error_m": float(errors_m[..., [1, 2, 4, 5]].mean()),
         "stderr_mpjpe_m": _standard_error(errors_m.mean(axis=(1, 2))),
         "stderr_cost_px": _standard_error(motion.runs.costs_px.mean(axis=1)),
         "mean_std_angles_rad": float(stddev_over_runs(motion.runs.postures)[:, 1:].mean()),
+        "runs": len(errors_m),
+        "ratings": float(motion.runs.ratings.mean()),
+        "effective_particles": float(motion.runs.effective.mean()),
     }
+    return {name: value for name, value in figures.items() if not np.isnan(value)}
 
 
-def mean_brief(figures: Sequence[Mapping[str, float]]) -> dict[str, float]:
+def mean_brief(motions: Sequence[MotionRuns]) -> dict[str, float]:
     """Return the means over motions of the figures of :func:`brief`."""
-    means = {name: float(np.mean([f[name] for f in figures])) for name in figures[0]}
-    for name in ("stderr_mpjpe_m", "stderr_cost_px"):
-        # The motions are tracked separately, so their errors are independent.
-        squares = np.sum([f[name] ** 2 for f in figures])
-        means[name] = float(np.sqrt(squares) / len(figures))
+    figures = [brief(motion) for motion in motions]
+    means = {name: float(np.mean([one[name] for one in figures])) for name in figures[0]}
+    # In a recorded session, one run tracks all motions, so their errors depend on each other.
+    errors_m = [
+        distances_m(one.runs.keypoints_m, one.keypoints_m).mean(axis=(1, 2)) for one in motions
+    ]
+    costs_px = [one.runs.costs_px.mean(axis=1) for one in motions]
+    means["stderr_mpjpe_m"] = _standard_error(np.mean(errors_m, axis=0))
+    means["stderr_cost_px"] = _standard_error(np.mean(costs_px, axis=0))
     return means
 
 

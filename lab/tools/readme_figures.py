@@ -1,6 +1,6 @@
-"""Write the README's table of accuracy from the committed results of evaluation.
+"""Write the README's tables of accuracy from the committed results of evaluation.
 
-``python -m lab.tools.readme_figures`` replaces the part between the marks in ``README.md``; with
+``python -m lab.tools.readme_figures`` replaces the parts between the marks in ``README.md``; with
 ``--check`` it only compares them.
 """
 
@@ -19,8 +19,12 @@ from cardbox_tracker.applications.evaluation.marks import replaced
 from cardbox_tracker.applications.evaluation.report import mean_of
 from cardbox_tracker.applications.evaluation.results import read_json
 from cardbox_tracker.common.files import atomic_path
+from lab.experiments.report import MEANING
 
 BEGIN, END = "<!-- accuracy:begin -->", "<!-- accuracy:end -->"
+PAPER_BEGIN, PAPER_END = "<!-- paper:begin -->", "<!-- paper:end -->"
+METHODS = ("DRS, Table I", "SRS, Table I", "SRS, tempered", "annealed particle filter", "CMA-ES")
+"""Methods in the README's table of the paper's method."""
 RESULTS = Path("docs/evaluation")
 # MediaPipe's error on the clips of gestures, from their description; they have no file of it, cm.
 _GESTURES_CM = 7.7
@@ -121,6 +125,26 @@ def section(
     return "\n".join([*lines, "", *textwrap.wrap(text, 100)])
 
 
+def paper_section(synthetic: Mapping[str, Any], recorded: Mapping[str, Any]) -> str:
+    """Return the text of the paper's method: the figures of two files ``results.json``."""
+    sources = synthetic, recorded
+    rows = [
+        ("600 ratings an image", "synthetic person", "rendered person `person_a`"),
+        ("---",) * 3,
+        *((name, *(_with_error(one, name) for one in sources)) for name in METHODS),
+    ]
+    origins = dict.fromkeys(f"{one['commit'][:12]} (digest {one['digest']})" for one in sources)
+    text = f"{MEANING} Measured at commit {' and '.join(origins)}; in brackets the number of runs."
+    lines = [f"| {' | '.join(row)} |" for row in rows]
+    return "\n".join([*lines, "", *textwrap.wrap(text, 100)])
+
+
+def _with_error(results: Mapping[str, Any], method: str) -> str:
+    figures = results["methods"][method]["mean"]
+    error, stderr = 100 * figures["mpjpe_m"], 100 * figures["stderr_mpjpe_m"]
+    return f"{error:.1f} ± {stderr:.1f} cm ({figures['runs']:.0f})"
+
+
 def _tracking(sessions: Sequence[Session]) -> str:
     """Return in words how many images are `tracking`, and how many of these are wrong."""
     runs = [run for one in sessions for run in one["runs"]]
@@ -142,7 +166,9 @@ def current(root: Path) -> str:
         read_json(folder / "sessions.json"),
         read_json(films) if films.is_file() else None,
     )
-    return replaced((root / "README.md").read_text(encoding="utf-8"), text, BEGIN, END)
+    text = replaced((root / "README.md").read_text(encoding="utf-8"), text, BEGIN, END)
+    paper = (read_json(folder / name / "results.json") for name in ("", "person_a"))
+    return replaced(text, paper_section(*paper), PAPER_BEGIN, PAPER_END)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

@@ -58,6 +58,18 @@ def test_the_truth_beside_the_bag_is_that_of_its_messages(session: Path) -> None
         )
 
 
+def test_the_page_of_the_format_names_every_topic_and_every_key(session: Path) -> None:
+    rows = (Path(__file__).parents[3] / "docs/synthetic-sessions.md").read_text().splitlines()
+    with BagReader(session) as bag:
+        for topic, kind in bag.topics.items():
+            said = f"| `{topic}` | {kind.replace('/msg/', '/')} |"
+            assert any(row.startswith(said) for row in rows), said
+    text = "\n".join(row for row in rows if row.startswith("|"))
+    truth = json.loads((session / "ground_truth.json").read_text())
+    for key in (*truth, *truth["frames"][-1], *truth["segments"][0]):
+        assert f"`{key}`" in text or key == "segment_index", key
+
+
 def test_the_true_joints_are_those_of_the_person(session: Path) -> None:
     truth = json.loads((session / "ground_truth.json").read_text())
     body = BodyModel.of(hip_height_m=-0.51)

@@ -192,6 +192,8 @@ def test_files_hold_what_is_promised(
     assert ("299/300" in text) == (nodes is not None)
     assert ("| posture | 4.00 ms, 4.00 ms |" in text) == (nodes is not None)
     assert (tmp_path / benchmark_report.PICTURE_OF_WAY).exists() == (nodes is not None)
+    torso_us = 5 * core["stages"]["cost of all torsos"]["median_ms"]
+    assert f"A rating takes {torso_us:.1f} us (torso)" in text
     assert "times faster" in capsys.readouterr().out
 
 

@@ -38,7 +38,7 @@ def hand_made() -> MotionRuns:
     postures[1, :, 2] = np.radians(30.0)
     costs = np.array([[100.0, 200.0], [300.0, 400.0]])
     return MotionRuns(
-        Runs(postures, keypoints_m, costs),
+        Runs(postures, keypoints_m, costs, np.full((2, 2), 600.0), np.full((2, 2), np.nan)),
         np.array([0.0, 0.1]),
         truth_m,
         np.zeros((2, 12)),
@@ -83,9 +83,15 @@ def test_brief_figures_and_their_mean_over_motions() -> None:
     figures = brief(hand_made())
     assert figures["mpjpe_m"] == pytest.approx(0.1)
     assert figures["stderr_mpjpe_m"] == pytest.approx(0.1)
-    mean = mean_brief([figures, figures | {"mpjpe_m": 0.3}])
-    assert mean["mpjpe_m"] == pytest.approx(0.2)
-    assert mean["stderr_mpjpe_m"] == pytest.approx(0.1 / np.sqrt(2))
+    assert (figures["runs"], figures["ratings"]) == (2, 600.0)
+    assert "effective_particles" not in figures
+    # One run tracks both motions and is off in both; where runs are off in turns, the mean is sure.
+    there = hand_made()
+    turned = replace(there, runs=Runs(*(values[::-1] for values in there.runs)))
+    assert mean_brief([there, there])["stderr_mpjpe_m"] == pytest.approx(0.1)
+    mean = mean_brief([there, turned])
+    assert mean["mpjpe_m"] == pytest.approx(0.1)
+    assert mean["stderr_mpjpe_m"] == pytest.approx(0.0)
 
 
 def test_images_of_other_segments_or_without_a_person_do_not_count(session: Session) -> None:
@@ -93,7 +99,7 @@ def test_images_of_other_segments_or_without_a_person_do_not_count(session: Sess
     costs = np.full((2, n), 7.0)
     (bowing,) = np.nonzero(session.segments == "bow")
     costs[:, bowing[3]] = np.nan
-    runs = Runs(np.zeros((2, n, 12)), np.zeros((2, n, 6, 3)), costs)
+    runs = Runs(np.zeros((2, n, 12)), np.zeros((2, n, 6, 3)), costs, costs, costs)
     chosen = select_motion(runs, session, "bow")
     expected = np.delete(bowing, 3)
     assert chosen.runs.costs_px.shape == (2, len(expected))

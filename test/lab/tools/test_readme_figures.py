@@ -6,7 +6,21 @@ import re
 from pathlib import Path
 from typing import Any
 
-from lab.tools.readme_figures import BEGIN, END, ROWS, current, main, section
+from cardbox_tracker.applications.evaluation.results import read_json
+from lab.experiments.digest import paper_digest
+from lab.tools.readme_figures import (
+    BEGIN,
+    END,
+    METHODS,
+    PAPER_BEGIN,
+    PAPER_END,
+    RESULTS,
+    ROWS,
+    current,
+    main,
+    paper_section,
+    section,
+)
 
 ROOT = Path(__file__).parents[3]
 
@@ -22,8 +36,41 @@ def test_the_readme_is_up_to_date() -> None:
 
 
 def test_no_error_or_cost_stands_outside_the_marks() -> None:
-    outside = readme().split(BEGIN)[0] + readme().split(END)[1]
+    outside = readme()
+    for begin, end in ((BEGIN, END), (PAPER_BEGIN, PAPER_END)):
+        outside = outside.split(begin)[0] + outside.split(end)[1]
     assert re.findall(r"\d[\d.]*\s*(?:cm|px)\b", outside) == []
+
+
+def test_the_experiments_are_of_the_present_filter_simulation_and_initialization() -> None:
+    """If not: make experiments."""
+    text = " ".join(readme().split(PAPER_BEGIN)[1].split(PAPER_END)[0].split())
+    for folder in (ROOT / RESULTS, ROOT / RESULTS / "person_a"):
+        results = read_json(folder / "results.json")
+        assert results["digest"] == paper_digest(), folder
+        report = (folder / "report.md").read_text(encoding="utf-8")
+        assert results["commit"] in report
+        assert results["digest"] in report
+        assert f"{results['commit'][:12]} (digest {results['digest']})" in text
+
+
+def test_peers_have_as_many_ratings_as_the_paper_within_one_percent() -> None:
+    for folder in (ROOT / RESULTS, ROOT / RESULTS / "person_a"):
+        for name, by_motion in read_json(folder / "results.json")["methods"].items():
+            for figures in by_motion.values():
+                assert 594 <= figures["ratings"] <= 606, name
+
+
+def test_section_of_the_paper_by_hand() -> None:
+    def results(commit: str) -> dict[str, Any]:
+        mean = {"mpjpe_m": 0.123, "stderr_mpjpe_m": 0.004, "runs": 20.0}
+        methods = {name: {"mean": mean} for name in METHODS}
+        return {"commit": commit * 40, "digest": "d" * 16, "methods": methods}
+
+    text = paper_section(results("a"), results("a"))
+    assert "| DRS, Table I | 12.3 ± 0.4 cm (20) | 12.3 ± 0.4 cm (20) |" in text
+    assert text.count("digest") == 1
+    assert paper_section(results("a"), results("b")).count("digest") == 2
 
 
 def session(name: str, points: str, aligned: float, cameras: tuple[str, ...]) -> dict[str, Any]:

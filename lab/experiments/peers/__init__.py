@@ -1,0 +1,1 @@
+"""Searches that take the place of the paper's hierarchy of filters, with as many ratings."""
