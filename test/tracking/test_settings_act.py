@@ -99,11 +99,12 @@ def scenes() -> tuple[tuple[np.ndarray, np.ndarray, ImagePoints | None], ...]:
     found += [(image, door, None)] * 2
     stripes = np.zeros_like(silhouette)
     stripes[:, ::5] = 255
-    found += [(image, stripes, None)] * 6 + [(*drawn(wave(1.0)), None)] * 2
+    # Points count for a while; the last stripes come after that.
+    found += [(image, stripes, None)] * 14 + [(*drawn(wave(1.0)), None)] * 2
     found.append((image, np.zeros_like(silhouette), None))
     elsewhere = reference_posture("front")
     elsewhere[0] = -0.35
-    return (*found, *[(*drawn(elsewhere), None)] * 4)
+    return (*found, *[(*drawn(elsewhere), None)] * 6)
 
 
 def result_of(config: TrackerConfig) -> list[Any]:
