@@ -8,6 +8,7 @@ import re
 from bisect import bisect_left
 from collections import Counter
 from collections.abc import Sequence
+from decimal import Decimal
 from pathlib import Path
 from typing import NamedTuple
 
@@ -25,6 +26,9 @@ from cardbox_tracker.detectors.point_checks import Size, check_person, check_poi
 COLUMNS = ("stamp_ns", "joint", "u", "v", "score")
 """Columns that a table needs; ``frame`` may take the place of the first."""
 FRAME, _PERSON = "frame", "person"
+# Columns of the image's stamp with their units, ns.
+_STAMPS = {"stamp_ns": 1, "stamp_us": 10**3, "stamp_ms": 10**6, "stamp_s": 10**9, "stamp": 10**9}
+_MOST_NS = 2**63
 # An hour of all points at 30 Hz has 100 MB.
 _MOST_BYTES = 256 * 1024 * 1024
 # Points of which less is in the silhouette are compared with others, of which as much must be.
@@ -43,7 +47,8 @@ Persons = dict[Key, list[ImagePoints]]
 class PointTable(NamedTuple):
     """Points in a CSV table with a row for each point, or in JSON files.
 
-    Columns are ``stamp_ns`` of the image, or ``frame``, its number from 0 on; ``joint``, one of
+    Columns are ``stamp_ns`` of the image, or ``stamp_us``, ``stamp_ms``, ``stamp_s``, or ``stamp``
+    in seconds, or ``frame``, the image's number from 0 on; ``joint``, one of
     ``POINT_NAMES`` (others are not used); ``u`` and ``v``, column and row in the camera's own
     image, px; and ``score``, 0 to 1. With several people, ``person`` tells them apart. A recording
     of several cameras also needs ``camera``, the camera's namespace. For JSON see
@@ -96,11 +101,12 @@ class PointTable(NamedTuple):
                 io.TextIOWrapper(data, newline="", encoding="utf-8-sig") as file,
             ):
                 rows = csv.DictReader(file)
-                kind = self._check(rows.fieldnames or (), camera)
+                column = self._check(rows.fieldnames or (), camera)
+                kind = FRAME if column == FRAME else COLUMNS[0]
                 for row in rows:
                     if camera is not None and row["camera"] != camera:
                         continue
-                    image, joint = int(row[kind]), row["joint"]
+                    image, joint = _image_of(row[column], column), row["joint"]
                     # A cell that is empty is missing, as in tables of pandas.
                     u, v, score = (
                         float("nan" if row[name] == "" else row[name]) for name in COLUMNS[2:]
@@ -127,11 +133,10 @@ class PointTable(NamedTuple):
                 f"{self.path} is not a table in UTF-8 ({quoted(str(error))}); give a CSV file with "
                 f"the columns {', '.join(COLUMNS)}"
             ) from None
-        except (ValueError, TypeError) as error:
+        except (ValueError, TypeError, ArithmeticError) as error:
             raise CardboxError(
                 f"{self.path}, line {rows.line_num}, has a value that is no number "
-                f"({quoted(str(error))}); expected whole numbers in {kind}, and numbers in u, v "
-                "and score"
+                f"({quoted(str(error))}); expected numbers in {column}, u, v and score"
             ) from None
         except _TableError:
             raise
@@ -148,16 +153,32 @@ class PointTable(NamedTuple):
 
     def _check(self, names: Sequence[str], camera: str | None) -> str:
         """Return the column that names the image."""
-        kind = FRAME if FRAME in names and COLUMNS[0] not in names else COLUMNS[0]
+        kind = next((name for name in (*_STAMPS, FRAME) if name in names), COLUMNS[0])
         expected = kind, *COLUMNS[1:], *(() if camera is None else ("camera",))
         missing = [name for name in expected if name not in names]
         if missing:
             raise _TableError(
                 f"{self.path} has no column {', '.join(missing)}; a table of points has the "
                 f"columns {', '.join(expected)}, separated by commas; {FRAME}, the image's number "
-                f"from 0 on, may take the place of {COLUMNS[0]}"
+                f"from 0 on, or {', '.join(list(_STAMPS)[1:])} may take the place of {COLUMNS[0]}"
             )
         return kind
+
+
+def _image_of(text: str, column: str) -> int:
+    """Return the number of an image, or its stamp in ns.
+
+    Raises:
+        ValueError: the text is no such number.
+        ArithmeticError: likewise.
+    """
+    if column == FRAME:
+        return int(text)
+    stamp_ns = Decimal(text) * _STAMPS[column]
+    is_whole = column != COLUMNS[0] or stamp_ns % 1 == 0
+    if not (abs(stamp_ns) < _MOST_NS and is_whole):
+        raise ValueError(f"{column} is {text}")
+    return round(stamp_ns)
 
 
 class _TableError(CardboxError):

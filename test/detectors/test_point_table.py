@@ -127,7 +127,7 @@ def test_a_table_of_a_spreadsheet_may_begin_with_a_byte_order_mark(tmp_path: Pat
         (HEADER, "5,nose,1,2,0.9", "left", "no column camera"),
         (HEADER.replace(",", ";"), "5;nose;1;2;0.9", None, "separated by commas"),
         (HEADER, "5,nose,one,2,0.9", None, "line 2, has a value that is no number .*one"),
-        (HEADER, "5.5,nose,1,2,0.9", None, r"no number .*5\.5.*whole numbers in stamp_ns"),
+        (HEADER, "5.5,nose,1,2,0.9", None, r"no number .*5\.5.*numbers in stamp_ns"),
         (HEADER, "5,nose,1", None, "no number"),
         (HEADER, "5,nose,nan,3,0.9", None, r"line 2: nose is at .*nan.* score 0 if the point is"),
         (HEADER, "5,nose,1,3,nan", None, "line 2: nose has the score nan"),
@@ -195,6 +195,27 @@ def test_points_with_another_clock_are_said_with_a_stamp_of_each(tmp_path: Path)
         found.check_span(10**18, 2 * 10**18)
     found.check_span(0, 7)
     found.check_span(10**9, 10**10)
+
+
+@pytest.mark.parametrize(
+    ("column", "text"),
+    [
+        ("stamp_ns", "1.7e18"),
+        ("stamp_us", "1700000000000000"),
+        ("stamp_ms", "1700000000000.0"),
+        ("stamp_s", "1700000000"),
+        ("stamp", "1700000000.000000000"),
+    ],
+)
+def test_stamps_may_have_other_units(tmp_path: Path, column: str, text: str) -> None:
+    found = read(table(tmp_path, f"{text},nose,1,2,1", header=f"{column},joint,u,v,score"))
+    assert found.persons(Image(1_700_000_000_000_000_000), 0)
+
+
+@pytest.mark.parametrize("text", ["nan", "1e999999", "-1e30", "soon", ""])
+def test_a_stamp_that_is_no_time_is_refused(tmp_path: Path, text: str) -> None:
+    with pytest.raises(CardboxError, match=r"line 2, has a value .*numbers in stamp_ms"):
+        read(table(tmp_path, f"{text},nose,1,2,1", header="stamp_ms,joint,u,v,score"))
 
 
 def test_a_column_with_the_number_of_the_image_takes_the_place_of_stamps(tmp_path: Path) -> None:
