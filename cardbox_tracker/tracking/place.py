@@ -104,15 +104,14 @@ def distance_of_points(points: ImagePoints, body: BodyModel, camera: Camera) -> 
 class PlaceWatch:
     """The place of one tracked person over time."""
 
-    def __init__(self, body: BodyModel, camera: Camera, is_alone: bool) -> None:
+    def __init__(self, body: BodyModel, camera: Camera) -> None:
         """Begin with what was given.
 
         Args:
             body: the person as given, before unknown values are fitted.
             camera: first camera, with its pitch.
-            is_alone: whether there is no further camera.
         """
-        self._body, self._camera, self._is_alone = body, camera, is_alone
+        self._body, self._camera = body, camera
         self._scale = MEASURED_BODY if body.source == MEASURED else STATURE
         self._is_given = body.source != MEASURED and "distance_m" not in body.unknown
         self._compared: list[tuple[float, float]] = []
@@ -120,13 +119,16 @@ class PlaceWatch:
         self._apart_m = 0.0
         self.contradiction = ""
 
-    def see(self, estimate: Estimate, body: BodyModel, frame: Frame) -> Place | None:
+    def see(
+        self, estimate: Estimate, body: BodyModel, frame: Frame, is_alone: bool = True
+    ) -> Place | None:
         """Return the place of an estimate; None if its filter does not estimate a place.
 
         Args:
             estimate: the estimate.
             body: the tracked body.
             frame: of the first camera.
+            is_alone: whether no further camera sees the person.
         """
         if estimate.offset_m is None or estimate.posture is None:
             return None
@@ -135,7 +137,7 @@ class PlaceWatch:
         rests_on = SECOND_CAMERA
         if frame.depth_m is not None:
             rests_on = DEPTH
-        elif self._is_alone:
+        elif is_alone:
             rests_on = self._scale
         self._compare(estimate, body, rests_on, frame)
         relative = hypot(SCALE_STDDEVS[rests_on], self._camera.focal_stddev)

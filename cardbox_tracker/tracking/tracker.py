@@ -109,7 +109,7 @@ class Tracker:
             what = "several cameras need" if others else "a corrector needs"
             raise ValueError(f"{what} the filter whole_body: the preset default")
         self._fitting = None
-        self._place = PlaceWatch(body, self.camera, not others)
+        self._place = PlaceWatch(body, self.camera)
         self.agreement: CameraAgreement | None = None
         self._frozen = FrozenCameras(1 + len(self._others))
         self.images, self.used = 0, dict[str, int]()
@@ -246,16 +246,17 @@ class Tracker:
         if self._others:
             observations = self._frozen.without(observations)
         frames = self._frames_of(observations)
-        estimate = self._placed(frames[0], self._track(frames))
+        estimate = self._placed(frames, self._track(frames))
         is_tilt_unknown = self.body.camera_pose.pitch_stddev_rad > UNKNOWN_TILT_RAD
         if estimate.state == TRACKING and (self.body.unknown or is_tilt_unknown):
             estimate = replace(estimate, state=UNCERTAIN)
         self._count(observations, frames, estimate)
         return self._head.see(frames[0], estimate)
 
-    def _placed(self, frame: Frame, estimate: Estimate) -> Estimate:
+    def _placed(self, frames: Sequence[Frame], estimate: Estimate) -> Estimate:
         """Return the estimate with its place, which no deviation of it is surer than."""
-        place = self._place.see(estimate, self.body, frame)
+        is_alone = not any(frame.foreground_px for frame in frames[1:])
+        place = self._place.see(estimate, self.body, frames[0], is_alone)
         if place is None or estimate.posture_stddev is None or estimate.offset_stddev_m is None:
             return estimate
         stddev = estimate.posture_stddev.copy()

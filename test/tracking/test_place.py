@@ -95,8 +95,8 @@ def frames(points: ImagePoints | None, depth: bool = False, count: int = 10) -> 
 def test_the_deviation_of_the_distance_is_that_of_what_it_rests_on(
     body: BodyModel, depth: bool, alone: bool, rests_on: str, relative: float
 ) -> None:
-    place = PlaceWatch(body, CAMERA, alone).see(
-        estimate_at(4.0, body), body, frames(None, depth)[0]
+    place = PlaceWatch(body, CAMERA).see(
+        estimate_at(4.0, body), body, frames(None, depth)[0], alone
     )
     assert place is not None
     assert place.rests_on == rests_on
@@ -106,7 +106,7 @@ def test_the_deviation_of_the_distance_is_that_of_what_it_rests_on(
 def test_a_stated_field_of_view_makes_a_far_place_uncertain() -> None:
     stated = replace(CAMERA, focal_stddev=0.03)
     near, far = (
-        PlaceWatch(TALL, stated, True).see(estimate_at(at_m, TALL), TALL, frames(None)[0])
+        PlaceWatch(TALL, stated).see(estimate_at(at_m, TALL), TALL, frames(None)[0])
         for at_m in (2.0, 6.0)
     )
     assert near is not None and far is not None
@@ -121,7 +121,7 @@ def test_a_stature_that_contradicts_the_given_distance_is_told(
     stature_m: float, is_told: bool
 ) -> None:
     body = body_from_proportions(stature_m, 2.0)
-    watch = PlaceWatch(body, CAMERA, is_alone=True)
+    watch = PlaceWatch(body, CAMERA)
     for frame in frames(points_at(2.0)):
         place = watch.see(estimate_at(2.0, body), body, frame)
     assert place is not None
@@ -138,15 +138,15 @@ def test_a_stature_that_contradicts_the_given_distance_is_told(
 def test_a_stature_that_contradicts_depth_or_a_second_camera_is_told(depth: bool) -> None:
     child = body_from_proportions(1.35)
     for body, is_told in ((child, True), (body_from_proportions(1.80), False)):
-        watch = PlaceWatch(body, CAMERA, is_alone=depth)
+        watch = PlaceWatch(body, CAMERA)
         for frame in frames(points_at(2.0), depth):
-            watch.see(estimate_at(2.0, body), body, frame)
+            watch.see(estimate_at(2.0, body), body, frame, is_alone=depth)
         assert bool(watch.contradiction) is is_told
 
 
 def test_without_a_second_source_nothing_contradicts() -> None:
     child = body_from_proportions(1.35)
-    watch = PlaceWatch(child, CAMERA, is_alone=True)
+    watch = PlaceWatch(child, CAMERA)
     for frame in frames(points_at(2.0)):
         watch.see(estimate_at(2.0, child), child, frame)
     assert watch.contradiction == ""
