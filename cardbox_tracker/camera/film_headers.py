@@ -76,7 +76,7 @@ def shown_s(path: Path) -> float | None:
     try:
         (timescale,) = struct.unpack_from(">I", header, at + (20 if header[at] else 12))
         times = list(_shown_times(header))
-    except struct.error:
+    except (struct.error, IndexError):
         return None
     return max(times) / timescale if timescale and times and max(times) > 0 else None
 

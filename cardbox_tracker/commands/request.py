@@ -434,7 +434,7 @@ def _count(text: str) -> int:
 
 
 def _person_choice(text: str) -> PersonChoice | int:
-    if text.isdecimal():
+    if text.isdecimal() and int(text) > 0:
         return int(text)
     from cardbox_tracker.detectors.person_choice import PersonChoice
 

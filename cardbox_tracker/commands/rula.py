@@ -114,10 +114,11 @@ def _content(
     images: MomentImages | None,
 ) -> PageContent:
     from cardbox_tracker.applications.ergonomics.report import PageContent
+    from cardbox_tracker.person.proportions import USUAL_STATURE_M
 
     name = options.recording.resolve().name
     number = options.person if options.people is not None and options.person else 1
-    statures = options.stature or ()
+    statures = options.stature or (USUAL_STATURE_M,)
     person = (
         f"stature {statures[min(number, len(statures)) - 1]} m"
         if options.model is None

@@ -162,8 +162,12 @@ def _assumptions(request: TrackingRequest, camera: Camera, body: BodyModel) -> I
     source = "given" if person.model is None else f"from {person.model.name}"
     tilt = body.camera_pose
     deviation = f"standard deviation {math.degrees(tilt.pitch_stddev_rad):.0f}"
-    pitch = source if person.is_pitch_given else f"found, {deviation}"
-    yield f"camera pitch {math.degrees(tilt.pitch_rad):.0f} degrees down ({pitch})"
+    pitch = "assumed" if request.recording.detector is None else f"found, {deviation}"
+    pitch_deg = math.degrees(tilt.pitch_rad)
+    yield (
+        f"camera pitch {abs(pitch_deg):.0f} degrees {'down' if pitch_deg >= 0 else 'up'} "
+        f"({source if person.is_pitch_given else pitch})"
+    )
     distance = "found" if "distance_m" in person.body.unknown else source
     yield f"distance {body.placement.distance_m:.2f} m ({distance})"
     if person.stature_m is not None:
@@ -249,7 +253,7 @@ def placed(
         given = math.degrees(given_rad)
         if abs(given - pitch) > max(_LEAST_DEG, _SURE_STDDEVS * deviation):
             remarks.append(
-                f"--camera-pitch-deg {given:g} is used, but {' and '.join(sources)} show "
+                f"--camera-pitch-deg {given:g} is used, but {' and '.join(sources) or 'most cameras'} show "
                 f"{number}; leave the option out to use that"
             )
     elif sources:

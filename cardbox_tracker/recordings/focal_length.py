@@ -34,7 +34,14 @@ def equivalent_mm(path: Path) -> float | None:
         with path.open("rb") as file:
             is_image = file.read(4).startswith(_IMAGES)
         found = _of_image(path) if is_image else _of_film(path)
-    except (OSError, ValueError, struct.error, SyntaxError):
+    except (
+        OSError,
+        ValueError,
+        struct.error,
+        SyntaxError,
+        RecursionError,
+        Image.DecompressionBombError,
+    ):
         # A damaged file says nothing; those who decode it say so.
         return None
     return found if found is not None and _SHORTEST_MM <= found <= _LONGEST_MM else None

@@ -92,7 +92,9 @@ class Quality:
         for one in sorted(self._moments, key=lambda one: (-one.chance, one.time_s)):
             if all(abs(one.time_s - other.time_s) >= GAP_S for other in found):
                 found.append(one)
-        return sorted(found[:MOST_MOMENTS], key=lambda one: one.time_s)
+            if len(found) == MOST_MOMENTS:
+                break
+        return sorted(found, key=lambda one: one.time_s)
 
 
 def _moment(time_s: float, estimate: Estimate) -> _Moment:

@@ -98,11 +98,11 @@ class _Tally:
             self.costs.append(estimate.cost_px)
             self.ious.append(estimate.iou)
 
-    def summary(self, tracker: Tracker, remarks: Sequence[str] = ()) -> TrackSummary:
+    def summary(self, body: BodyModel, remarks: Sequence[str] = ()) -> TrackSummary:
         found = self.costs, self.ious
         cost_px, iou = (float(np.mean(one)) if one else float("nan") for one in found)
         counts = self.frames, len(self.costs)
-        return TrackSummary(*counts, cost_px, iou, self.uncertain, tuple(remarks), tracker.body)
+        return TrackSummary(*counts, cost_px, iou, self.uncertain, tuple(remarks), body)
 
 
 def track_recording(
@@ -180,18 +180,21 @@ def track_recording(
         whole.costs += tally.costs
         whole.ious += tally.ious
         whole.frames += tally.frames
-    _, tracker = next(iter(tallies.values()))
     each = {
-        number: tally.summary(tracker)
+        number: tally.summary(tracker.body)
         for number, (tally, tracker) in tallies.items()
         if number is not None
     }
     given = ("points", first.has_points), ("depth", recording.measures_depth)
     names = {f"camera {number}": name for number, name in enumerate(recording.names, 1)}
-    used = {name: 0 for name, is_given in given if is_given} | {
-        names.get(name, name): count for name, count in tracker.used.items()
-    }
-    return replace(whole.summary(tracker, remarks), used={} if each else used, people=each)
+    used: dict[str, int] = {}
+    if crowd is None:
+        body = alone.body
+        used = {name: 0 for name, is_given in given if is_given} | {
+            names.get(name, name): count for name, count in alone.used.items()
+        }
+    # Of several people, there may be nobody.
+    return replace(whole.summary(body, remarks), used=used, people=each)
 
 
 def _track_one(tracker: Tracker, taken: FrameSet) -> list[tuple[Estimate, Tracker]]:

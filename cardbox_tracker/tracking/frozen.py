@@ -42,8 +42,13 @@ class FrozenCameras:
         now = [None if one is None else one.silhouette for one in seen]
         kept = [None if mask is None else np.array(mask) for mask in now]
         for number, one in enumerate(seen):
-            shown = None if one is None else (now[number] if one.image is None else one.image)
+            mask = now[number]
+            shown = None if one is None else one.image
+            if shown is None and mask is not None and mask.any():
+                # Without an image, only a person shows that a camera goes on.
+                shown = mask
             if shown is None:
+                self._repeated[number] = 0
                 continue
             last = self._last[number]
             if last is not None and np.array_equal(last, shown):

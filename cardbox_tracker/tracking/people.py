@@ -12,7 +12,6 @@ from __future__ import annotations
 
 from collections.abc import Container, Iterator, Sequence
 from dataclasses import replace
-from itertools import permutations
 from typing import NamedTuple
 
 import cv2
@@ -223,8 +222,7 @@ class People:
         for row, person in enumerate(known):
             for column, one in enumerate(shown):
                 costs[row, column] = self._cost(person, one, colours[column], stamp_ns)
-        chosen = _cheapest(np.minimum(costs, _OTHER))
-        return {known[row].number: column for row, column in chosen if costs[row, column] < _OTHER}
+        return {known[row].number: column for row, column in _cheapest(costs).items()}
 
     def _cost(
         self, person: _Person, one: Shown, colours: FloatArray | None, stamp_ns: int
@@ -437,15 +435,19 @@ def _distance(one: FloatArray, other: FloatArray) -> float:
     return float(np.sqrt(max(1.0 - np.sqrt(one * other).sum(), 0.0)))
 
 
-def _cheapest(costs: FloatArray) -> list[tuple[int, int]]:
-    """Return pairs of row and column with the least sum of costs (N, M)."""
-    rows, columns = costs.shape
-    if rows > columns:
-        return [(row, column) for column, row in _cheapest(costs.T)]
-    if not rows:
-        return []
-    order = np.arange(rows)
-    best = min(
-        permutations(range(columns), rows), key=lambda chosen: costs[order, list(chosen)].sum()
-    )
-    return list(enumerate(best))
+def _cheapest(costs: FloatArray) -> dict[int, int]:
+    """Return the column of each row that has one below ``_OTHER``, with the least sum.
+
+    A row without a column counts ``_OTHER``. The time grows with 2 to the number of rows.
+
+    Args:
+        costs: (N, M), of few rows.
+    """
+    best: dict[int, tuple[float, dict[int, int]]] = {0: (0.0, {})}
+    for column in range(costs.shape[1]):
+        for taken, (total, pairs) in list(best.items()):
+            for row in np.flatnonzero(costs[:, column] < _OTHER).tolist():
+                key, now = taken | 1 << row, total + float(costs[row, column]) - _OTHER
+                if not taken >> row & 1 and (key not in best or now < best[key][0]):
+                    best[key] = now, {**pairs, row: column}
+    return min(best.values(), key=lambda one: one[0])[1]

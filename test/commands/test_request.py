@@ -117,6 +117,11 @@ def test_a_person_is_chosen_for_the_detector(film: Path, monkeypatch: pytest.Mon
     )
 
 
+def test_people_are_numbered_from_1(film: Path) -> None:
+    with pytest.raises(SystemExit):
+        asked(film, "--fov", 60, "--stature", "1.8", "--people", "2", "--person", "0")
+
+
 def test_several_people_have_a_body_each(film: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(detector_module, "installed_models", lambda: ModelFiles(film, film))
     given = ("--fov", 60, "--detector", "mediapipe")

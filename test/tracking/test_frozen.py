@@ -65,6 +65,13 @@ def test_a_camera_frozen_for_long_is_noticed_by_little_changes() -> None:
     assert found[:15] == "b" * 15 and found[-1] == "1"
 
 
+def test_a_camera_that_sees_nobody_is_not_frozen() -> None:
+    nobody = Observation(np.zeros((60, 80), np.uint8))
+    moving = [seen(10 + 2 * i) for i in range(20)]
+    found, cameras = used(moving, [nobody] * 20)
+    assert set(found) == {"b"} and cameras.remarks() == []
+
+
 def test_cameras_without_data_are_no_frozen_ones() -> None:
     cameras = FrozenCameras(3)
     for i in range(5):

@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from itertools import permutations
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from cardbox_tracker.camera.camera import Camera
 from cardbox_tracker.camera.rasterisation import render
@@ -19,6 +22,7 @@ from cardbox_tracker.terms.outline import Outline
 from cardbox_tracker.terms.term import Posed
 from cardbox_tracker.terms.whole_body import WholeBodyCost
 from cardbox_tracker.terms.whole_body_config import WholeBodyCostConfig
+from cardbox_tracker.tracking import people
 from cardbox_tracker.tracking.estimate import NO_PERSON, UNCERTAIN, Estimate
 from cardbox_tracker.tracking.observation import Observation
 from cardbox_tracker.tracking.people import People
@@ -172,3 +176,18 @@ def test_the_outline_of_others_does_not_pull() -> None:
     ]
     cut, unknown, nothing = (float(one.costs[0]) for one in found if one is not None)
     assert unknown < cut / 2 and nothing == 0.0
+
+
+@given(
+    st.lists(st.lists(st.floats(0.0, 20.0), min_size=4, max_size=4), min_size=1, max_size=3),
+)
+def test_figures_are_assigned_with_the_least_sum(costs: list[list[float]]) -> None:
+    table = np.array(costs)
+    found = people._cheapest(table)
+    assert len(set(found.values())) == len(found)
+    assert all(table[row, column] < people._OTHER for row, column in found.items())
+    rows = np.arange(len(table))
+    clipped = np.minimum(table, people._OTHER)
+    least = min(clipped[rows, list(chosen)].sum() for chosen in permutations(range(4), len(rows)))
+    unassigned = people._OTHER * (len(table) - len(found))
+    assert sum(table[pair] for pair in found.items()) + unassigned == pytest.approx(least)

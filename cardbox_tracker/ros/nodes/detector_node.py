@@ -145,8 +145,8 @@ class DetectorNode(CardboxNode):
         found = self._found(stamp_ns(header.stamp), image)
         self._took_ms.append(1e3 * (time.perf_counter() - began_s))
         self._send_points(header, found, pipeline)
-        for one in found:
-            self._pitch.see(one, pipeline.camera)
+        if len(found) == 1:
+            self._pitch.see(found[0], pipeline.camera)
         if self._silhouettes is not None:
             self._silhouettes.send_image(header, image)
             silhouette = np.zeros(image.shape[:2], np.uint8)
