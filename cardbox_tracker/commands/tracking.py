@@ -254,7 +254,8 @@ def placed(
         if abs(given - pitch) > max(_LEAST_DEG, _SURE_STDDEVS * deviation):
             shown_by = " and ".join(sources) or "most cameras"
             remarks.append(
-                f"--camera-pitch-deg {given:g} is used, but {shown_by} show {number}; leave the option out to use that"
+                f"--camera-pitch-deg {given:g} is used, but {shown_by} show {number}; "
+                "leave the option out to use that"
             )
     elif sources:
         remarks.append(
