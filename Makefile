@@ -91,8 +91,14 @@ $(VENV)/extras: setup.py | $(VENV)/package
 	-XDG_DATA_HOME=$(CURDIR)/$(VENV)/data $(BIN)/cardbox detector --install
 	@touch $@
 
+# The tests run the tree, whose kernels compile on one core while the other one checks the types.
+.PHONY: kernels
+kernels: $(VENV)/package
+	$(BIN)/python -m cardbox_tracker.tracking.precompile
+
 .PHONY: test
-test: lint $(VENV)/extras
+test:
+	@$(MAKE) --no-print-directory --jobs=3 lint kernels $(VENV)/extras
 	XDG_DATA_HOME=$(CURDIR)/$(VENV)/data $(BIN)/python -m pytest
 
 # A warning is an error, so every link inside the documents leads somewhere.

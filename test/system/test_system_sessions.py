@@ -88,7 +88,7 @@ def test_session_is_measured_and_tracked_to_its_end(
     stops = [f"{at_s:.3f}" for at_s in pauses.values()]
     played = deep(topic, "publisher")
     player = graph.start(
-        *("play_bag", str(bag), "--rate", "3", "--pause-at", *stops), *remap, *played
+        *("play_bag", str(bag), "--rate", "6", "--pause-at", *stops), *remap, *played
     )
     stamps = [frame["stamp_ns"] for frame in truth["frames"]]
 

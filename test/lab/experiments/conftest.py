@@ -13,7 +13,7 @@ from lab.experiments.parallel import Progress
 from lab.experiments.plan import Plan
 from lab.experiments.sessions import Session, synthetic_session
 
-FPS, SIZE = 3.0, (160, 120)
+FPS, SIZE = 2.0, (160, 120)
 
 TINY = Plan(
     runs=3,
