@@ -51,7 +51,7 @@ def test_images_for_the_sequence_are_of_the_motion(session: Session) -> None:
 
 
 def test_the_same_seed_gives_the_same_session(session: Session) -> None:
-    again = synthetic_session("bow", 0, 3.0, (160, 120))
+    again = synthetic_session("bow", 0, 2.0, (160, 120))
     np.testing.assert_array_equal(again.silhouettes, session.silhouettes)
     assert again.body == session.body
 
