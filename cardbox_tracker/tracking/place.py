@@ -39,9 +39,9 @@ DISTANCE_STDDEV = 0.05
 """Relative standard deviation of a given distance, which people measure or estimate."""
 
 # Seconds and least number of images over which two sources are compared, deviations by which they
-# may differ, and the relative deviation of the distance of points (0.91 to 1.08 of the true one in
-# 24 recordings of 17 people).
-_COMPARED_S, _LEAST_COMPARED, _CONTRADICTING = 1.5, 5, 1.95
+# may differ, those by which they still do after a contradiction, and the relative deviation of the
+# distance of points (0.91 to 1.08 of the true one in 24 recordings of 17 people).
+_COMPARED_S, _LEAST_COMPARED, _CONTRADICTING, _AGREEING = 1.5, 5, 1.95, 1.0
 _POINTS_STDDEV = 0.045
 
 _TRUNK, _ARM = ("shoulder", "hip"), ("shoulder", "elbow", "wrist")
@@ -102,7 +102,13 @@ def distance_of_points(points: ImagePoints, body: BodyModel, camera: Camera) -> 
 
 
 class PlaceWatch:
-    """The place of one tracked person over time."""
+    """The place of one tracked person over time.
+
+    Attributes:
+        contradiction: what two sources of scale say, if they differ beyond their deviations.
+        is_too_large: whether the body is too large for the second source, so that its bones turn
+            along the line of sight to fit the image, and the shape is wrong, too.
+    """
 
     def __init__(self, body: BodyModel, camera: Camera) -> None:
         """Begin with what was given.
@@ -117,7 +123,7 @@ class PlaceWatch:
         self._compared: list[tuple[float, float]] = []
         self._first_ns: int | None = None
         self._apart_m = 0.0
-        self.contradiction = ""
+        self.contradiction, self.is_too_large = "", False
 
     def see(
         self, estimate: Estimate, body: BodyModel, frame: Frame, is_alone: bool = True
@@ -175,8 +181,10 @@ class PlaceWatch:
         shown_m, other_m = np.median(self._compared, axis=0).tolist()
         stddev = hypot(_POINTS_STDDEV, DISTANCE_STDDEV, self._camera.focal_stddev)
         apart = abs(log(shown_m / other_m)) / stddev
+        is_apart = apart > (_AGREEING if self.contradiction else _CONTRADICTING)
         self._apart_m, self.contradiction = 0.0, ""
-        if apart > _CONTRADICTING:
+        self.is_too_large = is_apart and shown_m > other_m
+        if is_apart:
             self._apart_m = abs(shown_m - other_m)
             self.contradiction = (
                 f"by the {self._scale} the person is {shown_m:.1f} m away, by the "

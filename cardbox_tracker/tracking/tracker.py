@@ -264,7 +264,18 @@ class Tracker:
         # The trunk leans in the level frame, which the camera's pitch defines.
         stddev[PITCH] = np.hypot(stddev[PITCH], self.body.camera_pose.pitch_stddev_rad)
         moved_m = np.hypot(estimate.offset_stddev_m, place.stddev_m[[0, 2]])
-        return replace(estimate, posture_stddev=stddev, offset_stddev_m=moved_m, place=place)
+        state, states = estimate.state, estimate.keypoint_states
+        if self._place.is_too_large:
+            state = UNCERTAIN if state == TRACKING else state
+            states = None if states is None else doubted(states)
+        return replace(
+            estimate,
+            state=state,
+            keypoint_states=states,
+            posture_stddev=stddev,
+            offset_stddev_m=moved_m,
+            place=place,
+        )
 
     def _count(
         self, observations: Observations, frames: Sequence[Frame], estimate: Estimate

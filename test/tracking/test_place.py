@@ -10,12 +10,16 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from cardbox_tracker.camera.camera import Camera
+from cardbox_tracker.camera.rasterisation import render
 from cardbox_tracker.detectors.image_points import POINT_INDEX, POINT_NAMES, ImagePoints
+from cardbox_tracker.person.cardbox import cardbox_patches
 from cardbox_tracker.person.model import BodyModel
+from cardbox_tracker.person.posture import reference_posture
 from cardbox_tracker.person.proportions import body_from_proportions
 from cardbox_tracker.person.skeleton import KeypointState
+from cardbox_tracker.search.config import default_preset
 from cardbox_tracker.terms.term import Frame
-from cardbox_tracker.tracking.estimate import TRACKING, Estimate
+from cardbox_tracker.tracking.estimate import TRACKING, UNCERTAIN, Estimate
 from cardbox_tracker.tracking.place import (
     DEPTH,
     MEASURED_BODY,
@@ -24,6 +28,7 @@ from cardbox_tracker.tracking.place import (
     PlaceWatch,
     distance_of_points,
 )
+from cardbox_tracker.tracking.tracker import Tracker
 
 CAMERA = Camera(320, 240, 300.0, 300.0, 159.5, 119.5)
 TALL = body_from_proportions(1.80, 2.0)
@@ -126,12 +131,35 @@ def test_a_stature_that_contradicts_the_given_distance_is_told(
         place = watch.see(estimate_at(2.0, body), body, frame)
     assert place is not None
     assert bool(place.contradiction) is is_told
+    assert watch.is_too_large is (stature_m > 2.0)
     assert place.state is (KeypointState.UNCERTAIN if is_told else KeypointState.TRACKED)
     if is_told:
         shown_m = f"{2.0 * stature_m / 1.80:.1f} m"
         assert shown_m in watch.contradiction and "2.0 m" in watch.contradiction
         # The place is off by what the two sources differ by.
         assert place.stddev_m[0] >= abs(2.0 * stature_m / 1.80 - 2.0)
+
+
+@pytest.mark.parametrize(("first", "is_told"), [(1.10, False), (1.25, True)])
+def test_a_contradiction_lasts_until_the_sources_agree(first: float, is_told: bool) -> None:
+    """A tenth is too little to be told, and too much for an end."""
+    watch = PlaceWatch(TALL, CAMERA)
+    shown = [first] * 5 + [1.10] * 9
+    for number, factor in enumerate(shown):
+        frame = replace(frames(points_at(2.0 * factor))[0], stamp_ns=number * 10**8)
+        watch.see(estimate_at(2.0, TALL), TALL, frame)
+    assert bool(watch.contradiction) is is_told
+
+
+def test_a_body_that_is_too_large_makes_the_shape_uncertain() -> None:
+    tracker = Tracker(TALL, CAMERA, default_preset())
+    shown = render(cardbox_patches(TALL, reference_posture("front")), CAMERA)
+    sure = tracker.track(shown)
+    tracker._place.is_too_large = True
+    doubtful = tracker.track(shown)
+    assert KeypointState.TRACKED in sure.keypoint_states
+    assert doubtful.state == UNCERTAIN
+    assert KeypointState.TRACKED not in doubtful.keypoint_states
 
 
 @pytest.mark.parametrize("depth", [False, True])
