@@ -3,19 +3,24 @@
 from __future__ import annotations
 
 import argparse
+import json
 from dataclasses import replace
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 from cardbox_tracker.commands.arguments import add_force, at_least, body_beside, check_outputs
 from cardbox_tracker.commands.request import FORMATS, TrackFiles, add_tracking, tracking_request
 from cardbox_tracker.commands.tracking import track
 from cardbox_tracker.common.errors import CardboxError
-from cardbox_tracker.common.files import is_written_in_place
+from cardbox_tracker.common.files import atomic_path, is_written_in_place
+
+if TYPE_CHECKING:
+    from cardbox_tracker.recordings.track import TrackSummary
 
 NAME = "track"
 HELP = "follow the posture through a recording, or through all recordings of a folder"
 
-_OF_ONE = ("csv", "bag", "video")
+_OF_ONE = ("csv", "bag", "video", "json")
 _OF_MANY = ("output", "formats", "jobs", "scheduler")
 
 
@@ -40,6 +45,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "wrists, in further columns and in the video (docs/results.md)",
     )
     parser.add_argument("--video", type=Path, metavar="OUT.mp4", help="also write an overlay video")
+    parser.add_argument(
+        "--json",
+        type=Path,
+        metavar="OUT.json",
+        help="also write what is printed at the end: what was tracked, used, left out and assumed",
+    )
     many = parser.add_argument_group("a folder of recordings (docs/many-recordings.md)")
     many.add_argument(
         "--output",
@@ -105,11 +116,29 @@ def _track_one(options: argparse.Namespace) -> None:
         # There is no place for a further file beside a pipe.
         body = body_beside(name if is_written_in_place(table) else table)
     files = TrackFiles(table, options.video, options.bag, body)
-    check_outputs(
-        (table, body, options.video), options.force, request.inputs, results=(options.bag,)
-    )
+    written = (table, body, options.video, options.json)
+    check_outputs(written, options.force, request.inputs, results=(options.bag,))
     summary = track(replace(request, files=files, force=options.force))
-    for path in (table, body, options.video, options.bag):
+    if options.json is not None:
+        with atomic_path(options.json) as temporary:
+            temporary.write_text(json.dumps(_account(summary), indent=1) + "\n", encoding="utf-8")
+    for path in (*written, options.bag):
         if path is not None:
             print(f"wrote {path}")
     print(*summary.accounts, sep="\n")
+
+
+def _account(summary: TrackSummary) -> dict[str, Any]:
+    """Return what ``--json`` writes of a run, or of one of its people."""
+    found: dict[str, Any] = {
+        "images": summary.frames,
+        "tracked": summary.frames_tracked,
+        "uncertain": summary.frames_uncertain,
+        "used": dict(summary.used),
+        "assumed": summary.assumptions,
+        "remarks": summary.remarks,
+        "cameras": summary.accounts,
+    }
+    if summary.people:
+        found["people"] = {number: _account(one) for number, one in summary.people.items()}
+    return found

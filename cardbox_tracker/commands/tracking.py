@@ -228,14 +228,24 @@ def placed(
     Raises:
         CardboxError: the recording cannot be read, or the detector cannot be loaded.
     """
+    from cardbox_tracker.measuring.standing_camera import PITCH_PRIOR, USUAL_PITCH
     from cardbox_tracker.recordings.standing import placed_camera
 
     detector, camera = recording.detector, recording.camera
     given_rad = None
     if person is not None and person.is_pitch_given:
         given_rad = person.body.camera_pose.pitch_rad
+    if detector is None and given_rad is not None:
+        return Placement(given_rad, recording)
     if detector is None:
-        return Placement(given_rad or 0.0, recording)
+        print_remarks(
+            [
+                "nothing tells the camera's pitch without a detector: a level camera is assumed, "
+                "so every posture is at best uncertain; give --camera-pitch-deg (0 for a level "
+                "camera)"
+            ]
+        )
+        return Placement(0.0, recording, math.hypot(USUAL_PITCH, PITCH_PRIOR))
     name = recording.cameras[0] if recording.cameras else None
     found = placed_camera(recording.path, detector, span, camera, name, until_s, given_rad)
     tilt = found.tilt

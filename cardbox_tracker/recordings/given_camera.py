@@ -17,7 +17,7 @@ FOV_HINT = "webcams 60 to 78, phones 60 to 75 held sideways, 36 to 46 upright"
 """Usual fields of view across the width of an image, degrees, for texts."""
 # Field of view along the longer side that is assumed where nothing tells it, degrees.
 _GUESSED_DEG = 65.0
-GUESSED_STDDEV = 0.13
+GUESSED_STDDEV = 0.2
 """Relative standard deviation of the focal length of such a guess."""
 
 

@@ -53,8 +53,9 @@ FILTERS: MappingProxyType[str, MakeFilter] = MappingProxyType(
     {"hierarchical": Cycles, "whole_body": WholeBodyFilter}
 )
 """Filter classes by the values of ``TrackerConfig.filter``."""
-UNKNOWN_TILT_RAD = np.radians(6.0)
-"""Standard deviation of a pitch that is too unsure for ``tracking``, rad."""
+UNKNOWN_TILT_RAD = np.radians(10.0)
+"""Standard deviation of a pitch that is too unsure for ``tracking``, rad; that of most cameras,
+which nothing tells more of, is above it."""
 
 # A model that overlaps the silhouette less than this is somewhere else.
 _TOUCHING_IOU = 0.05
@@ -84,7 +85,7 @@ class Tracker:
 
         Args:
             body: the person. Unknown values are fitted while tracking, which replaces the attribute
-                ``body``. Until then, or if the camera's pitch is not known to 6 degrees, estimates
+                ``body``. Until then, or if the camera's pitch is not known to 10 degrees, estimates
                 are at best ``uncertain``.
             camera: working camera, of the silhouettes' size.
             config: settings; the paper's by default.

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import json
 import re
 from collections.abc import Callable
 from pathlib import Path
@@ -181,13 +182,21 @@ def fov(film: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> str:
 def test_a_film_is_tracked_with_a_stature(
     files: Path, film: Path, fov: str, tmp_path: Path, off_m: Callable, cardbox: Callable[..., Any]
 ) -> None:
-    done = cardbox("track", film, "--fov", fov, *GIVEN, "--video", "out.mp4")
+    more = ("--video", "out.mp4", "--json", "out.json")
+    done = cardbox("track", film, "--fov", fov, *GIVEN, *more)
     assert done.code == 0, done.err
-    for name in ("me.csv", "me.body.yaml", "out.mp4"):
-        assert f"wrote {name}" in done.out
-    assert sorted(path.name for path in tmp_path.iterdir()) == ["me.body.yaml", "me.csv", "out.mp4"]
+    written = ["me.body.yaml", "me.csv", "out.json", "out.mp4"]
+    assert all(f"wrote {name}" in done.out for name in written)
+    assert sorted(path.name for path in tmp_path.iterdir()) == written
     with (tmp_path / "me.csv").open(encoding="utf-8") as file:
         rows = list(csv.DictReader(file))
+    # Nothing tells the pitch of this camera.
+    assert "a level camera is assumed" in done.err
+    assert {row["state"] for row in rows} == {"uncertain"}
+    told = json.loads((tmp_path / "out.json").read_text(encoding="utf-8"))
+    assert told["images"] == told["tracked"] == told["uncertain"] == len(rows)
+    assert told["used"] == {"colours": len(rows) - 1}
+    assert "camera pitch 0 degrees down (assumed)" in told["assumed"]
     assert [float(row["time_s"]) for row in rows[:3]] == pytest.approx([16.0, 16.25, 16.5])
     apart_m = beside_shoulders(off_m(tmp_path / "me.csv", files / "session"))
     errors_m = np.linalg.norm(apart_m, axis=2)

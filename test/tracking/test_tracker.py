@@ -177,7 +177,7 @@ def test_doubt_about_each_keypoint_comes_with_its_evidence(make_config: Any) -> 
 
 def test_an_unknown_pitch_makes_every_image_uncertain() -> None:
     states = []
-    for stddev_deg in (2.0, 7.0):
+    for stddev_deg in (9.0, 11.0):
         body = BODY.with_values(pitch_stddev_rad=np.radians(stddev_deg))
         tracker = Tracker(body, CAMERA, paper_preset(), np.random.default_rng(0))
         states.append({tracker.track(silhouette).state for silhouette in waving(5)})

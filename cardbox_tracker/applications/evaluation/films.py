@@ -22,8 +22,10 @@ from cardbox_tracker.applications.evaluation.session import RecordedSession, loa
 from cardbox_tracker.applications.evaluation.tracking import run_of
 from cardbox_tracker.common.errors import CardboxError
 from cardbox_tracker.person.model import BodyModel
+from cardbox_tracker.person.skeleton import KeypointState
 from cardbox_tracker.recordings.open_images import open_images
-from cardbox_tracker.tracking.estimate import Estimate
+from cardbox_tracker.search.doubt import FAR_M
+from cardbox_tracker.tracking.estimate import TRACKING, Estimate
 
 FloatArray = NDArray[np.float64]
 
@@ -136,9 +138,23 @@ def film_figures(
     run = run_of(film.session, body, "", by_stamp, [float("nan")])
     every = people_figures(film.session, run)
     found = {name: every[name] for name in _FIGURES if name in every}
+    found["placed"], found["placed_beyond_30"] = _placed(film.session, by_stamp)
     if body is not None:
         found["pitch_found_deg"] = float(np.degrees(body.camera_pose.pitch_rad))
     return found | {"pitch_deg": film.session.truth.pitch_deg}
+
+
+def _placed(session: RecordedSession, by_stamp: Mapping[int, Estimate]) -> tuple[int, int]:
+    """Count images whose shape and place are both sure, and those of them with a joint far off."""
+    count = beyond = 0
+    for stamp_ns, true_m in zip(session.stamps_ns.tolist(), session.keypoints_m, strict=True):
+        one = by_stamp.get(stamp_ns)
+        if one is None or one.state != TRACKING or one.place is None or one.keypoints_m is None:
+            continue
+        if one.place.state is KeypointState.TRACKED:
+            count += 1
+            beyond += bool(np.linalg.norm(one.keypoints_m - true_m, axis=1).max() > FAR_M)
+    return count, beyond
 
 
 def films_report(results: Mapping[str, Any]) -> str:
@@ -149,11 +165,13 @@ def films_report(results: Mapping[str, Any]) -> str:
         "Each session is tracked by `cardbox track FILM --detector mediapipe` with what is given, "
         "and without an empty scene. Errors are those of shoulders, elbows and hands, cm; "
         "*aligned*: beside the middle of the shoulders. Settings were chosen on the same "
-        "recordings. An image is beyond 30 cm if a joint is, place included.",
+        "recordings. An image is beyond 30 cm if a joint is, place included. *Placed*: the state "
+        "is `tracking`, and that of the place is `tracked`.",
         "",
         "| film | given | aligned | absolute | MediaPipe aligned | `tracking`, % | of these beyond "
-        "30 cm, % | without posture, % | pitch found / true, degrees |",
-        "|---" * 9 + "|",
+        "30 cm, % | placed, % | of these beyond 30 cm, % | without posture, % | pitch found / "
+        "true, degrees |",
+        "|---" * 11 + "|",
     ]
     groups: dict[tuple[str, ...], list[Mapping[str, Any]]] = {}
     for film in results["films"]:
@@ -185,6 +203,8 @@ def _row(name: str, films: Sequence[Mapping[str, Any]]) -> str:
         f"{mean('mediapipe_aligned', films):.1f}",
         f"{share(lambda run: run['tracking'], 'frames'):.0f}",
         f"{share(lambda run: run['tracking_beyond_30'], 'tracking'):.1f}",
+        f"{share(lambda run: run['placed'], 'frames'):.0f}",
+        f"{share(lambda run: run['placed_beyond_30'], 'placed'):.1f}",
         f"{share(lambda run: run['without_estimate'], 'frames'):.0f}",
         f"{mean('pitch_found_deg'):.1f} / {mean('pitch_deg'):.1f}",
     ]
