@@ -48,6 +48,7 @@ def track(
     """
     from cardbox_tracker.common.progress import progress_bar
     from cardbox_tracker.detectors.hand_network import HandNetwork
+    from cardbox_tracker.measuring.standing_camera import PITCH_PRIOR, USUAL_PITCH
     from cardbox_tracker.person.model import PLACEMENT
     from cardbox_tracker.person.model_file import save_body_model
     from cardbox_tracker.person.proportions import USUAL_STATURE_M, USUAL_STDDEV_M
@@ -67,6 +68,15 @@ def track(
         found = placed(recording, standing, start_s + _COMES_WITHIN_S, person)
         recording = found.recording
         if not person.is_pitch_given:
+            if recording.detector is None:
+                found = found._replace(stddev_rad=math.hypot(USUAL_PITCH, PITCH_PRIOR))
+                print_remarks(
+                    [
+                        "nothing tells the camera's pitch without a detector: a level camera is "
+                        "assumed, so every posture is at best uncertain; give --camera-pitch-deg "
+                        "(0 for a level camera)"
+                    ]
+                )
             tilt = {"camera_pitch_rad": found.pitch_rad, "pitch_stddev_rad": found.stddev_rad}
             bodies = [body.with_values(**tilt) for body in bodies]
         if found.distance is not None and "distance_m" in person.body.unknown:
@@ -228,24 +238,14 @@ def placed(
     Raises:
         CardboxError: the recording cannot be read, or the detector cannot be loaded.
     """
-    from cardbox_tracker.measuring.standing_camera import PITCH_PRIOR, USUAL_PITCH
     from cardbox_tracker.recordings.standing import placed_camera
 
     detector, camera = recording.detector, recording.camera
     given_rad = None
     if person is not None and person.is_pitch_given:
         given_rad = person.body.camera_pose.pitch_rad
-    if detector is None and given_rad is not None:
-        return Placement(given_rad, recording)
     if detector is None:
-        print_remarks(
-            [
-                "nothing tells the camera's pitch without a detector: a level camera is assumed, "
-                "so every posture is at best uncertain; give --camera-pitch-deg (0 for a level "
-                "camera)"
-            ]
-        )
-        return Placement(0.0, recording, math.hypot(USUAL_PITCH, PITCH_PRIOR))
+        return Placement(given_rad or 0.0, recording)
     name = recording.cameras[0] if recording.cameras else None
     found = placed_camera(recording.path, detector, span, camera, name, until_s, given_rad)
     tilt = found.tilt

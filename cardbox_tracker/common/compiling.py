@@ -175,8 +175,18 @@ def njit(**options: Any) -> Callable[[F], F]:
 kernel = njit()
 """Decorator that compiles a function."""
 
-inlined_kernel = njit(forceinline=True)
-"""Decorator that compiles a function and inlines it into its callers."""
+borrowing_kernel = njit(_nrt=False)
+"""Decorator that compiles a function which counts no references to the arrays that it is given.
+
+Counting takes longer than a few additions, so the loops of kernels call such functions. They
+allocate and return no arrays, also not in tuples: their callers would release them.
+"""
+
+inlined_kernel = njit(forceinline=True, _nrt=False)
+"""Decorator as :data:`borrowing_kernel`; the function is inlined into its callers."""
+
+inlined_allocation = njit(forceinline=True)
+"""Decorator that compiles and inlines a function which allocates or returns arrays."""
 
 copied_kernel = njit(inline="always")
 """Decorator that copies a short function into any caller, where it may return views of arrays."""

@@ -25,7 +25,12 @@ from typing import NamedTuple, Protocol
 
 import numpy as np
 
-from cardbox_tracker.common.compiling import copied_kernel, inlined_kernel, kernel
+from cardbox_tracker.common.compiling import (
+    copied_kernel,
+    inlined_allocation,
+    inlined_kernel,
+    kernel,
+)
 from cardbox_tracker.person.model import BodyModel, Person, Placement
 from cardbox_tracker.person.parts import (
     BOTTOM,
@@ -491,7 +496,7 @@ class PosedArm(NamedTuple):
     """(6,): the directions with y outwards, for the arms' prior; otherwise scratch."""
 
 
-@inlined_kernel
+@inlined_allocation
 def new_arm() -> PosedArm:
     """Return the scratch arrays of one arm."""
     return PosedArm(

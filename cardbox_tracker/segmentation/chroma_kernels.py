@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from cardbox_tracker.common.compiling import inlined_kernel, kernel
+from cardbox_tracker.common.compiling import inlined_allocation, inlined_kernel, kernel
 
 NEUTRAL = 128.0
 """Cr and Cb of grey."""
@@ -169,7 +169,7 @@ def rate_colors(
     _subtract_edge(scores, _f32(edge), rows[0], margins)
 
 
-@inlined_kernel
+@inlined_allocation
 def _part(memory: Any, height: Any, width: Any) -> Any:
     """Return the first elements of flat memory as an array (height, width)."""
     return memory[: height * width].reshape((height, width))

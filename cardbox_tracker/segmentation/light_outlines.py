@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from cardbox_tracker.common.compiling import inlined_kernel, kernel
+from cardbox_tracker.common.compiling import inlined_allocation, kernel
 from cardbox_tracker.segmentation.light_samples import take_samples
 
 # Light varies by less than this fraction within 12 px; an outline does not.
@@ -96,7 +96,7 @@ def find_smooth(
     return count
 
 
-@inlined_kernel
+@inlined_allocation
 def _flood(state: Any, reached: Any) -> None:
     """Mark the pixels of the state 1 that are connected to the state 2 by their sides."""
     height, width = state.shape

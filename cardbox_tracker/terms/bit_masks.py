@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from cardbox_tracker.common.compiling import inlined_kernel, kernel
+from cardbox_tracker.common.compiling import borrowing_kernel, inlined_allocation, inlined_kernel
 from cardbox_tracker.terms.bit_planes import (
     COUNTED,
     FOREGROUND,
@@ -51,7 +51,7 @@ class Masks(NamedTuple):
     rows_of: Counts
 
 
-@inlined_kernel
+@inlined_allocation
 def new_masks(patches: int, planes: Planes) -> Masks:
     """Return the scratch arrays for a number of patches before the planes (2, words, rows)."""
     words, rows = planes.shape[1:]
@@ -90,7 +90,7 @@ def _place(work: Workspace, has_cuts: bool, width: int, masks: Masks) -> None:
             drawn[w, v] = np.uint32(0)
 
 
-@kernel
+@borrowing_kernel
 def _add(sides: Whole, extent: Counts, words_of: Counts, drawn: Drawn) -> None:
     """Add all patches with their ``extent`` (K, 2) and columns of words (K, 2)."""
     for k in range(_index(extent.shape[0])):
@@ -110,7 +110,7 @@ def _add(sides: Whole, extent: Counts, words_of: Counts, drawn: Drawn) -> None:
                     drawn[w, v] = np.uint32(drawn[w, v] | added)
 
 
-@kernel
+@borrowing_kernel
 def _count(drawn: Drawn, rows_of: Counts, planes: Planes) -> tuple[int, int]:
     """Return drawn pixels and their sum of (1 - 2 f)."""
     pixels = gain = 0

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from math import sqrt
 
-from cardbox_tracker.common.compiling import inlined_kernel, kernel
+from cardbox_tracker.common.compiling import inlined_allocation, inlined_kernel, kernel
 from cardbox_tracker.person.kinematics import (
     PosedArm,
     angles_in,
@@ -151,7 +151,7 @@ def place_arm(arm: PosedArm, p: int, drawn: Floats, corners: Floats) -> None:
     _place_limb(arm, 1, (fore_m, thin, hand_cap), p + LIMB_PATCHES, corners)
 
 
-@inlined_kernel
+@inlined_allocation
 def new_scratch() -> tuple[Workspace, PosedArm]:
     """Return the scratch arrays of :func:`place_patches`."""
     return new_workspace(BODY_PATCHES, 1), new_arm()

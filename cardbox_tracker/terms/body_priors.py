@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from cardbox_tracker.common.compiling import inlined_kernel, kernel
+from cardbox_tracker.common.compiling import borrowing_kernel, inlined_kernel, kernel
 from cardbox_tracker.person.kinematics import PosedArm, angles_in, new_arm, pose_arm, side_of
 from cardbox_tracker.person.parts import (
     BOTTOM,
@@ -120,7 +120,7 @@ def _depth_inside(x: float, y: float, z: float, parts: Floats, margin: float) ->
     return max(deep, 1.0 - sqrt(a * a + b * b + c * c))
 
 
-@kernel
+@borrowing_kernel
 def penetration(points: Floats, parts: Floats) -> float:
     """Return the sum of the depths of hand, mid-forearm and elbow (3, 3) inside trunk or head."""
     margin = parts[FOREARM, TOP_WIDTH] / 2

@@ -45,7 +45,7 @@ from cardbox_tracker.terms.inner_cue_arms import (
     forearm_of,
     zones_of,
 )
-from cardbox_tracker.terms.inner_cue_kernels import ratio_maps
+from cardbox_tracker.terms.inner_cue_kernels import costs_of_arms, ratio_maps
 from cardbox_tracker.terms.inner_cue_sleeves import Sleeves
 from cardbox_tracker.terms.term import (
     Frame,
@@ -135,7 +135,7 @@ class InnerCueTerm:
             self._use(self._sleeves)
         return InnerCueObservation(
             ArmGains(maps, (u0, v0), self._weights, self._px_per_m, self._forearm_m),
-            tuple(arms_in_image(before, arm)[0] for arm in (0, 1)),
+            np.array([arms_in_image(before, arm)[0] for arm in (0, 1)]),
         )
 
     def _comparable(self, image: Image) -> Image | None:
@@ -218,21 +218,15 @@ class InnerCueObservation(TermObservation):
 
     Attributes:
         gains: gains of arms in this frame.
-        before: elbow and hand of each arm in the previous frame, (1, 2, 3).
+        before: elbow and hand of each arm in the previous frame, (2, 1, 2, 3).
     """
 
     gains: ArmGains
-    before: tuple[FloatArray, ...]
+    before: FloatArray
 
     def rate(self, posed: Posed) -> FloatArray:
-        """Rate the arms that count; the outline determines the trunk.
-
-        While one arm is rated, the other one has its last place.
-        """
-        costs = np.zeros(len(posed))
-        seen = [arms_in_image(posed, arm) if posed.parts[1 + arm] else None for arm in (0, 1)]
-        for arm, here in enumerate(seen):
-            if here is not None:
-                other = seen[1 - arm]
-                costs -= self.gains(*here, self.before[1 - arm] if other is None else other[0])
+        """Rate the arms that count; the outline determines the trunk."""
+        costs = np.zeros(len(posed.states))
+        of = posed.states, posed.parts, posed.body, self.before
+        costs_of_arms(*of, *self.gains.arguments, costs)
         return costs

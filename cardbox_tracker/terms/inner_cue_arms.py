@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -70,6 +71,10 @@ class ArmGains:
             others: points of the other arm, (N, 2, 3), or (1, 2, 3) for all.
         """
         gains = np.empty(len(points))
-        seen, forearm = (self.maps, *self.corner), (*self.forearm_m, self.px_per_m)
-        kernels.arm_gains(points, hidden, others, seen, forearm, self.weights, gains)
+        kernels.arm_gains(points, hidden, others, *self.arguments, gains)
         return gains
+
+    @cached_property
+    def arguments(self) -> tuple[kernels.MapsTuple, kernels.ForearmTuple, FloatArray]:
+        """The same for the kernels."""
+        return (self.maps, *self.corner), (*self.forearm_m, self.px_per_m), self.weights

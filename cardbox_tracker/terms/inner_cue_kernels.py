@@ -17,7 +17,7 @@ from cardbox_tracker.person.kinematics import (
     turn_arm,
 )
 from cardbox_tracker.person.parts import BOTTOM, FORWARD, HEAD, HEIGHT, TOP_WIDTH, TORSO, WAIST
-from cardbox_tracker.terms.kernel_arguments import BodyTuple, body_of
+from cardbox_tracker.terms.kernel_arguments import BodyTuple, Drawn, body_of
 
 # Begin and end of the forearm's patch between elbow and fist, and its width in forearm widths; a
 # wider patch would sample pixels outside of the forearm.
@@ -235,3 +235,41 @@ def arm_gains(
         # The length in the image counts, because a forearm that points to the camera covers less.
         area_m2 = _WIDTH * width_m * (_END - _BEGIN) * length / per_m
         gains[i] += weights[1] * covered * area_m2 * px_per_m**2
+
+
+@kernel
+def costs_of_arms(
+    states: Any,
+    counted: Drawn,
+    body: BodyTuple,
+    before: Any,
+    maps: MapsTuple,
+    forearm: ForearmTuple,
+    weights: Any,
+    costs: Any,
+) -> None:
+    """Subtract the gains of the arms of states (N, 14) from ``costs`` (N,), px.
+
+    Args:
+        states: of the camera.
+        counted: whether trunk, left arm and right arm count.
+        body: fields of :class:`~.kernel_arguments.Body`.
+        before: points of the left and the right arm in the previous frame, (2, 1, 2, 3). While one
+            arm is rated, the other one has its last place.
+        maps: fields of :class:`Maps`.
+        forearm: fields of :class:`Forearm`.
+        weights: see :func:`arm_gains`.
+        costs: changed.
+    """
+    count = states.shape[0]
+    points, hidden = np.empty((2, count, 2, 3)), np.empty((2, count), np.bool_)
+    gains = np.empty(count)
+    for arm in range(2):
+        if counted[1 + arm]:
+            project_arms(states, arm, body, points[arm], hidden[arm])
+    for arm in range(2):
+        if counted[1 + arm]:
+            others = points[1 - arm] if counted[2 - arm] else before[1 - arm]
+            arm_gains(points[arm], hidden[arm], others, maps, forearm, weights, gains)
+            for i in range(count):
+                costs[i] -= gains[i]

@@ -16,6 +16,7 @@ somebody else and are not used, unless this lasts.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from math import hypot
 
 import numpy as np
 
@@ -142,24 +143,24 @@ class JointPointsTerm:
         """Return the points, left and right exchanged if necessary; None if not this person's."""
         pixels = projected(before)
         found = points_of(points)
-        exchanged = points.exchanged()
-        away_m, other_m = (self._distances(one, pixels) for one in (found, points_of(exchanged)))
-        if not np.isfinite(away_m).any():
+        away_m, other_m = (self._distances(one, pixels) for one in (found, found[_OTHER_SIDE]))
+        if not len(away_m):
             return points
-        square, other = np.nanmean(away_m**2), np.nanmean(other_m**2)
+        square, other = np.mean(away_m**2), np.mean(other_m**2)
         if square > _EXCHANGED_M**2 and other < _EXCHANGED * square:
-            points, away_m = exchanged, other_m
+            points, away_m = points.exchanged(), other_m
             self._exchanged_s = self._exchanged_s or 0.0
         else:
             self._exchanged_s = None
-        self._elsewhere = self._elsewhere + 1 if np.nanmedian(away_m) > _ELSEWHERE_M else 0
+        self._elsewhere = self._elsewhere + 1 if np.median(away_m) > _ELSEWHERE_M else 0
         return None if 0 < self._elsewhere <= _ELSEWHERE_FRAMES else points
 
     def _distances(self, found: FloatArray, pixels: FloatArray) -> FloatArray:
-        """Return the distance of each point (10, 3) from the projected joint, m; nan if unknown."""
-        metre_px = self._camera.fx / np.maximum(pixels[:, 2], 0.1)
-        distances: FloatArray = np.linalg.norm(found[:, :2] - pixels[:, :2], axis=1) / metre_px
-        distances[found[:, 2] <= 0.0] = np.nan
+        """Return the distances of the known points of (10, 3) from the projected joints, m."""
+        known = found[:, 2] > 0.0
+        away_px = found[known, :2] - pixels[known, :2]
+        depths_m = np.maximum(pixels[known, 2], 0.1)
+        distances: FloatArray = np.hypot(*away_px.T) * depths_m / self._camera.fx
         return distances
 
     def _evidence(self, points: ImagePoints, age_s: float) -> EvidenceTuple:
@@ -168,8 +169,8 @@ class JointPointsTerm:
         for arm in range(2):
             for joint, metres in _JOINT_M.items():
                 moved_m = age_s * _JOINT_M_PER_S[joint]
-                deviations[POINTS_OF_ARM * arm + joint] = np.hypot(metres, moved_m), _POINT_PX
-        deviations[[HIPS, EARS]] = np.hypot(_TRUNK_M, age_s * _TRUNK_M_PER_S), _POINT_PX
+                deviations[POINTS_OF_ARM * arm + joint] = hypot(metres, moved_m), _POINT_PX
+        deviations[[HIPS, EARS]] = hypot(_TRUNK_M, age_s * _TRUNK_M_PER_S), _POINT_PX
         bones = np.zeros((N_BONES, 3))
         bones[:, 2] = _BONE_DEVIATIONS * (1.0 + age_s / 0.1)
         away = np.array([0.0, 0.0, 1.0])
@@ -259,6 +260,8 @@ EVIDENCE = (
 """Distance of a joint from its point at its depth, m; whether the point is not certain; difference
 of its depth from that of the detector, m; component of the bone that ends there, and of the upper
 arm, along the line of sight, as a fraction; distance of the person, m; whether the back is seen."""
+# Left and right arms of the points that are compared, exchanged.
+_OTHER_SIDE = [*range(POINTS_OF_ARM, 2 * POINTS_OF_ARM), *range(POINTS_OF_ARM), HIPS, EARS]
 # Score of a certain point.
 _CERTAIN = 0.5
 

@@ -20,7 +20,7 @@ from cardbox_tracker.camera.rasterisation import (
     NEAR_PLANE_M,
     SUBPIXELS,
 )
-from cardbox_tracker.common.compiling import inlined_kernel, kernel
+from cardbox_tracker.common.compiling import borrowing_kernel, inlined_allocation, inlined_kernel
 from cardbox_tracker.terms.kernel_arguments import Counts, Floats, Intrinsics, Whole
 
 _ONE = float(2**CROSSING_BITS)
@@ -73,7 +73,7 @@ class Workspace(NamedTuple):
     """(3,): middle of the hips, and shoulder or elbow, in the optical frame, metres."""
 
 
-@inlined_kernel
+@inlined_allocation
 def new_workspace(patches: int, rows: int) -> Workspace:
     """Return the workspace for a number of patches and rows; ``shape`` is zero.
 
@@ -186,7 +186,7 @@ def _cross(edges: Whole, e: int, p: int, side: _Index, sides: Whole, width: int)
         sides[k, side, base + _index(i)] = min(max(u, np.int32(0)), limit)
 
 
-@kernel
+@borrowing_kernel
 def _draw_cut(work: Workspace, p: int, camera: Intrinsics, rows: int, width: int) -> None:
     """Write sides and extent of patch ``p`` after clipping at the near plane.
 

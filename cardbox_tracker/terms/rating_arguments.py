@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from cardbox_tracker.common.compiling import inlined_kernel
+from cardbox_tracker.common.compiling import inlined_allocation
 from cardbox_tracker.person.kinematics import PosedArm, new_arm
 from cardbox_tracker.terms.bit_masks import Masks, new_masks
 from cardbox_tracker.terms.bit_planes import Planes
@@ -65,7 +65,7 @@ class Scratch(NamedTuple):
     logs: Floats
 
 
-@inlined_kernel
+@inlined_allocation
 def new_scratch(patches: int, seen: Observed, given: Prior) -> Scratch:
     """Return the scratch arrays for a number of patches."""
     return Scratch(

@@ -11,7 +11,7 @@ The pixels are those of equation (2), with the outlines of
 
 from __future__ import annotations
 
-from cardbox_tracker.common.compiling import inlined_kernel, kernel
+from cardbox_tracker.common.compiling import borrowing_kernel, inlined_kernel, kernel
 from cardbox_tracker.person.kinematics import (
     angles_in,
     new_arm,
@@ -90,7 +90,7 @@ def rate_trunks(
     _rate_trunks(states, body_of(body), seen, given, scratch, ratings)
 
 
-@kernel
+@borrowing_kernel
 def _rate_trunks(
     states: Floats, of: Body, seen: Observed, given: Prior, scratch: Scratch, ratings: Floats
 ) -> None:
@@ -124,7 +124,7 @@ def rate_arms(
     _rate_arms(arms, side, torso, body_of(body), seen, given, scratch, ratings, joints_m)
 
 
-@kernel
+@borrowing_kernel
 def _rate_arms(
     arms: Floats,
     side: float,
@@ -175,7 +175,7 @@ def rate_bodies(
     _rate_bodies(states, body_of(body), seen, given, scratch, ratings, pixels, Points(*points))
 
 
-@kernel
+@borrowing_kernel
 def _rate_bodies(
     states: Floats,
     of: Body,
@@ -219,7 +219,7 @@ def rate_pairs(
     _rate_pairs(states, body_of(body), seen, given, scratch, ratings, Points(*points))
 
 
-@kernel
+@borrowing_kernel
 def _rate_pairs(
     states: Floats,
     of: Body,

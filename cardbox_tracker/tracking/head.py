@@ -58,6 +58,7 @@ HEAD_HEIGHT_M = 0.23
 
 LEAST_SCORE = 0.5
 """Points with lower scores are not used."""
+_CHOSEN = np.array([POINT_INDEX[name] for name in FACE_POINTS])
 LEAST_POINTS = 3
 """Two points do not tell turning, nodding and tilting apart."""
 LARGEST_STDDEV_RAD = np.radians(20.0)
@@ -94,35 +95,35 @@ class Neck(NamedTuple):
 
 
 def fit_neck(
-    points: ImagePoints, body: BodyModel, camera: Camera, posture: FloatArray
+    points: ImagePoints, body: BodyModel, camera: Camera, state: FloatArray
 ) -> Neck | None:
     """Return the direction of the head that fits the points of the face best.
 
     Args:
         points: of the image of ``camera``.
-        body: the person, at the place of the estimate.
+        body: the person.
         camera: working camera, with the pitch of the body model.
-        posture: d1..d12, (12,), rad and metres; its torso is taken as exact.
+        state: d1..d12, (12,), or with ``torso_x`` and ``torso_z``, (14,), rad and metres; its torso
+            is taken as exact.
 
     Returns:
         The angles; None if the points are too few or too uncertain, or do not form a face.
     """
-    chosen = np.array([POINT_INDEX[name] for name in FACE_POINTS])
-    known = points.scores[chosen] >= LEAST_SCORE
+    known = points.scores[_CHOSEN] >= LEAST_SCORE
     if np.count_nonzero(known) < LEAST_POINTS:
         return None
-    frames = pose(body, posture)
-    depth_m = float(camera.reference_to_optical(frames.head)[2])
+    frames, axes = pose(body, state), camera.reference_to_optical_rotation()
+    head_m = axes @ frames.head
+    depth_m = float(head_m[2])
     if depth_m <= _FARTHEST_M:
         return None
     size = body_parts(body.sizes).head.height_m / HEAD_HEIGHT_M
-    axes = camera.reference_to_optical_rotation()
     values, rms, covariance = _solve(
         np.ascontiguousarray(axes @ frames.torso_rotation),
         np.ascontiguousarray(axes.T),
-        camera.reference_to_optical(frames.head),
+        head_m,
         size * FACE_M[known],
-        points.px[chosen[known]],
+        points.px[_CHOSEN[known]],
         (camera.fx, camera.fy, camera.cx, camera.cy),
         float(np.hypot(_POINT_PX, camera.fx * _POINT_M / depth_m)),
     )
@@ -274,7 +275,10 @@ class HeadTracker:
     def _fit(self, points: ImagePoints | None, found: Estimate) -> Neck | None:
         if points is None or found.posture is None:
             return None
-        neck = fit_neck(points, found.placed(self._body), self._camera, found.posture)
+        state = found.posture
+        if found.offset_m is not None:
+            state = np.concatenate([state, found.offset_m])
+        neck = fit_neck(points, self._body, self._camera, state)
         if neck is None or found.posture_stddev is None:
             return neck
         return neck._replace(stddev=np.hypot(neck.stddev, found.posture_stddev[[YAW, PITCH]]))
