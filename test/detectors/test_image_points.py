@@ -89,3 +89,16 @@ def test_lists_and_whole_numbers_of_numpy_are_taken() -> None:
     assert points.spatial_m is not None
     assert points.spatial_m.shape == (COUNT, 3)
     assert points.stamp_ns == 5
+
+
+def test_the_points_of_coco_have_their_names() -> None:
+    points = np.zeros((17, 3))
+    points[0], points[9] = (10.0, 20.0, 0.8), (30.0, 40.0, 0.9)
+    found = ImagePoints.from_coco17(points, 7)
+    expected = ImagePoints.of({"nose": (10.0, 20.0, 0.8), "left_wrist": (30.0, 40.0, 0.9)}, 7)
+    np.testing.assert_array_equal(found.scores, expected.scores)
+    known = expected.scores > 0.0
+    np.testing.assert_array_equal(found.px[known], expected.px[known])
+    assert found.stamp_ns == 7
+    with pytest.raises(ValueError, match=r"\(17, 3\)"):
+        ImagePoints.from_coco17(np.zeros((18, 3)))

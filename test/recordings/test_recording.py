@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from pathlib import Path
+from unittest.mock import Mock
 
 import numpy as np
 import pytest
@@ -12,7 +13,10 @@ import yaml
 from cardbox_tracker.camera.camera import Camera
 from cardbox_tracker.common.errors import BagError, CameraError, CardboxError
 from cardbox_tracker.detectors import detector as detector_module
+from cardbox_tracker.detectors.detector import Detector, PersonDetector
+from cardbox_tracker.detectors.image_points import POINT_INDEX
 from cardbox_tracker.detectors.model_files import ModelFiles
+from cardbox_tracker.detectors.point_table import PointTable
 from cardbox_tracker.detectors.pose_network import Detection
 from cardbox_tracker.recordings.bag_reader import BagReader
 from cardbox_tracker.recordings.bag_writer import BagWriter
@@ -242,3 +246,24 @@ def test_the_masks_of_a_detector_are_the_silhouettes(
         assert "6 images" in source.first.remarks[-1]
         assert len(list(source.frames(0.65))) == 3
     assert started == [detector.models]
+
+
+def test_given_points_of_several_people_precede_those_of_the_masks(
+    two: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def all_in(_: PersonDetector, __: int, image: np.ndarray) -> list[Detection]:
+        mask = np.full(image.shape[:2], 255, np.uint8)
+        return [Detection(np.zeros((33, 2)), np.ones(33), mask)]
+
+    monkeypatch.setattr(detector_module, "PoseNetwork", Mock())
+    monkeypatch.setattr(PersonDetector, "all_in", all_in)
+    table = tmp_path / "points.csv"
+    rows = [f"{10**18},one,{person},left_wrist,{u},30,0.9" for person, u in ((1, 20), (2, 50))]
+    table.write_text("\n".join(["stamp_ns,camera,person,joint,u,v,score", *rows]) + "\n")
+    models = ModelFiles(tmp_path / "a", tmp_path / "b")
+    detector, given = Detector(models)._replace(people=2), PointTable(table, people=2)
+    with open_recording(two, detector, ["one"], points=given) as source:
+        frame, scale = next(iter(source.first.frames())), source.first.camera.width / CAMERA.width
+    assert frame.people is not None
+    columns = [one.px[POINT_INDEX["left_wrist"], 0] for one in frame.people]
+    assert columns == pytest.approx([scale * 20.5 - 0.5, scale * 50.5 - 0.5])
