@@ -128,7 +128,8 @@ example: setup
 
 .PHONY: benchmark
 benchmark: setup
-	$(BIN)/cardbox benchmark --json docs/benchmarks.json --report docs/benchmarks.md
+	$(BIN)/cardbox benchmark --json docs/benchmarks.json --report docs/benchmarks.md \
+		$(patsubst %/ground_truth.json,--session %,$(wildcard $(DATA)/person_a/ground_truth.json))
 
 # Fewer runs: make experiments RUNS=2
 RUNS ?= 100

@@ -26,37 +26,46 @@ from cardbox_tracker.common.errors import CardboxError
 from cardbox_tracker.detectors.model_files import installed_models
 from cardbox_tracker.person.model_file import save_body_model
 from cardbox_tracker.ros.runtime.processes import Nodes, isolate, running_nodes
-from lab.benchmarks.scene import BenchmarkScene, make_scene
+from lab.benchmarks.scene import BenchmarkScene, make_scene, recorded_scene
 
 RATES_HZ = (15, 30, 60)
 STREAMS = (("mono8", 320, 240), ("bgr8", 640, 480))
 SEPARATE = ("background", "initializer", "tracker")
 TOGETHER = ("cardbox_nodes",)
 WITH_DETECTOR = (*SEPARATE, "detector")
+OF_DETECTOR = ("detector", "tracker")
 PERCENTILES = (50, 95, 99)
 
 _START_S = 30.0
 _LAST_S = 0.5
 
 
-def measure_nodes(seconds: float, report: Callable[[float], None]) -> dict[str, Any] | None:
+def measure_nodes(
+    seconds: float, report: Callable[[float], None], session: Path | None = None
+) -> dict[str, Any] | None:
     """Measure every stream at every rate for ``seconds``; None where ROS is not installed.
 
     ``single_process`` in the result holds the same figures for all nodes in one process, and
-    ``with_detector`` those beside the node ``detector``, None where it is not installed.
+    ``with_detector`` those beside the node ``detector``, None where it is not installed. If a
+    ``session`` is given, the detector sees its person, and ``of_detector`` holds the figures with
+    the detector's silhouettes.
     """
     try:
         import rclpy  # noqa: F401
     except ImportError:
         return None
     isolate()
-    scenes = {stream: make_scene(*stream[1:], 60) for stream in STREAMS}
-    ways = {"": SEPARATE, "single_process": TOGETHER}
+    drawn = {stream: make_scene(*stream[1:], 60) for stream in STREAMS}
+    ways = {"": (SEPARATE, drawn), "single_process": (TOGETHER, drawn)}
     if _has_detector():
-        ways["with_detector"] = WITH_DETECTOR
+        ways["with_detector"] = WITH_DETECTOR, drawn
+        if session is not None:
+            scene = recorded_scene(session, 60)
+            seen = {("bgr8", scene.camera.width, scene.camera.height): scene}
+            ways |= {"with_detector": (WITH_DETECTOR, seen), "of_detector": (OF_DETECTOR, seen)}
     measured: dict[str, Any] = {"with_detector": None}
-    for number, (way, processes) in enumerate(ways.items()):
-        measured[way] = _measure(processes, scenes, seconds, partial(_part, report, number, ways))
+    for number, (way, of) in enumerate(ways.items()):
+        measured[way] = _measure(*of, seconds, partial(_part, report, number, ways))
     return {**measured.pop(""), **measured}
 
 
@@ -83,7 +92,7 @@ def _measure(
         camera = CameraAndListener(nodes, processes)
         try:
             model = Path(folder) / "body.yaml"
-            save_body_model(scenes[STREAMS[0]].body, model)
+            save_body_model(next(iter(scenes.values())).body, model)
             ready_s = {name: camera.start(name, model) for name in processes}
             streams = {}
             for i, (stream, scene) in enumerate(scenes.items()):
@@ -91,7 +100,7 @@ def _measure(
                 for j, rate in enumerate(RATES_HZ):
                     name = f"{stream[0]} {stream[1]}x{stream[2]} at {rate} Hz"
                     streams[name] = camera.measure(scene, stream[0], rate, seconds)
-                    report((i * len(RATES_HZ) + j + 1) / (len(STREAMS) * len(RATES_HZ)))
+                    report((i * len(RATES_HZ) + j + 1) / (len(scenes) * len(RATES_HZ)))
             memory = {name: _rss_mb(nodes.pid(name)) for name in processes}
         finally:
             camera.close()
@@ -103,12 +112,14 @@ class CameraAndListener:
 
     Attributes:
         arrivals_ns: times of the callback and of the arrival in this process, by stamp.
+        points_ns: times at which a person's points came, by the stamp of their image.
     """
 
     def __init__(self, nodes: Nodes, processes: tuple[str, ...]) -> None:
         """Create the ROS node; ``nodes`` will start the executables ``processes``."""
         import rclpy
         from diagnostic_msgs.msg import DiagnosticArray
+        from geometry_msgs.msg import PolygonStamped
         from rclpy.executors import SingleThreadedExecutor
         from sensor_msgs.msg import CameraInfo, Image, JointState
 
@@ -134,8 +145,15 @@ class CameraAndListener:
             self._note_nodes,  # type: ignore[arg-type]  # as above
             qos.RESULT,
         )
+        self._node.create_subscription(
+            PolygonStamped,
+            "detector/keypoints",
+            self._saw,  # type: ignore[arg-type]  # as above
+            qos.RESULT,
+        )
         self._ready: set[str] = set()
         self.arrivals_ns: dict[int, tuple[int, int]] = {}
+        self.points_ns: dict[int, int] = {}
         self._listening = threading.Thread(target=partial(_listen, self._executor), daemon=True)
         self._listening.start()
 
@@ -144,6 +162,12 @@ class CameraAndListener:
 
         now_ns = time.time_ns()
         self.arrivals_ns[stamp_ns(message.header.stamp)] = (now_ns, info["received_timestamp"])
+
+    def _saw(self, message: Any, _: dict[str, Any]) -> None:
+        from cardbox_tracker.ros.messages.conversions import stamp_ns
+
+        if any(point.z > 0.0 for point in message.polygon.points):
+            self.points_ns[stamp_ns(message.header.stamp)] = time.time_ns()
 
     def _note_nodes(self, message: Any, _: dict[str, Any]) -> None:
         from cardbox_tracker.ros.runtime.diagnostics import STATUS, WAITING, WORKING
@@ -164,6 +188,8 @@ class CameraAndListener:
         arguments = ["--ros-args", "-p", parameter] if together or name == "tracker" else []
         if name == "tracker" and "detector" in self._processes:
             arguments += ["-p", "keypoints:=detector/keypoints"]
+        if name == "detector" and "background" not in self._processes:
+            arguments = ["--ros-args", "-p", "publish_silhouette:=true"]
         self._nodes.start(name, *arguments)
         expected = set(SEPARATE) if together else {name}
         while not expected <= self._ready:
@@ -187,9 +213,13 @@ class CameraAndListener:
     def measure(
         self, scene: BenchmarkScene, encoding: str, rate_hz: float, seconds: float
     ) -> dict[str, Any]:
-        """Publish for ``seconds``; return latencies, losses and the nodes' processor time."""
+        """Publish for ``seconds``; return latencies, losses and the nodes' processor time.
+
+        ``points`` counts the images whose own points came before their joint states.
+        """
         there_and_back = [*scene.images, *scene.images[::-1]]
         self.arrivals_ns.clear()
+        self.points_ns.clear()
         count = max(2, int(seconds * rate_hz))
         sent = []
         began = time.monotonic()
@@ -207,6 +237,7 @@ class CameraAndListener:
         arrived = [stamp for stamp in sent if stamp in self.arrivals_ns]
         if not arrived:
             raise CardboxError("no joint states arrived; the nodes do not track")
+        early = sum(self.points_ns.get(at, np.inf) < self.arrivals_ns[at][0] for at in arrived)
         times_ns = np.array([self.arrivals_ns[stamp] for stamp in arrived])
         called_ms, received_ms = (times_ns - np.array(arrived)[:, None]).T / 1e6
         return {
@@ -214,6 +245,7 @@ class CameraAndListener:
             **{f"received_p{p}_ms": float(np.percentile(received_ms, p)) for p in PERCENTILES},
             "sent": count,
             "received": len(arrived),
+            "points": early,
             "cpu_percent": cpu,
             "cpu_percent_sum": sum(cpu.values()),
         }

@@ -124,7 +124,8 @@ def _nodes(nodes: Mapping[str, Any] | None) -> list[str]:
         *_streams(nodes),
         "### All nodes in one process (`cardbox_nodes`)",
         *_streams(nodes["single_process"]),
-        *_beside_detector(nodes.get("with_detector")),
+        *_beside_detector(nodes.get("with_detector"), "of_detector" in nodes),
+        *_of_detector(nodes.get("of_detector")),
     ]
 
 
@@ -149,13 +150,29 @@ def _way(ways: Mapping[str, Any] | None) -> list[str]:
     ]
 
 
-def _beside_detector(measured: Mapping[str, Any] | None) -> list[str]:
+def _beside_detector(measured: Mapping[str, Any] | None, sees_person: bool) -> list[str]:
+    if measured is None:
+        return []
+    seen = (
+        "The images show a person whom the networks find. *Points*: images whose own points came "
+        "before their joint states; the others are tracked with those of an image before."
+        if sees_person
+        else "The networks find nobody in the drawn images, so they take less time than with a "
+        "real person."
+    )
+    return [
+        "### Beside the node `detector`",
+        f"The tracker takes the detector's [points](detectors.md) when they come. {seen}",
+        *_streams(measured),
+    ]
+
+
+def _of_detector(measured: Mapping[str, Any] | None) -> list[str]:
     if measured is None:
         return []
     return [
-        "### Beside the node `detector`",
-        "The tracker takes the detector's [points](detectors.md) when they come. The networks find "
-        "nobody in the drawn images, so they take less time than with a real person.",
+        "### With the silhouettes of the node `detector`",
+        "An image waits for its own points; images that come meanwhile are left out.",
         *_streams(measured),
     ]
 
@@ -165,6 +182,7 @@ def _streams(measured: Mapping[str, Any]) -> list[str]:
     memory = ", ".join(f"{name} {value:.0f} MB" for name, value in measured["rss_mb"].items())
     processes = list(measured["ready_s"])
     several = len(processes) > 1
+    has_points = any(stream.get("points") for stream in measured["streams"].values())
     rows = [
         (
             name,
@@ -173,12 +191,14 @@ def _streams(measured: Mapping[str, Any]) -> list[str]:
                 for p in PERCENTILES
             ),
             f"{stream['received']}/{stream['sent']}",
+            *([f"{stream['points']}"] if has_points else []),
             *(f"{stream['cpu_percent'][process]:.0f} %" for process in processes),
             *([f"{stream['cpu_percent_sum']:.0f} %"] if several else []),
         )
         for name, stream in measured["streams"].items()
     ]
-    titles = (*(f"p{p}" for p in PERCENTILES), "arrived", *processes)
+    titles = (*(f"p{p}" for p in PERCENTILES), "arrived")
+    titles = (*titles, *(["points"] if has_points else []), *processes)
     return [
         _table(
             (

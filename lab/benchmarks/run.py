@@ -20,7 +20,11 @@ NODE_SECONDS = 10.0
 
 
 def run_benchmark(
-    json_path: Path, report_path: Path | None, frames: int = FRAMES, seconds: float = NODE_SECONDS
+    json_path: Path,
+    report_path: Path | None,
+    frames: int = FRAMES,
+    seconds: float = NODE_SECONDS,
+    session: Path | None = None,
 ) -> dict[str, Any]:
     """Measure everything, write ``json_path`` and, if given, the report; return the results.
 
@@ -29,6 +33,7 @@ def run_benchmark(
         report_path: Markdown file to write.
         frames: images that the estimation is measured on.
         seconds: duration of the measurement of the nodes for each stream and rate.
+        session: recorded person whom the detector sees; None for the drawn one, whom it does not.
 
     Raises:
         CardboxError: a node failed or a file cannot be written.
@@ -38,7 +43,7 @@ def run_benchmark(
             raise CardboxError(f"there is no folder {path.parent}; make it, or choose another")
     with progress_bar("benchmark") as show:
         core = measure_core(frames, lambda done: show(0.4 * done))
-        nodes = measure_nodes(seconds, lambda done: show(0.4 + 0.5 * done))
+        nodes = measure_nodes(seconds, lambda done: show(0.4 + 0.5 * done), session)
         way = measure_way(seconds) if nodes else None
         ratios = measure_ratios(nodes is not None)
         show(1.0)

@@ -1,17 +1,24 @@
-"""The input of the benchmarks: a synthetic person who waves, at any resolution."""
+"""The input of the benchmarks: a drawn person who waves, at any resolution, or a recorded one."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from cardbox_tracker.applications.evaluation.session import load_session
 from cardbox_tracker.applications.simulation.motions import WAVE_S, wave
 from cardbox_tracker.applications.simulation.renderer import Renderer, Scene
 from cardbox_tracker.applications.simulation.session import session_camera
 from cardbox_tracker.camera.camera import Camera
+from cardbox_tracker.common.errors import CardboxError
 from cardbox_tracker.person.model import BodyModel
+from cardbox_tracker.person.proportions import body_from_proportions
+from cardbox_tracker.recordings.open_images import open_images
 
 Images = NDArray[np.uint8]
 
@@ -48,4 +55,38 @@ def make_scene(width: int, height: int, count: int, empty: int = 30) -> Benchmar
         background,
         np.array([image for image, _ in drawn]),
         np.array([silhouette for _, silhouette in drawn]),
+    )
+
+
+def recorded_scene(folder: Path, count: int, empty: int = 30) -> BenchmarkScene:
+    """Return ``count`` images of a session with one camera, from the first motion on, as grey.
+
+    Raises:
+        CardboxError: the folder is no session, does not say the stature, or has too few images.
+    """
+    session = load_session(folder)
+    truth = session.truth
+    with open_images(session.bag) as bag:
+        lens = bag.calibration()
+        grey: list[NDArray[Any]] = []
+        for image in bag.images():
+            shown = image.as_sent
+            time_s = (image.stamp_ns - truth.start_ns) / 1e9
+            if len(grey) < empty or time_s >= session.start_s:
+                grey.append(shown if shown.ndim == 2 else cv2.cvtColor(shown, cv2.COLOR_BGR2GRAY))
+            if len(grey) == empty + count:
+                break
+    if truth.stature_m is None or len(grey) < empty + count:
+        raise CardboxError(
+            f"{folder} has no stature, or fewer than {empty + count} images; expected both"
+        )
+    pictures = np.array(grey, np.uint8)
+    return BenchmarkScene(
+        body_from_proportions(
+            truth.stature_m, truth.distance_m, camera_pitch_rad=float(np.radians(truth.pitch_deg))
+        ),
+        Camera(lens.width, lens.height, *lens.k[[0, 1, 0, 1], [0, 1, 2, 2]].tolist()),
+        pictures[:empty],
+        pictures[empty:],
+        np.zeros((0, lens.height, lens.width), np.uint8),
     )

@@ -10,13 +10,15 @@ import numpy as np
 import pytest
 
 from cardbox_tracker.applications.evaluation.results import read_json
+from cardbox_tracker.applications.simulation.session import SessionFormat, synthesize_session
 from cardbox_tracker.commands.main import main
+from cardbox_tracker.common.errors import CardboxError
 from lab.benchmarks import core as benchmark_core
 from lab.benchmarks import report as benchmark_report
 from lab.benchmarks import run as benchmark
 from lab.benchmarks import views
 from lab.benchmarks.default_stages import WHOLE
-from lab.benchmarks.scene import make_scene
+from lab.benchmarks.scene import make_scene, recorded_scene
 from lab.benchmarks.silhouette import WITHOUT, colored, measure_silhouettes
 from lab.benchmarks.views import measure_two_views
 from lab.benchmarks.way import STEPS, steps_of
@@ -166,6 +168,30 @@ def test_the_scene_moves_and_its_background_does_not() -> None:
     assert np.any(scene.silhouettes[0] != scene.silhouettes[-1])
     assert np.abs(np.diff(scene.empty.astype(int), axis=0)).mean() < 6
     assert not np.any(make_scene(80, 60, 1, 3).empty != scene.empty)
+
+
+def test_the_detector_is_measured_with_a_recorded_person() -> None:
+    """Drawn images show it nobody; the text says which images it had."""
+    person = {**NODES, "streams": {"bgr8 320x240 at 30 Hz": {**STREAM, "points": 41}}}
+    drawn = benchmark_report._nodes({**NODES, "with_detector": NODES})
+    seen = benchmark_report._nodes({**NODES, "with_detector": person, "of_detector": person})
+    assert "find nobody" in " ".join(drawn) and "| points |" not in " ".join(drawn)
+    assert "find nobody" not in " ".join(seen)
+    assert " ".join(seen).count("| 299/300 | 41 |") == 2
+
+
+def test_a_recorded_scene_has_its_camera_its_body_and_the_motions(tmp_path: Path) -> None:
+    synthesize_session(tmp_path / "bag", "wave", 1, SessionFormat(5, 80, 60))
+    truth = json.loads((tmp_path / "bag" / "ground_truth.json").read_text())
+    (tmp_path / "ground_truth.json").write_text(json.dumps(truth))
+    with pytest.raises(CardboxError, match="stature"):
+        recorded_scene(tmp_path, 3, 5)
+    truth["person"]["height"] = 1.72
+    (tmp_path / "ground_truth.json").write_text(json.dumps(truth))
+    scene = recorded_scene(tmp_path, 3, 5)
+    size = scene.camera.height, scene.camera.width
+    assert scene.images.shape == (3, *size) and scene.empty.shape == (5, *size)
+    assert np.abs(scene.images[0].astype(int) - scene.empty[0]).max() > 20
 
 
 @pytest.mark.parametrize("nodes", [None, NODES])
