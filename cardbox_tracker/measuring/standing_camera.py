@@ -51,8 +51,8 @@ _ROLL_PRIOR = np.radians(6.0)
 # forwards and aside, statures.
 _LEGS, _TRUNK = np.radians((0.5, 4.0)), np.radians((0.0, 2.5))
 _FORWARD, _SIDE = 0.012, 0.02
-# A pitch that is found less surely than this is mostly that of most cameras, rad.
-_FOUND = np.radians(8.5)
+FOUND_STDDEV = float(np.radians(8.5))
+"""Standard deviation from which on a pitch is mostly that of most cameras, and not found, rad."""
 # A line that is further from upright is that of a person who leans, rad. A roll below the second
 # limit, or below so many standard deviations, can be the person's own.
 _LEANS, _LEAST_ROLL, _SURE_ROLL = np.radians(10.0), np.radians(2.0), 2.0
@@ -93,7 +93,7 @@ class StandingCamera(NamedTuple):
     @property
     def is_pitch_found(self) -> bool:
         """Whether the points themselves show the pitch, as those of a whole person do."""
-        return bool(self.pitch_stddev_rad < _FOUND)
+        return bool(self.pitch_stddev_rad < FOUND_STDDEV)
 
     @property
     def roll_rad(self) -> float:

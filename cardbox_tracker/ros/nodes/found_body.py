@@ -7,6 +7,7 @@ from collections.abc import Callable
 
 from std_msgs.msg import Float64, String
 
+from cardbox_tracker.measuring.standing_camera import FOUND_STDDEV
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.model_file import dumps_body_model
 from cardbox_tracker.person.urdf import urdf_from_body
@@ -48,7 +49,9 @@ class FoundBody:
 
     def _on_pitch(self, message: Float64, _: int) -> None:
         if not self._is_measured:
-            body = self._guess.with_values(camera_pitch_rad=message.data)
+            # The message has no deviation; this is the largest one of a pitch that is found.
+            tilt = {"camera_pitch_rad": message.data, "pitch_stddev_rad": FOUND_STDDEV}
+            body = self._guess.with_values(**tilt)
             degrees = math.degrees(message.data)
             self._node.diagnostics.say("pitch", f"the detector found a pitch of {degrees:.0f} deg")
             self._use(body)

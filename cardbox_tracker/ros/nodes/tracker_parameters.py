@@ -10,7 +10,12 @@ from typing import Any
 from cardbox_tracker.camera.pairing import camera_names
 from cardbox_tracker.common.settings import NoEffectError, nested, settings_of
 from cardbox_tracker.person.model import BodyModel
-from cardbox_tracker.person.proportions import STATURE_LIMITS_M, STATURE_M, body_from_proportions
+from cardbox_tracker.person.proportions import (
+    STATURE_LIMITS_M,
+    USUAL_STATURE_M,
+    USUAL_STDDEV_M,
+    body_from_proportions,
+)
 from cardbox_tracker.ros.nodes.shared_parameters import (
     camera_roll_parameter,
     cameras_parameter,
@@ -193,10 +198,12 @@ class TrackerParameters(NodeParameters):
     @property
     def guess(self) -> BodyModel | None:
         """Body of a person who is not measured; None if a measured one is waited for."""
-        stature_m = self.stature or (STATURE_M if self.keypoints else 0.0)
-        if not stature_m or self.model_file or len(self.cameras) > 1:
+        if not (self.stature or self.keypoints) or self.model_file or len(self.cameras) > 1:
             return None
-        return body_from_proportions(stature_m)
+        if self.stature:
+            return body_from_proportions(self.stature)
+        unsure = USUAL_STDDEV_M / USUAL_STATURE_M
+        return body_from_proportions(USUAL_STATURE_M).with_values(stature_stddev=unsure)
 
     def config(self) -> TrackerConfig:
         """Return the settings of the core.

@@ -16,11 +16,11 @@ from cardbox_tracker.camera.camera import Camera
 from cardbox_tracker.camera.rasterisation import render
 from cardbox_tracker.detectors.landmarks import LANDMARKS
 from cardbox_tracker.detectors.pose_network import Detection
-from cardbox_tracker.measuring.standing_camera import LEVELS
+from cardbox_tracker.measuring.standing_camera import FOUND_STDDEV, LEVELS
 from cardbox_tracker.person.cardbox import cardbox_patches
 from cardbox_tracker.person.model_file import dumps_body_model, loads_body_model
 from cardbox_tracker.person.posture import reference_posture
-from cardbox_tracker.person.proportions import STATURE_M, body_from_proportions
+from cardbox_tracker.person.proportions import USUAL_STATURE_M, body_from_proportions
 from cardbox_tracker.ros.messages.conversions import camera_info_message, image_message
 from cardbox_tracker.ros.nodes.camera_pitch import CameraPitch
 from cardbox_tracker.ros.nodes.tracker_node import TrackerNode
@@ -77,9 +77,13 @@ def test_a_measured_body_replaces_it(bus: Any, start: Any) -> None:
 
 def test_the_detectors_pitch_is_used(bus: Any, start: Any) -> None:
     node = start(keypoints="detector/keypoints")
-    assert node._body == body_from_proportions(STATURE_M)
+    assert node._body is not None
+    assert node._body.sizes.tolist() == body_from_proportions(USUAL_STATURE_M).sizes.tolist()
+    assert node._body.stature_stddev == pytest.approx(0.09 / 1.69)
     bus.send("/detector/camera_pitch", Float64(data=0.2))
     assert node._body.camera_pose.pitch_rad == 0.2
+    # What a standing person shows is not as sure as a measured pitch.
+    assert node._body.camera_pose.pitch_stddev_rad == FOUND_STDDEV
     bus.send("/detector/camera_pitch", Float64(data=float("nan")))
     assert node._body.camera_pose.pitch_rad == 0.2
 
