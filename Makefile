@@ -172,7 +172,7 @@ people: setup $(VENV)/extras
 .PHONY: wrong-inputs
 wrong-inputs: export XDG_DATA_HOME := $(CURDIR)/$(VENV)/data
 wrong-inputs: setup $(VENV)/extras
-	$(BIN)/python -m lab.tools.wrong_inputs $(DATA)/person_a $(PEOPLE) --output docs/evaluation/wrong-inputs.md
+	$(BIN)/python -m lab.tools.wrong_inputs $(DATA)/person_a $(DATA)/cmu_gestures $(PEOPLE) --output docs/evaluation/wrong-inputs.md
 
 # Fewer examples: make reliability EXAMPLES=1000
 EXAMPLES ?= 100000
