@@ -16,8 +16,7 @@ Measuring and Recording", 1965 (reprinted in Norkin & White, "Measurement of Joi
 degrees: thoraco-lumbar lateral flexion 35, flexion 80, extension 25, rotation 45; hip flexion 120,
 abduction 45, rotation 45; shoulder abduction 180, flexion 180, extension 60, horizontal adduction
 45; elbow flexion 150, none backwards (10 are allowed for a straight arm); neck rotation 80, flexion
-and extension 45; knee flexion 135. Soft tissue gives way under the weight of a person who squats or
-sits low, so hips and knees have up to 20 degrees more.
+and extension 45.
 
 The torso reaches from the hips to the neck, so the ranges of hips and spine add up, rounded down to
 the range of a standing person; who walks or looks aside also turns with the feet. The two angles of
@@ -52,7 +51,7 @@ Offset = Callable[[BodyParts[float]], Point]
 
 PRISMATIC, REVOLUTE, FIXED = "prismatic", "revolute", "fixed"
 X, Y, Z = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
-_BACK_Y, _DOWN = (0.0, -1.0, 0.0), (0.0, 0.0, -1.0)
+_BACK_Y = (0.0, -1.0, 0.0)
 
 
 class Group(StrEnum):
@@ -66,13 +65,11 @@ class Group(StrEnum):
     """Points of the face."""
     CLAVICLES = "clavicles"
     """The arms, which they follow."""
-    LEGS = "legs"
-    """Points of the legs (``LEGS``)."""
     NOTHING = "nothing"
     """Fixed, until something sees it: the hands at the wrists, for example."""
 
 
-_POSTURE, _PLACE, _NECK, _CLAVICLES, _LEGS, _NOTHING = Group
+_POSTURE, _PLACE, _NECK, _CLAVICLES, _NOTHING = Group
 
 SHOULDER_RISE = 0.077
 """Rise of a shoulder joint per radian of elevation of its arm, in shoulder breadths."""
@@ -169,44 +166,6 @@ _ARM: tuple[Joint, ...] = (
 )
 
 
-HIP_SHARE, THIGH_SHARE, SHANK_SHARE = 0.06, 0.245, 0.246
-"""Hip joint from the middle of the hips, thigh, and shank up to the ankle, as shares of the
-stature; the latter two are those of Drillis & Contini (:mod:`.proportions`)."""
-_CROWN_SHARE = 0.83 / 1.72
-
-
-def stature_of(parts: BodyParts[float]) -> float:
-    """Return the stature of a person with this trunk and head, m, see :mod:`.proportions`."""
-    return parts.head.top_m / _CROWN_SHARE
-
-
-# A thigh turns forwards, outwards, then inwards about its own axis.
-_LEG: tuple[Joint, ...] = (
-    Joint(
-        *("hip_flexion", _LEGS, "torso_yaw", REVOLUTE),
-        *(_BACK_Y, _deg(-40, 125), "p_hip", ""),
-        lambda parts: (0.0, HIP_SHARE * stature_of(parts), 0.0),
-    ),
-    Joint(
-        *("hip_abduction", _LEGS, "hip_flexion", REVOLUTE),
-        *(X, _deg(-35, 65), "r_hip", ""),
-    ),
-    Joint(
-        *("hip_rotation", _LEGS, "hip_abduction", REVOLUTE),
-        *(_DOWN, _deg(-50, 50), "y_hip", "thigh"),
-    ),
-    Joint(
-        *("knee_flexion", _LEGS, "hip_rotation", REVOLUTE),
-        *(Y, _deg(0, 150), "knee", "shank"),
-        lambda parts: (0.0, 0.0, -THIGH_SHARE * stature_of(parts)),
-    ),
-    Joint(
-        *("ankle", _NOTHING, "knee_flexion", FIXED, X, _NO_RANGE, "ankle", "foot"),
-        lambda parts: (0.0, 0.0, -SHANK_SHARE * stature_of(parts)),
-    ),
-)
-
-
 def _arms(group: Group) -> Iterator[Joint]:
     """Yield the joints of both arms in a group; the right ones mirror the left ones."""
     for name, side in (("left", 1.0), ("right", -1.0)):
@@ -251,11 +210,6 @@ SKELETON: tuple[Joint, ...] = (
 )
 """All joints; the movable ones in the order of joint states, to which new ones are appended."""
 
-LEGS: tuple[Joint, ...] = tuple(
-    _of_side(joint, name, side) for name, side in (("left", 1.0), ("right", -1.0)) for joint in _LEG
-)
-"""Joints of the legs, which follow the others where legs are measured (:mod:`.tracking.legs`)."""
-
 
 def joints_of(*groups: str) -> tuple[Joint, ...]:
     """Return the joints of some groups, in the order of the table."""
@@ -274,9 +228,7 @@ NECK_NAMES = _names(Group.NECK)
 CLAVICLE_NAMES = _names(Group.CLAVICLES)
 JOINT_STATE_NAMES = _names(Group.POSTURE, Group.PLACE, Group.NECK, Group.CLAVICLES)
 """Joints of ``joint_states``: those of the posture, the person's place, the neck, the clavicles."""
-LEG_NAMES = tuple(joint.name for joint in LEGS if joint.group == Group.LEGS)
-"""The 8 joints of the legs, four of the left one first."""
-UNITS = {joint.name: joint.unit for joint in (*SKELETON, *LEGS)}
+UNITS = {joint.name: joint.unit for joint in SKELETON}
 """Unit of each joint by its name, ``m`` or ``rad``."""
 
 NECK_LIMITS: FloatArray = np.array([joint.limits for joint in joints_of(Group.NECK)])
@@ -286,10 +238,6 @@ NECK_LIMITS.setflags(write=False)
 KEYPOINT_NAMES: tuple[str, ...] = (
     *("left_shoulder", "left_elbow", "left_hand"),
     *("right_shoulder", "right_elbow", "right_hand"),
-)
-LEG_KEYPOINT_NAMES: tuple[str, ...] = (
-    *("left_hip", "left_knee", "left_ankle"),
-    *("right_hip", "right_knee", "right_ankle"),
 )
 POINT_NAMES: tuple[str, ...] = ("hip", "neck", "head", *KEYPOINT_NAMES)
 """Points of :func:`.kinematics.pose`: the middle of the hips, the middle of the torso's top, the
@@ -351,32 +299,6 @@ def arm_rotations(angles_rad: FloatArray, side: float) -> tuple[FloatArray, Floa
     a = np.asarray(angles_rad, dtype=np.float64)
     upper_arm = rotation_x(side * a[..., 0]) @ rotation_y(-a[..., 1])
     return upper_arm, upper_arm @ rotation_x(side * a[..., 2]) @ rotation_y(-a[..., 3])
-
-
-def leg_directions(angles_rad: FloatArray, side: float) -> tuple[FloatArray, FloatArray]:
-    """Return unit vectors (..., 3) along thigh and shank in the frame of the hips.
-
-    Args:
-        angles_rad: the four angles of a leg, (..., 4).
-        side: +1 for the left leg, -1 for the right.
-    """
-    a = np.asarray(angles_rad, dtype=np.float64)
-    thigh = rotation_y(-a[..., 0]) @ rotation_x(side * a[..., 1]) @ rotation_z(-side * a[..., 2])
-    shank = thigh @ rotation_y(a[..., 3])
-    return -thigh[..., 2], -shank[..., 2]
-
-
-def leg_angles(thigh: FloatArray, shank: FloatArray, side: float) -> FloatArray:
-    """Return angles (4,) of a leg with these directions (3,), see :func:`leg_directions`.
-
-    The rotation is that of a leg that bends its knee backwards, within a quarter of a turn.
-    """
-    flexion = np.arctan2(thigh[0], -thigh[2])
-    abduction = side * np.arcsin(np.clip(thigh[1], -1.0, 1.0))
-    turned = (rotation_y(-flexion) @ rotation_x(side * abduction)).T @ shank
-    bend = np.arccos(np.clip(-turned[2], -1.0, 1.0))
-    rotation = side * np.arctan2(turned[1], max(-turned[0], 1e-3)) if bend > 0.05 else 0.0
-    return np.array([flexion, abduction, rotation, bend])
 
 
 def arm_directions(angles_rad: FloatArray, side: float) -> tuple[FloatArray, FloatArray]:

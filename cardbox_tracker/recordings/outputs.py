@@ -14,12 +14,12 @@ from typing import NamedTuple
 
 import numpy as np
 
+from cardbox_tracker.person.legs import LEG_NAMES
 from cardbox_tracker.person.sizes import FloatArray
 from cardbox_tracker.person.skeleton import (
     CLAVICLE_NAMES,
     JOINT_NAMES,
     JOINT_STATE_NAMES,
-    LEG_NAMES,
     NECK_NAMES,
     PLACE_NAMES,
 )

@@ -16,12 +16,11 @@ import numpy as np
 from cardbox_tracker.common.errors import CardboxError
 from cardbox_tracker.common.files import atomic_path
 from cardbox_tracker.person.isb_angles import ANATOMICAL_NAMES, anatomical_angles
+from cardbox_tracker.person.legs import LEG_KEYPOINT_NAMES, LEG_NAMES
 from cardbox_tracker.person.skeleton import (
     CLAVICLE_NAMES,
     JOINT_NAMES,
     KEYPOINT_NAMES,
-    LEG_KEYPOINT_NAMES,
-    LEG_NAMES,
     NECK_NAMES,
     PLACE_NAMES,
     UNITS,
@@ -112,8 +111,8 @@ LEG_POINT_COLUMNS = tuple(f"{name}_{axis}" for name in LEG_KEYPOINT_NAMES for ax
 
 def _leg_units() -> dict[str, str]:
     return {
-        **_units(LEG_NAMES),
-        **_deviation_units(LEG_NAMES),
+        **dict.fromkeys(LEG_NAMES, "rad"),
+        **dict.fromkeys((f"{name}_stddev_rad" for name in LEG_NAMES), "rad"),
         **dict.fromkeys(LEG_POINT_COLUMNS, "m"),
         **{f"{name}_state": "" for name in LEG_KEYPOINT_NAMES},
         **{f"{name}_stddev_m": "m" for name in LEG_KEYPOINT_NAMES},

@@ -33,26 +33,26 @@ from cardbox_tracker.detectors.image_points import (
     ImagePoints,
 )
 from cardbox_tracker.person.kinematics import pose
+from cardbox_tracker.person.legs import (
+    HIP_SHARE,
+    LEG_LIMITS,
+    LEG_NAMES,
+    SHANK_SHARE,
+    THIGH_SHARE,
+    leg_angles,
+    leg_directions,
+    stature_of,
+)
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.parts import body_parts
 from cardbox_tracker.person.posture import TORSO_Y, YAW
 from cardbox_tracker.person.sizes import FloatArray
 from cardbox_tracker.person.skeleton import (
-    HIP_SHARE,
-    LEG_NAMES,
-    LEGS,
-    SHANK_SHARE,
-    THIGH_SHARE,
-    Group,
     KeypointState,
-    leg_angles,
-    leg_directions,
     rotation_z,
-    stature_of,
 )
 from cardbox_tracker.tracking.estimate import Estimate, Legs
 
-_LIMITS = np.array([joint.limits for joint in LEGS if joint.group == Group.LEGS])
 _SIDES = 1.0, -1.0
 _N = len(LEG_NAMES)
 # Values of a fit: the angles, the logarithms of the lengths' factors, the floor, the distance.
@@ -306,7 +306,7 @@ class _Fit:
                     break
                 step = np.linalg.solve(information, jacobian.T @ residuals[0])
                 values = values - np.clip(step, -_LARGEST_STEP, _LARGEST_STEP)
-                values[:_N] = np.clip(values[:_N], *_LIMITS.T)
+                values[:_N] = np.clip(values[:_N], *LEG_LIMITS.T)
             count = 1 if seen is None else 4 + 8
             rms = float(np.sqrt(np.sum(residuals[0] ** 2) / count))
             if best is None or rms < best.rms:
@@ -334,7 +334,7 @@ class _Fit:
             leg_angles(thigh, shank, side)
             for (thigh, shank), side in zip(bones, _SIDES, strict=True)
         ]
-        return np.asarray(np.clip(np.concatenate(angles), *_LIMITS.T))
+        return np.asarray(np.clip(np.concatenate(angles), *LEG_LIMITS.T))
 
     def hips_moved_m(self, values: FloatArray) -> FloatArray:
         """Return how far from the tracker's place the hips are, (3,), reference frame."""

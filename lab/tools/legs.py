@@ -26,9 +26,12 @@ import numpy as np
 from cardbox_tracker.commands.request import points_named
 from cardbox_tracker.detectors.detector import Detector
 from cardbox_tracker.detectors.image_points import LEG_POINT_NAMES, POINT_INDEX, ImagePoints
+from cardbox_tracker.person.legs import LEG_KEYPOINT_NAMES
 from cardbox_tracker.person.proportions import body_from_proportions
 from cardbox_tracker.person.sizes import FloatArray
-from cardbox_tracker.person.skeleton import KEYPOINT_NAMES, LEG_KEYPOINT_NAMES
+from cardbox_tracker.person.skeleton import (
+    KEYPOINT_NAMES,
+)
 from cardbox_tracker.recordings.recording import Segmentation, open_recording
 from cardbox_tracker.recordings.silhouettes import TimeSpan
 from cardbox_tracker.recordings.track import points_of

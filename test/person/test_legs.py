@@ -8,17 +8,19 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from cardbox_tracker.person.kinematics import pose
-from cardbox_tracker.person.model import BodyModel
-from cardbox_tracker.person.parts import body_parts
-from cardbox_tracker.person.skeleton import (
+from cardbox_tracker.person.legs import (
     HIP_SHARE,
-    JOINT_STATE_NAMES,
     LEG_NAMES,
     SHANK_SHARE,
     THIGH_SHARE,
     leg_angles,
     leg_directions,
     stature_of,
+)
+from cardbox_tracker.person.model import BodyModel
+from cardbox_tracker.person.parts import body_parts
+from cardbox_tracker.person.skeleton import (
+    JOINT_STATE_NAMES,
 )
 from cardbox_tracker.person.urdf import LinkTransforms, urdf_from_body
 

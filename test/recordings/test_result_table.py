@@ -246,7 +246,8 @@ def test_the_page_lists_all_columns_in_their_order() -> None:
     listed: list[str] = []
     for cell in re.findall(r"(?m)^\| (`.*?) \|", text):
         listed += re.findall(r"`([a-z_]+)`", cell)
-    assert tuple(listed) == (*WHOLE, "person", *HANDS)
+    legs = columns(has_legs=True)[len(columns()) :]
+    assert tuple(listed) == (*WHOLE, "person", *HANDS, *legs)
 
 
 def test_of_several_people_the_number_comes_last() -> None:

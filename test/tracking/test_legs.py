@@ -16,17 +16,19 @@ from cardbox_tracker.detectors.image_points import (
     LegPoints,
 )
 from cardbox_tracker.person.kinematics import pose
+from cardbox_tracker.person.legs import (
+    HIP_SHARE,
+    SHANK_SHARE,
+    THIGH_SHARE,
+    leg_directions,
+    stature_of,
+)
 from cardbox_tracker.person.parts import body_parts
 from cardbox_tracker.person.posture import TORSO_Y
 from cardbox_tracker.person.proportions import body_from_proportions
 from cardbox_tracker.person.sizes import FloatArray
 from cardbox_tracker.person.skeleton import (
-    HIP_SHARE,
-    SHANK_SHARE,
-    THIGH_SHARE,
     KeypointState,
-    leg_directions,
-    stature_of,
 )
 from cardbox_tracker.tracking.estimate import Estimate
 from cardbox_tracker.tracking.legs import LegReader

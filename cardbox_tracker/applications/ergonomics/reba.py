@@ -43,18 +43,20 @@ from cardbox_tracker.applications.ergonomics.rula import (
 )
 from cardbox_tracker.common.errors import CardboxError
 from cardbox_tracker.common.files import UnreadableFileError, regular_file
+from cardbox_tracker.person.legs import (
+    LEG_KEYPOINT_NAMES,
+    LEG_NAMES,
+    leg_directions,
+)
 from cardbox_tracker.person.posture import LEFT_ARM, PITCH, RIGHT_ARM
 from cardbox_tracker.person.sizes import FloatArray
 from cardbox_tracker.person.skeleton import (
     JOINT_NAMES,
     KEYPOINT_NAMES,
-    LEG_KEYPOINT_NAMES,
-    LEG_NAMES,
     NECK_NAMES,
     UNITS,
     KeypointState,
     arm_directions,
-    leg_directions,
 )
 from cardbox_tracker.tracking.sampling import normal_postures
 
@@ -215,7 +217,7 @@ def _seen(row: Mapping[str, str]) -> Seen:
         return Seen(*stamp, None, None, None, np.zeros(5))
 
     def pair(names: Sequence[str]) -> FloatArray | None:
-        deviations = [f"{name}_stddev_{UNITS[name]}" for name in names]
+        deviations = [f"{name}_stddev_{UNITS.get(name, 'rad')}" for name in names]
         texts = [row.get(name, "") for name in (*names, *deviations)]
         return np.array(texts, float).reshape(2, -1) if all(texts) else None
 
