@@ -21,6 +21,7 @@ from cardbox_tracker.commands import (
     evaluate,
     export,
     initialize,
+    reba,
     retarget,
     rula,
     synthesize,
@@ -68,6 +69,7 @@ COMMANDS: tuple[Command, ...] = (
     view,
     export,
     rula,
+    reba,
     retarget,
     benchmark,
     urdf,
@@ -76,11 +78,6 @@ COMMANDS: tuple[Command, ...] = (
 )
 # Replacements of the subcommands of former versions.
 RETIRED = {"screenshots": "python -m lab.tools.screenshots --output docs/images"}
-# Methods that users may look for, and why there is none.
-ABSENT = {
-    "reba": "REBA rates legs and knees in every posture, and this tracker does not see legs; use "
-    "'cardbox rula', which rates arms, neck and trunk and takes the legs as declared (--legs)"
-}
 
 _EVERY_COMMAND = tuple(command.NAME for command in COMMANDS)
 # A folder of recordings has many reasons.
@@ -119,8 +116,6 @@ def main(arguments: Sequence[str] | None = None) -> int:
             parser = build_parser(words)
             if name in RETIRED:
                 parser.error(f"{name!r} is no longer a subcommand; use {RETIRED[name]!r}")
-            if name in ABSENT:
-                parser.error(ABSENT[name])
             options = parser.parse_args(words)
             options.run(options)
             sys.stdout.flush()

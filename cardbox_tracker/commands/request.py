@@ -185,6 +185,7 @@ class TrackingRequest:
         hands: network file that finds the points of hands; None if they are not measured.
         files: results to write.
         force: whether an existing bag is replaced.
+        legs: whether legs are measured.
     """
 
     recording: RecordingRequest
@@ -196,6 +197,7 @@ class TrackingRequest:
     hands: Path | None = None
     files: TrackFiles = TrackFiles()
     force: bool = False
+    legs: bool = False
 
 
 class OptionsError(CardboxError):
@@ -543,6 +545,7 @@ def tracking_request(options: argparse.Namespace, faults: Iterable[str] = ()) ->
     Raises:
         OptionsError: options are missing, wrong or contradict each other.
     """
+    from cardbox_tracker.detectors.detector import Detector
     from cardbox_tracker.search.config import PRESETS
 
     problems = Problems(options.recording, faults)
@@ -561,9 +564,20 @@ def tracking_request(options: argparse.Namespace, faults: Iterable[str] = ()) ->
         problems.add(f"--people needs the preset default, not {options.preset}")
     config = problems.caught(lambda: _config(options, preset), preset)
     hands = _hands(options, recording, problems)
+    # The option of this name of "cardbox rula" is a score.
+    legs = getattr(options, "legs", False) is True
+    if legs and not isinstance(recording.points, Detector):
+        problems.add("--legs needs the detector's knees and ankles: give --detector mediapipe")
     problems.check()
     return TrackingRequest(
-        recording, person, options.preset, config, options.seed, inputs_of(options), hands
+        recording,
+        person,
+        options.preset,
+        config,
+        options.seed,
+        inputs_of(options),
+        hands,
+        legs=legs,
     )
 
 

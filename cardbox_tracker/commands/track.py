@@ -44,6 +44,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="with --detector mediapipe: also tell open from closed hands, and measure palms and "
         "wrists, in further columns and in the video (docs/results.md)",
     )
+    parser.add_argument(
+        "--legs",
+        action="store_true",
+        help="with --detector mediapipe: also measure hips, knees and ankles, in further columns, "
+        "joints and in the video (docs/results.md)",
+    )
     parser.add_argument("--video", type=Path, metavar="OUT.mp4", help="also write an overlay video")
     parser.add_argument(
         "--json",

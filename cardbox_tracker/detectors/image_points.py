@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from operator import index
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -43,10 +44,37 @@ _CERTAIN, _SHARE = 0.5, 0.5
 
 POINT_INDEX = {name: index for index, name in enumerate(POINT_NAMES)}
 
+LEG_POINT_NAMES: tuple[str, ...] = (
+    *("left_knee", "right_knee", "left_ankle", "right_ankle"),
+    *("left_heel", "right_heel", "left_foot", "right_foot"),
+)
+"""Points of the legs beyond the hips; ``foot`` is its front end."""
+
 _OTHER_SIDE = [
     POINT_INDEX[name.replace("left", "right") if "left" in name else name.replace("right", "left")]
     for name in POINT_NAMES
 ]
+
+
+class LegPoints(NamedTuple):
+    """The points ``LEG_POINT_NAMES`` of one person in one image.
+
+    Attributes:
+        px: column and row, (8, 2), as in :class:`ImagePoints`.
+        scores: chance that the point is in the image and visible, 0 to 1, (8,).
+        spatial_m: the points in space, (8, 3), with the axes, origin and scale of
+            ``ImagePoints.spatial_m``; None without it.
+    """
+
+    px: FloatArray
+    scores: FloatArray
+    spatial_m: FloatArray | None = None
+
+    def exchanged(self) -> LegPoints:
+        """Return the points with left and right exchanged."""
+        other = np.arange(len(LEG_POINT_NAMES)) ^ 1
+        spatial_m = None if self.spatial_m is None else self.spatial_m[other]
+        return LegPoints(self.px[other], self.scores[other], spatial_m)
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,6 +90,8 @@ class ImagePoints:
         spatial_m: the points in space as the detector estimates them, (17, 3), up to a common
             scale: x right, y down, z away from the camera, in a level frame; None without it. Only
             directions between the points are used.
+        legs: the points of the legs, which the tracker of the upper body does not use; None without
+            them.
 
     Raises:
         ValueError: an array has another shape or is not numeric, or the stamp is no whole number.
@@ -71,6 +101,7 @@ class ImagePoints:
     scores: FloatArray
     stamp_ns: int | None = None
     spatial_m: FloatArray | None = None
+    legs: LegPoints | None = None
 
     def __post_init__(self) -> None:
         """Check the types; points that are not finite get the score 0, and others 0 to 1."""
@@ -127,6 +158,7 @@ class ImagePoints:
             px=self.px[_OTHER_SIDE],
             scores=self.scores[_OTHER_SIDE],
             spatial_m=None if self.spatial_m is None else self.spatial_m[_OTHER_SIDE],
+            legs=None if self.legs is None else self.legs.exchanged(),
         )
 
     @property

@@ -4,7 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from cardbox_tracker.detectors.image_points import POINT_NAMES, ImagePoints
+from cardbox_tracker.detectors.image_points import (
+    LEG_POINT_NAMES,
+    POINT_NAMES,
+    ImagePoints,
+    LegPoints,
+)
 from cardbox_tracker.detectors.pose_network import Detection
 
 LANDMARKS = (
@@ -45,10 +50,17 @@ LANDMARKS = (
 """``left`` is the person's left; fingers are their knuckles at the base."""
 
 _USED = np.array([LANDMARKS.index(name) for name in POINT_NAMES])
+_LEGS = np.array([LANDMARKS.index(name) for name in LEG_POINT_NAMES])
 
 
 def image_points(found: Detection) -> ImagePoints:
     """Return the points of a detection that the tracker uses."""
-    pixels, scores = found.points_px[_USED], found.scores[_USED]
-    spatial_m = None if found.spatial_m is None else found.spatial_m[_USED]
-    return ImagePoints(pixels, scores, spatial_m=spatial_m)
+    (pixels, scores, spatial_m), legs = (
+        (
+            found.points_px[used],
+            found.scores[used],
+            None if found.spatial_m is None else found.spatial_m[used],
+        )
+        for used in (_USED, _LEGS)
+    )
+    return ImagePoints(pixels, scores, spatial_m=spatial_m, legs=LegPoints(*legs))

@@ -9,6 +9,8 @@ where ``keypoints`` has them:
     torso -neck_yaw-> -neck_pitch-> -(fixed)-> head
     torso -clavicle_elevation-> clavicle -abduction (X)-> -flexion (Y)-> upper arm
     upper arm -abduction-> -flexion-> forearm -(fixed)-> hand
+    torso_yaw -hip_flexion-> -hip_abduction-> -hip_rotation-> thigh -knee_flexion-> shank
+    -(fixed)-> foot, where legs are measured
 
 The root ``camera_level`` follows REP-103: origin at the camera's centre, X forward (away from the
 camera), Y left, Z up, level even when the camera is pitched. The person faces the camera, so the
@@ -38,12 +40,19 @@ from xml.etree import ElementTree as Xml
 
 import numpy as np
 
+from cardbox_tracker.person.legs import LEGS
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.parts import Part, body_parts
 from cardbox_tracker.person.posture import place_limits
 from cardbox_tracker.person.rep155 import rep155_skeleton
 from cardbox_tracker.person.sizes import FloatArray
-from cardbox_tracker.person.skeleton import FIXED, PRISMATIC, SKELETON, Group, Joint
+from cardbox_tracker.person.skeleton import (
+    FIXED,
+    PRISMATIC,
+    SKELETON,
+    Group,
+    Joint,
+)
 
 Vector = tuple[float, float, float]
 Quaternion = tuple[float, float, float, float]
@@ -60,7 +69,7 @@ _ZERO = (0.0, 0.0, 0.0)
 
 
 def urdf_from_body(
-    body: BodyModel, optical_frame: str | None = None, torso_place: bool = True
+    body: BodyModel, optical_frame: str | None = None, torso_place: bool = True, legs: bool = False
 ) -> str:
     """Return the URDF of ``body`` as XML text.
 
@@ -70,6 +79,7 @@ def urdf_from_body(
             pitch, so that markers and keypoints are in the same tree.
         torso_place: add the joints beside the 12 of the posture; the joint states then must contain
             them, or the transforms beyond are missing.
+        legs: also add those of the legs, whose lengths are the mean ones of people of that size.
     """
     robot = _Robot("cardbox_person", ROOT_LINK)
     if optical_frame:
@@ -78,7 +88,7 @@ def urdf_from_body(
         robot.fix(f"{ROOT_LINK}_to_optical", ROOT_LINK, optical_frame, _ZERO, tilted)
     hips_m = body.placement.distance_m, 0.0, body.placement.hip_height_m
     robot.fix("camera_to_hips", ROOT_LINK, "hips", hips_m, (0.0, 0.0, math.pi))
-    robot.add(body, SKELETON, torso_place, "hips")
+    robot.add(body, (*SKELETON, *(LEGS if legs else ())), torso_place, "hips")
     parts = body_parts(body.sizes)
     robot.show("torso", "torso", parts.torso)
     lid = parts.torso.depth_m, parts.torso.top_width_m, PATCH_THICKNESS_M

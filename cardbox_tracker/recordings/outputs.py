@@ -14,6 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from cardbox_tracker.person.legs import LEG_NAMES
 from cardbox_tracker.person.sizes import FloatArray
 from cardbox_tracker.person.skeleton import (
     CLAVICLE_NAMES,
@@ -125,12 +126,16 @@ def person_space(number: int) -> str:
 def joint_values(estimate: Estimate, torso_place: bool = True) -> JointValues | None:
     """Return the joints of an estimate; None without a posture.
 
-    Without ``torso_place``, these are the 12 joints of the posture.
+    Without ``torso_place``, these are the 12 joints of the posture. Where legs are measured, theirs
+    are the last ones.
     """
     if estimate.posture is None or not torso_place:
         return _joints(JOINT_NAMES, estimate.posture)
     others = place_of(estimate), neck_of(estimate), clavicles_of(estimate)
-    return _joints(JOINT_STATE_NAMES, estimate.posture, *others)
+    if estimate.legs is None:
+        return _joints(JOINT_STATE_NAMES, estimate.posture, *others)
+    names = *JOINT_STATE_NAMES, *LEG_NAMES
+    return _joints(names, estimate.posture, *others, estimate.legs.angles)
 
 
 def joint_deviations(estimate: Estimate, torso_place: bool = True) -> JointValues | None:
@@ -143,8 +148,10 @@ def joint_deviations(estimate: Estimate, torso_place: bool = True) -> JointValue
     names, known = [*JOINT_NAMES, *PLACE_NAMES], [_or_zeros(estimate.offset_stddev_m)]
     if estimate.neck_stddev is not None:
         names, known = [*names, *NECK_NAMES], [*known, estimate.neck_stddev]
-    known.append(_or_zeros(estimate.clavicles_stddev_m))
-    return _joints((*names, *CLAVICLE_NAMES), estimate.posture_stddev, *known)
+    names, known = [*names, *CLAVICLE_NAMES], [*known, _or_zeros(estimate.clavicles_stddev_m)]
+    if estimate.legs is not None:
+        names, known = [*names, *LEG_NAMES], [*known, estimate.legs.angles_stddev]
+    return _joints(tuple(names), estimate.posture_stddev, *known)
 
 
 def place_of(estimate: Estimate) -> FloatArray:

@@ -16,6 +16,7 @@ import numpy as np
 from cardbox_tracker.common.errors import CardboxError
 from cardbox_tracker.common.files import atomic_path
 from cardbox_tracker.person.isb_angles import ANATOMICAL_NAMES, anatomical_angles
+from cardbox_tracker.person.legs import LEG_KEYPOINT_NAMES, LEG_NAMES
 from cardbox_tracker.person.skeleton import (
     CLAVICLE_NAMES,
     JOINT_NAMES,
@@ -27,7 +28,7 @@ from cardbox_tracker.person.skeleton import (
 from cardbox_tracker.recordings.keypoint_status import keypoint_states
 from cardbox_tracker.recordings.outputs import METRICS, joint_deviations, joint_values, positions_of
 from cardbox_tracker.recordings.silhouettes import RecordedFrame
-from cardbox_tracker.tracking.estimate import Estimate, Hand
+from cardbox_tracker.tracking.estimate import Estimate, Hand, Legs
 
 Cell = int | float | str | Decimal | None
 """A value of the table; None is unknown. A Decimal keeps the nine decimals of a stamp."""
@@ -53,20 +54,27 @@ _HAND = {"hand_open": "", **dict.fromkeys(("palm_x", "palm_y", "palm_z"), "")} |
 
 @cache
 def columns(
-    has_points: bool = False, has_people: bool = False, has_hands: bool = False
+    has_points: bool = False,
+    has_people: bool = False,
+    has_hands: bool = False,
+    has_legs: bool = False,
 ) -> tuple[str, ...]:
     """Return the names of the columns, see :func:`units`."""
-    return tuple(units(has_points, has_people, has_hands))
+    return tuple(units(has_points, has_people, has_hands, has_legs))
 
 
 def units(
-    has_points: bool = False, has_people: bool = False, has_hands: bool = False
+    has_points: bool = False,
+    has_people: bool = False,
+    has_hands: bool = False,
+    has_legs: bool = False,
 ) -> dict[str, str]:
     """Return the unit of each column by its name, in their order; empty for none.
 
     The names up to the person's place are fixed, because scripts read them; standard deviations end
     in their unit. With ``has_points``, for recordings with points of the person, the neck is among
-    them; with ``has_people``, the number of the person; with ``has_hands``, both hands.
+    them; with ``has_people``, the number of the person; with ``has_hands``, both hands; with
+    ``has_legs``, both legs.
     """
     return {
         "stamp": "s",
@@ -88,12 +96,27 @@ def units(
         **dict.fromkeys(ANATOMICAL_NAMES, "deg"),
         **({PERSON: ""} if has_people else {}),
         **(_HAND_UNITS if has_hands else {}),
+        **(_leg_units() if has_legs else {}),
     }
 
 
 _HAND_UNITS = {f"{side}_{name}": unit for side in _SIDES for name, unit in _HAND.items()} | {
     f"{side}_{name}_stddev_rad": "rad" for side in _SIDES for name in _WRIST
 }
+
+
+LEG_POINT_COLUMNS = tuple(f"{name}_{axis}" for name in LEG_KEYPOINT_NAMES for axis in "xyz")
+"""Columns of the points of the legs, m in the optical frame of the first camera."""
+
+
+def _leg_units() -> dict[str, str]:
+    return {
+        **dict.fromkeys(LEG_NAMES, "rad"),
+        **dict.fromkeys((f"{name}_stddev_rad" for name in LEG_NAMES), "rad"),
+        **dict.fromkeys(LEG_POINT_COLUMNS, "m"),
+        **{f"{name}_state": "" for name in LEG_KEYPOINT_NAMES},
+        **{f"{name}_stddev_m": "m" for name in LEG_KEYPOINT_NAMES},
+    }
 
 
 def _units(joints: Iterable[str]) -> dict[str, str]:
@@ -111,9 +134,10 @@ def row_of(
     has_points: bool = False,
     has_people: bool = False,
     has_hands: bool = False,
+    has_legs: bool = False,
 ) -> list[Cell]:
     """Return the row of one image, in the order of :func:`columns`."""
-    names = columns(has_points, has_people, has_hands)
+    names = columns(has_points, has_people, has_hands, has_legs)
     stamp = Decimal(stamp_ns).scaleb(-9)
     known: dict[str, Cell] = {"stamp": stamp, "state": estimate.state}
     known |= {"stamp_ns": stamp_ns, "time_s": time_s, PERSON: estimate.person}
@@ -141,6 +165,8 @@ def row_of(
     for side, hand in zip(_SIDES, estimate.hands or (None, None), strict=True):
         if hand is not None:
             known |= _hand_cells(side, hand)
+    if estimate.legs is not None:
+        known |= _leg_cells(estimate.legs)
     return [known.get(name) for name in names]
 
 
@@ -149,6 +175,12 @@ def _hand_cells(side: str, hand: Hand) -> dict[str, Cell]:
     cells: dict[str, Cell] = dict(zip((f"{side}_{name}" for name in _HAND), values, strict=True))
     stddevs = zip(_WRIST, map(_known, hand.wrist_stddev), strict=True)
     return cells | {f"{side}_{name}_stddev_rad": stddev for name, stddev in stddevs}
+
+
+def _leg_cells(legs: Legs) -> dict[str, Cell]:
+    values = [*legs.angles.tolist(), *legs.angles_stddev.tolist(), *legs.points_m.ravel().tolist()]
+    cells = [*values, *map(str, legs.states), *legs.points_stddev_m.tolist()]
+    return dict(zip(_leg_units(), cells, strict=True))
 
 
 def _known(value: float) -> float | None:
@@ -167,7 +199,11 @@ def check_table(path: Path) -> None:
 
 @contextmanager
 def result_table(
-    path: Path, has_points: bool, has_people: bool = False, has_hands: bool = False
+    path: Path,
+    has_points: bool,
+    has_people: bool = False,
+    has_hands: bool = False,
+    has_legs: bool = False,
 ) -> Iterator[Callable[[RecordedFrame, Estimate], None]]:
     """Context of a function that adds the row of an image to a table, which appears on exit.
 
@@ -176,11 +212,12 @@ def result_table(
         has_points: see :func:`columns`.
         has_people: see :func:`columns`; then each person of an image has a row.
         has_hands: see :func:`columns`.
+        has_legs: see :func:`columns`.
 
     Raises:
         CardboxError: the file cannot be written, or pyarrow is missing.
     """
-    has = has_points, has_people, has_hands
+    has = has_points, has_people, has_hands, has_legs
     names = columns(*has)
     if path.suffix == PARQUET:
         arrow, parquet = pyarrow_or_error()
@@ -189,7 +226,7 @@ def result_table(
             yield lambda frame, estimate: rows.append(
                 row_of(frame.stamp_ns, frame.time_s, estimate, *has)
             )
-            keypoints = (f"{name}_state" for name in KEYPOINT_NAMES)
+            keypoints = (f"{name}_state" for name in (*KEYPOINT_NAMES, *LEG_KEYPOINT_NAMES))
             texts = ("state", *keypoints, "place_state", "place_rests_on")
             whole = dict.fromkeys(("stamp_ns", PERSON), arrow.int64())
             types = whole | dict.fromkeys(texts, arrow.string())

@@ -22,6 +22,7 @@ from cardbox_tracker.recordings.silhouettes import RecordedFrame
 from cardbox_tracker.search.config import TrackerConfig
 from cardbox_tracker.tracking.estimate import UNCERTAIN, Estimate
 from cardbox_tracker.tracking.hands import HandReader, Look
+from cardbox_tracker.tracking.legs import LegReader
 from cardbox_tracker.tracking.people import People
 from cardbox_tracker.tracking.tracker import Tracker
 
@@ -116,6 +117,7 @@ def track_recording(
     end_s: float = math.inf,
     crowd: Crowd | None = None,
     hands: Look | None = None,
+    legs: bool = False,
 ) -> TrackSummary:
     """Track every image from ``start_s`` to ``end_s``.
 
@@ -132,6 +134,7 @@ def track_recording(
         end_s: seconds from the recording's start after which no image is tracked.
         crowd: people to track in place of ``body``, with the first camera alone.
         hands: finds the points of hands, which are then part of the estimates and the table.
+        legs: whether legs are measured, which are then part of them, too; this needs a detector.
 
     Raises:
         CardboxError: no image lies after ``start_s``, or a file cannot be written.
@@ -144,8 +147,9 @@ def track_recording(
     else:
         people = People(crowd.bodies, first.camera, config, rng, crowd.most)
         track = partial(_track_people, people)
-    readers: dict[int | None, HandReader] = {}
-    has = first.has_points, crowd is not None, hands is not None
+    hand_readers: dict[int | None, HandReader] = {}
+    leg_readers: dict[int | None, LegReader] = {}
+    has = first.has_points, crowd is not None, hands is not None, legs
     with nullcontext() if table is None else result_table(table, *has) as add_row:
         frames = 0
         for taken in recording.frames(start_s, end_s):
@@ -153,12 +157,16 @@ def track_recording(
             for estimate, tracker in track(taken):
                 tally, _ = tallies.setdefault(estimate.person, (_Tally(), tracker))
                 tally.add(estimate)
+                points = points_of(estimate, taken, first.camera) if hands or legs else None
+                time_s = taken.stamp_ns / 1e9
                 if hands is not None:
-                    reader = readers.setdefault(estimate.person, HandReader(hands))
+                    hand_reader = hand_readers.setdefault(estimate.person, HandReader(hands))
                     picture = partial(first.full_picture, taken.first)
-                    points = _points_of(estimate, taken, first.camera)
-                    time_s = taken.stamp_ns / 1e9
-                    estimate = reader.see(picture, points, estimate, first.camera, time_s)
+                    estimate = hand_reader.see(picture, points, estimate, first.camera, time_s)
+                if legs:
+                    leg_reader = leg_readers.setdefault(estimate.person, LegReader())
+                    person = tracker.body, tracker.camera
+                    estimate = leg_reader.see(points, estimate, *person, time_s)
                 if add_row is not None:
                     add_row(taken.first, estimate)
                 for observe in observers:
@@ -205,7 +213,7 @@ def _track_people(people: People, taken: FrameSet) -> list[tuple[Estimate, Track
     return people.track(taken.observations[0], taken.people)
 
 
-def _points_of(estimate: Estimate, taken: FrameSet, camera: Camera) -> ImagePoints | None:
+def points_of(estimate: Estimate, taken: FrameSet, camera: Camera) -> ImagePoints | None:
     """Return the points of a person: of several people, those that are nearest to the estimate."""
     if not taken.people or estimate.keypoints_m is None:
         return taken.first.points

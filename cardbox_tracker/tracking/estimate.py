@@ -67,6 +67,25 @@ class Hand(NamedTuple):
     wrist_stddev: FloatArray
 
 
+class Legs(NamedTuple):
+    """Both legs (:mod:`.legs`).
+
+    Attributes:
+        angles: ``LEG_NAMES``, (8,), rad.
+        angles_stddev: their standard deviations, (8,), rad.
+        points_m: ``LEG_KEYPOINT_NAMES``, (6, 3), metres in the optical frame.
+        points_stddev_m: standard deviation of each point relative to the middle of the hips, (6,),
+            m: the root of the sum of the variances along all axes.
+        states: state of each point: ``hidden`` where the detector does not see it.
+    """
+
+    angles: FloatArray
+    angles_stddev: FloatArray
+    points_m: FloatArray
+    points_stddev_m: FloatArray
+    states: tuple[KeypointState, ...]
+
+
 @dataclass(frozen=True)
 class Estimate:
     """State of tracking and posture of the person at one time.
@@ -102,6 +121,7 @@ class Estimate:
         person: number of the person, 1, 2, ...; None if only one is tracked.
         hands: the left and the right hand, None for one that is not known; None unless hands are
             looked at.
+        legs: None without a posture, or unless legs are looked at.
     """
 
     state: str
@@ -122,6 +142,7 @@ class Estimate:
     place: Place | None = None
     person: int | None = None
     hands: tuple[Hand | None, Hand | None] | None = None
+    legs: Legs | None = None
 
     def placed(self, body: BodyModel) -> BodyModel:
         """Return ``body`` at the place of this estimate."""

@@ -79,9 +79,9 @@ def _lines(
     rows: list[list[tuple[int, float, float]]] = [[] for _ in people]
     counts, hidden = [0] * len(people), [[0, 0] for _ in people]
     for i, frame in enumerate(truth["frames"]):
-        seen = [_seen(person["frames"][i], name) for person in people]
+        seen = [joints_of(person["frames"][i], name) for person in people]
         estimates = [one for one in found.get(frame["stamp_ns"], []) if one.posture is not None]
-        for k, estimate in _matched(seen, estimates):
+        for k, estimate in matched(seen, estimates):
             there = seen[k]
             assert there is not None and estimate.keypoints_m is not None
             known = np.isfinite(there[0]).all(axis=1)
@@ -110,7 +110,7 @@ def _lines(
         )
 
 
-def _seen(frame: Any, camera: str) -> tuple[FloatArray, list[int]] | None:
+def joints_of(frame: Any, camera: str) -> tuple[FloatArray, list[int]] | None:
     """Return the joints (6, 3), and which are covered; None if the person is not in sight."""
     there = frame.get("cameras", {}).get(camera)
     if there is None or there.get("full_mask_px", there["mask_px"]) < _LEAST_PX:
@@ -121,7 +121,7 @@ def _seen(frame: Any, camera: str) -> tuple[FloatArray, list[int]] | None:
     return joints, covered
 
 
-def _matched(
+def matched(
     seen: list[tuple[FloatArray, list[int]] | None], estimates: list[Estimate]
 ) -> Iterator[tuple[int, Estimate]]:
     """Yield the people, by index, with the estimates that are nearest to them together."""

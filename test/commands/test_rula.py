@@ -70,9 +70,3 @@ def test_mistakes_of_rula(
     done = cardbox("rula", *options(files), "--csv", files / "rula.csv", *given)
     done.assert_refused("rula", expected)
     assert not (files / "rula.csv").exists()
-
-
-def test_reba_is_refused_with_its_reason(cardbox: Callable) -> None:
-    done = cardbox("reba", "session")
-    assert (done.code, done.out) == (2, "")
-    assert "does not see legs; use 'cardbox rula'" in done.err

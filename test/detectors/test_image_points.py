@@ -11,6 +11,8 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from cardbox_tracker.detectors.image_points import POINT_INDEX, POINT_NAMES, ImagePoints
+from cardbox_tracker.detectors.landmarks import image_points
+from cardbox_tracker.detectors.pose_network import Detection
 
 COUNT = len(POINT_NAMES)
 PX, SCORES = np.full((COUNT, 2), 7.0), np.full(COUNT, 0.5)
@@ -102,3 +104,20 @@ def test_the_points_of_coco_have_their_names() -> None:
     assert found.stamp_ns == 7
     with pytest.raises(ValueError, match=r"\(17, 3\)"):
         ImagePoints.from_coco17(np.zeros((18, 3)))
+
+
+def test_a_detection_has_the_points_of_the_legs_beside_the_others() -> None:
+    numbers = np.arange(33.0)
+    space = np.stack([numbers, numbers, numbers], axis=1)
+    found = Detection(
+        np.stack([numbers, 2 * numbers], axis=1), numbers / 33, np.zeros((4, 4), np.uint8), space
+    )
+    points = image_points(found)
+    assert points.legs is not None and points.legs.spatial_m is not None
+    # Knees, ankles, heels and the ends of the feet are MediaPipe's points 25 to 32.
+    assert points.legs.px[:, 0].tolist() == list(range(25, 33))
+    assert points.legs.spatial_m[0].tolist() == [25.0] * 3
+    exchanged = points.exchanged().legs
+    assert exchanged is not None
+    assert exchanged.px[:, 0].tolist() == [26, 25, 28, 27, 30, 29, 32, 31]
+    assert points.px.shape == (17, 2)

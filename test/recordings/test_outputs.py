@@ -30,7 +30,15 @@ from cardbox_tracker.recordings.outputs import (
     place_from,
     posture_from,
 )
-from cardbox_tracker.tracking.estimate import LOST, NO_PERSON, TRACKING, UNCERTAIN, Estimate, Place
+from cardbox_tracker.tracking.estimate import (
+    LOST,
+    NO_PERSON,
+    TRACKING,
+    UNCERTAIN,
+    Estimate,
+    Legs,
+    Place,
+)
 from cardbox_tracker.tracking.tracker import Tracker
 
 STAMP_NS = 5_000_000_000
@@ -55,6 +63,10 @@ PLACED = replace(
     clavicles_stddev_m=np.array([0.002, 0.003]),
 )
 SEEN = replace(PLACED, neck=np.array([0.4, -0.1]), neck_stddev=np.array([0.1, 0.2]))
+LEGS = Legs(
+    *(np.arange(8) / 10, np.arange(8) / 100, np.zeros((6, 3)), np.zeros(6)),
+    (KeypointState.TRACKED,) * 6,
+)
 BODY_NAMES = (*JOINT_NAMES, "torso_x", "torso_z")
 CLAVICLES = ("left_clavicle_elevation", "right_clavicle_elevation")
 ALL_NAMES = (*BODY_NAMES, "neck_yaw", "neck_pitch", *CLAVICLES)
@@ -249,3 +261,15 @@ def test_the_place_is_found_by_its_names() -> None:
 def test_a_missing_joint_is_named() -> None:
     with pytest.raises(ValueError, match="torso_y"):
         posture_from(JointValues(JOINT_NAMES[1:], POSTURE[1:]))
+
+
+def test_joints_of_the_legs_are_the_last_ones_and_only_with_legs() -> None:
+    found = replace(SEEN, legs=LEGS)
+    without, joints, stddevs = joint_values(SEEN), joint_values(found), joint_deviations(found)
+    assert without is not None and joints is not None and stddevs is not None
+    assert joints.names[: len(without.names)] == without.names == ALL_NAMES
+    assert joints.names[-1] == stddevs.names[-1] == "right_knee_flexion"
+    assert joints.values[-8:] == pytest.approx(np.arange(8) / 10)
+    assert stddevs.values[-8:] == pytest.approx(np.arange(8) / 100)
+    only = joint_values(found, torso_place=False)
+    assert only is not None and only.names == JOINT_NAMES

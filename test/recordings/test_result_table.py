@@ -23,7 +23,7 @@ from cardbox_tracker.recordings.result_table import (
     units,
 )
 from cardbox_tracker.recordings.silhouettes import RecordedFrame
-from cardbox_tracker.tracking.estimate import Estimate, Hand, Place
+from cardbox_tracker.tracking.estimate import Estimate, Hand, Legs, Place
 
 ROOT = Path(__file__).parents[2]
 ANGLES = (
@@ -84,6 +84,35 @@ STAMP_NS, STAMP = 1_700_000_000_000_000_005, Decimal("1700000000.000000005")
 def test_scripts_find_the_columns_that_they_know() -> None:
     assert columns() == HEADER + CLAVICLES + PLACE + ANATOMICAL
     assert columns(has_points=True) == WHOLE
+
+
+def test_legs_follow_all_others() -> None:
+    angles = ("hip_flexion", "hip_abduction", "hip_rotation", "knee_flexion")
+    points = ("hip", "knee", "ankle")
+    expected = (
+        *(f"{side}_{name}" for side in ("left", "right") for name in angles),
+        *(f"{side}_{name}_stddev_rad" for side in ("left", "right") for name in angles),
+        *(
+            f"{side}_{name}_{axis}"
+            for side in ("left", "right")
+            for name in points
+            for axis in "xyz"
+        ),
+        *(f"{side}_{name}_state" for side in ("left", "right") for name in points),
+        *(f"{side}_{name}_stddev_m" for side in ("left", "right") for name in points),
+    )
+    assert columns(has_legs=True) == columns() + expected
+    states = (KeypointState.TRACKED,) * 5 + (KeypointState.HIDDEN,)
+    values = np.arange(8) / 10, np.arange(8) / 100, np.arange(18).reshape(6, 3) / 10
+    found = replace(FOUND, legs=Legs(*values, np.arange(6) / 10, states))
+    row = row_of(STAMP_NS, 1.0, found, has_legs=True)
+    named = dict(zip(columns(has_legs=True), row, strict=True))
+    assert named["right_knee_flexion"] == 0.7
+    assert named["right_knee_flexion_stddev_rad"] == 0.07
+    assert (named["left_knee_x"], named["right_ankle_z"]) == pytest.approx((0.3, 1.7))
+    assert (named["left_hip_state"], named["right_ankle_state"]) == ("tracked", "hidden")
+    assert named["right_ankle_stddev_m"] == 0.5
+    assert row_of(STAMP_NS, 1.0, found) == row_of(STAMP_NS, 1.0, FOUND)
 
 
 def test_each_column_has_its_unit() -> None:
@@ -217,7 +246,8 @@ def test_the_page_lists_all_columns_in_their_order() -> None:
     listed: list[str] = []
     for cell in re.findall(r"(?m)^\| (`.*?) \|", text):
         listed += re.findall(r"`([a-z_]+)`", cell)
-    assert tuple(listed) == (*WHOLE, "person", *HANDS)
+    legs = columns(has_legs=True)[len(columns()) :]
+    assert tuple(listed) == (*WHOLE, "person", *HANDS, *legs)
 
 
 def test_of_several_people_the_number_comes_last() -> None:

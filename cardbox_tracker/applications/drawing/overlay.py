@@ -88,6 +88,7 @@ def draw_overlay(
         if estimate.neck is not None:
             _draw_gaze(canvas, view, gaze_m(body_parts(there.sizes), posed, estimate.neck))
         _draw_hands(canvas, view, estimate)
+        _draw_legs(canvas, view, estimate)
         text += f"  IoU {estimate.iou:.2f}  {estimate.cost_px} px"
         if estimate.place is not None and estimate.place.state is KeypointState.UNCERTAIN:
             text += "  place uncertain"
@@ -116,8 +117,8 @@ def draw_camera_overlay(
         place_m = np.zeros(2) if estimate.offset_m is None else estimate.offset_m
         state = view.states(np.concatenate([estimate.posture, place_m]))
         posture, there = state[POSTURE], state[PLACE]
-        # The hands' places are those in the first camera.
-        estimate = replace(estimate, posture=posture, offset_m=there, hands=None)
+        # The places of hands and legs are those in the first camera.
+        estimate = replace(estimate, posture=posture, offset_m=there, hands=None, legs=None)
     return draw_overlay(view.upright(picture), view.body, view.camera, estimate, scale)
 
 
@@ -251,6 +252,19 @@ def _draw_hands(canvas: ImageArray, camera: Camera, estimate: Estimate) -> None:
         filled = 0 if hand.open > OPEN else 360 if hand.open < CLOSED else 180
         cv2.ellipse(canvas, centre, (radius, radius), 0, 0, filled, HAND_BGR, -1, cv2.LINE_AA)
         cv2.circle(canvas, centre, radius, HAND_BGR, thickness, cv2.LINE_AA)
+
+
+def _draw_legs(canvas: ImageArray, camera: Camera, estimate: Estimate) -> None:
+    """Draw thighs and shanks like the arms."""
+    if estimate.legs is None or not in_front(estimate.legs.points_m).all():
+        return
+    pixels = camera.project(estimate.legs.points_m)
+    thickness = max(1, round(camera.width / 400))
+    for end in (1, 2, 4, 5):
+        state = estimate.legs.states[end]
+        _draw_bone(canvas, pixels[end - 1], pixels[end], state, thickness + 1)
+    for joint in _subpixels(pixels).tolist():
+        cv2.circle(canvas, joint, (thickness + 1) << _SHIFT, JOINT_BGR, -1, cv2.LINE_AA, _SHIFT)
 
 
 def _draw_text(canvas: ImageArray, text: str, colour: tuple[int, int, int] = TEXT_BGR) -> None:

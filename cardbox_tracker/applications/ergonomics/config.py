@@ -1,4 +1,4 @@
-"""Settings of RULA: inputs that an outline does not show, and limits that the paper leaves open."""
+"""Settings of RULA and REBA: inputs that no image shows, and limits that the papers leave open."""
 
 from __future__ import annotations
 
@@ -101,13 +101,98 @@ class RulaConfig(Settings):
     )
 
 
+@dataclass(frozen=True)
+class RebaConfig(Settings):
+    """Settings of REBA: inputs that describe the task, then limits of angles.
+
+    Raises:
+        ValueError: a value is out of its range; the text names it.
+    """
+
+    neck: int = setting(
+        1,
+        "score of the neck: 1 for 0 to 20 degrees of flexion, 2 beyond or in extension; 1 more if "
+        "twisted or bent aside; declared for images without points of the face",
+        limits=(1, 3),
+    )
+    legs: int = setting(
+        1,
+        "score of the legs: 1 if both feet carry weight, walking or sitting, 2 if one does or the "
+        "posture is unstable; 1 more with knees bent by 30 to 60 degrees, 2 beyond; declared for "
+        "images that do not show both legs",
+        limits=(1, 4),
+    )
+    wrist: int = setting(
+        1,
+        f"score of the wrists: 1 to 15 degrees, 2 beyond; 1 more if bent aside or twisted; "
+        f"{_DECLARED}",
+        limits=(1, 3),
+    )
+    load: int = setting(
+        0, "0 below 5 kg, 1 for 5 to 10 kg, 2 above; 1 more with shocks", limits=(0, 3)
+    )
+    coupling: int = setting(0, "handles: 0 good, 1 fair, 2 poor, 3 unacceptable", limits=(0, 3))
+    activity: int = setting(
+        0,
+        "1 each if a part of the body is held for longer than a minute, if a small motion is "
+        "repeated more than 4 times in one, if the posture changes widely and fast",
+        limits=(0, 3),
+    )
+    shoulders_raised: bool = setting(False, f"the shoulders are raised; {_DECLARED}")
+    arms_supported: bool = setting(
+        False, f"the arms are supported, the person leans, or gravity helps; {_DECLARED}"
+    )
+    trunk_twisted: bool = setting(
+        False, "the trunk is twisted against the hips; declared, since no image shows it"
+    )
+    abducted_deg: float = setting(
+        30.0,
+        "an upper arm this far to the side counts as abducted; the paper names no angle",
+        unit="deg",
+        limits=(5.0, 90.0),
+    )
+    side_bent_deg: float = setting(
+        10.0,
+        "a trunk this far to a side counts as bent; the paper names no angle",
+        unit="deg",
+        limits=(1.0, 45.0),
+    )
+    neck_extended_deg: float = setting(
+        10.0,
+        "a neck bent backwards by more than this is in extension; the paper has 0, which is within "
+        "the error of the measurement",
+        unit="deg",
+        limits=(0.0, 45.0),
+    )
+    neck_twisted_deg: float = setting(
+        20.0,
+        "a head turned this far against the trunk twists the neck; the paper names no angle",
+        unit="deg",
+        limits=(5.0, 80.0),
+    )
+    upright_deg: float = setting(
+        10.0,
+        "a trunk bowed less than this is upright, score 1; the paper has 0, which nobody keeps",
+        unit="deg",
+        limits=(0.0, 20.0),
+    )
+
+
+ErgonomicConfig = RulaConfig | RebaConfig
+
 DECLARED_PARTS = {"wrist": 4, "wrist_twist": 2, "legs": 2}
 """Highest score of each part that no image shows."""
 
-_INPUTS = (
-    *("neck", "wrist", "wrist_twist", "legs", "arm_load", "arm_muscle_use"),
-    *("body_load", "body_muscle_use", "shoulders_raised", "arms_supported", "trunk_twisted"),
-)
+_INPUTS: dict[type[Settings], tuple[str, ...]] = {
+    RulaConfig: (
+        *("neck", "wrist", "wrist_twist", "legs", "arm_load", "arm_muscle_use"),
+        *("body_load", "body_muscle_use", "shoulders_raised", "arms_supported", "trunk_twisted"),
+    ),
+    RebaConfig: (
+        *("neck", "legs", "wrist", "load", "coupling", "activity"),
+        *("shoulders_raised", "arms_supported", "trunk_twisted"),
+    ),
+}
 
 
 class Declared(NamedTuple):
@@ -135,18 +220,22 @@ class Declared(NamedTuple):
         return f"{self.words} (default)" if self.is_default else self.words
 
 
-def declared(config: RulaConfig, is_neck_measured: bool = False) -> tuple[Declared, ...]:
-    """Return the inputs that are declared; the neck is none of them while it is measured."""
-    known, defaults = settings_of(RulaConfig), {one.name: one.default for one in fields(config)}
+def declared(
+    config: ErgonomicConfig, is_neck_measured: bool = False, are_legs_measured: bool = False
+) -> tuple[Declared, ...]:
+    """Return the inputs that are declared; neck and legs are none of them while measured."""
+    known, defaults = settings_of(type(config)), {one.name: one.default for one in fields(config)}
+    measured = {"neck"} if is_neck_measured else set[str]()
+    measured |= {"legs"} if are_legs_measured else set[str]()
     found = []
-    for name in _INPUTS[is_neck_measured:]:
+    for name in (name for name in _INPUTS[type(config)] if name not in measured):
         value = getattr(config, name)
         text = str(value) if type(value) is int else ("no", "yes")[value]
         found.append(Declared(name, text, value == defaults[name], known[name].description))
     return tuple(found)
 
 
-def limits(config: RulaConfig) -> dict[str, str]:
+def limits(config: ErgonomicConfig) -> dict[str, str]:
     """Return the limits of angles by name, degrees."""
-    names = [name for name in settings_of(RulaConfig) if name not in _INPUTS]
+    names = [name for name in settings_of(type(config)) if name not in _INPUTS[type(config)]]
     return {name.removesuffix("_deg"): f"{getattr(config, name):g}" for name in names}

@@ -14,17 +14,15 @@ import numpy as np
 from cardbox_tracker.applications.drawing.overlay import draw_overlay, with_hidden_head
 from cardbox_tracker.applications.ergonomics.config import (
     DECLARED,
-    DECLARED_PARTS,
     MEASURED,
     MIXED,
+    ErgonomicConfig,
     RulaConfig,
 )
 from cardbox_tracker.applications.ergonomics.rula import (
-    ABOVE,
-    ACTION_LEVELS,
-    HIGHEST,
-    PARTS,
+    RULA,
     SAMPLES,
+    Method,
     ScoreDistribution,
     expected,
     sampled_scores,
@@ -35,14 +33,21 @@ from cardbox_tracker.recordings.silhouettes import RecordedFrame
 from cardbox_tracker.tracking.estimate import UNCERTAIN, Estimate
 from cardbox_tracker.tracking.tracker import Tracker
 
-CSV_HEADER = (
-    *("stamp_ns", "state", "score", "likeliest", f"chance_above_{ABOVE}"),
-    *(f"chance_{score}" for score in range(1, HIGHEST + 1)),
-    *("left_score", "right_score"),
-    *(part.name for part in PARTS),
-    "neck_from",
-    "mean_posture_score",
-)
+
+def header_of(method: Method) -> tuple[str, ...]:
+    """Return the columns of :func:`write_csv`."""
+    return (
+        *("stamp_ns", "state", "score", "likeliest", f"chance_above_{method.above}"),
+        *(f"chance_{score}" for score in range(1, method.highest + 1)),
+        *("left_score", "right_score"),
+        *(part.name for part in method.parts),
+        "neck_from",
+        "mean_posture_score",
+        *(("legs_from",) if method is not RULA else ()),
+    )
+
+
+CSV_HEADER = header_of(RULA)
 MEAN_POSTURE = "mean_posture"
 """Name of the grand score of the mean posture among the shares."""
 SHARES_HEADER = ("part", "source", "score", "time_s", "share")
@@ -70,6 +75,7 @@ class RulaRow:
         scores: its scores; None without a posture.
         time_s: seconds from the recording's start.
         is_neck_measured: whether the neck's score is measured; otherwise it is declared.
+        are_legs_measured: the same for the legs.
     """
 
     stamp_ns: int
@@ -77,6 +83,7 @@ class RulaRow:
     scores: ScoreDistribution | None
     time_s: float
     is_neck_measured: bool = False
+    are_legs_measured: bool = False
 
     @property
     def worst(self) -> float:
@@ -175,6 +182,7 @@ class RulaSummary:
         of_mean: mean score of the mean postures over the same time.
         uncertain_s: part of the measured time whose postures may be wrong.
         neck_measured_s: part of the measured time with a measured neck.
+        legs_measured_s: the same with measured legs.
     """
 
     measured_s: float
@@ -184,26 +192,34 @@ class RulaSummary:
     of_mean: float
     uncertain_s: float
     neck_measured_s: float
+    legs_measured_s: float = 0.0
 
     @property
     def is_neck_always_measured(self) -> bool:
         """Whether no image with a posture has a declared neck."""
         return 0 < self.measured_s <= self.neck_measured_s + 1e-9
 
+    @property
+    def are_legs_always_measured(self) -> bool:
+        """Whether no image with a posture has declared legs."""
+        return 0 < self.measured_s <= self.legs_measured_s + 1e-9
 
-def summarize(rows: Sequence[RulaRow]) -> RulaSummary:
+
+def summarize(rows: Sequence[RulaRow], method: Method = RULA) -> RulaSummary:
     """Return the expected time spent at each score."""
-    time_s = _time_at(rows, "grand", HIGHEST)
+    time_s = _time_at(rows, "grand", method.highest)
     total_s = float(time_s.sum())
+    of_mean_s = _time_at(rows, MEAN_POSTURE, method.highest)
     scored_s = durations_of(rows) * [row.scores is not None for row in rows]
     return RulaSummary(
         total_s,
-        float(time_s[ABOVE:].sum()),
-        tuple(float(time_s[low - 1 : high].sum()) for low, high, _ in ACTION_LEVELS),
+        float(time_s[method.above :].sum()),
+        tuple(float(time_s[low - 1 : high].sum()) for low, high, _ in method.levels),
         expected(time_s / total_s) if total_s else float("nan"),
-        expected(_time_at(rows, MEAN_POSTURE, HIGHEST) / total_s) if total_s else float("nan"),
+        expected(of_mean_s / total_s) if total_s else float("nan"),
         float(scored_s @ np.array([row.state == UNCERTAIN for row in rows], float)),
         float(scored_s @ np.array([row.is_neck_measured for row in rows], float)),
+        float(scored_s @ np.array([row.are_legs_measured for row in rows], float)),
     )
 
 
@@ -234,21 +250,30 @@ class ScoreShares(NamedTuple):
         return expected(self.shares)
 
 
-def score_shares(rows: Sequence[RulaRow], config: RulaConfig) -> tuple[ScoreShares, ...]:
+def score_shares(
+    rows: Sequence[RulaRow], config: ErgonomicConfig, method: Method = RULA
+) -> tuple[ScoreShares, ...]:
     """Return the time at each score: the grand score, measured parts and tables, declared parts."""
-    grand_s = _time_at(rows, "grand", HIGHEST)
-    of_mean_s = _time_at(rows, MEAN_POSTURE, HIGHEST)
+    grand_s = _time_at(rows, "grand", method.highest)
+    of_mean_s = _time_at(rows, MEAN_POSTURE, method.highest)
     shares = [
         ScoreShares("grand", "grand score", MIXED, grand_s),
         ScoreShares(MEAN_POSTURE, "of mean posture", MIXED, of_mean_s),
     ]
-    necks = {row.is_neck_measured for row in rows if row.scores is not None} or {False}
-    neck = MIXED if len(necks) > 1 else (DECLARED, MEASURED)[necks.pop()]
-    for name, words, highest, _ in PARTS:
-        source = neck if name == "neck" else MIXED if "table" in name else MEASURED
+    scored = [row for row in rows if row.scores is not None]
+    found = {
+        "neck": {row.is_neck_measured for row in scored},
+        "legs": {row.are_legs_measured for row in scored},
+    }
+    sources = {
+        name: MIXED if len(known) > 1 else (DECLARED, MEASURED)[known == {True}]
+        for name, known in found.items()
+    }
+    for name, words, highest, _ in method.parts:
+        source = sources.get(name, MIXED if "table" in name else MEASURED)
         time_s = _time_at(rows, name, highest)
         shares.append(ScoreShares(name, words, source, time_s))
-    for name, highest in DECLARED_PARTS.items():
+    for name, highest in method.declared_parts.items():
         time_s = np.eye(highest)[getattr(config, name) - 1] * grand_s.sum()
         shares.append(ScoreShares(name, name.replace("_", " "), DECLARED, time_s))
     return tuple(shares)
@@ -286,24 +311,26 @@ def write_shares(shares: Sequence[ScoreShares], path: Path) -> None:
     write_table(path, SHARES_HEADER, rows)
 
 
-def write_csv(rows: Sequence[RulaRow], path: Path) -> None:
-    """Write ``CSV_HEADER`` and a row per image; unknown values are left empty.
+def write_csv(rows: Sequence[RulaRow], path: Path, method: Method = RULA) -> None:
+    """Write the columns of :func:`header_of` and a row per image; unknown values are left empty.
 
     Raises:
         CardboxError: the file cannot be written.
     """
-    write_table(path, CSV_HEADER, map(_fields, rows))
+    header = header_of(method)
+    write_table(path, header, (_fields(row, method)[: len(header)] for row in rows))
 
 
-def _fields(row: RulaRow) -> list[str]:
+def _fields(row: RulaRow, method: Method) -> list[str]:
     stamp, scores = str(row.stamp_ns), row.scores
     if scores is None:
-        return [stamp, row.state, *[""] * (len(CSV_HEADER) - 2)]
-    of_parts = [scores.left, scores.right, *(scores.parts[part.name] for part in PARTS)]
-    values = (scores.chance_above(ABOVE), *scores.grand.tolist(), *map(expected, of_parts))
+        return [stamp, row.state, *[""] * (len(header_of(method)) - 2)]
+    of_parts = [scores.left, scores.right, *(scores.parts[part.name] for part in method.parts)]
+    values = (scores.chance_above(method.above), *scores.grand.tolist(), *map(expected, of_parts))
     return [
         *(stamp, row.state, f"{scores.mean:.3f}", str(scores.likeliest)),
         *(f"{value:.3f}" for value in values),
         MEASURED if row.is_neck_measured else DECLARED,
         str(scores.of_mean),
+        MEASURED if row.are_legs_measured else DECLARED,
     ]

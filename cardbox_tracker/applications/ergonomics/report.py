@@ -10,7 +10,12 @@ from pathlib import Path
 
 import numpy as np
 
-from cardbox_tracker.applications.ergonomics.config import NOT_SEEN, RulaConfig, declared, limits
+from cardbox_tracker.applications.ergonomics.config import (
+    NOT_SEEN,
+    ErgonomicConfig,
+    declared,
+    limits,
+)
 from cardbox_tracker.applications.ergonomics.recording import (
     GAP_S,
     LONGEST_STEP,
@@ -22,18 +27,12 @@ from cardbox_tracker.applications.ergonomics.recording import (
     summarize,
     worst_moments,
 )
-from cardbox_tracker.applications.ergonomics.rula import (
-    ABOVE,
-    ACTION_LEVELS,
-    HIGHEST,
-    PARTS,
-    expected,
-)
+from cardbox_tracker.applications.ergonomics.rula import RULA, Method, expected
 from cardbox_tracker.common.files import atomic_path
 from cardbox_tracker.person.sizes import FloatArray
 from cardbox_tracker.tracking.estimate import UNCERTAIN
 
-_ACTION_COLOURS = ("#d9ecd5", "#fdf1c4", "#fbd5ac", "#f2aaa0")
+_ACTION_COLOURS = ("#d9ecd5", "#fdf1c4", "#fbd5ac", "#f2aaa0", "#d98c8c")
 _UNCERTAIN_COLOUR, _NOTHING_COLOUR, _LINE_COLOUR = "#e69f00", "#9a9a9a", "#1b4f8a"
 _LIGHTEST, _DARKEST = np.array([222, 235, 247]), np.array([8, 69, 148])
 # A smaller share is left out in words, and has no room for its score in a bar.
@@ -42,29 +41,35 @@ _DPI = 120
 
 
 def report_lines(
-    summary: RulaSummary, shares: Sequence[ScoreShares], config: RulaConfig
+    summary: RulaSummary,
+    shares: Sequence[ScoreShares],
+    config: ErgonomicConfig,
+    method: Method = RULA,
 ) -> Iterator[str]:
-    """Yield the lines that ``cardbox rula`` prints; only the declared inputs without a posture."""
+    """Yield the lines that a method's command prints; only declared inputs without a posture."""
     if summary.measured_s:
         yield (
-            f"expected RULA score {summary.mean:.1f} (of the mean postures {summary.of_mean:.1f}); "
-            f"above {ABOVE} for {summary.above_s:.1f} of {summary.measured_s:.1f} s "
+            f"expected {method.name} score {summary.mean:.1f} "
+            f"(of the mean postures {summary.of_mean:.1f}); "
+            f"above {method.above} for {summary.above_s:.1f} of {summary.measured_s:.1f} s "
             f"({summary.above_s / summary.measured_s:.0%})"
         )
-        for (low, high, meaning), time_s in zip(ACTION_LEVELS, summary.by_level_s, strict=True):
-            yield f"  {_span(low, high):<3} {time_s:6.1f} s  {meaning}"
+        for (low, high, meaning), time_s in zip(method.levels, summary.by_level_s, strict=True):
+            yield f"  {_span(low, high):<{3 if method is RULA else 5}} {time_s:6.1f} s  {meaning}"
         if summary.uncertain_s:
             yield f"  of these, {summary.uncertain_s:.1f} s have a posture that may be wrong"
         yield "mean score of each part, and the share of the time at each score:"
         for one in shares:
             yield f"  {one.words:<16} {one.mean:.1f}  {one.source:<8}  {_share_words(one)}"
-    inputs = declared(config, summary.is_neck_always_measured)
+    inputs = declared(config, summary.is_neck_always_measured, summary.are_legs_always_measured)
     for title, is_default in ((NOT_SEEN, False), (f"{NOT_SEEN}, with the default value", True)):
         found = [one.words for one in inputs if one.is_default == is_default]
         if found:
             yield f"{title}: {', '.join(found)}"
     if summary.neck_measured_s:
         yield _neck_words(summary)
+    if summary.legs_measured_s:
+        yield _legs_words(summary)
 
 
 @dataclass(frozen=True)
@@ -78,14 +83,16 @@ class PageContent:
         rows: one image each, in order.
         images: JPEG of images by stamp; None if no images are wanted or given.
         are_heads_hidden: whether heads in the images were made unrecognizable.
+        method: of the scores.
     """
 
     title: str
     facts: Mapping[str, str]
-    config: RulaConfig
+    config: ErgonomicConfig
     rows: Sequence[RulaRow]
     images: Mapping[int, bytes] | None = None
     are_heads_hidden: bool = True
+    method: Method = RULA
 
 
 def write_page(content: PageContent, path: Path) -> None:
@@ -96,27 +103,30 @@ def write_page(content: PageContent, path: Path) -> None:
     """
     import jinja2
 
-    rows, config, summary = content.rows, content.config, summarize(content.rows)
-    shares, moments = score_shares(rows, config), worst_moments(rows)
+    rows, config, method = content.rows, content.config, content.method
+    summary = summarize(rows, method)
+    shares, moments = score_shares(rows, config, method), worst_moments(rows)
     environment = jinja2.Environment(
         autoescape=True, trim_blocks=True, lstrip_blocks=True, undefined=jinja2.StrictUndefined
     )
     environment.filters |= {"data": _data, "bar": _bar, "words": _share_words}
-    levels = zip(ACTION_LEVELS, _ACTION_COLOURS, summary.by_level_s, strict=True)
+    colours = _ACTION_COLOURS[: len(method.levels)]
+    levels = zip(method.levels, colours, summary.by_level_s, strict=True)
     text = environment.from_string(
         Path(__file__).with_name("page.html").read_text(encoding="utf-8")
     ).render(
         content=content,
         summary=summary,
-        above=ABOVE,
+        above=method.above,
         gap_s=GAP_S,
         levels=[(_span(low, high), what, *rest) for (low, high, what), *rest in levels],
-        plot=score_plot(rows, moments) if summary.measured_s else b"",
+        plot=score_plot(rows, moments, method) if summary.measured_s else b"",
         colours={"uncertain": _UNCERTAIN_COLOUR, "nothing": _NOTHING_COLOUR},
         shares=shares,
-        inputs=declared(config, summary.is_neck_always_measured),
+        inputs=declared(config, summary.is_neck_always_measured, summary.are_legs_always_measured),
         neck=_neck_words(summary) if summary.neck_measured_s else "",
-        moments=[(row, _moment_words(row)) for row in moments],
+        legs=_legs_words(summary) if summary.legs_measured_s else "",
+        moments=[(row, _moment_words(row, method)) for row in moments],
         limits=limits(config),
     )
     with atomic_path(path) as temporary:
@@ -124,36 +134,38 @@ def write_page(content: PageContent, path: Path) -> None:
         temporary.write_bytes(text.encode("utf-8", "replace"))
 
 
-def plot_scores(rows: Sequence[RulaRow], path: Path) -> None:
+def plot_scores(rows: Sequence[RulaRow], path: Path, method: Method = RULA) -> None:
     """Write the plot of :func:`score_plot`.
 
     Raises:
         CardboxError: the file cannot be written.
     """
     with atomic_path(path) as temporary:
-        temporary.write_bytes(score_plot(rows))
+        temporary.write_bytes(score_plot(rows, (), method))
 
 
-def score_plot(rows: Sequence[RulaRow], moments: Sequence[RulaRow] = ()) -> bytes:
+def score_plot(
+    rows: Sequence[RulaRow], moments: Sequence[RulaRow] = (), method: Method = RULA
+) -> bytes:
     """Return the expected score over time, with its standard deviation, as PNG.
 
     Args:
         rows: one image each, in order; at least one.
         moments: images to mark with numbers in their order.
+        method: of the scores.
     """
     from matplotlib.figure import Figure
 
     time_s, durations_s = np.array([row.time_s for row in rows], float), durations_of(rows)
-    scores = np.arange(1, HIGHEST + 1)
-    chances = np.array(
-        [np.full(HIGHEST, np.nan) if row.scores is None else row.scores.grand for row in rows]
-    )
+    scores = np.arange(1, method.highest + 1)
+    nothing = np.full(method.highest, np.nan)
+    chances = np.array([nothing if row.scores is None else row.scores.grand for row in rows])
     mean = chances @ scores
     deviation = np.sqrt(np.maximum(chances @ scores**2 - mean**2, 0.0))
 
     figure = Figure(figsize=(10.0, 3.2), dpi=_DPI, layout="constrained")
     axes = figure.subplots()
-    for (low, high, _), colour in zip(ACTION_LEVELS, _ACTION_COLOURS, strict=True):
+    for (low, high, _), colour in zip(method.levels, _ACTION_COLOURS, strict=False):
         axes.axhspan(low - 0.5, high + 0.5, color=colour, linewidth=0)
     # A line ends where no image follows for long.
     gaps = np.flatnonzero(np.diff(time_s) > LONGEST_STEP * durations_s[-1]) + 1
@@ -170,7 +182,8 @@ def score_plot(rows: Sequence[RulaRow], moments: Sequence[RulaRow] = ()) -> byte
         at = (row.time_s, row.worst)
         axes.plot(*at, "o", color=_LINE_COLOUR)
         axes.annotate(str(number), at, (0, 5), textcoords="offset points", ha="center")
-    axes.set(xlabel="time [s]", ylabel="RULA score", yticks=scores, ylim=(0.5, HIGHEST + 0.5))
+    limits_ = (0.5, method.highest + 0.5)
+    axes.set(xlabel="time [s]", ylabel=f"{method.name} score", yticks=scores, ylim=limits_)
     axes.margins(x=0.01)
     png = io.BytesIO()
     figure.savefig(png, format="png", metadata={"Software": None})
@@ -195,9 +208,18 @@ def _neck_words(summary: RulaSummary) -> str:
     )
 
 
-def _moment_words(row: RulaRow) -> str:
+def _legs_words(summary: RulaSummary) -> str:
+    if summary.are_legs_always_measured:
+        return "the legs were measured all the time"
+    return (
+        f"the legs were measured for {summary.legs_measured_s:.1f} of {summary.measured_s:.1f} s, "
+        "and count as declared for the rest"
+    )
+
+
+def _moment_words(row: RulaRow, method: Method) -> str:
     parts = {} if row.scores is None else row.scores.parts
-    words = (f"{part.words} {expected(parts[part.name]):.1f}" for part in PARTS)
+    words = (f"{part.words} {expected(parts[part.name]):.1f}" for part in method.parts)
     doubt = ", but the posture may be wrong" if row.state == UNCERTAIN else ""
     return f"score {row.worst:.1f}{doubt} ({'; '.join(words)})"
 

@@ -21,7 +21,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from types import MappingProxyType
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,6 +31,7 @@ from cardbox_tracker.applications.ergonomics.config import (
     DECLARED_PARTS,
     MEASURED,
     NOT_SEEN,
+    ErgonomicConfig,
     RulaConfig,
     declared,
 )
@@ -56,13 +57,14 @@ within a second by 0.2 to 0.5 of the deviations, and a quarter gives the true sh
 """
 
 
-def _table(rows: str, *shape: int) -> ScoreArray:
+def table_of(rows: str, *shape: int) -> ScoreArray:
+    """Return a table of whole numbers of a shape."""
     table = np.array(rows.split(), dtype=np.int64).reshape(shape)
     table.setflags(write=False)
     return table
 
 
-TABLE_A: ScoreArray = _table(
+TABLE_A: ScoreArray = table_of(
     """
     1 2  2 2  2 3  3 3    2 2  2 2  3 3  3 3    2 3  3 3  3 3  4 4
     2 3  3 3  3 4  4 4    3 3  3 3  3 4  4 4    3 4  4 4  4 4  5 5
@@ -75,7 +77,7 @@ TABLE_A: ScoreArray = _table(
 )
 """Posture of one arm: upper arm (6), lower arm (3), wrist (4), wrist twist (2)."""
 
-TABLE_B: ScoreArray = _table(
+TABLE_B: ScoreArray = table_of(
     """
     1 3  2 3  3 4  5 5  6 6  7 7
     2 3  2 3  4 5  5 5  6 7  7 7
@@ -88,7 +90,7 @@ TABLE_B: ScoreArray = _table(
 )
 """Posture of the rest: neck (6), trunk (6), legs (2)."""
 
-TABLE_C: ScoreArray = _table(
+TABLE_C: ScoreArray = table_of(
     """
     1 2 3 3 4 5 5
     2 2 3 4 4 5 5
@@ -145,7 +147,7 @@ class Part(NamedTuple):
     name: str
     words: str
     highest: int
-    of: Callable[[RulaScores], ScoreArray]
+    of: Callable[[Any], ScoreArray]
 
 
 PARTS: tuple[Part, ...] = (
@@ -163,8 +165,31 @@ PARTS: tuple[Part, ...] = (
 muscle use."""
 
 
+class Method(NamedTuple):
+    """What tables and pages of scores need to know of a method.
+
+    Attributes:
+        name: its name.
+        highest: highest grand score.
+        above: grand score above which work has to be changed soon or at once.
+        levels: lowest and highest grand score of each action level, and its meaning.
+        parts: parts and tables whose scores are shown.
+        declared_parts: highest score of each part that no image shows.
+    """
+
+    name: str
+    highest: int
+    above: int
+    levels: tuple[tuple[int, int, str], ...]
+    parts: tuple[Part, ...]
+    declared_parts: Mapping[str, int]
+
+
+RULA = Method("RULA", HIGHEST, ABOVE, ACTION_LEVELS, PARTS, DECLARED_PARTS)
+
+
 class ScoreDistribution(NamedTuple):
-    """Chances (7,) of the grand scores 1 to 7; each array adds up to 1.
+    """Chances (n,) of the grand scores 1 to n, which is 7 in RULA; each array adds up to 1.
 
     Attributes:
         grand: chances for the worse arm.
@@ -267,15 +292,20 @@ def rula_scores(
         necks: ``neck_yaw`` and ``neck_pitch`` of each posture, (..., 2), rad; None if unknown.
     """
     d = np.asarray(postures, dtype=np.float64)
-    bow_deg, bend_deg = (np.abs(np.degrees(d[..., joint])) for joint in (PITCH, ROLL))
-    trunk = _steps(bow_deg, config.upright_deg, 20.0, 60.0) + (bend_deg > config.side_bent_deg)
-    trunk = trunk + config.trunk_twisted
+    trunk = trunk_scores(d, config)
     neck = np.full(trunk.shape, config.neck) if necks is None else _neck(necks, config)
     table_b = TABLE_B[neck - 1, trunk - 1, config.legs - 1]
     rest = table_b + config.body_muscle_use + config.body_load
     left = _arm(body, d[..., LEFT_ARM], 1.0, rest, config)
     right = _arm(body, d[..., RIGHT_ARM], -1.0, rest, config)
     return RulaScores(left, right, trunk, np.maximum(left.grand, right.grand), neck, table_b)
+
+
+def trunk_scores(postures: FloatArray, config: ErgonomicConfig) -> ScoreArray:
+    """Return the scores of the trunk in postures (..., 12)."""
+    bow_deg, bend_deg = (np.abs(np.degrees(postures[..., joint])) for joint in (PITCH, ROLL))
+    trunk = _steps(bow_deg, config.upright_deg, 20.0, 60.0) + (bend_deg > config.side_bent_deg)
+    return np.asarray(trunk + config.trunk_twisted)
 
 
 def _neck(necks: FloatArray, config: RulaConfig) -> ScoreArray:
@@ -290,27 +320,38 @@ def _arm(
 ) -> ArmScores:
     """Return the scores of arms (..., 4); ``side`` is +1 for left ones, -1 for right ones."""
     upper, fore = arm_directions(angles, side)
-    # In the trunk's frame X points forwards, Y to the left, Z up.
-    aside_deg, fore_aside_deg = (
-        np.degrees(np.arcsin(np.clip(side * limb[..., 1], -1.0, 1.0))) for limb in (upper, fore)
-    )
-    raised_deg = np.degrees(np.arccos(np.clip(-upper[..., 2], -1.0, 1.0)))
-    is_backwards = (-upper[..., 0] > np.abs(upper[..., 1])) & (raised_deg > 20.0)
-    score = np.where(is_backwards, 2, _steps(raised_deg, 20.0, 45.0, 90.0))
-    score = score + (aside_deg > config.abducted_deg)
-    upper_arm = np.clip(score + config.shoulders_raised - config.arms_supported, 1, 6)
-
+    upper_arm = upper_arm_scores(upper, side, config)
+    fore_aside_deg = _aside_deg(fore, side)
     parts = body_parts(body.sizes)
     hand_m = parts.shoulder_aside_m + side * (
         parts.upper_arm.height_m * upper[..., 1] + parts.forearm.height_m * fore[..., 1]
     )
-    bent_deg = np.degrees(np.arccos(np.clip((upper * fore).sum(axis=-1), -1.0, 1.0)))
     is_away = (hand_m < 0.0) | (fore_aside_deg > config.outwards_deg)
-    lower_arm = np.where((bent_deg >= 60.0) & (bent_deg <= 100.0), 1, 2) + is_away
+    lower_arm = elbow_scores(upper, fore) + is_away
 
     table_a = TABLE_A[upper_arm - 1, lower_arm - 1, config.wrist - 1, config.wrist_twist - 1]
     arm = table_a + config.arm_muscle_use + config.arm_load
     return ArmScores(upper_arm, lower_arm, table_a, grand_score(arm, rest))
+
+
+def upper_arm_scores(upper: FloatArray, side: float, config: ErgonomicConfig) -> ScoreArray:
+    """Return the scores of upper arms with the directions (..., 3) in the trunk's frame."""
+    # In the trunk's frame X points forwards, Y to the left, Z up.
+    raised_deg = np.degrees(np.arccos(np.clip(-upper[..., 2], -1.0, 1.0)))
+    is_backwards = (-upper[..., 0] > np.abs(upper[..., 1])) & (raised_deg > 20.0)
+    score = np.where(is_backwards, 2, _steps(raised_deg, 20.0, 45.0, 90.0))
+    score = score + (_aside_deg(upper, side) > config.abducted_deg)
+    return np.asarray(np.clip(score + config.shoulders_raised - config.arms_supported, 1, 6))
+
+
+def elbow_scores(upper: FloatArray, fore: FloatArray) -> ScoreArray:
+    """Return 1 for elbows that are bent by 60 to 100 degrees, else 2."""
+    bent_deg = np.degrees(np.arccos(np.clip((upper * fore).sum(axis=-1), -1.0, 1.0)))
+    return np.where((bent_deg >= 60.0) & (bent_deg <= 100.0), 1, 2)
+
+
+def _aside_deg(limb: FloatArray, side: float) -> FloatArray:
+    return np.asarray(np.degrees(np.arcsin(np.clip(side * limb[..., 1], -1.0, 1.0))))
 
 
 def grand_score(arm: ScoreArray, rest: ScoreArray) -> ScoreArray:

@@ -31,7 +31,7 @@ from cardbox_tracker.person.skeleton import KeypointState
 from cardbox_tracker.recordings.markers import marker_shapes
 from cardbox_tracker.terms.whole_body import WholeBodyCost
 from cardbox_tracker.terms.whole_body_config import WholeBodyCostConfig
-from cardbox_tracker.tracking.estimate import NO_PERSON, TRACKING, Estimate, Hand
+from cardbox_tracker.tracking.estimate import NO_PERSON, TRACKING, Estimate, Hand, Legs
 from cardbox_tracker.tracking.tracker import Tracker
 
 BODY = BodyModel()
@@ -80,6 +80,19 @@ def test_an_open_hand_is_a_ring_and_a_closed_one_a_disc() -> None:
         GREY, BODY, CAMERA, replace(FOUND, keypoints_m=keypoints, hands=(hands[1], None))
     )
     assert near(some, HAND_BGR)[top, left] and not near(some, HAND_BGR)[top, right]
+
+
+def test_legs_are_drawn_by_their_states() -> None:
+    points_m = np.array([(s, y, 2.0) for s in (0.9, -0.9) for y in (-0.6, -0.2, 0.2)])
+    states = (KeypointState.TRACKED,) * 5 + (KeypointState.UNCERTAIN,)
+    legs = Legs(np.zeros(8), np.zeros(8), points_m, np.zeros(6), states)
+    overlay = draw_overlay(GREY, BODY, CAMERA, replace(FOUND, legs=legs))
+    for joint, colour in ((1, SKELETON_BGR), (2, SKELETON_BGR), (5, (0, 230, 255))):
+        u, v = CAMERA.project((points_m[joint - 1] + points_m[joint]) / 2).round().astype(int)
+        assert near(overlay, colour)[v, u]
+    behind = legs._replace(points_m=-points_m)
+    hidden = draw_overlay(GREY, BODY, CAMERA, replace(FOUND, legs=behind))
+    assert (hidden == draw_overlay(GREY, BODY, CAMERA, FOUND)).all()
 
 
 def test_the_person_is_drawn_where_the_estimate_is() -> None:

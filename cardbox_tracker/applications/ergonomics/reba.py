@@ -1,0 +1,351 @@
+"""REBA scores of a table of results with legs.
+
+S. Hignett and L. McAtamney, "Rapid Entire Body Assessment (REBA)", Applied Ergonomics 31(2), 2000,
+pages 201-205. Upper arms are scored as in :mod:`.rula`; the other parts as follows:
+
+- trunk: 1 upright, 2 to 20 degrees, 3 to 60, 4 beyond, forwards or backwards (backwards ends at 3);
+  bent aside adds 1;
+- neck: 1 to 20 degrees of flexion against the trunk, 2 beyond or in extension; twisted adds 1;
+- legs: 1 if both feet carry weight, and walking or sitting, 2 if one does; the knee of a leg that
+  carries weight adds 1 from 30 degrees on, 2 beyond 60, but not while sitting;
+- lower arm: 1 for 60 to 100 degrees between it and the line of the upper arm, else 2.
+
+Wrists, load, coupling and activity come from the settings, and so do neck and legs where they were
+not measured. A foot that is 10 cm higher than the other one carries no weight, so a step of a walk
+counts as standing on one leg. Whoever would fall backwards sits: the centre of mass lies behind the
+heels.
+"""
+
+from __future__ import annotations
+
+import csv
+import math
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from cardbox_tracker.applications.ergonomics.config import RebaConfig
+from cardbox_tracker.applications.ergonomics.recording import RulaRow
+from cardbox_tracker.applications.ergonomics.rula import (
+    INDEPENDENT,
+    SAMPLES,
+    Method,
+    Part,
+    ScoreArray,
+    ScoreDistribution,
+    elbow_scores,
+    neck_samples,
+    table_of,
+    trunk_scores,
+    upper_arm_scores,
+)
+from cardbox_tracker.common.errors import CardboxError
+from cardbox_tracker.common.files import UnreadableFileError, regular_file
+from cardbox_tracker.person.legs import (
+    LEG_KEYPOINT_NAMES,
+    LEG_NAMES,
+    leg_directions,
+)
+from cardbox_tracker.person.posture import LEFT_ARM, PITCH, RIGHT_ARM
+from cardbox_tracker.person.sizes import FloatArray
+from cardbox_tracker.person.skeleton import (
+    JOINT_NAMES,
+    KEYPOINT_NAMES,
+    NECK_NAMES,
+    UNITS,
+    KeypointState,
+    arm_directions,
+)
+from cardbox_tracker.tracking.sampling import normal_postures
+
+TABLE_A: ScoreArray = table_of(
+    """
+    1 2 3 4  1 2 3 4  3 3 5 6
+    2 3 4 5  3 4 5 6  4 5 6 7
+    2 4 5 6  4 5 6 7  5 6 7 8
+    3 5 6 7  5 6 7 8  6 7 8 9
+    4 6 7 8  6 7 8 9  7 8 9 9
+    """,
+    *(5, 3, 4),
+)
+"""Posture of the body: trunk (5), neck (3), legs (4)."""
+
+TABLE_B: ScoreArray = table_of(
+    """
+    1 2 2  1 2 3
+    1 2 3  2 3 4
+    3 4 5  4 5 5
+    4 5 5  5 6 7
+    6 7 8  7 8 8
+    7 8 8  8 9 9
+    """,
+    *(6, 2, 3),
+)
+"""Posture of one arm: upper arm (6), lower arm (2), wrist (3)."""
+
+TABLE_C: ScoreArray = table_of(
+    """
+    1 1 1 2 3 3 4 5 6 7 7 7
+    1 2 2 3 4 4 5 6 6 7 7 8
+    2 3 3 3 4 5 6 7 7 8 8 8
+    3 4 4 4 5 6 7 8 8 9 9 9
+    4 4 4 5 6 7 8 8 9 9 9 9
+    6 6 6 7 8 8 9 9 10 10 10 10
+    7 7 7 8 9 9 9 10 10 11 11 11
+    8 8 8 9 10 10 10 10 10 11 11 11
+    9 9 9 10 10 10 11 11 11 12 12 12
+    10 10 10 11 11 11 11 12 12 12 12 12
+    11 11 11 11 12 12 12 12 12 12 12 12
+    12 12 12 12 12 12 12 12 12 12 12 12
+    """,
+    *(12, 12),
+)
+"""Score of body and load (12), and of arm and coupling (12)."""
+
+
+class ArmScores(NamedTuple):
+    """Scores (...) of one arm: its parts, ``TABLE_B``, and the grand score with this arm."""
+
+    upper_arm: ScoreArray
+    lower_arm: ScoreArray
+    table_b: ScoreArray
+    grand: ScoreArray
+
+
+class RebaScores(NamedTuple):
+    """Scores (...) of arms and body; ``grand`` is that of the worse arm, 1 to 15."""
+
+    left: ArmScores
+    right: ArmScores
+    trunk: ScoreArray
+    neck: ScoreArray
+    legs: ScoreArray
+    table_a: ScoreArray
+    grand: ScoreArray
+
+
+REBA = Method(
+    "REBA",
+    15,
+    7,
+    (
+        (1, 1, "negligible risk"),
+        (2, 3, "low risk; change may be needed"),
+        (4, 7, "medium risk; change is needed"),
+        (8, 10, "high risk; change soon"),
+        (11, 15, "very high risk; change now"),
+    ),
+    (
+        Part("left_upper_arm", "upper arm, left", 6, lambda scores: scores.left.upper_arm),
+        Part("right_upper_arm", "upper arm, right", 6, lambda scores: scores.right.upper_arm),
+        Part("left_lower_arm", "lower arm, left", 2, lambda scores: scores.left.lower_arm),
+        Part("right_lower_arm", "lower arm, right", 2, lambda scores: scores.right.lower_arm),
+        Part("trunk", "trunk", 5, lambda scores: scores.trunk),
+        Part("neck", "neck", 3, lambda scores: scores.neck),
+        Part("legs", "legs", 4, lambda scores: scores.legs),
+        Part("left_table_b", "table B, left", 9, lambda scores: scores.left.table_b),
+        Part("right_table_b", "table B, right", 9, lambda scores: scores.right.table_b),
+        Part("table_a", "table A", 9, lambda scores: scores.table_a),
+    ),
+    {"wrist": 3},
+)
+
+# Height above the other foot from which a foot carries no weight, m.
+_LIFTED_M = 0.10
+# Masses of head, arms and trunk, of both thighs, and of both shanks with the feet, and how far from
+# hips to shoulders, hips to knees, and knees to ankles their centres are (Winter, "Biomechanics and
+# Motor Control of Human Movement"); heel behind the ankle, m, and margin of the centre of mass, m.
+_MASSES, _CENTRES = (0.678, 0.2, 0.122), (0.626, 0.433, 0.606)
+_HEEL_M, _MARGIN_M = 0.05, 0.05
+
+
+class Seen(NamedTuple):
+    """One image of a table.
+
+    Attributes:
+        stamp_ns: its stamp.
+        time_s: seconds from the recording's start.
+        state: of the tracker.
+        posture: d1..d12 and their standard deviations, (2, 12); None without a posture.
+        neck: ``neck_yaw`` and ``neck_pitch`` and their deviations, (2, 2); None if unknown.
+        legs: ``LEG_NAMES`` and their deviations, (2, 8); None unless both legs are ``tracked``.
+        lengths_m: hips to shoulders, then thigh and shank of the left and the right leg, (5,).
+    """
+
+    stamp_ns: int
+    time_s: float
+    state: str
+    posture: FloatArray | None
+    neck: FloatArray | None
+    legs: FloatArray | None
+    lengths_m: FloatArray
+
+
+def read_table(path: Path, person: int = 1) -> list[Seen]:
+    """Return the images of a CSV table of ``cardbox track --legs``; of several people, of one.
+
+    Raises:
+        CardboxError: the file cannot be read, or lacks columns of the legs.
+    """
+    try:
+        with regular_file(path, 2**31) as data:
+            rows = list(csv.DictReader(data.read().decode("utf-8-sig").splitlines()))
+        known = rows[0].keys() if rows else ()
+        missing = [name for name in (*JOINT_NAMES, *LEG_NAMES) if name not in known]
+        if missing:
+            raise CardboxError(
+                f"{path} has no column {missing[0]}; make a table with 'cardbox track RECORDING "
+                "--detector mediapipe --legs --csv OUT.csv'"
+            )
+        found = [_seen(row) for row in rows if row.get("person") in (None, str(person))]
+    except UnreadableFileError as error:
+        raise CardboxError(f"cannot read {path}: {error}; give a CSV table") from None
+    except (OSError, UnicodeDecodeError, ValueError, KeyError, csv.Error) as error:
+        raise CardboxError(
+            f"{path} is no table of 'cardbox track --legs' ({error}); make it anew"
+        ) from None
+    if not found:
+        raise CardboxError(f"{path} has no person {person}; give --person with another number")
+    return found
+
+
+def _seen(row: Mapping[str, str]) -> Seen:
+    stamp = int(row["stamp_ns"]), float(row["time_s"]), row["state"]
+    if not row[JOINT_NAMES[0]]:
+        return Seen(*stamp, None, None, None, np.zeros(5))
+
+    def pair(names: Sequence[str]) -> FloatArray | None:
+        deviations = [f"{name}_stddev_{UNITS.get(name, 'rad')}" for name in names]
+        texts = [row.get(name, "") for name in (*names, *deviations)]
+        return np.array(texts, float).reshape(2, -1) if all(texts) else None
+
+    def point(name: str) -> FloatArray:
+        return np.array([row[f"{name}_{axis}"] or math.nan for axis in "xyz"], float)
+
+    chains = LEG_KEYPOINT_NAMES[:3], LEG_KEYPOINT_NAMES[3:]
+    legs_m = np.array([[point(name) for name in chain] for chain in chains])
+    shoulders_m = np.mean([point(KEYPOINT_NAMES[0]), point(KEYPOINT_NAMES[3])], axis=0)
+    trunk_m = np.linalg.norm(shoulders_m - legs_m[:, 0].mean(axis=0))
+    lengths_m = [trunk_m, *np.linalg.norm(np.diff(legs_m, axis=1), axis=-1).ravel()]
+    are_tracked = all(row[f"{name}_state"] == KeypointState.TRACKED for name in LEG_KEYPOINT_NAMES)
+    legs = pair(LEG_NAMES) if are_tracked else None
+    return Seen(*stamp, pair(JOINT_NAMES), pair(NECK_NAMES), legs, np.array(lengths_m))
+
+
+def score_table(images: Sequence[Seen], config: RebaConfig, seed: int) -> list[RulaRow]:
+    """Return the scores of each image, for samples of its posture as in :mod:`.rula`."""
+    rng = np.random.default_rng(seed)
+    return [
+        RulaRow(
+            seen.stamp_ns,
+            seen.state,
+            None if seen.posture is None else _distribution(seen, config, rng),
+            seen.time_s,
+            seen.neck is not None,
+            seen.legs is not None,
+        )
+        for seen in images
+    ]
+
+
+def _distribution(seen: Seen, config: RebaConfig, rng: np.random.Generator) -> ScoreDistribution:
+    assert seen.posture is not None
+    mean, stddev = seen.posture
+    postures = normal_postures(mean, INDEPENDENT * stddev, SAMPLES, rng)
+    necks = legs = None
+    if seen.neck is not None:
+        necks = neck_samples(seen.neck[0], INDEPENDENT * seen.neck[1], SAMPLES, rng)
+    if seen.legs is not None:
+        angles, deviations = seen.legs
+        legs = angles + INDEPENDENT * deviations * rng.standard_normal((SAMPLES, len(angles)))
+    scores = reba_scores(postures, config, necks, legs, seen.lengths_m)
+
+    def chances(found: ScoreArray, highest: int = REBA.highest) -> FloatArray:
+        return np.asarray(np.bincount(found, minlength=highest + 1)[1:] / len(found))
+
+    of_mean = reba_scores(
+        mean,
+        config,
+        None if seen.neck is None else seen.neck[0],
+        None if seen.legs is None else seen.legs[0],
+        seen.lengths_m,
+    )
+    parts = {part.name: chances(part.of(scores), part.highest) for part in REBA.parts}
+    grand = chances(scores.grand), chances(scores.left.grand), chances(scores.right.grand)
+    return ScoreDistribution(*grand, parts, int(of_mean.grand))
+
+
+def reba_scores(
+    postures: FloatArray,
+    config: RebaConfig,
+    necks: FloatArray | None = None,
+    legs: FloatArray | None = None,
+    lengths_m: FloatArray | None = None,
+) -> RebaScores:
+    """Return the scores of postures.
+
+    Args:
+        postures: shape (..., 12), rad and metres.
+        config: settings.
+        necks: ``neck_yaw`` and ``neck_pitch`` of each posture, (..., 2), rad; None if unknown.
+        legs: ``LEG_NAMES`` of each posture, (..., 8), rad; None if unknown.
+        lengths_m: see :class:`Seen`; needed with legs.
+    """
+    d = np.asarray(postures, np.float64)
+    is_far_back = np.degrees(d[..., PITCH]) < -60.0
+    trunk = trunk_scores(d, config) - is_far_back
+    neck = np.full(trunk.shape, config.neck) if necks is None else _neck(necks, config)
+    leg = np.full(trunk.shape, config.legs)
+    if legs is not None and lengths_m is not None:
+        leg = _legs(legs, d[..., PITCH], lengths_m)
+    table_a = TABLE_A[trunk - 1, neck - 1, leg - 1]
+    body = np.minimum(table_a + config.load, 12)
+    left = _arm(d[..., LEFT_ARM], 1.0, body, config)
+    right = _arm(d[..., RIGHT_ARM], -1.0, body, config)
+    return RebaScores(left, right, trunk, neck, leg, table_a, np.maximum(left.grand, right.grand))
+
+
+def _neck(necks: FloatArray, config: RebaConfig) -> ScoreArray:
+    yaw_deg, pitch_deg = (np.degrees(necks[..., joint]) for joint in (0, 1))
+    score = np.where((pitch_deg > 20.0) | (pitch_deg < -config.neck_extended_deg), 2, 1)
+    return np.asarray(score + (np.abs(yaw_deg) > config.neck_twisted_deg))
+
+
+def _legs(angles: FloatArray, pitch: FloatArray, lengths_m: FloatArray) -> ScoreArray:
+    """Return the scores of legs (..., 8) below a trunk with a pitch (...), rad."""
+    trunk_m, *limbs_m = lengths_m.tolist()
+    knees, ankles = [], []
+    for number, side in enumerate((1.0, -1.0)):
+        thigh, shank = leg_directions(angles[..., 4 * number : 4 * number + 4], side)
+        knees.append(limbs_m[2 * number] * thigh)
+        ankles.append(knees[-1] + limbs_m[2 * number + 1] * shank)
+    knee_m, ankle_m = np.stack(knees), np.stack(ankles)
+    # X points forwards from the hips, Z up.
+    low_m = ankle_m[..., 2].min(axis=0)
+    carries = ankle_m[..., 2] <= low_m + _LIFTED_M
+    ahead_m = (
+        trunk_m * np.sin(pitch),
+        knee_m[..., 0].mean(axis=0),
+        (knee_m[..., 0] + _CENTRES[2] * (ankle_m - knee_m)[..., 0]).mean(axis=0),
+    )
+    shares = _CENTRES[0], _CENTRES[1], 1.0
+    parts = zip(_MASSES, shares, ahead_m, strict=True)
+    centre_m = sum(mass * share * at_m for mass, share, at_m in parts)
+    heels_m = ankle_m[..., 0].min(axis=0) - _HEEL_M
+    is_seated = centre_m < heels_m - _MARGIN_M
+    bent_deg = np.where(carries, np.degrees(angles[..., [3, 7]].T.reshape(carries.shape)), 0.0)
+    most_deg = bent_deg.max(axis=0)
+    bent = np.where(is_seated, 0, np.where(most_deg > 60.0, 2, np.where(most_deg >= 30.0, 1, 0)))
+    return np.asarray(np.where(carries.all(axis=0) | is_seated, 1, 2) + bent)
+
+
+def _arm(angles: FloatArray, side: float, body: ScoreArray, config: RebaConfig) -> ArmScores:
+    """Return the scores of arms (..., 4); ``side`` is +1 for left ones, -1 for right ones."""
+    upper, fore = arm_directions(angles, side)
+    upper_arm, lower_arm = upper_arm_scores(upper, side, config), elbow_scores(upper, fore)
+    table_b = TABLE_B[upper_arm - 1, lower_arm - 1, config.wrist - 1]
+    arm = np.minimum(table_b + config.coupling, 12)
+    grand = TABLE_C[body - 1, arm - 1] + config.activity
+    return ArmScores(upper_arm, lower_arm, table_b, np.asarray(grand))

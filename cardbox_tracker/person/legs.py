@@ -1,0 +1,117 @@
+"""The legs: rows of the skeleton behind the others, for people whose legs are measured.
+
+A thigh turns forwards, outwards, then inwards about its own axis; then the knee bends:
+
+    R_thigh = R_hips Ry(-flexion) Rx(+-abduction) Rz(-+rotation),   R_shank = R_thigh Ry(bend)
+
+with the upper sign for the left leg. The frame of the hips is that which ``torso_yaw`` moves, so it
+stays level. All is zero for a leg that hangs.
+
+The ranges are those of the American Academy of Orthopaedic Surgeons, see :mod:`.skeleton`: hip
+flexion 120, extension 30, abduction 45, adduction 30, rotation 45; knee flexion 135. Soft tissue
+gives way under the weight of a person who squats or sits low, so they have up to 20 degrees more.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+
+import numpy as np
+
+from cardbox_tracker.person.parts import BodyParts
+from cardbox_tracker.person.sizes import FloatArray
+from cardbox_tracker.person.skeleton import (
+    FIXED,
+    REVOLUTE,
+    Group,
+    Joint,
+    X,
+    Y,
+    rotation_x,
+    rotation_y,
+    rotation_z,
+)
+
+HIP_SHARE, THIGH_SHARE, SHANK_SHARE = 0.06, 0.245, 0.246
+"""Hip joint from the middle of the hips, thigh, and shank up to the ankle, as shares of the
+stature; the latter two are those of Drillis & Contini (:mod:`.proportions`)."""
+_CROWN_SHARE = 0.83 / 1.72
+
+
+def stature_of(parts: BodyParts[float]) -> float:
+    """Return the stature of a person with this trunk and head, m, see :mod:`.proportions`."""
+    return parts.head.top_m / _CROWN_SHARE
+
+
+def _deg(lowest: float, highest: float) -> tuple[float, float]:
+    return math.radians(lowest), math.radians(highest)
+
+
+def _leg(name: str, side: float) -> Iterator[Joint]:
+    """Yield the joints of a leg; ``side`` is +1 for the left one, -1 for the right."""
+    free, letter = (Group.NOTHING, REVOLUTE), name[0]
+
+    def joint(what: str, parent: str, *rest: object, **more: object) -> Joint:
+        group, kind = free
+        return Joint(f"{name}_{what}", group, parent, kind, *rest, **more)  # type: ignore[arg-type]
+
+    yield joint(
+        *("hip_flexion", "torso_yaw", (0.0, -1.0, 0.0), _deg(-40, 125), f"{letter}_p_hip"),
+        offset=lambda parts: (0.0, side * HIP_SHARE * stature_of(parts), 0.0),
+    )
+    yield joint(
+        "hip_abduction", f"{name}_hip_flexion", (side, 0.0, 0.0), _deg(-35, 65), f"{letter}_r_hip"
+    )
+    yield joint(
+        *("hip_rotation", f"{name}_hip_abduction", (0.0, 0.0, -side), _deg(-50, 50)),
+        *(f"{letter}_y_hip", f"{name}_thigh"),
+    )
+    yield joint(
+        *("knee_flexion", f"{name}_hip_rotation", Y, _deg(0, 150), f"{letter}_knee"),
+        *(f"{name}_shank", lambda parts: (0.0, 0.0, -THIGH_SHARE * stature_of(parts))),
+    )
+    yield Joint(
+        *(f"{name}_ankle", Group.NOTHING, f"{name}_knee_flexion", FIXED, X, (0.0, 0.0)),
+        *(f"{letter}_ankle", f"{name}_foot"),
+        lambda parts: (0.0, 0.0, -SHANK_SHARE * stature_of(parts)),
+    )
+
+
+LEGS: tuple[Joint, ...] = (*_leg("left", 1.0), *_leg("right", -1.0))
+"""Joints of the legs, which follow the others where legs are measured (:mod:`.tracking.legs`)."""
+LEG_NAMES = tuple(joint.name for joint in LEGS if joint.kind == REVOLUTE)
+"""The 8 joints of the legs, four of the left one first; all are in rad."""
+LEG_LIMITS: FloatArray = np.array([joint.limits for joint in LEGS if joint.kind == REVOLUTE])
+"""Shape (8, 2): lowest and highest value of each of ``LEG_NAMES``, rad."""
+LEG_LIMITS.setflags(write=False)
+LEG_KEYPOINT_NAMES: tuple[str, ...] = (
+    *("left_hip", "left_knee", "left_ankle"),
+    *("right_hip", "right_knee", "right_ankle"),
+)
+
+
+def leg_directions(angles_rad: FloatArray, side: float) -> tuple[FloatArray, FloatArray]:
+    """Return unit vectors (..., 3) along thigh and shank in the frame of the hips.
+
+    Args:
+        angles_rad: the four angles of a leg, (..., 4).
+        side: +1 for the left leg, -1 for the right.
+    """
+    a = np.asarray(angles_rad, dtype=np.float64)
+    thigh = rotation_y(-a[..., 0]) @ rotation_x(side * a[..., 1]) @ rotation_z(-side * a[..., 2])
+    shank = thigh @ rotation_y(a[..., 3])
+    return -thigh[..., 2], -shank[..., 2]
+
+
+def leg_angles(thigh: FloatArray, shank: FloatArray, side: float) -> FloatArray:
+    """Return angles (4,) of a leg with these directions (3,), see :func:`leg_directions`.
+
+    The rotation is that of a leg that bends its knee backwards, within a quarter of a turn.
+    """
+    flexion = np.arctan2(thigh[0], -thigh[2])
+    abduction = side * np.arcsin(np.clip(thigh[1], -1.0, 1.0))
+    turned = (rotation_y(-flexion) @ rotation_x(side * abduction)).T @ shank
+    bend = np.arccos(np.clip(-turned[2], -1.0, 1.0))
+    rotation = side * np.arctan2(turned[1], max(-turned[0], 1e-3)) if bend > 0.05 else 0.0
+    return np.array([flexion, abduction, rotation, bend])

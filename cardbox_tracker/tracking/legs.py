@@ -1,0 +1,409 @@
+"""Fits the legs of a tracked person to the points of a detector.
+
+The upper body comes first: it places the hips and turns them. For each image, the angles of both
+legs then are a maximum a posteriori estimate by Gauss-Newton steps. These residuals count, each in
+units of its deviation:
+
+- knees and ankles in the image;
+- the slope of thigh and shank along the line of sight, from the detector's points in space;
+- the height of each ankle above the floor. It may not be below; near the floor it is pulled there,
+  and a foot that is lifted is not;
+- the angles, from those of the image before and from a leg that hangs.
+
+Lengths of thigh and shank, and the height of the floor, are the same in all images. They are
+unknowns of each fit whose prior is what the images before have shown. So is the distance of the
+hips, with the tracker's as prior: feet on a floor that is known show it better than the trunk's
+size. The whole person is moved along the line of sight to it.
+
+A leg that the detector does not see keeps its angles, with growing deviations, and is ``hidden``.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from math import exp
+from typing import NamedTuple
+
+import numpy as np
+
+from cardbox_tracker.camera.camera import Camera
+from cardbox_tracker.detectors.image_points import (
+    LEG_POINT_NAMES,
+    POINT_INDEX,
+    ImagePoints,
+)
+from cardbox_tracker.person.kinematics import pose
+from cardbox_tracker.person.legs import (
+    HIP_SHARE,
+    LEG_LIMITS,
+    LEG_NAMES,
+    SHANK_SHARE,
+    THIGH_SHARE,
+    leg_angles,
+    leg_directions,
+    stature_of,
+)
+from cardbox_tracker.person.model import BodyModel
+from cardbox_tracker.person.parts import body_parts
+from cardbox_tracker.person.posture import TORSO_Y, YAW
+from cardbox_tracker.person.sizes import FloatArray
+from cardbox_tracker.person.skeleton import (
+    KeypointState,
+    rotation_z,
+)
+from cardbox_tracker.tracking.estimate import Estimate, Legs
+
+_SIDES = 1.0, -1.0
+_N = len(LEG_NAMES)
+# Values of a fit: the angles, the logarithms of the lengths' factors, the floor, the distance.
+_SHARED, _DISTANCE = slice(_N, _N + 3), _N + 3
+# Knee and ankle, left and right, among the points.
+_ENDS = [
+    [LEG_POINT_NAMES.index(f"{side}_{name}") for name in ("knee", "ankle")]
+    for side in ("left", "right")
+]
+_HIPS = [POINT_INDEX[f"{side}_hip"] for side in ("left", "right")]
+_SHOULDERS = [POINT_INDEX[f"{side}_shoulder"] for side in ("left", "right")]
+
+# Height of the ankle above the floor, as a share of the stature (Drillis & Contini).
+_ANKLE_SHARE = 0.039
+# A point with a lower score is not seen.
+LEAST_SCORE = 0.5
+# Deviations of the points of knee and ankle, m and px; how much larger that of an unseen one is.
+_POINT_M, _POINT_PX, _UNSEEN = np.array([0.025, 0.025]), 1.5, 6.0
+# Deviations of the slopes of thigh and shank, and how much larger those of unseen ones are.
+_SLOPES, _UNSEEN_SLOPE = np.array([0.22, 0.12]), 1.5
+# The true slopes as linear functions of the detector's: factors and offsets.
+_SLOPE_FACTORS, _SLOPE_OFFSETS = np.array([0.93, 0.68]), np.array([-0.04, -0.08])
+# Deviation of a foot on the floor, m, and height above it from which a foot is lifted rather.
+_CONTACT_M, _LIFTED_M = 0.02, 0.06
+# Of the priors: angles of a hanging leg, and change of an angle and its growth a second, rad.
+_REST = np.tile(np.radians([60.0, 15.0, 15.0, 60.0]), 2)
+_CHANGE, _CHANGE_PER_S = np.radians(8.0), np.radians(200.0)
+# Logarithms of the lengths' factors, and the floor before it is seen, m.
+_LENGTH, _FLOOR_M = 0.04, 0.12
+# Relative deviation of the tracker's distance of the hips.
+_DISTANCE_SHARE = 0.05
+_FIXED = 1e-6
+# Time in which what the feet have shown of the distance is forgotten, s.
+_FORGOTTEN_S = 2.0
+# Its change from image to image and the growth of that a second.
+_DISTANCE_CHANGE, _DISTANCE_PER_S = 0.01, 0.1
+# Images whose information counts for what they share, because their errors are alike, and time over
+# which it is averaged, s.
+_IMAGES, _AVERAGED_S = 2.0, 3.0
+_KEPT_S = 1.0
+_STEPS, _LARGEST_STEP, _DIFFERENCE = 8, 0.6, 1e-5
+# Deviation of a point from which it is uncertain, m, and rms of the residuals of a wrong fit.
+_UNCERTAIN_M, _WRONG_RMS = 0.15, 3.0
+# Least deviation of a point: that of the skeletons of detectors and people.
+_LEAST_M = 0.05
+
+
+class _Seen(NamedTuple):
+    """What one image shows; the rows of arrays are the left and the right leg.
+
+    Attributes:
+        px: knee and ankle, (2, 2, 2).
+        sigma_px: their deviations, (2, 2).
+        slopes: components of thigh and shank along the line of sight, (2, 2); nan if unknown.
+        sigma_slopes: their deviations, (2, 2).
+        scores: of hip, knee and ankle, (2, 3).
+        shows_back: whether the tracker and the detector exchange left and right, as they do for a
+            person seen from behind, whose knees then bend to the wrong side.
+    """
+
+    px: FloatArray
+    sigma_px: FloatArray
+    slopes: FloatArray
+    sigma_slopes: FloatArray
+    scores: FloatArray
+    shows_back: bool
+
+
+class LegReader:
+    """Adds the legs to the estimates of one person, from the first camera's points."""
+
+    def __init__(self) -> None:
+        """Start without knowledge of lengths and floor."""
+        self._last: FloatArray | None = None
+        self._last_stddev = _REST
+        self._last_s, self._last_share = 0.0, 0.0
+        self._usual: FloatArray | None = None
+        self._mean_information, self._mean_vector = np.zeros((3, 3)), np.zeros(3)
+        self._seen_s = 0.0
+
+    def see(
+        self,
+        points: ImagePoints | None,
+        estimate: Estimate,
+        body: BodyModel,
+        camera: Camera,
+        time_s: float,
+    ) -> Estimate:
+        """Return ``estimate`` with the legs.
+
+        Args:
+            points: of the person in the image of ``camera``; None if nobody is found.
+            estimate: of the same image; without a posture it stays as it is.
+            body: the person, as the tracker has it.
+            camera: working camera, with the pitch of the body model.
+            time_s: time of the image.
+        """
+        if estimate.posture is None or estimate.keypoints_m is None:
+            return estimate
+        fit = _Fit(estimate, body, camera)
+        elapsed_s = abs(time_s - self._last_s)
+        change, steady = np.full(_N, np.inf), np.inf
+        if self._last is not None and elapsed_s <= _KEPT_S:
+            change = np.hypot(self._last_stddev, _CHANGE + _CHANGE_PER_S * elapsed_s)
+            steady = _DISTANCE_CHANGE + _DISTANCE_PER_S * elapsed_s
+        else:
+            self._last = np.zeros(_N)
+        if self._usual is None:
+            self._usual = np.array([0.0, 0.0, fit.usual_floor_m])
+        usual = np.diag(np.array([_LENGTH, _LENGTH, _FLOOR_M]) ** -2.0)
+        information = usual + _IMAGES * self._mean_information
+        vector = usual @ self._usual + _IMAGES * self._mean_vector
+        shared: FloatArray = np.asarray(np.linalg.solve(information, vector), np.float64)
+        seen = fit.seen(points)
+        if seen is None or seen.scores[:, 2].min() < LEAST_SCORE:
+            # Without both feet, nothing shows the distance.
+            self._last_share *= exp(-min(elapsed_s, _KEPT_S) / _FORGOTTEN_S)
+            steady = _FIXED
+        fit.prior(self._last, change, shared, information, (self._last_share, steady))
+        found = fit.solve(seen, self._last)
+        self._last, self._last_s = found.values[:_N], time_s
+        self._last_share = float(found.values[_DISTANCE])
+        covariance: FloatArray = np.asarray(np.linalg.inv(found.information), np.float64)
+        covariance = covariance * max(1.0, found.rms) ** 2
+        self._last_stddev = np.minimum(np.sqrt(np.diag(covariance)[:_N]), _REST)
+        estimate = _moved(estimate, fit.hips_moved_m(found.values), camera)
+        if seen is not None and (seen.scores >= LEAST_SCORE).all() and found.rms < _WRONG_RMS:
+            after = np.linalg.inv(np.linalg.inv(found.information)[_SHARED, _SHARED])
+            step_s = min(max(elapsed_s, 0.01), 0.2)
+            self._seen_s = min(self._seen_s + step_s, _AVERAGED_S)
+            share = step_s / self._seen_s
+            new = after - information
+            self._mean_information += share * (0.5 * (new + new.T) - self._mean_information)
+            gained = after @ found.values[_SHARED] - vector
+            self._mean_vector += share * (gained - self._mean_vector)
+        return replace(estimate, legs=fit.legs(seen, found, covariance))
+
+
+def _moved(estimate: Estimate, by_m: FloatArray, camera: Camera) -> Estimate:
+    """Return an estimate whose person stands elsewhere, (3,) in the reference frame."""
+    if estimate.offset_m is None:
+        return estimate
+    assert estimate.posture is not None and estimate.keypoints_m is not None
+    posture = np.array(estimate.posture)
+    posture[TORSO_Y] += by_m[1]
+    return replace(
+        estimate,
+        posture=posture,
+        offset_m=estimate.offset_m + by_m[[0, 2]],
+        keypoints_m=estimate.keypoints_m + camera.reference_to_optical(by_m),
+    )
+
+
+class _Solution(NamedTuple):
+    """Values (12,) of a fit, their information (12, 12), and the rms of the residuals."""
+
+    values: FloatArray
+    information: FloatArray
+    rms: float
+
+
+class _Fit:
+    """The fit of one image."""
+
+    def __init__(self, estimate: Estimate, body: BodyModel, camera: Camera) -> None:
+        assert estimate.posture is not None
+        self._estimate, self._camera = estimate, camera
+        placed = estimate.placed(body)
+        stature_m = stature_of(body_parts(body.sizes))
+        self._hip_m = pose(placed, estimate.posture).hip
+        self._turn = rotation_z(np.asarray(estimate.posture[YAW]))
+        self._aside = self._turn[:, 1] * HIP_SHARE * stature_m
+        self._lengths_m = np.array([THIGH_SHARE, SHANK_SHARE]) * stature_m
+        self._ankle_m = _ANKLE_SHARE * stature_m
+        self._sight = camera.optical_to_reference(np.array([0.0, 0.0, 1.0]))
+        # A filter that keeps the distance constant has no values for another one.
+        self._distance_share = _FIXED if estimate.offset_m is None else _DISTANCE_SHARE
+        place = body.placement
+        self.usual_floor_m = place.hip_height_m - float(self._lengths_m.sum()) - self._ankle_m
+
+    def seen(self, points: ImagePoints | None) -> _Seen | None:
+        """Return what the points show; None if they do not show the legs."""
+        if points is None or points.legs is None:
+            return None
+        shows_back = self._is_exchanged(points)
+        if shows_back:
+            points = points.exchanged()
+        assert points.legs is not None
+        px, scores, spatial_m = points.legs.px[_ENDS], points.legs.scores[_ENDS], None
+        known = np.asarray(np.isfinite(px).all(axis=-1))
+        px, scores = np.where(known[..., None], px, 0.0), np.where(known, scores, 0.0)
+        is_seen = scores >= LEAST_SCORE
+        depth_m = float(self._camera.reference_to_optical(self._hip_m)[2])
+        sigma_px = np.hypot(_POINT_PX, self._camera.fx * _POINT_M / max(depth_m, 0.3))
+        sigma_px = np.where(is_seen, sigma_px, _UNSEEN * sigma_px)
+        sigma_px = np.where(known, sigma_px, np.inf)
+        slopes = np.full((2, 2), np.nan)
+        if points.spatial_m is not None and points.legs.spatial_m is not None:
+            spatial_m = points.legs.spatial_m[_ENDS]
+            bones = np.diff(
+                np.concatenate([points.spatial_m[_HIPS][:, None], spatial_m], axis=1), axis=1
+            )
+            slopes = bones[..., 2] / np.maximum(np.linalg.norm(bones, axis=-1), 1e-6)
+            slopes = _SLOPE_FACTORS * slopes + _SLOPE_OFFSETS
+        sigma_slopes = np.where(is_seen, _SLOPES, _UNSEEN_SLOPE * _SLOPES)
+        hips = points.scores[_HIPS][:, None]
+        scores = np.concatenate([hips, scores], axis=1)
+        return _Seen(px, sigma_px, slopes, sigma_slopes, scores, shows_back)
+
+    def _is_exchanged(self, points: ImagePoints) -> bool:
+        """Return whether the tracker takes the detector's left shoulder for the right one."""
+        assert self._estimate.keypoints_m is not None
+        shoulders = self._camera.project(np.asarray(self._estimate.keypoints_m)[[0, 3]])
+        seen = points.px[_SHOULDERS]
+        return bool((seen[0] - seen[1]) @ (shoulders[0] - shoulders[1]) < 0.0)
+
+    def prior(
+        self,
+        before: FloatArray,
+        change: FloatArray,
+        shared: FloatArray,
+        information: FloatArray,
+        distance: tuple[float, float],
+    ) -> None:
+        """Set the priors.
+
+        Args:
+            before: angles (8,) in the image before.
+            change: deviations of their change; inf for none.
+            shared: what images share, (3,).
+            information: its information (3, 3).
+            distance: share of the distance in the image before, and deviation of its change.
+        """
+        self._before, self._change, self._distance = before, change, distance
+        self._expected, self._root = shared, np.linalg.cholesky(information).T
+
+    def solve(self, seen: _Seen | None, before: FloatArray) -> _Solution:
+        """Return the best of the fits that start at the angles before and at what is seen."""
+        starts = [before]
+        if seen is not None and np.isfinite(seen.slopes).all():
+            starts.append(self._by_bones(seen))
+        best: _Solution | None = None
+        for start in starts:
+            values = np.concatenate([start, self._expected, [0.0]])
+            for number in range(_STEPS + 1):
+                moved = np.concatenate([values[None], values + _DIFFERENCE * np.eye(len(values))])
+                residuals = self._residuals(moved, seen)
+                jacobian = (residuals[1:] - residuals[0]).T / _DIFFERENCE
+                information = jacobian.T @ jacobian
+                if number == _STEPS:
+                    break
+                step = np.linalg.solve(information, jacobian.T @ residuals[0])
+                values = values - np.clip(step, -_LARGEST_STEP, _LARGEST_STEP)
+                values[:_N] = np.clip(values[:_N], *LEG_LIMITS.T)
+            count = 1 if seen is None else 4 + 8
+            rms = float(np.sqrt(np.sum(residuals[0] ** 2) / count))
+            if best is None or rms < best.rms:
+                best = _Solution(values, information, rms)
+        assert best is not None
+        return best
+
+    def _by_bones(self, seen: _Seen) -> FloatArray:
+        """Return the angles (8,) of legs in the image whose bones slope as their lengths tell.
+
+        The detector tells whether a bone that looks short points to the camera or away.
+        """
+        hips_m = self._hip_m + np.outer(_SIDES, self._aside)
+        optical_m = self._camera.reference_to_optical(hips_m)
+        metres = optical_m[:, 2].mean() / np.array([self._camera.fx, self._camera.fy])
+        ends = np.concatenate([self._camera.project(optical_m)[:, None], seen.px], axis=1)
+        across = np.diff(ends, axis=1) * metres / self._lengths_m[:, None]
+        short = np.sqrt(np.maximum(1.0 - (across**2).sum(axis=-1), 0.0))
+        slopes = np.sign(seen.slopes) * np.maximum(np.abs(seen.slopes), short)
+        slopes = np.clip(slopes, -0.98, 0.98)
+        flat = across / np.maximum(np.linalg.norm(across, axis=-1, keepdims=True), 1e-6)
+        bones = np.concatenate([flat * np.sqrt(1.0 - slopes**2)[..., None], slopes[..., None]], -1)
+        bones = self._camera.optical_to_reference(bones) @ self._turn
+        angles = [
+            leg_angles(thigh, shank, side)
+            for (thigh, shank), side in zip(bones, _SIDES, strict=True)
+        ]
+        return np.asarray(np.clip(np.concatenate(angles), *LEG_LIMITS.T))
+
+    def hips_moved_m(self, values: FloatArray) -> FloatArray:
+        """Return how far from the tracker's place the hips are, (3,), reference frame."""
+        return np.asarray(self._hip_m * (np.exp(values[_DISTANCE]) - 1.0))
+
+    def points_m(self, values: FloatArray) -> FloatArray:
+        """Return hips, knees and ankles (..., 2, 3, 3) of values (..., 12), reference frame."""
+        hip_m = self._hip_m * np.exp(values[..., _DISTANCE, None])
+        lengths_m = self._lengths_m * np.exp(values[..., _N : _N + 2])
+        legs = []
+        for number, side in enumerate(_SIDES):
+            angles = values[..., 4 * number : 4 * number + 4]
+            bones = leg_directions(angles, side)
+            chain = [hip_m + side * self._aside]
+            for part, bone in enumerate(bones):
+                chain.append(chain[-1] + lengths_m[..., part, None] * (bone @ self._turn.T))
+            legs.append(np.stack(chain, axis=-2))
+        return np.stack(legs, axis=-3)
+
+    def _residuals(self, values: FloatArray, seen: _Seen | None) -> FloatArray:
+        """Return the residuals (n, m) of values (n, 12)."""
+        points_m = self.points_m(values)
+        angles = values[:, :_N]
+        found = [
+            angles / _REST,
+            (angles - self._before) / self._change,
+            (values[:, _SHARED] - self._expected) @ self._root.T,
+            values[:, _DISTANCE, None] / self._distance_share,
+            (values[:, _DISTANCE, None] - self._distance[0]) / self._distance[1],
+        ]
+        # A foot may not be below the floor; from some height on, it is lifted.
+        height_m = points_m[:, :, 2, 2] - values[:, _N + 2, None] - self._ankle_m
+        contact = height_m / np.sqrt(1.0 + np.maximum(height_m / _LIFTED_M, 0.0) ** 2) / _CONTACT_M
+        found.append(contact)
+        if seen is not None:
+            optical_m = self._camera.reference_to_optical(points_m[:, :, 1:])
+            optical_m[..., 2] = np.maximum(optical_m[..., 2], 0.1)
+            away = (self._camera.project(optical_m) - seen.px) / seen.sigma_px[..., None]
+            found.append(away.reshape(len(values), -1))
+            bones = np.diff(points_m, axis=2)
+            bones /= np.linalg.norm(bones, axis=-1, keepdims=True)
+            slopes = (bones @ self._sight - seen.slopes) / seen.sigma_slopes
+            found.append(np.nan_to_num(slopes).reshape(len(values), -1))
+        return np.concatenate(found, axis=1)
+
+    def legs(self, seen: _Seen | None, found: _Solution, covariance: FloatArray) -> Legs:
+        """Return the legs of a solution."""
+        values = found.values
+        moved = np.concatenate([values[None], values + _DIFFERENCE * np.eye(len(values))])
+        # The place of the hips has its own deviation.
+        moved[:, _DISTANCE] = values[_DISTANCE]
+        points_m = self.points_m(moved).reshape(len(moved), 6, 3)
+        slopes = (points_m[1:] - points_m[0]) / _DIFFERENCE
+        variance = np.einsum("ika,ij,jka->k", slopes, covariance, slopes)
+        stddev_m = np.sqrt(np.maximum(variance, 0.0) + _LEAST_M**2)
+        is_seen = np.zeros(6) if seen is None else seen.scores.ravel() >= LEAST_SCORE
+        is_wrong = found.rms > _WRONG_RMS or (seen is not None and seen.shows_back)
+        states = tuple(
+            KeypointState.HIDDEN
+            if not is_there
+            else KeypointState.UNCERTAIN
+            if is_wrong or stddev > _UNCERTAIN_M
+            else KeypointState.TRACKED
+            for is_there, stddev in zip(is_seen, stddev_m, strict=True)
+        )
+        return Legs(
+            values[:_N],
+            np.sqrt(np.diag(covariance)[:_N]),
+            self._camera.reference_to_optical(points_m[0]),
+            stddev_m,
+            states,
+        )

@@ -1,0 +1,212 @@
+"""Legs from the points of a detector: angles by hand, sitting, unseen legs, lengths and floor."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from cardbox_tracker.camera.camera import Camera
+from cardbox_tracker.detectors.image_points import (
+    LEG_POINT_NAMES,
+    POINT_INDEX,
+    POINT_NAMES,
+    ImagePoints,
+    LegPoints,
+)
+from cardbox_tracker.person.kinematics import pose
+from cardbox_tracker.person.legs import (
+    HIP_SHARE,
+    SHANK_SHARE,
+    THIGH_SHARE,
+    leg_directions,
+    stature_of,
+)
+from cardbox_tracker.person.parts import body_parts
+from cardbox_tracker.person.posture import TORSO_Y
+from cardbox_tracker.person.proportions import body_from_proportions
+from cardbox_tracker.person.sizes import FloatArray
+from cardbox_tracker.person.skeleton import (
+    KeypointState,
+)
+from cardbox_tracker.tracking.estimate import Estimate
+from cardbox_tracker.tracking.legs import LegReader
+
+PITCH_RAD = float(np.radians(8.0))
+CAMERA = Camera(480, 640, 500.0, 500.0, 239.5, 319.5, PITCH_RAD)
+BODY = body_from_proportions(1.75, 3.0, hip_height_m=-0.5, camera_pitch_rad=PITCH_RAD)
+STATURE_M = stature_of(body_parts(BODY.sizes))
+STANDING = np.radians([2.0, 4.0, 0.0, 4.0] * 2)
+SITTING = np.radians([85.0, 10.0, 0.0, 88.0, 85.0, 8.0, 0.0, 88.0])
+# The detector's slope of a bone whose true slope is known, see the fit.
+FACTORS, OFFSETS = np.array([0.93, 0.68]), np.array([-0.04, -0.08])
+
+
+def estimate(offset_m: tuple[float, float] = (0.0, 0.0)) -> Estimate:
+    found = Estimate("tracking", np.zeros(12), np.full(12, 0.05), offset_m=np.array(offset_m))
+    points_m = pose(found.placed(BODY), np.zeros(12)).keypoints_m
+    return replace(found, keypoints_m=CAMERA.reference_to_optical(points_m))
+
+
+def joints_m(
+    angles: FloatArray, found: Estimate, scales: tuple[float, float] = (1.0, 1.0)
+) -> FloatArray:
+    """Hips, knees and ankles (2, 3, 3) in the optical frame."""
+    hip = pose(found.placed(BODY), np.zeros(12)).hip
+    legs = []
+    for number, side in enumerate((1.0, -1.0)):
+        thigh, shank = leg_directions(angles[4 * number : 4 * number + 4], side)
+        first = hip + np.array([0.0, side * HIP_SHARE * STATURE_M, 0.0])
+        knee = first + scales[0] * THIGH_SHARE * STATURE_M * thigh
+        legs.append([first, knee, knee + scales[1] * SHANK_SHARE * STATURE_M * shank])
+    return CAMERA.reference_to_optical(np.array(legs))
+
+
+def seen(joints: FloatArray, found: Estimate, score: float = 1.0) -> ImagePoints:
+    """What a detector without noise finds of these joints, with its usual slopes."""
+    px, scores = np.full((len(POINT_NAMES), 2), np.nan), np.zeros(len(POINT_NAMES))
+    spatial, legs_m = np.zeros((len(POINT_NAMES), 3)), np.zeros((len(LEG_POINT_NAMES), 3))
+    legs_px = np.full((len(LEG_POINT_NAMES), 2), np.nan)
+    legs_scores = np.zeros(len(LEG_POINT_NAMES))
+    assert found.keypoints_m is not None
+    for number, side in enumerate(("left", "right")):
+        points_m = found.keypoints_m[3 * number], joints[number, 0]
+        for name, point_m in zip(("shoulder", "hip"), points_m, strict=True):
+            at = POINT_INDEX[f"{side}_{name}"]
+            px[at], scores[at] = CAMERA.project(point_m), 1.0
+        end = np.zeros(3)
+        for part, name in enumerate(("knee", "ankle")):
+            at = LEG_POINT_NAMES.index(f"{side}_{name}")
+            legs_px[at], legs_scores[at] = CAMERA.project(joints[number, part + 1]), score
+            bone = joints[number, part + 1] - joints[number, part]
+            slope = (bone[2] / np.linalg.norm(bone) - OFFSETS[part]) / FACTORS[part]
+            slope = float(np.clip(slope, -1.0, 1.0))
+            end = end + np.array([0.0, np.sqrt(1.0 - slope**2), slope])
+            legs_m[at] = end
+    legs = LegPoints(legs_px, legs_scores, legs_m)
+    return ImagePoints(px, scores, spatial_m=spatial, legs=legs)
+
+
+def read(angles: FloatArray, found: Estimate, images: int = 10) -> Estimate:
+    reader = LegReader()
+    points = seen(joints_m(angles, found), found)
+    for number in range(images):
+        result = reader.see(points, found, BODY, CAMERA, number / 15)
+    return result
+
+
+@pytest.mark.parametrize(
+    ("angles", "lower_m"), [(STANDING, 0.0), (SITTING, 0.38)], ids=["standing", "sitting"]
+)
+def test_legs_are_found_where_they_are(angles: FloatArray, lower_m: float) -> None:
+    there = estimate((0.0, -lower_m))
+    legs = read(angles, there).legs
+    assert legs is not None
+    away_m = np.linalg.norm(legs.points_m - joints_m(angles, there).reshape(6, 3), axis=1)
+    assert away_m.max() < 0.08
+    bends = np.degrees(legs.angles - angles)[[0, 3, 4, 7]]
+    assert np.abs(bends).max() < 12.0
+    assert set(legs.states) == {KeypointState.TRACKED}
+
+
+def test_a_lifted_leg_is_not_pulled_to_the_floor() -> None:
+    lifted = STANDING.copy()
+    lifted[:4] = np.radians([70.0, 5.0, 0.0, 80.0])
+    reader, found = LegReader(), estimate()
+    for number in range(10):
+        reader.see(seen(joints_m(STANDING, found), found), found, BODY, CAMERA, number / 15)
+    result = reader.see(seen(joints_m(lifted, found), found), found, BODY, CAMERA, 10 / 15)
+    assert result.legs is not None
+    assert np.degrees(result.legs.angles)[[0, 3, 4, 7]] == pytest.approx([70, 80, 2, 4], abs=15)
+
+
+def test_what_the_detector_does_not_see_is_hidden_and_less_exact() -> None:
+    reader, found = LegReader(), estimate()
+    points = seen(joints_m(STANDING, found), found)
+    known = reader.see(points, found, BODY, CAMERA, 0.0).legs
+    assert points.legs is not None and known is not None
+    scores = points.legs.scores.copy()
+    scores[LEG_POINT_NAMES.index("left_ankle")] = 0.1
+    part = reader.see(
+        replace(points, legs=points.legs._replace(scores=scores)), found, BODY, CAMERA, 0.1
+    ).legs
+    assert part is not None
+    assert part.states[2] == KeypointState.HIDDEN and part.states[5] == KeypointState.TRACKED
+    none = reader.see(None, found, BODY, CAMERA, 0.3).legs
+    assert none is not None
+    assert set(none.states) == {KeypointState.HIDDEN}
+    assert (none.points_stddev_m[[1, 2, 4, 5]] > known.points_stddev_m[[1, 2, 4, 5]]).all()
+    assert none.angles == pytest.approx(part.angles, abs=0.2)
+
+
+def test_without_a_posture_there_are_no_legs() -> None:
+    lost = Estimate("lost")
+    assert LegReader().see(None, lost, BODY, CAMERA, 0.0) is lost
+
+
+def test_exchanged_sides_are_exchanged_back() -> None:
+    """The tracker takes a person's back for the front; the detector does not."""
+    turned = STANDING.copy()
+    turned[:4] = np.radians([60.0, 5.0, 0.0, 70.0])
+    found = estimate()
+    points = seen(joints_m(turned, found), found).exchanged()
+    legs = LegReader().see(points, found, BODY, CAMERA, 0.0).legs
+    assert legs is not None
+    assert legs.angles[3] > 0.8 and legs.angles[7] < 0.5
+    assert set(legs.states) == {KeypointState.UNCERTAIN}
+
+
+def test_lengths_approach_those_that_are_seen_and_do_not_run_away() -> None:
+    reader, found = LegReader(), estimate()
+    joints = joints_m(STANDING, found, scales=(0.95, 1.05))
+    lengths = []
+    for number in range(300):
+        result = reader.see(seen(joints, found), found, BODY, CAMERA, number / 15)
+        assert result.legs is not None
+        first = result.legs.points_m[:3]
+        lengths.append(np.linalg.norm(np.diff(first, axis=0), axis=1) / STATURE_M)
+    shares = np.array([0.95 * THIGH_SHARE, 1.05 * SHANK_SHARE])
+    off = np.abs(np.array(lengths) - shares)
+    assert (off[-1] < off[0]).all()
+    assert np.ptp(lengths[150:], axis=0).max() < 0.005
+
+
+def test_the_floor_shows_the_distance() -> None:
+    """The floor is known; then the tracker's distance of the same image is wrong by 0.12 m."""
+    reader, there = LegReader(), estimate()
+    joints = joints_m(STANDING, there)
+    for number in range(60):
+        reader.see(seen(joints, there), there, BODY, CAMERA, number / 15)
+    # The hips look the same from a place farther away along their ray.
+    hip = pose(BODY, np.zeros(12)).hip
+    moved = hip * 0.12 / abs(hip[0])
+    wrong = estimate((float(moved[0]), float(moved[2])))
+    points = seen(joints, there)
+    result = wrong
+    for number in range(60, 90):
+        result = reader.see(points, wrong, BODY, CAMERA, number / 15)
+    assert result.offset_m is not None and result.posture is not None
+    assert wrong.keypoints_m is not None and result.keypoints_m is not None
+    assert abs(float(result.offset_m[0])) < 0.08
+    assert result.posture[TORSO_Y] == pytest.approx(0.0, abs=1e-9)
+    # All points of the person are moved with the hips.
+    by_m = CAMERA.reference_to_optical(
+        np.array([result.offset_m[0] - moved[0], 0.0, result.offset_m[1] - moved[2]])
+    )
+    assert result.keypoints_m - wrong.keypoints_m == pytest.approx(np.tile(by_m, (6, 1)), abs=1e-9)
+
+
+def test_a_filter_with_a_constant_place_keeps_it() -> None:
+    found = replace(estimate(), offset_m=None)
+    result = LegReader().see(seen(joints_m(STANDING, found), found), found, BODY, CAMERA, 0.0)
+    assert result.offset_m is None and result.legs is not None
+    assert result.posture == pytest.approx(found.posture)
+
+
+def test_without_feet_the_tracker_alone_has_the_distance() -> None:
+    reader, found = LegReader(), estimate()
+    points = seen(joints_m(STANDING, found, scales=(1.3, 1.3)), found, score=0.1)
+    for number in range(30):
+        result = reader.see(points, found, BODY, CAMERA, number / 15)
+    assert result.offset_m == pytest.approx([0.0, 0.0], abs=1e-4)
