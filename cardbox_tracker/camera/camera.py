@@ -129,6 +129,11 @@ class Camera:
             [self.fx * points[..., 0] / z + self.cx, self.fy * points[..., 1] / z + self.cy], -1
         )
 
+    def rays(self, px: FloatArray) -> FloatArray:
+        """Return the points (..., 3) at the depth 1 of pixels (..., 2), in the optical frame."""
+        across = (np.asarray(px, np.float64) - (self.cx, self.cy)) / (self.fx, self.fy)
+        return np.concatenate([across, np.ones((*across.shape[:-1], 1))], -1)
+
 
 @dataclass(frozen=True)
 class Calibration:

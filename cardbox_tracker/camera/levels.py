@@ -38,7 +38,7 @@ class Levels:
         """Return an image uint16 as uint8 of the same shape."""
         sample = image[::_EVERY, ::_EVERY]
         outside = (sample < self._low) | (sample >= self._low + self._width)
-        if np.mean(outside) > _MOST_OUTSIDE or not self.changes:
+        if np.mean(outside) > _MOST_OUTSIDE:
             self._set(image)
         shift = self._width.bit_length() - 9
         if self._width == _ALL:

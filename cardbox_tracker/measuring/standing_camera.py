@@ -140,7 +140,7 @@ def standing_camera(
         return None
     levels = np.array([LEVELS[name] for name in names])
     seen = np.array([points[name] for name in names])
-    rays: FloatArray = (seen - (camera.cx, camera.cy)) / (camera.fx, camera.fy)
+    rays = camera.rays(seen)[:, :2]
     below = rays[-1, 1] - rays[0, 1]
     if below <= 0.0:
         return None

@@ -27,6 +27,7 @@ from cardbox_tracker.camera.camera import Camera
 from cardbox_tracker.camera.camera_info import calibration_from_info
 from cardbox_tracker.camera.encodings import (
     SUPPORTED_ENCODINGS,
+    SentImage,
     decode_as_sent,
     decode_bgr,
     decode_compressed,
@@ -223,7 +224,10 @@ def test_camera_info(message: SimpleNamespace) -> None:
 def test_image(data: bytes, height: int, width: int, step: int, encoding: str, big: bool) -> None:
     for decode in (decode_grey, decode_bgr, decode_as_sent):
         with refusals():
-            assert decode(data, height, width, step, encoding, big).shape[:2] == (height, width)
+            assert decode(SentImage(data, height, width, step, encoding, big)).shape[:2] == (
+                height,
+                width,
+            )
 
 
 @cache
