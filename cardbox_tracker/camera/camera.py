@@ -32,6 +32,16 @@ a person states."""
 _MOST_SIDE_PX = 65535
 
 
+def level_to_optical(pitch_rad: float) -> FloatArray:
+    """Return the rotation (3, 3) from the level reference frame into that of a pitched camera."""
+    # Level camera: x_optical = Y, y_optical = -Z, z_optical = -X of the reference frame.
+    level = np.array([(0.0, 1.0, 0.0), (0.0, 0.0, -1.0), (-1.0, 0.0, 0.0)])
+    c, s = np.cos(pitch_rad), np.sin(pitch_rad)
+    look_down = np.array([(1.0, 0.0, 0.0), (0.0, c, -s), (0.0, s, c)])
+    rotation: FloatArray = look_down @ level
+    return rotation
+
+
 @dataclass(frozen=True)
 class Camera:
     """An ideal pinhole camera at a working resolution.
@@ -104,12 +114,7 @@ class Camera:
 
     def reference_to_optical_rotation(self) -> FloatArray:
         """Return the rotation (3, 3) from the reference frame into the optical frame."""
-        # Level camera: x_optical = Y, y_optical = -Z, z_optical = -X of the reference frame.
-        level = np.array([(0.0, 1.0, 0.0), (0.0, 0.0, -1.0), (-1.0, 0.0, 0.0)])
-        c, s = np.cos(self.pitch_rad), np.sin(self.pitch_rad)
-        look_down = np.array([(1.0, 0.0, 0.0), (0.0, c, -s), (0.0, s, c)])
-        rotation: FloatArray = look_down @ level
-        return rotation
+        return level_to_optical(self.pitch_rad)
 
     def reference_to_optical(self, points_m: FloatArray) -> FloatArray:
         """Rotate points (..., 3), metres, from the level reference frame into the optical frame."""

@@ -48,13 +48,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--output", type=Path, required=True, metavar="DIR", help="folder of results"
     )
     parser.add_argument("--quick", action="store_true", help="everything smaller, in two minutes")
-    parser.add_argument(
+    what = parser.add_mutually_exclusive_group()
+    what.add_argument(
         "--session",
         type=Path,
         metavar="DIR",
         help="a recording with ground_truth.json instead of synthetic ones",
     )
-    parser.add_argument(
+    what.add_argument(
         "--sessions",
         type=Path,
         nargs="+",
@@ -62,7 +63,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="recorded sessions (bag/, ground_truth.json) to track and compare, instead of the "
         "paper's experiments; whoever takes the reference postures in a session is measured first",
     )
-    parser.add_argument(
+    what.add_argument(
         "--films",
         type=Path,
         nargs="+",
@@ -176,8 +177,9 @@ def _films(options: argparse.Namespace, jobs: int) -> None:
             films += future.result()
             show(done / len(work))
     names = " ".join(folder.name for folder in options.films)
+    how = f"--preset {options.preset} --seed {options.seed} --seeds {options.seeds}"
     results = {
-        "command": f"cardbox evaluate --films {names} --seeds {options.seeds} --output DIR",
+        "command": f"cardbox evaluate --films {names} {how} --output DIR",
         "films": sorted(films, key=lambda film: (film["given"], film["shape"])),
         "provenance": provenance(),
     }

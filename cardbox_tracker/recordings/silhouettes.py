@@ -265,12 +265,12 @@ class SilhouetteSource:
 
     def _people(self, prepared: PreparedImage) -> tuple[ImagePoints, ...]:
         """Return the points of all people in an image."""
-        if self._detector is not None:
-            found = self._detector.all_in(prepared.stamp_ns, prepared.image)
-            return tuple(image_points(one) for one in found)
-        assert self._given is not None
-        image = Image(prepared.stamp_ns, prepared.number, prepared.recorded.name)
-        return tuple(self._given.all_in(image))
+        if self._given is not None:
+            image = Image(prepared.stamp_ns, prepared.number, prepared.recorded.name)
+            return tuple(self._given.all_in(image))
+        assert self._detector is not None
+        found = self._detector.all_in(prepared.stamp_ns, prepared.image)
+        return tuple(image_points(one) for one in found)
 
     def _restart_points(self) -> None:
         for source in (self._detector, self._given):

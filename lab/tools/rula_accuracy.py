@@ -206,8 +206,7 @@ def load(folder: Path) -> RecordedSession:
         return session
     session = load_session(folder, session.truth.cameras[:1])
     if session.hips_m is None:
-        pitch_rad = np.radians(session.truth.pitch_deg)
-        down = np.array([0.0, np.cos(pitch_rad), np.sin(pitch_rad)])
+        down = -session.truth.to_optical[:, 2]
         session = replace(session, hips_m=session.keypoints_m[:, SHOULDERS].mean(axis=1) + down)
     return replace(session, torso_rad=torso_angles(session))
 

@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from cardbox_tracker.detectors.image_points import POINT_INDEX, POINT_NAMES, ImagePoints
+from cardbox_tracker.detectors.image_points import COCO_NAMES, POINT_INDEX, POINT_NAMES, ImagePoints
 
 COUNT = len(POINT_NAMES)
 PX, SCORES = np.full((COUNT, 2), 7.0), np.full(COUNT, 0.5)
@@ -89,3 +89,18 @@ def test_lists_and_whole_numbers_of_numpy_are_taken() -> None:
     assert points.spatial_m is not None
     assert points.spatial_m.shape == (COUNT, 3)
     assert points.stamp_ns == 5
+
+
+def test_points_of_coco_lose_knees_and_ankles() -> None:
+    given = np.column_stack([np.arange(17.0), 100 + np.arange(17.0), np.full(17, 0.5)])
+    given[COCO_NAMES.index("left_wrist"), 0] = np.nan
+    found = ImagePoints.from_coco17(given, 7)
+    assert found.stamp_ns == 7
+    for name in POINT_NAMES:
+        place = found.px[POINT_NAMES.index(name)]
+        if name in COCO_NAMES and name != "left_wrist":
+            assert place.tolist() == [COCO_NAMES.index(name), 100 + COCO_NAMES.index(name)]
+        else:
+            assert np.isnan(place).all()
+    with pytest.raises(ValueError, match="COCO_NAMES"):
+        ImagePoints.from_coco17(given[:13])

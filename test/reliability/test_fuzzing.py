@@ -58,15 +58,7 @@ right:
   T_cn_cnm1: [[1, 0, 0, -0.12], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]]
   rostopic: /right/image_raw
 """
-CAMERA_GROUP = """[cam_0]
-name = "left"
-rotation = [0.0, 0.1, 0.0]
-translation = [0.0, 0.0, 0.0]
-[cam_1]
-name = "right"
-rotation = [0.0, 0.0, 0.0]
-translation = [0.1, 0.0, 0.0]
-"""
+CAMERA_GROUP = Path(__file__).with_name("camera_group.toml").read_text()
 JUNK = st.one_of(
     st.text(max_size=12),
     st.sampled_from(

@@ -152,7 +152,4 @@ def _true_joint_height_m(session: RecordedSession) -> float:
     ]
     if not shoulders:
         return float("nan")
-    pitch_rad = np.radians(session.truth.pitch_deg)
-    # Upwards in the optical frame of a camera that looks down by the pitch.
-    up = np.array([0.0, -np.cos(pitch_rad), -np.sin(pitch_rad)])
-    return float(np.median(np.array(shoulders) @ up))
+    return float(np.median((np.array(shoulders) @ session.truth.to_optical)[:, 2]))

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-import sys
 from dataclasses import dataclass
+from types import MappingProxyType
 from typing import Any
 
 from sensor_msgs.msg import Image
@@ -13,7 +13,6 @@ from cardbox_tracker.camera.camera import Calibration, Camera
 from cardbox_tracker.camera.stamps import StampOrder
 from cardbox_tracker.common.errors import BackgroundFileError, CameraError
 from cardbox_tracker.common.progress import told
-from cardbox_tracker.common.settings import settings_of
 from cardbox_tracker.ros.messages import conversions
 from cardbox_tracker.ros.nodes.camera_images import CameraImages
 from cardbox_tracker.ros.nodes.depth_cut import DepthCut
@@ -27,7 +26,7 @@ from cardbox_tracker.ros.nodes.silhouette_outputs import SilhouetteOutputs
 from cardbox_tracker.ros.runtime import qos
 from cardbox_tracker.ros.runtime.command_line import plain_command_line
 from cardbox_tracker.ros.runtime.node import CardboxNode, run_node
-from cardbox_tracker.ros.runtime.parameter_fields import AT_START, NodeParameters, parameter, shared
+from cardbox_tracker.ros.runtime.parameter_fields import AT_START, NodeParameters, parameter
 from cardbox_tracker.ros.runtime.parameters import LiveParameters
 from cardbox_tracker.segmentation.background import warm_up
 from cardbox_tracker.segmentation.background_advice import Findings, advice
@@ -43,8 +42,10 @@ _NEXT_LEARNING = "next learning"
 
 
 @dataclass(frozen=True)
-class BackgroundParameters(NodeParameters):
+class BackgroundParameters(NodeParameters, BackgroundConfig):
     """Cut the person out of the camera's images."""
+
+    effects = MappingProxyType({"learn_images": _NEXT_LEARNING})
 
     image_transport: str = image_transport_parameter()
     width: int = parameter(
@@ -77,24 +78,6 @@ class BackgroundParameters(NodeParameters):
     )
     camera_roll_deg: float = camera_roll_parameter()
     max_megapixels: float = max_megapixels_parameter()
-    learn_images: int = shared(BackgroundConfig, "learn_images", effect=_NEXT_LEARNING)
-    threshold: float = shared(BackgroundConfig, "threshold")
-    min_stddev: float = shared(BackgroundConfig, "min_stddev")
-    clean_up: bool = shared(BackgroundConfig, "clean_up")
-    smoothing_px: float = shared(BackgroundConfig, "smoothing_px")
-    min_contrast: float = shared(BackgroundConfig, "min_contrast")
-    shadow: float = shared(BackgroundConfig, "shadow")
-    soft_shadow: float = shared(BackgroundConfig, "soft_shadow")
-    darkest_shadow: float = shared(BackgroundConfig, "darkest_shadow")
-    color: bool = shared(BackgroundConfig, "color")
-    min_color_contrast: float = shared(BackgroundConfig, "min_color_contrast")
-    color_edge: float = shared(BackgroundConfig, "color_edge")
-    edge: float = shared(BackgroundConfig, "edge")
-    flicker: float = shared(BackgroundConfig, "flicker")
-    follow: bool = shared(BackgroundConfig, "follow")
-    min_area: float = shared(BackgroundConfig, "min_area")
-    max_hole: float = shared(BackgroundConfig, "max_hole")
-    absorb_after: int = shared(BackgroundConfig, "absorb_after")
 
     def check(self) -> None:
         """Raise ValueError if values contradict each other."""
@@ -108,11 +91,6 @@ class BackgroundParameters(NodeParameters):
                 f"within_m is {self.within_m:g} but no depth is given; set 'depth' to a topic of "
                 "depth images, or within_m to 0"
             )
-
-    def config(self) -> BackgroundConfig:
-        """Return the settings of the core."""
-        names = settings_of(BackgroundConfig)
-        return BackgroundConfig(**{name: getattr(self, name) for name in names})
 
 
 class BackgroundNode(CardboxNode):
@@ -150,7 +128,7 @@ class BackgroundNode(CardboxNode):
 
     def _changed(self, settings: BackgroundParameters) -> None:
         if self._pipeline is not None:
-            self._pipeline.config = settings.config()
+            self._pipeline.config = settings
 
     def _learn(self) -> str:
         if self.parameters.value.within_m > 0.0:
@@ -173,7 +151,7 @@ class BackgroundNode(CardboxNode):
         self._pipeline = SilhouettePipeline(
             calibration,
             (settings.width, settings.height),
-            settings.config(),
+            settings,
             WAYS[settings.learning],
         )
 
@@ -266,7 +244,3 @@ def main(args: list[str] | None = None) -> int:
     return run_node(
         BackgroundNode, plain_command_line("background", _DOES, BackgroundParameters, args)
     )
-
-
-if __name__ == "__main__":
-    sys.exit(main())

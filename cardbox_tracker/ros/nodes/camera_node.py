@@ -16,7 +16,7 @@ from sensor_msgs.msg import CameraInfo, Image
 from std_msgs.msg import Header
 
 from cardbox_tracker.camera.calibration_file import load_calibration
-from cardbox_tracker.camera.camera import Calibration
+from cardbox_tracker.camera.camera import OPTICAL_FRAME, Calibration
 from cardbox_tracker.camera.camera_device import (
     describe_devices,
     lock_exposure,
@@ -64,7 +64,7 @@ class CameraParameters(NodeParameters):
         "mono8 suffices for the tracker and has a third of the bytes; bgr8 for colour",
         choices=("mono8", "bgr8"),
     )
-    frame_id: str = parameter("camera_optical_frame", "name of the camera's optical frame")
+    frame_id: str = parameter(OPTICAL_FRAME, "name of the camera's optical frame")
     calibration_file: str = parameter(
         "", "file of camera_calibration, OpenCV's FileStorage or Kalibr", effect=AT_START
     )
@@ -244,7 +244,3 @@ def main(args: list[str] | None = None) -> int:
         print(describe_devices())
         return 0
     return run_node(CameraNode, command_line)
-
-
-if __name__ == "__main__":
-    sys.exit(main())

@@ -7,10 +7,8 @@ import math
 from std_msgs.msg import Float64
 
 from cardbox_tracker.camera.camera import Camera
-from cardbox_tracker.detectors.landmarks import LANDMARKS
 from cardbox_tracker.detectors.pose_network import Detection
 from cardbox_tracker.measuring.standing_camera import middles, standing_camera
-from cardbox_tracker.person.sizes import FloatArray
 from cardbox_tracker.ros.runtime import qos
 from cardbox_tracker.ros.runtime.node import CardboxNode
 
@@ -29,15 +27,14 @@ class CameraPitch:
 
     def restart(self) -> None:
         """Look again, because the camera is another one."""
-        self._seen: list[tuple[dict[str, FloatArray], dict[str, float]]] = []
+        self._seen: list[Detection] = []
         self._is_found = False
 
     def see(self, found: Detection, camera: Camera) -> None:
         """Add a person in the image of ``camera``."""
         if self._is_found:
             return
-        scores = dict(zip(LANDMARKS, found.scores.tolist(), strict=True))
-        self._seen.append((dict(zip(LANDMARKS, found.points_px, strict=True)), scores))
+        self._seen.append(found)
         if len(self._seen) < _IMAGES:
             return
         standing = standing_camera(middles(self._seen), camera)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import sys
 import time
 from collections import deque
 from collections.abc import Sequence
@@ -207,7 +206,3 @@ class DetectorNode(CardboxNode):
 def main(args: list[str] | None = None) -> int:
     """Run the node; the exit code is 0 unless it could not start."""
     return run_node(DetectorNode, plain_command_line("detector", _DOES, DetectorParameters, args))
-
-
-if __name__ == "__main__":
-    sys.exit(main())

@@ -294,7 +294,3 @@ def main(args: list[str] | None = None) -> int:
     # The tracker, which gets the same silhouettes, has priority.
     os.nice(5)
     return run_node(InitializerNode, command_line)
-
-
-if __name__ == "__main__":
-    sys.exit(main())

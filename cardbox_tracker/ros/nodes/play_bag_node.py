@@ -317,7 +317,3 @@ def main(args: list[str] | None = None) -> int:
     command_line = list(sys.argv) if args is None else ["play_bag", *args]
     overrides = overrides_from(own_arguments(command_line))
     return run(partial(PlayBagNode, parameter_overrides=overrides), command_line, PlayBagNode.play)
-
-
-if __name__ == "__main__":
-    sys.exit(main())

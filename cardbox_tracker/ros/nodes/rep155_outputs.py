@@ -11,6 +11,7 @@ import numpy as np
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Header, String
 
+from cardbox_tracker.camera.camera import OPTICAL_FRAME
 from cardbox_tracker.person.rep155 import Rep155Joints, head_joints, joint_names
 from cardbox_tracker.person.urdf import rep155_urdf
 from cardbox_tracker.recordings.outputs import JointValues, clavicles_of, neck_of, place_of
@@ -97,7 +98,7 @@ class Rep155Outputs:
         if self._described != (tracker.body, header.frame_id):
             self._described = (tracker.body, header.frame_id)
             self._values = BodyJoints(self._id, self._torso_place)
-            frame_id = header.frame_id or "camera_optical_frame"
+            frame_id = header.frame_id or OPTICAL_FRAME
             urdf = rep155_urdf(tracker.body, self._id, frame_id, self._torso_place)
             for publisher in self._descriptions:
                 publisher.publish(String(data=urdf))

@@ -10,6 +10,7 @@ from typing import Any
 from geometry_msgs.msg import Quaternion, Transform, TransformStamped, Vector3
 from std_msgs.msg import Header
 
+from cardbox_tracker.camera.camera import OPTICAL_FRAME
 from cardbox_tracker.common.errors import CardboxError
 from cardbox_tracker.person.urdf import (
     LinkTransform,
@@ -71,7 +72,7 @@ class TfOutputs:
             self._described = (tracker.body, header.frame_id)
             optical, place = header.frame_id, settings.torso_place
             if self._id is not None:
-                frame_id = optical or "camera_optical_frame"
+                frame_id = optical or OPTICAL_FRAME
                 urdf = rep155_urdf(tracker.body, self._id, frame_id, place)
             else:
                 root = optical if settings.optical_frame_in_tf else ""

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Iterator, Sequence
 from functools import partial
 from typing import Any
@@ -244,7 +243,3 @@ def _named(person: int | None) -> str:
 def main(args: list[str] | None = None) -> int:
     """Run the node; the exit code is 0 unless it could not start."""
     return run_node(TrackerNode, plain_command_line("tracker", _DOES, TrackerParameters, args))
-
-
-if __name__ == "__main__":
-    sys.exit(main())

@@ -104,7 +104,6 @@ class CardboxNode(Node):
         profile: QoSProfile,
         *,
         has_one_type: bool = True,
-        is_overridable: bool = True,
     ) -> Subscription | None:
         """Subscribe to a topic, bypassing DDS if a node of this process offers it.
 
@@ -114,9 +113,8 @@ class CardboxNode(Node):
             kind: class of the messages.
             topic: name of the topic.
             callback: receives each message.
-            profile: quality of service, which can be overridden by default.
+            profile: quality of service, which can be overridden.
             has_one_type: False if the caller adapts to publishers of another type.
-            is_overridable: False for a second subscription to a topic.
 
         Returns:
             The subscription; None without DDS.
@@ -134,7 +132,7 @@ class CardboxNode(Node):
             guarded,  # type: ignore[arg-type]  # rclpy leaves out its own second argument
             qos.copy_of(profile),
             event_callbacks=qos.subscription_events(self.resolve(topic), self.diagnostics.warn),
-            qos_overriding_options=qos.overridable(profile) if is_overridable else None,
+            qos_overriding_options=qos.overridable(profile),
         )
 
     def subscribe_info(self, topic: str, callback: Callback) -> None:
