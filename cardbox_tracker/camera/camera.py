@@ -11,12 +11,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cardbox_tracker.camera.camera_checks import (
+    DISTORTION_MODELS,
     distortion_problem,
+    lens_problem,
     matrix_problem,
+    normal_lens,
     real_number,
     whole_pixels,
 )
-from cardbox_tracker.camera.lens import DISTORTION_MODELS, lens_problem, normal_lens
 from cardbox_tracker.common.errors import CameraError, quoted
 
 FloatArray = NDArray[np.float64]

@@ -5,22 +5,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.model_file import dumps_body_model
-from cardbox_tracker.person.urdf import urdf_from_body
-from cardbox_tracker.recordings.bag_markers import write_markers
-from cardbox_tracker.recordings.bag_transforms import BagTransforms
+from cardbox_tracker.person.urdf import LinkTransforms, urdf_from_body
 from cardbox_tracker.recordings.bag_writer import BagWriter
-from cardbox_tracker.recordings.keypoint_status import LEVELS, KeypointStates
+from cardbox_tracker.recordings.markers import MarkerShape, Rgba
 from cardbox_tracker.recordings.outputs import (
+    LEVELS,
     JointValues,
+    KeypointStates,
     Markers,
     OutputStream,
     Points,
@@ -34,6 +35,109 @@ from cardbox_tracker.recordings.silhouettes import RecordedFrame
 from cardbox_tracker.recordings.track import Observer
 from cardbox_tracker.tracking.estimate import Estimate
 from cardbox_tracker.tracking.tracker import Tracker
+
+TOPIC = "/tf"
+
+
+class BagTransforms:
+    """Writes ``/tf`` for the joint states of a recording, from its URDF.
+
+    A viewer needs ``/tf`` to move the URDF, and a recording has no robot_state_publisher.
+    """
+
+    def __init__(self, writer: BagWriter) -> None:
+        """Use ``writer``; nothing is written before :meth:`describe`."""
+        self._writer = writer
+        self._links: LinkTransforms | None = None
+
+    def describe(self, urdf: str) -> None:
+        """Write the links of ``urdf`` from now on."""
+        self._links = LinkTransforms(urdf)
+
+    def write(self, stamp_ns: int, positions: Mapping[str, float]) -> None:
+        """Write the transforms at ``positions`` of the joints, rad and metres.
+
+        Raises:
+            ValueError: a joint of the URDF has no position.
+        """
+        if self._links is None:
+            return
+        make = self._writer.type
+        vector = make("geometry_msgs/msg/Vector3")
+        quaternion = make("geometry_msgs/msg/Quaternion")
+        transform = make("geometry_msgs/msg/Transform")
+        stamped = make("geometry_msgs/msg/TransformStamped")
+        transforms = []
+        for link in self._links.at(positions):
+            x, y, z = link.translation_m
+            turn = quaternion(**dict(zip("xyzw", link.rotation, strict=True)))
+            transforms.append(
+                stamped(
+                    header=self._writer.header(stamp_ns, link.parent),
+                    child_frame_id=link.child,
+                    transform=transform(translation=vector(x=x, y=y, z=z), rotation=turn),
+                )
+            )
+        message = make("tf2_msgs/msg/TFMessage")(transforms=transforms)
+        self._writer.write(TOPIC, message, stamp_ns)
+
+
+_NO_BYTES = np.zeros(0, np.uint8)
+_NO_POINTS = np.zeros((0, 3))
+# Values of the constants of visualization_msgs/Marker.
+_ADD, _DELETE_ALL = 0, 3
+_NOTHING = MarkerShape("", 0, 0.0, _NO_POINTS, (0.0, 0.0, 0.0, 0.0))
+
+
+def write_markers(
+    writer: BagWriter, topic: str, stamp_ns: int, frame_id: str, markers: Markers
+) -> None:
+    """Write markers; without shapes, a message that removes all earlier ones."""
+    header = writer.header(stamp_ns, frame_id)
+    messages = [_marker(writer, header, shape, _ADD) for shape in markers.shapes]
+    if not messages:
+        messages = [_marker(writer, header, _NOTHING, _DELETE_ALL)]
+    array = writer.type("visualization_msgs/msg/MarkerArray")
+    writer.write(topic, array(markers=messages), stamp_ns)
+
+
+def _marker(writer: BagWriter, header: Any, shape: MarkerShape, action: int) -> Any:
+    """Return a marker message; all fields are given because the classes have no defaults."""
+    make = writer.type
+    point, color = make("geometry_msgs/msg/Point"), make("std_msgs/msg/ColorRGBA")
+    still = make("geometry_msgs/msg/Quaternion")(x=0.0, y=0.0, z=0.0, w=1.0)
+    image = make("sensor_msgs/msg/CompressedImage")
+    nothing = make("std_msgs/msg/Header")(
+        stamp=make("builtin_interfaces/msg/Time")(sec=0, nanosec=0), frame_id=""
+    )
+    scale = shape.scale
+    return make("visualization_msgs/msg/Marker")(
+        header=header,
+        ns=shape.namespace,
+        id=0,
+        type=shape.kind,
+        action=action,
+        pose=make("geometry_msgs/msg/Pose")(position=point(x=0.0, y=0.0, z=0.0), orientation=still),
+        scale=make("geometry_msgs/msg/Vector3")(x=scale, y=scale, z=scale),
+        color=_color(color, shape.rgba),
+        lifetime=make("builtin_interfaces/msg/Duration")(sec=0, nanosec=0),
+        frame_locked=False,
+        points=[point(x=x, y=y, z=z) for x, y, z in shape.points_m.tolist()],
+        colors=[_color(color, rgba) for rgba in shape.colors],
+        texture_resource="",
+        texture=image(header=nothing, format="", data=_NO_BYTES),
+        uv_coordinates=[],
+        text="",
+        mesh_resource="",
+        mesh_file=make("visualization_msgs/msg/MeshFile")(filename="", data=_NO_BYTES),
+        mesh_use_embedded_materials=False,
+    )
+
+
+def _color(make: Any, rgba: Rgba) -> Any:
+    r, g, b, a = rgba
+    return make(r=r, g=g, b=b, a=a)
+
 
 Draw = Callable[[NDArray[np.uint8], Estimate, Tracker], NDArray[np.uint8]]
 """Draws an estimate over the picture (H, W, ...) of the first camera; returns bgr."""

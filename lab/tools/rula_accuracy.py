@@ -31,9 +31,9 @@ from cardbox_tracker.applications.ergonomics.rula import (
     score_distribution,
 )
 from cardbox_tracker.applications.evaluation.angles import comparable, true_postures
-from cardbox_tracker.applications.evaluation.marks import replaced
 from cardbox_tracker.applications.evaluation.metrics import SHOULDERS
 from cardbox_tracker.applications.evaluation.people import torso_angles
+from cardbox_tracker.applications.evaluation.people_report import replaced
 from cardbox_tracker.applications.evaluation.session import RecordedSession, load_session
 from cardbox_tracker.applications.evaluation.tracking import (
     ALL_INPUTS,

@@ -20,9 +20,9 @@ from cardbox_tracker.applications.drawing.guidance import Guide
 from cardbox_tracker.camera.camera import Camera
 from cardbox_tracker.common.errors import CardboxError, InitializationError
 from cardbox_tracker.common.progress import told
-from cardbox_tracker.measuring.cancellation import Cancellation
 from cardbox_tracker.measuring.guidance import (
     ASK,
+    Cancellation,
     Guidance,
     Prompt,
     measuring,

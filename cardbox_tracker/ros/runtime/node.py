@@ -26,7 +26,7 @@ from cardbox_tracker.common.errors import CardboxError, cut, quoted
 from cardbox_tracker.ros.runtime import qos
 from cardbox_tracker.ros.runtime.diagnostics import PERIOD_S, NodeDiagnostics
 from cardbox_tracker.ros.runtime.intra_process import IntraProcess, IntraProcessPublisher
-from cardbox_tracker.ros.runtime.topic_types import TopicTypes
+from cardbox_tracker.ros.runtime.publishers import TopicTypes
 
 Callback = Callable[[Any, int], None]
 """Callback that receives a message and its send time, ns since the epoch."""
