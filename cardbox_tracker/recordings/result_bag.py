@@ -36,8 +36,6 @@ from cardbox_tracker.recordings.track import Observer
 from cardbox_tracker.tracking.estimate import Estimate
 from cardbox_tracker.tracking.tracker import Tracker
 
-TOPIC = "/tf"
-
 
 class BagTransforms:
     """Writes ``/tf`` for the joint states of a recording, from its URDF.
@@ -62,81 +60,59 @@ class BagTransforms:
         """
         if self._links is None:
             return
-        make = self._writer.type
-        vector = make("geometry_msgs/msg/Vector3")
-        quaternion = make("geometry_msgs/msg/Quaternion")
-        transform = make("geometry_msgs/msg/Transform")
-        stamped = make("geometry_msgs/msg/TransformStamped")
-        transforms = []
+        new, transforms = self._writer.new, []
         for link in self._links.at(positions):
             x, y, z = link.translation_m
-            turn = quaternion(**dict(zip("xyzw", link.rotation, strict=True)))
+            turn = new(
+                "geometry_msgs/msg/Quaternion", **dict(zip("xyzw", link.rotation, strict=True))
+            )
+            place = new("geometry_msgs/msg/Vector3", x=x, y=y, z=z)
+            moved = new("geometry_msgs/msg/Transform", translation=place, rotation=turn)
+            header = self._writer.header(stamp_ns, link.parent)
             transforms.append(
-                stamped(
-                    header=self._writer.header(stamp_ns, link.parent),
+                new(
+                    "geometry_msgs/msg/TransformStamped",
+                    header=header,
                     child_frame_id=link.child,
-                    transform=transform(translation=vector(x=x, y=y, z=z), rotation=turn),
+                    transform=moved,
                 )
             )
-        message = make("tf2_msgs/msg/TFMessage")(transforms=transforms)
-        self._writer.write(TOPIC, message, stamp_ns)
+        message = new("tf2_msgs/msg/TFMessage", transforms=transforms)
+        self._writer.write("/tf", message, stamp_ns)
 
 
-_NO_BYTES = np.zeros(0, np.uint8)
-_NO_POINTS = np.zeros((0, 3))
-# Values of the constants of visualization_msgs/Marker.
-_ADD, _DELETE_ALL = 0, 3
-_NOTHING = MarkerShape("", 0, 0.0, _NO_POINTS, (0.0, 0.0, 0.0, 0.0))
+# Constant of visualization_msgs/Marker; ADD is 0.
+_DELETE_ALL = 3
 
 
-def write_markers(
-    writer: BagWriter, topic: str, stamp_ns: int, frame_id: str, markers: Markers
+def _write_markers(
+    bag: BagWriter, topic: str, stamp_ns: int, frame_id: str, markers: Markers
 ) -> None:
     """Write markers; without shapes, a message that removes all earlier ones."""
-    header = writer.header(stamp_ns, frame_id)
-    messages = [_marker(writer, header, shape, _ADD) for shape in markers.shapes]
-    if not messages:
-        messages = [_marker(writer, header, _NOTHING, _DELETE_ALL)]
-    array = writer.type("visualization_msgs/msg/MarkerArray")
-    writer.write(topic, array(markers=messages), stamp_ns)
+    header = bag.header(stamp_ns, frame_id)
+    messages = [_marker(bag, header, shape) for shape in markers.shapes] or [
+        bag.new("visualization_msgs/msg/Marker", header=header, action=_DELETE_ALL, pose=bag.pose())
+    ]
+    array = bag.new("visualization_msgs/msg/MarkerArray", markers=messages)
+    bag.write(topic, array, stamp_ns)
 
 
-def _marker(writer: BagWriter, header: Any, shape: MarkerShape, action: int) -> Any:
-    """Return a marker message; all fields are given because the classes have no defaults."""
-    make = writer.type
-    point, color = make("geometry_msgs/msg/Point"), make("std_msgs/msg/ColorRGBA")
-    still = make("geometry_msgs/msg/Quaternion")(x=0.0, y=0.0, z=0.0, w=1.0)
-    image = make("sensor_msgs/msg/CompressedImage")
-    nothing = make("std_msgs/msg/Header")(
-        stamp=make("builtin_interfaces/msg/Time")(sec=0, nanosec=0), frame_id=""
-    )
-    scale = shape.scale
-    return make("visualization_msgs/msg/Marker")(
+def _marker(bag: BagWriter, header: Any, shape: MarkerShape) -> Any:
+    return bag.new(
+        "visualization_msgs/msg/Marker",
         header=header,
         ns=shape.namespace,
-        id=0,
         type=shape.kind,
-        action=action,
-        pose=make("geometry_msgs/msg/Pose")(position=point(x=0.0, y=0.0, z=0.0), orientation=still),
-        scale=make("geometry_msgs/msg/Vector3")(x=scale, y=scale, z=scale),
-        color=_color(color, shape.rgba),
-        lifetime=make("builtin_interfaces/msg/Duration")(sec=0, nanosec=0),
-        frame_locked=False,
-        points=[point(x=x, y=y, z=z) for x, y, z in shape.points_m.tolist()],
-        colors=[_color(color, rgba) for rgba in shape.colors],
-        texture_resource="",
-        texture=image(header=nothing, format="", data=_NO_BYTES),
-        uv_coordinates=[],
-        text="",
-        mesh_resource="",
-        mesh_file=make("visualization_msgs/msg/MeshFile")(filename="", data=_NO_BYTES),
-        mesh_use_embedded_materials=False,
+        pose=bag.pose(),
+        scale=bag.new("geometry_msgs/msg/Vector3", **dict.fromkeys("xyz", shape.scale)),
+        color=_color(bag, shape.rgba),
+        points=bag.points(shape.points_m),
+        colors=[_color(bag, rgba) for rgba in shape.colors],
     )
 
 
-def _color(make: Any, rgba: Rgba) -> Any:
-    r, g, b, a = rgba
-    return make(r=r, g=g, b=b, a=a)
+def _color(bag: BagWriter, rgba: Rgba) -> Any:
+    return bag.new("std_msgs/msg/ColorRGBA", **dict(zip("rgba", rgba, strict=True)))
 
 
 Draw = Callable[[NDArray[np.uint8], Estimate, Tracker], NDArray[np.uint8]]
@@ -230,7 +206,7 @@ def _write_value(bag: BagWriter, topic: str, stamp_ns: int, frame_id: str, value
         case Points(points_m):
             bag.write_pose_array(topic, stamp_ns, frame_id, points_m)
         case Markers():
-            write_markers(bag, topic, stamp_ns, frame_id, value)
+            _write_markers(bag, topic, stamp_ns, frame_id, value)
         case KeypointStates():
             _write_keypoint_states(bag, topic, stamp_ns, frame_id, value)
         case Text(text):
@@ -240,19 +216,17 @@ def _write_value(bag: BagWriter, topic: str, stamp_ns: int, frame_id: str, value
 def _write_keypoint_states(
     bag: BagWriter, topic: str, stamp_ns: int, frame_id: str, found: KeypointStates
 ) -> None:
-    status = bag.type("diagnostic_msgs/msg/DiagnosticStatus")
-    pair = bag.type("diagnostic_msgs/msg/KeyValue")
     each = [
-        status(
+        bag.new(
+            "diagnostic_msgs/msg/DiagnosticStatus",
             level=LEVELS[state],
             name=name,
             message=str(state),
-            hardware_id="",
-            values=[pair(key=key, value=text) for key, text in texts.items()],
+            values=[
+                bag.new("diagnostic_msgs/msg/KeyValue", key=key, value=text)
+                for key, text in texts.items()
+            ],
         )
         for name, state, texts in found.rows()
     ]
-    message = bag.type("diagnostic_msgs/msg/DiagnosticArray")(
-        header=bag.header(stamp_ns, frame_id), status=each
-    )
-    bag.write(topic, message, stamp_ns)
+    bag.write_stamped(topic, "diagnostic_msgs/msg/DiagnosticArray", stamp_ns, frame_id, status=each)
