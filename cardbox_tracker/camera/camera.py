@@ -11,12 +11,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cardbox_tracker.camera.camera_checks import (
+    DISTORTION_MODELS,
     distortion_problem,
+    lens_problem,
     matrix_problem,
+    normal_lens,
     real_number,
     whole_pixels,
 )
-from cardbox_tracker.camera.lens import DISTORTION_MODELS, lens_problem, normal_lens
 from cardbox_tracker.common.errors import CameraError, quoted
 
 FloatArray = NDArray[np.float64]
@@ -30,6 +32,16 @@ CALIBRATED, GIVEN_FIELD_OF_VIEW = 0.005, 0.03
 a person states."""
 # Largest side of a JPEG image; a CameraInfo and a file may contain any number.
 _MOST_SIDE_PX = 65535
+
+
+def level_to_optical(pitch_rad: float) -> FloatArray:
+    """Return the rotation (3, 3) from the level reference frame into that of a pitched camera."""
+    # Level camera: x_optical = Y, y_optical = -Z, z_optical = -X of the reference frame.
+    level = np.array([(0.0, 1.0, 0.0), (0.0, 0.0, -1.0), (-1.0, 0.0, 0.0)])
+    c, s = np.cos(pitch_rad), np.sin(pitch_rad)
+    look_down = np.array([(1.0, 0.0, 0.0), (0.0, c, -s), (0.0, s, c)])
+    rotation: FloatArray = look_down @ level
+    return rotation
 
 
 @dataclass(frozen=True)
@@ -104,12 +116,7 @@ class Camera:
 
     def reference_to_optical_rotation(self) -> FloatArray:
         """Return the rotation (3, 3) from the reference frame into the optical frame."""
-        # Level camera: x_optical = Y, y_optical = -Z, z_optical = -X of the reference frame.
-        level = np.array([(0.0, 1.0, 0.0), (0.0, 0.0, -1.0), (-1.0, 0.0, 0.0)])
-        c, s = np.cos(self.pitch_rad), np.sin(self.pitch_rad)
-        look_down = np.array([(1.0, 0.0, 0.0), (0.0, c, -s), (0.0, s, c)])
-        rotation: FloatArray = look_down @ level
-        return rotation
+        return level_to_optical(self.pitch_rad)
 
     def reference_to_optical(self, points_m: FloatArray) -> FloatArray:
         """Rotate points (..., 3), metres, from the level reference frame into the optical frame."""
@@ -128,6 +135,11 @@ class Camera:
         return np.stack(
             [self.fx * points[..., 0] / z + self.cx, self.fy * points[..., 1] / z + self.cy], -1
         )
+
+    def rays(self, px: FloatArray) -> FloatArray:
+        """Return the points (..., 3) at the depth 1 of pixels (..., 2), in the optical frame."""
+        across = (np.asarray(px, np.float64) - (self.cx, self.cy)) / (self.fx, self.fy)
+        return np.concatenate([across, np.ones((*across.shape[:-1], 1))], -1)
 
 
 @dataclass(frozen=True)

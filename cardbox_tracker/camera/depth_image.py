@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cardbox_tracker.camera.camera import Camera
-from cardbox_tracker.camera.encodings import MOST_PIXELS, image_parts
+from cardbox_tracker.camera.encodings import MOST_PIXELS, SentImage
 from cardbox_tracker.camera.given_arrays import depth_from
 from cardbox_tracker.camera.image_headers import check_pixels, compressed_size
 from cardbox_tracker.common.errors import EncodingError, quoted
@@ -32,15 +32,14 @@ _PNG = b"\x89PNG"
 _KINDS = {"16UC1": ("u2", 0.001), "mono16": ("u2", 0.001), "32FC1": ("f4", 1.0)}
 
 
-def decode_depth(
-    data: Any, height: int, width: int, step: int, encoding: str, is_bigendian: bool
-) -> DepthImage:
+def decode_depth(sent: SentImage) -> DepthImage:
     """Return a depth image (H, W), metres along the optical axis; 0 where nothing was measured.
 
     Raises:
         EncodingError: the encoding is not that of a depth image, the bytes do not fit it or seem to
             be of 32 bit a pixel where it has 16, or the image is too large.
     """
+    data, height, width, step, encoding, is_bigendian = sent
     if encoding not in _KINDS:
         raise EncodingError(
             f"encoding {quoted(encoding)} is no depth; expected 16UC1 (millimetres) or "
@@ -116,7 +115,7 @@ def depth_from_image(message: Any) -> DepthImage:
     if hasattr(message, "format"):
         depth_m = unpack_depth(message.data, message.format)
     else:
-        depth_m = decode_depth(*image_parts(message))
+        depth_m = decode_depth(SentImage.of(message))
     try:
         return depth_from(depth_m, "the depth image")
     except ValueError as error:

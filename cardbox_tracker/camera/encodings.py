@@ -7,7 +7,6 @@ after the second row's second and third pixel, so the names in the table below d
 
 from __future__ import annotations
 
-from types import MappingProxyType
 from typing import Any, NamedTuple
 
 import cv2
@@ -27,158 +26,124 @@ MOST_PIXELS = 2**25
 
 
 class _Encoding(NamedTuple):
-    """Bytes per pixel, channels of the array, OpenCV's codes to grey and bgr (None: unchanged).
+    """How the pixels of an encoding are stored.
 
-    An encoding of 16 bits has the codes of the eight bits that its images are scaled to.
+    Attributes:
+        channels: channels of the array.
+        to_grey: OpenCV's code to grey; None: unchanged.
+        to_bgr: OpenCV's code to bgr; None: unchanged.
+        word_bytes: bytes of a number; those of 16 bits are scaled to eight.
+        shared: across and down, pixels that share a colour of YUV; None for other colours. With two
+            channels it lies beside the brightness, with one in rows below all brightness.
+        order: place of the brightness in a pixel of two channels; place of u in a colour below.
     """
 
-    bytes_per_pixel: int
     channels: int
-    to_grey: int | None
-    to_bgr: int | None
+    to_grey: int | None = None
+    to_bgr: int | None = None
+    word_bytes: int = 1
+    shared: tuple[int, int] | None = None
+    order: int = 0
 
-    @property
-    def of_16_bits(self) -> _Encoding:
-        return self._replace(bytes_per_pixel=2 * self.bytes_per_pixel)
 
-
-_MONO = _Encoding(1, 1, None, cv2.COLOR_GRAY2BGR)
-_BGR = _Encoding(3, 3, cv2.COLOR_BGR2GRAY, None)
-_RGB = _Encoding(3, 3, cv2.COLOR_RGB2GRAY, cv2.COLOR_RGB2BGR)
-_BGRA = _Encoding(4, 4, cv2.COLOR_BGRA2GRAY, cv2.COLOR_BGRA2BGR)
-_RGBA = _Encoding(4, 4, cv2.COLOR_RGBA2GRAY, cv2.COLOR_RGBA2BGR)
-_UYVY = _Encoding(2, 2, cv2.COLOR_YUV2GRAY_UYVY, None)
-_YUYV = _Encoding(2, 2, cv2.COLOR_YUV2GRAY_YUY2, None)
-_RGGB = _Encoding(1, 1, cv2.COLOR_BayerBG2GRAY, cv2.COLOR_BayerBG2BGR)
-_BGGR = _Encoding(1, 1, cv2.COLOR_BayerRG2GRAY, cv2.COLOR_BayerRG2BGR)
-_GBRG = _Encoding(1, 1, cv2.COLOR_BayerGR2GRAY, cv2.COLOR_BayerGR2BGR)
-_GRBG = _Encoding(1, 1, cv2.COLOR_BayerGB2GRAY, cv2.COLOR_BayerGB2BGR)
-# Brightness of all pixels, followed by their colours in pairs of bytes.
-_NV12 = _Encoding(1, 1, None, cv2.COLOR_YUV2BGR_NV12)
-_NV21 = _Encoding(1, 1, None, cv2.COLOR_YUV2BGR_NV21)
-_NV24 = _Encoding(1, 1, None, None)
-_ENCODINGS = MappingProxyType(
-    {
-        "mono8": _MONO,
-        "8UC1": _MONO,
-        "mono16": _MONO.of_16_bits,
-        "16UC1": _MONO.of_16_bits,
-        "rgb8": _RGB,
-        "bgr8": _BGR,
-        "8UC3": _BGR,
-        "rgba8": _RGBA,
-        "bgra8": _BGRA,
-        "8UC4": _BGRA,
-        "rgb16": _RGB.of_16_bits,
-        "bgr16": _BGR.of_16_bits,
-        "16UC3": _BGR.of_16_bits,
-        "rgba16": _RGBA.of_16_bits,
-        "bgra16": _BGRA.of_16_bits,
-        "16UC4": _BGRA.of_16_bits,
-        "yuv422": _UYVY,
-        "uyvy": _UYVY,
-        "yuv422_yuy2": _YUYV,
-        "yuyv": _YUYV,
-        "nv12": _NV12,
-        "nv21": _NV21,
-        "nv24": _NV24,
-        "bayer_rggb8": _RGGB,
-        "bayer_bggr8": _BGGR,
-        "bayer_gbrg8": _GBRG,
-        "bayer_grbg8": _GRBG,
-        "bayer_rggb16": _RGGB.of_16_bits,
-        "bayer_bggr16": _BGGR.of_16_bits,
-        "bayer_gbrg16": _GBRG.of_16_bits,
-        "bayer_grbg16": _GRBG.of_16_bits,
-    }
-)
+_MONO = _Encoding(1, None, cv2.COLOR_GRAY2BGR)
+_BGR = _Encoding(3, cv2.COLOR_BGR2GRAY)
+_RGB = _Encoding(3, cv2.COLOR_RGB2GRAY, cv2.COLOR_RGB2BGR)
+_BGRA = _Encoding(4, cv2.COLOR_BGRA2GRAY, cv2.COLOR_BGRA2BGR)
+_RGBA = _Encoding(4, cv2.COLOR_RGBA2GRAY, cv2.COLOR_RGBA2BGR)
+_EIGHT_BITS = {
+    "mono8": _MONO,
+    "8UC1": _MONO,
+    "rgb8": _RGB,
+    "bgr8": _BGR,
+    "8UC3": _BGR,
+    "rgba8": _RGBA,
+    "bgra8": _BGRA,
+    "8UC4": _BGRA,
+    "bayer_rggb8": _Encoding(1, cv2.COLOR_BayerBG2GRAY, cv2.COLOR_BayerBG2BGR),
+    "bayer_bggr8": _Encoding(1, cv2.COLOR_BayerRG2GRAY, cv2.COLOR_BayerRG2BGR),
+    "bayer_gbrg8": _Encoding(1, cv2.COLOR_BayerGR2GRAY, cv2.COLOR_BayerGR2BGR),
+    "bayer_grbg8": _Encoding(1, cv2.COLOR_BayerGB2GRAY, cv2.COLOR_BayerGB2BGR),
+}
+_ENCODINGS = _EIGHT_BITS | {
+    **{name.replace("8", "16"): kind._replace(word_bytes=2) for name, kind in _EIGHT_BITS.items()},
+    **dict.fromkeys(("yuv422", "uyvy"), _Encoding(2, shared=(2, 1), order=1)),
+    **dict.fromkeys(("yuv422_yuy2", "yuyv"), _Encoding(2, shared=(2, 1))),
+    "nv12": _Encoding(1, shared=(2, 2)),
+    "nv21": _Encoding(1, shared=(2, 2), order=1),
+    "nv24": _Encoding(1, shared=(1, 1)),
+}
 
 SUPPORTED_ENCODINGS: tuple[str, ...] = tuple(_ENCODINGS)
 
 
-def image_parts(message: Any) -> tuple[Any, int, int, int, str, bool]:
-    """Return the decoders' arguments from a sensor_msgs/Image of rclpy or of a recording."""
-    return (
-        message.data,
-        message.height,
-        message.width,
-        message.step,
-        message.encoding,
-        bool(message.is_bigendian),
-    )
+class SentImage(NamedTuple):
+    """An image as it is sent.
 
-
-def decode_grey(
-    data: Any,
-    height: int,
-    width: int,
-    step: int,
-    encoding: str,
-    is_bigendian: bool = False,
-    levels: Levels | None = None,
-) -> ImageArray:
-    """Return the brightness (H, W) uint8 of an image; mono8 is not copied.
-
-    Args:
+    Attributes:
         data: the bytes, as bytes, array.array or uint8 array.
         height: rows.
         width: columns.
         step: bytes per row, padding included.
-        encoding: one of ``SUPPORTED_ENCODINGS``.
-        is_bigendian: byte order of 16 bits.
+        encoding: one of ``SUPPORTED_ENCODINGS``, or that of a depth image.
+        is_bigendian: byte order of numbers of more than a byte.
+    """
+
+    data: Any
+    height: int
+    width: int
+    step: int
+    encoding: str
+    is_bigendian: bool = False
+
+    @classmethod
+    def of(cls, message: Any) -> SentImage:
+        """Return the image of a sensor_msgs/Image of rclpy or of a recording."""
+        return cls(*(getattr(message, name) for name in cls._fields))
+
+
+def decode_grey(sent: SentImage, levels: Levels | None = None) -> ImageArray:
+    """Return the brightness (H, W) uint8 of an image; mono8 is not copied.
+
+    Args:
+        sent: the image.
         levels: what scales 16 bits, the same for all images of a camera; without it, the range of
             this image counts.
 
     Raises:
         EncodingError: the encoding is not supported, or the bytes do not fit it.
     """
-    raw, kind = _pixels(data, height, width, step, encoding, is_bigendian, levels)
-    if encoding.startswith("nv"):
-        return np.ascontiguousarray(raw[:height])
+    raw, kind = _pixels(sent, levels)
+    if kind.shared is not None:
+        return np.ascontiguousarray(raw[: sent.height] if raw.ndim == 2 else raw[..., kind.order])
     return raw if kind.to_grey is None else np.asarray(cv2.cvtColor(raw, kind.to_grey), np.uint8)
 
 
-def decode_bgr(
-    data: Any,
-    height: int,
-    width: int,
-    step: int,
-    encoding: str,
-    is_bigendian: bool = False,
-    levels: Levels | None = None,
-) -> ImageArray:
+def decode_bgr(sent: SentImage, levels: Levels | None = None) -> ImageArray:
     """Return the colours (H, W, 3) uint8, bgr, of an image; see :func:`decode_grey`.
 
     Raises:
         EncodingError: the encoding is not supported, or the bytes do not fit it.
     """
-    raw, kind = _pixels(data, height, width, step, encoding, is_bigendian, levels)
-    if encoding == "nv24":
-        return _full_range(raw[:height], raw[height:].reshape(height, width, 2))
-    if kind.channels == 2:
-        luma = 1 if kind is _UYVY else 0
-        colours = raw[..., 1 - luma].reshape(height, width // 2, 2)
-        return _full_range(
-            raw[..., luma], cv2.resize(colours, (width, height), interpolation=cv2.INTER_NEAREST)
-        )
-    return raw if kind.to_bgr is None else np.asarray(cv2.cvtColor(raw, kind.to_bgr), np.uint8)
-
-
-def _full_range(brightness: ImageArray, colours: NDArray[Any]) -> ImageArray:
-    """Return bgr of a brightness (H, W), which it keeps, and colours (H, W, 2), u and v."""
-    yuv = np.dstack([brightness, colours])
+    raw, kind = _pixels(sent, levels)
+    if kind.shared is None:
+        return raw if kind.to_bgr is None else np.asarray(cv2.cvtColor(raw, kind.to_bgr), np.uint8)
+    height, width, (across, down) = sent.height, sent.width, kind.shared
+    if raw.ndim == 3:
+        brightness, colours = raw[..., kind.order], raw[..., 1 - kind.order]
+    else:
+        brightness, colours = raw[:height], raw[height:]
+    pairs = colours.reshape(height // down, width // across, 2)
+    if raw.ndim == 2 and kind.order:
+        pairs = pairs[..., ::-1]
+    each = cv2.resize(np.ascontiguousarray(pairs), (width, height), interpolation=cv2.INTER_NEAREST)
+    # The brightness has the full range, and is that of the grey image.
+    yuv = np.dstack([brightness, each])
     return np.asarray(cv2.cvtColor(yuv, cv2.COLOR_YUV2BGR), np.uint8)
 
 
 def decode_as_sent(
-    data: Any,
-    height: int,
-    width: int,
-    step: int,
-    encoding: str,
-    is_bigendian: bool = False,
-    most_pixels: float = MOST_PIXELS,
-    levels: Levels | None = None,
+    sent: SentImage, most_pixels: float = MOST_PIXELS, levels: Levels | None = None
 ) -> ImageArray:
     """Return bgr (H, W, 3) uint8 of a colour image, brightness (H, W) uint8 of a grey one.
 
@@ -186,10 +151,9 @@ def decode_as_sent(
         EncodingError: the encoding is not supported, the bytes do not fit it, or the image has more
             than ``most_pixels``.
     """
-    check_pixels(width, height, most_pixels)
-    is_grey = encoding.startswith("mono") or encoding in ("8UC1", "16UC1")
-    decode = decode_grey if is_grey else decode_bgr
-    return decode(data, height, width, step, encoding, is_bigendian, levels)
+    check_pixels(sent.width, sent.height, most_pixels)
+    is_grey = sent.encoding.startswith("mono") or sent.encoding in ("8UC1", "16UC1")
+    return (decode_grey if is_grey else decode_bgr)(sent, levels)
 
 
 def decode_compressed(
@@ -229,16 +193,9 @@ def _is_cut_off(raw: ImageArray) -> bool:
     return not data or (is_jpeg and data.rfind(b"\xff\xd9") < data.rfind(b"\xff\xda"))
 
 
-def _pixels(
-    data: Any,
-    height: int,
-    width: int,
-    step: int,
-    encoding: str,
-    is_bigendian: bool,
-    levels: Levels | None,
-) -> tuple[ImageArray, _Encoding]:
+def _pixels(sent: SentImage, levels: Levels | None) -> tuple[ImageArray, _Encoding]:
     """Return the image as an array in its own layout, and its encoding."""
+    data, height, width, step, encoding, is_bigendian = sent
     check_pixels(width, height, MOST_PIXELS)
     kind = _ENCODINGS.get(encoding)
     if kind is None:
@@ -246,7 +203,7 @@ def _pixels(
             f"encoding {quoted(encoding)} is not supported; supported are "
             f"{', '.join(SUPPORTED_ENCODINGS)}: set the camera driver to one of them"
         )
-    row_bytes = width * kind.bytes_per_pixel
+    row_bytes = width * kind.channels * kind.word_bytes
     if height <= 0 or width <= 0:
         raise EncodingError(
             f"a {encoding} image has the size {width}x{height}; expected one pixel or more: the "
@@ -257,11 +214,11 @@ def _pixels(
             f"a {encoding} image of {width}x{height} has rows of {step} bytes; expected "
             f"{row_bytes} or more"
         )
-    has_pairs = kind.channels == 2 or encoding in ("nv12", "nv21")
-    if (has_pairs and width % 2) or (encoding in ("nv12", "nv21") and height % 2):
+    across, down = kind.shared or (1, 1)
+    if width % across or height % down:
         raise EncodingError(
             f"a {encoding} image is {width} wide and {height} high; expected an even width"
-            + (" and height" if encoding.startswith("nv") else "")
+            + (" and height" if down > 1 else "")
         )
     if encoding.startswith("bayer") and min(width, height) < 3:
         raise EncodingError(
@@ -269,8 +226,8 @@ def _pixels(
             "expected 3x3 or more"
         )
     raw, rows = np.frombuffer(data, np.uint8), height
-    if encoding.startswith("nv"):
-        rows = 3 * height if encoding == "nv24" else height * 3 // 2
+    if kind.shared is not None and kind.channels == 1:
+        rows += 2 * height // (across * down)
         # Some drivers count the bytes of the colours into the rows of the brightness.
         step = step if len(raw) >= rows * step else width
     if len(raw) < rows * step:
@@ -279,7 +236,7 @@ def _pixels(
             f"{rows * step}: the message is incomplete"
         )
     pixels = raw[: rows * step].reshape(rows, step)[:, :row_bytes]
-    if kind.bytes_per_pixel == 2 * kind.channels:
+    if kind.word_bytes == 2:
         words = np.ascontiguousarray(pixels).view(">u2" if is_bigendian else "<u2")
         pixels = (levels or Levels())(words)
     if kind.channels == 1:

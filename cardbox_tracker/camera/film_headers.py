@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import struct
-from collections.abc import Iterator
+from collections.abc import Container, Iterator
 from pathlib import Path
 from typing import Any, BinaryIO
 
@@ -14,7 +14,8 @@ from numpy.typing import NDArray
 
 from cardbox_tracker.common.errors import CameraError
 
-_MOST_HEADER_BYTES = 64 * 1024 * 1024
+# More than the longest header of a film or a track.
+_MOST_HEADER_BYTES = 128
 # Pixels that are less oblong count as square, px / px.
 _SQUARE = 0.01
 _MOST_OBLONG = 4.0
@@ -68,44 +69,46 @@ def shown_s(path: Path) -> float | None:
     Films that were trimmed on a phone keep the images before and after. It is None for other
     films, and for those that do not state it.
     """
-    with path.open("rb") as file:
-        header = _movie_header(file)
-    at = header.find(b"mvhd") + 4
-    if at < 4:
-        return None
+    timescale, times = 0, [0]
     try:
-        (timescale,) = struct.unpack_from(">I", header, at + (20 if header[at] else 12))
-        times = list(_shown_times(header))
-    except (struct.error, IndexError):
+        with path.open("rb") as file:
+            for kind, at, _ in boxes(file, (b"moov", b"trak")):
+                file.seek(at)
+                header = file.read(_MOST_HEADER_BYTES)
+                if kind == b"mvhd":
+                    (timescale,) = struct.unpack_from(">I", header, 20 if header[0] else 12)
+                elif kind == b"tkhd":
+                    (width,) = struct.unpack_from(">I", header, 88 if header[0] else 76)
+                    place = (">Q", 28) if header[0] else (">I", 20)
+                    (duration,) = struct.unpack_from(place[0], header, place[1])
+                    times.append(duration if width else 0)
+    except (struct.error, IndexError, RecursionError):
         return None
-    return max(times) / timescale if timescale and times and max(times) > 0 else None
+    return max(times) / timescale if timescale and max(times) > 0 else None
 
 
-def _movie_header(file: BinaryIO) -> bytes:
-    """Return the box ``moov`` of a film; empty if there is none."""
-    size = os.fstat(file.fileno()).st_size
-    at = 0
-    while at + 16 <= size:
-        file.seek(at)
-        length, kind, long = struct.unpack(">I4sQ", file.read(16))
-        length = long if length == 1 else length or size - at
-        if length < 8 or (at == 0 and kind not in (b"ftyp", b"moov", b"wide", b"mdat", b"free")):
-            return b""
-        if kind == b"moov":
-            file.seek(at)
-            return file.read(min(length, _MOST_HEADER_BYTES))
-        at += length
-    return b""
+def boxes(
+    file: BinaryIO, inside: Container[bytes] = (), start: int = 0, end: int | None = None
+) -> Iterator[tuple[bytes, int, int]]:
+    """Yield kind, and begin and end of the content, of the boxes of an MP4 or MOV.
 
-
-def _shown_times(header: bytes) -> Iterator[int]:
-    """Yield the duration of each track that has a width, in units of the film."""
-    at = header.find(b"tkhd")
-    while at >= 0:
-        is_long = header[at + 4]
-        (width,) = struct.unpack_from(">I", header, at + 4 + (88 if is_long else 76))
-        place = at + 4 + (28 if is_long else 20)
-        (duration,) = struct.unpack_from(">Q" if is_long else ">I", header, place)
-        if width:
-            yield duration
-        at = header.find(b"tkhd", at + 4)
+    Args:
+        file: the film, or the content of a box.
+        inside: kinds of boxes in which the boxes follow, too.
+        start: place of the first box.
+        end: place behind the last one; None for the end of the file.
+    """
+    end = file.seek(0, os.SEEK_END) if end is None else end
+    while start + 8 <= end:
+        file.seek(start)
+        size, kind = struct.unpack(">I4s", file.read(8))
+        header = 8
+        if size == 1:
+            size, header = struct.unpack(">Q", file.read(8))[0], 16
+        size = size or end - start
+        if size < header:
+            return
+        yield kind, start + header, min(start + size, end)
+        if kind in inside:
+            yield from boxes(file, inside, start + header, min(start + size, end))
+        start += size

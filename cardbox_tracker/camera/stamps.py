@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from bisect import insort
 from collections import Counter, deque
+from collections.abc import Iterable
 from enum import Enum
 
 WINDOW = 120
@@ -144,7 +145,7 @@ class StreamStatistics:
 
     def _note(self, spacing_ns: int) -> None:
         if len(self._spacings_ns) == WINDOW:
-            self._dropped_before += self._lost_in(self._spacings_ns.popleft())
+            self._dropped_before += self._lost_in([self._spacings_ns.popleft()])
         self._spacings_ns.append(spacing_ns)
         if len(self._group_ns) % _GROUP == 0:
             self._group_ns.clear()
@@ -155,11 +156,13 @@ class StreamStatistics:
     @property
     def dropped(self) -> int:
         """Number of lost messages, of the latest ones by the period as it is known now."""
-        is_known = len(self._spacings_ns) >= _ENOUGH
-        return self._dropped_before + is_known * sum(map(self._lost_in, self._spacings_ns))
+        if len(self._spacings_ns) < _ENOUGH:
+            return self._dropped_before
+        return self._dropped_before + self._lost_in(self._spacings_ns)
 
-    def _lost_in(self, spacing_ns: int) -> int:
-        return max(round(spacing_ns / self.period_ns) - 1, 0)
+    def _lost_in(self, spacings_ns: Iterable[int]) -> int:
+        period_ns = self.period_ns
+        return sum(max(round(spacing_ns / period_ns) - 1, 0) for spacing_ns in spacings_ns)
 
     @property
     def out_of_order(self) -> int:

@@ -23,8 +23,7 @@ def unrectified(calibration: Calibration, px: FloatArray, width: int, height: in
         CameraError: the camera is uncalibrated or its distortion model is unknown.
     """
     camera = calibration.camera(width, height)
-    rays = (np.asarray(px, np.float64) - (camera.cx, camera.cy)) / (camera.fx, camera.fy)
-    rays = rays @ calibration.turn()[:2, :2]
+    rays = camera.rays(px)[:, :2] @ calibration.turn()[:2, :2]
     k, lens = calibration.k, calibration.distortion
     if not calibration.is_distorted:
         return np.asarray(rays * k.diagonal()[:2] + k[:2, 2])

@@ -177,9 +177,9 @@ def _films(options: argparse.Namespace, jobs: int) -> None:
             films += future.result()
             show(done / len(work))
     names = " ".join(folder.name for folder in options.films)
+    how = f"--preset {options.preset} --seed {options.seed} --seeds {options.seeds}"
     results = {
-        "command": f"cardbox evaluate --films {names} --preset {options.preset} "
-        f"--seeds {options.seeds} --seed {options.seed} --output DIR",
+        "command": f"cardbox evaluate --films {names} {how} --output DIR",
         "films": sorted(films, key=lambda film: (film["given"], film["shape"])),
         "provenance": provenance(),
     }

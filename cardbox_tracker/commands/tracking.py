@@ -108,6 +108,8 @@ def track(
         total_s = max(1e-9, min(source.first.duration_s, person.end_s) - start_s)
         with ExitStack() as stack:
             observers = (*_writers(request, source, stack), *observers)
+            if show is None:
+                observers = (*observers, judge)
             advance = show or stack.enter_context(progress_bar("track"))
             summary = track_recording(
                 source,
@@ -116,11 +118,7 @@ def track(
                 request.seed,
                 start_s,
                 request.files.table,
-                (
-                    *observers,
-                    judge,
-                    lambda frame, *_: advance((frame.time_s - start_s) / total_s),
-                ),
+                (*observers, lambda frame, *_: advance((frame.time_s - start_s) / total_s)),
                 person.end_s,
                 crowd,
                 None if request.hands is None else HandNetwork(request.hands),

@@ -39,21 +39,24 @@ class ModelFile(NamedTuple):
     sha256: str
 
 
+_DETECTOR, _LANDMARKS, _HANDS = (
+    f"{name}.tflite" for name in ("pose_detection", "pose_landmark_full", "hand_landmark_full")
+)
 FILES = {
-    "pose_detection.tflite": ModelFile(
+    _DETECTOR: ModelFile(
         "mediapipe/modules/pose_detection/pose_detection.tflite",
         "9ba9dd3d42efaaba86b4ff0122b06f29c4122e756b329d89dca1e297fd8f866c",
     ),
-    "pose_landmark_full.tflite": ModelFile(
+    _LANDMARKS: ModelFile(
         "mediapipe/modules/pose_landmark/pose_landmark_full.tflite",
         "e9a5c5cb17f736fafd4c2ec1da3b3d331d6edbe8a0d32395855aeb2cdfd64b9f",
     ),
-    "hand_landmark_full.tflite": ModelFile(
+    _HANDS: ModelFile(
         "mediapipe/modules/hand_landmark/hand_landmark_full.tflite",
         "11c272b891e1a99ab034208e23937a8008388cf11ed2a9d776ed3d01d0ba00e3",
     ),
 }
-"""The network files by their installed names; the first two find people, the last one hands."""
+"""The network files by their installed names."""
 
 
 class ModelFiles(NamedTuple):
@@ -76,8 +79,7 @@ def installed_models() -> ModelFiles:
     Raises:
         CardboxError: one is missing, or is not the file that it should be.
     """
-    detector, landmarks, _ = FILES
-    return ModelFiles(_checked(detector), _checked(landmarks))
+    return ModelFiles(_checked(_DETECTOR), _checked(_LANDMARKS))
 
 
 def installed_hands() -> Path:
@@ -86,7 +88,7 @@ def installed_hands() -> Path:
     Raises:
         CardboxError: it is missing, or is not the file that it should be.
     """
-    return _checked(list(FILES)[-1])
+    return _checked(_HANDS)
 
 
 def _checked(name: str) -> Path:

@@ -82,26 +82,23 @@ def person_in(silhouette: NDArray[np.uint8], persons: Sequence[ImagePoints]) -> 
     known = [person for person in persons if not person.is_empty]
     if len(known) < 2:
         return known[0] if known else None
-    near = _near(silhouette)
+    near = _dilated(silhouette)
     return max(known, key=lambda person: (_support(near, person), person.scores.sum()))
 
 
-def inside(silhouette: NDArray[np.uint8], points: ImagePoints) -> float | None:
-    """Return the share of the points, by their scores, that lie in the silhouette.
-
-    Args:
-        silhouette: (H, W), 0 or 255.
-        points: px of the silhouette.
-
-    Returns:
-        None if there are no points, or the silhouette is too small for a person.
-    """
-    if np.count_nonzero(silhouette) < _LEAST_SILHOUETTE * silhouette.size or points.is_empty:
+def near_person(silhouette: NDArray[np.uint8]) -> NDArray[np.uint8] | None:
+    """Return the pixels (H, W) in and near a silhouette; None if it is too small for a person."""
+    if np.count_nonzero(silhouette) < _LEAST_SILHOUETTE * silhouette.size:
         return None
-    return _support(_near(silhouette), points) / float(points.scores.sum())
+    return _dilated(silhouette)
 
 
-def _near(silhouette: NDArray[np.uint8]) -> NDArray[np.uint8]:
+def inside(near: NDArray[np.uint8], points: ImagePoints) -> float:
+    """Return the share of points, by their scores, on pixels of :func:`near_person`; 0 of none."""
+    return _support(near, points) / max(float(points.scores.sum()), 1e-9)
+
+
+def _dilated(silhouette: NDArray[np.uint8]) -> NDArray[np.uint8]:
     kernel = np.ones((2 * _MARGIN_PX + 1, 2 * _MARGIN_PX + 1), np.uint8)
     return np.asarray(cv2.dilate(silhouette, kernel), np.uint8)
 

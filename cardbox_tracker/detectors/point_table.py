@@ -20,7 +20,7 @@ from cardbox_tracker.common.errors import CardboxError, quoted
 from cardbox_tracker.common.files import UnreadableFileError, regular_file
 from cardbox_tracker.detectors.image_points import POINT_INDEX, ImagePoints
 from cardbox_tracker.detectors.keypoint_json import coco_people, openpose_people
-from cardbox_tracker.detectors.person_choice import LEAST_INSIDE, inside, person_in
+from cardbox_tracker.detectors.person_choice import LEAST_INSIDE, inside, near_person, person_in
 from cardbox_tracker.detectors.point_checks import Size, check_person, check_point, person_of
 
 COLUMNS = ("stamp_ns", "joint", "u", "v", "score")
@@ -216,9 +216,11 @@ class GivenPoints:
         """Keep the people in each image."""
         self._path, self.kind, self._persons, self._tolerance_ns = path, kind, persons, tolerance_ns
         self._stamps = sorted(key for key in persons if isinstance(key, int))
-        # A video's images have no names, but programs number those that they take out of it.
-        numbers = {key: re.findall(r"\d+", str(key)) for key in persons}
-        self._numbered = {int(found[-1]): persons[key] for key, found in numbers.items() if found}
+        self._numbered: dict[int, list[ImagePoints]] = {}
+        if kind == "name":
+            # A video's images have no names, but programs number those that they take out of it.
+            numbers = {key: re.findall(r"\d+", str(key)) for key in persons}
+            self._numbered = {int(one[-1]): persons[key] for key, one in numbers.items() if one}
         self.restart()
 
     def restart(self) -> None:
@@ -346,15 +348,12 @@ def why_not(silhouette: NDArray[np.uint8], person: ImagePoints) -> str:
 
     Points that are wrong in another way than their place may lie on the person in part.
     """
-    share = inside(silhouette, person)
-    if share is None or share >= _MOST_DOUBTFUL:
+    near = near_person(silhouette)
+    if near is None or person.is_empty or (share := inside(near, person)) >= _MOST_DOUBTFUL:
         return ""
     mirrored = np.stack([silhouette.shape[1] - 1 - person.px[:, 0], person.px[:, 1]], axis=1)
     others = {_EXCHANGED: person.px[:, ::-1], _MIRRORED: mirrored}
-    shares = {
-        reason: inside(silhouette, ImagePoints(px, person.scores)) or 0.0
-        for reason, px in others.items()
-    }
+    shares = {reason: inside(near, ImagePoints(px, person.scores)) for reason, px in others.items()}
     best = max(shares, key=lambda reason: shares[reason])
     if shares[best] >= _LEAST_SURE:
         return best

@@ -7,6 +7,9 @@ the person still stands there. :mod:`.reference_checks` makes finer checks of al
 
 from __future__ import annotations
 
+from dataclasses import replace
+from typing import NamedTuple
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -16,7 +19,7 @@ from cardbox_tracker.common.errors import InitializationError
 from cardbox_tracker.measuring.config import InitializationConfig
 from cardbox_tracker.measuring.outline import filled
 from cardbox_tracker.measuring.references import POSTURE_TEXT, lateral_m
-from cardbox_tracker.measuring.standing import at_height_of
+from cardbox_tracker.measuring.stature import at_height_of
 from cardbox_tracker.measuring.wording import rounded_down
 from cardbox_tracker.person.cardbox import cardbox_patches
 from cardbox_tracker.person.model import BodyModel
@@ -102,3 +105,101 @@ def check_asked(
             f"and the distance ({config.distance_m:g} m), and {POSTURE_TEXT[name]}"
         )
     return ""
+
+
+FITS, NEARLY, FAR = "fits", "nearly", "far"
+"""A capture would be accepted without a warning, or almost; or another posture is shown."""
+
+_WIDTH_PX = 80
+_SOME_IOU = 0.40
+_LEAST_PX = 20
+
+
+class _Outline(NamedTuple):
+    """A rendered person in a posture on the grid, above the hips.
+
+    Attributes:
+        name: reference posture.
+        mask: (h, w); the first row has the top of the head.
+        column: middle of head and chest in ``mask``.
+    """
+
+    name: str
+    mask: NDArray[np.bool_]
+    column: int
+
+
+class LiveFit:
+    """Compares silhouettes of one camera with the reference postures."""
+
+    def __init__(self, camera: Camera, config: InitializationConfig) -> None:
+        """Draw the outlines of people at the distance of ``config``."""
+        self.camera, self.config = camera, config
+        self._cell = max(1, camera.width // _WIDTH_PX)
+        grid = camera.scaled(camera.width // self._cell, camera.height // self._cell)
+        # The canvas is larger than the image, so that no outline is cut off.
+        wide = replace(
+            grid.with_pitch(config.camera_pitch_rad),
+            width=3 * grid.width,
+            height=3 * grid.height,
+            cx=grid.cx + grid.width,
+            cy=grid.cy + grid.height,
+        )
+        self._outlines = [
+            _outline(name, stature_m, wide, config)
+            for stature_m in STATURES_M
+            for name in REFERENCE_NAMES
+        ]
+
+    def __call__(self, name: str, silhouette: Silhouette) -> str:
+        """Return ``fits``, ``nearly`` or ``far`` for a reference's name and a silhouette (H, W)."""
+        ious = self.ious(silhouette)
+        if ious[name] < _SOME_IOU or max(ious.values()) - ious[name] >= CLEARLY:
+            return FAR
+        return FITS if ious[name] >= LEAST_IOU else NEARLY
+
+    def ious(self, silhouette: Silhouette) -> dict[str, float]:
+        """Return the IoU of the best stature with each reference posture, by name."""
+        half = self._cell // 2
+        # Holes are filled at full resolution, because narrow parts break on the grid.
+        seen = filled(silhouette)[half :: self._cell, half :: self._cell] > 0
+        ious = dict.fromkeys(REFERENCE_NAMES, 0.0)
+        if np.count_nonzero(seen) < _LEAST_PX:
+            return ious
+        crown = int(np.argmax(seen.any(axis=1)))
+        column = _middle_column(seen)
+        for outline in self._outlines:
+            iou = _iou(seen[crown:], outline.mask, column - outline.column)
+            ious[outline.name] = max(ious[outline.name], iou)
+        return ious
+
+
+def _outline(name: str, stature_m: float, camera: Camera, config: InitializationConfig) -> _Outline:
+    body = BodyModel.of(
+        sizes_of_stature(stature_m),
+        distance_m=config.distance_m,
+        hip_height_m=0.0,
+        camera_pitch_rad=config.camera_pitch_rad,
+        side_turn=config.side_turn,
+    )
+    drawn = render(cardbox_patches(body, reference_posture(name, config.side_turn)), camera) > 0
+    hips = camera.reference_to_optical(np.array([-config.distance_m, 0.0, 0.0]))
+    crown = int(np.argmax(drawn.any(axis=1)))
+    mask = drawn[crown : max(crown + 1, round(float(camera.project(hips)[1])))]
+    return _Outline(name, mask, _middle_column(drawn))
+
+
+def _middle_column(mask: NDArray[np.bool_]) -> int:
+    """Return the middle column of head and chest."""
+    plain = Camera(mask.shape[1], mask.shape[0], 1.0, 1.0, 0.0, 0.0)
+    return round(lateral_m(mask.astype(np.uint8), plain, 1.0))
+
+
+def _iou(seen: NDArray[np.bool_], drawn: NDArray[np.bool_], shift: int) -> float:
+    """Return the IoU of ``seen`` and ``drawn`` translated to the right by ``shift``."""
+    rows = min(len(seen), len(drawn))
+    first, last = max(0, -shift), min(drawn.shape[1], seen.shape[1] - shift)
+    there = seen[:rows]
+    both = np.count_nonzero(there[:, first + shift : last + shift] & drawn[:rows, first:last])
+    either = np.count_nonzero(there) + np.count_nonzero(drawn[:rows]) - both
+    return both / either if either else 0.0

@@ -137,7 +137,7 @@ def _guesses(
         return
     top = int(rows[0])
     column = float(np.median(np.flatnonzero(front[top : top + 3].any(axis=0))))
-    ray = np.array([(column - camera.cx) / camera.fx, (top - camera.cy) / camera.fy, 1.0])
+    ray = camera.rays(np.array([column, top]))
     ray /= np.linalg.norm(ray)
     frames = pose(body, reference_posture("front"))
     crown = frames.head + np.array([0.0, 0.0, body_parts(body.sizes).head.height_m / 2])

@@ -30,7 +30,7 @@ from cardbox_tracker.measuring.references import (
     MIN_PERSON_FRACTION,
     lateral_m,
 )
-from cardbox_tracker.measuring.standing import at_height_of
+from cardbox_tracker.measuring.stature import at_height_of
 from cardbox_tracker.measuring.wording import rounded_down
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.posture import N_STATE, PLACE, POSTURE, TORSO_Y

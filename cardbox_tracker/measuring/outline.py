@@ -76,15 +76,7 @@ def plane_points_m(
         rows: shape (n,), px.
         distance_m: level distance to the plane.
     """
-    rays = np.stack(
-        [
-            (np.asarray(columns, dtype=np.float64) - camera.cx) / camera.fx,
-            (np.asarray(rows, dtype=np.float64) - camera.cy) / camera.fy,
-            np.ones(len(columns)),
-        ],
-        axis=-1,
-    )
-    points = camera.optical_to_reference(rays)
+    points = camera.optical_to_reference(camera.rays(np.column_stack([columns, rows])))
     scaled: FloatArray = points[:, 1:] * (-distance_m / points[:, :1])
     return scaled
 

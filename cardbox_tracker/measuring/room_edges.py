@@ -71,8 +71,7 @@ def _planes(picture: NDArray[np.uint8], camera: Camera) -> tuple[FloatArray, Flo
     is_inside = (columns.max(axis=1) > border) & (columns.min(axis=1) < view.width - 1 - border)
     is_steep = along[:, 0] < np.tan(_STEEPEST) * along[:, 1]
     kept = is_inside & is_steep & (lengths > _SHORTEST * longer)
-    rays = np.ones((int(kept.sum()), 2, 3))
-    rays[..., :2] = (ends[kept] - (view.cx, view.cy)) / (view.fx, view.fy)
+    rays = view.rays(ends[kept])
     normals = np.cross(rays[:, 0], rays[:, 1])
     normals /= np.linalg.norm(normals, axis=1, keepdims=True)
     return normals, lengths[kept] / (_WHOLE * longer)

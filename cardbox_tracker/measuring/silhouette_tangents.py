@@ -194,7 +194,7 @@ def _hull(mask: Silhouette, camera: Camera) -> _Hull:
     hull = cv2.convexHull(points).reshape(-1, 2).astype(np.float64)
     x, y = hull.T
     inside = (x >= _BORDER_PX) & (x < camera.width - _BORDER_PX) & (y >= _BORDER_PX)
-    rays = np.column_stack([(x - camera.cx) / camera.fx, (y - camera.cy) / camera.fy, 0.0 * x + 1])
+    rays = camera.rays(hull)
     return rays / np.linalg.norm(rays, axis=1)[:, None], inside
 
 

@@ -16,6 +16,8 @@ from typing import NamedTuple
 import numpy as np
 
 from cardbox_tracker.camera.camera import Camera
+from cardbox_tracker.detectors.landmarks import LANDMARKS
+from cardbox_tracker.detectors.pose_network import Detection
 from cardbox_tracker.person.sizes import FloatArray
 
 
@@ -80,7 +82,6 @@ class StandingCamera(NamedTuple):
             person does not lean aside.
         roll_stddev_rad: its standard deviation.
         distance: level distance of the person, in statures.
-        distance_stddev: its standard deviation as a share of it.
     """
 
     pitch_rad: float
@@ -88,7 +89,6 @@ class StandingCamera(NamedTuple):
     line_roll_rad: float
     roll_stddev_rad: float
     distance: float
-    distance_stddev: float
 
     @property
     def is_pitch_found(self) -> bool:
@@ -102,21 +102,16 @@ class StandingCamera(NamedTuple):
         return self.line_roll_rad if is_sure else 0.0
 
 
-def middles(
-    images: Sequence[tuple[Mapping[str, FloatArray], Mapping[str, float]]],
-) -> dict[str, FloatArray]:
-    """Return the middle (2,), px, of each pair of joints that is seen in half of the images.
-
-    Args:
-        images: points (2,), px, and their scores, 0 to 1, by name, such as ``left_ear``.
-    """
+def middles(images: Sequence[Detection]) -> dict[str, FloatArray]:
+    """Return the middle (2,), px, of each of ``LEVELS`` that is seen in half of the images."""
     found: dict[str, FloatArray] = {}
     for level in LEVELS:
-        pair = (level,) * 2 if level == "nose" else (f"left_{level}", f"right_{level}")
+        names = (level,) if level == "nose" else (f"left_{level}", f"right_{level}")
+        pair = [LANDMARKS.index(name) for name in names]
         seen = [
-            (points[pair[0]] + points[pair[1]]) / 2
-            for points, scores in images
-            if min(scores[name] for name in pair) >= _LEAST_SCORE
+            one.points_px[pair].mean(axis=0)
+            for one in images
+            if one.scores[pair].min() >= _LEAST_SCORE
         ]
         if 2 * len(seen) > len(images):
             found[level] = np.median(seen, axis=0)
@@ -140,7 +135,7 @@ def standing_camera(
         return None
     levels = np.array([LEVELS[name] for name in names])
     seen = np.array([points[name] for name in names])
-    rays: FloatArray = (seen - (camera.cx, camera.cy)) / (camera.fx, camera.fy)
+    rays = camera.rays(seen)[:, :2]
     below = rays[-1, 1] - rays[0, 1]
     if below <= 0.0:
         return None
@@ -172,7 +167,6 @@ def standing_camera(
         float(fit[_ROLL]),
         float(stddevs[_ROLL]),
         float(np.exp(fit[_DISTANCE])),
-        float(stddevs[_DISTANCE]),
     )
 
 

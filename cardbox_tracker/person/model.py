@@ -228,14 +228,10 @@ class BodyModel:
         changed: dict[str, Any] = {}
         if "sizes" in values:
             changed["person"] = Person(values.pop("sizes"))
-        if "camera_pitch_rad" in values:
-            pitch_rad = values.pop("camera_pitch_rad")
-            changed["camera_pose"] = replace(self.camera_pose, pitch_rad=pitch_rad)
-        if "pitch_stddev_rad" in values:
-            there = changed.get("camera_pose", self.camera_pose)
-            stddev_rad = values.pop("pitch_stddev_rad")
-            changed["camera_pose"] = replace(there, pitch_stddev_rad=stddev_rad)
+        tilt = {"camera_pitch_rad": "pitch_rad", "pitch_stddev_rad": "pitch_stddev_rad"}
+        tilted = {tilt[name]: values.pop(name) for name in tilt if name in values}
         place = {name: values.pop(name) for name in PLACEMENT if name in values}
+        changed["camera_pose"] = replace(self.camera_pose, **tilted)
         changed["placement"] = replace(self.placement, **place)
         return replace(self, **changed, **values)
 

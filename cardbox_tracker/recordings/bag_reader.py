@@ -20,9 +20,9 @@ from rosbags.typesys import Stores, get_typestore
 from cardbox_tracker.camera.calibration_watch import CalibrationWatch
 from cardbox_tracker.camera.camera import Calibration
 from cardbox_tracker.camera.encodings import (
+    SentImage,
     decode_as_sent,
     decode_compressed,
-    image_parts,
 )
 from cardbox_tracker.camera.levels import Levels
 from cardbox_tracker.camera.stamps import RecordedStamps, StampOrder
@@ -415,7 +415,7 @@ def stamp_ns_of(message: Any) -> int:
 
 def _decoder(image: Any, levels: Levels) -> Callable[[], NDArray[np.uint8]]:
     if hasattr(image, "encoding"):
-        return partial(decode_as_sent, *image_parts(image), levels=levels)
+        return partial(decode_as_sent, SentImage.of(image), levels=levels)
     return partial(decode_compressed, image.data, levels=levels)
 
 

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 from rosbags.interfaces import (
     Connection,
+    Nodetype,
     Qos,
     QosDurability,
     QosHistory,
@@ -116,12 +117,30 @@ class BagWriter:
                     os.replace(self.path, self._folder / "replaced recording")
                 os.replace(self.folder, self.path)
 
-    def type(self, name: str) -> Any:
-        """Return the message class of ``name``, such as ``std_msgs/msg/String``."""
-        return self._store.types[name]
+    def knows(self, kind: str) -> bool:
+        """Return whether a message type is part of ROS 2."""
+        return kind in self._store.types
+
+    def new(self, kind: str, **values: Any) -> Any:
+        """Return a message of a type such as ``std_msgs/msg/String``; what is not given is zero."""
+        fields = self._store.fielddefs[kind][1]
+        zeros = {name: self._zero(type_) for name, type_ in fields if name not in values}
+        return self._store.types[kind](**zeros, **values)
+
+    def _zero(self, type_: Any) -> Any:
+        """Return the zero of the type of a field, as rosbags describes it."""
+        node, of = type_
+        if node is Nodetype.NAME:
+            return self.new(of)
+        if node is Nodetype.BASE:
+            return "" if of[0] == "string" else 0
+        # Only numbers are arrays of a fixed length here.
+        (inner, name), count = of
+        is_number = inner is Nodetype.BASE and name[0] != "string"
+        return np.zeros(count * (node is Nodetype.ARRAY), name[0]) if is_number else []
 
     def write(self, topic: str, message: Any, stamp_ns: int) -> None:
-        """Write a message made with :meth:`type`."""
+        """Write a message made with :meth:`new`."""
         name = message.__msgtype__
         self.write_raw(topic, name, self._store.serialize_cdr(message, name), stamp_ns)
 
@@ -136,45 +155,45 @@ class BagWriter:
             self._connections[topic] = connection
         self._writer.write(connection, stamp_ns, raw)
 
+    def write_stamped(
+        self, topic: str, kind: str, stamp_ns: int, frame_id: str, **values: Any
+    ) -> None:
+        """Write a message of :meth:`new` with a header."""
+        self.write(
+            topic, self.new(kind, header=self.header(stamp_ns, frame_id), **values), stamp_ns
+        )
+
     def header(self, stamp_ns: int, frame_id: str) -> Any:
         """Return a std_msgs/Header."""
-        time = self.type("builtin_interfaces/msg/Time")
-        stamp = time(sec=stamp_ns // 10**9, nanosec=stamp_ns % 10**9)
-        return self.type("std_msgs/msg/Header")(stamp=stamp, frame_id=frame_id)
+        stamp = self.new(
+            "builtin_interfaces/msg/Time", sec=stamp_ns // 10**9, nanosec=stamp_ns % 10**9
+        )
+        return self.new("std_msgs/msg/Header", stamp=stamp, frame_id=frame_id)
 
     def write_image(
         self, topic: str, stamp_ns: int, frame_id: str, array: NDArray[Any], encoding: str
     ) -> None:
         """Write pixels (H, W) or (H, W, channels) as an Image of that encoding."""
         array = np.ascontiguousarray(array)
-        message = self.type("sensor_msgs/msg/Image")(
-            header=self.header(stamp_ns, frame_id),
+        self.write_stamped(
+            *(topic, "sensor_msgs/msg/Image", stamp_ns, frame_id),
             height=array.shape[0],
             width=array.shape[1],
             encoding=encoding,
-            is_bigendian=0,
             step=array.nbytes // array.shape[0],
             data=array.view(np.uint8).ravel(),
         )
-        self.write(topic, message, stamp_ns)
 
     def write_compressed(self, topic: str, stamp_ns: int, frame_id: str, data: bytes) -> None:
         """Write JPEG bytes as a CompressedImage."""
-        message = self.type("sensor_msgs/msg/CompressedImage")(
-            header=self.header(stamp_ns, frame_id),
-            format="jpeg",
-            data=np.frombuffer(data, np.uint8),
-        )
-        self.write(topic, message, stamp_ns)
+        pixels, kind = np.frombuffer(data, np.uint8), "sensor_msgs/msg/CompressedImage"
+        self.write_stamped(topic, kind, stamp_ns, frame_id, format="jpeg", data=pixels)
 
     def write_camera_info(self, topic: str, stamp_ns: int, frame_id: str, camera: Camera) -> None:
         """Write an ideal camera as a CameraInfo without distortion."""
         k = np.array([camera.fx, 0, camera.cx, 0, camera.fy, camera.cy, 0, 0, 1], np.float64)
-        roi = self.type("sensor_msgs/msg/RegionOfInterest")(
-            x_offset=0, y_offset=0, height=0, width=0, do_rectify=False
-        )
-        message = self.type("sensor_msgs/msg/CameraInfo")(
-            header=self.header(stamp_ns, frame_id),
+        self.write_stamped(
+            *(topic, "sensor_msgs/msg/CameraInfo", stamp_ns, frame_id),
             height=camera.height,
             width=camera.width,
             distortion_model="plumb_bob",
@@ -182,11 +201,7 @@ class BagWriter:
             k=k,
             r=np.eye(3).ravel(),
             p=np.insert(k, (3, 6, 9), 0.0),
-            binning_x=0,
-            binning_y=0,
-            roi=roi,
         )
-        self.write(topic, message, stamp_ns)
 
     def write_joint_state(
         self,
@@ -198,31 +213,30 @@ class BagWriter:
         velocities: NDArray[np.float64] | None = None,
     ) -> None:
         """Write joint positions, rad and metres, and velocities, rad/s and m/s, if known."""
-        message = self.type("sensor_msgs/msg/JointState")(
-            header=self.header(stamp_ns, frame_id),
+        self.write_stamped(
+            *(topic, "sensor_msgs/msg/JointState", stamp_ns, frame_id),
             name=list(names),
             position=np.asarray(positions, np.float64),
             velocity=np.zeros(0) if velocities is None else np.asarray(velocities, np.float64),
-            effort=np.zeros(0),
         )
-        self.write(topic, message, stamp_ns)
+
+    def points(self, points_m: NDArray[np.float64]) -> list[Any]:
+        """Return points (n, 3), metres, as a list of geometry_msgs/Point."""
+        point = self._store.types["geometry_msgs/msg/Point"]
+        return [point(x=x, y=y, z=z) for x, y, z in np.asarray(points_m, np.float64).tolist()]
+
+    def pose(self, **values: Any) -> Any:
+        """Return a geometry_msgs/Pose without rotation."""
+        still = self.new("geometry_msgs/msg/Quaternion", w=1.0)
+        return self.new("geometry_msgs/msg/Pose", orientation=still, **values)
 
     def write_pose_array(
         self, topic: str, stamp_ns: int, frame_id: str, points_m: NDArray[np.float64]
     ) -> None:
         """Write points (n, 3), metres, as poses without rotation."""
-        point = self.type("geometry_msgs/msg/Point")
-        pose = self.type("geometry_msgs/msg/Pose")
-        still = self.type("geometry_msgs/msg/Quaternion")(x=0.0, y=0.0, z=0.0, w=1.0)
-        poses = [
-            pose(position=point(x=float(x), y=float(y), z=float(z)), orientation=still)
-            for x, y, z in points_m
-        ]
-        message = self.type("geometry_msgs/msg/PoseArray")(
-            header=self.header(stamp_ns, frame_id), poses=poses
-        )
-        self.write(topic, message, stamp_ns)
+        poses = [self.pose(position=point) for point in self.points(points_m)]
+        self.write_stamped(topic, "geometry_msgs/msg/PoseArray", stamp_ns, frame_id, poses=poses)
 
     def write_string(self, topic: str, stamp_ns: int, text: str) -> None:
         """Write a std_msgs/String."""
-        self.write(topic, self.type("std_msgs/msg/String")(data=text), stamp_ns)
+        self.write(topic, self.new("std_msgs/msg/String", data=text), stamp_ns)

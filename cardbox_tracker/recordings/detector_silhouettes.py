@@ -59,8 +59,8 @@ class DetectorSilhouetteSource(SilhouetteSource):
             seen = brightness_of(image), silhouette, image
             frame = RecordedFrame(stamp_ns, time_s, *seen, recorded=recorded)
             if self._finds_people:
-                detected = tuple(image_points(one) for one in found)
-                people = detected if self._given is None else self._people(prepared)
+                own = tuple(image_points(one) for one in found)
+                people = own if self._given is None else self._people(prepared)
                 yield frame._replace(people=people)
             elif found and self._has_own_points:
                 yield frame._replace(points=image_points(found[0]))

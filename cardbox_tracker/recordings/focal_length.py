@@ -6,13 +6,14 @@ Images state it as EXIF ``FocalLengthIn35mmFilm``. Films have it among their Qui
 
 from __future__ import annotations
 
-import os
 import struct
 from collections.abc import Iterator
+from io import BytesIO
 from pathlib import Path
-from typing import BinaryIO
 
 from PIL import Image
+
+from cardbox_tracker.camera.film_headers import boxes
 
 FILM_DIAGONAL_MM = 43.27
 """Diagonal of the image on 35 mm film, to which the equivalent focal length belongs."""
@@ -55,10 +56,15 @@ def _of_image(path: Path) -> float | None:
 
 def _of_film(path: Path) -> float | None:
     with path.open("rb") as film:
-        for meta in _metas(film, 0, os.fstat(film.fileno()).st_size):
-            boxes = dict(_parts(meta))
-            keys = [name for _, name in _parts(boxes.get(b"keys", b"")[8:])]
-            for number, item in _parts(boxes.get(b"ilst", b"")):
+        for kind, begin, end in boxes(film, _CONTAINERS):
+            if kind != b"meta":
+                continue
+            film.seek(begin)
+            content = film.read(min(end - begin, _MOST_BYTES))
+            # That of MP4 begins with version and flags, that of QuickTime does not.
+            parts = dict(_parts(content[4:] if content[:4] == bytes(4) else content))
+            keys = [name for _, name in _parts(parts.get(b"keys", b"")[8:])]
+            for number, item in _parts(parts.get(b"ilst", b"")):
                 index = int.from_bytes(number, "big") - 1
                 value = dict(_parts(item)).get(b"data", b"")
                 if 0 <= index < len(keys) and keys[index].endswith(_ENDING):
@@ -66,35 +72,10 @@ def _of_film(path: Path) -> float | None:
     return None
 
 
-def _metas(film: BinaryIO, start: int, end: int) -> Iterator[bytes]:
-    """Yield the contents of the boxes ``meta`` between two places of a film."""
-    while start + 8 <= end:
-        film.seek(start)
-        size, kind = struct.unpack(">I4s", film.read(8))
-        header = 8
-        if size == 1:
-            size, header = struct.unpack(">Q", film.read(8))[0], 16
-        size = size or end - start
-        if size < header:
-            return
-        if kind == b"meta":
-            content = film.read(min(size - header, _MOST_BYTES))
-            # That of MP4 begins with version and flags, that of QuickTime does not.
-            yield content[4:] if content[:4] == bytes(4) else content
-        elif kind in _CONTAINERS:
-            yield from _metas(film, start + header, start + size)
-        start += size
-
-
 def _parts(content: bytes) -> Iterator[tuple[bytes, bytes]]:
     """Yield kind and content of each box in a row of boxes."""
-    at = 0
-    while at + 8 <= len(content):
-        size, kind = struct.unpack(">I4s", content[at : at + 8])
-        if size < 8:
-            return
-        yield kind, content[at + 8 : at + size]
-        at += size
+    for kind, begin, end in boxes(BytesIO(content)):
+        yield kind, content[begin:end]
 
 
 def _number(value: bytes) -> float | None:

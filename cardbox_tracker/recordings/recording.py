@@ -28,8 +28,7 @@ from cardbox_tracker.detectors.detector import Detector
 from cardbox_tracker.detectors.image_points import ImagePoints
 from cardbox_tracker.detectors.point_table import PointTable
 from cardbox_tracker.recordings.bag_reader import BagReader
-from cardbox_tracker.recordings.depth_images import depth_images
-from cardbox_tracker.recordings.depth_silhouettes import DepthSilhouetteSource, Within
+from cardbox_tracker.recordings.depth_silhouettes import DepthSilhouetteSource, Within, depth_images
 from cardbox_tracker.recordings.detector_silhouettes import DetectorSilhouetteSource
 from cardbox_tracker.recordings.given_camera import GivenCamera
 from cardbox_tracker.recordings.image_recording import ImageRecording, working_size

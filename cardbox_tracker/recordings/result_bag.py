@@ -5,22 +5,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.model_file import dumps_body_model
-from cardbox_tracker.person.urdf import urdf_from_body
-from cardbox_tracker.recordings.bag_markers import write_markers
-from cardbox_tracker.recordings.bag_transforms import BagTransforms
+from cardbox_tracker.person.urdf import LinkTransforms, urdf_from_body
 from cardbox_tracker.recordings.bag_writer import BagWriter
-from cardbox_tracker.recordings.keypoint_status import LEVELS, KeypointStates
+from cardbox_tracker.recordings.markers import MarkerShape, Rgba
 from cardbox_tracker.recordings.outputs import (
+    LEVELS,
     JointValues,
+    KeypointStates,
     Markers,
     OutputStream,
     Points,
@@ -34,6 +35,85 @@ from cardbox_tracker.recordings.silhouettes import RecordedFrame
 from cardbox_tracker.recordings.track import Observer
 from cardbox_tracker.tracking.estimate import Estimate
 from cardbox_tracker.tracking.tracker import Tracker
+
+
+class BagTransforms:
+    """Writes ``/tf`` for the joint states of a recording, from its URDF.
+
+    A viewer needs ``/tf`` to move the URDF, and a recording has no robot_state_publisher.
+    """
+
+    def __init__(self, writer: BagWriter) -> None:
+        """Use ``writer``; nothing is written before :meth:`describe`."""
+        self._writer = writer
+        self._links: LinkTransforms | None = None
+
+    def describe(self, urdf: str) -> None:
+        """Write the links of ``urdf`` from now on."""
+        self._links = LinkTransforms(urdf)
+
+    def write(self, stamp_ns: int, positions: Mapping[str, float]) -> None:
+        """Write the transforms at ``positions`` of the joints, rad and metres.
+
+        Raises:
+            ValueError: a joint of the URDF has no position.
+        """
+        if self._links is None:
+            return
+        new, transforms = self._writer.new, []
+        for link in self._links.at(positions):
+            x, y, z = link.translation_m
+            turn = new(
+                "geometry_msgs/msg/Quaternion", **dict(zip("xyzw", link.rotation, strict=True))
+            )
+            place = new("geometry_msgs/msg/Vector3", x=x, y=y, z=z)
+            moved = new("geometry_msgs/msg/Transform", translation=place, rotation=turn)
+            header = self._writer.header(stamp_ns, link.parent)
+            transforms.append(
+                new(
+                    "geometry_msgs/msg/TransformStamped",
+                    header=header,
+                    child_frame_id=link.child,
+                    transform=moved,
+                )
+            )
+        message = new("tf2_msgs/msg/TFMessage", transforms=transforms)
+        self._writer.write("/tf", message, stamp_ns)
+
+
+# Constant of visualization_msgs/Marker; ADD is 0.
+_DELETE_ALL = 3
+
+
+def _write_markers(
+    bag: BagWriter, topic: str, stamp_ns: int, frame_id: str, markers: Markers
+) -> None:
+    """Write markers; without shapes, a message that removes all earlier ones."""
+    header = bag.header(stamp_ns, frame_id)
+    messages = [_marker(bag, header, shape) for shape in markers.shapes] or [
+        bag.new("visualization_msgs/msg/Marker", header=header, action=_DELETE_ALL, pose=bag.pose())
+    ]
+    array = bag.new("visualization_msgs/msg/MarkerArray", markers=messages)
+    bag.write(topic, array, stamp_ns)
+
+
+def _marker(bag: BagWriter, header: Any, shape: MarkerShape) -> Any:
+    return bag.new(
+        "visualization_msgs/msg/Marker",
+        header=header,
+        ns=shape.namespace,
+        type=shape.kind,
+        pose=bag.pose(),
+        scale=bag.new("geometry_msgs/msg/Vector3", **dict.fromkeys("xyz", shape.scale)),
+        color=_color(bag, shape.rgba),
+        points=bag.points(shape.points_m),
+        colors=[_color(bag, rgba) for rgba in shape.colors],
+    )
+
+
+def _color(bag: BagWriter, rgba: Rgba) -> Any:
+    return bag.new("std_msgs/msg/ColorRGBA", **dict(zip("rgba", rgba, strict=True)))
+
 
 Draw = Callable[[NDArray[np.uint8], Estimate, Tracker], NDArray[np.uint8]]
 """Draws an estimate over the picture (H, W, ...) of the first camera; returns bgr."""
@@ -128,7 +208,7 @@ def _write_value(bag: BagWriter, topic: str, stamp_ns: int, frame_id: str, value
         case Points(points_m):
             bag.write_pose_array(topic, stamp_ns, frame_id, points_m)
         case Markers():
-            write_markers(bag, topic, stamp_ns, frame_id, value)
+            _write_markers(bag, topic, stamp_ns, frame_id, value)
         case KeypointStates():
             _write_keypoint_states(bag, topic, stamp_ns, frame_id, value)
         case Text(text):
@@ -138,19 +218,17 @@ def _write_value(bag: BagWriter, topic: str, stamp_ns: int, frame_id: str, value
 def _write_keypoint_states(
     bag: BagWriter, topic: str, stamp_ns: int, frame_id: str, found: KeypointStates
 ) -> None:
-    status = bag.type("diagnostic_msgs/msg/DiagnosticStatus")
-    pair = bag.type("diagnostic_msgs/msg/KeyValue")
     each = [
-        status(
+        bag.new(
+            "diagnostic_msgs/msg/DiagnosticStatus",
             level=LEVELS[state],
             name=name,
             message=str(state),
-            hardware_id="",
-            values=[pair(key=key, value=text) for key, text in texts.items()],
+            values=[
+                bag.new("diagnostic_msgs/msg/KeyValue", key=key, value=text)
+                for key, text in texts.items()
+            ],
         )
         for name, state, texts in found.rows()
     ]
-    message = bag.type("diagnostic_msgs/msg/DiagnosticArray")(
-        header=bag.header(stamp_ns, frame_id), status=each
-    )
-    bag.write(topic, message, stamp_ns)
+    bag.write_stamped(topic, "diagnostic_msgs/msg/DiagnosticArray", stamp_ns, frame_id, status=each)

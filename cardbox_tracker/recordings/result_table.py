@@ -25,8 +25,13 @@ from cardbox_tracker.person.skeleton import (
     PLACE_NAMES,
     UNITS,
 )
-from cardbox_tracker.recordings.keypoint_status import keypoint_states
-from cardbox_tracker.recordings.outputs import METRICS, joint_deviations, joint_values, positions_of
+from cardbox_tracker.recordings.outputs import (
+    METRICS,
+    joint_deviations,
+    joint_values,
+    keypoint_states,
+    positions_of,
+)
 from cardbox_tracker.recordings.silhouettes import RecordedFrame
 from cardbox_tracker.tracking.estimate import Estimate, Hand, Legs
 

@@ -10,7 +10,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cardbox_tracker.detectors.detector import Detector
-from cardbox_tracker.detectors.landmarks import LANDMARKS
 from cardbox_tracker.detectors.pose_network import Detection
 from cardbox_tracker.measuring.camera_tilt import Tilt, camera_tilt
 from cardbox_tracker.measuring.room_edges import edge_likelihoods
@@ -90,7 +89,7 @@ def placed_camera(
             # Somebody who comes into view is seen in a part of the span only.
             there = [person for person in people if person is not None]
             if there and (searched == span or len(there) == len(people)):
-                points = middles([_points(one) for one in there])
+                points = middles(there)
                 found = standing_camera(points, source.camera)
                 if found is not None:
                     upright.append((searched, points, found))
@@ -105,11 +104,6 @@ def placed_camera(
     first, points, found = upright[0]
     prior = (tilt.pitch_rad, tilt.pitch_stddev_rad) if pitch_rad is None else (pitch_rad, _GIVEN)
     return Placed(tilt, first, standing_camera(points, source.camera, prior) or found)
-
-
-def _points(person: Detection) -> tuple[dict[str, FloatArray], dict[str, float]]:
-    points = dict(zip(LANDMARKS, person.points_px, strict=True))
-    return points, dict(zip(LANDMARKS, person.scores.tolist(), strict=True))
 
 
 def _spans(

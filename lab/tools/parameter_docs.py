@@ -21,8 +21,13 @@ from cardbox_tracker.ros.nodes.retarget_node import RetargetParameters
 from cardbox_tracker.ros.nodes.rula_node import RulaParameters
 from cardbox_tracker.ros.nodes.stereo_depth_node import StereoDepthParameters
 from cardbox_tracker.ros.nodes.tracker_parameters import TrackerParameters
-from cardbox_tracker.ros.runtime.parameter_fields import NodeParameters
-from cardbox_tracker.ros.runtime.parameter_text import default_of, details, type_name, yaml_value
+from cardbox_tracker.ros.runtime.parameter_fields import (
+    NodeParameters,
+    default_of,
+    details,
+    type_name,
+    yaml_value,
+)
 from cardbox_tracker.search.config import TrackerConfig
 from cardbox_tracker.terms.depth import Depth
 from cardbox_tracker.terms.inner_cue import InnerCue

@@ -15,7 +15,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from cardbox_tracker.applications.evaluation.marks import replaced
+from cardbox_tracker.applications.evaluation.people_report import replaced
 from cardbox_tracker.applications.evaluation.report import mean_of
 from cardbox_tracker.applications.evaluation.results import read_json
 from cardbox_tracker.common.files import atomic_path

@@ -18,13 +18,13 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from cardbox_tracker.applications.evaluation.marks import replaced
+from cardbox_tracker.applications.evaluation.people_report import replaced
 from cardbox_tracker.camera.camera import Camera
 from cardbox_tracker.common.errors import CardboxError
 from cardbox_tracker.detectors.detector import Detector
 from cardbox_tracker.measuring.first_sight import upper_body
 from cardbox_tracker.measuring.references import lateral_m
-from cardbox_tracker.measuring.standing import at_height_of
+from cardbox_tracker.measuring.stature import at_height_of
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.proportions import body_from_proportions
 from cardbox_tracker.search.config import default_preset

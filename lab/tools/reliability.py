@@ -18,7 +18,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from cardbox_tracker.applications.evaluation.marks import replaced
+from cardbox_tracker.applications.evaluation.people_report import replaced
 from cardbox_tracker.common.files import atomic_path
 
 ROOT = Path(__file__).resolve().parents[2]

@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cardbox_tracker.applications.evaluation.angles import comparable, true_postures
-from cardbox_tracker.applications.evaluation.marks import replaced
+from cardbox_tracker.applications.evaluation.people_report import replaced
 from cardbox_tracker.applications.evaluation.session import RecordedSession, load_session
 from cardbox_tracker.applications.evaluation.tracking import track_session
 from cardbox_tracker.applications.retargeting.config import RetargetConfig

@@ -31,9 +31,9 @@ from cardbox_tracker.applications.ergonomics.rula import (
     score_distribution,
 )
 from cardbox_tracker.applications.evaluation.angles import comparable, true_postures
-from cardbox_tracker.applications.evaluation.marks import replaced
 from cardbox_tracker.applications.evaluation.metrics import SHOULDERS
 from cardbox_tracker.applications.evaluation.people import torso_angles
+from cardbox_tracker.applications.evaluation.people_report import replaced
 from cardbox_tracker.applications.evaluation.session import RecordedSession, load_session
 from cardbox_tracker.applications.evaluation.tracking import (
     ALL_INPUTS,
@@ -206,8 +206,7 @@ def load(folder: Path) -> RecordedSession:
         return session
     session = load_session(folder, session.truth.cameras[:1])
     if session.hips_m is None:
-        pitch_rad = np.radians(session.truth.pitch_deg)
-        down = np.array([0.0, np.cos(pitch_rad), np.sin(pitch_rad)])
+        down = -session.truth.to_optical[:, 2]
         session = replace(session, hips_m=session.keypoints_m[:, SHOULDERS].mean(axis=1) + down)
     return replace(session, torso_rad=torso_angles(session))
 

@@ -17,10 +17,13 @@ import numpy as np
 
 from cardbox_tracker.applications.evaluation.metrics import SHOULDERS, beside_shoulders
 from cardbox_tracker.applications.evaluation.session import RecordedSession, load_session
-from cardbox_tracker.applications.evaluation.tracking import InputSelection, track_session
+from cardbox_tracker.applications.evaluation.tracking import (
+    InputSelection,
+    person_of,
+    track_session,
+)
 from cardbox_tracker.common.files import atomic_path
 from cardbox_tracker.detectors.detector import Detector
-from cardbox_tracker.person.proportions import STATURE_LIMITS_M, body_from_proportions
 from cardbox_tracker.person.skeleton import KeypointState
 from cardbox_tracker.search.config import default_preset
 from cardbox_tracker.search.doubt import FAR_M
@@ -54,13 +57,7 @@ with his distance.
 
 def row_of(session: RecordedSession, wrong: str, detector: Detector) -> str:
     """Return a row of the table."""
-    truth, (stature, distance, pitch_deg) = session.truth, CASES[wrong]
-    assert truth.stature_m is not None
-    body = body_from_proportions(
-        float(np.clip(truth.stature_m * stature, *STATURE_LIMITS_M)),
-        truth.distance_m * distance,
-        camera_pitch_rad=float(np.radians(truth.pitch_deg + pitch_deg)),
-    )
+    truth, body = session.truth, person_of(session.truth, *CASES[wrong])
     true_m = dict(zip(session.stamps_ns.tolist(), session.keypoints_m, strict=True))
     rows: list[tuple[bool, bool, bool, bool, float]] = []
     began_ns: list[int] = []

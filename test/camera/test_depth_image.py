@@ -18,6 +18,7 @@ from cardbox_tracker.camera.depth_image import (
     median_depth,
     unpack_depth,
 )
+from cardbox_tracker.camera.encodings import SentImage
 from cardbox_tracker.common.errors import EncodingError
 
 
@@ -80,7 +81,7 @@ def test_a_depth_image_too_large_is_refused_before_memory_is_taken(
     with pytest.raises(EncodingError, match=rf"{width}x{height} .*33\.6 million"):
         unpack_depth(bytes(data), f"{kind}; compressedDepth png")
     with pytest.raises(EncodingError, match=rf"{width}x{height} .*33\.6 million"):
-        decode_depth(b"", height, width, 4 * width, kind, is_bigendian=False)
+        decode_depth(SentImage(b"", height, width, 4 * width, kind, is_bigendian=False))
 
 
 def test_what_opencv_cannot_decode_is_refused_in_our_words(monkeypatch: pytest.MonkeyPatch) -> None:

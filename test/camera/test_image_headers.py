@@ -13,6 +13,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from cardbox_tracker.camera.encodings import (
+    SentImage,
     decode_as_sent,
     decode_bgr,
     decode_compressed,
@@ -78,7 +79,7 @@ def test_no_decoder_but_those_of_jpeg_and_png_is_reached(
 @pytest.mark.parametrize("decode", [decode_grey, decode_bgr, decode_as_sent])
 def test_a_raw_image_too_large_is_refused_whatever_its_bytes(decode: Callable) -> None:
     with pytest.raises(EncodingError, match="60000x60000"):
-        decode(b"", 60000, 60000, 60000, "mono8")
+        decode(SentImage(b"", 60000, 60000, 60000, "mono8"))
 
 
 @given(st.binary(max_size=60), st.sampled_from([b"\xff\xd8", b"\x89PNG\r\n\x1a\n", b""]))

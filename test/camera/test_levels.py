@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from cardbox_tracker.camera.encodings import decode_as_sent, decode_compressed
+from cardbox_tracker.camera.encodings import SentImage, decode_as_sent, decode_compressed
 from cardbox_tracker.camera.levels import Levels
 
 GREY = np.random.default_rng(1).integers(0, 256, (120, 160), dtype=np.uint8)
@@ -22,7 +22,9 @@ def test_images_of_any_number_of_bits_give_the_brightness_of_eight(
 ) -> None:
     words = GREY.astype(np.uint16) << (bits - 8)
     data = words.astype(">u2" if is_bigendian else "<u2").tobytes()
-    np.testing.assert_array_equal(decode_as_sent(data, 120, 160, 320, encoding, is_bigendian), GREY)
+    np.testing.assert_array_equal(
+        decode_as_sent(SentImage(data, 120, 160, 320, encoding, is_bigendian)), GREY
+    )
     ok, png = cv2.imencode(".png", words)
     assert ok
     np.testing.assert_array_equal(decode_compressed(png), GREY)

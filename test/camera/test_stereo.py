@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from cardbox_tracker.camera.depth_image import at_size, decode_depth
+from cardbox_tracker.camera.encodings import SentImage
 from cardbox_tracker.camera.stereo import StereoDepth
 from cardbox_tracker.common.errors import CameraError, EncodingError
 
@@ -27,16 +28,16 @@ def test_depth_is_in_metres_whatever_its_encoding(big: bool) -> None:
         step = 2 * raw.itemsize + 3
         rows = np.zeros((2, step), np.uint8)
         rows[:, : 2 * raw.itemsize] = raw.view(np.uint8)
-        found = decode_depth(rows.tobytes(), 2, 2, step, encoding, big)
+        found = decode_depth(SentImage(rows.tobytes(), 2, 2, step, encoding, big))
         np.testing.assert_allclose(found, metres, rtol=1e-6)
     assert at_size(found, 4, 4).shape == (4, 4)
 
 
 def test_what_is_no_depth_is_refused() -> None:
     with pytest.raises(EncodingError, match="16UC1"):
-        decode_depth(b"", 1, 1, 1, "rgb8", False)
+        decode_depth(SentImage(b"", 1, 1, 1, "rgb8", False))
     with pytest.raises(EncodingError, match="incomplete"):
-        decode_depth(b"12", 2, 2, 4, "16UC1", False)
+        decode_depth(SentImage(b"12", 2, 2, 4, "16UC1", False))
 
 
 @pytest.mark.promise("Any damaged or hostile input is read or refused with a reason")

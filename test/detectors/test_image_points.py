@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from cardbox_tracker.detectors.image_points import POINT_INDEX, POINT_NAMES, ImagePoints
+from cardbox_tracker.detectors.image_points import COCO_NAMES, POINT_INDEX, POINT_NAMES, ImagePoints
 from cardbox_tracker.detectors.landmarks import image_points
 from cardbox_tracker.detectors.pose_network import Detection
 
@@ -93,19 +93,6 @@ def test_lists_and_whole_numbers_of_numpy_are_taken() -> None:
     assert points.stamp_ns == 5
 
 
-def test_the_points_of_coco_have_their_names() -> None:
-    points = np.zeros((17, 3))
-    points[0], points[9] = (10.0, 20.0, 0.8), (30.0, 40.0, 0.9)
-    found = ImagePoints.from_coco17(points, 7)
-    expected = ImagePoints.of({"nose": (10.0, 20.0, 0.8), "left_wrist": (30.0, 40.0, 0.9)}, 7)
-    np.testing.assert_array_equal(found.scores, expected.scores)
-    known = expected.scores > 0.0
-    np.testing.assert_array_equal(found.px[known], expected.px[known])
-    assert found.stamp_ns == 7
-    with pytest.raises(ValueError, match=r"\(17, 3\)"):
-        ImagePoints.from_coco17(np.zeros((18, 3)))
-
-
 def test_a_detection_has_the_points_of_the_legs_beside_the_others() -> None:
     numbers = np.arange(33.0)
     space = np.stack([numbers, numbers, numbers], axis=1)
@@ -121,3 +108,18 @@ def test_a_detection_has_the_points_of_the_legs_beside_the_others() -> None:
     assert exchanged is not None
     assert exchanged.px[:, 0].tolist() == [26, 25, 28, 27, 30, 29, 32, 31]
     assert points.px.shape == (17, 2)
+
+
+def test_points_of_coco_lose_knees_and_ankles() -> None:
+    given = np.column_stack([np.arange(17.0), 100 + np.arange(17.0), np.full(17, 0.5)])
+    given[COCO_NAMES.index("left_wrist"), 0] = np.nan
+    found = ImagePoints.from_coco17(given, 7)
+    assert found.stamp_ns == 7
+    for name in POINT_NAMES:
+        place = found.px[POINT_NAMES.index(name)]
+        if name in COCO_NAMES and name != "left_wrist":
+            assert place.tolist() == [COCO_NAMES.index(name), 100 + COCO_NAMES.index(name)]
+        else:
+            assert np.isnan(place).all()
+    with pytest.raises(ValueError, match="COCO_NAMES"):
+        ImagePoints.from_coco17(given[:13])

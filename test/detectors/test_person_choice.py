@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from cardbox_tracker.detectors.image_points import ImagePoints
-from cardbox_tracker.detectors.person_choice import PersonChoice, inside, person_in
+from cardbox_tracker.detectors.person_choice import PersonChoice, inside, near_person, person_in
 from cardbox_tracker.detectors.pose_network import Square
 
 
@@ -46,12 +46,14 @@ def test_points_outside_the_image_support_nobody() -> None:
 
 
 def test_the_share_of_the_points_in_the_silhouette_is_known() -> None:
-    assert inside(silhouette(40), person(40.0, 0.5)) == 1.0
-    assert inside(silhouette(40), person(150.0, 0.5)) == 0.0
+    near = near_person(silhouette(40))
+    assert near is not None
+    assert inside(near, person(40.0, 0.5)) == 1.0
+    assert inside(near, person(150.0, 0.5)) == 0.0
     # Noise, or an empty silhouette, says nothing.
     noise = np.zeros((100, 200), np.uint8)
     noise[:5, :5] = 255
-    assert inside(noise, person(150.0, 0.5)) is None
+    assert near_person(noise) is None
 
 
 @pytest.mark.parametrize(

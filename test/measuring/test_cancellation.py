@@ -7,8 +7,7 @@ import threading
 import pytest
 
 from cardbox_tracker.common.errors import InitializationError
-from cardbox_tracker.measuring.cancellation import Cancellation
-from cardbox_tracker.measuring.guidance import CANCELLED, FAILED, FINISHED
+from cardbox_tracker.measuring.guidance import CANCELLED, FAILED, FINISHED, Cancellation
 
 
 def test_without_an_initialization_there_is_nothing_to_cancel() -> None:

@@ -7,9 +7,8 @@ import pytest
 
 from cardbox_tracker.camera.camera import Camera
 from cardbox_tracker.camera.rasterisation import render
-from cardbox_tracker.measuring.asked_outline import outline_ious
+from cardbox_tracker.measuring.asked_outline import FAR, FITS, NEARLY, LiveFit, outline_ious
 from cardbox_tracker.measuring.config import InitializationConfig
-from cardbox_tracker.measuring.live_fit import FAR, FITS, NEARLY, LiveFit
 from cardbox_tracker.person.cardbox import cardbox_patches
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.posture import REFERENCE_NAMES, reference_posture

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from cardbox_tracker.camera.camera import Camera
 from cardbox_tracker.camera.rasterisation import render
-from cardbox_tracker.measuring.standing import at_height_of
+from cardbox_tracker.measuring.stature import at_height_of
 from cardbox_tracker.person.cardbox import cardbox_patches
 from cardbox_tracker.person.kinematics import pose
 from cardbox_tracker.person.model import BodyModel

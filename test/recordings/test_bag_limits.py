@@ -48,7 +48,8 @@ def record(path: Path, count: int = 12, late_s: float = 0.0, broken: tuple[int, 
             data = cv2.imencode(".jpg", image)[1].tobytes()
             data = data[: len(data) // 2] if number in broken else data
             bag.write_camera_info("/camera_info", recorded_ns, "eye", CAMERA)
-            message = bag.type("sensor_msgs/msg/CompressedImage")(
+            message = bag.new(
+                "sensor_msgs/msg/CompressedImage",
                 header=bag.header(stamp_ns, "eye"),
                 format="jpeg",
                 data=np.frombuffer(data, np.uint8),

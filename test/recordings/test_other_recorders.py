@@ -57,14 +57,13 @@ def write_images(
         stamp = stamps[place] if stamps else recorded
         grey = np.full((120, 160), 90 + number % 50, np.uint8)
         for topic in topics:
-            header = bag.header(stamp, "/left")
+            values = {"encoding": "mono8", "height": 120, "width": 160, "step": 160}
+            kind, data = "sensor_msgs/msg/Image", grey.ravel()
             if topic.endswith("compressed"):
+                kind, values = "sensor_msgs/msg/CompressedImage", {"format": "png"}
                 data = np.frombuffer(cv2.imencode(".png", grey)[1].tobytes(), np.uint8)
-                kind = bag.type("sensor_msgs/msg/CompressedImage")
-                bag.write(topic, kind(header, "png", data), recorded)
-            else:
-                kind = bag.type("sensor_msgs/msg/Image")
-                bag.write(topic, kind(header, 120, 160, "mono8", 0, 160, grey.ravel()), recorded)
+            header = bag.header(stamp, "/left")
+            bag.write(topic, bag.new(kind, header=header, data=data, **values), recorded)
 
 
 def recorded(

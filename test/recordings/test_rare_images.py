@@ -12,7 +12,7 @@ import cv2
 import numpy as np
 import pytest
 
-from cardbox_tracker.camera.encodings import decode_as_sent, decode_compressed
+from cardbox_tracker.camera.encodings import SentImage, decode_as_sent, decode_compressed
 from cardbox_tracker.common.errors import BagError, CardboxError, EncodingError
 from cardbox_tracker.recordings.given_camera import GivenCamera
 from cardbox_tracker.recordings.open_images import open_images
@@ -93,10 +93,10 @@ def test_padded_rows_in_either_byte_order(padding: int, big: bool) -> None:
     values = np.arange(35, dtype=np.uint16).reshape(5, 7) * 1800
     rows = values.astype(">u2" if big else "<u2").view(np.uint8)
     data = np.pad(rows, ((0, 0), (0, padding)), constant_values=255).tobytes()
-    found = decode_as_sent(data, 5, 7, 14 + padding, "mono16", big)
+    found = decode_as_sent(SentImage(data, 5, 7, 14 + padding, "mono16", big))
     assert np.array_equal(found, values >> 8)
     with pytest.raises(EncodingError, match="incomplete"):
-        decode_as_sent(data[:-1], 5, 7, 14 + padding, "mono16", big)
+        decode_as_sent(SentImage(data[:-1], 5, 7, 14 + padding, "mono16", big))
 
 
 def film(path: Path, count: int, width: int = 64, height: int = 48) -> bytearray:

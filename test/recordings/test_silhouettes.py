@@ -3,15 +3,24 @@
 from __future__ import annotations
 
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
+import cv2
 import numpy as np
 import pytest
 
 from cardbox_tracker.camera.camera import Camera
 from cardbox_tracker.common.errors import BagError, CardboxError
+from cardbox_tracker.detectors.detector import Detector
+from cardbox_tracker.detectors.image_points import POINT_INDEX
+from cardbox_tracker.detectors.model_files import ModelFiles
+from cardbox_tracker.detectors.point_table import PointTable
 from cardbox_tracker.recordings.bag_reader import BagReader
 from cardbox_tracker.recordings.bag_writer import BagWriter
+from cardbox_tracker.recordings.detector_silhouettes import DetectorSilhouetteSource
+from cardbox_tracker.recordings.given_camera import GivenCamera
+from cardbox_tracker.recordings.image_folder import ImageFolder
 from cardbox_tracker.recordings.silhouettes import SilhouetteSource, TimeSpan
 from cardbox_tracker.segmentation.background_config import BackgroundConfig
 
@@ -131,3 +140,24 @@ def test_a_span_without_images_is_refused_by_name(source: SilhouetteSource) -> N
         match=r"arms.* 90:91 s .*24\.2 s; give",
     ):
         source.held(TimeSpan(90, 91), "arms")
+
+
+def test_given_points_of_several_people_come_before_the_detectors(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for number in range(2):
+        cv2.imwrite(str(tmp_path / f"{number}.png"), np.full((48, 64), 90, np.uint8))
+    table = tmp_path / "points.csv"
+    rows = [
+        f"{frame},{person},nose,{10 + 20 * person},9,1" for frame in (0, 1) for person in (0, 1)
+    ]
+    table.write_text("\n".join(["frame,person,joint,u,v,score", *rows]))
+    nobody = SimpleNamespace(restart=lambda: None, all_in=lambda *_: [], missed=0, remark="")
+    monkeypatch.setattr(SilhouetteSource, "_started", lambda *_: nobody)
+    with ImageFolder(tmp_path, GivenCamera(fov_deg=60.0)) as images:
+        detector = Detector(ModelFiles(tmp_path, tmp_path), people=2)
+        source = DetectorSilhouetteSource(images, detector, points=PointTable(table, people=2))
+        frames = list(source.frames())
+    found = [[one.px[POINT_INDEX["nose"], 0] for one in frame.people or ()] for frame in frames]
+    # The images are five times as large as the recorded ones.
+    assert found == [pytest.approx([52.0, 152.0])] * 2

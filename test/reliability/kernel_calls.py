@@ -29,11 +29,10 @@ from cardbox_tracker.person.appearance import PARTS, Appearance, bins_of
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.search.config import PRESETS
 from cardbox_tracker.segmentation.absorption import StillRegions
-from cardbox_tracker.segmentation.background import SilhouetteExtractor
+from cardbox_tracker.segmentation.background import SilhouetteExtractor, segment_foreground
 from cardbox_tracker.segmentation.chroma import ChromaModel, ChromaScore
 from cardbox_tracker.segmentation.color_reader import ColorReader
 from cardbox_tracker.segmentation.empty_scene import BackgroundLearner, BackgroundModel
-from cardbox_tracker.segmentation.foreground import segment_foreground
 from cardbox_tracker.segmentation.light import LightFollower
 from cardbox_tracker.segmentation.medians import median
 from cardbox_tracker.segmentation.regions import (

@@ -27,6 +27,7 @@ from cardbox_tracker.camera.camera import Camera
 from cardbox_tracker.camera.camera_info import calibration_from_info
 from cardbox_tracker.camera.encodings import (
     SUPPORTED_ENCODINGS,
+    SentImage,
     decode_as_sent,
     decode_bgr,
     decode_compressed,
@@ -57,15 +58,7 @@ right:
   T_cn_cnm1: [[1, 0, 0, -0.12], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]]
   rostopic: /right/image_raw
 """
-CAMERA_GROUP = """[cam_0]
-name = "left"
-rotation = [0.0, 0.1, 0.0]
-translation = [0.0, 0.0, 0.0]
-[cam_1]
-name = "right"
-rotation = [0.0, 0.0, 0.0]
-translation = [0.1, 0.0, 0.0]
-"""
+CAMERA_GROUP = Path(__file__).with_name("camera_group.toml").read_text()
 JUNK = st.one_of(
     st.text(max_size=12),
     st.sampled_from(
@@ -223,7 +216,10 @@ def test_camera_info(message: SimpleNamespace) -> None:
 def test_image(data: bytes, height: int, width: int, step: int, encoding: str, big: bool) -> None:
     for decode in (decode_grey, decode_bgr, decode_as_sent):
         with refusals():
-            assert decode(data, height, width, step, encoding, big).shape[:2] == (height, width)
+            assert decode(SentImage(data, height, width, step, encoding, big)).shape[:2] == (
+                height,
+                width,
+            )
 
 
 @cache

@@ -88,15 +88,7 @@ CAMCHAIN = {
     "left": {"T_cam_imu": np.eye(4).tolist()},
     "right": {"T_cn_cnm1": np.eye(4).tolist(), "rostopic": "/right/image_raw"},
 }
-CAMERA_GROUP = """[cam_0]
-name = "left"
-rotation = [0.0, 0.1, 0.0]
-translation = [0.0, 0.0, 0.0]
-[cam_1]
-name = "right"
-rotation = [0.0, 0.0, 0.0]
-translation = [0.1, 0.0, 0.0]
-"""
+CAMERA_GROUP = Path(__file__).with_name("camera_group.toml").read_text()
 SETTINGS = {"lost_frames": 10, "whole_body": {"effort": 0.5, "cost": {"yaw_deg": 20.0}}}
 YAML_FILES: dict[str, tuple[Callable[[Path], Any], Any]] = {
     "body": (load_body_model, yaml.safe_load(dumps_body_model(BODY))),

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from cardbox_tracker.segmentation.foreground import segment_foreground
+from cardbox_tracker.segmentation.background import segment_foreground
 from cardbox_tracker.segmentation.window import window_of
 
 BRIGHTER, DARKER = 0.1, -0.05

@@ -13,8 +13,7 @@ from hypothesis import strategies as st
 from cardbox_tracker.segmentation.background import SilhouetteExtractor
 from cardbox_tracker.segmentation.background_config import BackgroundConfig
 from cardbox_tracker.segmentation.empty_scene import BackgroundLearner
-from cardbox_tracker.segmentation.light import LightFollower
-from cardbox_tracker.segmentation.light_field import multiply_field, update_field
+from cardbox_tracker.segmentation.light import LightFollower, multiply_field, update_field
 from cardbox_tracker.segmentation.light_outlines import average_blocks, find_smooth, grow_person
 from cardbox_tracker.segmentation.light_samples import (
     limit_channels,

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from cardbox_tracker.segmentation.empty_scene import BackgroundLearner, BackgroundModel
-from cardbox_tracker.segmentation.scene_fit import compare_scene
+from cardbox_tracker.segmentation.kept_background import compare_scene
 
 
 def model_of(room: Any) -> BackgroundModel:

@@ -17,11 +17,11 @@ from cardbox_tracker.applications.drawing.overlay import (
     pixels_of,
 )
 from cardbox_tracker.camera.camera import Camera
+from cardbox_tracker.measuring.asked_outline import LiveFit
 from cardbox_tracker.measuring.config import InitializationConfig
 from cardbox_tracker.measuring.guidance import Prompt
-from cardbox_tracker.measuring.live_fit import LiveFit
 from cardbox_tracker.measuring.references import MIN_PERSON_FRACTION, lateral_m
-from cardbox_tracker.measuring.standing import at_height_of
+from cardbox_tracker.measuring.stature import at_height_of
 from cardbox_tracker.person.cardbox import cardbox_patches
 from cardbox_tracker.person.kinematics import pose
 from cardbox_tracker.person.model import BodyModel

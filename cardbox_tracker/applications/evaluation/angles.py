@@ -17,12 +17,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cardbox_tracker.applications.evaluation.session import RecordedSession
+from cardbox_tracker.camera.camera import level_to_optical
 from cardbox_tracker.person.skeleton import rotation_x, rotation_y, rotation_z
 
 FloatArray = NDArray[np.float64]
-
-_LEVEL = np.array([(0.0, 1.0, 0.0), (0.0, 0.0, -1.0), (-1.0, 0.0, 0.0)])
-"""Rotation from the reference frame into the optical frame of a level camera."""
 
 
 def joint_angles(keypoints_m: FloatArray, torso_rad: FloatArray, pitch_rad: float) -> FloatArray:
@@ -36,7 +34,7 @@ def joint_angles(keypoints_m: FloatArray, torso_rad: FloatArray, pitch_rad: floa
     Returns:
         Shape (..., 11), rad, ordered as ``JOINT_NAMES[1:]``.
     """
-    points = to_reference(np.asarray(keypoints_m), pitch_rad)
+    points = np.asarray(keypoints_m) @ level_to_optical(pitch_rad)
     torso = np.asarray(torso_rad)
     frame = rotation_z(torso[..., 2]) @ rotation_y(torso[..., 1]) @ rotation_x(torso[..., 0])
     angles = [torso]
@@ -49,19 +47,6 @@ def joint_angles(keypoints_m: FloatArray, torso_rad: FloatArray, pitch_rad: floa
             angles.append(np.stack([abduction, flexion], axis=-1))
             parent = parent @ rotation_x(side * abduction) @ rotation_y(-flexion)
     return np.concatenate(angles, axis=-1)
-
-
-def to_reference(vectors: FloatArray, pitch_rad: float) -> FloatArray:
-    """Turn vectors (..., 3) of the optical frame into the level reference frame.
-
-    Args:
-        vectors: in the optical frame of a camera.
-        pitch_rad: downward pitch of that camera.
-    """
-    c, s = np.cos(pitch_rad), np.sin(pitch_rad)
-    to_optical = np.array([(1.0, 0.0, 0.0), (0.0, c, -s), (0.0, s, c)]) @ _LEVEL
-    turned: FloatArray = vectors @ to_optical  # the inverse of a rotation is its transpose
-    return turned
 
 
 def true_postures(session: RecordedSession) -> FloatArray:

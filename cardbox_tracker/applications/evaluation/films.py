@@ -88,7 +88,8 @@ def make_film(folder: Path, shape: str, path: Path) -> Film:
             # An upright phone points at the person.
             there = session.keypoints_m.mean(axis=1) @ lens.k.T
             column = float(np.median(there[:, 0] / there[:, 2]))
-        turn = _turn(lens.k, (column, (lens.height - 1) / 2), session.truth.pitch_deg)
+        down = -session.truth.to_optical[:, 2]
+        turn = _turn(lens.k, (column, (lens.height - 1) / 2), down)
         size = (width, height)
         maps = cv2.initUndistortRectifyMap(lens.k, lens.distortion, turn, k, size, cv2.CV_32FC1)
         fps = round(1e9 / float(np.median(np.diff(stamps_ns))), 2)
@@ -98,7 +99,7 @@ def make_film(folder: Path, shape: str, path: Path) -> Film:
                 color = shown if shown.ndim == 3 else cv2.cvtColor(shown, cv2.COLOR_GRAY2BGR)
                 add(cv2.remap(color, *maps, cv2.INTER_LINEAR).astype(np.uint8))
     hips = session.hips_m
-    pitch_deg = float(np.degrees(np.arcsin(turn[2] @ _down(session.truth.pitch_deg))))
+    pitch_deg = float(np.degrees(np.arcsin(turn[2] @ down)))
     turned = replace(
         session,
         truth=replace(session.truth, pitch_deg=pitch_deg),
@@ -109,16 +110,11 @@ def make_film(folder: Path, shape: str, path: Path) -> Film:
     return Film(turned, shape, path, fov_deg, stamps_ns)
 
 
-def _down(pitch_deg: float) -> FloatArray:
-    pitch_rad = np.radians(pitch_deg)
-    return np.array([0.0, np.cos(pitch_rad), np.sin(pitch_rad)])
-
-
-def _turn(k: FloatArray, middle: tuple[float, float], pitch_deg: float) -> FloatArray:
+def _turn(k: FloatArray, middle: tuple[float, float], down: FloatArray) -> FloatArray:
     """Return the rotation (3, 3) to a level camera whose axis goes through a pixel."""
     ahead = np.linalg.solve(k, [*middle, 1.0])
     ahead /= np.linalg.norm(ahead)
-    right = np.cross(_down(pitch_deg), ahead)
+    right = np.cross(down, ahead)
     right /= np.linalg.norm(right)
     return np.array([right, np.cross(ahead, right), ahead])
 

@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from cardbox_tracker.applications.evaluation.angles import to_reference
 from cardbox_tracker.applications.evaluation.figures import figures
 from cardbox_tracker.applications.evaluation.metrics import SHOULDERS
 from cardbox_tracker.applications.evaluation.session import RecordedSession
@@ -46,15 +45,14 @@ def torso_angles(session: RecordedSession) -> FloatArray:
     The torso's axis leads from the middle of the hips to that of the shoulders. Without known hips,
     the angles are nan.
     """
-    pitch_rad = float(np.radians(session.truth.pitch_deg))
     hips_m = session.hips_m
     if hips_m is None:
         hips_m = np.full((len(session.stamps_ns), 3), np.nan)
     left, right = SHOULDERS
     breadth = session.keypoints_m[:, left] - session.keypoints_m[:, right]
     axis = session.keypoints_m[:, SHOULDERS].mean(axis=1) - hips_m
-    up = _unit(to_reference(axis, pitch_rad))
-    aside = to_reference(breadth, pitch_rad)
+    up = _unit(axis @ session.truth.to_optical)
+    aside = breadth @ session.truth.to_optical
     aside = _unit(aside - (aside * up).sum(axis=1, keepdims=True) * up)
     front = np.cross(aside, up)
     return np.column_stack(

@@ -9,10 +9,22 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from cardbox_tracker.applications.evaluation.marks import replaced
 from cardbox_tracker.applications.evaluation.people import BEYOND_CM
 from cardbox_tracker.applications.evaluation.report import mean_of
 from cardbox_tracker.common.errors import CardboxError
+
+
+def replaced(text: str, section: str, begin: str, end: str) -> str:
+    """Return the document ``text`` with another ``section`` between its marks.
+
+    Raises:
+        CardboxError: the marks are not there, each once.
+    """
+    if text.count(begin) != 1 or text.count(end) != 1:
+        raise CardboxError(f"the document needs the marks {begin} and {end}, each once")
+    before, rest = text.split(begin)
+    return f"{before}{begin}\n{section}\n{end}{rest.split(end)[1]}"
+
 
 FloatArray = NDArray[np.float64]
 Entry = Mapping[str, Any]

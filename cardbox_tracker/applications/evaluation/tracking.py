@@ -11,13 +11,14 @@ from numpy.typing import NDArray
 
 from cardbox_tracker.applications.evaluation.recovery import Recovery, measure_recovery
 from cardbox_tracker.applications.evaluation.session import RecordedSession
+from cardbox_tracker.applications.evaluation.truth import GroundTruth
 from cardbox_tracker.common.errors import CardboxError
 from cardbox_tracker.detectors.detector import Detector
 from cardbox_tracker.detectors.point_table import PointTable
 from cardbox_tracker.measuring.config import InitializationConfig
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.posture import N_JOINTS, POSTURE
-from cardbox_tracker.person.proportions import body_from_proportions
+from cardbox_tracker.person.proportions import STATURE_LIMITS_M, body_from_proportions
 from cardbox_tracker.recordings.initialize import initialize_from_recording
 from cardbox_tracker.recordings.recording import STEREO, FrameSet, open_recording
 from cardbox_tracker.recordings.silhouettes import SilhouetteSource, TimeSpan
@@ -159,7 +160,8 @@ def track_session(
     ) as source:
         camera = source.first.camera
         offset_s = (session.truth.start_ns - source.first.start_ns) / 1e9
-        body = body or _unmeasured(session)
+        if body is None and not session.has_references:
+            body = person_of(session.truth)
         bodies = [
             _measure(session, source.first, seed) if body is None else (body, "") for seed in seeds
         ]
@@ -235,13 +237,16 @@ def recovery_of(
         return measure_recovery(session, frames, body, source.camera, config, seed)
 
 
-def _unmeasured(session: RecordedSession) -> BodyModel | None:
-    """Return the person of a session without reference postures; None if the session has them."""
-    truth = session.truth
-    if session.has_references or truth.stature_m is None:
-        return None
-    pitch_rad = float(np.radians(truth.pitch_deg))
-    return body_from_proportions(truth.stature_m, truth.distance_m, camera_pitch_rad=pitch_rad)
+def person_of(
+    truth: GroundTruth, stature: float = 1.0, distance: float = 1.0, more_pitch_deg: float = 0.0
+) -> BodyModel:
+    """Return a person of known stature at their place; factors and degrees make a number wrong."""
+    assert truth.stature_m is not None
+    return body_from_proportions(
+        float(np.clip(truth.stature_m * stature, *STATURE_LIMITS_M)),
+        truth.distance_m * distance,
+        camera_pitch_rad=float(np.radians(truth.pitch_deg + more_pitch_deg)),
+    )
 
 
 def _measure(

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cardbox_tracker.applications.evaluation.metrics import SHOULDERS
+from cardbox_tracker.camera.camera import level_to_optical
 from cardbox_tracker.common.errors import CardboxError, cut
 from cardbox_tracker.common.files import UnreadableFileError, read_regular
 from cardbox_tracker.person.skeleton import JOINT_NAMES, KEYPOINT_NAMES
@@ -74,6 +75,11 @@ class GroundTruth:
     stature_m: float | None = None
     depth_topic: str | None = None
     source: str = ""
+
+    @property
+    def to_optical(self) -> FloatArray:
+        """Rotation (3, 3) from the level reference frame into the camera's optical frame."""
+        return level_to_optical(np.radians(self.pitch_deg))
 
 
 def load_ground_truth(path: str | os.PathLike[str], camera: str | None = None) -> GroundTruth:
@@ -164,9 +170,8 @@ def _distance_m(data: Mapping[str, Any], frames: Mapping[int, TrueFrame]) -> flo
     middles = [
         f.keypoints_m[SHOULDERS, :].mean(axis=0) if f.hips_m is None else f.hips_m for f in first
     ]
-    pitch_rad = np.radians(float(data["camera"]["pitch_down_deg"]))
-    level = np.array([0.0, -np.sin(pitch_rad), np.cos(pitch_rad)])
-    return float(np.median(np.array(middles) @ level))
+    to_optical = level_to_optical(np.radians(float(data["camera"]["pitch_down_deg"])))
+    return float(-np.median((np.array(middles) @ to_optical)[:, 0]))
 
 
 def _is_in_sight(entry: Mapping[str, Any], camera: Mapping[str, Any]) -> bool:

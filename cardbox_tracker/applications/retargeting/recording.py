@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from contextlib import suppress
 from pathlib import Path
 from typing import NamedTuple
 
@@ -110,8 +109,7 @@ def write_bag(
     description = f"{SPACE}/robot_description"
     with BagWriter(path, "mcap", overwrite, compress=True, latched=[*latched, description]) as out:
         for message in bag.messages():
-            with suppress(KeyError):  # the type is not part of ROS 2
-                out.type(message.msgtype)
+            if out.knows(message.msgtype):
                 out.write_raw(message.topic, message.msgtype, message.raw, message.time_ns)
         if motion.commands:
             out.write_string(description, motion.commands[0].stamp_ns, urdf)
@@ -122,18 +120,15 @@ def write_bag(
 
 
 def _write_command(bag: BagWriter, stamp_ns: int, command: Command, joints: Sequence[str]) -> None:
-    positions, names = command.positions, list(joints)
     bag.write_string(f"{SPACE}/status", stamp_ns, command.status)
-    duration_ns = round(command.duration_s * 1e9)
-    duration = bag.type("builtin_interfaces/msg/Duration")
-    point = bag.type("trajectory_msgs/msg/JointTrajectoryPoint")(
-        positions=positions,
-        velocities=positions[:0],
-        accelerations=positions[:0],
-        effort=positions[:0],
-        time_from_start=duration(sec=duration_ns // 10**9, nanosec=duration_ns % 10**9),
+    sec, nanosec = divmod(round(command.duration_s * 1e9), 10**9)
+    point = bag.new(
+        "trajectory_msgs/msg/JointTrajectoryPoint",
+        positions=command.positions,
+        time_from_start=bag.new("builtin_interfaces/msg/Duration", sec=sec, nanosec=nanosec),
     )
-    trajectory = bag.type("trajectory_msgs/msg/JointTrajectory")
     # A controller starts a trajectory with the stamp 0 at once.
-    message = trajectory(header=bag.header(0, ""), joint_names=names, points=[point])
+    message = bag.new(
+        "trajectory_msgs/msg/JointTrajectory", joint_names=list(joints), points=[point]
+    )
     bag.write(f"{SPACE}/joint_trajectory", message, stamp_ns)

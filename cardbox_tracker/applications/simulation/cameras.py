@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from cardbox_tracker.camera.camera import Camera
+from cardbox_tracker.camera.camera import OPTICAL_FRAME, Camera
 from cardbox_tracker.camera.extrinsics import Extrinsics
 from cardbox_tracker.camera.pairing import MOST_CAMERAS
 from cardbox_tracker.camera.view import OtherCamera, View
@@ -16,7 +16,7 @@ from cardbox_tracker.common.errors import CardboxError
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.posture import PLACE, POSTURE
 
-FRAME_ID = "camera_optical_frame"
+FRAME_ID = OPTICAL_FRAME
 
 # Azimuths of the cameras towards the person's left, degrees; all have the same distance.
 _ROUND_DEG = (0.0, 65.0, -55.0, 110.0)

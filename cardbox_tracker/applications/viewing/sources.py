@@ -10,7 +10,7 @@ import numpy as np
 
 from cardbox_tracker.applications.drawing.overlay import draw_camera_overlay
 from cardbox_tracker.applications.viewing.scene import Scene
-from cardbox_tracker.camera.encodings import decode_bgr, image_parts
+from cardbox_tracker.camera.encodings import SentImage, decode_bgr
 from cardbox_tracker.common.errors import BagError, CardboxError
 from cardbox_tracker.person.model_file import dumps_body_model
 from cardbox_tracker.recordings.bag_reader import BagMessage, BagReader, stamp_ns_of
@@ -120,7 +120,7 @@ def _handlers(
             stamp_ns_of(c), [str(one.message) for one in c.status]
         ),
         space + "/keypoints": lambda _, c: scene.keypoints(stamp_ns_of(c), points_of(c)),
-        space + _OVERLAY: lambda _, c: scene.image(stamp_ns_of(c), decode_bgr(*image_parts(c))),
+        space + _OVERLAY: lambda _, c: scene.image(stamp_ns_of(c), decode_bgr(SentImage.of(c))),
     }
     for topic in bag.topics:
         is_person = topic.removesuffix(_ROBOT) + MODEL in bag.topics

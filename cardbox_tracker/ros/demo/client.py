@@ -19,9 +19,9 @@ from std_msgs.msg import String
 from std_srvs.srv import Trigger
 
 from cardbox_tracker.common.errors import CardboxError
-from cardbox_tracker.recordings.bag_transforms import BagTransforms
 from cardbox_tracker.recordings.bag_writer import BagWriter
 from cardbox_tracker.recordings.outputs import OUTPUTS, place_from, positions_of, posture_from
+from cardbox_tracker.recordings.result_bag import BagTransforms
 from cardbox_tracker.ros.messages import results
 from cardbox_tracker.ros.messages.measurement import mean_iou_of
 from cardbox_tracker.ros.nodes.camera_poses import silhouettes_of

@@ -4,15 +4,16 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterable
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import matplotlib
 import numpy as np
+from numpy.typing import NDArray
 
 from cardbox_tracker.applications.drawing.overlay import draw_overlay
 from cardbox_tracker.applications.drawing.video import video_file
-from cardbox_tracker.applications.evaluation.truth import tracking_error
+from cardbox_tracker.applications.evaluation.truth import GroundTruth, tracking_error
 from cardbox_tracker.camera.camera import Camera
 from cardbox_tracker.common.errors import CardboxError
 from cardbox_tracker.common.files import atomic_path
@@ -20,11 +21,40 @@ from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.model_file import save_body_model
 from cardbox_tracker.person.skeleton import JOINT_NAMES
 from cardbox_tracker.recordings.bag_reader import BagReader
-from cardbox_tracker.ros.demo.result import DemoResult
 from cardbox_tracker.search.config import PRESETS
 from cardbox_tracker.segmentation.silhouettes import SilhouettePipeline
 from cardbox_tracker.terms.compiled import CompiledSilhouette
 from cardbox_tracker.tracking.estimate import TRACKING, UNCERTAIN, Estimate
+
+
+@dataclass(frozen=True)
+class DemoResult:
+    """Published data and ground truth.
+
+    Attributes:
+        body: the measured person.
+        truth: ground truth of the session.
+        start_ns: stamp of the first image after the initialization.
+        postures: (12,) by stamp.
+        keypoints_m: (6, 3) by stamp, metres in the optical frame.
+        silhouettes: (H, W) by stamp.
+        fps: received joint states per second.
+        initialization_iou: mean fit of the references, as the initializer reported it.
+        places_m: ``torso_x`` and ``torso_z`` (2,) by stamp; empty if they are kept constant.
+        states: tracking state by stamp; a missing state means ``tracking``.
+    """
+
+    body: BodyModel
+    truth: GroundTruth
+    start_ns: int
+    postures: dict[int, NDArray[np.float64]]
+    keypoints_m: dict[int, NDArray[np.float64]]
+    silhouettes: dict[int, NDArray[np.uint8]] = field(repr=False)
+    fps: float
+    initialization_iou: float
+    places_m: dict[int, NDArray[np.float64]] = field(default_factory=dict)
+    states: dict[int, str] = field(default_factory=dict)
+
 
 matplotlib.use("Agg")
 

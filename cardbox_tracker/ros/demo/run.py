@@ -13,8 +13,7 @@ from cardbox_tracker.common.progress import progress_bar
 from cardbox_tracker.person.model_file import loads_body_model
 from cardbox_tracker.person.posture import REFERENCE_NAMES
 from cardbox_tracker.recordings.result_bag import result_writer
-from cardbox_tracker.ros.demo.report import write_report
-from cardbox_tracker.ros.demo.result import DemoResult
+from cardbox_tracker.ros.demo.report import DemoResult, write_report
 from cardbox_tracker.ros.runtime.processes import (
     Nodes,
     compile_kernels,

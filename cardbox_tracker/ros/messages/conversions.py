@@ -20,9 +20,9 @@ from cardbox_tracker.camera.camera import Calibration, Camera
 from cardbox_tracker.camera.camera_checks import matrix_problem
 from cardbox_tracker.camera.encodings import (
     MOST_PIXELS,
+    SentImage,
     decode_as_sent,
     decode_compressed,
-    image_parts,
 )
 from cardbox_tracker.camera.given_arrays import silhouette_from
 from cardbox_tracker.camera.levels import Levels
@@ -63,7 +63,7 @@ def image_of(
     """
     if isinstance(message, CompressedImage):
         return decode_compressed(message.data, most_pixels, levels)
-    return decode_as_sent(*image_parts(message), most_pixels, levels)
+    return decode_as_sent(SentImage.of(message), most_pixels, levels)
 
 
 def most_pixels_of(calibration: Calibration, most_megapixels: float) -> float:

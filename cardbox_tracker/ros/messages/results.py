@@ -16,10 +16,11 @@ from visualization_msgs.msg import Marker, MarkerArray
 
 from cardbox_tracker.common.errors import CardboxError, NotFiniteError
 from cardbox_tracker.person.sizes import FloatArray
-from cardbox_tracker.recordings.keypoint_status import LEVELS, KeypointStates
 from cardbox_tracker.recordings.markers import MarkerShape, Rgba
 from cardbox_tracker.recordings.outputs import (
+    LEVELS,
     JointValues,
+    KeypointStates,
     Markers,
     Points,
     Text,

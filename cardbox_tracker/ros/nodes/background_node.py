@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-import sys
 from dataclasses import dataclass
+from types import MappingProxyType
 from typing import Any
 
 from sensor_msgs.msg import Image
@@ -13,10 +13,9 @@ from cardbox_tracker.camera.camera import Calibration, Camera
 from cardbox_tracker.camera.stamps import StampOrder
 from cardbox_tracker.common.errors import BackgroundFileError, CameraError
 from cardbox_tracker.common.progress import told
-from cardbox_tracker.common.settings import settings_of
 from cardbox_tracker.ros.messages import conversions
 from cardbox_tracker.ros.nodes.camera_images import CameraImages
-from cardbox_tracker.ros.nodes.depth_cut import DepthCut
+from cardbox_tracker.ros.nodes.depth_input import DepthCut
 from cardbox_tracker.ros.nodes.shared_parameters import (
     camera_roll_parameter,
     depth_parameter,
@@ -27,10 +26,9 @@ from cardbox_tracker.ros.nodes.silhouette_outputs import SilhouetteOutputs
 from cardbox_tracker.ros.runtime import qos
 from cardbox_tracker.ros.runtime.command_line import plain_command_line
 from cardbox_tracker.ros.runtime.node import CardboxNode, run_node
-from cardbox_tracker.ros.runtime.parameter_fields import AT_START, NodeParameters, parameter, shared
+from cardbox_tracker.ros.runtime.parameter_fields import AT_START, NodeParameters, parameter
 from cardbox_tracker.ros.runtime.parameters import LiveParameters
 from cardbox_tracker.segmentation.background import warm_up
-from cardbox_tracker.segmentation.background_advice import Findings, advice
 from cardbox_tracker.segmentation.background_config import BackgroundConfig
 from cardbox_tracker.segmentation.background_file import background_path
 from cardbox_tracker.segmentation.depth_silhouette import WITHIN_LIMITS_M
@@ -38,13 +36,74 @@ from cardbox_tracker.segmentation.kept_background import KeptBackground
 from cardbox_tracker.segmentation.learning import WAYS
 from cardbox_tracker.segmentation.silhouettes import SilhouettePipeline
 
+# The default shared-memory segment of Fast DDS holds half a megabyte, less its own data.
+_LARGE_IMAGE_BYTES = 400_000
+_LOSS_TO_WARN = 0.1
+# Well above the noise of a median over the image.
+_DRIFT_TO_WARN_GREY_LEVELS = 12.0
+# A person who is wholly in view covers less of the image.
+_COVERAGE_TO_WARN = 0.6
+
+
+@dataclass(frozen=True)
+class Findings:
+    """Measurements of the images.
+
+    Attributes:
+        topic: the images' topic.
+        loss: share of them that never arrived.
+        image_bytes: size of one.
+        drift: how much brighter they are than the background, grey levels.
+        follows: True if the light is followed.
+        covered: share of the image that is foreground.
+        within_m: pixels nearer than this are foreground, m; 0: the learned background decides.
+    """
+
+    topic: str
+    loss: float
+    image_bytes: int
+    drift: float
+    follows: bool
+    covered: float
+    within_m: float = 0.0
+
+
+def advice(findings: Findings) -> dict[str, str]:
+    """Return what a user should do about the images, a text for each kind of trouble."""
+    texts = {}
+    if findings.loss > _LOSS_TO_WARN and findings.image_bytes > _LARGE_IMAGE_BYTES:
+        texts["loss"] = (
+            f"{100 * findings.loss:.0f} % of the images on {findings.topic} "
+            f"({findings.image_bytes // 1000} kB each) are lost on the way: start all nodes "
+            "with FASTRTPS_DEFAULT_PROFILES_FILE set to this package's "
+            "config/fastdds_large_images.xml, or use smaller, grey or compressed images"
+        )
+    if findings.within_m > 0.0:
+        if findings.covered > _COVERAGE_TO_WARN:
+            texts["depth"] = (
+                f"most of the image is nearer than within_m, {findings.within_m:g} m: choose it "
+                "between the person and the wall, and let nothing else stand before it"
+            )
+        return texts
+    drifted = not findings.follows and abs(findings.drift) > _DRIFT_TO_WARN_GREY_LEVELS
+    if drifted or findings.covered > _COVERAGE_TO_WARN:
+        texts["brightness"] = (
+            "the whole scene changed its brightness: switch the camera's automatic exposure "
+            "and white balance off (v4l2-ctl -c auto_exposure=1,white_balance_automatic=0), "
+            "then call background/learn with nobody in view"
+        )
+    return texts
+
+
 _DOES = "Cut the person out of a camera's images: images in, silhouettes out."
 _NEXT_LEARNING = "next learning"
 
 
 @dataclass(frozen=True)
-class BackgroundParameters(NodeParameters):
+class BackgroundParameters(NodeParameters, BackgroundConfig):
     """Cut the person out of the camera's images."""
+
+    effects = MappingProxyType({"learn_images": _NEXT_LEARNING})
 
     image_transport: str = image_transport_parameter()
     width: int = parameter(
@@ -77,24 +136,6 @@ class BackgroundParameters(NodeParameters):
     )
     camera_roll_deg: float = camera_roll_parameter()
     max_megapixels: float = max_megapixels_parameter()
-    learn_images: int = shared(BackgroundConfig, "learn_images", effect=_NEXT_LEARNING)
-    threshold: float = shared(BackgroundConfig, "threshold")
-    min_stddev: float = shared(BackgroundConfig, "min_stddev")
-    clean_up: bool = shared(BackgroundConfig, "clean_up")
-    smoothing_px: float = shared(BackgroundConfig, "smoothing_px")
-    min_contrast: float = shared(BackgroundConfig, "min_contrast")
-    shadow: float = shared(BackgroundConfig, "shadow")
-    soft_shadow: float = shared(BackgroundConfig, "soft_shadow")
-    darkest_shadow: float = shared(BackgroundConfig, "darkest_shadow")
-    color: bool = shared(BackgroundConfig, "color")
-    min_color_contrast: float = shared(BackgroundConfig, "min_color_contrast")
-    color_edge: float = shared(BackgroundConfig, "color_edge")
-    edge: float = shared(BackgroundConfig, "edge")
-    flicker: float = shared(BackgroundConfig, "flicker")
-    follow: bool = shared(BackgroundConfig, "follow")
-    min_area: float = shared(BackgroundConfig, "min_area")
-    max_hole: float = shared(BackgroundConfig, "max_hole")
-    absorb_after: int = shared(BackgroundConfig, "absorb_after")
 
     def check(self) -> None:
         """Raise ValueError if values contradict each other."""
@@ -108,11 +149,6 @@ class BackgroundParameters(NodeParameters):
                 f"within_m is {self.within_m:g} but no depth is given; set 'depth' to a topic of "
                 "depth images, or within_m to 0"
             )
-
-    def config(self) -> BackgroundConfig:
-        """Return the settings of the core."""
-        names = settings_of(BackgroundConfig)
-        return BackgroundConfig(**{name: getattr(self, name) for name in names})
 
 
 class BackgroundNode(CardboxNode):
@@ -150,7 +186,7 @@ class BackgroundNode(CardboxNode):
 
     def _changed(self, settings: BackgroundParameters) -> None:
         if self._pipeline is not None:
-            self._pipeline.config = settings.config()
+            self._pipeline.config = settings
 
     def _learn(self) -> str:
         if self.parameters.value.within_m > 0.0:
@@ -173,7 +209,7 @@ class BackgroundNode(CardboxNode):
         self._pipeline = SilhouettePipeline(
             calibration,
             (settings.width, settings.height),
-            settings.config(),
+            settings,
             WAYS[settings.learning],
         )
 
@@ -266,7 +302,3 @@ def main(args: list[str] | None = None) -> int:
     return run_node(
         BackgroundNode, plain_command_line("background", _DOES, BackgroundParameters, args)
     )
-
-
-if __name__ == "__main__":
-    sys.exit(main())

@@ -244,7 +244,3 @@ def main(args: list[str] | None = None) -> int:
         print(describe_devices())
         return 0
     return run_node(CameraNode, command_line)
-
-
-if __name__ == "__main__":
-    sys.exit(main())

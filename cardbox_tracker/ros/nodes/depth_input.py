@@ -1,11 +1,12 @@
-"""Depth images on a topic, converted to the view of a camera at the same position."""
+"""Depth images on a topic in the view of a camera beside it, and silhouettes cut out by them."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any
+from typing import Any, NamedTuple
 
 from sensor_msgs.msg import CameraInfo, CompressedImage, Image
+from std_msgs.msg import Header
 
 from cardbox_tracker.camera.camera import Camera
 from cardbox_tracker.camera.depth_image import (
@@ -14,9 +15,13 @@ from cardbox_tracker.camera.depth_image import (
     at_size,
     depth_from_image,
 )
+from cardbox_tracker.camera.pairing import TOLERANCE_NS, Arrivals
+from cardbox_tracker.common.errors import EncodingError
 from cardbox_tracker.ros.messages import conversions
+from cardbox_tracker.ros.messages.conversions import ImageArray
 from cardbox_tracker.ros.runtime import qos
 from cardbox_tracker.ros.runtime.node import CardboxNode
+from cardbox_tracker.segmentation.depth_silhouette import silhouette_within
 
 _PACKED = "/compressedDepth"
 
@@ -53,3 +58,61 @@ class DepthInput:
         if self.camera is None:
             return at_size(depth_m, camera.width, camera.height)
         return as_seen_by(depth_m, self.camera, camera)
+
+
+class Taken(NamedTuple):
+    """An image or a depth image that waits for its counterpart.
+
+    Attributes:
+        message: header of the image, or the depth image.
+        camera: camera of the image; None for a depth image.
+        within_m: depth limit at the time of the image, metres.
+        sent_ns: send time, ns since the epoch.
+    """
+
+    message: Any
+    camera: Camera | None
+    within_m: float
+    sent_ns: int
+
+
+Send = Callable[[Header, ImageArray, Camera, int], None]
+"""Callback that receives header, silhouette, camera and the later of both send times, ns."""
+
+
+class DepthCut:
+    """Pairs images with depth images and cuts out the pixels nearer than a limit."""
+
+    def __init__(self, node: CardboxNode, topic: str, send: Send) -> None:
+        """Subscribe with ``node`` to depth images on ``topic``; ``send`` receives silhouettes."""
+        self._node, self._topic = node, node.resolve(topic)
+        self._send = send
+        self._arrivals: Arrivals[Taken] = Arrivals(2, TOLERANCE_NS)
+        self._input = DepthInput(node, topic, self._on_depth)
+
+    def add(self, header: Header, camera: Camera, within_m: float, sent_ns: int) -> None:
+        """Add an image of ``camera``, in which pixels nearer than ``within_m`` are the person."""
+        stamp_ns = conversions.stamp_ns(header.stamp)
+        self._add(0, stamp_ns, Taken(header, camera, within_m, sent_ns))
+
+    def _on_depth(self, message: Any, sent_ns: int) -> None:
+        stamp_ns = conversions.stamp_ns(message.header.stamp)
+        self._add(1, stamp_ns, Taken(message, None, 0.0, sent_ns))
+
+    def _add(self, number: int, stamp_ns: int, taken: Taken) -> None:
+        self._arrivals.add(number, stamp_ns, taken)
+        for seen, measured in self._arrivals.sets():
+            if seen is None:
+                continue
+            if measured is None:
+                self._node.diagnostics.wait_for(f"depth images on {self._topic}")
+                continue
+            assert seen.camera is not None
+            try:
+                depth_m = self._input.seen_by(seen.camera, measured.message)
+            except EncodingError as error:
+                # The node would otherwise name the topic of the message that completed the set.
+                raise EncodingError(f"{self._topic}: {error}") from None
+            silhouette = silhouette_within(depth_m, seen.within_m)
+            sent_ns = max(seen.sent_ns, measured.sent_ns)
+            self._send(seen.message, silhouette, seen.camera, sent_ns)

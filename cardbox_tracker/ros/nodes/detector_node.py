@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+import math
 import os
-import sys
 import time
 from collections import deque
 from collections.abc import Sequence
@@ -12,14 +12,15 @@ from typing import Any
 
 import numpy as np
 from geometry_msgs.msg import PolygonStamped
-from std_msgs.msg import Header
+from std_msgs.msg import Float64, Header
 
-from cardbox_tracker.camera.camera import Calibration
+from cardbox_tracker.camera.camera import Calibration, Camera
 from cardbox_tracker.camera.stamps import WINDOW, StampOrder
 from cardbox_tracker.camera.unrectify import unrectified
 from cardbox_tracker.detectors.detector import Detector, PersonDetector
 from cardbox_tracker.detectors.landmarks import LANDMARKS
 from cardbox_tracker.detectors.pose_network import Detection
+from cardbox_tracker.measuring.standing_camera import middles, standing_camera
 from cardbox_tracker.ros.messages.conversions import ImageArray, stamp_ns
 from cardbox_tracker.ros.messages.keypoints import (
     people_message,
@@ -27,7 +28,6 @@ from cardbox_tracker.ros.messages.keypoints import (
     skeleton_message,
 )
 from cardbox_tracker.ros.nodes.camera_images import CameraImages
-from cardbox_tracker.ros.nodes.camera_pitch import CameraPitch
 from cardbox_tracker.ros.nodes.shared_parameters import (
     camera_roll_parameter,
     image_transport_parameter,
@@ -42,6 +42,45 @@ from cardbox_tracker.ros.runtime.parameters import LiveParameters
 from cardbox_tracker.ros.runtime.publishers import SinglePublisher
 from cardbox_tracker.segmentation.silhouettes import SilhouettePipeline
 from cardbox_tracker.tracking.people import MOST_PEOPLE
+
+# People stand still for some time, and move about between.
+_IMAGES = 10
+
+
+class CameraPitch:
+    """Looks for the pitch until a standing person shows it, and latches it."""
+
+    def __init__(self, node: CardboxNode) -> None:
+        """Advertise ``~/camera_pitch`` for ``node``."""
+        self._node = node
+        self._publisher = node.advertise(Float64, "~/camera_pitch", qos.LATCHED)
+        self.restart()
+
+    def restart(self) -> None:
+        """Look again, because the camera is another one."""
+        self._seen: list[Detection] = []
+        self._is_found = False
+
+    def see(self, found: Detection, camera: Camera) -> None:
+        """Add a person in the image of ``camera``."""
+        if self._is_found:
+            return
+        self._seen.append(found)
+        if len(self._seen) < _IMAGES:
+            return
+        standing = standing_camera(middles(self._seen), camera)
+        self._seen.clear()
+        if standing is None or not standing.is_pitch_found:
+            return
+        self._is_found = True
+        self._publisher.publish(Float64(data=standing.pitch_rad))
+        degrees = math.degrees(standing.pitch_rad)
+        self._node.get_logger().info(
+            f"camera pitch {abs(degrees):.0f} degrees {'down' if degrees >= 0 else 'up'} (standard "
+            f"deviation {math.degrees(standing.pitch_stddev_rad):.0f}), found from the person "
+            "standing upright"
+        )
+
 
 _NICE = 5
 _DOES = "Find the person in a camera's images: images in, 2D points and silhouettes out."
@@ -207,7 +246,3 @@ class DetectorNode(CardboxNode):
 def main(args: list[str] | None = None) -> int:
     """Run the node; the exit code is 0 unless it could not start."""
     return run_node(DetectorNode, plain_command_line("detector", _DOES, DetectorParameters, args))
-
-
-if __name__ == "__main__":
-    sys.exit(main())

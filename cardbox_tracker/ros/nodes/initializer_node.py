@@ -20,9 +20,9 @@ from cardbox_tracker.applications.drawing.guidance import Guide
 from cardbox_tracker.camera.camera import Camera
 from cardbox_tracker.common.errors import CardboxError, InitializationError
 from cardbox_tracker.common.progress import told
-from cardbox_tracker.measuring.cancellation import Cancellation
 from cardbox_tracker.measuring.guidance import (
     ASK,
+    Cancellation,
     Guidance,
     Prompt,
     measuring,
@@ -294,7 +294,3 @@ def main(args: list[str] | None = None) -> int:
     # The tracker, which gets the same silhouettes, has priority.
     os.nice(5)
     return run_node(InitializerNode, command_line)
-
-
-if __name__ == "__main__":
-    sys.exit(main())

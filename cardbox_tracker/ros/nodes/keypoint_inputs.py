@@ -3,24 +3,211 @@
 from __future__ import annotations
 
 import time
+from collections import deque
+from typing import Any, NamedTuple
 
 import numpy as np
+from geometry_msgs.msg import PolygonStamped
+from rclpy.clock import Clock
+from rclpy.clock_type import ClockType
+from rclpy.subscription import Subscription
 from sensor_msgs.msg import CameraInfo
 from std_msgs.msg import Header
 
 from cardbox_tracker.camera.calibration_watch import CalibrationWatch
 from cardbox_tracker.camera.camera import Camera
 from cardbox_tracker.camera.pairing import TOLERANCE_NS
-from cardbox_tracker.common.errors import CardboxError
+from cardbox_tracker.camera.stamps import StampOrder
+from cardbox_tracker.common.errors import CardboxError, cut, quoted
 from cardbox_tracker.common.files import user_path
 from cardbox_tracker.detectors.image_points import ImagePoints
 from cardbox_tracker.detectors.person_choice import person_in
 from cardbox_tracker.detectors.point_checks import check_places
 from cardbox_tracker.detectors.point_table import COLUMNS, Image, PointTable, placed, why_not
 from cardbox_tracker.ros.messages.conversions import ImageArray, stamp_ns
-from cardbox_tracker.ros.nodes.keypoint_topic import KeypointTopic, Taken
+from cardbox_tracker.ros.messages.keypoints import CONVERSIONS, POLYGON_STAMPED, Size
+from cardbox_tracker.ros.messages.types import optional_class
+from cardbox_tracker.ros.nodes.input_stream import InputStream
 from cardbox_tracker.ros.nodes.tracker_parameters import TrackerParameters
+from cardbox_tracker.ros.runtime import qos
 from cardbox_tracker.ros.runtime.node import CardboxNode
+
+MOST_AGE_NS = 300_000_000
+"""Points that are older than the silhouette by more are not used."""
+SAME_TIME_NS = 50_000_000
+"""Points that are newer than the silhouette by at most this are of the same time."""
+
+_KEPT = 8
+_LOOK_S = 1.0
+_SILENT_S = 3.0
+# After so many consecutive messages of another time the clocks are in doubt.
+_IN_DOUBT = 5
+
+
+class Taken(NamedTuple):
+    """Points of all persons in one image, in pixels of the camera's own image.
+
+    Attributes:
+        stamp_ns: stamp of the image.
+        frame_id: frame of the image; empty if it is not known.
+        persons: points of each person.
+    """
+
+    stamp_ns: int
+    frame_id: str
+    persons: list[ImagePoints]
+
+
+class KeypointTopic:
+    """Keeps the points that arrive for one camera until a silhouette takes them.
+
+    Attributes:
+        stream: statistics of the messages.
+        size: width and height of the camera's image, px; None until they are known.
+    """
+
+    def __init__(self, node: CardboxNode, name: str, topic: str) -> None:
+        """Subscribe with ``node`` to ``topic``; ``name`` stands in the diagnostics."""
+        self.stream = InputStream(name, node.resolve(topic))
+        self.size: Size | None = None
+        self._node, self._topic = node, topic
+        self._kept: deque[Taken] = deque()
+        self._asked_ns = self._apart_ns = 0
+        self._used = self._unused = self._in_doubt = 0
+        self._wrong_type = ""
+        self._type = ""
+        self._subscription: Subscription | None = None
+        self._use(POLYGON_STAMPED, PolygonStamped)
+        self._look()
+        # The publisher may start later, or be replaced by one of another type.
+        steady = Clock(clock_type=ClockType.STEADY_TIME)
+        self._timer = node.create_timer(_LOOK_S, self._look, clock=steady)
+
+    def take(self, at_ns: int, frame_id: str) -> Taken | None:
+        """Return the newest points for a silhouette, once; None if there are none in time.
+
+        Args:
+            at_ns: stamp of the silhouette.
+            frame_id: frame of the silhouette.
+        """
+        self._asked_ns, newest = at_ns, None
+        while self._kept and self._kept[0].stamp_ns <= at_ns + SAME_TIME_NS:
+            newest = self._kept.popleft()
+        if newest is None:
+            return None
+        if at_ns - newest.stamp_ns > MOST_AGE_NS:
+            self._leave_out(newest)
+            return None
+        if newest.frame_id and frame_id and newest.frame_id != frame_id:
+            self._report(
+                f"points are in the frame {quoted(newest.frame_id)}; expected the camera's, "
+                f"{quoted(frame_id)}: give each camera's detector the images of that camera"
+            )
+            return None
+        self._used, self._in_doubt = self._used + 1, 0
+        self._apart_ns = at_ns - newest.stamp_ns
+        return newest
+
+    def values(self) -> dict[str, str]:
+        """Return rate, age and use of the points for the diagnostics."""
+        name = self.stream.name
+        behind = f"{max(self._apart_ns, 0) / 1e6:.0f}"
+        return self.stream.values() | {
+            f"{name} behind the image (ms)": behind,
+            f"{name} used": str(self._used),
+            f"{name} not used": str(self._unused),
+        }
+
+    def warnings(self) -> dict[str, str]:
+        """Return warnings about the points, while tracking goes on, by kind."""
+        stream, name = self.stream, self.stream.name
+        if self._wrong_type:
+            return {f"type of {name}": self._wrong_type}
+        if stream.age_s > _SILENT_S and stream.statistics.received:
+            return {
+                f"silence of {name}": f"nothing has come on {stream.topic} for {stream.age_s:.0f} "
+                "s; tracking goes on without points. Is the detector running?"
+            }
+        if self._in_doubt >= _IN_DOUBT:
+            return {
+                f"clock of {name}": f"the points on {stream.topic} are "
+                f"{abs(self._apart_ns) / 1e9:.1f} s {'older' if self._apart_ns > 0 else 'newer'} "
+                "than the silhouettes, so they are not used; expected at most "
+                f"{MOST_AGE_NS / 1e9:g} s: the stamp must be that of the image, and clocks of "
+                "several computers synchronized"
+            }
+        return {f"{name} cannot be used": stream.problem} if stream.problem else {}
+
+    def _look(self) -> None:
+        """Subscribe with the type of the publisher, if it is one that can be read."""
+        ends = self._node.get_publishers_info_by_topic(self.stream.topic)
+        types = sorted({str(end.topic_type) for end in ends})
+        self._wrong_type = ""
+        if not types or self._type in types:
+            return
+        for type_ in types:
+            package, _, name = type_.partition("/msg/")
+            kind = optional_class(package, name) if type_ in CONVERSIONS else None
+            if kind is not None:
+                self._use(type_, kind)
+                return
+        known = [type_ for type_ in types if type_ in CONVERSIONS]
+        if known:
+            package = known[0].partition("/")[0]
+            remedy = f"install that package (ros-jazzy-{package.replace('_', '-')}, or its source)"
+        else:
+            remedy = f"expected one of {', '.join(CONVERSIONS)}"
+        self._wrong_type = (
+            f"the points on {self.stream.topic} are {', '.join(types)}, which cannot be read: "
+            f"{remedy}"
+        )
+
+    def _use(self, type_: str, kind: Any) -> None:
+        if self._subscription is not None:
+            self._node.destroy_subscription(self._subscription)
+        self._type, self._convert = type_, CONVERSIONS[type_]
+        self._kept.clear()
+        self._subscription = self._node.subscribe(
+            kind, self._topic, self._add, qos.SENSOR_DATA, has_one_type=False
+        )
+
+    def _add(self, message: Any, _: int) -> None:
+        at_ns = stamp_ns(message.header.stamp)
+        order = self.stream.arrived(at_ns)
+        if not order.is_usable or self.size is None:
+            return
+        if order is StampOrder.UNSTAMPED:
+            self._report("points have no stamp (it is zero); expected the stamp of their image")
+            return
+        if order is StampOrder.RESTART:
+            self._kept.clear()
+        try:
+            persons = self._convert(message, self.size)
+        except CardboxError as error:
+            self._report(str(error))
+            return
+        except (AttributeError, TypeError) as error:
+            # Another release of a foreign package may have other fields.
+            self._report(f"the fields of {self._type} are not the expected ones: {cut(str(error))}")
+            return
+        self.stream.problem = ""
+        self._kept.append(Taken(at_ns, message.header.frame_id.lstrip("/"), persons))
+        if len(self._kept) > _KEPT:
+            oldest = self._kept.popleft()
+            if self._asked_ns:
+                self._leave_out(oldest)
+
+    def _leave_out(self, taken: Taken) -> None:
+        self._unused += 1
+        self._in_doubt += 1
+        self._apart_ns = self._asked_ns - taken.stamp_ns
+
+    def _report(self, problem: str) -> None:
+        self._unused += 1
+        self.stream.problem = f"{self.stream.topic}: {problem}"
+        kind = f"{self.stream.name} cannot be used"
+        self._node.diagnostics.say(kind, self.stream.problem, warning=True)
+
 
 _PATIENCE_S = 3.0
 # Images in a row whose points lie beside the silhouette, after which a warning follows.

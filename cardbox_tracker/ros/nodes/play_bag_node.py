@@ -13,7 +13,7 @@ from __future__ import annotations
 import argparse
 import sys
 import time
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
 from functools import partial
@@ -29,13 +29,54 @@ from std_msgs.msg import String
 
 from cardbox_tracker.common.errors import BagError, CardboxError
 from cardbox_tracker.recordings.bag_reader import BagReader
-from cardbox_tracker.recordings.bag_topics import find_topics
 from cardbox_tracker.ros.messages.types import message_classes
 from cardbox_tracker.ros.runtime import qos
 from cardbox_tracker.ros.runtime.command_line import node_help
 from cardbox_tracker.ros.runtime.node import CardboxNode, own_arguments, run
 from cardbox_tracker.ros.runtime.parameter_fields import AT_START, NodeParameters, parameter
 from cardbox_tracker.ros.runtime.parameters import LiveParameters
+
+_COMPRESSED = "/compressed"
+
+
+def find_topics(bag: str, wanted: Iterable[str], cameras: Sequence[str] = ()) -> dict[str, str]:
+    """Return the topics of a bag as values of the launch arguments of the same names.
+
+    Args:
+        bag: rosbag2 folder or file.
+        wanted: ``image``, which includes ``image_transport``, and ``camera_info``.
+        cameras: namespaces of several cameras; the names are then relative to each namespace.
+
+    Raises:
+        CardboxError: the bag cannot be read, does not have exactly one topic of each kind, or the
+            cameras differ.
+    """
+    with BagReader(bag) as reader:
+        images = reader.image_topics
+        if len(images) > 1 and not cameras:
+            raise CardboxError(
+                f"{bag} has images on {', '.join(images)}; choose one with the launch arguments "
+                'image and camera_info, or several cameras with cameras:="[NAMESPACE, NAMESPACE]"'
+            )
+        found = [_topics_of(reader, wanted, camera) for camera in cameras or ("",)]
+    if any(one != found[0] for one in found):
+        each = "; ".join(f"{name}: {one}" for name, one in zip(cameras, found, strict=True))
+        raise CardboxError(f"the cameras of {bag} have different topics, expected the same: {each}")
+    return found[0]
+
+
+def _topics_of(reader: BagReader, wanted: Iterable[str], camera: str) -> dict[str, str]:
+    """Return the topics of one camera; if ``camera`` is empty, those of the only camera."""
+    folder = f"/{camera}/" if camera else ""
+    found = {}
+    if "image" in wanted:
+        topic = reader.image_topic(camera or None).removeprefix(folder)
+        found["image"] = topic.removesuffix(_COMPRESSED)
+        found["image_transport"] = "compressed" if topic.endswith(_COMPRESSED) else "raw"
+    if "camera_info" in wanted:
+        found["camera_info"] = reader.camera_info_topic(camera or None).removeprefix(folder)
+    return found
+
 
 _PROGRESS_S = 5.0
 # The nodes of a second camera may start this much later.
@@ -317,7 +358,3 @@ def main(args: list[str] | None = None) -> int:
     command_line = list(sys.argv) if args is None else ["play_bag", *args]
     overrides = overrides_from(own_arguments(command_line))
     return run(partial(PlayBagNode, parameter_overrides=overrides), command_line, PlayBagNode.play)
-
-
-if __name__ == "__main__":
-    sys.exit(main())

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-import sys
 import time
 from dataclasses import dataclass
+from types import MappingProxyType
 from typing import Any
 
 from builtin_interfaces.msg import Duration
@@ -25,7 +25,7 @@ from cardbox_tracker.ros.messages.results import posture_and_neck_of
 from cardbox_tracker.ros.runtime import qos
 from cardbox_tracker.ros.runtime.command_line import plain_command_line
 from cardbox_tracker.ros.runtime.node import CardboxNode, run_node
-from cardbox_tracker.ros.runtime.parameter_fields import AT_START, NodeParameters, parameter, shared
+from cardbox_tracker.ros.runtime.parameter_fields import AT_START, NodeParameters, parameter
 from cardbox_tracker.ros.runtime.parameters import LiveParameters
 from cardbox_tracker.tracking.estimate import TRACKING
 
@@ -33,14 +33,12 @@ _DOES = "Move a robot arm as the tracked person moves theirs, within its limits.
 _CHECK_S = 0.1
 
 
-def _fixed(name: str) -> Any:
-    """Return a setting of the retargeting, which cannot change while a robot moves."""
-    return shared(RetargetConfig, name, effect=AT_START)
-
-
 @dataclass(frozen=True)
-class RetargetParameters(NodeParameters):
+class RetargetParameters(NodeParameters, RetargetConfig):
     """Move a robot arm as the tracked person moves theirs."""
+
+    # They cannot change while a robot moves.
+    effects = MappingProxyType(dict.fromkeys(settings_of(RetargetConfig), AT_START))
 
     robot_file: str = parameter("", "URDF of the robot; has to be given", effect=AT_START)
     joint_map_file: str = parameter(
@@ -59,19 +57,6 @@ class RetargetParameters(NodeParameters):
         limits=(0.05, 10.0),
         effect=AT_START,
     )
-    side: str = _fixed("side")
-    max_speed: float = _fixed("max_speed")
-    max_stddev_rad: float = _fixed("max_stddev_rad")
-    rate_hz: float = _fixed("rate_hz")
-    longest_step_s: float = _fixed("longest_step_s")
-    reach: float = _fixed("reach")
-    mount_roll_deg: float = _fixed("mount_roll_deg")
-    mount_pitch_deg: float = _fixed("mount_pitch_deg")
-    mount_yaw_deg: float = _fixed("mount_yaw_deg")
-
-    def config(self) -> RetargetConfig:
-        """Return the settings of the core."""
-        return RetargetConfig(**{name: getattr(self, name) for name in settings_of(RetargetConfig)})
 
 
 class RetargetNode(CardboxNode):
@@ -89,7 +74,7 @@ class RetargetNode(CardboxNode):
             raise CardboxError("retarget needs a robot: give the parameter robot_file, a URDF")
         joint_map = user_path(settings.joint_map_file) if settings.joint_map_file else None
         robot, self._retargeter = make_retargeter(
-            user_path(settings.robot_file), joint_map, settings.hand_link, settings.config()
+            user_path(settings.robot_file), joint_map, settings.hand_link, settings
         )
         self._timeout_s = settings.timeout_s
         self._body: BodyModel | None = None
@@ -199,7 +184,3 @@ def _now_ns() -> int:
 def main(args: list[str] | None = None) -> int:
     """Run the node; the exit code is 0 unless it could not start."""
     return run_node(RetargetNode, plain_command_line("retarget", _DOES, RetargetParameters, args))
-
-
-if __name__ == "__main__":
-    sys.exit(main())

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -22,7 +21,6 @@ from cardbox_tracker.applications.ergonomics.rula import (
     part_values,
     sampled_scores,
 )
-from cardbox_tracker.common.settings import settings_of
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.model_file import loads_body_model
 from cardbox_tracker.ros.messages import conversions
@@ -30,7 +28,7 @@ from cardbox_tracker.ros.messages.results import neck_of, posture_of
 from cardbox_tracker.ros.runtime import qos
 from cardbox_tracker.ros.runtime.command_line import plain_command_line
 from cardbox_tracker.ros.runtime.node import CardboxNode, run_node
-from cardbox_tracker.ros.runtime.parameter_fields import AT_START, NodeParameters, parameter, shared
+from cardbox_tracker.ros.runtime.parameter_fields import AT_START, NodeParameters, parameter
 from cardbox_tracker.ros.runtime.parameters import LiveParameters
 from cardbox_tracker.tracking.sampling import normal_postures
 
@@ -38,33 +36,12 @@ _DOES = "Score the strain on arms, neck and trunk (RULA) while the tracker follo
 
 
 @dataclass(frozen=True)
-class RulaParameters(NodeParameters):
+class RulaParameters(NodeParameters, RulaConfig):
     """Score the strain on arms, neck and trunk (RULA)."""
 
-    neck: int = shared(RulaConfig, "neck")
-    wrist: int = shared(RulaConfig, "wrist")
-    wrist_twist: int = shared(RulaConfig, "wrist_twist")
-    legs: int = shared(RulaConfig, "legs")
-    arm_muscle_use: int = shared(RulaConfig, "arm_muscle_use")
-    arm_load: int = shared(RulaConfig, "arm_load")
-    body_muscle_use: int = shared(RulaConfig, "body_muscle_use")
-    body_load: int = shared(RulaConfig, "body_load")
-    shoulders_raised: bool = shared(RulaConfig, "shoulders_raised")
-    arms_supported: bool = shared(RulaConfig, "arms_supported")
-    trunk_twisted: bool = shared(RulaConfig, "trunk_twisted")
-    abducted_deg: float = shared(RulaConfig, "abducted_deg")
-    outwards_deg: float = shared(RulaConfig, "outwards_deg")
-    side_bent_deg: float = shared(RulaConfig, "side_bent_deg")
-    neck_extended_deg: float = shared(RulaConfig, "neck_extended_deg")
-    neck_twisted_deg: float = shared(RulaConfig, "neck_twisted_deg")
-    upright_deg: float = shared(RulaConfig, "upright_deg")
     seed: int = parameter(
         0, "random seed of the posture samples", limits=(0, 2**31 - 1), effect=AT_START
     )
-
-    def config(self) -> RulaConfig:
-        """Return the settings of the core."""
-        return RulaConfig(**{name: getattr(self, name) for name in settings_of(RulaConfig)})
 
 
 class RulaNode(CardboxNode):
@@ -108,7 +85,7 @@ class RulaNode(CardboxNode):
         posture, stddev = posture_of(self._joints), posture_of(message)
         postures = normal_postures(posture, stddev, SAMPLES, self._rng)
         # The tracker leaves out the deviations of a neck that it does not know.
-        neck, config = (neck_of(self._joints), neck_of(message)), self.parameters.value.config()
+        neck, config = (neck_of(self._joints), neck_of(message)), self.parameters.value
         scores, is_measured = sampled_scores(self._body, posture, postures, neck, config, self._rng)
         self._score.publish(Float32(data=scores.mean))
         self._chances.publish(_chances_message(scores))
@@ -154,7 +131,3 @@ def _report_message(
 def main(args: list[str] | None = None) -> int:
     """Run the node; the exit code is 0 unless it could not start."""
     return run_node(RulaNode, plain_command_line("rula", _DOES, RulaParameters, args))
-
-
-if __name__ == "__main__":
-    sys.exit(main())

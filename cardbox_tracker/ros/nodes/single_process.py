@@ -136,7 +136,3 @@ def main(args: list[str] | None = None) -> int:
     command_line = list(sys.argv) if args is None else ["cardbox_nodes", *args]
     source = source_from(own_arguments(command_line))
     return run(partial(AllNodes, source), command_line, AllNodes.work)
-
-
-if __name__ == "__main__":
-    sys.exit(main())

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 from dataclasses import dataclass
 from functools import partial
 from typing import Any, NamedTuple
@@ -203,7 +202,3 @@ def main(args: list[str] | None = None) -> int:
     return run_node(
         StereoDepthNode, plain_command_line("stereo_depth", _DOES, StereoDepthParameters, args)
     )
-
-
-if __name__ == "__main__":
-    sys.exit(main())

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import sys
-from collections.abc import Iterator, Sequence
+import math
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import partial
 from typing import Any
 
 import numpy as np
-from std_msgs.msg import String
+from std_msgs.msg import Float64, String
 
 from cardbox_tracker.camera.camera import Camera
 from cardbox_tracker.camera.stamps import StampOrder
@@ -17,23 +17,159 @@ from cardbox_tracker.common.errors import CameraError
 from cardbox_tracker.common.files import user_path
 from cardbox_tracker.common.progress import told
 from cardbox_tracker.common.settings import restarts
+from cardbox_tracker.measuring.standing_camera import FOUND_STDDEV
 from cardbox_tracker.person.model import BodyModel
-from cardbox_tracker.person.model_file import load_body_model, loads_body_model
+from cardbox_tracker.person.model_file import dumps_body_model, load_body_model, loads_body_model
+from cardbox_tracker.person.skeleton import PLACE_NAMES
+from cardbox_tracker.person.urdf import urdf_from_body
+from cardbox_tracker.recordings.outputs import METRICS, place_of
 from cardbox_tracker.ros.messages import conversions
 from cardbox_tracker.ros.nodes.camera_inputs import CameraInputs, Received
-from cardbox_tracker.ros.nodes.found_body import FoundBody
 from cardbox_tracker.ros.nodes.rep155_outputs import TrackedBodies
 from cardbox_tracker.ros.nodes.tracker_outputs import TrackerOutputs
 from cardbox_tracker.ros.nodes.tracker_parameters import TrackerParameters
-from cardbox_tracker.ros.nodes.tracking_report import TrackingReport
 from cardbox_tracker.ros.runtime import qos
 from cardbox_tracker.ros.runtime.command_line import plain_command_line
 from cardbox_tracker.ros.runtime.node import CardboxNode, run_node
 from cardbox_tracker.ros.runtime.parameters import LiveParameters
 from cardbox_tracker.tracking.agreement_watch import AgreementWatch
+from cardbox_tracker.tracking.estimate import LOST, NO_PERSON, UNCERTAIN, Estimate
 from cardbox_tracker.tracking.people import People
 from cardbox_tracker.tracking.precompile import compile_all
 from cardbox_tracker.tracking.tracker import Tracker
+
+_REASONS = {
+    NO_PERSON: "nobody is in the image",
+    LOST: (
+        "the person was lost (the model does not fit the silhouette); call tracker/reset when they "
+        "stand in the front reference posture, or initialize again if it is another person"
+    ),
+    UNCERTAIN: (
+        "the posture may be wrong (several postures fit the silhouette, or none fits it well); "
+        "look at the overlay, and let a robot wait until tracking_state is tracking again"
+    ),
+}
+
+
+class TrackingReport:
+    """Collects the estimates of a tracker, and describes its state in words and numbers."""
+
+    def __init__(self) -> None:
+        """Begin without an estimate."""
+        self._body: BodyModel | None = None
+        self._state = ""
+        self._counts: dict[str, int] = {}
+        self._estimate: Estimate | None = None
+
+    def start(self, body: BodyModel) -> None:
+        """Begin again with ``body``."""
+        self._state, self._body = "", body
+
+    def add(self, estimate: Estimate, body: BodyModel) -> dict[str, str]:
+        """Add the estimate of an image and the ``body`` to which it belongs.
+
+        Returns:
+            Texts about changes, by kind.
+        """
+        news = {}
+        if body is not self._body:
+            self._body = body
+            news["body"] = f"fitted to the person in the image:\n{body}"
+        self._estimate = estimate
+        self._counts[estimate.state] = self._counts.get(estimate.state, 0) + 1
+        before, self._state = self._state, estimate.state
+        reason = _REASONS.get(estimate.state)
+        if estimate.state == before:
+            return news
+        if estimate.state == UNCERTAIN:
+            news["state"] = f"tracking, but {reason}"
+        elif before != UNCERTAIN or reason:
+            # The state may change between tracking and uncertain with each image.
+            news["state"] = f"not tracking: {reason}" if reason else "tracking"
+        return news
+
+    def warnings(self) -> dict[str, str]:
+        """Return texts about present problems, by kind."""
+        reason = _REASONS.get(self._state)
+        if reason is None:
+            return {}
+        return {"": reason if self._state == UNCERTAIN else f"no joint states: {reason}"}
+
+    def values(self, cameras: Mapping[str, str]) -> dict[str, str]:
+        """Return the state, the number of images with each state, and values of the last posture.
+
+        ``cameras`` are further values, which precede those of the posture.
+        """
+        values = {"state": self._state or "not started"}
+        values |= {f"images {state}": str(count) for state, count in self._counts.items()}
+        values |= cameras
+        estimate = self._estimate
+        if estimate is None or estimate.posture is None:
+            return values
+        values |= {metric.label: metric.text(estimate) for metric in METRICS}
+        if estimate.posture_stddev is not None:
+            angles = estimate.posture_stddev[1:]
+            values["largest deviation (deg)"] = f"{math.degrees(float(angles.max())):.1f}"
+        places = zip(PLACE_NAMES, place_of(estimate), strict=True)
+        return values | {f"{name} (m)": f"{value:.3f}" for name, value in places}
+
+
+class FoundBody:
+    """Publishes what was found, latched, until a measured body replaces it.
+
+    Attributes:
+        text: the body model that was published last; empty before.
+    """
+
+    def __init__(
+        self,
+        node: CardboxNode,
+        settings: TrackerParameters,
+        guess: BodyModel,
+        use: Callable[[BodyModel], None],
+    ) -> None:
+        """Use ``guess`` now, and again with the camera's pitch when the detector finds it."""
+        self.text = ""
+        self._node, self._settings, self._guess, self._use = node, settings, guess, use
+        self._is_measured = False
+        self._model = node.advertise(String, "body_model", qos.LATCHED)
+        self._description = node.advertise(String, "robot_description", qos.LATCHED)
+        node.subscribe(Float64, "detector/camera_pitch", self._on_pitch, qos.LATCHED)
+        stature = (
+            f"a stature of {settings.stature:g} m"
+            if settings.stature
+            else "the mean stature of people, so sizes and distances may be wrong by a tenth"
+        )
+        node.get_logger().info(
+            f"nobody is measured: the person in the image is tracked with {stature}"
+        )
+        use(guess)
+
+    def _on_pitch(self, message: Float64, _: int) -> None:
+        if not self._is_measured:
+            # The message has no deviation; this is the largest one of a pitch that is found.
+            tilt = {"camera_pitch_rad": message.data, "pitch_stddev_rad": FOUND_STDDEV}
+            body = self._guess.with_values(**tilt)
+            degrees = math.degrees(message.data)
+            self._node.diagnostics.say("pitch", f"the detector found a pitch of {degrees:.0f} deg")
+            self._use(body)
+
+    def replace(self, text: str) -> None:
+        """Latch the text of a measured body, too, so that late subscribers get one body."""
+        self._is_measured, self.text = True, text
+        self._model.publish(String(data=text))
+
+    def publish(self, body: BodyModel, frame_id: str) -> None:
+        """Publish a body that was fitted to the images of a camera's frame."""
+        if self._is_measured:
+            return
+        self.text = dumps_body_model(body)
+        self._model.publish(String(data=self.text))
+        settings = self._settings
+        frame = frame_id if settings.optical_frame_in_tf else ""
+        urdf = urdf_from_body(body, frame or None, torso_place=settings.torso_place)
+        self._description.publish(String(data=urdf))
+
 
 _DOES = "Follow the measured person: silhouettes in, joint states out."
 _PREPARING = "preparing (the very first start compiles for one to two minutes)"
@@ -244,7 +380,3 @@ def _named(person: int | None) -> str:
 def main(args: list[str] | None = None) -> int:
     """Run the node; the exit code is 0 unless it could not start."""
     return run_node(TrackerNode, plain_command_line("tracker", _DOES, TrackerParameters, args))
-
-
-if __name__ == "__main__":
-    sys.exit(main())

@@ -3,16 +3,55 @@
 from __future__ import annotations
 
 import argparse
+import csv
 import re
 import sys
 import textwrap
 from collections.abc import Iterator
-from typing import Any
+from pathlib import Path
+from typing import Any, NamedTuple
 
-from cardbox_tracker.ros.runtime.interface import SERVICE, Entry, entries
 from cardbox_tracker.ros.runtime.node import own_arguments
-from cardbox_tracker.ros.runtime.parameter_fields import NodeParameters
-from cardbox_tracker.ros.runtime.parameter_text import default_of, details, type_name, yaml_value
+from cardbox_tracker.ros.runtime.parameter_fields import (
+    NodeParameters,
+    default_of,
+    details,
+    type_name,
+    yaml_value,
+)
+
+_TABLE = Path(__file__).parents[1] / "topics.csv"
+SERVICE = "service"
+
+
+class Entry(NamedTuple):
+    """One topic or service of a node.
+
+    Attributes:
+        node: name of the node.
+        case: settings with which it exists; empty for the default.
+        direction: ``in``, ``out`` or ``service``.
+        name: relative or absolute; words in capitals are values of parameters.
+        type: such as ``sensor_msgs/Image``.
+        qos: reliability, or ``latched``, and depth; empty for a service.
+        content: phrase in Markdown.
+    """
+
+    node: str
+    case: str
+    direction: str
+    name: str
+    type: str
+    qos: str
+    content: str
+
+
+def entries(node: str = "") -> list[Entry]:
+    """Return the topics and services of a node, or of all nodes, in the order of the table."""
+    with _TABLE.open(encoding="utf-8", newline="") as file:
+        found = [Entry(**row) for row in csv.DictReader(file)]
+    return [entry for entry in found if node in ("", entry.node)]
+
 
 _WIDTH = 96
 _LINK = re.compile(r"\[([^\]]*)\]\([^)]*\)")

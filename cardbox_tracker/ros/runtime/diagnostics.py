@@ -1,7 +1,7 @@
 """The state of a node on ``/diagnostics`` once a second, and in its log when it changes.
 
 A node reports when it waits for input and when its input has ceased. Lost images are counted by the
-spacing of their stamps, because the middleware does not report them. :mod:`.log_limit` limits
+spacing of their stamps, because the middleware does not report them. :class:`LogLimit` limits
 repeated log messages.
 """
 
@@ -10,6 +10,7 @@ from __future__ import annotations
 import time
 from collections import deque
 from collections.abc import Callable
+from dataclasses import dataclass, field
 
 import numpy as np
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
@@ -21,7 +22,52 @@ from rclpy.qos import QoSProfile
 from cardbox_tracker.camera.stamps import WINDOW, StreamStatistics
 from cardbox_tracker.common.errors import plain
 from cardbox_tracker.ros.runtime import qos
-from cardbox_tracker.ros.runtime.log_limit import LogLimit
+
+_TEXTS = 3
+_FIRST_PAUSE_S = 10.0
+_LONGEST_PAUSE_S = 600.0
+
+
+@dataclass
+class _Spell:
+    """Messages of one kind since its last quiet period."""
+
+    texts: set[str] = field(default_factory=set)
+    pause_s: float = _FIRST_PAUSE_S
+    next_s: float = 0.0
+    seen_s: float = 0.0
+
+
+class LogLimit:
+    """Allows the first texts of a kind, then one text after each of growing pauses.
+
+    The kind is the fault without the numbers and names of its text, because a sender of always
+    different nonsense would otherwise fill log and memory. A kind that was quiet for longer than
+    its pause starts anew.
+    """
+
+    def __init__(self, now_s: Callable[[], float] = time.monotonic) -> None:
+        """Measure time with ``now_s``, which returns seconds."""
+        self._now_s = now_s
+        self._spells: dict[str, _Spell] = {}
+
+    def allows(self, kind: str, text: str) -> bool:
+        """Return whether to log ``text``, and count it."""
+        now_s = self._now_s()
+        spell = self._spells.get(kind)
+        if spell is None or now_s - spell.seen_s > 2 * spell.pause_s:
+            spell = self._spells[kind] = _Spell()
+        spell.seen_s = now_s
+        is_new = text not in spell.texts and len(spell.texts) < _TEXTS
+        if not is_new and now_s < spell.next_s:
+            return False
+        if is_new:
+            spell.texts.add(text)
+        else:
+            spell.pause_s = min(2 * spell.pause_s, _LONGEST_PAUSE_S)
+        spell.next_s = now_s + spell.pause_s
+        return True
+
 
 PERIOD_S = 1.0
 # The input has ceased after this time and this number of periods without a message.

@@ -26,7 +26,7 @@ from cardbox_tracker.common.errors import CardboxError, cut, quoted
 from cardbox_tracker.ros.runtime import qos
 from cardbox_tracker.ros.runtime.diagnostics import PERIOD_S, NodeDiagnostics
 from cardbox_tracker.ros.runtime.intra_process import IntraProcess, IntraProcessPublisher
-from cardbox_tracker.ros.runtime.topic_types import TopicTypes
+from cardbox_tracker.ros.runtime.publishers import TopicTypes
 
 Callback = Callable[[Any, int], None]
 """Callback that receives a message and its send time, ns since the epoch."""
@@ -113,7 +113,7 @@ class CardboxNode(Node):
             kind: class of the messages.
             topic: name of the topic.
             callback: receives each message.
-            profile: quality of service, which can be overridden by default.
+            profile: quality of service, which can be overridden.
             has_one_type: False if the caller adapts to publishers of another type.
 
         Returns:

@@ -7,7 +7,7 @@ change while the node runs. A field of :func:`shared` takes most of these from a
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field
 from types import MappingProxyType
 from typing import Any, ClassVar, get_type_hints
 
@@ -72,34 +72,48 @@ def shared(kind: Any, name: str, **changes: Any) -> Any:
         "unit": core.unit,
         "limits": core.limits,
         "choices": core.choices,
-        "effect": RESTARTS if core.restarts else NEXT_IMAGE,
+        "effect": _effect(core),
     }
     return parameter(**(given | changes))
 
 
+def _effect(core: Setting) -> str:
+    return RESTARTS if core.restarts else NEXT_IMAGE
+
+
 @dataclass(frozen=True)
 class NodeParameters:
-    """Base of the parameter dataclasses; every field is made by :func:`parameter`.
+    """Base of the parameter dataclasses; every own field is made by :func:`parameter`.
+
+    A class may also inherit settings of the core, all of which are parameters then.
 
     Attributes:
         retired: removed names, and the instruction for each.
+        effects: effect of a change of inherited settings that is not that of the core, by name.
     """
 
     retired: ClassVar[Mapping[str, str]] = MappingProxyType({})
+    effects: ClassVar[Mapping[str, str]] = MappingProxyType({})
 
     def check(self) -> None:
         """Raise ValueError if values contradict each other; ranges are checked before."""
 
     @classmethod
     def specs(cls) -> dict[str, ParameterSpec]:
-        """Return the specification of every parameter by name, in order."""
-        return {entry.name: entry.metadata["setting"] for entry in fields(cls)}
+        """Return the specification of every parameter by name, the own ones first."""
+        known = settings_of(cls)
+        own = {name: one for name, one in known.items() if isinstance(one, ParameterSpec)}
+        return own | {
+            name: ParameterSpec(**vars(one), effect=cls.effects.get(name, _effect(one)))
+            for name, one in known.items()
+            if name not in own
+        }
 
     @classmethod
     def types(cls) -> dict[str, Any]:
         """Return the Python type of every parameter by name."""
         hints = get_type_hints(cls)
-        return {entry.name: hints[entry.name] for entry in fields(cls)}
+        return {name: hints[name] for name in cls.specs()}
 
 
 def descriptor(spec: ParameterSpec, type_: Any) -> ParameterDescriptor:
@@ -119,3 +133,39 @@ def descriptor(spec: ParameterSpec, type_: Any) -> ParameterDescriptor:
                 FloatingPointRange(from_value=float(spec.minimum), to_value=float(spec.maximum))
             ]
     return message
+
+
+_TYPE_NAMES = {list[str]: "list of str", list[float]: "list of float"}
+
+
+def yaml_value(value: Any) -> str:
+    """Return a parameter's value as YAML that the ROS parser reads as the right type."""
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    if isinstance(value, float):
+        text = repr(value)
+        # YAML 1.1 takes 1e-05 for a text.
+        return f"{value:.10f}".rstrip("0") if "e" in text else text
+    if isinstance(value, str):
+        return f'"{value}"'
+    return str(value)
+
+
+def default_of(kind: type[NodeParameters], name: str) -> Any:
+    """Return the default of the parameter ``name``; lists are empty."""
+    return getattr(kind, name, [])
+
+
+def type_name(type_: Any) -> str:
+    """Return the name of a parameter's type."""
+    return _TYPE_NAMES.get(type_) or str(type_.__name__)
+
+
+def details(spec: ParameterSpec) -> str:
+    """Return unit, allowed values and effect of a parameter, as far as it has them."""
+    parts = [
+        spec.unit,
+        spec.range_text,
+        spec.effect if spec.read_only else f"live: {spec.effect}",
+    ]
+    return "; ".join(part for part in parts if part)

@@ -7,7 +7,7 @@ validated instance. A wrong value is refused with the reason, and the old value 
 from __future__ import annotations
 
 from array import array
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from typing import Any, Generic, TypeVar, get_args
 
@@ -69,7 +69,7 @@ class LiveParameters(Generic[T]):
         self._new_names = {spec.was: name for name, spec in self._specs.items() if spec.was}
         values = {name: self._declare(name) for name in self._specs}
         self.value: T = kind(**values)
-        problem = self._problem(self.value)
+        problem = self._problem({})
         if problem:
             raise self._refusal(problem)
         self._warn_of_unknown()
@@ -210,7 +210,7 @@ class LiveParameters(Generic[T]):
         changed = self._changed(parameters)
         if not changed:
             return SetParametersResult(successful=True)
-        problem = self._problem(replace(self.value, **changed))
+        problem = self._problem(changed)
         return SetParametersResult(successful=not problem, reason=problem)
 
     def _apply(self, parameters: list[Parameter]) -> None:
@@ -220,8 +220,10 @@ class LiveParameters(Generic[T]):
             if self._on_change is not None:
                 self._on_change(self.value)
 
-    def _problem(self, value: T) -> str:
+    def _problem(self, changed: Mapping[str, Any]) -> str:
+        """Return why the present values with the changed ones are refused; empty if not."""
         try:
+            value = replace(self.value, **changed)
             check(value)
             value.check()
         except (ValueError, CardboxError) as error:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from cardbox_tracker.applications.evaluation.marks import replaced
+from cardbox_tracker.applications.evaluation.people_report import replaced
 from cardbox_tracker.common.errors import CardboxError
 
 BEGIN, END = "<!-- begin -->", "<!-- end -->"

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from cardbox_tracker.applications.exporting.isb import write_isb
+from cardbox_tracker.applications.exporting.formats import write_isb
 from cardbox_tracker.person.isb_angles import ISB_NAMES
 from cardbox_tracker.person.model import BodyModel
 

@@ -15,8 +15,7 @@ from cardbox_tracker.applications.simulation.session import SessionFormat, synth
 from cardbox_tracker.common.errors import CardboxError
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.model_file import load_body_model
-from cardbox_tracker.ros.demo.report import write_report
-from cardbox_tracker.ros.demo.result import DemoResult
+from cardbox_tracker.ros.demo.report import DemoResult, write_report
 
 BODY = BodyModel.of(hip_height_m=-0.51)
 LAST = 24

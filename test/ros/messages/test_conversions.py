@@ -20,9 +20,15 @@ from cardbox_tracker.person.cardbox import cardbox_patches
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.posture import reference_posture
 from cardbox_tracker.person.skeleton import JOINT_NAMES, KeypointState
-from cardbox_tracker.recordings.keypoint_status import KeypointStates
 from cardbox_tracker.recordings.markers import MarkerShape, marker_shapes
-from cardbox_tracker.recordings.outputs import OUTPUTS, JointValues, Markers, Points, Text
+from cardbox_tracker.recordings.outputs import (
+    OUTPUTS,
+    JointValues,
+    KeypointStates,
+    Markers,
+    Points,
+    Text,
+)
 from cardbox_tracker.ros.messages import conversions, results
 
 HEADER = Header(frame_id="optical")

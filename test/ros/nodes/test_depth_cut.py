@@ -16,7 +16,7 @@ from std_msgs.msg import Header  # noqa: E402
 from cardbox_tracker.camera.camera import Camera  # noqa: E402
 from cardbox_tracker.common.errors import EncodingError  # noqa: E402
 from cardbox_tracker.ros.messages.conversions import image_message  # noqa: E402
-from cardbox_tracker.ros.nodes.depth_cut import DepthCut  # noqa: E402
+from cardbox_tracker.ros.nodes.depth_input import DepthCut  # noqa: E402
 
 CAMERA = Camera(64, 48, 60.0, 60.0, 31.5, 23.5)
 

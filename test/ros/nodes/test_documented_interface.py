@@ -38,7 +38,7 @@ from cardbox_tracker.ros.nodes.retarget_node import RetargetNode  # noqa: E402
 from cardbox_tracker.ros.nodes.rula_node import RulaNode  # noqa: E402
 from cardbox_tracker.ros.nodes.stereo_depth_node import StereoDepthNode  # noqa: E402
 from cardbox_tracker.ros.nodes.tracker_node import TrackerNode  # noqa: E402
-from cardbox_tracker.ros.runtime.interface import SERVICE, entries  # noqa: E402
+from cardbox_tracker.ros.runtime.command_line import SERVICE, entries  # noqa: E402
 
 ROOT = Path(__file__).parents[3]
 NODES = (

@@ -31,7 +31,7 @@ from cardbox_tracker.person.model_file import save_body_model  # noqa: E402
 from cardbox_tracker.person.posture import reference_posture  # noqa: E402
 from cardbox_tracker.ros.messages import conversions  # noqa: E402
 from cardbox_tracker.ros.nodes.background_node import BackgroundNode  # noqa: E402
-from cardbox_tracker.ros.nodes.image_pairing import ImagePairing  # noqa: E402
+from cardbox_tracker.ros.nodes.camera_inputs import ImagePairing  # noqa: E402
 from cardbox_tracker.ros.nodes.reference_capture import ReferenceCapture  # noqa: E402
 from cardbox_tracker.ros.nodes.tracker_node import TrackerNode  # noqa: E402
 from cardbox_tracker.ros.runtime import qos  # noqa: E402

@@ -23,7 +23,7 @@ from cardbox_tracker.camera.camera import Camera  # noqa: E402
 from cardbox_tracker.common.errors import CardboxError  # noqa: E402
 from cardbox_tracker.detectors.image_points import POINT_INDEX, ImagePoints  # noqa: E402
 from cardbox_tracker.ros.messages.conversions import camera_info_message, image_message  # noqa: E402
-from cardbox_tracker.ros.nodes import input_stream, keypoint_topic  # noqa: E402
+from cardbox_tracker.ros.nodes import input_stream, keypoint_inputs  # noqa: E402
 from cardbox_tracker.ros.nodes.camera_inputs import CameraInputs, ObservationSet  # noqa: E402
 from cardbox_tracker.ros.nodes.keypoint_inputs import KeypointInputs  # noqa: E402
 from cardbox_tracker.ros.nodes.tracker_parameters import TrackerParameters  # noqa: E402
@@ -386,8 +386,8 @@ def test_the_type_of_the_publisher_is_used_when_it_comes(
 ) -> None:
     """PoseArray stands for a message of a package that may be installed."""
     persons = [ImagePoints.of({"nose": (100.0, 100.0, 0.5)})]
-    types = keypoint_topic.CONVERSIONS | {"geometry_msgs/msg/PoseArray": lambda _, __: persons}
-    monkeypatch.setattr(keypoint_topic, "CONVERSIONS", types)
+    types = keypoint_inputs.CONVERSIONS | {"geometry_msgs/msg/PoseArray": lambda _, __: persons}
+    monkeypatch.setattr(keypoint_inputs, "CONVERSIONS", types)
     inputs = KeypointInputs(tracker_node, TrackerParameters(keypoints="points"))
     topic = inputs._topics[0]
     topic.size = (640, 480)
@@ -417,6 +417,6 @@ def test_a_package_that_is_missing_is_named(bus: Any, monkeypatch: pytest.Monkey
     profile = QoSProfile(depth=1)
     ends = [SimpleNamespace(topic_type="yolo_msgs/msg/DetectionArray", qos_profile=profile)]
     monkeypatch.setattr(tracker.node, "get_publishers_info_by_topic", lambda _: ends)
-    monkeypatch.setattr(keypoint_topic, "optional_class", lambda *_: None)
+    monkeypatch.setattr(keypoint_inputs, "optional_class", lambda *_: None)
     bus.tick()
     assert "install that package (ros-jazzy-yolo-msgs" in tracker.warning()

@@ -13,7 +13,7 @@ from std_msgs.msg import Header
 
 from cardbox_tracker.common.errors import EncodingError
 from cardbox_tracker.ros.messages.conversions import image_message
-from cardbox_tracker.ros.nodes.image_pairing import ImagePairing
+from cardbox_tracker.ros.nodes.camera_inputs import ImagePairing
 from cardbox_tracker.ros.nodes.reference_capture import ReferenceCapture
 from cardbox_tracker.ros.runtime.recent import MOST_BYTES, RecentImages
 

@@ -24,7 +24,7 @@ from cardbox_tracker.ros.messages.conversions import (  # noqa: E402
     image_message,
     stamp_ns,
 )
-from cardbox_tracker.ros.nodes.image_pairing import ImagePairing  # noqa: E402
+from cardbox_tracker.ros.nodes.camera_inputs import ImagePairing  # noqa: E402
 from cardbox_tracker.ros.nodes.tracker_node import TrackerNode  # noqa: E402
 from cardbox_tracker.tracking.estimate import Estimate  # noqa: E402
 from cardbox_tracker.tracking.tracker import Tracker  # noqa: E402

@@ -19,7 +19,7 @@ from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.posture import reference_posture
 from cardbox_tracker.person.urdf import LinkTransforms, urdf_from_body
 from cardbox_tracker.recordings.outputs import joint_values, positions_of
-from cardbox_tracker.ros.nodes.tf_outputs import TfOutputs
+from cardbox_tracker.ros.nodes.tracker_outputs import TfOutputs
 from cardbox_tracker.tracking.estimate import LOST, TRACKING, Estimate
 
 BODY = BodyModel.of(distance_m=2.3, hip_height_m=-0.4)

@@ -14,7 +14,7 @@ from cardbox_tracker.person.cardbox import cardbox_patches
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.model_file import dumps_body_model
 from cardbox_tracker.person.posture import reference_posture
-from cardbox_tracker.ros.nodes.tracking_report import TrackingReport
+from cardbox_tracker.ros.nodes.tracker_node import TrackingReport
 from cardbox_tracker.search.config import PRESETS
 from cardbox_tracker.tracking.estimate import LOST, NO_PERSON, TRACKING, UNCERTAIN, Estimate
 

@@ -22,7 +22,7 @@ from cardbox_tracker.person.model_file import dumps_body_model, loads_body_model
 from cardbox_tracker.person.posture import reference_posture
 from cardbox_tracker.person.proportions import USUAL_STATURE_M, body_from_proportions
 from cardbox_tracker.ros.messages.conversions import camera_info_message, image_message
-from cardbox_tracker.ros.nodes.camera_pitch import CameraPitch
+from cardbox_tracker.ros.nodes.detector_node import CameraPitch
 from cardbox_tracker.ros.nodes.tracker_node import TrackerNode
 from cardbox_tracker.ros.nodes.tracker_parameters import TrackerParameters
 from cardbox_tracker.ros.runtime.node import CardboxNode

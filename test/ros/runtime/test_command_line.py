@@ -8,8 +8,7 @@ import pytest
 
 pytest.importorskip("rclpy", reason="rclpy is not installed")
 
-from cardbox_tracker.ros.runtime.command_line import plain_command_line
-from cardbox_tracker.ros.runtime.interface import entries
+from cardbox_tracker.ros.runtime.command_line import entries, plain_command_line
 from lab.tools.parameter_docs import NODES as PARAMETERS
 
 NODES = ("background", "initializer", "tracker")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from cardbox_tracker.ros.runtime.log_limit import LogLimit
+from cardbox_tracker.ros.runtime.diagnostics import LogLimit
 
 
 class Clock:

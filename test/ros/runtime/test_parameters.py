@@ -391,7 +391,6 @@ def test_one_file_has_the_parameters_of_all_nodes_in_any_namespace(
 
 
 def test_defaults_of_the_core_are_not_written_twice() -> None:
-    assert BackgroundParameters().config() == BackgroundConfig()
     assert InitializerParameters().config() == InitializationConfig()
     for preset, make in PRESETS.items():
         assert TrackerParameters(preset=preset).config() == make()
