@@ -61,7 +61,9 @@ def _lines(
 ) -> Iterator[str]:
     name, people = camera.get("name", "camera"), truth["people"]
     pitch_rad = float(np.radians(camera["pitch_down_deg"]))
-    statures = given or [person["height"] for person in people]
+    # The tracker numbers people as they come, and from left to right if they come together.
+    as_numbered = sorted(people, key=lambda person: _comes(person, name))
+    statures = given or [person["height"] for person in as_numbered]
     bodies = [body_from_proportions(one, None, camera_pitch_rad=pitch_rad) for one in statures]
     finder = detector._replace(people=len(people)) if isinstance(detector, Detector) else detector
     empty = next((one for one in truth["segments"] if one["name"] == "empty"), None)
@@ -108,6 +110,16 @@ def _lines(
             f"{name}, {person['name']}, {counts[k]}, {len(row)}, {exchanged}, {aligned:.1f}, "
             f"{absolute:.1f}, {hidden[k][1]} of {hidden[k][0]}, {ms:.0f}"
         )
+
+
+def _comes(person: Any, camera: str) -> tuple[int, float]:
+    """Return the image in which a person first is in sight, and where; last if in none."""
+    for number, frame in enumerate(person["frames"]):
+        seen = joints_of(frame, camera)
+        if seen is not None:
+            x, _, z = np.nanmean(seen[0], axis=0).tolist()
+            return number, x / z
+    return len(person["frames"]), 0.0
 
 
 def joints_of(frame: Any, camera: str) -> tuple[FloatArray, list[int]] | None:
