@@ -22,11 +22,6 @@ def distances_m(estimates_m: FloatArray, truth_m: FloatArray) -> FloatArray:
     return distances
 
 
-def mpjpe_m(estimates_m: FloatArray, truth_m: FloatArray) -> float:
-    """Return the mean distance of all joints (..., k, 3), metres."""
-    return float(distances_m(estimates_m, truth_m).mean())
-
-
 def align(estimates_m: FloatArray, truth_m: FloatArray) -> FloatArray:
     """Move, turn and scale each set of joints (..., k, 3) to lie as near to the truth as it can.
 
