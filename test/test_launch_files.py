@@ -86,7 +86,7 @@ def launch(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Iterator[Callable
     program.parent.mkdir(parents=True)
     program.write_text(
         f'#!/bin/sh\nPYTHONPATH="{ROOT}" exec "{sys.executable}" -m '
-        'cardbox_tracker.ros.nodes.play_bag_node "$@"\n'
+        'cardbox_tracker.start play_bag "$@"\n'
     )
     program.chmod(0o755)
     for name in [n for n in sys.modules if n.partition(".")[0] == "cardbox_tracker"]:

@@ -158,6 +158,7 @@ def row_of(
     known |= zip(POINT_COLUMNS, points_m.tolist(), strict=True)
     known |= {metric.name: metric.of(estimate) for metric in METRICS}
     stddevs = {} if deviations is None else positions_of(deviations)
+    stddevs = {name: value for name, value in stddevs.items() if name in UNITS}
     known |= zip(_deviation_units(stddevs), stddevs.values(), strict=True)
     states = keypoint_states(estimate)
     if states is not None:

@@ -324,7 +324,7 @@ def test_the_cameras_pitch_is_found_from_who_stands_upright(
     stands = found is not None and not found.has_edges
     span = TimeSpan(20.0, 21.0) if stands else None
     # A person of 1.72 m is 2 m away.
-    person = StandingCamera(tilt.pitch_rad, 0.1, 0.0, 0.1, 2.0 / 1.72, 0.05) if stands else None
+    person = StandingCamera(tilt.pitch_rad, 0.1, 0.0, 0.1, 2.0 / 1.72) if stands else None
     placed = standing.Placed(tilt, span, person)
     monkeypatch.setattr(standing, "placed_camera", lambda *_: placed)
 

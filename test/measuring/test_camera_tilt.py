@@ -25,7 +25,7 @@ def lines(pitch_deg: float, roll_deg: float, gain: float = 30.0) -> np.ndarray:
 
 def person(pitch_deg: float, stddev_deg: float, roll_deg: float = 0.0) -> StandingCamera:
     values = np.radians([pitch_deg, stddev_deg, roll_deg, 2.0]).tolist()
-    return StandingCamera(*values, 1.5, 0.06)
+    return StandingCamera(*values, 1.5)
 
 
 def degrees(tilt: Tilt) -> tuple[float, float, float]:

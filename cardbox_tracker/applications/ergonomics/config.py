@@ -220,15 +220,24 @@ class Declared(NamedTuple):
         return f"{self.words} (default)" if self.is_default else self.words
 
 
+def _kind_of(config: ErgonomicConfig) -> type[Settings]:
+    """Return the class of settings; a node's parameters are a subclass."""
+    return next(kind for kind in _INPUTS if isinstance(config, kind))
+
+
 def declared(
     config: ErgonomicConfig, is_neck_measured: bool = False, are_legs_measured: bool = False
 ) -> tuple[Declared, ...]:
     """Return the inputs that are declared; neck and legs are none of them while measured."""
-    known, defaults = settings_of(type(config)), {one.name: one.default for one in fields(config)}
+    known, defaults = (
+        settings_of(_kind_of(config)),
+        {one.name: one.default for one in fields(config)},
+    )
+    inputs = _INPUTS[_kind_of(config)]
     measured = {"neck"} if is_neck_measured else set[str]()
     measured |= {"legs"} if are_legs_measured else set[str]()
     found = []
-    for name in (name for name in _INPUTS[type(config)] if name not in measured):
+    for name in (name for name in inputs if name not in measured):
         value = getattr(config, name)
         text = str(value) if type(value) is int else ("no", "yes")[value]
         found.append(Declared(name, text, value == defaults[name], known[name].description))
@@ -237,5 +246,6 @@ def declared(
 
 def limits(config: ErgonomicConfig) -> dict[str, str]:
     """Return the limits of angles by name, degrees."""
-    names = [name for name in settings_of(type(config)) if name not in _INPUTS[type(config)]]
+    kind = _kind_of(config)
+    names = [name for name in settings_of(kind) if name not in _INPUTS[kind]]
     return {name.removesuffix("_deg"): f"{getattr(config, name):g}" for name in names}
