@@ -1,4 +1,4 @@
-"""What all tests share: three processes for a whole run, a ROS domain for each graph of nodes."""
+"""What all tests share: two processes for a whole run, a ROS domain for each graph of nodes."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ settings.load_profile("long" if "RELIABILITY_EXAMPLES" in os.environ else "untim
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
     signal.signal(signal.SIGINT, signal.default_int_handler)
 
-PROCESSES = 3
+PROCESSES = 2
 WORKER = int(os.environ.get("PYTEST_XDIST_WORKER", "gw0")[2:])
 # Above 101, domains collide with ephemeral ports.
 MOST_DOMAINS = 100

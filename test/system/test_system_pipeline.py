@@ -76,6 +76,12 @@ class Session:
             stamps.append(header.stamp)
         return stamps
 
+    def hold(self, posture: NDArray[np.float64] | str | None) -> None:
+        """Show images slowly, so that a busy initializer, which may lose some, sees the last."""
+        for _ in range(8):
+            self.show(posture)
+            self.graph.spin(0.1)
+
     def track(self, posture: NDArray[np.float64] | str, count: int) -> list[Any]:
         """Show images and wait for the joint state of each; return the joint states."""
         first = len(self.joint_states)
@@ -117,7 +123,7 @@ def measured(learned: Session) -> tuple[Session, str, str]:
     """Return the session after the measurement, the service's answer and the body model's text."""
     models = learned.graph.collect(String, "body_model", qos.LATCHED)
     for name in ("front", "side", "arms"):
-        learned.show(name, 5)
+        learned.hold(name)
         response = learned.graph.call(f"initializer/capture_{name}")
         assert response.success, response.message
     response = learned.graph.call("initializer/initialize", timeout_s=90)
@@ -209,7 +215,7 @@ def test_too_few_bytes_are_refused_and_the_node_goes_on(learned: Session) -> Non
 
 
 def test_capture_refuses_an_empty_image(learned: Session) -> None:
-    learned.show(None, 5)
+    learned.hold(None)
     response = learned.graph.call("initializer/capture_front")
     assert not response.success and "nobody is in the image" in response.message
 
@@ -217,13 +223,13 @@ def test_capture_refuses_an_empty_image(learned: Session) -> None:
 def test_capture_refuses_a_person_cut_off(learned: Session) -> None:
     aside = reference_posture("front")
     aside[0] = 1.1
-    learned.show(aside, 5)
+    learned.hold(aside)
     response = learned.graph.call("initializer/capture_front")
     assert not response.success and "cut off at the right border" in response.message
 
 
 def test_capture_refuses_a_person_who_did_not_turn(learned: Session) -> None:
-    learned.show("front", 5)
+    learned.hold("front")
     assert learned.graph.call("initializer/capture_front").success
     response = learned.graph.call("initializer/capture_side")
     assert not response.success and "'side': it looks like 'front'" in response.message
