@@ -11,13 +11,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cardbox_tracker.applications.evaluation.session import load_session
+from cardbox_tracker.applications.evaluation.tracking import person_of
 from cardbox_tracker.applications.simulation.motions import WAVE_S, wave
 from cardbox_tracker.applications.simulation.renderer import Renderer, Scene
 from cardbox_tracker.applications.simulation.session import session_camera
 from cardbox_tracker.camera.camera import Camera
 from cardbox_tracker.common.errors import CardboxError
 from cardbox_tracker.person.model import BodyModel
-from cardbox_tracker.person.proportions import body_from_proportions
 from cardbox_tracker.recordings.open_images import open_images
 
 Images = NDArray[np.uint8]
@@ -82,9 +82,7 @@ def recorded_scene(folder: Path, count: int, empty: int = 30) -> BenchmarkScene:
         )
     pictures = np.array(grey, np.uint8)
     return BenchmarkScene(
-        body_from_proportions(
-            truth.stature_m, truth.distance_m, camera_pitch_rad=float(np.radians(truth.pitch_deg))
-        ),
+        person_of(truth),
         Camera(lens.width, lens.height, *lens.k[[0, 1, 0, 1], [0, 1, 2, 2]].tolist()),
         pictures[:empty],
         pictures[empty:],

@@ -90,7 +90,6 @@ def test_both_cameras_are_used_and_one_goes_on_while_the_other_is_silent(
     # The player loops, because a busy machine may miss a part of the recording.
     graph.start("play_bag", str(recorded["bag"]), loop=True)
     nearer_m: dict[str, list[float]] = {"both": [], "one": [], "both again": []}
-    of_other: list[int] = []
 
     def sorted_by_phase() -> dict[str, list[float]]:
         # The stamps of one turn of the loop recur in the next one.
@@ -101,8 +100,7 @@ def test_both_cameras_are_used_and_one_goes_on_while_the_other_is_silent(
             # second camera, which are 8 ms later.
             at_ns = stamp_ns(message.header.stamp)
             number, rest_ns = divmod(at_ns - START_NS, PERIOD_NS)
-            if rest_ns and at_ns - rest_ns in of_first:
-                of_other.append(at_ns)
+            assert rest_ns == 0 or at_ns - rest_ns not in of_first
             image = number - EMPTY
             phase = "one" if image in SILENT else "both" if image < SILENT[0] else "both again"
             if phase != "both" or image > SETTLED:
@@ -114,8 +112,6 @@ def test_both_cameras_are_used_and_one_goes_on_while_the_other_is_silent(
         lambda: all(len(found) >= 10 for found in sorted_by_phase().values()),
         "joint states while both cameras see, one is silent, and both see again",
     )
-    # On a busy machine, an image may come too late for the tracker.
-    assert len(of_other) <= sum(map(len, nearer_m.values())) / 4
     # The silhouette of one camera would not show that the person is 20 cm nearer.
     assert np.median(nearer_m["both"]) == pytest.approx(NEARER_M, abs=0.08)
 

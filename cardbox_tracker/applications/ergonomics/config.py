@@ -229,15 +229,11 @@ def declared(
     config: ErgonomicConfig, is_neck_measured: bool = False, are_legs_measured: bool = False
 ) -> tuple[Declared, ...]:
     """Return the inputs that are declared; neck and legs are none of them while measured."""
-    known, defaults = (
-        settings_of(_kind_of(config)),
-        {one.name: one.default for one in fields(config)},
-    )
-    inputs = _INPUTS[_kind_of(config)]
-    measured = {"neck"} if is_neck_measured else set[str]()
-    measured |= {"legs"} if are_legs_measured else set[str]()
+    kind = _kind_of(config)
+    known, defaults = settings_of(kind), {one.name: one.default for one in fields(config)}
+    is_measured = {"neck": is_neck_measured, "legs": are_legs_measured}
     found = []
-    for name in (name for name in inputs if name not in measured):
+    for name in (name for name in _INPUTS[kind] if not is_measured.get(name)):
         value = getattr(config, name)
         text = str(value) if type(value) is int else ("no", "yes")[value]
         found.append(Declared(name, text, value == defaults[name], known[name].description))
