@@ -247,3 +247,18 @@ def scene() -> Scene:
 def make_scene() -> type[Scene]:
     """Return the class of scenes, to make one with a person at another place."""
     return Scene
+
+
+@pytest.fixture(scope="session")
+def deep() -> Callable[[str, str], tuple[str, ...]]:
+    """What gives the arguments for a deep queue of a topic, as those of a replay are.
+
+    A slow machine then loses no image, where live nodes would take the newest one.
+    """
+    from cardbox_tracker.ros.runtime import qos
+
+    def arguments(topic: str, end: str) -> tuple[str, ...]:
+        name = f"qos_overrides.{topic}.{end}"
+        return ("-p", f"{name}.reliability:=reliable", "-p", f"{name}.depth:={qos.REPLAY.depth}")
+
+    return arguments

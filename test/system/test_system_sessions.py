@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -28,16 +29,10 @@ KEYPOINTS = tuple(
 MEAN_ERROR_M = 0.15
 
 
-def deep(topic: str, end: str) -> tuple[str, ...]:
-    """Return arguments for a deep queue of ``topic``, so that a slow machine loses no image."""
-    name = f"qos_overrides.{topic}.{end}"
-    return ("-p", f"{name}.reliability:=reliable", "-p", f"{name}.depth:={qos.REPLAY.depth}")
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["synthetic", "person_a"])
 def test_session_is_measured_and_tracked_to_its_end(
-    own_graph: Any, name: str, tmp_path: Path
+    own_graph: Any, deep: Callable[[str, str], tuple[str, ...]], name: str, tmp_path: Path
 ) -> None:
     graph = own_graph
     if name == "synthetic":

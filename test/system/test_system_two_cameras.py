@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -71,18 +72,22 @@ def recorded(scene: Any, tmp_path_factory: pytest.TempPathFactory) -> dict[str, 
 
 
 def test_both_cameras_are_used_and_one_goes_on_while_the_other_is_silent(
-    own_graph: Any, recorded: dict[str, Path]
+    own_graph: Any, deep: Callable[[str, str], tuple[str, ...]], recorded: dict[str, Path]
 ) -> None:
     graph = own_graph
     states = graph.collect(JointState, "joint_states", qos.REPLAY)
     seen_first = graph.collect(Image, "cam0/silhouette", qos.REPLAY)
     overlays = graph.collect(Image, "cam1/overlay", qos.SENSOR_DATA)
     diagnostics = graph.collect(DiagnosticArray, "/diagnostics")
+    topics = {name: f"/{name}/silhouette" for name in ("cam0", "cam1")}
     for name in ("cam0", "cam1"):
         space = ("--ros-args", "-r", f"__ns:=/{name}")
-        graph.start("background", *space, learn_images=EMPTY - 2, learning="always")
+        queues = *deep(f"/{name}/image_raw", "subscription"), *deep(topics[name], "publisher")
+        graph.start("background", *space, *queues, learn_images=EMPTY - 2, learning="always")
     graph.start(
         "tracker",
+        *("--ros-args", *deep(topics["cam0"], "subscription")),
+        *deep(topics["cam1"], "subscription"),
         cameras="[cam0, cam1]",
         extrinsics_file=recorded["chain.yaml"],
         model_file=recorded["body.yaml"],
