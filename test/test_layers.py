@@ -22,7 +22,7 @@ FOLDERS = (
 INSIDE: dict[str, tuple[tuple[str, ...], ...]] = {
     "applications": (
         ("drawing",),
-        ("ergonomics", "exporting", "retargeting", "simulation", "evaluation"),
+        ("ergonomics", "exporting", "retargeting", "simulation"),
         ("viewing",),
     ),
     "ros": (("runtime", "messages"), ("nodes",), ("demo",)),

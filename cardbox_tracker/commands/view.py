@@ -21,8 +21,8 @@ from cardbox_tracker.commands.tracking import track
 from cardbox_tracker.common.errors import CardboxError, RosMissingError
 
 if TYPE_CHECKING:
-    from cardbox_tracker.applications.evaluation.truth import TrueFrame
     from cardbox_tracker.applications.viewing.scene import Scene
+    from cardbox_tracker.recordings.truth import TrueFrame
 
 NAME = "view"
 HELP = "show results in a viewer: image, body in 3D, plots, error, a slider for the time"
@@ -157,8 +157,8 @@ def _truth_of(
     Raises:
         CardboxError: the ground truth cannot be read, or is given for other images.
     """
-    from cardbox_tracker.applications.evaluation.truth import load_ground_truth
     from cardbox_tracker.applications.viewing.sources import image_stamps
+    from cardbox_tracker.recordings.truth import load_ground_truth
 
     path = options.truth or _truth_beside(options.recording)
     if path is None:

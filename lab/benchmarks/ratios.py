@@ -17,7 +17,6 @@ from typing import Any
 
 import numpy as np
 
-from cardbox_tracker.applications.evaluation.results import commit, read_json, write_json
 from cardbox_tracker.applications.simulation.session import synthesize_session
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.model_file import save_body_model
@@ -27,6 +26,7 @@ from lab.benchmarks.silhouette import colored, measure_silhouettes
 from lab.benchmarks.start import measure_start
 from lab.benchmarks.tools import pinned
 from lab.benchmarks.views import measure_two_views
+from lab.evaluation.results import commit, read_json, write_json
 
 RECORDINGS = 8
 """Number of recordings in the folder that is tracked."""

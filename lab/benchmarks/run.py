@@ -6,7 +6,6 @@ import os
 from pathlib import Path
 from typing import Any
 
-from cardbox_tracker.applications.evaluation.results import provenance, write_json
 from cardbox_tracker.common.errors import CardboxError
 from cardbox_tracker.common.progress import progress_bar
 from lab.benchmarks.core import measure_core
@@ -14,6 +13,7 @@ from lab.benchmarks.nodes import measure_nodes
 from lab.benchmarks.ratios import measure_ratios
 from lab.benchmarks.report import PICTURE_OF_WAY, write_report
 from lab.benchmarks.way import measure_way, plot_way
+from lab.evaluation.results import provenance, write_json
 
 FRAMES = 150
 NODE_SECONDS = 10.0

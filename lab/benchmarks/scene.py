@@ -10,8 +10,6 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from cardbox_tracker.applications.evaluation.session import load_session
-from cardbox_tracker.applications.evaluation.tracking import person_of
 from cardbox_tracker.applications.simulation.motions import WAVE_S, wave
 from cardbox_tracker.applications.simulation.renderer import Renderer, Scene
 from cardbox_tracker.applications.simulation.session import session_camera
@@ -19,6 +17,8 @@ from cardbox_tracker.camera.camera import Camera
 from cardbox_tracker.common.errors import CardboxError
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.recordings.open_images import open_images
+from lab.evaluation.session import load_session
+from lab.evaluation.tracking import person_of
 
 Images = NDArray[np.uint8]
 

@@ -7,11 +7,11 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from cardbox_tracker.applications.evaluation.results import provenance, write_json
 from cardbox_tracker.applications.simulation.motions import MOTIONS
 from cardbox_tracker.common.errors import CardboxError
 from cardbox_tracker.common.progress import progress_bar
 from cardbox_tracker.tracking.precompile import compile_all
+from lab.evaluation.results import provenance, write_json
 from lab.experiments.cells import (
     Cell,
     CellFactory,

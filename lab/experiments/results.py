@@ -7,8 +7,8 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from cardbox_tracker.applications.evaluation.results import read_json
 from cardbox_tracker.common.files import atomic_path
+from lab.evaluation.results import read_json
 from lab.experiments.tracking import FloatArray
 
 Curves = Mapping[tuple[str, str], Mapping[str, FloatArray]]

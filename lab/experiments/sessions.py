@@ -15,7 +15,6 @@ from tempfile import TemporaryDirectory
 import numpy as np
 from numpy.typing import NDArray
 
-from cardbox_tracker.applications.evaluation.truth import GroundTruth, load_ground_truth
 from cardbox_tracker.applications.simulation.session import SessionFormat, synthesize_session
 from cardbox_tracker.camera.camera import Camera
 from cardbox_tracker.common.errors import CardboxError
@@ -25,6 +24,7 @@ from cardbox_tracker.person.posture import N_JOINTS
 from cardbox_tracker.recordings.bag_reader import BagReader
 from cardbox_tracker.recordings.initialize import initialize_from_recording
 from cardbox_tracker.recordings.silhouettes import RecordedFrame, SilhouetteSource, TimeSpan
+from cardbox_tracker.recordings.truth import GroundTruth, load_ground_truth
 from cardbox_tracker.segmentation.background_config import BackgroundConfig
 
 FloatArray = NDArray[np.float64]

@@ -14,13 +14,13 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from cardbox_tracker.applications.evaluation.metrics import align, angle_errors_deg, distances_m
 from cardbox_tracker.person.posture import N_JOINTS, TURNS
 from cardbox_tracker.person.skeleton import JOINT_NAMES, KEYPOINT_NAMES
 from cardbox_tracker.search.config import TrackerConfig
 from cardbox_tracker.search.cycles import Cycles, MakeHierarchy
 from cardbox_tracker.search.resampling import gaussian_weights
 from cardbox_tracker.tracking.tracker import Tracker
+from lab.evaluation.metrics import align, angle_errors_deg, distances_m
 from lab.experiments.counting import CountingSilhouette
 from lab.experiments.models import make_silhouette_term
 from lab.experiments.parallel import Call

@@ -22,13 +22,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from cardbox_tracker.applications.evaluation.metrics import beside_shoulders
-from cardbox_tracker.applications.evaluation.plan import choices_of_cameras
-from cardbox_tracker.applications.evaluation.session import load_session
-from cardbox_tracker.applications.evaluation.tracking import InputSelection, track_session
 from cardbox_tracker.common.errors import CardboxError
 from cardbox_tracker.common.files import atomic_path
 from cardbox_tracker.detectors.detector import Detector
+from cardbox_tracker.recordings.truth import beside_shoulders
 from cardbox_tracker.search.config import PRESETS
 from cardbox_tracker.search.doubt import (
     FAR_M,
@@ -40,6 +37,9 @@ from cardbox_tracker.search.doubt import (
 )
 from cardbox_tracker.tracking.estimate import Estimate
 from cardbox_tracker.tracking.tracker import Tracker
+from lab.evaluation.plan import choices_of_cameras
+from lab.evaluation.session import load_session
+from lab.evaluation.tracking import InputSelection, track_session
 
 FloatArray = NDArray[np.float64]
 PENALTY = 0.02

@@ -10,10 +10,10 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from cardbox_tracker.applications.evaluation.session import RecordedSession, load_session
-from cardbox_tracker.applications.evaluation.tracking import silhouettes_of
 from cardbox_tracker.detectors.detector import Detector
 from cardbox_tracker.recordings.recording import FrameSet, Recording, open_recording
+from lab.evaluation.session import RecordedSession, load_session
+from lab.evaluation.tracking import silhouettes_of
 
 FloatArray = NDArray[np.float64]
 

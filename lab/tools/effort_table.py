@@ -17,10 +17,10 @@ from typing import NamedTuple
 import matplotlib
 import numpy as np
 
-from cardbox_tracker.applications.evaluation.session import RecordedSession, load_session
-from cardbox_tracker.applications.evaluation.tracking import SessionRun, track_session
 from cardbox_tracker.common.files import atomic_path
 from cardbox_tracker.search.config import PRESETS
+from lab.evaluation.session import RecordedSession, load_session
+from lab.evaluation.tracking import SessionRun, track_session
 
 EFFORTS = (0.25, 0.5, 1.0, 2.0, 4.0)
 _DPI = 90

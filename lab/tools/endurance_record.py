@@ -11,8 +11,8 @@ from typing import Any, NamedTuple
 import matplotlib
 import numpy as np
 
-from cardbox_tracker.applications.evaluation.results import provenance, read_json, write_json
 from cardbox_tracker.common.files import atomic_path
+from lab.evaluation.results import provenance, read_json, write_json
 
 PERCENTILES = (50, 95, 99, 100)
 

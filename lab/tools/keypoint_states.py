@@ -15,10 +15,10 @@ from typing import Any
 import matplotlib
 import numpy as np
 
-from cardbox_tracker.applications.evaluation.figures import KINDS, added
-from cardbox_tracker.applications.evaluation.results import read_json
 from cardbox_tracker.common.errors import CardboxError
 from cardbox_tracker.common.files import atomic_path
+from lab.evaluation.figures import KINDS, added
+from lab.evaluation.results import read_json
 
 _TEXT = """\
 # States of the keypoints

@@ -20,7 +20,6 @@ from typing import Any
 
 import numpy as np
 
-from cardbox_tracker.applications.evaluation.metrics import SHOULDERS, align, distances_m
 from cardbox_tracker.commands.request import points_named
 from cardbox_tracker.detectors.detector import Detector
 from cardbox_tracker.person.proportions import body_from_proportions
@@ -28,9 +27,11 @@ from cardbox_tracker.person.sizes import FloatArray
 from cardbox_tracker.person.skeleton import KEYPOINT_NAMES
 from cardbox_tracker.recordings.recording import Segmentation, open_recording
 from cardbox_tracker.recordings.silhouettes import TimeSpan
+from cardbox_tracker.recordings.truth import SHOULDERS
 from cardbox_tracker.search.config import default_preset
 from cardbox_tracker.tracking.estimate import TRACKING, Estimate
 from cardbox_tracker.tracking.people import People
+from lab.evaluation.metrics import align, distances_m
 
 _WITHIN_M = 0.35
 # Joints that must be seen and known to align the others.

@@ -18,8 +18,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cardbox_tracker.applications.drawing.overlay import draw_overlay
-from cardbox_tracker.applications.evaluation.session import RecordedSession, load_session
-from cardbox_tracker.applications.evaluation.tracking import InputSelection, track_session
 from cardbox_tracker.camera.camera import Camera
 from cardbox_tracker.common.errors import CardboxError
 from cardbox_tracker.common.files import atomic_path
@@ -31,6 +29,8 @@ from cardbox_tracker.recordings.silhouettes import RecordedFrame
 from cardbox_tracker.search.config import default_preset
 from cardbox_tracker.tracking.estimate import Estimate
 from cardbox_tracker.tracking.tracker import Tracker
+from lab.evaluation.session import RecordedSession, load_session
+from lab.evaluation.tracking import InputSelection, track_session
 from lab.tools.real_sheet import COLUMNS, REFERENCE_BGR, side_by_side
 
 Image = NDArray[np.uint8]

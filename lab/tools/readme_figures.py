@@ -15,10 +15,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from cardbox_tracker.applications.evaluation.people_report import replaced
-from cardbox_tracker.applications.evaluation.report import mean_of
-from cardbox_tracker.applications.evaluation.results import read_json
 from cardbox_tracker.common.files import atomic_path
+from lab.evaluation.people_report import replaced
+from lab.evaluation.report import mean_of
+from lab.evaluation.results import read_json
 from lab.experiments.report import MEANING
 
 BEGIN, END = "<!-- accuracy:begin -->", "<!-- accuracy:end -->"

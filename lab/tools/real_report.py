@@ -18,7 +18,6 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from cardbox_tracker.applications.evaluation.people_report import replaced
 from cardbox_tracker.camera.camera import Camera
 from cardbox_tracker.common.errors import CardboxError
 from cardbox_tracker.detectors.detector import Detector
@@ -32,6 +31,7 @@ from cardbox_tracker.terms.whole_body import WholeBodyCost, iou_of
 from cardbox_tracker.tracking.estimate import Estimate
 from cardbox_tracker.tracking.observation import Observation
 from cardbox_tracker.tracking.tracker import Tracker
+from lab.evaluation.people_report import replaced
 from lab.tools.real_frames import LANDMARKS, Frames, read_frames
 from lab.tools.real_sheet import contact_sheet
 

@@ -18,8 +18,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from cardbox_tracker.applications.evaluation.people_report import replaced
 from cardbox_tracker.common.files import atomic_path
+from lab.evaluation.people_report import replaced
 
 ROOT = Path(__file__).resolve().parents[2]
 PAGE = "docs/reliability.md"

@@ -18,10 +18,6 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from cardbox_tracker.applications.evaluation.angles import comparable, true_postures
-from cardbox_tracker.applications.evaluation.people_report import replaced
-from cardbox_tracker.applications.evaluation.session import RecordedSession, load_session
-from cardbox_tracker.applications.evaluation.tracking import track_session
 from cardbox_tracker.applications.retargeting.config import RetargetConfig
 from cardbox_tracker.applications.retargeting.hand import HandFollower
 from cardbox_tracker.applications.retargeting.retargeter import Retargeter
@@ -31,6 +27,10 @@ from cardbox_tracker.person.sizes import FloatArray
 from cardbox_tracker.search.config import PRESETS, TrackerConfig
 from cardbox_tracker.tracking.estimate import TRACKING, Estimate
 from cardbox_tracker.tracking.tracker import Tracker
+from lab.evaluation.angles import comparable, true_postures
+from lab.evaluation.people_report import replaced
+from lab.evaluation.session import RecordedSession, load_session
+from lab.evaluation.tracking import track_session
 
 ROOT = Path(__file__).resolve().parents[2]
 DOCUMENT, ROBOT = ROOT / "docs" / "retargeting.md", ROOT / "config" / "example_arm.urdf"

@@ -30,24 +30,24 @@ from cardbox_tracker.applications.ergonomics.rula import (
     sampled_scores,
     score_distribution,
 )
-from cardbox_tracker.applications.evaluation.angles import comparable, true_postures
-from cardbox_tracker.applications.evaluation.metrics import SHOULDERS
-from cardbox_tracker.applications.evaluation.people import torso_angles
-from cardbox_tracker.applications.evaluation.people_report import replaced
-from cardbox_tracker.applications.evaluation.session import RecordedSession, load_session
-from cardbox_tracker.applications.evaluation.tracking import (
+from cardbox_tracker.detectors.detector import Detector
+from cardbox_tracker.person.model import BodyModel
+from cardbox_tracker.person.sizes import FloatArray
+from cardbox_tracker.recordings.truth import SHOULDERS
+from cardbox_tracker.search.config import PRESETS, TrackerConfig
+from cardbox_tracker.tracking.estimate import Estimate
+from cardbox_tracker.tracking.sampling import normal_postures
+from cardbox_tracker.tracking.tracker import Tracker
+from lab.evaluation.angles import comparable, true_postures
+from lab.evaluation.people import torso_angles
+from lab.evaluation.people_report import replaced
+from lab.evaluation.session import RecordedSession, load_session
+from lab.evaluation.tracking import (
     ALL_INPUTS,
     DETECTOR,
     InputSelection,
     track_session,
 )
-from cardbox_tracker.detectors.detector import Detector
-from cardbox_tracker.person.model import BodyModel
-from cardbox_tracker.person.sizes import FloatArray
-from cardbox_tracker.search.config import PRESETS, TrackerConfig
-from cardbox_tracker.tracking.estimate import Estimate
-from cardbox_tracker.tracking.sampling import normal_postures
-from cardbox_tracker.tracking.tracker import Tracker
 
 DOCUMENT = Path(__file__).resolve().parents[2] / "docs" / "ergonomics.md"
 BEGIN, END = "<!-- rula-accuracy:begin -->", "<!-- rula-accuracy:end -->"

@@ -10,8 +10,8 @@ import sys
 from itertools import groupby
 from pathlib import Path
 
-from cardbox_tracker.applications.evaluation.people_report import replaced
 from cardbox_tracker.ros.runtime.command_line import SERVICE, Entry, entries
+from lab.evaluation.people_report import replaced
 
 DOCUMENT = Path(__file__).resolve().parents[2] / "docs" / "topics.md"
 _TOPICS = ("| topic | direction | type | QoS | what |", "|---|---|---|---|---|")

@@ -20,20 +20,20 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from cardbox_tracker.applications.evaluation.metrics import SHOULDERS, beside_shoulders
-from cardbox_tracker.applications.evaluation.session import RecordedSession, load_session
-from cardbox_tracker.applications.evaluation.tracking import InputSelection, track_session
 from cardbox_tracker.commands.arguments import at_least
 from cardbox_tracker.person.kinematics import jacobian
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.posture import ARM_ANGLES, FIRST_ANGLES
 from cardbox_tracker.person.proportions import body_from_proportions
+from cardbox_tracker.recordings.truth import SHOULDERS, beside_shoulders
 from cardbox_tracker.search.config import PRESETS
 from cardbox_tracker.search.whole_body import WholeBodyFilter
 from cardbox_tracker.terms.body_priors import PENETRATION, WEIGHT, penetration, priors
 from cardbox_tracker.terms.whole_body import WholeBodyCost
 from cardbox_tracker.tracking.estimate import Estimate
 from cardbox_tracker.tracking.tracker import Tracker
+from lab.evaluation.session import RecordedSession, load_session
+from lab.evaluation.tracking import InputSelection, track_session
 
 FloatArray = NDArray[np.float64]
 

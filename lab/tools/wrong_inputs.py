@@ -15,20 +15,20 @@ from pathlib import Path
 
 import numpy as np
 
-from cardbox_tracker.applications.evaluation.metrics import SHOULDERS, beside_shoulders
-from cardbox_tracker.applications.evaluation.session import RecordedSession, load_session
-from cardbox_tracker.applications.evaluation.tracking import (
-    InputSelection,
-    person_of,
-    track_session,
-)
 from cardbox_tracker.common.files import atomic_path
 from cardbox_tracker.detectors.detector import Detector
 from cardbox_tracker.person.skeleton import KeypointState
+from cardbox_tracker.recordings.truth import SHOULDERS, beside_shoulders
 from cardbox_tracker.search.config import default_preset
 from cardbox_tracker.search.doubt import FAR_M
 from cardbox_tracker.tracking.estimate import TRACKING, Estimate
 from cardbox_tracker.tracking.tracker import Tracker
+from lab.evaluation.session import RecordedSession, load_session
+from lab.evaluation.tracking import (
+    InputSelection,
+    person_of,
+    track_session,
+)
 
 CASES = {
     "nothing": (1.0, 1.0, 0.0),

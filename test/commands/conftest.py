@@ -10,13 +10,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from cardbox_tracker.applications.evaluation.truth import load_ground_truth
 from cardbox_tracker.applications.simulation.session import SessionFormat, synthesize_session
 from cardbox_tracker.commands.main import main
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.model_file import save_body_model
 from cardbox_tracker.person.skeleton import KEYPOINT_NAMES
 from cardbox_tracker.recordings.bag_writer import BagWriter
+from cardbox_tracker.recordings.truth import load_ground_truth
 
 
 @dataclass(frozen=True)

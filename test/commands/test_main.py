@@ -263,6 +263,8 @@ def installed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     [
         (("benchmark", "--json", "b.json"), "make benchmark"),
         (("evaluate", "--runs", "2", "--output", "out"), "make experiments"),
+        (("evaluate", "--sessions", "a", "--output", "out"), "make sessions"),
+        (("evaluate", "--films", "a", "--output", "out"), "make people"),
     ],
 )
 def test_without_a_checkout_the_make_target_is_named(

@@ -13,7 +13,6 @@ import cv2
 import numpy as np
 import pytest
 
-from cardbox_tracker.applications.evaluation.metrics import beside_shoulders
 from cardbox_tracker.commands.request import RETIRED
 from cardbox_tracker.common.settings import settings_below
 from cardbox_tracker.detectors import detector as detector_module
@@ -24,6 +23,7 @@ from cardbox_tracker.person.model_file import load_body_model
 from cardbox_tracker.recordings import standing
 from cardbox_tracker.recordings.bag_reader import BagReader
 from cardbox_tracker.recordings.silhouettes import SilhouetteSource, TimeSpan
+from cardbox_tracker.recordings.truth import beside_shoulders
 from cardbox_tracker.search.config import TrackerConfig
 
 FPS = 4.0

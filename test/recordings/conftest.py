@@ -8,7 +8,6 @@ from pathlib import Path
 
 import pytest
 
-from cardbox_tracker.applications.evaluation.truth import GroundTruth, load_ground_truth
 from cardbox_tracker.applications.simulation.session import SessionFormat, synthesize_session
 from cardbox_tracker.measuring.config import (
     InitializationConfig,
@@ -18,6 +17,7 @@ from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.recordings.bag_reader import BagReader
 from cardbox_tracker.recordings.initialize import initialize_from_recording
 from cardbox_tracker.recordings.silhouettes import SilhouetteSource, TimeSpan
+from cardbox_tracker.recordings.truth import GroundTruth, load_ground_truth
 
 FPS = 5.0
 

@@ -9,12 +9,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-from cardbox_tracker.applications.evaluation.truth import load_ground_truth, tracking_error
 from cardbox_tracker.commands.main import main
 from cardbox_tracker.measuring.config import InitializationResult
 from cardbox_tracker.measuring.measure import initialize_body
 from cardbox_tracker.person.model_file import load_body_model
 from cardbox_tracker.person.skeleton import KEYPOINT_NAMES
+from cardbox_tracker.recordings.truth import load_ground_truth, tracking_error
 
 DATA = Path(__file__).resolve().parents[3] / "shared" / "data"
 MEAN_ERROR_M = 0.12

@@ -15,8 +15,6 @@ import numpy as np
 import pytest
 import yaml
 
-from cardbox_tracker.applications.evaluation.results import read_json
-from cardbox_tracker.applications.evaluation.truth import load_ground_truth
 from cardbox_tracker.applications.exporting.motion_reader import read_motion
 from cardbox_tracker.applications.retargeting.joint_map import load_joint_map
 from cardbox_tracker.applications.retargeting.robot import load_robot
@@ -30,6 +28,7 @@ from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.model_file import dumps_body_model, load_body_model
 from cardbox_tracker.recordings.result_table import result_table
 from cardbox_tracker.recordings.silhouettes import RecordedFrame
+from cardbox_tracker.recordings.truth import load_ground_truth
 from cardbox_tracker.search.config import TrackerConfig
 from cardbox_tracker.search.settings_file import read_settings
 from cardbox_tracker.segmentation.background_file import (
@@ -39,6 +38,7 @@ from cardbox_tracker.segmentation.background_file import (
 )
 from cardbox_tracker.segmentation.empty_scene import BackgroundModel
 from cardbox_tracker.tracking.estimate import Estimate
+from lab.evaluation.results import read_json
 
 ROOT = Path(__file__).parents[2]
 SIZE = (32, 24)

@@ -10,7 +10,6 @@ from typing import Any
 import numpy as np
 import pytest
 
-from cardbox_tracker.applications.evaluation.truth import load_ground_truth
 from cardbox_tracker.applications.retargeting.joint_map import load_joint_map
 from cardbox_tracker.applications.retargeting.robot import load_robot
 from cardbox_tracker.camera.calibration_file import load_calibration
@@ -22,6 +21,7 @@ from cardbox_tracker.detectors.point_table import PointTable
 from cardbox_tracker.person.model_file import load_body_model
 from cardbox_tracker.recordings.given_camera import GivenCamera
 from cardbox_tracker.recordings.image_folder import ImageFolder
+from cardbox_tracker.recordings.truth import load_ground_truth
 from cardbox_tracker.recordings.video_reader import VideoReader
 from cardbox_tracker.search.config import TrackerConfig
 from cardbox_tracker.search.settings_file import read_settings

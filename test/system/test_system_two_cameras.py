@@ -11,10 +11,10 @@ import numpy as np
 import pytest
 import yaml
 
-from cardbox_tracker.applications.evaluation.session import load_session
 from cardbox_tracker.camera.camera import Camera
 from cardbox_tracker.person.model_file import loads_body_model, save_body_model
 from cardbox_tracker.recordings.bag_writer import BagWriter
+from lab.evaluation.session import load_session
 
 rclpy = pytest.importorskip("rclpy", reason="rclpy is not installed")
 

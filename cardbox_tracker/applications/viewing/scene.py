@@ -10,8 +10,6 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from cardbox_tracker.applications.evaluation.metrics import beside_shoulders
-from cardbox_tracker.applications.evaluation.truth import TrueFrame
 from cardbox_tracker.applications.viewing.viewer import rerun
 from cardbox_tracker.camera.camera import Camera
 from cardbox_tracker.common.errors import CardboxError, cut
@@ -28,6 +26,7 @@ from cardbox_tracker.person.skeleton import (
 )
 from cardbox_tracker.person.urdf import ROOT_LINK, urdf_from_body
 from cardbox_tracker.recordings.outputs import JointValues
+from cardbox_tracker.recordings.truth import TrueFrame, beside_shoulders
 
 Rgb = tuple[int, int, int]
 

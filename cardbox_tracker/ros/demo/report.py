@@ -13,7 +13,6 @@ from numpy.typing import NDArray
 
 from cardbox_tracker.applications.drawing.overlay import draw_overlay
 from cardbox_tracker.applications.drawing.video import video_file
-from cardbox_tracker.applications.evaluation.truth import GroundTruth, tracking_error
 from cardbox_tracker.camera.camera import Camera
 from cardbox_tracker.common.errors import CardboxError
 from cardbox_tracker.common.files import atomic_path
@@ -21,6 +20,7 @@ from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.model_file import save_body_model
 from cardbox_tracker.person.skeleton import JOINT_NAMES
 from cardbox_tracker.recordings.bag_reader import BagReader
+from cardbox_tracker.recordings.truth import GroundTruth, tracking_error
 from cardbox_tracker.search.config import PRESETS
 from cardbox_tracker.segmentation.silhouettes import SilhouettePipeline
 from cardbox_tracker.terms.compiled import CompiledSilhouette

@@ -6,13 +6,13 @@ from pathlib import Path
 
 import numpy as np
 
-from cardbox_tracker.applications.evaluation.truth import GroundTruth, load_ground_truth
 from cardbox_tracker.applications.simulation.session import SessionFormat, synthesize_session
 from cardbox_tracker.common.errors import CardboxError, RosMissingError
 from cardbox_tracker.common.progress import progress_bar
 from cardbox_tracker.person.model_file import loads_body_model
 from cardbox_tracker.person.posture import REFERENCE_NAMES
 from cardbox_tracker.recordings.result_bag import result_writer
+from cardbox_tracker.recordings.truth import GroundTruth, load_ground_truth
 from cardbox_tracker.ros.demo.report import DemoResult, write_report
 from cardbox_tracker.ros.runtime.processes import (
     Nodes,

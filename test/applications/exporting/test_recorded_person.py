@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 
 from cardbox_tracker import KEYPOINT_NAMES
-from cardbox_tracker.applications.evaluation.session import load_session
 from cardbox_tracker.commands.main import main
+from lab.evaluation.session import load_session
 
 SESSION = Path(__file__).resolve().parents[4] / "shared" / "data" / "person_a"
 MARKERS = ("LShoulder", "LElbow", "LHand", "RShoulder", "RElbow", "RHand")

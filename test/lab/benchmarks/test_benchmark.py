@@ -9,7 +9,6 @@ from typing import Any
 import numpy as np
 import pytest
 
-from cardbox_tracker.applications.evaluation.results import read_json
 from cardbox_tracker.applications.simulation.session import SessionFormat, synthesize_session
 from cardbox_tracker.commands.main import main
 from cardbox_tracker.common.errors import CardboxError
@@ -22,6 +21,7 @@ from lab.benchmarks.scene import make_scene, recorded_scene
 from lab.benchmarks.silhouette import WITHOUT, colored, measure_silhouettes
 from lab.benchmarks.views import measure_two_views
 from lab.benchmarks.way import STEPS, steps_of
+from lab.evaluation.results import read_json
 
 ROOT = Path(__file__).parents[3]
 BENCHMARKS = "docs/benchmarks.json"

@@ -14,7 +14,6 @@ import pytest
 
 from cardbox_tracker.applications.ergonomics.config import RulaConfig
 from cardbox_tracker.applications.ergonomics.rula import ScoreDistribution
-from cardbox_tracker.applications.evaluation.angles import true_postures
 from cardbox_tracker.applications.retargeting.config import RetargetConfig
 from cardbox_tracker.applications.retargeting.robot import load_robot
 from cardbox_tracker.applications.simulation.session import session_camera
@@ -23,6 +22,7 @@ from cardbox_tracker.person.posture import reference_posture
 from cardbox_tracker.person.proportions import body_from_proportions
 from cardbox_tracker.search.config import default_preset
 from cardbox_tracker.tracking.estimate import LOST, TRACKING, Estimate
+from lab.evaluation.angles import true_postures
 from lab.tools import retarget_accuracy, rula_accuracy
 
 BODY = body_from_proportions(1.75, 2.0, 0.4, 0.0)

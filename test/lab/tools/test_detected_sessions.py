@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from cardbox_tracker.applications.evaluation.session import RecordedSession
-from cardbox_tracker.applications.evaluation.truth import GroundTruth
+from cardbox_tracker.recordings.truth import GroundTruth
+from lab.evaluation.session import RecordedSession
 from lab.tools.detected_sessions import source_of, source_weights
 
 TRUTH = GroundTruth({}, {}, 0, 2.0, 10.0, "left")

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from cardbox_tracker.applications.evaluation.results import read_json
+from lab.evaluation.results import read_json
 from lab.tools.endurance import main
 from lab.tools.endurance_record import Record, Resources, resources_of, section_of
 

@@ -10,12 +10,12 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from cardbox_tracker.applications.evaluation.session import RecordedSession
-from cardbox_tracker.applications.evaluation.truth import GroundTruth
 from cardbox_tracker.camera.camera import Camera
 from cardbox_tracker.common.errors import CardboxError
 from cardbox_tracker.detectors.image_points import POINT_INDEX, POINT_NAMES, ImagePoints
+from cardbox_tracker.recordings.truth import GroundTruth
 from cardbox_tracker.terms import joint_points_kernels as kernels
+from lab.evaluation.session import RecordedSession
 from lab.tools import point_deviations as tool
 
 PITCH_RAD = 0.3

@@ -6,7 +6,7 @@ import re
 from pathlib import Path
 from typing import Any
 
-from cardbox_tracker.applications.evaluation.results import read_json
+from lab.evaluation.results import read_json
 from lab.experiments.digest import paper_digest
 from lab.tools.readme_figures import (
     BEGIN,

@@ -10,11 +10,11 @@ import cv2
 import numpy as np
 import pytest
 
-from cardbox_tracker.applications.evaluation.truth import load_ground_truth
 from cardbox_tracker.applications.simulation.session import SessionFormat, synthesize_session
 from cardbox_tracker.common.errors import CardboxError
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.model_file import load_body_model
+from cardbox_tracker.recordings.truth import load_ground_truth
 from cardbox_tracker.ros.demo.report import DemoResult, write_report
 
 BODY = BodyModel.of(hip_height_m=-0.51)

@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from cardbox_tracker.applications.evaluation.results import commit, processor, read_json, write_json
 from cardbox_tracker.common.errors import CardboxError
+from lab.evaluation.results import commit, processor, read_json, write_json
 
 
 def test_numbers_are_rounded_and_read_back(tmp_path: Path) -> None:

@@ -20,10 +20,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from cardbox_tracker.applications.evaluation.truth import GroundTruth, load_ground_truth
 from cardbox_tracker.common.errors import CardboxError, cut
 from cardbox_tracker.common.files import UnreadableFileError, read_regular
 from cardbox_tracker.recordings.silhouettes import TimeSpan
+from cardbox_tracker.recordings.truth import GroundTruth, load_ground_truth
 
 FloatArray = NDArray[np.float64]
 

@@ -12,9 +12,6 @@ from numpy.typing import NDArray
 
 FloatArray = NDArray[np.float64]
 
-SHOULDERS = (0, 3)
-"""Their places among the keypoints."""
-
 
 def distances_m(estimates_m: FloatArray, truth_m: FloatArray) -> FloatArray:
     """Return the distance of each joint (..., k) of ``estimates_m`` (..., k, 3) from the truth."""
@@ -41,12 +38,6 @@ def align(estimates_m: FloatArray, truth_m: FloatArray) -> FloatArray:
     scale = np.divide(s.sum(axis=-1), extent, out=np.zeros_like(extent), where=extent > 0)
     aligned: FloatArray = scale[..., None, None] * source @ np.swapaxes(u @ vt, -1, -2) + middle_m
     return aligned
-
-
-def beside_shoulders(difference: FloatArray) -> FloatArray:
-    """Return differences of keypoints (..., 6, 3) without that of the middle of the shoulders."""
-    local: FloatArray = difference - difference[..., SHOULDERS, :].mean(axis=-2, keepdims=True)
-    return local
 
 
 def acceleration_error(difference_m: FloatArray, stamps_ns: NDArray[np.int64]) -> float:

@@ -16,9 +16,9 @@ from collections.abc import Container
 import numpy as np
 from numpy.typing import NDArray
 
-from cardbox_tracker.applications.evaluation.session import RecordedSession
 from cardbox_tracker.camera.camera import level_to_optical
 from cardbox_tracker.person.skeleton import rotation_x, rotation_y, rotation_z
+from lab.evaluation.session import RecordedSession
 
 FloatArray = NDArray[np.float64]
 

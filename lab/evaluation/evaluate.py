@@ -9,14 +9,18 @@ from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
 
-from cardbox_tracker.applications.evaluation.figures import figures
-from cardbox_tracker.applications.evaluation.people import people_figures
-from cardbox_tracker.applications.evaluation.people_report import people_report
-from cardbox_tracker.applications.evaluation.plan import NO_POINTS, Plan, Way, ways_of
-from cardbox_tracker.applications.evaluation.report import sessions_report
-from cardbox_tracker.applications.evaluation.results import provenance, write_json
-from cardbox_tracker.applications.evaluation.session import RecordedSession, load_session
-from cardbox_tracker.applications.evaluation.tracking import (
+from cardbox_tracker.common.errors import CardboxError
+from cardbox_tracker.common.files import atomic_path
+from cardbox_tracker.search.config import PRESETS
+from cardbox_tracker.tracking.precompile import compile_all
+from lab.evaluation.figures import figures
+from lab.evaluation.people import people_figures
+from lab.evaluation.people_report import people_report
+from lab.evaluation.plan import NO_POINTS, Plan, Way, ways_of
+from lab.evaluation.report import sessions_report
+from lab.evaluation.results import provenance, write_json
+from lab.evaluation.session import RecordedSession, load_session
+from lab.evaluation.tracking import (
     BACKGROUND,
     DETECTOR,
     WITH_DEPTH,
@@ -24,10 +28,6 @@ from cardbox_tracker.applications.evaluation.tracking import (
     recovery_of,
     track_session,
 )
-from cardbox_tracker.common.errors import CardboxError
-from cardbox_tracker.common.files import atomic_path
-from cardbox_tracker.search.config import PRESETS
-from cardbox_tracker.tracking.precompile import compile_all
 
 SESSIONS, PEOPLE = "sessions", "real-people"
 """Names of the results of sessions with reference postures, and of sessions of real people."""

@@ -7,11 +7,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from cardbox_tracker.applications.evaluation.angles import joint_angles, limb_angles
 from cardbox_tracker.camera.camera import Camera
 from cardbox_tracker.person.kinematics import pose
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.posture import JOINT_LIMITS
+from lab.evaluation.angles import joint_angles, limb_angles
 
 BODY = BodyModel.of(distance_m=2.3, hip_height_m=-0.4)
 

@@ -5,13 +5,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from cardbox_tracker.applications.evaluation.figures import lengths
-from cardbox_tracker.applications.evaluation.report import sessions_report
-from cardbox_tracker.applications.evaluation.session import RecordedSession, load_session
-from cardbox_tracker.applications.evaluation.tracking import SessionRun
 from cardbox_tracker.applications.simulation.session import SessionFormat, synthesize_session
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.sizes import SIZE_INDEX
+from lab.evaluation.figures import lengths
+from lab.evaluation.report import sessions_report
+from lab.evaluation.session import RecordedSession, load_session
+from lab.evaluation.tracking import SessionRun
 
 BODY = BodyModel.of(hip_height_m=-0.6, camera_pitch_rad=np.radians(8.0))
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from cardbox_tracker.applications.evaluation.figures import added, compared
+from lab.evaluation.figures import added, compared
 
 TRACKED = {"tracked": [2, 0], "uncertain": [0, 0], "hidden": [0, 0], "lost": [0, 0]}
 

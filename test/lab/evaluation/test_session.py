@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from cardbox_tracker.applications.evaluation.session import load_session
 from cardbox_tracker.common.errors import CardboxError
 from cardbox_tracker.person.skeleton import KEYPOINT_NAMES
+from lab.evaluation.session import load_session
 
 MARKS = ("hips", *KEYPOINT_NAMES)
 

@@ -8,13 +8,13 @@ from typing import Any
 import numpy as np
 import pytest
 
-from cardbox_tracker.applications.evaluation.figures import figures
-from cardbox_tracker.applications.evaluation.session import RecordedSession
-from cardbox_tracker.applications.evaluation.tracking import SessionRun
-from cardbox_tracker.applications.evaluation.truth import GroundTruth
 from cardbox_tracker.camera.camera import Camera
 from cardbox_tracker.person.kinematics import pose
 from cardbox_tracker.person.model import BodyModel
+from cardbox_tracker.recordings.truth import GroundTruth
+from lab.evaluation.figures import figures
+from lab.evaluation.session import RecordedSession
+from lab.evaluation.tracking import SessionRun
 
 BODY = BodyModel.of(hip_height_m=-0.5)
 CAMERA = Camera(320, 240, 300.0, 300.0, 159.5, 119.5)

@@ -20,12 +20,12 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from cardbox_tracker.applications.evaluation.session import RecordedSession
 from cardbox_tracker.camera.camera import Camera
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.recordings.silhouettes import RecordedFrame
 from cardbox_tracker.search.config import TrackerConfig
 from cardbox_tracker.tracking.tracker import Tracker
+from lab.evaluation.session import RecordedSession
 
 FloatArray = NDArray[np.float64]
 Silhouette = NDArray[np.uint8]

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from cardbox_tracker.applications.evaluation.people_report import replaced
 from cardbox_tracker.common.errors import CardboxError
+from lab.evaluation.people_report import replaced
 
 BEGIN, END = "<!-- begin -->", "<!-- end -->"
 

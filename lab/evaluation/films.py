@@ -7,9 +7,14 @@ truth is turned with them.
 
 from __future__ import annotations
 
+import argparse
 from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import ProcessPoolExecutor
 from dataclasses import replace
+from functools import partial
+from multiprocessing import get_context
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any, NamedTuple
 
 import cv2
@@ -17,15 +22,23 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cardbox_tracker.applications.drawing.video import video_file
-from cardbox_tracker.applications.evaluation.people import people_figures
-from cardbox_tracker.applications.evaluation.session import RecordedSession, load_session
-from cardbox_tracker.applications.evaluation.tracking import run_of
+from cardbox_tracker.commands.request import add_tracking, tracking_request
+from cardbox_tracker.commands.tracking import track
 from cardbox_tracker.common.errors import CardboxError
+from cardbox_tracker.common.files import atomic_path
+from cardbox_tracker.common.progress import progress_bar
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.skeleton import KeypointState
 from cardbox_tracker.recordings.open_images import open_images
+from cardbox_tracker.recordings.silhouettes import RecordedFrame
 from cardbox_tracker.search.doubt import FAR_M
 from cardbox_tracker.tracking.estimate import TRACKING, Estimate
+from cardbox_tracker.tracking.precompile import compile_all
+from cardbox_tracker.tracking.tracker import Tracker
+from lab.evaluation.people import people_figures
+from lab.evaluation.results import provenance, write_json
+from lab.evaluation.session import RecordedSession, load_session
+from lab.evaluation.tracking import run_of
 
 FloatArray = NDArray[np.float64]
 
@@ -205,3 +218,85 @@ def _row(name: str, films: Sequence[Mapping[str, Any]]) -> str:
         f"{mean('pitch_found_deg'):.1f} / {mean('pitch_deg'):.1f}",
     ]
     return f"| {' | '.join(cells)} |".replace("nan", "")
+
+
+def evaluate_films(
+    folders: Sequence[Path], report: Path, preset: str, seeds: range, jobs: int
+) -> None:
+    """Track sessions as films, and write the report and, beside it, all numbers as JSON.
+
+    Args:
+        folders: sessions.
+        report: Markdown file to write.
+        preset: name of the tracker's settings.
+        seeds: seeds of the runs.
+        jobs: number of processes.
+
+    Raises:
+        CardboxError: a folder is no session, or the report cannot be written.
+    """
+    for folder in folders:
+        load_session(folder)
+    report.parent.mkdir(parents=True, exist_ok=True)
+    compile_all()
+    words = ["--detector", "mediapipe", "--preset", preset]
+    films: list[dict[str, Any]] = []
+    with (
+        progress_bar("evaluate") as show,
+        ProcessPoolExecutor(jobs, mp_context=get_context("spawn")) as pool,
+    ):
+        work = [
+            pool.submit(_film, folder, shape, words, seeds)
+            for folder in folders
+            for shape in SHAPES
+        ]
+        for done, future in enumerate(work, 1):
+            films += future.result()
+            show(done / len(work))
+    names = " ".join(folder.name for folder in folders)
+    how = f"--preset {preset} --seed {seeds[0]} --seeds {len(seeds)}"
+    results = {
+        "command": f"cardbox evaluate --films {names} {how} --output DIR",
+        "films": sorted(films, key=lambda film: (film["given"], film["shape"])),
+        "provenance": provenance(),
+    }
+    write_json(results, report.with_suffix(".json"))
+    with atomic_path(report) as temporary:
+        temporary.write_text(films_report(results), encoding="utf-8")
+
+
+def _film(folder: Path, shape: str, words: list[str], seeds: range) -> list[dict[str, Any]]:
+    """Return the entries of one session in ``films.json``, one for all that is given."""
+    from lab.evaluation.films import film_figures, make_film
+
+    parser, found = argparse.ArgumentParser(), list[dict[str, Any]]()
+    add_tracking(parser)
+    with TemporaryDirectory() as made:
+        film = make_film(folder, shape, Path(made) / f"{folder.name}.mp4")
+        known = ["--fov", f"{film.fov_deg:.1f}", "--stature", str(film.session.truth.stature_m)]
+        for given, more in {"field of view, stature": known, "nothing": []}.items():
+            runs = []
+            for seed in seeds:
+                typed = parser.parse_args([str(film.path), *words, *more, "--seed", str(seed)])
+                estimates: list[Estimate] = []
+                summary = track(
+                    tracking_request(typed),
+                    (partial(_keep, estimates),),
+                    lambda _: None,
+                )
+                runs.append(film_figures(film, estimates, summary.body))
+            found.append(
+                {
+                    "name": f"{folder.name}, {shape}",
+                    "group": folder.resolve().parent.name,
+                    "shape": shape,
+                    "given": given,
+                    "mediapipe_aligned": film.session.mediapipe.get("aligned"),
+                    "runs": runs,
+                }
+            )
+    return found
+
+
+def _keep(estimates: list[Estimate], _: RecordedFrame, estimate: Estimate, __: Tracker) -> None:
+    estimates.append(estimate)

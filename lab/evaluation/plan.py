@@ -8,10 +8,10 @@ from itertools import product
 from pathlib import Path
 from typing import NamedTuple
 
-from cardbox_tracker.applications.evaluation.session import RecordedSession, load_session
-from cardbox_tracker.applications.evaluation.tracking import BACKGROUND, WITH_DEPTH
 from cardbox_tracker.detectors.detector import Detector
 from cardbox_tracker.detectors.point_table import PointTable
+from lab.evaluation.session import RecordedSession, load_session
+from lab.evaluation.tracking import BACKGROUND, WITH_DEPTH
 
 NO_POINTS = "none"
 """Name of the source of points that finds none."""

@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from cardbox_tracker.applications.evaluation.truth import load_ground_truth, tracking_error
 from cardbox_tracker.common.errors import CardboxError
 from cardbox_tracker.person.skeleton import JOINT_NAMES, KEYPOINT_NAMES
+from cardbox_tracker.recordings.truth import load_ground_truth, tracking_error
 
 
 def frame(stamp_ns: int, segment: str, x_m: float) -> dict[str, Any]:

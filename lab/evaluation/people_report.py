@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from cardbox_tracker.applications.evaluation.people import BEYOND_CM
-from cardbox_tracker.applications.evaluation.report import mean_of
 from cardbox_tracker.common.errors import CardboxError
+from lab.evaluation.people import BEYOND_CM
+from lab.evaluation.report import mean_of
 
 
 def replaced(text: str, section: str, begin: str, end: str) -> str:

@@ -14,21 +14,16 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from cardbox_tracker.applications.evaluation.angles import joint_angles
-from cardbox_tracker.applications.evaluation.metrics import (
-    SHOULDERS,
-    acceleration_error,
-    align,
-    angle_errors_deg,
-    beside_shoulders,
-)
-from cardbox_tracker.applications.evaluation.session import RecordedSession
-from cardbox_tracker.applications.evaluation.tracking import SessionRun
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.parts import body_parts
 from cardbox_tracker.person.skeleton import JOINT_NAMES, KEYPOINT_NAMES, KeypointState
+from cardbox_tracker.recordings.truth import SHOULDERS, beside_shoulders
 from cardbox_tracker.search.doubt import FAR_M, HANDS
 from cardbox_tracker.tracking.estimate import TRACKING
+from lab.evaluation.angles import joint_angles
+from lab.evaluation.metrics import acceleration_error, align, angle_errors_deg
+from lab.evaluation.session import RecordedSession
+from lab.evaluation.tracking import SessionRun
 
 FloatArray = NDArray[np.float64]
 

@@ -8,17 +8,17 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from cardbox_tracker.applications.evaluation.evaluate import evaluate_session, evaluate_sessions
-from cardbox_tracker.applications.evaluation.plan import Plan, Way
-from cardbox_tracker.applications.evaluation.report import sessions_report
-from cardbox_tracker.applications.evaluation.session import load_session
-from cardbox_tracker.applications.evaluation.tracking import InputSelection, track_session
 from cardbox_tracker.applications.simulation.session import synthesize_session
 from cardbox_tracker.commands.main import main
 from cardbox_tracker.common.errors import CardboxError
 from cardbox_tracker.recordings.bag_reader import BagReader
 from cardbox_tracker.recordings.bag_writer import BagWriter
 from cardbox_tracker.search.config import default_preset
+from lab.evaluation.evaluate import evaluate_session, evaluate_sessions
+from lab.evaluation.plan import Plan, Way
+from lab.evaluation.report import sessions_report
+from lab.evaluation.session import load_session
+from lab.evaluation.tracking import InputSelection, track_session
 
 LARGEST_ERROR_CM = 25.0
 

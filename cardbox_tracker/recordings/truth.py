@@ -12,13 +12,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from cardbox_tracker.applications.evaluation.metrics import SHOULDERS
 from cardbox_tracker.camera.camera import level_to_optical
 from cardbox_tracker.common.errors import CardboxError, cut
 from cardbox_tracker.common.files import UnreadableFileError, read_regular
 from cardbox_tracker.person.skeleton import JOINT_NAMES, KEYPOINT_NAMES
 
 FloatArray = NDArray[np.float64]
+
+SHOULDERS = (0, 3)
+"""Their places among the keypoints."""
 
 # A person who is about to move still stands where the recording began in this many frames.
 _FIRST_FRAMES = 10
@@ -230,3 +232,9 @@ def tracking_error(estimates: Mapping[int, FloatArray], truth: GroundTruth) -> T
         float(along[2]),
         len(stamps),
     )
+
+
+def beside_shoulders(difference: FloatArray) -> FloatArray:
+    """Return differences of keypoints (..., 6, 3) without that of the middle of the shoulders."""
+    local: FloatArray = difference - difference[..., SHOULDERS, :].mean(axis=-2, keepdims=True)
+    return local

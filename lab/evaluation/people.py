@@ -8,11 +8,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from cardbox_tracker.applications.evaluation.figures import figures
-from cardbox_tracker.applications.evaluation.metrics import SHOULDERS
-from cardbox_tracker.applications.evaluation.session import RecordedSession
-from cardbox_tracker.applications.evaluation.tracking import SessionRun
+from cardbox_tracker.recordings.truth import SHOULDERS
 from cardbox_tracker.tracking.estimate import TRACKING
+from lab.evaluation.figures import figures
+from lab.evaluation.session import RecordedSession
+from lab.evaluation.tracking import SessionRun
 
 FloatArray = NDArray[np.float64]
 

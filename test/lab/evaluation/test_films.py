@@ -8,16 +8,16 @@ import cv2
 import numpy as np
 import pytest
 
-from cardbox_tracker.applications.evaluation.films import (
+from cardbox_tracker.common.errors import CardboxError
+from cardbox_tracker.person.model import BodyModel
+from cardbox_tracker.tracking.estimate import NO_PERSON, TRACKING, Estimate
+from lab.evaluation.films import (
     SHAPES,
     film_figures,
     films_report,
     make_film,
 )
-from cardbox_tracker.applications.evaluation.session import load_session
-from cardbox_tracker.common.errors import CardboxError
-from cardbox_tracker.person.model import BodyModel
-from cardbox_tracker.tracking.estimate import NO_PERSON, TRACKING, Estimate
+from lab.evaluation.session import load_session
 
 
 @pytest.mark.parametrize("shape", SHAPES)

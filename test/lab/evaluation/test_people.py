@@ -11,22 +11,22 @@ from typing import Any
 import numpy as np
 import pytest
 
-from cardbox_tracker.applications.evaluation.people import people_figures, torso_angles
-from cardbox_tracker.applications.evaluation.people_report import BEGIN, END, people_report
-from cardbox_tracker.applications.evaluation.plan import NO_POINTS, Plan, ways_of
-from cardbox_tracker.applications.evaluation.session import RecordedSession, load_session
-from cardbox_tracker.applications.evaluation.tracking import (
-    BACKGROUND,
-    DETECTOR,
-    SessionRun,
-    silhouettes_of,
-)
-from cardbox_tracker.applications.evaluation.truth import GroundTruth
 from cardbox_tracker.camera.camera import Camera
 from cardbox_tracker.commands.main import main
 from cardbox_tracker.common.errors import CardboxError
 from cardbox_tracker.person.kinematics import pose
 from cardbox_tracker.person.model import BodyModel
+from cardbox_tracker.recordings.truth import GroundTruth
+from lab.evaluation.people import people_figures, torso_angles
+from lab.evaluation.people_report import BEGIN, END, people_report
+from lab.evaluation.plan import NO_POINTS, Plan, ways_of
+from lab.evaluation.session import RecordedSession, load_session
+from lab.evaluation.tracking import (
+    BACKGROUND,
+    DETECTOR,
+    SessionRun,
+    silhouettes_of,
+)
 
 PITCH_DEG = 15.0
 BODY = BodyModel.of(hip_height_m=-0.5, camera_pitch_rad=float(np.radians(PITCH_DEG)))

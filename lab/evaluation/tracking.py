@@ -9,9 +9,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from cardbox_tracker.applications.evaluation.recovery import Recovery, measure_recovery
-from cardbox_tracker.applications.evaluation.session import RecordedSession
-from cardbox_tracker.applications.evaluation.truth import GroundTruth
 from cardbox_tracker.common.errors import CardboxError
 from cardbox_tracker.detectors.detector import Detector
 from cardbox_tracker.detectors.point_table import PointTable
@@ -22,10 +19,13 @@ from cardbox_tracker.person.proportions import STATURE_LIMITS_M, body_from_propo
 from cardbox_tracker.recordings.initialize import initialize_from_recording
 from cardbox_tracker.recordings.recording import STEREO, FrameSet, open_recording
 from cardbox_tracker.recordings.silhouettes import SilhouetteSource, TimeSpan
+from cardbox_tracker.recordings.truth import GroundTruth
 from cardbox_tracker.search.config import TrackerConfig
 from cardbox_tracker.tracking.estimate import Estimate
 from cardbox_tracker.tracking.observation import Observation
 from cardbox_tracker.tracking.tracker import Tracker
+from lab.evaluation.recovery import Recovery, measure_recovery
+from lab.evaluation.session import RecordedSession
 
 FloatArray = NDArray[np.float64]
 
