@@ -54,8 +54,11 @@ _DISTANCES_M = 0.9 * 1.2 ** np.arange(9)
 _BREADTHS = [SIZE_INDEX[name] for name in BREADTHS]
 _ROUNDS, _BODIES, _POSTURES = 6, 60, 12
 # Standard deviations of the prior: of the logarithmic distance, the hip height, and the
-# logarithmic breadths. The noise of a round is a fraction of them that shrinks.
-_DISTANCE_SD, _HEIGHT_SD_M, _BREADTH_SD = 0.25, 0.10, 0.20
+# logarithmic breadths. Those between the shoulders' joints vary by 6 % among people (biacromial
+# breadth of ANSUR II, both sexes), outlines with their clothes by more. The noise of a round is a
+# fraction of them that shrinks.
+_DISTANCE_SD, _HEIGHT_SD_M = 0.25, 0.10
+_BREADTH_SD = {name: 0.06 if name == "shoulder_breadth" else 0.20 for name in BREADTHS}
 _NOISE, _SHRINK = 0.5, 0.75
 # Unit of the prior of a step along the line of sight, m.
 _X_STEP_M = 0.06
@@ -157,7 +160,7 @@ class _Search:
             [
                 _DISTANCE_SD if "distance_m" in unknown else 0.0,
                 _HEIGHT_SD_M if "hip_height_m" in unknown else 0.0,
-                *[_BREADTH_SD if name in unknown else 0.0 for name in BREADTHS],
+                *[sd if name in unknown else 0.0 for name, sd in _BREADTH_SD.items()],
             ]
         )
 
