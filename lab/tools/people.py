@@ -4,8 +4,10 @@
 
 A session has ``bag/`` and a ``ground_truth.json`` of format 2, whose ``people`` are a list. Each of
 its cameras is tracked alone. Statures and the camera's pitch are given. In an image, each estimate
-belongs to the person whose shoulders it is nearest to, if they are within 0.35 m sideways. Joints
-are aligned by a similarity, see ``PA-MPJPE``.
+belongs to the person whose shoulders it is nearest to, if they are within 0.35 m sideways.
+*Aligned*: the mean error of shoulders, elbows, and hands beside the middle of the shoulders. *Seen*
+counts only joints that nobody covers. *More* is the processor time that each further person adds to
+an image of one, network included.
 """
 
 from __future__ import annotations
@@ -31,11 +33,9 @@ from cardbox_tracker.recordings.truth import SHOULDERS
 from cardbox_tracker.search.config import default_preset
 from cardbox_tracker.tracking.estimate import TRACKING, Estimate
 from cardbox_tracker.tracking.people import People
-from lab.evaluation.metrics import align, distances_m
+from lab.evaluation.metrics import distances_m
 
 _WITHIN_M = 0.35
-# Joints that must be seen and known to align the others.
-_FEWEST_JOINTS = 4
 # Area of a silhouette, of the whole one, from which a person counts as seen, px.
 _LEAST_PX = 2000
 
@@ -49,7 +49,11 @@ def main() -> None:
     options = parser.parse_args()
     detector = None if options.detector == "none" else points_named(options.detector)
     given = [float(one) for one in options.stature.split(",")] if options.stature else None
-    print("camera, person, images, found, exchanged, aligned cm, cm, hidden said, ms a person")
+    print(
+        "camera, person, images, found, all found %, exchanged, aligned cm, of seen cm, cm, ",
+        end="",
+    )
+    print("uncertain %, hidden said, ms of one, ms more")
     for folder in options.sessions:
         truth = json.loads((folder / "ground_truth.json").read_text())
         for camera in truth.get("cameras", [truth["camera"]]):
@@ -66,51 +70,75 @@ def _lines(
     as_numbered = sorted(people, key=lambda person: _comes(person, name))
     statures = given or [person["height"] for person in as_numbered]
     bodies = [body_from_proportions(one, None, camera_pitch_rad=pitch_rad) for one in statures]
-    finder = detector._replace(people=len(people)) if isinstance(detector, Detector) else detector
     empty = next((one for one in truth["segments"] if one["name"] == "empty"), None)
-    scene: Segmentation = finder if empty is None else TimeSpan(empty["start_s"], empty["end_s"])
     names = [name] if len(truth.get("cameras", ())) > 1 else []
-    found: dict[int, list[Estimate]] = {}
-    spent_s, images = time.process_time(), 0
-    with open_recording(folder / "bag", scene, names, points=finder) as recording:
-        tracked = People(bodies, recording.first.camera, default_preset(), count=len(people))
-        for taken in recording.frames():
-            results = tracked.track(taken.observations[0], taken.people)
-            found[taken.stamp_ns] = [estimate for estimate, _ in results]
-            images += 1
-    ms = 1e3 * (time.process_time() - spent_s) / images / len(people)
-    rows: list[list[tuple[int, float, float]]] = [[] for _ in people]
-    counts, hidden = [0] * len(people), [[0, 0] for _ in people]
+
+    def tracked(count: int) -> tuple[dict[int, list[Estimate]], float]:
+        """Return the estimates by stamp, and the time of an image, ms."""
+        finder = detector._replace(people=count) if isinstance(detector, Detector) else detector
+        scene: Segmentation = (
+            finder if empty is None else TimeSpan(empty["start_s"], empty["end_s"])
+        )
+        spent_s, found = time.process_time(), {}
+        with open_recording(folder / "bag", scene, names, points=finder) as recording:
+            people = People(bodies, recording.first.camera, default_preset(), count=count)
+            for taken in recording.frames():
+                results = people.track(taken.observations[0], taken.people)
+                found[taken.stamp_ns] = [estimate for estimate, _ in results]
+        return found, 1e3 * (time.process_time() - spent_s) / len(found)
+
+    (_, one_ms), (found, ms) = tracked(1), tracked(len(people))
+    more_ms = (ms - one_ms) / max(len(people) - 1, 1)
+    rows: list[list[tuple[int, float, float, float, bool]]] = [[] for _ in people]
+    counts, hidden, all_seen, all_found = [0] * len(people), [[0, 0] for _ in people], 0, 0
     for i, frame in enumerate(truth["frames"]):
         seen = [joints_of(person["frames"][i], name) for person in people]
         estimates = [one for one in found.get(frame["stamp_ns"], []) if one.posture is not None]
-        for k, estimate in matched(seen, estimates):
-            there = seen[k]
-            assert there is not None and estimate.keypoints_m is not None
-            known = np.isfinite(there[0]).all(axis=1)
-            errors = np.nan, np.nan
-            if known.sum() >= _FEWEST_JOINTS:
-                pair = estimate.keypoints_m[known], there[0][known]
-                errors = (
-                    float(distances_m(align(*pair), pair[1]).mean()),
-                    float(distances_m(*pair).mean()),
+        pairs = dict(matched(seen, estimates))
+        all_seen += None not in seen
+        all_found += None not in seen and len(pairs) == len(people)
+        for k, there in enumerate(seen):
+            if there is None:
+                continue
+            counts[k] += 1
+            joints, covered = there
+            hidden[k][0] += len(covered)
+            if k not in pairs:
+                continue
+            estimate = pairs[k]
+            assert estimate.keypoints_m is not None
+            pair = estimate.keypoints_m, joints
+            beside = [points - points[list(SHOULDERS)].mean(axis=0) for points in pair]
+            is_clear = np.isin(np.arange(len(joints)), covered, invert=True)
+            errors_m = distances_m(beside[0], beside[1])
+            rows[k].append(
+                (
+                    estimate.person or 0,
+                    _mean(errors_m),
+                    _mean(errors_m[is_clear]),
+                    _mean(distances_m(*pair)),
+                    estimate.state != TRACKING,
                 )
-            rows[k].append((estimate.person or 0, *errors))
-            for joint in there[1]:
+            )
+            for joint in covered:
                 states = estimate.keypoint_states
                 is_sure = states is None or str(states[joint]) == "tracked"
-                hidden[k][0] += 1
                 hidden[k][1] += estimate.state != TRACKING or not is_sure
-        for k, there in enumerate(seen):
-            counts[k] += there is not None
     for k, (person, row) in enumerate(zip(people, rows, strict=True)):
-        numbers = [one[0] for one in row]
-        exchanged = sum(a != b for a, b in pairwise(numbers))
-        aligned, absolute = (100 * float(np.nanmean([one[j] for one in row])) for j in (1, 2))
+        exchanged = sum(a[0] != b[0] for a, b in pairwise(row))
+        cm = [f"{100 * float(np.nanmean([one[j] for one in row])):.1f}" for j in (1, 2, 3)]
         yield (
-            f"{name}, {person['name']}, {counts[k]}, {len(row)}, {exchanged}, {aligned:.1f}, "
-            f"{absolute:.1f}, {hidden[k][1]} of {hidden[k][0]}, {ms:.0f}"
+            f"{name}, {person['name']}, {counts[k]}, {len(row)}, "
+            f"{100 * all_found / max(all_seen, 1):.0f}, {exchanged}, {', '.join(cm)}, "
+            f"{100 * np.mean([one[4] for one in row]):.0f}, {hidden[k][1]} of {hidden[k][0]}, "
+            f"{one_ms:.0f}, {more_ms:.0f}"
         )
+
+
+def _mean(errors_m: FloatArray) -> float:
+    """Return the mean of the known errors; NaN if there are none."""
+    known = errors_m[np.isfinite(errors_m)]
+    return float(known.mean()) if len(known) else np.nan
 
 
 def _comes(person: Any, camera: str) -> tuple[int, float]:
