@@ -40,12 +40,14 @@ POSTURE, PLACE = slice(0, N_JOINTS), slice(N_JOINTS, N_STATE)
 
 TURNING_LIMITS: FloatArray = np.array([joint.limits for joint in joints_of(Group.POSTURE)])
 """Shape (12, 2): lowest and highest value of each joint, rad (metres for ``torso_y``), of a person
-who also turns with the feet, to walk or to look aside."""
+who also turns with the feet, to walk, to look aside, or around."""
 JOINT_LIMITS: FloatArray = TURNING_LIMITS.copy()
 """Shape (12, 2): the same of a person who stands."""
 JOINT_LIMITS[YAW] = np.radians([-60.0, 60.0])
 TURNING_LIMITS.setflags(write=False)
 JOINT_LIMITS.setflags(write=False)
+
+_ASIDE_RAD = np.radians(100.0)
 
 NEAREST_M, FARTHEST_M = 0.5, 10.0
 """Distances of the hips from the camera between which a person is searched, metres."""
@@ -67,13 +69,15 @@ def place_limits(distance_m: float) -> FloatArray:
     return np.array([[distance_m - farthest_m, distance_m - nearest_m], torso_z.limits])
 
 
-def state_limits(distance_m: float) -> FloatArray:
+def state_limits(distance_m: float, facing_rad: float = 0.0) -> FloatArray:
     """Return the lowest and highest value of each value of a state, (14, 2); not writable.
 
     Args:
         distance_m: distance of the hips in the body model, metres.
+        facing_rad: yaw around which the person turns: 0 faces the camera, pi or -pi away from it.
     """
     limits: FloatArray = np.vstack([TURNING_LIMITS, place_limits(distance_m)])
+    limits[YAW] = facing_rad - _ASIDE_RAD, facing_rad + _ASIDE_RAD
     limits.setflags(write=False)
     return limits
 

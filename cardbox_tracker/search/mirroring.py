@@ -1,4 +1,4 @@
-"""Compiled mirror images of arms in depth, which look alike in the image."""
+"""Compiled states that look alike in the image: mirror images of arms in depth, turned people."""
 
 from __future__ import annotations
 
@@ -15,6 +15,7 @@ from cardbox_tracker.person.kinematics import (
     side_of,
     state_pose,
 )
+from cardbox_tracker.person.posture import PITCH, ROLL, YAW
 from cardbox_tracker.terms.kernel_arguments import BodyTuple, Floats, body_of
 
 
@@ -65,3 +66,24 @@ def mirrored_states(state: Floats, body: BodyTuple, arm_limits: Floats) -> Float
                 ray[c] /= sqrt(norm)
             mirror(angles, side, (i >> (2 * arm)) & 3, ray, arm_limits, directions)
     return states
+
+
+@kernel
+def turned_states(states: Floats, turn_rad: float, arm_limits: Floats) -> Floats:
+    """Return ``states`` (N, 14) of people who face the other way, with the same places of joints.
+
+    The torso's rotation is Rz(yaw) Ry(pitch) Rx(roll) Rz(pi), whose turn about the vertical is
+    written as ``turn_rad``, pi or -pi. What was the left arm is the right one.
+    """
+    turned, directions = states.copy(), np.empty(6)
+    for i in range(states.shape[0]):
+        turned[i, YAW] += turn_rad
+        turned[i, PITCH], turned[i, ROLL] = -states[i, PITCH], -states[i, ROLL]
+        for arm in range(2):
+            limb_directions(angles_in(states[i], arm), side_of(arm), directions)
+            for half in range(2):
+                directions[3 * half] *= -1.0
+                directions[3 * half + 1] *= -1.0
+            other = 1 - arm
+            angles_of_arm(directions, side_of(other), arm_limits, angles_in(turned[i], other))
+    return turned

@@ -111,7 +111,7 @@ def propose_torsos(
             elif kind < _BOWING_OR_TURNING:
                 state[YAW] = limits[YAW, 0] + (limits[YAW, 1] - limits[YAW, 0]) * value
             else:
-                state[YAW] = -state[YAW]
+                state[YAW] = limits[YAW, 0] + limits[YAW, 1] - state[YAW]
             # The random numbers of the arms are not used otherwise.
             state[TORSO_X] += _EXPLORERS_X_M * normals[i, FIRST_ANGLES[0]]
         else:
@@ -122,7 +122,7 @@ def propose_torsos(
             if uniforms[i, 0] < _FRESH_TURNED:
                 state[YAW] = limits[YAW, 0] + (limits[YAW, 1] - limits[YAW, 0]) * uniforms[i, 1]
             else:
-                state[YAW] = _FRESH_YAW_RAD * normals[i, YAW]
+                state[YAW] = fresh_state[YAW] + _FRESH_YAW_RAD * normals[i, YAW]
             state[TORSO_Y] = sight * (distance_m - state[TORSO_X])
         clip_state(state, limits)
     return states

@@ -35,7 +35,7 @@ from cardbox_tracker.search.arms import ARM_LIMITS
 from cardbox_tracker.search.config import TrackerConfig
 from cardbox_tracker.search.draws import Draws
 from cardbox_tracker.search.locating import Location, Locator
-from cardbox_tracker.search.mirroring import mirrored_states
+from cardbox_tracker.search.mirroring import mirrored_states, turned_states
 from cardbox_tracker.search.particles import Particles
 from cardbox_tracker.search.pose_filter import Corrector, Fit, Presence
 from cardbox_tracker.search.presence import PersonPresence
@@ -64,7 +64,8 @@ _OUTLINED, _OUTLINED_STEPS = (3, 1, 0.1), 2
 _NEAR = (0.7 * np.array([0.1, 0.1, 0.1, 0.2, *[0.2] * (2 * ARM_ANGLES), 0.1, 0.1])) ** -2
 # The same for cues that tell where joints are, which mainly correct the depth of the arms.
 _LOCATED = np.array([0.03, 0.05, 0.05, 0.08, *[0.2] * (2 * ARM_ANGLES), 0.05, 0.02]) ** -2
-_NONE = np.zeros(6)
+# Yaw beside the direction that somebody faces from which they face the other way, rad.
+_ASIDE_RAD = np.radians(95.0)
 # Weight of the last correction by the outline in the next one, against jitter.
 _KEPT = 0.6
 
@@ -150,6 +151,7 @@ class WholeBodyFilter:
         self._seeing: list[int] = []
         self._is_new, self._is_lost = True, False
         self._age = 0
+        self._face(0.0)
         self._presence.forget()
         self.approach.begin(0.0)
         self._locator.forget()
@@ -182,6 +184,10 @@ class WholeBodyFilter:
     def follow(self, frames: Sequence[Frame], terms: Sequence[Sequence[Term]]) -> Fit:
         """See :class:`~.pose_filter.PoseFilter`."""
         location = self._observe(frames, terms)
+        is_back = bool(self._cues) and all(cue.shows_back for _, cue in self._cues)
+        if self._is_new and is_back:
+            self._face(np.pi)
+            self._survivors = self._reference[None].copy()
         passes = self._profile.start_passes if self._is_new else 1
         if self._is_new or self._is_lost:
             given = self._survivors, self._reference, location.bearing, self._is_new
@@ -261,7 +267,7 @@ class WholeBodyFilter:
         more = [standing, self.approach.nearer_and_farther(before, cost)]
         if search.cues:
             turned, hanging = before.copy(), search.reference.copy()
-            turned[YAW] *= -1.0
+            turned[YAW] = 2.0 * cost.facing_rad - turned[YAW]
             hanging[[TORSO_X, TORSO_Y]] = before[[TORSO_X, TORSO_Y]]
             begin = [search.survivors[0], search.survivors[-1], turned, hanging]
             more.append(self._located_by_cues(np.array(begin)))
@@ -331,20 +337,26 @@ class WholeBodyFilter:
         self._output = kept * before + (1.0 - kept) * mean
         fitted = self._refined(frames, self._output)
         result = self._corrected(frames, fitted)
+        is_back = cost.facing_rad != 0.0
+        if self._cues:
+            fitted, result = self._turned(np.array([fitted, result]))
         both = np.array([fitted, result])
         ratings, (differs_px, cost_px), (drawn_px, area_px), points = cost.bodies(both)
         deviations, total = doubt.deviations_of(stddev), cost.silhouette_px
         fit_iou = iou_of(total, drawn_px, differs_px)
         pixels = float(total), float(cost.frontal_px_at(result)), float(area_px), float(cost_px)
         prior = float(ratings[1]) - float(cost_px) / max(total, 1)
-        found = pixels, prior, self._arm.spreads_m, (result, deviations), cost.body, self._age
+        ahead = result.copy()
+        ahead[YAW] -= cost.facing_rad
+        found = pixels, prior, self._arm.spreads_m, (ahead, deviations), cost.body, self._age
         evidence = doubt.evidence_of_search(*found)
         for number, cue in self._cues:
             there = cost.to_views[number](result[None])
             evidence |= cue.evidence(Posed(cost.costs[number].body, there))
         evidence["cameras"] = np.full(6, float(len(self._seeing) > 1))
         source = doubt.Source.POINTS if self._cues else doubt.Source.OUTLINE
-        vetoes = not is_trackable(cost, fitted), bool(evidence.get("back", _NONE).any())
+        evidence["back"] = np.full(6, float(is_back or cost.facing_rad != 0.0))
+        vetoes = not is_trackable(cost, fitted), bool(evidence["back"].any())
         judged = self._doubt.judge(evidence, source, are_hidden(cost, result), vetoes)
         self._result = result
         if profile.keeps_result:
@@ -364,6 +376,36 @@ class WholeBodyFilter:
             particles=Particles(*rated, mean, profile.spread),
             judged=judged,
         )
+
+    def _turned(self, found: FloatArray) -> FloatArray:
+        """Return states (N, 14) that face as the points show, and search there from now on.
+
+        Left and right are exchanged if the points have shown this for long. Somebody who turns to
+        the side, and further, faces the other way from then on.
+        """
+        cost = self._cost
+        facing_rad, yaw_rad = cost.facing_rad, float(found[-1, YAW]) - cost.facing_rad
+        way_rad = np.pi if facing_rad <= 0.0 else -np.pi
+        if self._age and all(cue.shows_back for _, cue in self._cues):
+            self._face(facing_rad + way_rad)
+            self._survivors = turned_states(self._survivors, way_rad, ARM_LIMITS)
+            self._output = self._correction = None
+            return turned_states(found, way_rad, ARM_LIMITS)
+        if abs(yaw_rad) > _ASIDE_RAD:
+            self._face(facing_rad + np.copysign(np.pi, yaw_rad))
+            if abs(self._cost.facing_rad) > 1.5 * np.pi:
+                # Once around.
+                whole_rad = self._cost.facing_rad
+                self._face(0.0)
+                for states in (self._survivors, found):
+                    states[:, YAW] -= whole_rad
+                self._output = self._correction = None
+        return found
+
+    def _face(self, facing_rad: float) -> None:
+        """Search around the yaw ``facing_rad``; 0 faces the first camera."""
+        self._cost.face(facing_rad)
+        self._reference[YAW] = facing_rad
 
     def _refined(self, frames: Sequence[Frame], state: FloatArray) -> FloatArray:
         """Return the state (14,) near ``state`` that fits all cues best."""

@@ -67,6 +67,8 @@ _ELSEWHERE_M, _ELSEWHERE_FRAMES = 0.4, 10
 _EXCHANGED, _EXCHANGED_M = 0.3, 0.1
 # A detector that mistakes left for right soon corrects itself; after this time it is right.
 _BACK_S = 0.5
+# Distance of the shoulders in the image, in lengths of the trunk, that tells front from back.
+_BROAD = 0.25
 
 _SIDES = tuple(ARMS)
 # Two of the detector's points for each of the ten, which is their middle.
@@ -118,8 +120,10 @@ class JointPointsTerm:
             return None
         weight = self.config.weight * max(frame.foreground_px, 1)
         evidence = self._evidence(points, self._age_s)
-        back = self._exchanged_s is not None and self._exchanged_s >= _BACK_S
-        return JointPointsObservation(evidence, weight, shows_back=back)
+        is_back = self._exchanged_s is not None and self._exchanged_s >= _BACK_S
+        if frame.before is None:
+            is_back = _from_behind(evidence[0])
+        return JointPointsObservation(evidence, weight, is_back)
 
     def _newest(self, frame: Frame) -> ImagePoints | None:
         """Return the newest points of this person, which may be of an earlier frame, if any."""
@@ -189,7 +193,8 @@ class JointPointsObservation(TermObservation):
     Attributes:
         seen: fields of :class:`~.joint_points_kernels.Evidence`.
         weight_px: cost of a squared residual of 1, px.
-        shows_back: whether left and right have been exchanged for long: the person's back is seen.
+        shows_back: whether left and right have been exchanged for long, so that the person faces
+            the other way.
     """
 
     seen: EvidenceTuple
@@ -224,7 +229,6 @@ class JointPointsObservation(TermObservation):
         away_m = np.linalg.norm(points[:, :2] - pixels[:, :2], axis=1) * pixels[:, 2] / focal_px
         away_m = np.where(known, away_m, 0.0)
         found = {name: np.zeros(6) for name in EVIDENCE}
-        found["back"][:] = self.shows_back
         found["distance"][:] = float(np.linalg.norm(keypoints_m[[0, 3]].mean(axis=0)))
         for arm in (0, 1):
             first = POINTS_OF_ARM * arm
@@ -255,11 +259,10 @@ EVIDENCE = (
     "foreshortened",
     "elbow foreshortened",
     "distance",
-    "back",
 )
 """Distance of a joint from its point at its depth, m; whether the point is not certain; difference
 of its depth from that of the detector, m; component of the bone that ends there, and of the upper
-arm, along the line of sight, as a fraction; distance of the person, m; whether the back is seen."""
+arm, along the line of sight, as a fraction; distance of the person, m."""
 # Left and right arms of the points that are compared, exchanged.
 _OTHER_SIDE = [*range(POINTS_OF_ARM, 2 * POINTS_OF_ARM), *range(POINTS_OF_ARM), HIPS, EARS]
 # Score of a certain point.
@@ -271,6 +274,14 @@ def projected(posed: Posed) -> FloatArray:
     pixels = np.empty((N_POINTS, 3))
     kernels.project(posed.states[0], posed.body, pixels)
     return pixels
+
+
+def _from_behind(found: FloatArray) -> bool:
+    """Return whether :func:`points_of` are those of a back: the left shoulder is on the left."""
+    left, right, hips = found[[SHOULDER, POINTS_OF_ARM + SHOULDER, HIPS]]
+    trunk_px = float(np.linalg.norm((left + right - 2 * hips)[:2])) / 2
+    is_known = min(left[2], right[2], hips[2]) > 0.0
+    return bool(is_known and right[0] - left[0] > _BROAD * trunk_px)
 
 
 def level_sight(camera: Camera, column_px: float) -> FloatArray:

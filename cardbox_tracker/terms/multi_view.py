@@ -27,6 +27,7 @@ from cardbox_tracker.person.posture import (
     TORSO_X,
     TORSO_Z,
     YAW,
+    state_limits,
 )
 from cardbox_tracker.person.sizes import FloatArray
 from cardbox_tracker.terms.outline import Outline
@@ -50,6 +51,8 @@ class MultiViewCost:
         costs: the cost of each camera, the first camera's first.
         to_views: transform of states for each camera.
         x_factor: factor on the units of the priors of ``torso_x``.
+        facing_rad: yaw around which the person turns; 0 faces the first camera.
+        limits: lowest and highest value of each value of a state, (14, 2).
         seeing: indices of the cameras that show the person in this frame.
     """
 
@@ -71,7 +74,13 @@ class MultiViewCost:
         self.parts, self.girdle = first.parts, first.girdle
         self.place, self.view, self.body = first.place, first.view, first.body
         self.x_factor = 1.0
-        self.anchor, self.limits = first.anchor, first.limits
+        self.anchor = first.anchor
+        self.face(0.0)
+
+    def face(self, facing_rad: float) -> None:
+        """Set the yaw around which the person turns: 0 faces the first camera."""
+        self.facing_rad = facing_rad
+        self.limits = state_limits(float(self.place[0]), facing_rad)
 
     def cover(self, covered: Sequence[Silhouette | None]) -> None:
         """Set the pixels (H, W) of other people in the frames of all cameras, which do not count.
@@ -89,9 +98,11 @@ class MultiViewCost:
     def expect(self, x_m: float, z_m: float, home_m: float, yaw_rad: float) -> None:
         """Set the anchor of the priors: place of the last frame, home of x, and expected yaw.
 
-        An outline of a person who is twice as far away determines the distance half as well.
+        The yaw is that of somebody who faces the camera, 0 if nothing else is known. An outline of
+        a person who is twice as far away determines the distance half as well.
         """
-        self.anchor[:] = x_m, z_m, home_m, yaw_rad
+        around_rad = self.facing_rad
+        self.anchor[:] = x_m, z_m, home_m, around_rad + (-yaw_rad if around_rad else yaw_rad)
         self.x_factor = max((self.place[0] - x_m) / _NORMAL_M, 1.0)
         self.costs[0].loosen_x(self.x_factor)
 

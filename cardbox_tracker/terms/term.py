@@ -185,9 +185,11 @@ class TermObservation:
     Attributes:
         locates: whether the residuals tell where joints are. Then states that fit them are
             proposed, and the search needs fewer others.
+        shows_back: whether it shows for some time that the person faces the other way.
     """
 
     locates = False
+    shows_back = False
 
     def rate(self, posed: Posed) -> FloatArray:
         """Return the costs (N,) of the parts that count, px."""
