@@ -424,7 +424,7 @@ def test_evidence_of_exact_points_by_hand(detected: Detect) -> None:
     found = seen.evidence(Posed(COST.body, STATE[None]))
     assert set(found) == set(EVIDENCE)
     np.testing.assert_allclose(found["point distance"], 0.0, atol=1e-6)
-    for name in ("point missing", "depth difference", "back"):
+    for name in ("point missing", "depth difference"):
         assert found[name].tolist() == [0.0] * 6
     joints_m = COST.keypoints(STATE)
     middle_m = np.linalg.norm((joints_m[0] + joints_m[3]) / 2)
