@@ -97,6 +97,7 @@ ARGUMENTS = {
         choices=("background", "detector"),
     ),
     "keypoints": Argument("", "2D points of another detector: a topic, or a table FILE.csv"),
+    "hands": Argument("false", "with detector: look at hands, see the tracker's parameter", bool),
     "rula": Argument("false", "start the node rula: RULA scores of the posture", bool),
     "robot_file": Argument("", "start the node retarget with this robot arm, a URDF", Path),
     "joint_map_file": Argument(
@@ -128,6 +129,7 @@ GIVEN = {
         "extrinsics_file",
         "depth",
         "keypoints",
+        "hands",
     ),
     "detector": ("image_transport",),
 }

@@ -40,6 +40,7 @@ from xml.etree import ElementTree as Xml
 
 import numpy as np
 
+from cardbox_tracker.person.hands import HANDS
 from cardbox_tracker.person.legs import LEGS
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.parts import Part, body_parts
@@ -63,7 +64,11 @@ _ZERO = (0.0, 0.0, 0.0)
 
 
 def urdf_from_body(
-    body: BodyModel, optical_frame: str | None = None, torso_place: bool = True, legs: bool = False
+    body: BodyModel,
+    optical_frame: str | None = None,
+    torso_place: bool = True,
+    legs: bool = False,
+    hands: bool = False,
 ) -> str:
     """Return the URDF of ``body`` as XML text.
 
@@ -74,6 +79,7 @@ def urdf_from_body(
         torso_place: add the joints beside the 12 of the posture; the joint states then must contain
             them, or the transforms beyond are missing.
         legs: also add those of the legs, whose lengths are the mean ones of people of that size.
+        hands: also add those of the hands.
     """
     robot = _Robot("cardbox_person", ROOT_LINK)
     if optical_frame:
@@ -82,7 +88,8 @@ def urdf_from_body(
         robot.fix(f"{ROOT_LINK}_to_optical", ROOT_LINK, optical_frame, _ZERO, tilted)
     hips_m = body.placement.distance_m, 0.0, body.placement.hip_height_m
     robot.fix("camera_to_hips", ROOT_LINK, "hips", hips_m, (0.0, 0.0, math.pi))
-    robot.add(body, (*SKELETON, *(LEGS if legs else ())), torso_place, "hips")
+    more = *(HANDS if hands else ()), *(LEGS if legs else ())
+    robot.add(body, (*SKELETON, *more), torso_place, "hips")
     parts = body_parts(body.sizes)
     robot.show("torso", "torso", parts.torso)
     lid = parts.torso.depth_m, parts.torso.top_width_m, PATCH_THICKNESS_M

@@ -15,6 +15,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from cardbox_tracker.person.hands import HAND_NAMES, HAND_OPEN_NAMES
 from cardbox_tracker.person.legs import LEG_NAMES
 from cardbox_tracker.person.sizes import FloatArray
 from cardbox_tracker.person.skeleton import (
@@ -173,22 +174,27 @@ def person_space(number: int) -> str:
 def joint_values(estimate: Estimate, torso_place: bool = True) -> JointValues | None:
     """Return the joints of an estimate; None without a posture.
 
-    Without ``torso_place``, these are the 12 joints of the posture. Where legs are measured, theirs
-    are the last ones.
+    Without ``torso_place``, these are the 12 joints of the posture. Where hands and legs are
+    measured, theirs are the last ones; those of a hand that is not known are 0.
     """
     if estimate.posture is None or not torso_place:
         return _joints(JOINT_NAMES, estimate.posture)
-    others = place_of(estimate), neck_of(estimate), clavicles_of(estimate)
-    if estimate.legs is None:
-        return _joints(JOINT_STATE_NAMES, estimate.posture, *others)
-    names = *JOINT_STATE_NAMES, *LEG_NAMES
-    return _joints(names, estimate.posture, *others, estimate.legs.angles)
+    names, known = (
+        JOINT_STATE_NAMES,
+        [place_of(estimate), neck_of(estimate), clavicles_of(estimate)],
+    )
+    if estimate.hands is not None:
+        names = *names, *HAND_NAMES
+        known += [np.zeros(3) if hand is None else hand.joints for hand in estimate.hands]
+    if estimate.legs is not None:
+        names, known = (*names, *LEG_NAMES), [*known, estimate.legs.angles]
+    return _joints(names, estimate.posture, *known)
 
 
 def joint_deviations(estimate: Estimate, torso_place: bool = True) -> JointValues | None:
     """Return the standard deviation of each joint; None if unknown.
 
-    The joints of the neck are among them only if the face was seen.
+    The joints of the neck, or of a hand, are among them only if it was seen.
     """
     if estimate.posture_stddev is None or not torso_place:
         return _joints(JOINT_NAMES, estimate.posture_stddev)
@@ -196,9 +202,23 @@ def joint_deviations(estimate: Estimate, torso_place: bool = True) -> JointValue
     if estimate.neck_stddev is not None:
         names, known = [*names, *NECK_NAMES], [*known, estimate.neck_stddev]
     names, known = [*names, *CLAVICLE_NAMES], [*known, _or_zeros(estimate.clavicles_stddev_m)]
+    for number, hand in enumerate(estimate.hands or ()):
+        if hand is not None:
+            names = [*names, *HAND_NAMES[3 * number : 3 * number + 3]]
+            known = [*known, hand.joints_stddev]
     if estimate.legs is not None:
         names, known = [*names, *LEG_NAMES], [*known, estimate.legs.angles_stddev]
     return _joints(tuple(names), estimate.posture_stddev, *known)
+
+
+def open_hands(estimate: Estimate) -> JointValues | None:
+    """Return how open each hand is, 0 to 1, as far as it is known; None if nothing is."""
+    found = {
+        name: hand.open
+        for name, hand in zip(HAND_OPEN_NAMES, estimate.hands or (), strict=False)
+        if hand is not None and hand.open is not None
+    }
+    return JointValues(tuple(found), np.array([*found.values()])) if found else None
 
 
 def place_of(estimate: Estimate) -> FloatArray:
@@ -255,6 +275,12 @@ def neck_from(joints: JointValues) -> FloatArray | None:
     return np.array([by_name[name] for name in NECK_NAMES])
 
 
+def open_hands_from(joints: JointValues) -> FloatArray:
+    """Return how open both hands are, (2,), from their topic; nan for one that is missing."""
+    by_name = positions_of(joints)
+    return np.array([by_name.get(name, np.nan) for name in HAND_OPEN_NAMES])
+
+
 def positions_of(joints: JointValues) -> dict[str, float]:
     """Return the joint values by name."""
     return dict(zip(joints.names, np.asarray(joints.values).tolist(), strict=True))
@@ -271,11 +297,13 @@ def _markers(estimate: Estimate, tracker: Tracker) -> Markers | None:
     return Markers(marker_shapes(body, tracker.camera, estimate.posture, estimate.neck))
 
 
-def outputs(torso_place: bool = True) -> tuple[Output, ...]:
+def outputs(torso_place: bool = True, hands: bool = True) -> tuple[Output, ...]:
     """Return the topics of the tracker in the order of publication.
 
-    With ``torso_place``, the joints include those of place, neck and clavicles.
+    With ``torso_place``, the joints include those of place, neck and clavicles, and of what else is
+    measured; with ``hands``, there is the topic of hands, which has no message without any.
     """
+    opened = Output("hands", JointValues, lambda found, _: open_hands(found))
     return (
         # The states come first, so that subscribers have them when the posture arrives.
         Output(
@@ -289,6 +317,8 @@ def outputs(torso_place: bool = True) -> tuple[Output, ...]:
             lambda found, _: joint_values(found, torso_place),
             moves=True,
         ),
+        # Who waits for the deviations has the hands by then.
+        *([opened] if hands else ()),
         Output(
             "joint_states_stddev",
             JointValues,
@@ -368,4 +398,7 @@ class _Motion:
         if not (has_neck and before[2]):
             # A face that appears does not turn.
             found[_NECK] = 0.0
+        if estimate.hands is not None:
+            # A hand is looked at every other image at most, and may not be known in one.
+            found[[name in HAND_NAMES for name in joints.names]] = 0.0
         return found

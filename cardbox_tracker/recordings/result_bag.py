@@ -171,17 +171,19 @@ class _ResultBag:
         self._space, self._is_first = space, is_first
         self._transforms = BagTransforms(bag)
         self._described: BodyModel | None = None
-        self._has_legs = False
+        self._more: dict[str, bool] = {}
         self._outputs = OutputStream()
 
     def __call__(self, frame: RecordedFrame, estimate: Estimate, tracker: Tracker) -> None:
         bag, transforms = self._bag, self._transforms
         stamp, optical = frame.stamp_ns, self._frame_id
         body, camera = tracker.body, tracker.camera
-        if body is not self._described or (estimate.legs is not None and not self._has_legs):
-            self._has_legs |= estimate.legs is not None
+        more = {"legs": estimate.legs is not None, "hands": estimate.hands is not None}
+        more = {name: has or self._more.get(name, False) for name, has in more.items()}
+        if body is not self._described or more != self._more:
+            self._more = more
             bag.write_string(f"{self._space}/body_model", stamp, dumps_body_model(body))
-            urdf = urdf_from_body(body, optical or None, legs=self._has_legs)
+            urdf = urdf_from_body(body, optical or None, **more)
             bag.write_string(f"{self._space}/robot_description", stamp, urdf)
             # The links of several people have the same names.
             if not self._space:

@@ -15,6 +15,7 @@ from cardbox_tracker.recordings.bag_reader import BagReader, stamp_ns_of
 from cardbox_tracker.recordings.outputs import (
     JointValues,
     neck_from,
+    open_hands_from,
     person_space,
     place_from,
     posture_from,
@@ -23,7 +24,7 @@ from cardbox_tracker.tracking.estimate import NO_PERSON, TRACKING, UNCERTAIN
 
 MODEL = "/body_model"
 _STATE, _JOINTS, _STDDEV = "/tracking_state", "/joint_states", "/joint_states_stddev"
-_KEYPOINTS = "/keypoints"
+_KEYPOINTS, _HANDS = "/keypoints", "/hands"
 
 
 @dataclass(frozen=True)
@@ -40,6 +41,7 @@ class Result:
             if they are not known.
         place_m: ``torso_x`` and ``torso_z``, (2,); None if the bag has none.
         keypoints_m: (n, 3), metres in the optical frame of the first camera; None without any.
+        hands_open: how open both hands are, (2,), nan for one that is not known; None without any.
     """
 
     stamp_ns: int
@@ -49,6 +51,7 @@ class Result:
     stddev: FloatArray | None = None
     place_m: FloatArray | None = None
     keypoints_m: FloatArray | None = None
+    hands_open: FloatArray | None = None
 
 
 def has_results(bag: BagReader) -> bool:
@@ -101,7 +104,7 @@ def read_results(bag: BagReader, person: int | None = None) -> list[Result]:
         BagError: the bag has no results of the tracker, or is damaged.
     """
     space = namespace_of(bag, person)
-    topics = [space + name for name in (MODEL, _STATE, _JOINTS, _STDDEV, _KEYPOINTS)]
+    topics = [space + name for name in (MODEL, _STATE, _JOINTS, _STDDEV, _KEYPOINTS, _HANDS)]
     found = _Results()
     for message in bag.messages([topic for topic in topics if topic in bag.topics]):
         content = bag.deserialize(message)
@@ -141,6 +144,8 @@ class _Results:
         elif (found := self.by_stamp.get(stamp_ns_of(message))) is not None:
             if name == _KEYPOINTS:
                 found = replace(found, keypoints_m=points_of(message))
+            elif name == _HANDS:
+                found = replace(found, hands_open=open_hands_from(joints_of(message)))
             else:
                 found = replace(found, stddev=_with_neck(joints_of(message)))
             self.by_stamp[found.stamp_ns] = found

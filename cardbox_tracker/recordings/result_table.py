@@ -15,6 +15,7 @@ import numpy as np
 
 from cardbox_tracker.common.errors import CardboxError
 from cardbox_tracker.common.files import atomic_path
+from cardbox_tracker.person.hands import HAND_NAMES
 from cardbox_tracker.person.isb_angles import ANATOMICAL_NAMES, anatomical_angles
 from cardbox_tracker.person.legs import LEG_KEYPOINT_NAMES, LEG_NAMES
 from cardbox_tracker.person.skeleton import (
@@ -168,6 +169,8 @@ def row_of(
         place = estimate.place
         known |= {"place_state": str(place.state), "place_chance": place.chance}
         known["place_rests_on"] = place.rests_on
+    # The joints of a hand that is not known are not 0 here.
+    known |= dict.fromkeys(HAND_NAMES)
     for side, hand in zip(_SIDES, estimate.hands or (None, None), strict=True):
         if hand is not None:
             known |= _hand_cells(side, hand)

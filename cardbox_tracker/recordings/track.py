@@ -158,14 +158,13 @@ def track_recording(
                 tally, _ = tallies.setdefault(estimate.person, (_Tally(), tracker))
                 tally.add(estimate)
                 points = points_of(estimate, taken, first.camera) if hands or legs else None
-                time_s = taken.stamp_ns / 1e9
+                person, time_s = (tracker.body, tracker.camera), taken.stamp_ns / 1e9
                 if hands is not None:
                     hand_reader = hand_readers.setdefault(estimate.person, HandReader(hands))
                     picture = partial(first.full_picture, taken.first)
-                    estimate = hand_reader.see(picture, points, estimate, first.camera, time_s)
+                    estimate = hand_reader.see(picture, points, estimate, *person, time_s)
                 if legs:
                     leg_reader = leg_readers.setdefault(estimate.person, LegReader())
-                    person = tracker.body, tracker.camera
                     estimate = leg_reader.see(points, estimate, *person, time_s)
                 if add_row is not None:
                     add_row(taken.first, estimate)

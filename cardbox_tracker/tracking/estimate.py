@@ -11,6 +11,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import NamedTuple
 
+import numpy as np
+
+from cardbox_tracker.person.hands import limited
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.sizes import FloatArray
 from cardbox_tracker.person.skeleton import KeypointState
@@ -59,12 +62,24 @@ class Hand(NamedTuple):
         wrist: flexion and deviation of the wrist and rotation of the forearm, (3,), rad; the
             rotation of a straight arm is nan.
         wrist_stddev: their standard deviations, (3,), rad.
+        turn: turn of the hand about the forearm's frame, rad (:mod:`.person.hands`).
     """
 
     open: float | None
     palm: FloatArray
     wrist: FloatArray
     wrist_stddev: FloatArray
+    turn: float = 0.0
+
+    @property
+    def joints(self) -> FloatArray:
+        """Turn, flexion and deviation, (3,), rad, as joints within their limits."""
+        return limited(np.array([self.turn, *self.wrist[:2]]))
+
+    @property
+    def joints_stddev(self) -> FloatArray:
+        """Standard deviations of ``joints``, (3,), rad."""
+        return self.wrist_stddev[[0, 0, 1]]
 
 
 class Legs(NamedTuple):

@@ -30,8 +30,11 @@ from cardbox_tracker.detectors.detector import color
 from cardbox_tracker.detectors.hand_network import FINGERS, WRIST, HandPoints
 from cardbox_tracker.detectors.image_points import POINT_INDEX, ImagePoints
 from cardbox_tracker.detectors.pose_network import ColorImage, Square
+from cardbox_tracker.person.hands import WRIST_SHARE, turn_of
+from cardbox_tracker.person.kinematics import pose
+from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.sizes import FloatArray
-from cardbox_tracker.person.skeleton import KeypointState
+from cardbox_tracker.person.skeleton import FRAME_NAMES, KeypointState
 from cardbox_tracker.tracking.estimate import HAND_KEYPOINTS, Estimate, Hand
 
 # A finger is open if its end is bent by less than the first angle from the direction of its base,
@@ -61,8 +64,6 @@ _SQUARE, _PALM_M = 2.4, 0.09
 _LEAST_SCORE = 0.3
 # Time for which a hand that is not found keeps its result, s.
 _KEPT_S = 0.5
-# Where between elbow and knuckles the wrist is.
-_WRIST_SHARE = 0.75
 # Deviations of the palm's direction, and of the forearm beside that of its joints, rad.
 _PALM_RAD, _FOREARM_RAD = np.radians([18.0, 10.0])
 # Logarithm of the odds of fingers that bend to the palm, for a length of the palm, and usual angles
@@ -93,6 +94,7 @@ class HandReader:
         picture: Callable[[], ColorImage],
         points: ImagePoints | None,
         estimate: Estimate,
+        body: BodyModel,
         camera: Camera,
         time_s: float,
     ) -> Estimate:
@@ -102,7 +104,8 @@ class HandReader:
             picture: returns the image (H, W, 3), bgr, or (H, W) at any resolution.
             points: of the person in the image of ``camera``; None if nobody is found.
             estimate: of the same image.
-            camera: working camera.
+            body: the person.
+            camera: working camera, with the pitch of the body model.
             time_s: time of the image.
         """
         tracked = [side for side in _SIDES if is_tracked(estimate, side)]
@@ -118,7 +121,8 @@ class HandReader:
                 self._looked_s[side] = time_s
                 found = self._look(image, shown[side])
                 if found is not None:
-                    self._seen[side] = time_s, measured(side, found, placed, estimate, view)
+                    hand = measured(side, found, placed, estimate, view)
+                    self._seen[side] = time_s, _turned(hand, side, estimate, body, camera)
         hands = [self._kept(side, estimate, time_s) for side in _SIDES]
         return replace(estimate, hands=(hands[0], hands[1]))
 
@@ -126,6 +130,14 @@ class HandReader:
         seen_s, hand = self._seen.get(side, (-np.inf, None))
         is_new = 0.0 <= time_s - seen_s <= _KEPT_S
         return hand if is_new and is_tracked(estimate, side) else None
+
+
+def _turned(hand: Hand, side: str, estimate: Estimate, body: BodyModel, camera: Camera) -> Hand:
+    """Return the hand with its turn about the forearm's frame."""
+    assert estimate.posture is not None
+    posed = pose(body, estimate.posture, camera.pitch_rad)
+    forearm = posed.rotations[FRAME_NAMES.index(f"{side}_forearm")]
+    return hand._replace(turn=turn_of(hand.palm, forearm, 1.0 if side == "left" else -1.0))
 
 
 def is_tracked(estimate: Estimate, side: str) -> bool:
@@ -254,7 +266,7 @@ def _forearm(side: str, arm: FloatArray, points: ImagePoints, camera: Camera) ->
     The tracked arm ends at the knuckles, so it bends with the wrist; only its depth is used.
     """
     elbow, wrist = points.px[[POINT_INDEX[f"{side}_{name}"] for name in ("elbow", "wrist")]]
-    depths_m = arm[1, 2] + np.array([0.0, _WRIST_SHARE]) * (arm[2, 2] - arm[1, 2])
+    depths_m = arm[1, 2] + np.array([0.0, WRIST_SHARE]) * (arm[2, 2] - arm[1, 2])
     rays = [
         _ray(px, camera) * depth_m for px, depth_m in zip((elbow, wrist), depths_m, strict=True)
     ]

@@ -12,7 +12,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from cardbox_tracker.camera.camera import Camera
+from cardbox_tracker.person.hands import HAND_NAMES
 from cardbox_tracker.person.kinematics import pose
+from cardbox_tracker.person.legs import LEG_NAMES
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.posture import reference_posture
 from cardbox_tracker.person.skeleton import JOINT_NAMES, KeypointState
@@ -26,6 +28,8 @@ from cardbox_tracker.recordings.outputs import (
     joint_deviations,
     joint_values,
     neck_from,
+    open_hands,
+    open_hands_from,
     outputs,
     place_from,
     posture_from,
@@ -36,6 +40,7 @@ from cardbox_tracker.tracking.estimate import (
     TRACKING,
     UNCERTAIN,
     Estimate,
+    Hand,
     Legs,
     Place,
 )
@@ -85,9 +90,8 @@ def test_a_posture_is_all_topics_in_their_order() -> None:
         output.topic: value for output, value in OutputStream().values(STAMP_NS, FOUND, TRACKER)
     }
     assert list(found) == TOPICS
-    assert {output.topic: output.kind for output in OUTPUTS} == {
-        topic: type(value) for topic, value in found.items()
-    }
+    kinds = {output.topic: output.kind for output in OUTPUTS if output.topic != "hands"}
+    assert kinds == {topic: type(value) for topic, value in found.items()}
     state, keypoints, place, joints, deviations, points, markers = cast(Any, list(found.values()))
     assert state == Text(TRACKING)
     assert keypoints.names[:4] == ("left_shoulder", "left_elbow", "left_hand", "right_shoulder")
@@ -273,3 +277,18 @@ def test_joints_of_the_legs_are_the_last_ones_and_only_with_legs() -> None:
     assert stddevs.values[-8:] == pytest.approx(np.arange(8) / 100)
     only = joint_values(found, torso_place=False)
     assert only is not None and only.names == JOINT_NAMES
+
+
+def test_joints_of_the_hands_are_0_without_deviation_while_one_is_not_known() -> None:
+    hand = Hand(0.9, np.array([0.0, 0.0, -1.0]), np.array([0.2, 0.1, np.nan]), np.full(3, 0.3), 0.4)
+    found = replace(SEEN, hands=(None, hand), legs=LEGS)
+    joints, stddevs = joint_values(found), joint_deviations(found)
+    assert joints is not None and stddevs is not None
+    assert joints.names == (*ALL_NAMES, *HAND_NAMES, *LEG_NAMES)
+    assert joints.values[len(ALL_NAMES) :][:6] == pytest.approx([0.0, 0.0, 0.0, 0.4, 0.2, 0.1])
+    assert [name in stddevs.names for name in HAND_NAMES] == [False] * 3 + [True] * 3
+    opened = open_hands(found)
+    assert opened is not None and opened.names == ("right_hand_open",)
+    np.testing.assert_array_equal(open_hands_from(opened), [np.nan, 0.9])
+    unknown = hand._replace(open=None)
+    assert open_hands(replace(SEEN, hands=(unknown, None))) is open_hands(SEEN) is None

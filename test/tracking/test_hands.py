@@ -11,12 +11,14 @@ from cardbox_tracker.camera.camera import Camera
 from cardbox_tracker.detectors.hand_network import HandPoints
 from cardbox_tracker.detectors.image_points import ImagePoints
 from cardbox_tracker.detectors.pose_network import Square
+from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.sizes import FloatArray
 from cardbox_tracker.person.skeleton import KeypointState
 from cardbox_tracker.tracking.estimate import Estimate
 from cardbox_tracker.tracking.hands import HandReader, measured, opened
 
 CAMERA = Camera(320, 240, 300.0, 300.0, 159.5, 119.5)
+BODY = BodyModel.of()
 PICTURE = np.zeros((480, 640, 3), np.uint8)
 SIDES = "left", "right"
 RIGHT, DOWN, AHEAD = np.eye(3)
@@ -176,7 +178,7 @@ def test_one_hand_an_image_is_looked_at_and_kept_until_its_turn() -> None:
     looks, (estimate, points) = Looks(), both()
     reader = HandReader(looks)
     seen = [
-        reader.see(lambda: PICTURE, points, estimate, CAMERA, number / 10).hands
+        reader.see(lambda: PICTURE, points, estimate, BODY, CAMERA, number / 10).hands
         for number in range(4)
     ]
     assert len(looks.squares) == 4
@@ -196,10 +198,10 @@ def test_only_tracked_hands_are_looked_at() -> None:
     states[5] = KeypointState.HIDDEN
     reader, unsure = HandReader(looks), replace(estimate, keypoint_states=tuple(states))
     for number in range(3):
-        found = reader.see(lambda: PICTURE, points, unsure, CAMERA, number / 10)
+        found = reader.see(lambda: PICTURE, points, unsure, BODY, CAMERA, number / 10)
         assert found.hands is not None and found.hands[0] is not None and found.hands[1] is None
     assert len({square.u for square in looks.squares}) == 1
-    assert reader.see(lambda: PICTURE, None, estimate, CAMERA, 2.0).hands == (None, None)
+    assert reader.see(lambda: PICTURE, None, estimate, BODY, CAMERA, 2.0).hands == (None, None)
 
 
 def test_a_hand_that_is_not_found_keeps_its_state_for_half_a_second() -> None:
@@ -208,15 +210,29 @@ def test_a_hand_that_is_not_found_keeps_its_state_for_half_a_second() -> None:
     known = []
     for number in range(9):
         looks.sees = number < 2
-        found = reader.see(lambda: PICTURE, points, estimate, CAMERA, number / 10)
+        found = reader.see(lambda: PICTURE, points, estimate, BODY, CAMERA, number / 10)
         known.append([one is not None for one in found.hands or ()])
     assert known[5:8] == [[True, True], [False, True], [False, False]]
     # Time that goes back, as in a loop, is no reason to keep it.
-    assert reader.see(lambda: PICTURE, points, estimate, CAMERA, -1.0).hands == (None, None)
+    assert reader.see(lambda: PICTURE, points, estimate, BODY, CAMERA, -1.0).hands == (None, None)
 
 
 def test_points_that_are_not_known_place_no_square() -> None:
     looks, (estimate, _) = Looks(), both()
     empty = ImagePoints.of({})
-    found = HandReader(looks).see(lambda: PICTURE, empty, estimate, CAMERA, 0.0)
+    found = HandReader(looks).see(lambda: PICTURE, empty, estimate, BODY, CAMERA, 0.0)
     assert found.hands == (None, None) and not looks.squares
+
+
+@pytest.mark.parametrize("side", SIDES)
+def test_the_turn_is_that_of_the_hand_against_the_forearm(side: str) -> None:
+    """The arm of the posture hangs; the network sees a palm that faces the camera, fingers down."""
+    estimate, points = arm(side, DOWN)
+    reader = HandReader(lambda *_: hand(fingers=DOWN, side=side))
+    found = reader.see(lambda: PICTURE[::2, ::2], points, estimate, BODY, CAMERA, 0.0).hands
+    assert found is not None
+    seen = found[SIDES.index(side)]
+    assert seen is not None
+    # The palm of a person who faces the camera faces forwards, so the thumb has turned outwards.
+    np.testing.assert_allclose(seen.joints, [-np.pi / 2, 0.0, 0.0], atol=1e-6)
+    np.testing.assert_array_equal(seen.joints_stddev, seen.wrist_stddev[[0, 0, 1]])

@@ -8,7 +8,8 @@
 Each row sets ``to = scale * from + offset``; the default scale is 1, the default offset 0. A row
 without ``from`` keeps a joint at its offset, because a controller may want all joints of an arm.
 
-Besides the joints of the posture and of the neck, each arm has two angles as most robot arms have
+``left_hand_open`` and ``right_hand_open``, 0 to 1, move grippers where hands are measured. Besides
+them and the joints of the posture and of the neck, each arm has two angles as most robot arms have
 them, ``SIDE_elbow_bend`` and ``SIDE_upper_arm_turn``: the elbow bends by the first, 0 if the arm is
 stretched, and the bent forearm points forwards, or outwards at a turn of a quarter.
 """
@@ -23,6 +24,7 @@ import numpy as np
 
 from cardbox_tracker.common.errors import CardboxError, cut, quoted
 from cardbox_tracker.common.small_yaml import SmallYamlError, parse_small_yaml, read_small_text
+from cardbox_tracker.person.hands import HAND_OPEN_NAMES
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.posture import (
     ELBOW_ABDUCTION,
@@ -34,40 +36,46 @@ from cardbox_tracker.person.posture import (
 from cardbox_tracker.person.sizes import FloatArray
 from cardbox_tracker.person.skeleton import JOINT_NAMES, NECK_NAMES
 
-WITH_NECK: tuple[str, ...] = (*JOINT_NAMES, *NECK_NAMES)
-"""Order of a posture with the head, (14,)."""
+WITH_HEAD_AND_HANDS: tuple[str, ...] = (*JOINT_NAMES, *NECK_NAMES, *HAND_OPEN_NAMES)
+"""Order of a posture with head and hands, (16,)."""
+_WITH_NECK = len(JOINT_NAMES) + len(NECK_NAMES)
 _ARMS = {"left": LEFT_ARM, "right": RIGHT_ARM}
 _ELBOW = {
     f"{side}_{name}": tuple(f"{side}_elbow_{angle}" for angle in ("abduction", "flexion"))
     for side in _ARMS
     for name in ("upper_arm_turn", "elbow_bend")
 }
-ANGLES: tuple[str, ...] = (*WITH_NECK, *_ELBOW)
+ANGLES: tuple[str, ...] = (*WITH_HEAD_AND_HANDS, *_ELBOW)
 """Names that a joint map may have."""
 # The direction of a nearly stretched arm says nothing about its turn.
 _LEAST_BEND = math.radians(10.0)
 _KEYS = {"from", "to", "scale", "offset_deg"}
 
 
-def with_neck(posture: FloatArray, stddev: FloatArray, most_stddev_rad: float) -> FloatArray:
-    """Return a posture with the head, (14,), nan where the head is not known.
+def with_head_and_hands(
+    posture: FloatArray, stddev: FloatArray, most_stddev_rad: float, hands: FloatArray | None = None
+) -> FloatArray:
+    """Return a posture with head and hands, (16,), nan where they are not known.
 
     Args:
         posture: d1..d12, with ``neck_yaw`` and ``neck_pitch`` if they are known, (12,) or (14,).
         stddev: standard deviations in the same order, (12,) or (14,).
         most_stddev_rad: largest deviation of a known angle, rad.
+        hands: ``HAND_OPEN_NAMES``, (2,), nan for one that is not known; None without any.
     """
-    whole = np.full(len(WITH_NECK), np.nan)
+    whole = np.full(len(WITH_HEAD_AND_HANDS), np.nan)
     whole[:N_JOINTS] = posture[:N_JOINTS]
-    if len(posture) == len(stddev) == len(WITH_NECK):
+    if len(posture) == len(stddev) == _WITH_NECK:
         sure = stddev[N_JOINTS:] <= most_stddev_rad
-        whole[N_JOINTS:][sure] = posture[N_JOINTS:][sure]
+        whole[N_JOINTS:_WITH_NECK][sure] = posture[N_JOINTS:][sure]
+    if hands is not None:
+        whole[_WITH_NECK:] = hands
     return whole
 
 
 def angles_of(posture: FloatArray) -> dict[str, float]:
-    """Return the value of each of ``ANGLES`` in a posture (14,), rad or m; nan if unknown."""
-    found = dict(zip(WITH_NECK, posture.tolist(), strict=True))
+    """Return the value of each of ``ANGLES`` in a posture (16,), rad or m; nan if unknown."""
+    found = dict(zip(WITH_HEAD_AND_HANDS, posture.tolist(), strict=True))
     for side, arm in _ARMS.items():
         abduction, flexion = posture[arm][[ELBOW_ABDUCTION, ELBOW_FLEXION]].tolist()
         forwards, outwards = math.sin(flexion), math.cos(flexion) * math.sin(abduction)

@@ -56,7 +56,8 @@ def retarget_bag(
         if motion.commands:
             motion.way.extend(_until(found.stamp_ns, motion.commands, retargeter, rate_hz))
         command = retargeter.update(
-            found.stamp_ns, found.state, found.body, found.posture, found.stddev
+            *(found.stamp_ns, found.state, found.body, found.posture, found.stddev),
+            hands=found.hands_open,
         )
         motion.commands.append(StampedCommand(found.stamp_ns, command))
     if motion.commands:

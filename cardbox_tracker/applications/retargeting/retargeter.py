@@ -9,7 +9,7 @@ import numpy as np
 
 from cardbox_tracker.applications.retargeting.config import RetargetConfig
 from cardbox_tracker.applications.retargeting.hand import HandFollower
-from cardbox_tracker.applications.retargeting.joint_map import load_joint_map, with_neck
+from cardbox_tracker.applications.retargeting.joint_map import load_joint_map, with_head_and_hands
 from cardbox_tracker.applications.retargeting.robot import Robot, load_robot
 from cardbox_tracker.common.errors import CardboxError
 from cardbox_tracker.person.model import BodyModel
@@ -33,9 +33,9 @@ class Method(Protocol):
         """Names of the robot's joints that are moved."""
 
     def target(self, body: BodyModel, posture: FloatArray, now: FloatArray) -> FloatArray:
-        """Return target positions (n,) of the robot's joints for a posture with the head, (14,).
+        """Return target positions (n,) of the joints for a posture with head and hands, (16,).
 
-        ``now`` (n,) are the current positions. The angles of the head are nan while unknown. The
+        ``now`` (n,) are the current positions. What is not known of head and hands is nan. The
         target may be beyond the joint limits; it is nan if there is no solution.
         """
 
@@ -154,6 +154,7 @@ class Retargeter:
         posture: FloatArray | None = None,
         stddev: FloatArray | None = None,
         now_ns: int | None = None,
+        hands: FloatArray | None = None,
     ) -> Command:
         """Return the command for an image.
 
@@ -165,6 +166,7 @@ class Retargeter:
             stddev: their standard deviations, (12,) or (14,).
             now_ns: time of the robot's clock; None if that is the stamp. The robot moves for no
                 longer than since the command before, whatever the stamps say.
+            hands: how open both hands are, (2,), 0 to 1, nan for one that is not known.
         """
         now_ns = stamp_ns if now_ns is None else now_ns
         before_ns, self._before_ns = self._before_ns, stamp_ns
@@ -172,7 +174,7 @@ class Retargeter:
         reason = self._reason(state, posture, stddev)
         if reason or body is None or posture is None or stddev is None:
             return self._stop(reason or "no body model", now_ns)
-        whole = with_neck(posture, stddev, self._config.max_stddev_rad)
+        whole = with_head_and_hands(posture, stddev, self._config.max_stddev_rad, hands)
         target = self._method.target(body, whole, self.at(now_ns).positions)
         if not np.isfinite(target).all():
             return self._stop("no solution", now_ns)

@@ -204,7 +204,12 @@ class InitializerNode(CardboxNode):
     def _describe(self, body: BodyModel) -> None:
         settings = self.parameters.value
         frame_id = self._frame_id if settings.optical_frame_in_urdf else None
-        urdf = urdf_from_body(body, frame_id or None, torso_place=settings.torso_place_in_urdf)
+        urdf = urdf_from_body(
+            body,
+            frame_id or None,
+            torso_place=settings.torso_place_in_urdf,
+            hands=settings.hands_in_urdf,
+        )
         self._description.publish(String(data=urdf))
 
     def _values(self) -> dict[str, str]:

@@ -86,6 +86,11 @@ class InitializerParameters(NodeParameters):
         "same as the tracker's torso_place",
         effect=_NEXT_MEASUREMENT,
     )
+    hands_in_urdf: bool = parameter(
+        False,
+        "robot_description has the joints of hands, too; must be the same as the tracker's hands",
+        effect=_NEXT_MEASUREMENT,
+    )
 
     cameras: list[str] = cameras_parameter()
     extrinsics_file: str = extrinsics_parameter()

@@ -20,8 +20,9 @@ from cardbox_tracker.common.files import user_path
 from cardbox_tracker.common.settings import settings_of
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.model_file import loads_body_model
+from cardbox_tracker.recordings.outputs import open_hands_from
 from cardbox_tracker.ros.messages import conversions
-from cardbox_tracker.ros.messages.results import posture_and_neck_of
+from cardbox_tracker.ros.messages.results import joint_values_of, posture_and_neck_of
 from cardbox_tracker.ros.runtime import qos
 from cardbox_tracker.ros.runtime.command_line import plain_command_line
 from cardbox_tracker.ros.runtime.node import CardboxNode, run_node
@@ -79,7 +80,7 @@ class RetargetNode(CardboxNode):
         self._timeout_s = settings.timeout_s
         self._body: BodyModel | None = None
         self._state, self._status = "", ""
-        self._joints = JointState()
+        self._joints, self._open = JointState(), JointState()
         self._heard_ns, self._stamp_ns = _now_ns(), 0
         self._trajectory = self.advertise(JointTrajectory, "retarget/joint_trajectory", qos.RESULT)
         self._commands = self.advertise(Float64MultiArray, "retarget/commands", qos.RESULT)
@@ -91,6 +92,7 @@ class RetargetNode(CardboxNode):
         self.subscribe(String, "body_model", self._on_model, qos.LATCHED)
         self.subscribe(String, "tracking_state", self._on_state, qos.RESULT)
         self.subscribe(JointState, "joint_states", self._on_joints, qos.RESULT)
+        self.subscribe(JointState, "hands", self._on_hands, qos.RESULT)
         self.subscribe(JointState, "joint_states_stddev", self._on_stddev, qos.RESULT)
         self.create_timer(_CHECK_S, self._check)
         self.create_timer(1.0 / settings.rate_hz, self._stream)
@@ -109,6 +111,9 @@ class RetargetNode(CardboxNode):
     def _on_joints(self, message: JointState, _: int) -> None:
         self._joints = message
 
+    def _on_hands(self, message: JointState, _: int) -> None:
+        self._open = message
+
     def _on_stddev(self, message: JointState, sent_ns: int) -> None:
         """Command the robot; the deviations come after the joints, with the same stamp."""
         if self._joints.header.stamp != message.header.stamp:
@@ -119,8 +124,11 @@ class RetargetNode(CardboxNode):
         # Stamps may run faster than the robot's own time, which its speed is about.
         self._heard_ns, self._stamp_ns = _now_ns(), stamp_ns
         posture, stddev = posture_and_neck_of(self._joints), posture_and_neck_of(message)
+        hands = None
+        if self._open.header.stamp == message.header.stamp:
+            hands = open_hands_from(joint_values_of(self._open))
         command = self._retargeter.update(
-            stamp_ns, self._state, self._body, posture, stddev, self._heard_ns
+            stamp_ns, self._state, self._body, posture, stddev, self._heard_ns, hands
         )
         self._send(command)
         if self._body is None:

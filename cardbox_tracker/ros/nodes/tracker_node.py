@@ -17,6 +17,8 @@ from cardbox_tracker.common.errors import CameraError
 from cardbox_tracker.common.files import user_path
 from cardbox_tracker.common.progress import told
 from cardbox_tracker.common.settings import restarts
+from cardbox_tracker.detectors.hand_network import HandNetwork
+from cardbox_tracker.detectors.model_files import installed_hands
 from cardbox_tracker.measuring.standing_camera import FOUND_STDDEV
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.model_file import dumps_body_model, load_body_model, loads_body_model
@@ -24,7 +26,7 @@ from cardbox_tracker.person.skeleton import PLACE_NAMES
 from cardbox_tracker.person.urdf import urdf_from_body
 from cardbox_tracker.recordings.outputs import METRICS, place_of
 from cardbox_tracker.ros.messages import conversions
-from cardbox_tracker.ros.nodes.camera_inputs import CameraInputs, Received
+from cardbox_tracker.ros.nodes.camera_inputs import CameraInputs, ObservationSet, Received
 from cardbox_tracker.ros.nodes.rep155_outputs import TrackedBodies
 from cardbox_tracker.ros.nodes.tracker_outputs import TrackerOutputs
 from cardbox_tracker.ros.nodes.tracker_parameters import TrackerParameters
@@ -34,6 +36,7 @@ from cardbox_tracker.ros.runtime.node import CardboxNode, run_node
 from cardbox_tracker.ros.runtime.parameters import LiveParameters
 from cardbox_tracker.tracking.agreement_watch import AgreementWatch
 from cardbox_tracker.tracking.estimate import LOST, NO_PERSON, UNCERTAIN, Estimate
+from cardbox_tracker.tracking.hands import HandReader
 from cardbox_tracker.tracking.people import People
 from cardbox_tracker.tracking.precompile import compile_all
 from cardbox_tracker.tracking.tracker import Tracker
@@ -167,7 +170,9 @@ class FoundBody:
         self._model.publish(String(data=self.text))
         settings = self._settings
         frame = frame_id if settings.optical_frame_in_tf else ""
-        urdf = urdf_from_body(body, frame or None, torso_place=settings.torso_place)
+        urdf = urdf_from_body(
+            body, frame or None, torso_place=settings.torso_place, hands=settings.hands
+        )
         self._description.publish(String(data=urdf))
 
 
@@ -185,6 +190,8 @@ class TrackerNode(CardboxNode):
         # Calls that come while the code is compiled are answered afterwards.
         self.offer("~/reset", self._reset)
         settings = self.parameters.value
+        self._look = HandNetwork(installed_hands()) if settings.hands else None
+        self._hands: HandReader | None = None
         self._prepared: set[str] = set()
         self._prepare(settings)
         self._body: BodyModel | None = None
@@ -238,7 +245,8 @@ class TrackerNode(CardboxNode):
 
     def _use(self, body: BodyModel) -> None:
         self._body = body
-        self._inputs.wait_for_images(body.appearance is not None or bool(body.unknown))
+        needs_images = body.appearance is not None or bool(body.unknown) or bool(self._look)
+        self._inputs.wait_for_images(needs_images)
         if body.doubt:
             self.get_logger().warning(body.doubt)
         self._build("new body model")
@@ -282,6 +290,7 @@ class TrackerNode(CardboxNode):
                 Tracker(self._body, self._camera, settings.config(), rng, others=self._others)
             ]
         self._tracker = trackers[0]
+        self._hands = None if self._look is None else HandReader(self._look)
         for report, tracker in zip(self._reports, trackers, strict=True):
             report.start(tracker.body)
         self.diagnostics.say(reason, f"{reason}: tracking starts from the front reference posture")
@@ -331,7 +340,8 @@ class TrackerNode(CardboxNode):
             return
         seen = self._inputs.observed(received)
         if self._people is None:
-            found = [(self._tracker.track(seen.observations), self._tracker)]
+            estimate = self._tracker.track(seen.observations)
+            found = [(self._with_hands(seen, estimate, self._tracker), self._tracker)]
         else:
             found = self._people.track(seen.observations[0], seen.people)
         for outputs, report, (estimate, tracker) in zip(
@@ -346,6 +356,17 @@ class TrackerNode(CardboxNode):
         self._agreement.see(self._tracker.agreement)
         self.diagnostics.advice = self._warnings
         self.diagnostics.working(seen.sent_ns)
+
+    def _with_hands(self, seen: ObservationSet, estimate: Estimate, tracker: Tracker) -> Estimate:
+        """Return the estimate of an image with the hands, if they are looked at."""
+        first = seen.observations[0]
+        if self._hands is None or first.image is None:
+            return estimate
+        time_s = conversions.stamp_ns(seen.header.stamp) / 1e9
+        person = tracker.body, tracker.camera
+        found = self._hands.see(seen.picture, first.points, estimate, *person, time_s)
+        tracker.used["hands"] = tracker.used.get("hands", 0) + any(found.hands or ())
+        return found
 
     def _warnings(self) -> dict[str, str]:
         """Return warnings for the diagnostics."""

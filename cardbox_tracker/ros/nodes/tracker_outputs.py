@@ -84,7 +84,9 @@ class TfOutputs:
                 urdf = rep155_urdf(tracker.body, self._id, frame_id, place)
             else:
                 root = optical if settings.optical_frame_in_tf else ""
-                urdf = urdf_from_body(tracker.body, root or None, torso_place=place)
+                urdf = urdf_from_body(
+                    tracker.body, root or None, torso_place=place, hands=settings.hands
+                )
             self._links = LinkTransforms(urdf)
         links = self._links.at(positions_of(joints))
         transforms = [_stamped(header, link) for link in links]
@@ -124,7 +126,7 @@ class TrackerOutputs:
         Raises:
             CardboxError: TF is requested, but its messages are not installed.
         """
-        topics = outputs(settings.torso_place)
+        topics = outputs(settings.torso_place, settings.hands)
         space = "" if person is None else f"{person_space(person)[1:]}/"
         self._publishers = {
             output.topic: node.advertise(

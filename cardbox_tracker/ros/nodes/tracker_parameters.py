@@ -177,6 +177,13 @@ class TrackerParameters(NodeParameters):
         effect=AT_START,
     )
 
+    hands: bool = parameter(
+        False,
+        "also look at hands in silhouette/image, with the detector's network and the points on "
+        "keypoints: the topic hands tells open from closed ones, and joint_states has their "
+        "joints; must be the same as the initializer's hands_in_urdf",
+        effect=AT_START,
+    )
     people: int = parameter(
         0,
         "number of people to track with one camera, each with topics below person_1, person_2 ...; "
@@ -248,6 +255,12 @@ class TrackerParameters(NodeParameters):
             raise ValueError(
                 f"people is {self.people}; several people are tracked with one camera, without "
                 "depth, and with the preset default"
+            )
+        if self.hands and (self.people or not (self.keypoints and self.use_image)):
+            raise ValueError(
+                "hands needs images, and the wrists and knuckles of one person: leave use_image "
+                "on, give keypoints, such as detector/keypoints, and no people; for several, use "
+                "'cardbox track --hands --people'"
             )
         camera_names(self.cameras)
         if self.stature and len(self.cameras) > 1:

@@ -11,7 +11,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from cardbox_tracker.applications.retargeting.config import RetargetConfig
-from cardbox_tracker.applications.retargeting.joint_map import angles_of, load_joint_map, with_neck
+from cardbox_tracker.applications.retargeting.joint_map import (
+    angles_of,
+    load_joint_map,
+    with_head_and_hands,
+)
 from cardbox_tracker.applications.retargeting.retargeter import Retargeter
 from cardbox_tracker.applications.retargeting.robot import load_robot, parse_robot
 from cardbox_tracker.common.errors import CardboxError
@@ -32,7 +36,7 @@ BODY = body_from_proportions(1.75, 2.0)
 
 
 def with_right_arm(*angles_rad: float) -> np.ndarray:
-    posture = np.zeros(14)
+    posture = np.zeros(16)
     posture[RIGHT_ARM] = angles_rad
     return posture
 
@@ -107,7 +111,7 @@ def test_a_head_follows_only_where_it_is_known(
 
 
 def test_a_posture_without_a_neck_has_an_unknown_one() -> None:
-    whole = with_neck(np.ones(12), np.zeros(12), 0.5)
+    whole = with_head_and_hands(np.ones(12), np.zeros(12), 0.5)
     assert whole[:12].tolist() == [1.0] * 12
     assert np.isnan(whole[12:]).all()
 

@@ -12,6 +12,7 @@ import pytest
 
 rclpy = pytest.importorskip("rclpy", reason="rclpy is not installed")
 
+from sensor_msgs.msg import JointState  # noqa: E402
 from std_msgs.msg import String  # noqa: E402
 
 from cardbox_tracker.applications.retargeting.robot import load_robot  # noqa: E402
@@ -213,3 +214,25 @@ def test_a_node_without_a_robot_does_not_start(bus: Any, tmp_path: Path) -> None
         bus.start(RetargetNode)
     with pytest.raises(CardboxError, match="No such file"):
         bus.start(RetargetNode, robot_file=str(tmp_path / "arm.urdf"))
+
+
+def test_a_gripper_follows_the_hand_of_the_same_image(
+    bus: Any, clock: Clock, joints: Any, tmp_path: Path
+) -> None:
+    joint_map = tmp_path / "map.yaml"
+    joint_map.write_text("joints: [{from: right_hand_open, to: wrist_roll, scale: 0.2}]")
+    bus.start(RetargetNode, robot_file=str(ARM), joint_map_file=str(joint_map))
+    bus.send("/body_model", MODEL)
+    for tenth, opened in enumerate((1.0, 1.0, 1.0, None)):
+        clock.now_s += 0.1
+        bus.send("/tracking_state", String(data="tracking"))
+        bus.send("/joint_states", joints(tenth, {}))
+        if opened is not None:
+            header = joints(tenth, {}).header
+            bus.send("/hands", JointState(header=header, name=["right_hand_open"], position=[1.0]))
+        bus.send("/joint_states_stddev", joints(tenth, {}, other=0.1))
+        bus.tick()
+    goals = [one.points[0].positions[0] for one in bus.sent["/retarget/joint_trajectory"]]
+    # The robot moves by its speed, and stays where it is without a hand.
+    assert goals[0] == 0.0 and 0.0 < goals[1] < goals[2] <= 0.2
+    assert goals[3] == pytest.approx(goals[2])
