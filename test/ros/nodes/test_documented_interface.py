@@ -8,6 +8,7 @@ from collections.abc import Callable, Iterator
 from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
+from unittest.mock import DEFAULT, patch
 
 import cv2
 import numpy as np
@@ -29,6 +30,7 @@ from cardbox_tracker.person.urdf import (  # noqa: E402
     urdf_from_body,
 )
 from cardbox_tracker.recordings.bag_writer import BagWriter  # noqa: E402
+from cardbox_tracker.ros.nodes import tracker_node  # noqa: E402
 from cardbox_tracker.ros.nodes.background_node import BackgroundNode  # noqa: E402
 from cardbox_tracker.ros.nodes.camera_node import CameraNode  # noqa: E402
 from cardbox_tracker.ros.nodes.detector_node import DetectorNode  # noqa: E402
@@ -155,7 +157,11 @@ def nodes_called(name: str, make: Callable[..., Any], folder: Path) -> list[Any]
             make(kind, image_transport="compressed"),
         ]
     if name == "tracker":
+        # The network of hands is not part of the package.
+        with patch.multiple(tracker_node, HandNetwork=DEFAULT, installed_hands=DEFAULT):
+            looking = make(TrackerNode, keypoints="KEYPOINTS", hands=True)
         return [
+            looking,
             make(TrackerNode, rep155_id="ID", keypoints="KEYPOINTS"),
             make(TrackerNode, people=1, keypoints="KEYPOINTS"),
             make(TrackerNode, cameras=["CAMERA"], depth="DEPTH", keypoints="KEYPOINTS"),
