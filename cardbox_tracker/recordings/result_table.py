@@ -44,6 +44,8 @@ PARQUET = ".parquet"
 
 PERSON = "person"
 """Column of the number of the person; it follows the others if several people are tracked."""
+PERSON_CHANCE = "person_chance"
+"""Column of the probability that it is the person who had this number before, behind it."""
 
 _BODY_NAMES = (*JOINT_NAMES, *PLACE_NAMES)
 
@@ -100,7 +102,7 @@ def units(
         "place_chance": "",
         "place_rests_on": "",
         **dict.fromkeys(ANATOMICAL_NAMES, "deg"),
-        **({PERSON: ""} if has_people else {}),
+        **(dict.fromkeys((PERSON, PERSON_CHANCE), "") if has_people else {}),
         **(_HAND_UNITS if has_hands else {}),
         **(_leg_units() if has_legs else {}),
     }
@@ -147,6 +149,7 @@ def row_of(
     stamp = Decimal(stamp_ns).scaleb(-9)
     known: dict[str, Cell] = {"stamp": stamp, "state": estimate.state}
     known |= {"stamp_ns": stamp_ns, "time_s": time_s, PERSON: estimate.person}
+    known[PERSON_CHANCE] = estimate.person_chance
     joints, deviations = joint_values(estimate), joint_deviations(estimate)
     if joints is None or estimate.keypoints_m is None:
         return [known.get(name) for name in names]

@@ -134,6 +134,8 @@ class Estimate:
         place: how surely distance, scale and height are known, and by what; None if the filter
             keeps them constant. All states above are about the shape alone.
         person: number of the person, 1, 2, ...; None if only one is tracked.
+        person_chance: probability that it is the person who had this number before: 1 unless they
+            were away; None if only one is tracked.
         hands: the left and the right hand, None for one that is not known; None unless hands are
             looked at.
         legs: None without a posture, or unless legs are looked at.
@@ -156,6 +158,7 @@ class Estimate:
     clavicles_stddev_m: FloatArray | None = None
     place: Place | None = None
     person: int | None = None
+    person_chance: float | None = None
     hands: tuple[Hand | None, Hand | None] | None = None
     legs: Legs | None = None
 

@@ -41,6 +41,8 @@ _COLOURS = 0.3
 # The distance up to which colours alone tell that it is the same person; different clothes have 0.8
 # to 1, those of one person 0.1 to 0.4.
 _ALIKE = 0.6
+# Change of that distance that changes the odds of being the same person by a factor of e.
+_ALIKE_SPREAD = 0.07
 # Squared deviations above which a figure is somebody else.
 _OTHER = 16.0
 # Images in a row with the colours of somebody else after which a person is given up.
@@ -88,6 +90,7 @@ class _Person:
         self.colours: FloatArray | None = None
         self.seen_ns: int | None = None
         self.fitted_ns = self.others_images = 0
+        self.chance = 1.0
         self._drawer: PersonDrawer | None = None
         self._body: BodyModel | None = None
 
@@ -184,7 +187,8 @@ class People:
         found |= self._new_people(shown, colours, found)
         for person in self._people:
             if person.number in found:
-                self._see(person, shown[found[person.number]], stamp_ns)
+                number = found[person.number]
+                self._see(person, shown[number], colours[number], stamp_ns)
                 continue
             person.points = None
             if not is_detected:
@@ -274,9 +278,10 @@ class People:
         self._new = 0
         return added
 
-    def _see(self, person: _Person, one: Shown, stamp_ns: int) -> None:
+    def _see(self, person: _Person, one: Shown, colours: FloatArray | None, stamp_ns: int) -> None:
         if person.seen_ns is not None and stamp_ns - person.seen_ns > _GONE_NS:
             person.tracker.reset()
+            person.chance = _chance_of_same(person.colours, colours)
         person.points = one.points
         person.figure, person.pixels, person.seen_ns = one.figure, one.pixels, stamp_ns
 
@@ -362,7 +367,9 @@ class People:
                     return _held(last, hidden=True)
                 if now_ns - person.seen_ns <= _DROPPED_NS:
                     return _held(last)
-        found = replace(person.tracker.track(one), person=person.number)
+        found = replace(
+            person.tracker.track(one), person=person.number, person_chance=person.chance
+        )
         if found.posture is not None:
             person.fitted_ns = now_ns
             if not is_detected:
@@ -433,6 +440,12 @@ def _distance(one: FloatArray, other: FloatArray) -> float:
     if len(one) != len(other):
         return 1.0
     return float(np.sqrt(max(1.0 - np.sqrt(one * other).sum(), 0.0)))
+
+
+def _chance_of_same(before: FloatArray | None, now: FloatArray | None) -> float:
+    """Return the probability that colours are those of one person; without them, it is even."""
+    away = _ALIKE if before is None or now is None else _distance(before, now)
+    return float(1.0 / (1.0 + np.exp((away - _ALIKE) / _ALIKE_SPREAD)))
 
 
 def _cheapest(costs: FloatArray) -> dict[int, int]:

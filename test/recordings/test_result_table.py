@@ -194,7 +194,7 @@ def test_hands_follow_all_other_columns_and_are_empty_where_unknown() -> None:
     seen = Hand(0.9, np.array([0.0, 0.6, -0.8]), wrist, np.array([0.3, 0.4, np.nan]))
     small = seen._replace(open=None, wrist=np.array([0.5, 0.6, 0.7]))
     names = columns(has_points=True, has_people=True, has_hands=True)
-    assert names == (*WHOLE, "person", *HANDS)
+    assert names == (*WHOLE, "person", "person_chance", *HANDS)
     cells = row_of(42, 1.5, replace(SEEN, hands=(seen, None)), has_hands=True)[-20:]
     first = [0.9, 0.0, 0.6, -0.8, 0.1, -0.2, None]
     assert cells == [*first, *[None] * 7, 0.3, 0.4, None, *[None] * 3]
@@ -247,10 +247,12 @@ def test_the_page_lists_all_columns_in_their_order() -> None:
     for cell in re.findall(r"(?m)^\| (`.*?) \|", text):
         listed += re.findall(r"`([a-z_]+)`", cell)
     legs = columns(has_legs=True)[len(columns()) :]
-    assert tuple(listed) == (*WHOLE, "person", *HANDS, *legs)
+    assert tuple(listed) == (*WHOLE, "person", "person_chance", *HANDS, *legs)
 
 
 def test_of_several_people_the_number_comes_last() -> None:
-    assert columns(has_people=True)[:-1] == columns() and columns(has_people=True)[-1] == "person"
-    assert row_of(42, 1.5, replace(FOUND, person=2), has_people=True)[-1] == 2
-    assert row_of(42, 1.5, Estimate("no_person", person=1), has_people=True)[-1] == 1
+    assert columns(has_people=True) == (*columns(), "person", "person_chance")
+    found = replace(FOUND, person=2, person_chance=0.9)
+    assert row_of(42, 1.5, found, has_people=True)[-2:] == [2, 0.9]
+    nobody = Estimate("no_person", person=1)
+    assert row_of(42, 1.5, nobody, has_people=True)[-2:] == [1, None]

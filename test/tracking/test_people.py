@@ -127,6 +127,17 @@ def test_who_leaves_and_returns_elsewhere_keeps_the_identity_by_the_clothes(
     for _ in range(3):
         found = show((0.5, BLUE), (-0.2, RED))
     assert places(found) == pytest.approx([-0.2, 0.5], abs=0.1)
+    chances = [one.person_chance or 0.0 for one in found]
+    assert 0.99 < chances[0] < 1.0 == chances[1]
+
+
+def test_the_chance_of_the_same_person_by_hand() -> None:
+    one, other = np.array([1.0, 0.0]), np.array([0.36, 0.64])
+    # Their distance is sqrt(1 - 0.6) = 0.632.
+    expected = 1.0 / (1.0 + np.exp((0.6325 - 0.6) / 0.07))
+    assert people._chance_of_same(one, other) == pytest.approx(expected, abs=1e-3)
+    assert people._chance_of_same(one, one) > 0.999 > 0.01 > people._chance_of_same(one, one[::-1])
+    assert people._chance_of_same(one, None) == 0.5
 
 
 def test_somebody_else_in_the_place_of_one_who_left_is_not_that_person(detected: Detect) -> None:
