@@ -15,8 +15,59 @@ _DECLARED = "declared, since it is not measured"
 
 
 @dataclass(frozen=True)
-class RulaConfig(Settings):
-    """Settings of the score: inputs that describe the task, then limits of angles.
+class ErgonomicConfig(Settings):
+    """Settings that both methods have: what no image shows, then limits of angles.
+
+    Raises:
+        ValueError: a value is out of its range; the text names it.
+    """
+
+    shoulders_raised: bool = setting(False, f"the shoulders are raised; {_DECLARED}")
+    arms_supported: bool = setting(
+        False, f"the arms are supported, the person leans, or gravity helps; {_DECLARED}"
+    )
+    trunk_twisted: bool = setting(
+        False,
+        "the trunk is twisted against the hips; declared, since torso_yaw is where the whole "
+        "person faces",
+    )
+    abducted_deg: float = setting(
+        30.0,
+        "an upper arm this far to the side counts as abducted; the paper names no angle",
+        unit="deg",
+        limits=(5.0, 90.0),
+    )
+    side_bent_deg: float = setting(
+        10.0,
+        "a trunk this far to a side counts as bent; the paper names no angle",
+        unit="deg",
+        limits=(1.0, 45.0),
+    )
+    neck_extended_deg: float = setting(
+        10.0,
+        "a neck bent backwards by more than this is in extension; the paper has 0, which is within "
+        "the error of the measurement",
+        unit="deg",
+        limits=(0.0, 45.0),
+    )
+    neck_twisted_deg: float = setting(
+        20.0,
+        "a head turned this far against the trunk twists the neck; the paper names no angle",
+        unit="deg",
+        limits=(5.0, 80.0),
+    )
+    upright_deg: float = setting(
+        10.0,
+        "a trunk bowed less than this is upright, score 1; the paper has 0, which nobody keeps and "
+        "no outline shows",
+        unit="deg",
+        limits=(0.0, 20.0),
+    )
+
+
+@dataclass(frozen=True)
+class RulaConfig(ErgonomicConfig):
+    """Settings of RULA.
 
     Raises:
         ValueError: a value is out of its range; the text names it.
@@ -51,21 +102,6 @@ class RulaConfig(Settings):
     )
     body_muscle_use: int = setting(0, "as arm_muscle_use, of neck, trunk and legs", limits=(0, 1))
     body_load: int = setting(0, "as arm_load, of neck, trunk and legs", limits=(0, 3))
-    shoulders_raised: bool = setting(False, f"the shoulders are raised; {_DECLARED}")
-    arms_supported: bool = setting(
-        False, f"the arms are supported, or the person leans; {_DECLARED}"
-    )
-    trunk_twisted: bool = setting(
-        False,
-        "the trunk is twisted against the hips; declared, since torso_yaw is where the whole "
-        "person faces",
-    )
-    abducted_deg: float = setting(
-        30.0,
-        "an upper arm this far to the side counts as abducted; the paper names no angle",
-        unit="deg",
-        limits=(5.0, 90.0),
-    )
     outwards_deg: float = setting(
         30.0,
         "a forearm that points this far to the outside works out to the side of the body; the "
@@ -73,37 +109,11 @@ class RulaConfig(Settings):
         unit="deg",
         limits=(5.0, 90.0),
     )
-    side_bent_deg: float = setting(
-        10.0,
-        "a trunk this far to a side counts as bent; the paper names no angle",
-        unit="deg",
-        limits=(1.0, 45.0),
-    )
-    neck_extended_deg: float = setting(
-        10.0,
-        "a neck bent backwards by more than this is in extension, score 4; the paper has 0, which "
-        "is within the error of the measurement",
-        unit="deg",
-        limits=(0.0, 45.0),
-    )
-    neck_twisted_deg: float = setting(
-        20.0,
-        "a head turned this far against the trunk twists the neck; the paper names no angle",
-        unit="deg",
-        limits=(5.0, 80.0),
-    )
-    upright_deg: float = setting(
-        10.0,
-        "a trunk bowed less than this is upright, score 1; the paper has 0, which nobody keeps and "
-        "no outline shows",
-        unit="deg",
-        limits=(0.0, 20.0),
-    )
 
 
 @dataclass(frozen=True)
-class RebaConfig(Settings):
-    """Settings of REBA: inputs that describe the task, then limits of angles.
+class RebaConfig(ErgonomicConfig):
+    """Settings of REBA.
 
     Raises:
         ValueError: a value is out of its range; the text names it.
@@ -138,47 +148,7 @@ class RebaConfig(Settings):
         "repeated more than 4 times in one, if the posture changes widely and fast",
         limits=(0, 3),
     )
-    shoulders_raised: bool = setting(False, f"the shoulders are raised; {_DECLARED}")
-    arms_supported: bool = setting(
-        False, f"the arms are supported, the person leans, or gravity helps; {_DECLARED}"
-    )
-    trunk_twisted: bool = setting(
-        False, "the trunk is twisted against the hips; declared, since no image shows it"
-    )
-    abducted_deg: float = setting(
-        30.0,
-        "an upper arm this far to the side counts as abducted; the paper names no angle",
-        unit="deg",
-        limits=(5.0, 90.0),
-    )
-    side_bent_deg: float = setting(
-        10.0,
-        "a trunk this far to a side counts as bent; the paper names no angle",
-        unit="deg",
-        limits=(1.0, 45.0),
-    )
-    neck_extended_deg: float = setting(
-        10.0,
-        "a neck bent backwards by more than this is in extension; the paper has 0, which is within "
-        "the error of the measurement",
-        unit="deg",
-        limits=(0.0, 45.0),
-    )
-    neck_twisted_deg: float = setting(
-        20.0,
-        "a head turned this far against the trunk twists the neck; the paper names no angle",
-        unit="deg",
-        limits=(5.0, 80.0),
-    )
-    upright_deg: float = setting(
-        10.0,
-        "a trunk bowed less than this is upright, score 1; the paper has 0, which nobody keeps",
-        unit="deg",
-        limits=(0.0, 20.0),
-    )
 
-
-ErgonomicConfig = RulaConfig | RebaConfig
 
 DECLARED_PARTS = {"wrist": 4, "wrist_twist": 2, "legs": 2}
 """Highest score of each part that no image shows."""

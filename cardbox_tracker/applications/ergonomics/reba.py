@@ -35,6 +35,7 @@ from cardbox_tracker.applications.ergonomics.rula import (
     Part,
     ScoreArray,
     ScoreDistribution,
+    distribution_of,
     elbow_scores,
     neck_samples,
     table_of,
@@ -261,10 +262,6 @@ def _distribution(seen: Seen, config: RebaConfig, rng: np.random.Generator) -> S
         angles, deviations = seen.legs
         legs = angles + INDEPENDENT * deviations * rng.standard_normal((SAMPLES, len(angles)))
     scores = reba_scores(postures, config, necks, legs, seen.lengths_m)
-
-    def chances(found: ScoreArray, highest: int = REBA.highest) -> FloatArray:
-        return np.asarray(np.bincount(found, minlength=highest + 1)[1:] / len(found))
-
     of_mean = reba_scores(
         mean,
         config,
@@ -272,9 +269,7 @@ def _distribution(seen: Seen, config: RebaConfig, rng: np.random.Generator) -> S
         None if seen.legs is None else seen.legs[0],
         seen.lengths_m,
     )
-    parts = {part.name: chances(part.of(scores), part.highest) for part in REBA.parts}
-    grand = chances(scores.grand), chances(scores.left.grand), chances(scores.right.grand)
-    return ScoreDistribution(*grand, parts, int(of_mean.grand))
+    return distribution_of(scores, REBA, int(of_mean.grand))
 
 
 def reba_scores(

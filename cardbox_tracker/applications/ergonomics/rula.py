@@ -270,14 +270,24 @@ def score_distribution(
 
     ``necks`` (n, 2) are the angles of the neck in each of them, rad; None if they are unknown.
     """
-    scores = rula_scores(body, postures, config, necks)
+    return distribution_of(rula_scores(body, postures, config, necks), RULA)
 
-    def chances(found: ScoreArray, highest: int = HIGHEST) -> FloatArray:
+
+def distribution_of(scores: Any, method: Method, of_mean: int = 0) -> ScoreDistribution:
+    """Return the distribution of the scores (n,) of equally likely postures.
+
+    Args:
+        scores: those of the method, such as :class:`RulaScores`.
+        method: how they were scored.
+        of_mean: score of the mean posture.
+    """
+
+    def chances(found: ScoreArray, highest: int = method.highest) -> FloatArray:
         return np.asarray(np.bincount(found, minlength=highest + 1)[1:] / len(found))
 
-    parts = {part.name: chances(part.of(scores), part.highest) for part in PARTS}
-    grand = chances(scores.grand), chances(scores.left.grand), chances(scores.right.grand)
-    return ScoreDistribution(*grand, parts)
+    parts = {part.name: chances(part.of(scores), part.highest) for part in method.parts}
+    grand, left, right = (chances(one.grand) for one in (scores, scores.left, scores.right))
+    return ScoreDistribution(grand, left, right, parts, of_mean)
 
 
 def rula_scores(
