@@ -24,6 +24,7 @@ from cardbox_tracker.tracking.estimate import LOST, TRACKING, Estimate
 
 BODY = BodyModel.of(distance_m=2.3, hip_height_m=-0.4)
 FOUND = Estimate(TRACKING, reference_posture("arms"), offset_m=np.array([0.25, -0.05]))
+DEFAULTS = {"torso_place": True, "optical_frame_in_tf": True, "hands": False}
 
 
 class TFMessage(SimpleNamespace):
@@ -37,7 +38,7 @@ def published(*estimates: Estimate, **settings: bool) -> list[Any]:
         assert (kind, topic, profile.depth) == (TFMessage, "/tf", 100)
         return SimpleNamespace(publish=sent.append)
 
-    given: Any = SimpleNamespace(**({"torso_place": True, "optical_frame_in_tf": True} | settings))
+    given: Any = SimpleNamespace(**(DEFAULTS | settings))
     outputs = TfOutputs(SimpleNamespace(advertise=advertise), given)  # type: ignore[arg-type]
     tracker: Any = SimpleNamespace(body=BODY)
     for estimate in estimates:
