@@ -184,8 +184,8 @@ class WholeBodyFilter:
     def follow(self, frames: Sequence[Frame], terms: Sequence[Sequence[Term]]) -> Fit:
         """See :class:`~.pose_filter.PoseFilter`."""
         location = self._observe(frames, terms)
-        is_back = bool(self._cues) and all(cue.shows_back for _, cue in self._cues)
-        if self._is_new and is_back:
+        # Whether somebody is first seen from behind is different for each camera.
+        if self._is_new and any(cue.shows_back for number, cue in self._cues if number == 0):
             self._face(np.pi)
             self._survivors = self._reference[None].copy()
         passes = self._profile.start_passes if self._is_new else 1
@@ -339,6 +339,7 @@ class WholeBodyFilter:
         result = self._corrected(frames, fitted)
         is_back = cost.facing_rad != 0.0
         if self._cues:
+            # The image in which somebody is found to have turned counts as one of a back, too.
             fitted, result = self._turned(np.array([fitted, result]))
         both = np.array([fitted, result])
         ratings, (differs_px, cost_px), (drawn_px, area_px), points = cost.bodies(both)
@@ -355,8 +356,9 @@ class WholeBodyFilter:
             evidence |= cue.evidence(Posed(cost.costs[number].body, there))
         evidence["cameras"] = np.full(6, float(len(self._seeing) > 1))
         source = doubt.Source.POINTS if self._cues else doubt.Source.OUTLINE
-        evidence["back"] = np.full(6, float(is_back or cost.facing_rad != 0.0))
-        vetoes = not is_trackable(cost, fitted), bool(evidence["back"].any())
+        is_back = is_back or cost.facing_rad != 0.0
+        evidence["back"] = np.full(6, float(is_back))
+        vetoes = not is_trackable(cost, fitted), is_back
         judged = self._doubt.judge(evidence, source, are_hidden(cost, result), vetoes)
         self._result = result
         if profile.keeps_result:
@@ -383,8 +385,8 @@ class WholeBodyFilter:
         Left and right are exchanged if the points have shown this for long. Somebody who turns to
         the side, and further, faces the other way from then on.
         """
-        cost = self._cost
-        facing_rad, yaw_rad = cost.facing_rad, float(found[-1, YAW]) - cost.facing_rad
+        facing_rad = self._cost.facing_rad
+        yaw_rad = float(found[-1, YAW]) - facing_rad
         way_rad = np.pi if facing_rad <= 0.0 else -np.pi
         if self._age and all(cue.shows_back for _, cue in self._cues):
             self._face(facing_rad + way_rad)
@@ -392,14 +394,14 @@ class WholeBodyFilter:
             self._output = self._correction = None
             return turned_states(found, way_rad, ARM_LIMITS)
         if abs(yaw_rad) > _ASIDE_RAD:
-            self._face(facing_rad + np.copysign(np.pi, yaw_rad))
-            if abs(self._cost.facing_rad) > 1.5 * np.pi:
-                # Once around.
-                whole_rad = self._cost.facing_rad
-                self._face(0.0)
+            facing_rad += np.copysign(np.pi, yaw_rad)
+            if abs(facing_rad) > 1.5 * np.pi:
+                # Once around, where the yaw begins again.
                 for states in (self._survivors, found):
-                    states[:, YAW] -= whole_rad
+                    states[:, YAW] -= facing_rad
                 self._output = self._correction = None
+                facing_rad = 0.0
+            self._face(facing_rad)
         return found
 
     def _face(self, facing_rad: float) -> None:

@@ -194,7 +194,7 @@ class JointPointsObservation(TermObservation):
         seen: fields of :class:`~.joint_points_kernels.Evidence`.
         weight_px: cost of a squared residual of 1, px.
         shows_back: whether left and right have been exchanged for long, so that the person faces
-            the other way.
+            the other way; at the start of tracking, whether the points are those of a back.
     """
 
     seen: EvidenceTuple

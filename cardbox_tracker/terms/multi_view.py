@@ -101,8 +101,9 @@ class MultiViewCost:
         The yaw is that of somebody who faces the camera, 0 if nothing else is known. An outline of
         a person who is twice as far away determines the distance half as well.
         """
-        around_rad = self.facing_rad
-        self.anchor[:] = x_m, z_m, home_m, around_rad + (-yaw_rad if around_rad else yaw_rad)
+        facing_rad = self.facing_rad
+        # Who walks to one side turns from the back to it the other way round.
+        self.anchor[:] = x_m, z_m, home_m, facing_rad + (-yaw_rad if facing_rad else yaw_rad)
         self.x_factor = max((self.place[0] - x_m) / _NORMAL_M, 1.0)
         self.costs[0].loosen_x(self.x_factor)
 

@@ -185,7 +185,8 @@ class TermObservation:
     Attributes:
         locates: whether the residuals tell where joints are. Then states that fit them are
             proposed, and the search needs fewer others.
-        shows_back: whether it shows for some time that the person faces the other way.
+        shows_back: whether the person faces the other way than in the last states; at the start of
+            tracking, away from the camera.
     """
 
     locates = False

@@ -452,3 +452,29 @@ def test_points_of_another_type_are_refused(points: Any, kind: str) -> None:
         tracker.track(Observation(person, points=points))
     # It changes nothing for the next frame.
     assert values(tracker.track(person)) == values(fresh.track(person))
+
+
+def test_a_camera_behind_a_person_who_faces_the_first_one_does_not_turn_them(
+    detected: Detect,
+) -> None:
+    """Only the second camera has points, and sees the back."""
+    turn = np.diag([-1.0, 1.0, -1.0])
+    other = OtherCamera(CAMERA, Extrinsics(turn, -turn @ [0.0, 0.0, 4.0]))
+    view = View.of(GUESSED, CAMERA, other)
+    tracker = Tracker(GUESSED, CAMERA, default_preset(), others=[other])
+    state = np.append(reference_posture("front"), [0.0, 0.0])
+    there = view.states(state)
+    placed = view.body.with_values(
+        distance_m=view.body.placement.distance_m - there[12],
+        hip_height_m=view.body.placement.hip_height_m + there[13],
+    )
+    behind = render(cardbox_patches(placed, there[:12]), view.camera)
+    for number in range(4):
+        stamp_ns = BEGIN_NS + number * 66_666_667
+        points = detected(view.body, view.camera, there, stamp_ns=stamp_ns)
+        seen = [
+            Observation(silhouette(state[:12]), stamp_ns=stamp_ns),
+            Observation(behind, stamp_ns=stamp_ns, points=points),
+        ]
+        estimate = tracker.track(seen)
+        assert estimate.posture is not None and abs(estimate.posture[YAW]) < np.radians(20.0)
