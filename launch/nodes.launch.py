@@ -119,7 +119,7 @@ GIVEN = {
     "background": ("image_transport", "background_file", "within_m", "depth"),
     "initializer": (
         *("person_distance_m", "camera_pitch_deg", "side_turn", "model_file"),
-        *("cameras", "extrinsics_file", "measure_distance", "depth"),
+        *("cameras", "extrinsics_file", "measure_distance", "depth", "hands"),
     ),
     "tracker": (
         "preset",

@@ -208,7 +208,7 @@ class InitializerNode(CardboxNode):
             body,
             frame_id or None,
             torso_place=settings.torso_place_in_urdf,
-            hands=settings.hands_in_urdf,
+            hands=settings.hands,
         )
         self._description.publish(String(data=urdf))
 

@@ -86,7 +86,7 @@ class InitializerParameters(NodeParameters):
         "same as the tracker's torso_place",
         effect=_NEXT_MEASUREMENT,
     )
-    hands_in_urdf: bool = parameter(
+    hands: bool = parameter(
         False,
         "robot_description has the joints of hands, too; must be the same as the tracker's hands",
         effect=_NEXT_MEASUREMENT,

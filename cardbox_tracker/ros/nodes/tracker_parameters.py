@@ -181,7 +181,7 @@ class TrackerParameters(NodeParameters):
         False,
         "also look at hands in silhouette/image, with the detector's network and the points on "
         "keypoints: the topic hands tells open from closed ones, and joint_states has their "
-        "joints; must be the same as the initializer's hands_in_urdf",
+        "joints; must be the same as the initializer's hands",
         effect=AT_START,
     )
     people: int = parameter(
