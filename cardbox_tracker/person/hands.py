@@ -67,7 +67,9 @@ def turn_of(palm: FloatArray, forearm: FloatArray, side: float) -> float:
     return -side * math.atan2(side * float(x), -side * float(y))
 
 
+_LOWEST, _HIGHEST = np.array([joint.limits for joint in HANDS[:3]]).T
+
+
 def limited(joints_rad: FloatArray) -> FloatArray:
     """Return turn, flexion and deviation (3,) within their limits."""
-    low, high = np.array([joint.limits for joint in HANDS[:3]]).T
-    return np.clip(joints_rad, low, high)
+    return np.clip(joints_rad, _LOWEST, _HIGHEST)

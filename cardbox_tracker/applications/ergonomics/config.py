@@ -24,7 +24,7 @@ class ErgonomicConfig(Settings):
 
     shoulders_raised: bool = setting(False, f"the shoulders are raised; {_DECLARED}")
     arms_supported: bool = setting(
-        False, f"the arms are supported, the person leans, or gravity helps; {_DECLARED}"
+        False, f"the arms are supported, or the person leans; {_DECLARED}"
     )
     trunk_twisted: bool = setting(
         False,
@@ -147,6 +147,9 @@ class RebaConfig(ErgonomicConfig):
         "1 each if a part of the body is held for longer than a minute, if a small motion is "
         "repeated more than 4 times in one, if the posture changes widely and fast",
         limits=(0, 3),
+    )
+    arms_supported: bool = setting(
+        False, f"the arms are supported, the person leans, or gravity helps; {_DECLARED}"
     )
 
 
