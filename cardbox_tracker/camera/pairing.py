@@ -77,9 +77,10 @@ class Arrivals(Generic[T]):
     """Groups items as they arrive, like :func:`side_by_side`, with a limited wait.
 
     A set is complete once every stream has sent the item that belongs to it, or a later one. A
-    silent stream is waited for until another has sent two more items. After five such sets it is no
-    longer waited for until it sends again. Items that arrive after their set are dropped. If the
-    stamps of a stream go back by more than a second, everything is reset.
+    stream that sends nothing is waited for until another has sent two more items. After five such
+    sets it is no longer waited for until it sends again. A stream that is behind, because its queue
+    is longer, sends, so it is waited for while it catches up. Items that arrive after their set are
+    dropped. If the stamps of a stream go back by more than a second, everything is reset.
 
     Attributes:
         tolerance_ns: items whose stamps are this near to the earliest one belong together.
@@ -99,6 +100,9 @@ class Arrivals(Generic[T]):
             items.clear()
         self._missed = [0] * len(self._items)
         self._newest_ns = [0] * len(self._items)
+        # Number of items of each stream, and these numbers when each stream sent last.
+        self._received = [0] * len(self._items)
+        self._before = [[0] * len(self._items) for _ in self._items]
         # Earliest stamp of the last set, and the streams that had items in it.
         self._last_ns: int | None = None
         self._chosen = [False] * len(self._items)
@@ -114,6 +118,8 @@ class Arrivals(Generic[T]):
             return
         self._missed[number] = 0
         self._newest_ns[number] = stamp_ns
+        self._received[number] += 1
+        self._before[number] = [*self._received]
         items = self._items[number]
         items.append((stamp_ns, item))
         if len(items) > _WAITING + 1:
@@ -148,8 +154,13 @@ class Arrivals(Generic[T]):
         counts = [len(items) for items in self._items]
         if not any(counts):
             return False
-        is_waited_for = any(
-            not count and missed < _PATIENCE
-            for count, missed in zip(counts, self._missed, strict=True)
+        is_full = max(counts) > _WAITING
+        return not any(
+            not count and self._missed[number] < _PATIENCE and not (is_full and self._rests(number))
+            for number, count in enumerate(counts)
         )
-        return not is_waited_for or max(counts) > _WAITING
+
+    def _rests(self, number: int) -> bool:
+        """Return whether another stream has sent several items since the last one of a stream."""
+        numbers = zip(self._received, self._before[number], strict=True)
+        return any(now - then > _WAITING for now, then in numbers)

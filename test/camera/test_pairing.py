@@ -123,6 +123,18 @@ def test_a_camera_that_is_always_late_is_waited_for() -> None:
     assert live.arrivals.late == [0, 0]
 
 
+def test_a_camera_with_a_longer_queue_loses_nothing_when_the_other_one_is_back() -> None:
+    """The first camera's queue has ten images, in which the second one was silent."""
+    live = Live()
+    first, second = [10 * n for n in range(1, 31)], [10 * n + 1 for n in range(11, 31)]
+    for stamps in zip(first, second, strict=False):
+        live.send(*enumerate(stamps))
+    live.send(*((0, stamp) for stamp in first[len(second) :]))
+    assert [stamp for stamp, _ in live.sets] == first
+    assert live.arrivals.late[0] == 0
+    assert live.sets[-1] == (first[-1], second[-1])
+
+
 def test_without_stamps_the_order_of_arrival_counts() -> None:
     live = Live()
     assert live.send(*[(0, 0), (1, 0)] * 3) == [(0, 0)] * 3

@@ -95,17 +95,26 @@ def test_both_cameras_are_used_and_one_goes_on_while_the_other_is_silent(
     # The player loops, because a busy machine may miss a part of the recording.
     graph.start("play_bag", str(recorded["bag"]), loop=True)
     nearer_m: dict[str, list[float]] = {"both": [], "one": [], "both again": []}
+    # Stamps of results without the first camera, whose silhouette was there nevertheless.
+    without_first: list[int] = []
+    with_first: list[int] = []
 
     def sorted_by_phase() -> dict[str, list[float]]:
+        stamps = [stamp_ns(silhouette.header.stamp) for silhouette in seen_first]
         # The stamps of one turn of the loop recur in the next one.
-        of_first = {stamp_ns(silhouette.header.stamp) for silhouette in seen_first[-SILENT.start :]}
+        turns = [n for n in range(1, len(stamps)) if stamps[n] < stamps[n - 1]]
+        of_first = set(stamps[turns[-1] if turns else 0 :])
         for message in states:
             assert message.header.frame_id == "cam0_optical"
             # The stamps are those of the first camera, or, without its image, those of the
             # second camera, which are 8 ms later.
             at_ns = stamp_ns(message.header.stamp)
             number, rest_ns = divmod(at_ns - START_NS, PERIOD_NS)
-            assert rest_ns == 0 or at_ns - rest_ns not in of_first
+            if not rest_ns:
+                with_first.append(at_ns)
+            # The tracker may have begun to hear the second camera before the first.
+            elif with_first and at_ns - rest_ns in of_first:
+                without_first.append(at_ns)
             image = number - EMPTY
             phase = "one" if image in SILENT else "both" if image < SILENT[0] else "both again"
             if phase != "both" or image > SETTLED:
@@ -120,15 +129,26 @@ def test_both_cameras_are_used_and_one_goes_on_while_the_other_is_silent(
     # The silhouette of one camera would not show that the person is 20 cm nearer.
     assert np.median(nearer_m["both"]) == pytest.approx(NEARER_M, abs=0.08)
 
+    def values() -> list[dict[str, str]]:
+        found = [status for array in diagnostics for status in array.status]
+        return [{v.key: v.value for v in status.values} for status in found]
+
+    # On a busy machine, the first camera's silhouette may come after three of the second one.
+    graph.wait(
+        lambda: (
+            max((int(found.get("cam0 late", 0)) for found in values()), default=0)
+            >= len(without_first)
+        ),
+        f"as many late images of the first camera as results without it, {len(without_first)}",
+    )
+
     def fits() -> bool:
         return any(
             all(
-                float(values.get(f"{name} iou", "0").replace("sees nobody", "0")) > 0.7
+                float(found.get(f"{name} iou", "0").replace("sees nobody", "0")) > 0.7
                 for name in ("cam0", "cam1")
             )
-            for array in diagnostics
-            for status in array.status
-            if (values := {v.key: v.value for v in status.values})
+            for found in values()
         )
 
     graph.wait(fits, "the fit of each camera in the diagnostics")
