@@ -12,9 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from cardbox_tracker.camera.camera import Camera
 from cardbox_tracker.common.errors import CardboxError
-from cardbox_tracker.detectors.image_points import POINT_INDEX, ImagePoints
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.recordings.recording import FrameSet, Recording
 from cardbox_tracker.recordings.result_table import result_table
@@ -25,10 +23,6 @@ from cardbox_tracker.tracking.hands import HandReader, Look
 from cardbox_tracker.tracking.legs import LegReader
 from cardbox_tracker.tracking.people import People
 from cardbox_tracker.tracking.tracker import Tracker
-
-_SHOULDERS_ELBOWS = [
-    POINT_INDEX[f"{side}_{name}"] for side in ("left", "right") for name in ("shoulder", "elbow")
-]
 
 Observer = Callable[[RecordedFrame, Estimate, Tracker], None]
 """Callback that receives each image with its estimate and the tracker."""
@@ -157,7 +151,9 @@ def track_recording(
             for estimate, tracker in track(taken):
                 tally, _ = tallies.setdefault(estimate.person, (_Tally(), tracker))
                 tally.add(estimate)
-                points = points_of(estimate, taken, first.camera) if hands or legs else None
+                points = taken.first.points
+                if estimate.person is not None:
+                    points = people.points_of(estimate.person)
                 person, time_s = (tracker.body, tracker.camera), taken.stamp_ns / 1e9
                 if hands is not None:
                     hand_reader = hand_readers.setdefault(estimate.person, HandReader(hands))
@@ -210,16 +206,3 @@ def _track_one(tracker: Tracker, taken: FrameSet) -> list[tuple[Estimate, Tracke
 
 def _track_people(people: People, taken: FrameSet) -> list[tuple[Estimate, Tracker]]:
     return people.track(taken.observations[0], taken.people)
-
-
-def points_of(estimate: Estimate, taken: FrameSet, camera: Camera) -> ImagePoints | None:
-    """Return the points of a person: of several people, those that are nearest to the estimate."""
-    if not taken.people or estimate.keypoints_m is None:
-        return taken.first.points
-    px = camera.project(np.asarray(estimate.keypoints_m)[[0, 1, 3, 4]])
-
-    def away_px(points: ImagePoints) -> float:
-        apart = points.px[_SHOULDERS_ELBOWS] - px
-        return float(np.nan_to_num(np.linalg.norm(apart, axis=1), nan=camera.width).sum())
-
-    return min(taken.people, key=away_px)

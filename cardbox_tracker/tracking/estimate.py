@@ -61,8 +61,9 @@ class Hand(NamedTuple):
         palm: normal out of the palm, unit vector (3,) in the optical frame.
         wrist: flexion and deviation of the wrist and rotation of the forearm, (3,), rad; the
             rotation of a straight arm is nan.
-        wrist_stddev: their standard deviations, (3,), rad.
+        wrist_stddev: their standard deviations, (3,), rad; nan where the rotation is.
         turn: turn of the hand about the forearm's frame, rad (:mod:`.person.hands`).
+        turn_stddev: its standard deviation, rad.
     """
 
     open: float | None
@@ -70,6 +71,7 @@ class Hand(NamedTuple):
     wrist: FloatArray
     wrist_stddev: FloatArray
     turn: float = 0.0
+    turn_stddev: float = 0.0
 
     @property
     def joints(self) -> FloatArray:
@@ -79,7 +81,7 @@ class Hand(NamedTuple):
     @property
     def joints_stddev(self) -> FloatArray:
         """Standard deviations of ``joints``, (3,), rad."""
-        return self.wrist_stddev[[0, 0, 1]]
+        return np.array([self.turn_stddev, *self.wrist_stddev[:2]])
 
 
 class Legs(NamedTuple):

@@ -13,6 +13,11 @@ fingers' direction ``h``:
 - the forearm's rotation is its pronation: 0 with the palm towards the body while the elbow is bent
   (thumb up), positive as the thumb turns inwards. It is relative to the plane of the bent arm,
   which a straight arm does not have.
+
+The network's points are good in the image and bad in depth: in films, its fingers are off by 50
+degrees, more than those of a wrist that is taken as straight. So a grid of turns, flexions and
+deviations is rated: by where it puts the bases of the fingers in the image, given the length of the
+palm, by how far people bend their wrists, and by the side to which the network's palm faces.
 """
 
 from __future__ import annotations
@@ -64,11 +69,25 @@ _SQUARE, _PALM_M = 2.4, 0.09
 _LEAST_SCORE = 0.3
 # Time for which a hand that is not found keeps its result, s.
 _KEPT_S = 0.5
-# Deviations of the palm's direction, and of the forearm beside that of its joints, rad.
-_PALM_RAD, _FOREARM_RAD = np.radians([18.0, 10.0])
-# Logarithm of the odds of fingers that bend to the palm, for a length of the palm, and usual angles
-# of flexion and deviation, rad.
-_CURL, _BENT_RAD = 4.65, np.radians([35.0, 18.0])
+# Bases of index, middle, ring and little finger from the wrist, in lengths of the palm: aside to
+# the little finger, and ahead. They are means of the network's own points.
+_BASES, _PALM = [5, 9, 13, 17], np.array([(-0.15, 1.02), (0.0, 1.0), (0.15, 0.97), (0.27, 0.81)])
+# Deviations of these points in lengths of the palm, and of that length as a share.
+_POINT, _LENGTH = 0.25, 0.15
+# Turns about the forearm, flexions and deviations of the hands that are rated, rad.
+_STEPS = np.arange(0, 360, 15), np.arange(-75, 91, 15), np.arange(-36, 37, 12)
+_TURNS, _FLEXIONS, _DEVIATIONS = (
+    one.ravel() for one in np.meshgrid(*map(np.radians, _STEPS), indexing="ij")
+)
+# Deviations of the flexion and deviation of people's wrists, and of the side to which the network's
+# palm faces, rad.
+_FLEXED_RAD, _DEVIATED_RAD, _FACING_RAD = np.radians([20.0, 10.0, 35.0])
+# Part of a palm's normal beside the forearm from which on it shows the turn.
+_SHOWS = 0.5
+# Deviation of the forearm, and of a turn of which nothing is known, rad.
+_FOREARM_RAD, _UNKNOWN_RAD = np.radians(10.0), np.pi / np.sqrt(3.0)
+# Logarithm of the odds of fingers that bend to the palm, for a length of the palm.
+_CURL = 4.65
 # Sine of the least bend of an elbow whose plane is known.
 _LEAST_BEND = float(np.sin(np.radians(20.0)))
 
@@ -171,9 +190,6 @@ def measured(
 ) -> Hand:
     """Return what the points of a hand tell.
 
-    The network does not know which hand it sees, and at times gives the depth of the mirror image,
-    whose fingers would bend backwards, or whose wrist would be bent too far.
-
     Args:
         side: left or right.
         found: the hand's points, px of ``camera``.
@@ -185,39 +201,91 @@ def measured(
     sign = 1.0 if side == "left" else -1.0
     arm = np.asarray(estimate.keypoints_m)[_KEYPOINTS[side] - 2 :][:3]
     upper_arm, forearm = _unit(arm[1] - arm[0]), _forearm(side, arm, points, camera)
-    turn = _ray_rotation(found.px[WRIST], camera)
-    best, palm, wrist = -np.inf, forearm, np.zeros(3)
-    for mirror in (1.0, -1.0):
-        at = found.spatial_m * (1.0, 1.0, mirror)
-        normal = _palm(at, sign)
-        fingers = turn @ _unit(at[_MIDDLE] - at[WRIST])
-        angles = _wrist(turn @ normal, fingers, upper_arm, forearm, sign)
-        score = _CURL * _curl(at, normal) - 0.5 * float(np.sum((angles[:2] / _BENT_RAD) ** 2))
-        if score > best:
-            best, palm, wrist = score, turn @ normal, angles
-    spread_rad = _FOREARM_RAD
-    if estimate.posture_stddev is not None:
-        elbow = np.asarray(estimate.posture_stddev)[_ELBOWS[side]]
-        spread_rad = hypot(_FOREARM_RAD, *elbow)
-    bent = hypot(_PALM_RAD, spread_rad)
-    bend = float(np.linalg.norm(np.cross(upper_arm, forearm)))
-    turned = hypot(_PALM_RAD, spread_rad / bend) if bend >= _LEAST_BEND else np.nan
-    return Hand(opened(found), palm, wrist, np.array([bent, bent, turned]))
-
-
-def _wrist(
-    palm: FloatArray, fingers: FloatArray, upper_arm: FloatArray, forearm: FloatArray, sign: float
-) -> FloatArray:
-    """Return flexion, deviation and rotation (3,), rad, of unit vectors (3,)."""
-    flexion = -np.arcsin(np.clip(palm @ forearm, -1.0, 1.0))
-    straight = _unit(forearm - (forearm @ palm) * palm)
-    deviation = np.arctan2(fingers @ (sign * np.cross(straight, palm)), fingers @ straight)
     plane = sign * np.cross(upper_arm, forearm)
-    if float(np.linalg.norm(plane)) < _LEAST_BEND:
-        return np.array([flexion, deviation, np.nan])
+    bend = float(np.linalg.norm(plane))
+    # The turns of a straight arm may count from any direction.
+    if bend < _LEAST_BEND:
+        plane = np.cross(forearm, np.eye(3)[np.argmin(np.abs(forearm))])
     inner = _unit(plane)
-    rotation = np.arctan2(palm @ (sign * np.cross(forearm, inner)), palm @ inner)
-    return np.array([flexion, deviation, rotation])
+    axes = np.column_stack([inner, sign * np.cross(forearm, inner), forearm])
+    palm_m = (1.0 - WRIST_SHARE) * float(np.linalg.norm(arm[2] - arm[1]))
+    bases = (found.px[_BASES] - found.px[WRIST]) / (camera.fx, camera.fy) * arm[2, 2] / palm_m
+    weights = _rated(bases, found, _ray_rotation(found.px[WRIST], camera).T @ axes, sign)
+    best = int(np.argmax(weights))
+    # A hand that faces the other way is another answer, and no part of the mean.
+    near = np.where(np.abs(_wrapped(_TURNS - _TURNS[best])) < np.pi / 3, weights, 0.0)
+    near /= near.sum()
+    turn = _TURNS[best] + float(near @ _wrapped(_TURNS - _TURNS[best]))
+    flexion, deviation = float(near @ _FLEXIONS), float(near @ _DEVIATIONS)
+    away = _FLEXIONS - flexion, _DEVIATIONS - deviation, _wrapped(_TURNS - turn)
+    stddev = np.sqrt(np.square(away) @ weights + _FOREARM_RAD**2)
+    turn_stddev, rotation = float(stddev[2]), np.nan
+    if bend < _LEAST_BEND:
+        stddev[2] = np.nan
+    else:
+        rotation = float(_wrapped(turn))
+        if estimate.posture_stddev is not None:
+            elbow = np.asarray(estimate.posture_stddev)[_ELBOWS[side]]
+            stddev[2] = min(hypot(turn_stddev, *(elbow / bend)), _UNKNOWN_RAD)
+    palm = axes @ directions(turn, flexion, deviation)[0]
+    wrist = np.array([flexion, deviation, rotation])
+    return Hand(opened(found), palm, wrist, stddev, turn_stddev=turn_stddev)
+
+
+def _wrapped(angles: FloatArray | float) -> FloatArray:
+    """Return angles between -pi and pi."""
+    return np.asarray(np.remainder(np.asarray(angles) + np.pi, 2.0 * np.pi) - np.pi)
+
+
+def directions(
+    turn: FloatArray | float, flexion: FloatArray | float, deviation: FloatArray | float
+) -> FloatArray:
+    """Return palm, fingers, and the direction to the little finger, (3, 3, ...), unit vectors.
+
+    The axes are the direction to which the palm faces without a turn, the one to which it faces
+    after a quarter of a turn, and the forearm.
+    """
+    inner = np.array([np.cos(turn), np.sin(turn), np.zeros_like(turn)])
+    forearm = np.array([np.zeros_like(turn), np.zeros_like(turn), np.ones_like(turn)])
+    palm = np.cos(flexion) * inner - np.sin(flexion) * forearm
+    straight = np.cos(flexion) * forearm + np.sin(flexion) * inner
+    aside = np.array([-np.sin(turn), np.cos(turn), np.zeros_like(turn)])
+    fingers = np.cos(deviation) * straight + np.sin(deviation) * aside
+    return np.array([palm, fingers, np.cos(deviation) * aside - np.sin(deviation) * straight])
+
+
+_RATED = directions(_TURNS, _FLEXIONS, _DEVIATIONS)
+_UNUSUAL = 0.5 * ((_FLEXIONS / _FLEXED_RAD) ** 2 + (_DEVIATIONS / _DEVIATED_RAD) ** 2)
+
+
+def _rated(bases: FloatArray, found: HandPoints, to_ray: FloatArray, sign: float) -> FloatArray:
+    """Return the probability of each hand of the grid, (n,).
+
+    Args:
+        bases: bases of four fingers from the wrist in the image, (4, 2), in lengths of the palm.
+        found: the hand's points.
+        to_ray: (3, 3) turns the axes of :func:`directions` to those of the ray to the hand.
+        sign: 1 for a left hand, -1 for a right one.
+    """
+    ahead, aside = (np.tensordot(to_ray[:2], one, 1) for one in _RATED[1:])
+    at = _PALM[:, 0, None, None] * aside + _PALM[:, 1, None, None] * ahead
+    agrees, size = np.einsum("ki,kin->n", bases, at), np.einsum("kin,kin->n", at, at)
+    # The scale that fits best, given the usual one of 1.
+    scale = (agrees / _POINT**2 + 1.0 / _LENGTH**2) / (size / _POINT**2 + 1.0 / _LENGTH**2)
+    differs = float(np.sum(bases**2)) - 2.0 * scale * agrees + scale**2 * size
+    chances = -_UNUSUAL - 0.5 * (differs / _POINT**2 + ((scale - 1.0) / _LENGTH) ** 2)
+    # The network does not know which hand it sees, and may give the depth of the mirror image,
+    # whose fingers would bend backwards.
+    faces = []
+    for mirror in (1.0, -1.0):
+        spatial = found.spatial_m * (1.0, 1.0, mirror)
+        normal = _palm(spatial, sign)
+        x, y, _ = to_ray.T @ normal
+        away = _wrapped(_TURNS - np.arctan2(y, x)) * min(hypot(x, y) / _SHOWS, 1.0)
+        faces.append(_CURL * _curl(spatial, normal) - 0.5 * (away / _FACING_RAD) ** 2)
+    chances += np.logaddexp(*faces)
+    weights = np.exp(chances - chances.max())
+    return np.asarray(weights / weights.sum())
 
 
 def _palm(at: FloatArray, sign: float) -> FloatArray:

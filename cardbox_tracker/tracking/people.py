@@ -155,6 +155,10 @@ class People:
         """The tracker of each person, in the order of the numbers."""
         return [person.tracker for person in self._people]
 
+    def points_of(self, number: int) -> ImagePoints | None:
+        """Return the points of a person in the last image; None if they were not found."""
+        return self._people[number - 1].points
+
     def reset(self, number: int) -> None:
         """Forget the posture of a person, who keeps the number."""
         person = self._people[number - 1]

@@ -34,7 +34,6 @@ from cardbox_tracker.person.skeleton import (
 )
 from cardbox_tracker.recordings.recording import Segmentation, open_recording
 from cardbox_tracker.recordings.silhouettes import TimeSpan
-from cardbox_tracker.recordings.track import points_of
 from cardbox_tracker.search.config import default_preset
 from cardbox_tracker.tracking.estimate import Estimate
 from cardbox_tracker.tracking.legs import LegReader
@@ -82,7 +81,8 @@ def _lines(folder: Path, truth: Any, camera: Any, given: list[float] | None) -> 
         for taken in recording.frames():
             there = found.setdefault(taken.stamp_ns, [])
             for estimate, tracker in tracked.track(taken.observations[0], taken.people):
-                points = points_of(estimate, taken, recording.first.camera)
+                assert estimate.person is not None
+                points = tracked.points_of(estimate.person)
                 reader = readers.setdefault(estimate.person, LegReader())
                 seen = points, estimate, tracker.body, tracker.camera, taken.stamp_ns / 1e9
                 begin_s = time.process_time()

@@ -6,6 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from cardbox_tracker.camera.camera import Camera
 from cardbox_tracker.detectors.hand_network import HandPoints
@@ -15,13 +17,15 @@ from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.sizes import FloatArray
 from cardbox_tracker.person.skeleton import KeypointState
 from cardbox_tracker.tracking.estimate import Estimate
-from cardbox_tracker.tracking.hands import HandReader, measured, opened
+from cardbox_tracker.tracking.hands import HandReader, directions, measured, opened
 
 CAMERA = Camera(320, 240, 300.0, 300.0, 159.5, 119.5)
 BODY = BodyModel.of()
 PICTURE = np.zeros((480, 640, 3), np.uint8)
 SIDES = "left", "right"
 RIGHT, DOWN, AHEAD = np.eye(3)
+# Palm of the arm of :func:`arm`, whose wrist is 25 cm from the elbow.
+PALM_M = 0.25 * 0.25 / 0.75
 # Of each finger: how far its base is aside of the wrist, towards the little finger, and ahead.
 BASES = (-0.03, 0.03), (-0.025, 0.09), (0.0, 0.09), (0.02, 0.085), (0.04, 0.08)
 
@@ -31,9 +35,12 @@ def hand(
     fingers: FloatArray = -DOWN,
     palm: FloatArray = -AHEAD,
     side: str = "left",
-    size_px: float = 60.0,
+    size_px: float | None = None,
 ) -> HandPoints:
-    """A hand at the middle of the image whose fingers are bent to the palm by angles, rad."""
+    """A hand at the middle of the image whose fingers are bent to the palm by angles, rad.
+
+    Without the longer side of its box, px, it has the size of the hand of :func:`arm`.
+    """
     sign = 1.0 if side == "left" else -1.0
     little = sign * np.cross(fingers, palm)
     points = [np.zeros(3)]
@@ -49,10 +56,10 @@ def hand(
         points += [base, first, *(first + (one - joints[1]) * turned for one in joints[2:])]
     spatial = np.array(points)
     flat = spatial[:, :2]
-    middle = np.array([159.5, 119.5])
-    return HandPoints(
-        middle + size_px * (flat - flat[0]) / max(np.ptp(flat, axis=0).max(), 0.01), spatial
-    )
+    px_per_m = CAMERA.fx / 2.0 * PALM_M / 0.09
+    if size_px is not None:
+        px_per_m = size_px / float(np.ptp(flat, axis=0).max())
+    return HandPoints(np.array([159.5, 119.5]) + px_per_m * (flat - flat[0]), spatial)
 
 
 FIST = (1.2, 2.6, 2.6, 2.6, 2.6)
@@ -101,45 +108,67 @@ def test_the_wrist_is_straight_and_the_thumb_up(side: str) -> None:
     """The forearm points to the camera, so the palm faces the body's middle."""
     inwards = RIGHT if side == "right" else -RIGHT
     found = hand(fingers=-AHEAD, palm=inwards, side=side)
-    np.testing.assert_allclose(angles(side, found, -AHEAD), 0.0, atol=1e-6)
+    np.testing.assert_allclose(angles(side, found, -AHEAD), 0.0, atol=0.1)
 
 
 @pytest.mark.parametrize("side", SIDES)
 @pytest.mark.parametrize(
-    ("flexion", "deviation"), [(0.6, 0.0), (-0.4, 0.0), (0.0, 0.3), (0.5, -0.2)]
+    ("flexion", "deviation", "least"),
+    [(0.6, 0.0, 0.5), (-0.5, 0.0, 0.5), (0.0, 0.4, 0.4), (0.5, -0.3, 0.2)],
 )
 def test_flexion_is_to_the_palm_and_deviation_to_the_little_finger(
-    side: str, flexion: float, deviation: float
+    side: str, flexion: float, deviation: float, least: float
 ) -> None:
+    """The angles are between those of a straight wrist and the true ones, as wrists bend little."""
     inwards = RIGHT if side == "right" else -RIGHT
     straight = np.cos(flexion) * -AHEAD + np.sin(flexion) * inwards
     palm = np.cos(flexion) * inwards - np.sin(flexion) * -AHEAD
     # The thumb is up, and the little finger down.
     fingers = np.cos(deviation) * straight + np.sin(deviation) * DOWN
     found = angles(side, hand(fingers=fingers, palm=palm, side=side), -AHEAD)
-    np.testing.assert_allclose(found, [flexion, deviation, 0.0], atol=1e-6)
+    for value, true in zip(found, (flexion, deviation), strict=False):
+        if true:
+            assert least <= value / true < 1.1
+        else:
+            assert abs(value) < 0.1
 
 
 @pytest.mark.parametrize("side", SIDES)
 @pytest.mark.parametrize(("palm", "rotation"), [(DOWN, np.pi / 2), (-DOWN, -np.pi / 2)])
 def test_a_palm_that_faces_down_is_pronated(side: str, palm: FloatArray, rotation: float) -> None:
     found = angles(side, hand(fingers=-AHEAD, palm=palm, side=side), -AHEAD)
-    np.testing.assert_allclose(found, [0.0, 0.0, rotation], atol=1e-6)
+    np.testing.assert_allclose(found, [0.0, 0.0, rotation], atol=0.1)
 
 
 def test_a_straight_arm_has_no_rotation() -> None:
-    found = angles("left", hand(fingers=DOWN, palm=-RIGHT), DOWN)
-    assert np.isnan(found[2])
-    np.testing.assert_allclose(found[:2], 0.0, atol=1e-6)
+    estimate, points = arm("left", DOWN)
+    found = measured("left", hand(fingers=DOWN, palm=-RIGHT), points, estimate, CAMERA)
+    assert np.isnan([found.wrist[2], found.wrist_stddev[2]]).all()
+    np.testing.assert_allclose(found.wrist[:2], 0.0, atol=0.1)
+
+
+@pytest.mark.parametrize("dives_rad", [-0.9, 0.9])
+def test_fingers_that_only_the_networks_depth_bends_stay_straight(dives_rad: float) -> None:
+    """In the image, the hand is as long as a hand that lies in its plane."""
+    estimate, points = arm("left", DOWN)
+    seen = hand(fingers=DOWN, palm=-AHEAD)
+    dives = hand(
+        fingers=np.cos(dives_rad) * DOWN + np.sin(dives_rad) * AHEAD,
+        palm=-np.cos(dives_rad) * AHEAD + np.sin(dives_rad) * DOWN,
+    )
+    wrong = seen._replace(spatial_m=dives.spatial_m)
+    found = measured("left", wrong, points, estimate, CAMERA)
+    np.testing.assert_allclose(found.wrist[:2], 0.0, atol=0.1)
+    np.testing.assert_allclose(found.palm, -AHEAD, atol=0.15)
 
 
 def test_the_palm_is_that_of_the_ray_to_the_hand() -> None:
     """At the border of the image, a palm that faces the camera along the ray is turned with it."""
-    estimate, points = arm("left", -AHEAD)
+    estimate, points = arm("left", -DOWN)
     found = hand()
     aside = found._replace(px=found.px + np.array([150.0, 0.0]))
     palm = measured("left", aside, points, estimate, CAMERA).palm
-    np.testing.assert_allclose(palm, -np.array([150.0, 0.0, 300.0]) / np.hypot(150, 300), atol=1e-9)
+    np.testing.assert_allclose(palm, -np.array([150.0, 0.0, 300.0]) / np.hypot(150, 300), atol=0.05)
 
 
 @pytest.mark.parametrize("side", SIDES)
@@ -149,9 +178,26 @@ def test_the_depth_of_the_mirror_image_is_told_by_the_fingers(side: str) -> None
     found = hand((0.5,) * 5, fingers=-DOWN, palm=palm, side=side)
     mirrored = found._replace(spatial_m=found.spatial_m * (1.0, 1.0, -1.0))
     estimate, points = arm(side, -DOWN)
-    for one in (found, mirrored):
-        seen = measured(side, one, points, estimate, CAMERA)
-        np.testing.assert_allclose(seen.palm, palm, atol=1e-6)
+    first, second = (measured(side, one, points, estimate, CAMERA) for one in (found, mirrored))
+    np.testing.assert_allclose(first.palm, second.palm, atol=1e-9)
+    assert first.palm @ palm > np.cos(0.3)
+
+
+@given(turn=st.floats(-3.1, 3.1), flexion=st.floats(-1.4, 1.4), deviation=st.floats(-1.0, 1.0))
+def test_directions_of_a_hand_are_a_frame_with_these_angles(
+    turn: float, flexion: float, deviation: float
+) -> None:
+    found = directions(turn, flexion, deviation)
+    np.testing.assert_allclose(found @ found.T, np.eye(3), atol=1e-12)
+    palm, fingers, aside = found
+    assert np.arcsin(-palm[2]) == pytest.approx(flexion)
+    # The forearm in the plane of the palm, from which the hand deviates.
+    straight = np.array([0.0, 0.0, 1.0]) - palm[2] * palm
+    across = np.cos(deviation) * aside + np.sin(deviation) * fingers
+    assert np.arctan2(fingers @ across, fingers @ straight / np.linalg.norm(straight)) == (
+        pytest.approx(deviation)
+    )
+    np.testing.assert_allclose(directions(turn, 0.0, 0.0)[0], [np.cos(turn), np.sin(turn), 0.0])
 
 
 class Looks:
@@ -168,8 +214,10 @@ class Looks:
 
 def both() -> tuple[Estimate, ImagePoints]:
     estimate, left = arm("left", -AHEAD)
-    _, right = arm("right", -AHEAD)
-    assert estimate.keypoints_m is not None
+    other, right = arm("right", -AHEAD)
+    assert estimate.keypoints_m is not None and other.keypoints_m is not None
+    keypoints_m = np.concatenate([estimate.keypoints_m[:3], other.keypoints_m[3:]])
+    estimate = replace(estimate, keypoints_m=keypoints_m)
     px = np.where(np.isnan(left.px), right.px + np.array([60.0, 0.0]), left.px)
     return estimate, ImagePoints(px, np.maximum(left.scores, right.scores))
 
@@ -234,5 +282,6 @@ def test_the_turn_is_that_of_the_hand_against_the_forearm(side: str) -> None:
     seen = found[SIDES.index(side)]
     assert seen is not None
     # The palm of a person who faces the camera faces forwards, so the thumb has turned outwards.
-    np.testing.assert_allclose(seen.joints, [-np.pi / 2, 0.0, 0.0], atol=1e-6)
-    np.testing.assert_array_equal(seen.joints_stddev, seen.wrist_stddev[[0, 0, 1]])
+    np.testing.assert_allclose(seen.joints, [-np.pi / 2, 0.0, 0.0], atol=0.1)
+    assert (seen.joints_stddev > np.radians(10.0)).all()
+    assert (seen.joints_stddev < np.radians([60.0, 25.0, 20.0])).all()

@@ -191,7 +191,7 @@ class TrackerNode(CardboxNode):
         self.offer("~/reset", self._reset)
         settings = self.parameters.value
         self._look = HandNetwork(installed_hands()) if settings.hands else None
-        self._hands: HandReader | None = None
+        self._hands: list[HandReader] = []
         self._prepared: set[str] = set()
         self._prepare(settings)
         self._body: BodyModel | None = None
@@ -290,7 +290,7 @@ class TrackerNode(CardboxNode):
                 Tracker(self._body, self._camera, settings.config(), rng, others=self._others)
             ]
         self._tracker = trackers[0]
-        self._hands = None if self._look is None else HandReader(self._look)
+        self._hands = [HandReader(self._look) for _ in trackers if self._look is not None]
         for report, tracker in zip(self._reports, trackers, strict=True):
             report.start(tracker.body)
         self.diagnostics.say(reason, f"{reason}: tracking starts from the front reference posture")
@@ -340,10 +340,10 @@ class TrackerNode(CardboxNode):
             return
         seen = self._inputs.observed(received)
         if self._people is None:
-            estimate = self._tracker.track(seen.observations)
-            found = [(self._with_hands(seen, estimate, self._tracker), self._tracker)]
+            found = [(self._tracker.track(seen.observations), self._tracker)]
         else:
             found = self._people.track(seen.observations[0], seen.people)
+        found = [(self._with_hands(seen, *one), one[1]) for one in found]
         for outputs, report, (estimate, tracker) in zip(
             self._outputs, self._reports, found, strict=True
         ):
@@ -360,11 +360,14 @@ class TrackerNode(CardboxNode):
     def _with_hands(self, seen: ObservationSet, estimate: Estimate, tracker: Tracker) -> Estimate:
         """Return the estimate of an image with the hands, if they are looked at."""
         first = seen.observations[0]
-        if self._hands is None or first.image is None:
+        if not self._hands or first.image is None:
             return estimate
         time_s = conversions.stamp_ns(seen.header.stamp) / 1e9
-        person = tracker.body, tracker.camera
-        found = self._hands.see(seen.picture, first.points, estimate, *person, time_s)
+        number, points = estimate.person or 1, first.points
+        if self._people is not None:
+            points = self._people.points_of(number)
+        person, reader = (tracker.body, tracker.camera), self._hands[number - 1]
+        found = reader.see(seen.picture, points, estimate, *person, time_s)
         tracker.used["hands"] = tracker.used.get("hands", 0) + any(found.hands or ())
         return found
 

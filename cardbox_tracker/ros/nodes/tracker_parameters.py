@@ -256,11 +256,10 @@ class TrackerParameters(NodeParameters):
                 f"people is {self.people}; several people are tracked with one camera, without "
                 "depth, and with the preset default"
             )
-        if self.hands and (self.people or not (self.keypoints and self.use_image)):
+        if self.hands and not (self.keypoints and self.use_image):
             raise ValueError(
-                "hands needs images, and the wrists and knuckles of one person: leave use_image "
-                "on, give keypoints, such as detector/keypoints, and no people; for several, use "
-                "'cardbox track --hands --people'"
+                "hands needs images, and wrists and knuckles: leave use_image on, and give "
+                "keypoints, such as detector/keypoints"
             )
         camera_names(self.cameras)
         if self.stature and len(self.cameras) > 1:

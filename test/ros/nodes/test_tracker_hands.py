@@ -58,14 +58,17 @@ def installed(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(tracker_node, "HandNetwork", Network)
 
 
-def test_hands_are_published_with_their_joints(bus: Any, installed: None, detected: Any) -> None:
+@pytest.mark.parametrize(("people", "space"), [(0, ""), (1, "/person_1")])
+def test_hands_are_published_with_their_joints(
+    bus: Any, installed: None, detected: Any, people: int, space: str
+) -> None:
     points = detected(BODY, CAMERA, POSTURE)
     px, scores = np.zeros((len(LANDMARKS), 2)), np.zeros(len(LANDMARKS))
     for number, name in enumerate(LANDMARKS):
         if name in POINT_INDEX:
             px[number] = np.nan_to_num(points.px[POINT_INDEX[name]])
             scores[number] = points.scores[POINT_INDEX[name]]
-    bus.start(TrackerNode, hands=True, keypoints="detector/keypoints", publish_tf=False)
+    bus.start(TrackerNode, hands=True, keypoints="detector/keypoints", people=people)
     bus.send("/body_model", String(data=dumps_body_model(BODY)))
     for tenth in range(8):
         header = Header(frame_id="eye", stamp=Time(sec=1, nanosec=tenth * 10**8))
@@ -75,20 +78,19 @@ def test_hands_are_published_with_their_joints(bus: Any, installed: None, detect
         image = np.zeros((CAMERA.height, CAMERA.width, 3), np.uint8)
         bus.send("/silhouette/image", image_message(header, image, "bgr8"))
         bus.send("/silhouette", image_message(header, OUTLINE, "mono8"))
-    opened, joints = bus.sent["/hands"][-1], bus.sent["/joint_states"][-1]
+    opened, joints = (bus.sent[f"{space}/{name}"][-1] for name in ("hands", "joint_states"))
     assert opened.name == ["left_hand_open", "right_hand_open"]
     assert min(opened.position) > 0.75
     assert tuple(joints.name[-6:]) == HAND_NAMES
     assert any(joints.position[-6:]) and not any(joints.velocity[-6:])
     values = {value.key: value.value for value in bus.tick().values}
-    assert values["hands used"] == "8 of 8"
+    person = "person 1 " if people else ""
+    assert values[f"{person}hands used"] == "8 of 8"
 
 
-@pytest.mark.parametrize(
-    "wrong", [{}, {"keypoints": "a/b", "people": 2}, {"keypoints": "a/b", "use_image": False}]
-)
-def test_hands_need_points_of_one_person_and_images(bus: Any, wrong: dict[str, Any]) -> None:
-    with pytest.raises(CardboxError, match="hands needs images, and the wrists and knuckles"):
+@pytest.mark.parametrize("wrong", [{}, {"keypoints": "a/b", "use_image": False}])
+def test_hands_need_points_and_images(bus: Any, wrong: dict[str, Any]) -> None:
+    with pytest.raises(CardboxError, match="hands needs images, and wrists and knuckles"):
         bus.start(TrackerNode, hands=True, **wrong)
 
 
