@@ -61,6 +61,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "unrecognizable, as they are, or none",
     )
     parser.add_argument("--title", metavar="TEXT", help="heading of --html, such as the task")
+    parser.add_argument(
+        "--hands",
+        action="store_true",
+        help="with --detector mediapipe: also measure the wrists, which are declared otherwise",
+    )
     add_force(parser)
     add_settings(parser, RulaConfig, "the task and the limits that the paper leaves open")
 

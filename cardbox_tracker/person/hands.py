@@ -51,6 +51,8 @@ HANDS: tuple[Joint, ...] = (*_hand("left", 1.0), *_hand("right", -1.0))
 """Joints of the hands, where they are measured (:mod:`.tracking.hands`)."""
 HAND_NAMES = tuple(joint.name for joint in HANDS)
 """The 6 joints of the hands, three of the left one first; all are in rad."""
+WRIST_NAMES = HAND_NAMES[1:3], HAND_NAMES[4:6]
+"""Flexion and deviation of the left and the right wrist."""
 HAND_OPEN_NAMES = "left_hand_open", "right_hand_open"
 """How open the hands are, 0 to 1."""
 

@@ -15,7 +15,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from cardbox_tracker.person.hands import HAND_NAMES, HAND_OPEN_NAMES
+from cardbox_tracker.person.hands import HAND_NAMES, HAND_OPEN_NAMES, WRIST_NAMES
 from cardbox_tracker.person.legs import LEG_NAMES
 from cardbox_tracker.person.sizes import FloatArray
 from cardbox_tracker.person.skeleton import (
@@ -273,6 +273,12 @@ def neck_from(joints: JointValues) -> FloatArray | None:
     if not by_name.keys() >= set(NECK_NAMES):
         return None
     return np.array([by_name[name] for name in NECK_NAMES])
+
+
+def wrists_from(joints: JointValues) -> FloatArray:
+    """Return flexion and deviation of both wrists, (2, 2), rad; nan for one that is missing."""
+    by_name = positions_of(joints)
+    return np.array([[by_name.get(name, np.nan) for name in names] for names in WRIST_NAMES])
 
 
 def open_hands_from(joints: JointValues) -> FloatArray:

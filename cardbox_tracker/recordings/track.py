@@ -159,6 +159,8 @@ def track_recording(
                     hand_reader = hand_readers.setdefault(estimate.person, HandReader(hands))
                     picture = partial(first.full_picture, taken.first)
                     estimate = hand_reader.see(picture, points, estimate, *person, time_s)
+                    is_seen = any(estimate.hands or ())
+                    tracker.used["hands"] = tracker.used.get("hands", 0) + is_seen
                 if legs:
                     leg_reader = leg_readers.setdefault(estimate.person, LegReader())
                     estimate = leg_reader.see(points, estimate, *person, time_s)

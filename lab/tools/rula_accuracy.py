@@ -55,6 +55,8 @@ TASKS = {
     "no load": RulaConfig(),
     "2 to 10 kg held": RulaConfig(arm_load=2, arm_muscle_use=1, body_load=2, body_muscle_use=1),
 }
+UNKNOWN = np.full((2, 2, 2), np.nan)
+"""Wrists, whose true flexion is not known."""
 LOW = 2
 """Highest score that is acceptable."""
 _HEAD = (
@@ -123,7 +125,9 @@ def score_errors(
         angles, deviations = neck = estimate.neck, estimate.neck_stddev
         for task, rula in tasks.items():
             drawn = [
-                sampled_scores(tracker.body, estimate.posture, postures, neck, rula, rng)[0]
+                sampled_scores(tracker.body, estimate.posture, postures, neck, UNKNOWN, rula, rng)[
+                    0
+                ]
                 for postures in (normal, particles)
             ]
             mean = np.eye(HIGHEST)[drawn[0].of_mean - 1]

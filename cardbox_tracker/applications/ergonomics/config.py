@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import dataclass, fields
 from typing import NamedTuple
 
@@ -10,6 +11,8 @@ from cardbox_tracker.common.settings import Settings, setting, settings_of
 MEASURED, DECLARED, MIXED = "measured", "declared", "mixed"
 """Origins of a part score; tables and the grand score are mixed."""
 NOT_SEEN = "declared, not seen"
+WRISTS = frozenset({"left_wrist", "right_wrist"})
+"""Parts that share one declared input."""
 
 _DECLARED = "declared, since it is not measured"
 
@@ -56,6 +59,13 @@ class ErgonomicConfig(Settings):
         unit="deg",
         limits=(5.0, 80.0),
     )
+    wrist_aside_deg: float = setting(
+        15.0,
+        "a hand bent this far to the thumb or to the little finger is bent aside; the paper names "
+        "no angle",
+        unit="deg",
+        limits=(5.0, 40.0),
+    )
     upright_deg: float = setting(
         10.0,
         "a trunk bowed less than this is upright, score 1; the paper has 0, which nobody keeps and "
@@ -81,8 +91,8 @@ class RulaConfig(ErgonomicConfig):
     )
     wrist: int = setting(
         1,
-        "score of the wrists: 1 neutral, 2 to 15 degrees, 3 beyond; 1 more if bent aside; "
-        f"{_DECLARED}",
+        "score of the wrists: 1 neutral, 2 to 15 degrees, 3 beyond; 1 more if bent aside; declared "
+        "for images in which a hand is not measured",
         limits=(1, 4),
     )
     wrist_twist: int = setting(
@@ -102,6 +112,12 @@ class RulaConfig(ErgonomicConfig):
     )
     body_muscle_use: int = setting(0, "as arm_muscle_use, of neck, trunk and legs", limits=(0, 1))
     body_load: int = setting(0, "as arm_load, of neck, trunk and legs", limits=(0, 3))
+    wrist_neutral_deg: float = setting(
+        5.0,
+        "a wrist bent less than this is neutral; the paper has 0, which no wrist keeps",
+        unit="deg",
+        limits=(0.0, 15.0),
+    )
     outwards_deg: float = setting(
         30.0,
         "a forearm that points this far to the outside works out to the side of the body; the "
@@ -134,8 +150,8 @@ class RebaConfig(ErgonomicConfig):
     )
     wrist: int = setting(
         1,
-        f"score of the wrists: 1 to 15 degrees, 2 beyond; 1 more if bent aside or twisted; "
-        f"{_DECLARED}",
+        "score of the wrists: 1 to 15 degrees, 2 beyond; 1 more if bent aside or twisted; declared "
+        "for images in which a hand is not measured",
         limits=(1, 3),
     )
     load: int = setting(
@@ -153,7 +169,7 @@ class RebaConfig(ErgonomicConfig):
     )
 
 
-DECLARED_PARTS = {"wrist": 4, "wrist_twist": 2, "legs": 2}
+DECLARED_PARTS = {"wrist_twist": 2, "legs": 2}
 """Highest score of each part that no image shows."""
 
 _INPUTS: dict[type[Settings], tuple[str, ...]] = {
@@ -199,14 +215,15 @@ def _kind_of(config: ErgonomicConfig) -> type[Settings]:
 
 
 def declared(
-    config: ErgonomicConfig, is_neck_measured: bool = False, are_legs_measured: bool = False
+    config: ErgonomicConfig, measured: Collection[str] = frozenset()
 ) -> tuple[Declared, ...]:
-    """Return the inputs that are declared; neck and legs are none of them while measured."""
+    """Return the inputs that are declared, without parts that are ``measured``."""
     kind = _kind_of(config)
     known, defaults = settings_of(kind), {one.name: one.default for one in fields(config)}
-    is_measured = {"neck": is_neck_measured, "legs": are_legs_measured}
     found = []
-    for name in (name for name in _INPUTS[kind] if not is_measured.get(name)):
+    for name in _INPUTS[kind]:
+        if {"wrist": WRISTS}.get(name, {name}) <= set(measured):
+            continue
         value = getattr(config, name)
         text = str(value) if type(value) is int else ("no", "yes")[value]
         found.append(Declared(name, text, value == defaults[name], known[name].description))

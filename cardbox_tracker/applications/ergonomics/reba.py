@@ -8,9 +8,10 @@ pages 201-205. Upper arms are scored as in :mod:`.rula`; the other parts as foll
 - neck: 1 to 20 degrees of flexion against the trunk, 2 beyond or in extension; twisted adds 1;
 - legs: 1 if both feet carry weight, and walking or sitting, 2 if one does; the knee of a leg that
   carries weight adds 1 from 30 degrees on, 2 beyond 60, but not while sitting;
-- lower arm: 1 for 60 to 100 degrees between it and the line of the upper arm, else 2.
+- lower arm: 1 for 60 to 100 degrees between it and the line of the upper arm, else 2;
+- wrist: 1 to 15 degrees to the palm or to the back, 2 beyond; bent aside adds 1.
 
-Wrists, load, coupling and activity come from the settings, and so do neck and legs where they were
+Load, coupling and activity come from the settings, and so do neck, legs and wrists where they were
 not measured. A foot that is 10 cm higher than the other one carries no weight, so a step of a walk
 counts as standing on one leg. Whoever would fall backwards sits: the centre of mass lies behind the
 heels.
@@ -37,13 +38,17 @@ from cardbox_tracker.applications.ergonomics.rula import (
     ScoreDistribution,
     distribution_of,
     elbow_scores,
+    measured_wrists,
     neck_samples,
     table_of,
     trunk_scores,
     upper_arm_scores,
+    wrist_samples,
+    wrist_scores,
 )
 from cardbox_tracker.common.errors import CardboxError
 from cardbox_tracker.common.files import UnreadableFileError, regular_file
+from cardbox_tracker.person.hands import WRIST_NAMES
 from cardbox_tracker.person.legs import (
     LEG_KEYPOINT_NAMES,
     LEG_NAMES,
@@ -111,6 +116,7 @@ class ArmScores(NamedTuple):
 
     upper_arm: ScoreArray
     lower_arm: ScoreArray
+    wrist: ScoreArray
     table_b: ScoreArray
     grand: ScoreArray
 
@@ -149,8 +155,11 @@ REBA = Method(
         Part("left_table_b", "table B, left", 9, lambda scores: scores.left.table_b),
         Part("right_table_b", "table B, right", 9, lambda scores: scores.right.table_b),
         Part("table_a", "table A", 9, lambda scores: scores.table_a),
+        Part("left_wrist", "wrist, left", 3, lambda scores: scores.left.wrist),
+        Part("right_wrist", "wrist, right", 3, lambda scores: scores.right.wrist),
     ),
-    {"wrist": 3},
+    {},
+    ("neck", "legs", "left_wrist", "right_wrist"),
 )
 
 # Height above the other foot from which a foot carries no weight, m.
@@ -171,6 +180,7 @@ class Seen(NamedTuple):
         state: of the tracker.
         posture: d1..d12 and their standard deviations, (2, 12); None without a posture.
         neck: ``neck_yaw`` and ``neck_pitch`` and their deviations, (2, 2); None if unknown.
+        wrists: see :func:`.rula.wrist_samples`.
         legs: ``LEG_NAMES`` and their deviations, (2, 8); None unless both legs are ``tracked``.
         lengths_m: hips to shoulders, then thigh and shank of the left and the right leg, (5,).
     """
@@ -180,6 +190,7 @@ class Seen(NamedTuple):
     state: str
     posture: FloatArray | None
     neck: FloatArray | None
+    wrists: FloatArray
     legs: FloatArray | None
     lengths_m: FloatArray
 
@@ -215,7 +226,7 @@ def read_table(path: Path, person: int = 1) -> list[Seen]:
 def _seen(row: Mapping[str, str]) -> Seen:
     stamp = int(row["stamp_ns"]), float(row["time_s"]), row["state"]
     if not row[JOINT_NAMES[0]]:
-        return Seen(*stamp, None, None, None, np.zeros(5))
+        return Seen(*stamp, None, None, np.full((2, 2, 2), np.nan), None, np.zeros(5))
 
     def pair(names: Sequence[str]) -> FloatArray | None:
         deviations = [f"{name}_stddev_{UNITS.get(name, 'rad')}" for name in names]
@@ -232,7 +243,12 @@ def _seen(row: Mapping[str, str]) -> Seen:
     lengths_m = [trunk_m, *np.linalg.norm(np.diff(legs_m, axis=1), axis=-1).ravel()]
     are_tracked = all(row[f"{name}_state"] == KeypointState.TRACKED for name in LEG_KEYPOINT_NAMES)
     legs = pair(LEG_NAMES) if are_tracked else None
-    return Seen(*stamp, pair(JOINT_NAMES), pair(NECK_NAMES), legs, np.array(lengths_m))
+    wrists = np.full((2, 2, 2), np.nan)
+    for number, names in enumerate(WRIST_NAMES):
+        found = pair(names)
+        if found is not None:
+            wrists[:, number] = found
+    return Seen(*stamp, pair(JOINT_NAMES), pair(NECK_NAMES), wrists, legs, np.array(lengths_m))
 
 
 def score_table(images: Sequence[Seen], config: RebaConfig, seed: int) -> list[RulaRow]:
@@ -244,8 +260,8 @@ def score_table(images: Sequence[Seen], config: RebaConfig, seed: int) -> list[R
             seen.state,
             None if seen.posture is None else _distribution(seen, config, rng),
             seen.time_s,
-            seen.neck is not None,
-            seen.legs is not None,
+            frozenset(name for name in ("neck", "legs") if getattr(seen, name) is not None)
+            | measured_wrists(seen.wrists),
         )
         for seen in images
     ]
@@ -261,13 +277,15 @@ def _distribution(seen: Seen, config: RebaConfig, rng: np.random.Generator) -> S
     if seen.legs is not None:
         angles, deviations = seen.legs
         legs = angles + INDEPENDENT * deviations * rng.standard_normal((SAMPLES, len(angles)))
-    scores = reba_scores(postures, config, necks, legs, seen.lengths_m)
+    wrists = wrist_samples(seen.wrists, SAMPLES, rng)
+    scores = reba_scores(postures, config, necks, legs, seen.lengths_m, wrists)
     of_mean = reba_scores(
         mean,
         config,
         None if seen.neck is None else seen.neck[0],
         None if seen.legs is None else seen.legs[0],
         seen.lengths_m,
+        seen.wrists[0],
     )
     return distribution_of(scores, REBA, int(of_mean.grand))
 
@@ -278,6 +296,7 @@ def reba_scores(
     necks: FloatArray | None = None,
     legs: FloatArray | None = None,
     lengths_m: FloatArray | None = None,
+    wrists: FloatArray | None = None,
 ) -> RebaScores:
     """Return the scores of postures.
 
@@ -287,8 +306,12 @@ def reba_scores(
         necks: ``neck_yaw`` and ``neck_pitch`` of each posture, (..., 2), rad; None if unknown.
         legs: ``LEG_NAMES`` of each posture, (..., 8), rad; None if unknown.
         lengths_m: see :class:`Seen`; needed with legs.
+        wrists: flexion and deviation of the left and the right wrist in each posture,
+            (..., 2, 2), rad; nan or None if unknown.
     """
     d = np.asarray(postures, np.float64)
+    if wrists is None:
+        wrists = np.full((*d.shape[:-1], 2, 2), np.nan)
     is_far_back = np.degrees(d[..., PITCH]) < -60.0
     trunk = trunk_scores(d, config) - is_far_back
     neck = np.full(trunk.shape, config.neck) if necks is None else _neck(necks, config)
@@ -297,8 +320,8 @@ def reba_scores(
         leg = _legs(legs, d[..., PITCH], lengths_m)
     table_a = TABLE_A[trunk - 1, neck - 1, leg - 1]
     body = np.minimum(table_a + config.load, 12)
-    left = _arm(d[..., LEFT_ARM], 1.0, body, config)
-    right = _arm(d[..., RIGHT_ARM], -1.0, body, config)
+    left = _arm(d[..., LEFT_ARM], 1.0, wrists[..., 0, :], body, config)
+    right = _arm(d[..., RIGHT_ARM], -1.0, wrists[..., 1, :], body, config)
     return RebaScores(left, right, trunk, neck, leg, table_a, np.maximum(left.grand, right.grand))
 
 
@@ -336,11 +359,14 @@ def _legs(angles: FloatArray, pitch: FloatArray, lengths_m: FloatArray) -> Score
     return np.asarray(np.where(carries.all(axis=0) | is_seated, 1, 2) + bent)
 
 
-def _arm(angles: FloatArray, side: float, body: ScoreArray, config: RebaConfig) -> ArmScores:
-    """Return the scores of arms (..., 4); ``side`` is +1 for left ones, -1 for right ones."""
+def _arm(
+    angles: FloatArray, side: float, wrists: FloatArray, body: ScoreArray, config: RebaConfig
+) -> ArmScores:
+    """Return the scores of arms (..., 4) with wrists (..., 2); ``side`` is +1 for left ones."""
     upper, fore = arm_directions(angles, side)
     upper_arm, lower_arm = upper_arm_scores(upper, side, config), elbow_scores(upper, fore)
-    table_b = TABLE_B[upper_arm - 1, lower_arm - 1, config.wrist - 1]
+    wrist = wrist_scores(wrists, (15.0,), config, config.wrist)
+    table_b = TABLE_B[upper_arm - 1, lower_arm - 1, wrist - 1]
     arm = np.minimum(table_b + config.coupling, 12)
     grand = TABLE_C[body - 1, arm - 1] + config.activity
-    return ArmScores(upper_arm, lower_arm, table_b, np.asarray(grand))
+    return ArmScores(upper_arm, lower_arm, wrist, table_b, np.asarray(grand))

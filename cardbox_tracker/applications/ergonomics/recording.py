@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import heapq
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import NamedTuple
@@ -43,7 +43,7 @@ def header_of(method: Method) -> tuple[str, ...]:
         *(part.name for part in method.parts),
         "neck_from",
         "mean_posture_score",
-        *(("legs_from",) if method is not RULA else ()),
+        *(f"{name}_from" for name in method.measurable if name != "neck"),
     )
 
 
@@ -74,16 +74,14 @@ class RulaRow:
         state: of the tracker.
         scores: its scores; None without a posture.
         time_s: seconds from the recording's start.
-        is_neck_measured: whether the neck's score is measured; otherwise it is declared.
-        are_legs_measured: the same for the legs.
+        measured: which of the method's ``measurable`` parts are measured; others are declared.
     """
 
     stamp_ns: int
     state: str
     scores: ScoreDistribution | None
     time_s: float
-    is_neck_measured: bool = False
-    are_legs_measured: bool = False
+    measured: frozenset[str] = frozenset()
 
     @property
     def worst(self) -> float:
@@ -142,14 +140,18 @@ class RulaObserver:
 
     def __call__(self, frame: RecordedFrame, estimate: Estimate, tracker: Tracker) -> None:
         """Append the row of one image, scored for samples of its posterior."""
-        scores, is_measured = None, False
+        scores, measured = None, frozenset[str]()
         if estimate.posture is not None:
             postures = tracker.sample(estimate, SAMPLES, self._rng)
             neck = estimate.neck, estimate.neck_stddev
-            scores, is_measured = sampled_scores(
-                tracker.body, estimate.posture, postures, neck, self._config, self._rng
+            wrists = np.full((2, 2, 2), np.nan)
+            for number, hand in enumerate(estimate.hands or ()):
+                if hand is not None:
+                    wrists[:, number] = hand.wrist[:2], hand.wrist_stddev[:2]
+            scores, measured = sampled_scores(
+                tracker.body, estimate.posture, postures, neck, wrists, self._config, self._rng
             )
-        row = RulaRow(frame.stamp_ns, estimate.state, scores, frame.time_s, is_measured)
+        row = RulaRow(frame.stamp_ns, estimate.state, scores, frame.time_s, measured)
         self.rows.append(row)
         if self._images is not None:
             self._images.add(row, frame, estimate, tracker)
@@ -181,8 +183,7 @@ class RulaSummary:
         mean: expected score over the measured time; nan without any.
         of_mean: mean score of the mean postures over the same time.
         uncertain_s: part of the measured time whose postures may be wrong.
-        neck_measured_s: part of the measured time with a measured neck.
-        legs_measured_s: the same with measured legs.
+        measured_parts_s: part of the measured time in which each measurable part was measured.
     """
 
     measured_s: float
@@ -191,18 +192,13 @@ class RulaSummary:
     mean: float
     of_mean: float
     uncertain_s: float
-    neck_measured_s: float
-    legs_measured_s: float = 0.0
+    measured_parts_s: Mapping[str, float]
 
     @property
-    def is_neck_always_measured(self) -> bool:
-        """Whether no image with a posture has a declared neck."""
-        return 0 < self.measured_s <= self.neck_measured_s + 1e-9
-
-    @property
-    def are_legs_always_measured(self) -> bool:
-        """Whether no image with a posture has declared legs."""
-        return 0 < self.measured_s <= self.legs_measured_s + 1e-9
+    def always_measured(self) -> frozenset[str]:
+        """Parts that are declared in no image with a posture."""
+        parts = self.measured_parts_s.items()
+        return frozenset(name for name, time_s in parts if 0 < self.measured_s <= time_s + 1e-9)
 
 
 def summarize(rows: Sequence[RulaRow], method: Method = RULA) -> RulaSummary:
@@ -218,8 +214,10 @@ def summarize(rows: Sequence[RulaRow], method: Method = RULA) -> RulaSummary:
         expected(time_s / total_s) if total_s else float("nan"),
         expected(of_mean_s / total_s) if total_s else float("nan"),
         float(scored_s @ np.array([row.state == UNCERTAIN for row in rows], float)),
-        float(scored_s @ np.array([row.is_neck_measured for row in rows], float)),
-        float(scored_s @ np.array([row.are_legs_measured for row in rows], float)),
+        {
+            name: float(scored_s @ np.array([name in row.measured for row in rows], float))
+            for name in method.measurable
+        },
     )
 
 
@@ -261,14 +259,10 @@ def score_shares(
         ScoreShares(MEAN_POSTURE, "of mean posture", MIXED, of_mean_s),
     ]
     scored = [row for row in rows if row.scores is not None]
-    found = {
-        "neck": {row.is_neck_measured for row in scored},
-        "legs": {row.are_legs_measured for row in scored},
-    }
-    sources = {
-        name: MIXED if len(known) > 1 else (DECLARED, MEASURED)[known == {True}]
-        for name, known in found.items()
-    }
+    sources = {}
+    for name in method.measurable:
+        known = {name in row.measured for row in scored}
+        sources[name] = MIXED if len(known) > 1 else (DECLARED, MEASURED)[known == {True}]
     for name, words, highest, _ in method.parts:
         source = sources.get(name, MIXED if "table" in name else MEASURED)
         time_s = _time_at(rows, name, highest)
@@ -318,7 +312,7 @@ def write_csv(rows: Sequence[RulaRow], path: Path, method: Method = RULA) -> Non
         CardboxError: the file cannot be written.
     """
     header = header_of(method)
-    write_table(path, header, (_fields(row, method)[: len(header)] for row in rows))
+    write_table(path, header, (_fields(row, method) for row in rows))
 
 
 def _fields(row: RulaRow, method: Method) -> list[str]:
@@ -327,10 +321,9 @@ def _fields(row: RulaRow, method: Method) -> list[str]:
         return [stamp, row.state, *[""] * (len(header_of(method)) - 2)]
     of_parts = [scores.left, scores.right, *(scores.parts[part.name] for part in method.parts)]
     values = (scores.chance_above(method.above), *scores.grand.tolist(), *map(expected, of_parts))
+    neck, *others = (MEASURED if name in row.measured else DECLARED for name in method.measurable)
     return [
         *(stamp, row.state, f"{scores.mean:.3f}", str(scores.likeliest)),
         *(f"{value:.3f}" for value in values),
-        MEASURED if row.is_neck_measured else DECLARED,
-        str(scores.of_mean),
-        MEASURED if row.are_legs_measured else DECLARED,
+        *(neck, str(scores.of_mean), *others),
     ]

@@ -61,15 +61,12 @@ def report_lines(
         yield "mean score of each part, and the share of the time at each score:"
         for one in shares:
             yield f"  {one.words:<16} {one.mean:.1f}  {one.source:<8}  {_share_words(one)}"
-    inputs = declared(config, summary.is_neck_always_measured, summary.are_legs_always_measured)
+    inputs = declared(config, summary.always_measured)
     for title, is_default in ((NOT_SEEN, False), (f"{NOT_SEEN}, with the default value", True)):
         found = [one.words for one in inputs if one.is_default == is_default]
         if found:
             yield f"{title}: {', '.join(found)}"
-    if summary.neck_measured_s:
-        yield _neck_words(summary)
-    if summary.legs_measured_s:
-        yield _legs_words(summary)
+    yield from _measured_words(summary)
 
 
 @dataclass(frozen=True)
@@ -123,9 +120,8 @@ def write_page(content: PageContent, path: Path) -> None:
         plot=score_plot(rows, moments, method) if summary.measured_s else b"",
         colours={"uncertain": _UNCERTAIN_COLOUR, "nothing": _NOTHING_COLOUR},
         shares=shares,
-        inputs=declared(config, summary.is_neck_always_measured, summary.are_legs_always_measured),
-        neck=_neck_words(summary) if summary.neck_measured_s else "",
-        legs=_legs_words(summary) if summary.legs_measured_s else "",
+        inputs=declared(config, summary.always_measured),
+        measured=[*_measured_words(summary)],
         moments=[(row, _moment_words(row, method)) for row in moments],
         limits=limits(config),
     )
@@ -199,22 +195,19 @@ def _share_words(shares: ScoreShares) -> str:
     return ", ".join(f"{score}: {share:.0%}" for score, share in found if share >= _LEAST_SHARE)
 
 
-def _neck_words(summary: RulaSummary) -> str:
-    if summary.is_neck_always_measured:
-        return "the neck was measured all the time"
-    return (
-        f"the neck was measured for {summary.neck_measured_s:.1f} of {summary.measured_s:.1f} s, "
-        "and counts as declared for the rest"
-    )
-
-
-def _legs_words(summary: RulaSummary) -> str:
-    if summary.are_legs_always_measured:
-        return "the legs were measured all the time"
-    return (
-        f"the legs were measured for {summary.legs_measured_s:.1f} of {summary.measured_s:.1f} s, "
-        "and count as declared for the rest"
-    )
+def _measured_words(summary: RulaSummary) -> Iterator[str]:
+    """Yield a text on each part that was measured in some images."""
+    for name, time_s in summary.measured_parts_s.items():
+        words, (was, counts) = name.replace("_", " "), ("was", "counts")
+        if name == "legs":
+            was, counts = "were", "count"
+        if name in summary.always_measured:
+            yield f"the {words} {was} measured all the time"
+        elif time_s:
+            yield (
+                f"the {words} {was} measured for {time_s:.1f} of {summary.measured_s:.1f} s, and "
+                f"{counts} as declared for the rest"
+            )
 
 
 def _moment_words(row: RulaRow, method: Method) -> str:

@@ -10,16 +10,17 @@ figures:
   the middle of the body, or a forearm that points outside, adds 1;
 - neck: 1 to 10 degrees of flexion against the trunk, 2 to 20, 3 beyond, 4 in extension; twisted
   adds 1;
-- trunk: 1 upright, 2 to 20 degrees, 3 to 60, 4 beyond, forwards or backwards; bent aside adds 1.
+- trunk: 1 upright, 2 to 20 degrees, 3 to 60, 4 beyond, forwards or backwards; bent aside adds 1;
+- wrist: 1 neutral, 2 to 15 degrees, 3 beyond, to the palm or to the back; bent aside adds 1.
 
-Wrists, legs, twist of the trunk, load and muscle use come from the settings, and the neck where its
-angles are not known. A neck that bends aside is not measured. All scores count from 1, so an index
-into a table or into chances is the score less one.
+Twist of the wrists, legs, twist of the trunk, load and muscle use come from the settings, and neck
+and wrists where their angles are not known. A neck that bends aside is not measured. All scores
+count from 1, so an index into a table or into chances is the score less one.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping, Sequence
 from types import MappingProxyType
 from typing import Any, NamedTuple
 
@@ -122,6 +123,7 @@ class ArmScores(NamedTuple):
 
     upper_arm: ScoreArray
     lower_arm: ScoreArray
+    wrist: ScoreArray
     table_a: ScoreArray
     grand: ScoreArray
 
@@ -160,6 +162,8 @@ PARTS: tuple[Part, ...] = (
     Part("left_table_a", "table A, left", 9, lambda scores: scores.left.table_a),
     Part("right_table_a", "table A, right", 9, lambda scores: scores.right.table_a),
     Part("table_b", "table B", 9, lambda scores: scores.table_b),
+    Part("left_wrist", "wrist, left", 4, lambda scores: scores.left.wrist),
+    Part("right_wrist", "wrist, right", 4, lambda scores: scores.right.wrist),
 )
 """Table A rates upper arm, lower arm and wrist, table B neck, trunk and legs; both without load and
 muscle use."""
@@ -175,6 +179,7 @@ class Method(NamedTuple):
         levels: lowest and highest grand score of each action level, and its meaning.
         parts: parts and tables whose scores are shown.
         declared_parts: highest score of each part that no image shows.
+        measurable: names of the parts that are measured in some images and declared in others.
     """
 
     name: str
@@ -183,9 +188,13 @@ class Method(NamedTuple):
     levels: tuple[tuple[int, int, str], ...]
     parts: tuple[Part, ...]
     declared_parts: Mapping[str, int]
+    measurable: tuple[str, ...]
 
 
-RULA = Method("RULA", HIGHEST, ABOVE, ACTION_LEVELS, PARTS, DECLARED_PARTS)
+RULA = Method(
+    *("RULA", HIGHEST, ABOVE, ACTION_LEVELS, PARTS, DECLARED_PARTS),
+    ("neck", "left_wrist", "right_wrist"),
+)
 
 
 class ScoreDistribution(NamedTuple):
@@ -234,43 +243,76 @@ def neck_samples(
     return np.asarray(np.clip(drawn, NECK_LIMITS[:, 0], NECK_LIMITS[:, 1]))
 
 
+def wrist_samples(wrists: FloatArray, count: int, rng: np.random.Generator) -> FloatArray | None:
+    """Return normal samples (count, 2, 2) of the wrists, rad; None if both are unknown.
+
+    A wrist is drawn with its whole deviation, because so little of it is measured: a quarter would
+    make nearly every wrist straight.
+
+    Args:
+        wrists: flexion and deviation of both wrists, and their standard deviations, (2, 2, 2), rad;
+            the deviations of an unknown wrist are nan.
+        count: number of samples.
+        rng: random numbers.
+    """
+    mean, stddev = wrists
+    if np.isnan(stddev).all():
+        return None
+    return np.asarray(mean + stddev * rng.standard_normal((count, 2, 2)))
+
+
+def measured_wrists(wrists: FloatArray) -> frozenset[str]:
+    """Return the names of those ``wrists``, see :func:`wrist_samples`, that are known."""
+    names = zip(("left_wrist", "right_wrist"), np.isfinite(wrists[1, :, 0]).tolist(), strict=True)
+    return frozenset(name for name, is_known in names if is_known)
+
+
 def sampled_scores(
     body: BodyModel,
     posture: FloatArray,
     drawn: FloatArray,
     neck: tuple[FloatArray | None, FloatArray | None],
+    wrists: FloatArray,
     config: RulaConfig,
     rng: np.random.Generator,
-) -> tuple[ScoreDistribution, bool]:
-    """Return the scores of an uncertain posture, and whether the neck is measured.
+) -> tuple[ScoreDistribution, frozenset[str]]:
+    """Return the scores of an uncertain posture, and which of the measurable parts are measured.
 
     Args:
         body: the person.
         posture: mean, (12,), rad and metres.
         drawn: samples of the posture with its whole deviation, (n, 12).
         neck: angles of the neck and their standard deviations, (2,) each, rad; None if unknown.
+        wrists: see :func:`wrist_samples`.
         config: settings.
-        rng: random numbers for the neck.
+        rng: random numbers for neck and wrists.
     """
     angles, stddev = neck
-    necks = None
+    necks, measured = None, measured_wrists(wrists)
     if angles is None or stddev is None:
         angles = None
     else:
         necks = neck_samples(angles, INDEPENDENT * stddev, len(drawn), rng)
-    found = score_distribution(body, posture + INDEPENDENT * (drawn - posture), config, necks)
-    of_mean = rula_scores(body, posture, config, angles).grand
-    return found._replace(of_mean=int(of_mean)), angles is not None
+        measured |= {"neck"}
+    bent = wrist_samples(wrists, len(drawn), rng)
+    found = score_distribution(body, posture + INDEPENDENT * (drawn - posture), config, necks, bent)
+    known = np.where(np.isfinite(wrists[1]), wrists[0], np.nan)
+    of_mean = rula_scores(body, posture, config, angles, known).grand
+    return found._replace(of_mean=int(of_mean)), measured
 
 
 def score_distribution(
-    body: BodyModel, postures: FloatArray, config: RulaConfig, necks: FloatArray | None = None
+    body: BodyModel,
+    postures: FloatArray,
+    config: RulaConfig,
+    necks: FloatArray | None = None,
+    wrists: FloatArray | None = None,
 ) -> ScoreDistribution:
     """Return the distribution of the scores, given equally likely postures (n, 12) of ``body``.
 
-    ``necks`` (n, 2) are the angles of the neck in each of them, rad; None if they are unknown.
+    ``necks`` and ``wrists`` are as in :func:`rula_scores`.
     """
-    return distribution_of(rula_scores(body, postures, config, necks), RULA)
+    return distribution_of(rula_scores(body, postures, config, necks, wrists), RULA)
 
 
 def distribution_of(scores: Any, method: Method, of_mean: int = 0) -> ScoreDistribution:
@@ -291,7 +333,11 @@ def distribution_of(scores: Any, method: Method, of_mean: int = 0) -> ScoreDistr
 
 
 def rula_scores(
-    body: BodyModel, postures: FloatArray, config: RulaConfig, necks: FloatArray | None = None
+    body: BodyModel,
+    postures: FloatArray,
+    config: RulaConfig,
+    necks: FloatArray | None = None,
+    wrists: FloatArray | None = None,
 ) -> RulaScores:
     """Return the scores of postures of ``body``.
 
@@ -300,14 +346,18 @@ def rula_scores(
         postures: shape (..., 12), rad and metres.
         config: settings.
         necks: ``neck_yaw`` and ``neck_pitch`` of each posture, (..., 2), rad; None if unknown.
+        wrists: flexion and deviation of the left and the right wrist in each posture,
+            (..., 2, 2), rad; nan or None if unknown.
     """
     d = np.asarray(postures, dtype=np.float64)
+    if wrists is None:
+        wrists = np.full((*d.shape[:-1], 2, 2), np.nan)
     trunk = trunk_scores(d, config)
     neck = np.full(trunk.shape, config.neck) if necks is None else _neck(necks, config)
     table_b = TABLE_B[neck - 1, trunk - 1, config.legs - 1]
     rest = table_b + config.body_muscle_use + config.body_load
-    left = _arm(body, d[..., LEFT_ARM], 1.0, rest, config)
-    right = _arm(body, d[..., RIGHT_ARM], -1.0, rest, config)
+    left = _arm(body, d[..., LEFT_ARM], 1.0, wrists[..., 0, :], rest, config)
+    right = _arm(body, d[..., RIGHT_ARM], -1.0, wrists[..., 1, :], rest, config)
     return RulaScores(left, right, trunk, np.maximum(left.grand, right.grand), neck, table_b)
 
 
@@ -326,9 +376,14 @@ def _neck(necks: FloatArray, config: RulaConfig) -> ScoreArray:
 
 
 def _arm(
-    body: BodyModel, angles: FloatArray, side: float, rest: ScoreArray, config: RulaConfig
+    body: BodyModel,
+    angles: FloatArray,
+    side: float,
+    wrists: FloatArray,
+    rest: ScoreArray,
+    config: RulaConfig,
 ) -> ArmScores:
-    """Return the scores of arms (..., 4); ``side`` is +1 for left ones, -1 for right ones."""
+    """Return the scores of arms (..., 4) with wrists (..., 2); ``side`` is +1 for left ones."""
     upper, fore = arm_directions(angles, side)
     upper_arm = upper_arm_scores(upper, side, config)
     fore_aside_deg = _aside_deg(fore, side)
@@ -339,9 +394,22 @@ def _arm(
     is_away = (hand_m < 0.0) | (fore_aside_deg > config.outwards_deg)
     lower_arm = elbow_scores(upper, fore) + is_away
 
-    table_a = TABLE_A[upper_arm - 1, lower_arm - 1, config.wrist - 1, config.wrist_twist - 1]
+    wrist = wrist_scores(wrists, (config.wrist_neutral_deg, 15.0), config, config.wrist)
+    table_a = TABLE_A[upper_arm - 1, lower_arm - 1, wrist - 1, config.wrist_twist - 1]
     arm = table_a + config.arm_muscle_use + config.arm_load
-    return ArmScores(upper_arm, lower_arm, table_a, grand_score(arm, rest))
+    return ArmScores(upper_arm, lower_arm, wrist, table_a, grand_score(arm, rest))
+
+
+def wrist_scores(
+    wrists: FloatArray, limits_deg: Sequence[float], config: ErgonomicConfig, declared: int
+) -> ScoreArray:
+    """Return the scores of wrists (..., 2): 1 up to the first limit, 1 more beyond each and aside.
+
+    Wrists with nan have the ``declared`` score.
+    """
+    bent_deg, aside_deg = np.moveaxis(np.abs(np.degrees(wrists)), -1, 0)
+    score = _steps(bent_deg, *limits_deg) + (aside_deg > config.wrist_aside_deg)
+    return np.asarray(np.where(np.isnan(bent_deg), declared, score))
 
 
 def upper_arm_scores(upper: FloatArray, side: float, config: ErgonomicConfig) -> ScoreArray:
@@ -375,16 +443,14 @@ def _steps(angle_deg: FloatArray, *limits_deg: float) -> ScoreArray:
 
 
 def part_values(
-    scores: ScoreDistribution, config: RulaConfig, is_neck_measured: bool
+    scores: ScoreDistribution, config: RulaConfig, measured: Collection[str]
 ) -> dict[str, str]:
     """Return the part scores of one image in words, and the inputs that were not seen."""
-    from_ = MEASURED if is_neck_measured else DECLARED
-    values = {
-        part.words + (f" ({from_})" if part.name == "neck" else ""): (
-            f"{expected(scores.parts[part.name]):.2f}"
-        )
-        for part in PARTS
-    }
+    values = {}
+    for part in PARTS:
+        from_ = MEASURED if part.name in measured else DECLARED
+        name = part.words + (f" ({from_})" if part.name in RULA.measurable else "")
+        values[name] = f"{expected(scores.parts[part.name]):.2f}"
     for name in DECLARED_PARTS:
         values[f"{name.replace('_', ' ')} ({DECLARED})"] = str(getattr(config, name))
-    return values | {NOT_SEEN: ", ".join(map(str, declared(config, is_neck_measured)))}
+    return values | {NOT_SEEN: ", ".join(map(str, declared(config, measured)))}

@@ -23,8 +23,9 @@ from cardbox_tracker.applications.ergonomics.rula import (
 )
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.model_file import loads_body_model
+from cardbox_tracker.recordings.outputs import wrists_from
 from cardbox_tracker.ros.messages import conversions
-from cardbox_tracker.ros.messages.results import neck_of, posture_of
+from cardbox_tracker.ros.messages.results import joint_values_of, neck_of, posture_of
 from cardbox_tracker.ros.runtime import qos
 from cardbox_tracker.ros.runtime.command_line import plain_command_line
 from cardbox_tracker.ros.runtime.node import CardboxNode, run_node
@@ -84,12 +85,15 @@ class RulaNode(CardboxNode):
             return
         posture, stddev = posture_of(self._joints), posture_of(message)
         postures = normal_postures(posture, stddev, SAMPLES, self._rng)
-        # The tracker leaves out the deviations of a neck that it does not know.
+        # The tracker leaves out the deviations of a neck, or a hand, that it does not know.
         neck, config = (neck_of(self._joints), neck_of(message)), self.parameters.value
-        scores, is_measured = sampled_scores(self._body, posture, postures, neck, config, self._rng)
+        wrists = np.array([wrists_from(joint_values_of(one)) for one in (self._joints, message)])
+        scores, measured = sampled_scores(
+            self._body, posture, postures, neck, wrists, config, self._rng
+        )
         self._score.publish(Float32(data=scores.mean))
         self._chances.publish(_chances_message(scores))
-        parts = part_values(scores, config, is_measured)
+        parts = part_values(scores, config, measured)
         self._report.publish(_report_message(message, scores, parts, self.get_name()))
         self.diagnostics.working(sent_ns)
 

@@ -26,7 +26,7 @@ from cardbox_tracker.person.posture import PITCH, ROLL
 from cardbox_tracker.person.sizes import FloatArray
 from cardbox_tracker.person.skeleton import JOINT_NAMES, KeypointState
 from cardbox_tracker.recordings.result_table import columns, row_of
-from cardbox_tracker.tracking.estimate import Estimate, Legs
+from cardbox_tracker.tracking.estimate import Estimate, Hand, Legs
 
 CONFIG = RebaConfig()
 LENGTHS_M = np.array([0.5, 0.42, 0.42, 0.42, 0.42])
@@ -111,9 +111,35 @@ def test_what_is_not_measured_counts_as_declared() -> None:
     config = replace(CONFIG, neck=3, legs=4)
     found = reba_scores(np.zeros(12), config)
     assert (found.neck, found.legs, found.table_a) == (3, 4, 6)
-    names = [one.name for one in declared(config, True, True)]
+    names = [one.name for one in declared(config, ("neck", "legs"))]
     assert "neck" not in names and "legs" not in names
     assert {"load", "coupling", "activity", "wrist"} <= set(names)
+
+
+@pytest.mark.parametrize(
+    ("flexion_deg", "deviation_deg", "score"), [(14, 0, 1), (-16, 0, 2), (0, 20, 2), (40, -20, 3)]
+)
+def test_wrists_by_hand(flexion_deg: float, deviation_deg: float, score: int) -> None:
+    wrists = np.radians([(np.nan, np.nan), (flexion_deg, deviation_deg)])
+    found = reba_scores(np.zeros(12), replace(CONFIG, wrist=3), wrists=wrists)
+    assert (found.left.wrist, found.right.wrist) == (3, score)
+    # Upper arm 1, straight elbow 2.
+    assert found.right.table_b == (1, 2, 3)[score - 1]
+
+
+def test_wrists_of_a_table_are_read(tmp_path: Path) -> None:
+    path = tmp_path / "a.csv"
+    hand = Hand(0.5, np.array([0.0, 0.0, 1.0]), np.full(3, 0.4), np.full(3, 0.1))
+    with path.open("w", newline="") as file:
+        writer = csv.writer(file)
+        writer.writerow(columns(has_hands=True, has_legs=True))
+        for found in (seen(SEATED), replace(seen(SEATED), hands=(None, hand))):
+            cells = row_of(10**9, 0.0, found, has_hands=True, has_legs=True)
+            writer.writerow(["" if cell is None else cell for cell in cells])
+    before, after = score_table(read_table(path), CONFIG, seed=1)
+    assert (before.measured, after.measured) == ({"legs"}, {"legs", "right_wrist"})
+    # 23 degrees, and bent aside.
+    assert after.scores is not None and after.scores.parts["right_wrist"][2] > 0.8
 
 
 def test_corners_of_the_tables() -> None:
@@ -126,12 +152,16 @@ def test_corners_of_the_tables() -> None:
             assert (np.diff(table, axis=axis) >= 0).all()
 
 
-def table(path: Path, angles: FloatArray, state: KeypointState = KeypointState.TRACKED) -> Path:
+def seen(angles: FloatArray, state: KeypointState = KeypointState.TRACKED) -> Estimate:
     points_m = np.zeros((6, 3))
     points_m[[1, 4], 1], points_m[[2, 5], 1] = 0.42, 0.84
     legs = Legs(angles, np.full(8, 0.05), points_m, np.full(6, 0.05), (state,) * 6)
     keypoints = np.full((6, 3), -0.5)
-    found = Estimate("tracking", np.zeros(12), np.full(12, 0.02), keypoints, 100, 0.9, legs=legs)
+    return Estimate("tracking", np.zeros(12), np.full(12, 0.02), keypoints, 100, 0.9, legs=legs)
+
+
+def table(path: Path, angles: FloatArray, state: KeypointState = KeypointState.TRACKED) -> Path:
+    found = seen(angles, state)
     rows = [row_of(10**9 * i, float(i), found, has_legs=True) for i in range(4)]
     rows.append(row_of(4 * 10**9, 4.0, Estimate("lost"), has_legs=True))
     with path.open("w", newline="") as file:
@@ -145,7 +175,7 @@ def test_a_table_of_results_is_scored(tmp_path: Path) -> None:
     images = read_table(table(tmp_path / "a.csv", SEATED))
     rows = score_table(images, CONFIG, seed=1)
     assert [row.scores is None for row in rows] == [False] * 4 + [True]
-    assert all(row.are_legs_measured for row in rows[:4])
+    assert all(row.measured == {"legs"} for row in rows[:4])
     assert rows[0].scores is not None
     assert rows[0].scores.parts["legs"][0] == 1.0
     assert float(rows[0].scores.grand.sum()) == pytest.approx(1.0)
@@ -158,7 +188,8 @@ def test_a_table_of_results_is_scored(tmp_path: Path) -> None:
     assert "expected REBA score" in lines and "the legs were measured all the time" in lines
     write_csv(rows, tmp_path / "reba.csv", REBA)
     text = (tmp_path / "reba.csv").read_text().splitlines()
-    assert text[0].endswith("mean_posture_score,legs_from") and text[1].endswith(",measured")
+    assert text[0].endswith("mean_posture_score,legs_from,left_wrist_from,right_wrist_from")
+    assert text[1].endswith(",measured,declared,declared")
     page = tmp_path / "reba.html"
     write_page(PageContent("Sitting", {}, CONFIG, rows, method=REBA), page)
     assert "Rapid Entire Body Assessment" in page.read_text(encoding="utf-8")
@@ -168,7 +199,7 @@ def test_a_table_of_results_is_scored(tmp_path: Path) -> None:
 def test_hidden_legs_count_as_declared(tmp_path: Path) -> None:
     images = read_table(table(tmp_path / "a.csv", SEATED, KeypointState.HIDDEN))
     rows = score_table(images, replace(CONFIG, legs=4), seed=1)
-    assert not any(row.are_legs_measured for row in rows)
+    assert not any(row.measured for row in rows)
     assert rows[0].scores is not None and rows[0].scores.parts["legs"][3] == 1.0
 
 

@@ -27,6 +27,7 @@ from cardbox_tracker.person.proportions import body_from_proportions
 from cardbox_tracker.person.skeleton import JOINT_NAMES
 
 BODY = body_from_proportions(1.75, 2.0)
+NO_WRISTS = np.full((2, 2, 2), np.nan)
 
 
 def posture(**angles_deg: float) -> np.ndarray:
@@ -101,6 +102,34 @@ def test_a_hand_beyond_the_middle_of_the_body_adds_one() -> None:
     assert scores(left_elbow_flexion=80)[1] == 1
     assert scores(left_elbow_abduction=-80)[1] == 2
     assert scores(left_elbow_abduction=80)[1] == 2  # to the outside
+
+
+@pytest.mark.parametrize(
+    ("flexion_deg", "deviation_deg", "score"),
+    [(0, 0, 1), (4, 0, 1), (-10, 0, 2), (16, 0, 3), (0, 20, 2), (-30, -20, 4)],
+)
+def test_wrists_by_hand(flexion_deg: float, deviation_deg: float, score: int) -> None:
+    """The left wrist is known, the right one counts as declared. Upper arm 1, lower arm 1."""
+    wrists = np.radians([(flexion_deg, deviation_deg), (np.nan, np.nan)])
+    bent = posture(left_elbow_flexion=80, right_elbow_flexion=80)
+    found = rula_scores(BODY, bent, RulaConfig(wrist=2), wrists=wrists)
+    assert (found.left.wrist, found.right.wrist) == (score, 2)
+    assert found.left.table_a == (1, 2, 2, 3)[score - 1]
+
+
+def test_a_wrist_counts_with_all_of_its_deviation() -> None:
+    """At 15 degrees, it is beyond the limit in half of the samples."""
+    rng, mean = np.random.default_rng(0), posture(left_elbow_flexion=80)
+    wrists, neck = NO_WRISTS.copy(), (None, None)
+    wrists[:, 0] = np.radians([(15.0, 0.0), (5.0, 1.0)])
+    drawn = np.tile(mean, (SAMPLES, 1))
+    found, measured = sampled_scores(BODY, mean, drawn, neck, wrists, RulaConfig(), rng)
+    assert measured == {"left_wrist"}
+    assert found.parts["left_wrist"][2] == pytest.approx(0.5, abs=0.07)
+    assert found.parts["right_wrist"].tolist() == [1, 0, 0, 0]
+    names = [one.name for one in declared(RulaConfig(), measured | {"right_wrist"})]
+    assert "wrist" not in names and "wrist_twist" in names
+    assert "wrist" in [one.name for one in declared(RulaConfig(), measured)]
 
 
 def test_tables_count_without_load_and_muscle_use() -> None:
@@ -209,7 +238,7 @@ def test_a_posture_on_a_line_is_as_likely_on_either_side() -> None:
 
 def test_a_measured_neck_is_not_among_the_declared_inputs() -> None:
     scores = score_distribution(BODY, posture()[None], RulaConfig(neck=2))
-    measured, assumed = (part_values(scores, RulaConfig(neck=2), one) for one in (True, False))
+    measured, assumed = (part_values(scores, RulaConfig(neck=2), x) for x in ({"neck"}, ()))
     assert measured["neck (measured)"] == "2.00"
     assert "neck" not in measured["declared, not seen"]
     assert assumed["declared, not seen"].startswith("neck 2, wrist 1 (default)")
@@ -222,8 +251,8 @@ def test_the_spread_does_not_push_the_score_up(pitch_deg: float) -> None:
     rng, mean = np.random.default_rng(0), posture(torso_pitch=pitch_deg, left_elbow_flexion=80)
     drawn = mean + np.radians(9.0) * rng.standard_normal((SAMPLES, 12))
     neck = np.zeros(2), np.radians([12.0, 12.0])
-    found, is_measured = sampled_scores(BODY, mean, drawn, neck, RulaConfig(), rng)
-    assert is_measured
+    found, measured = sampled_scores(BODY, mean, drawn, neck, NO_WRISTS, RulaConfig(), rng)
+    assert measured == {"neck"}
     assert found.of_mean == 2
     assert found.mean == pytest.approx(2.0, abs=0.3)
     known = score_distribution(BODY, drawn, RulaConfig(), neck_samples(*neck, SAMPLES, rng))

@@ -62,6 +62,23 @@ def test_a_neck_counts_where_its_deviations_are_known(bus: Any, joints: Any) -> 
     assert bus.texts("/rula/score") == [pytest.approx(2.0), pytest.approx(3.0)]
 
 
+def test_a_wrist_counts_where_its_deviations_are_known(bus: Any, joints: Any) -> None:
+    bus.send("/body_model", MODEL)
+    names = ["left_wrist_flexion", "left_wrist_deviation"]
+    for number, has_deviations in ((5, False), (6, True)):
+        states, deviations = joints(number, {}), joints(number, {}, other=0.001)
+        for message, values in ((states, (0.5, 0.0)), (deviations, (0.001, 0.001))):
+            if message is states or has_deviations:
+                message.name, message.position = (
+                    [*message.name, *names],
+                    [*message.position, *values],
+                )
+        send(bus, states, deviations)
+    found = [{v.key: v.value for v in one.status[0].values} for one in bus.sent["/rula/report"]]
+    assert found[0]["wrist, left (declared)"] == found[1]["wrist, right (declared)"] == "1.00"
+    assert found[1]["wrist, left (measured)"] == "3.00"
+
+
 def test_deviations_of_another_image_are_not_taken(bus: Any, joints: Any) -> None:
     bus.send("/body_model", MODEL)
     send(bus, joints(7, {}), joints(8, {}))
