@@ -221,7 +221,8 @@ class WholeBodyFilter:
         before = self._survivors[0].copy()
         approach, z_m = self.approach, float(before[TORSO_Z])
         approach.see(float(before[TORSO_X]))
-        cost.expect(approach.expected_m, z_m, approach.home_m, self._locator.yaw_rad)
+        expected = approach.expected_m, z_m, approach.home_m, self._locator.yaw_rad
+        cost.expect(*expected, is_located=bool(self._cues))
         self.rated = RatedStates(cost)
         search = Search(
             cost,

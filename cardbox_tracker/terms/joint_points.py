@@ -5,7 +5,8 @@ projected joints against the points of ``Frame.points``, and, if the detector es
 space, the directions of the bones along the line of sight. Detectors of single images take the
 camera for level, so these directions are compared along the horizontal line of sight.
 
-The directions are used only for people who were not measured.
+The directions of arms are used only for people who were not measured, that of the line of the
+shoulders for all.
 
 Without new points, the last ones count for up to a second, less and less, because joints may have
 moved. Points that fit the last posture only with left and right exchanged are exchanged; if this
@@ -56,7 +57,7 @@ _TRUNK_M, _TRUNK_M_PER_S = 0.05, 0.25
 _POINT_PX = 1.5
 # Bones (upper arm, forearm, shoulders): deviation of the component along the line of sight, and
 # mean difference of the detector's from the true one (lab/tools/point_deviations.py).
-_BONE_DEVIATIONS = np.array([0.22, 0.32, 0.22, 0.32, 0.13])
+_BONE_DEVIATIONS = np.array([0.22, 0.32, 0.22, 0.32, 0.2])
 _BONE_OFFSETS = np.array([0.06, -0.13, 0.06, -0.13, 0.05])
 _OLDEST_S = 1.0
 # Points belong to somebody else if the median of their distances from the last posture is larger;
@@ -106,7 +107,7 @@ class JointPointsTerm:
     def __init__(self, config: JointPoints, person: BodyModel, camera: Camera) -> None:
         """Prepare for one person and one camera."""
         self.config, self._camera = config, camera
-        self._uses_bones = person.source != MEASURED
+        self._uses_arms = person.source != MEASURED
         self._elsewhere = 0
         # Time since left and right were first exchanged, s; None if they are not.
         self._exchanged_s: float | None = None
@@ -179,9 +180,12 @@ class JointPointsTerm:
         bones[:, 2] = _BONE_DEVIATIONS * (1.0 + age_s / 0.1)
         away = np.array([0.0, 0.0, 1.0])
         shoulders = found[[SHOULDER, POINTS_OF_ARM + SHOULDER]]
-        if self._uses_bones and points.spatial_m is not None and shoulders[:, 2].min() > 0.0:
+        if points.spatial_m is not None and shoulders[:, 2].min() > 0.0:
             bones[:, :2] = bones_of(points.spatial_m, found)
             bones[:, 0] -= _BONE_OFFSETS
+            bones[SHOULDERS, 0] = _turned(bones[SHOULDERS, 0])
+            if not self._uses_arms:
+                bones[:SHOULDERS, :2] = 0.0
             away = level_sight(self._camera, float(shoulders[:, 0].mean()))
         return found, deviations, bones, away
 
@@ -274,6 +278,15 @@ def projected(posed: Posed) -> FloatArray:
     pixels = np.empty((N_POINTS, 3))
     kernels.project(posed.states[0], posed.body, pixels)
     return pixels
+
+
+def _turned(away: float) -> float:
+    """Return the component of the line of the shoulders, which the detector makes too small.
+
+    It finds a turn of 35 degrees as one of 22, and one of 80 degrees as it is.
+    """
+    away = min(max(away, -1.0), 1.0)
+    return away * (3.0 - away**2) / 2.0
 
 
 def _from_behind(found: FloatArray) -> bool:

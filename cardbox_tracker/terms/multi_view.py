@@ -51,6 +51,7 @@ class MultiViewCost:
         costs: the cost of each camera, the first camera's first.
         to_views: transform of states for each camera.
         x_factor: factor on the units of the priors of ``torso_x``.
+        yaw_unit_rad: unit of the prior of the yaw.
         facing_rad: yaw around which the person turns; 0 faces the first camera.
         limits: lowest and highest value of each value of a state, (14, 2).
         seeing: indices of the cameras that show the person in this frame.
@@ -73,7 +74,7 @@ class MultiViewCost:
         first = self.costs[0]
         self.parts, self.girdle = first.parts, first.girdle
         self.place, self.view, self.body = first.place, first.view, first.body
-        self.x_factor = 1.0
+        self.x_factor, self.yaw_unit_rad = 1.0, np.radians(config.yaw_deg)
         self.anchor = first.anchor
         self.face(0.0)
 
@@ -95,17 +96,22 @@ class MultiViewCost:
         for cost, to_view, silhouette in zip(self.costs, self.to_views, silhouettes, strict=True):
             cost.see(silhouette, to_view(state))
 
-    def expect(self, x_m: float, z_m: float, home_m: float, yaw_rad: float) -> None:
+    def expect(
+        self, x_m: float, z_m: float, home_m: float, yaw_rad: float, is_located: bool = False
+    ) -> None:
         """Set the anchor of the priors: place of the last frame, home of x, and expected yaw.
 
         The yaw is that of somebody who faces the camera, 0 if nothing else is known. An outline of
-        a person who is twice as far away determines the distance half as well.
+        a person who is twice as far away determines the distance half as well. The yaw is freer if
+        the person ``is_located`` by points.
         """
         facing_rad = self.facing_rad
         # Who walks to one side turns from the back to it the other way round.
         self.anchor[:] = x_m, z_m, home_m, facing_rad + (-yaw_rad if facing_rad else yaw_rad)
         self.x_factor = max((self.place[0] - x_m) / _NORMAL_M, 1.0)
-        self.costs[0].loosen_x(self.x_factor)
+        config = self._config
+        self.yaw_unit_rad = np.radians(config.located_yaw_deg if is_located else config.yaw_deg)
+        self.costs[0].loosen(self.x_factor, self.yaw_unit_rad)
 
     def choose(self, seeing: Sequence[int]) -> None:
         """Use only the cameras with these indices in this frame."""
@@ -140,7 +146,7 @@ class MultiViewCost:
         mean, inverse = np.zeros((2, N_STATE))
         inverse[ROLL] = np.radians(config.roll_deg) ** -2
         inverse[PITCH] = np.radians(config.pitch_forward_deg) ** -2
-        mean[YAW], inverse[YAW] = yaw_rad, np.radians(config.yaw_deg) ** -2
+        mean[YAW], inverse[YAW] = yaw_rad, self.yaw_unit_rad**-2
         step, home = (self.x_factor * np.array([config.x_step_m, config.x_home_m])) ** -2
         inverse[TORSO_X] = step + home
         mean[TORSO_X] = (step * x_m + home * home_m) / inverse[TORSO_X]

@@ -166,10 +166,11 @@ class WholeBodyCost:
         """Return the arguments of the kernels that rate by pixels of ``planes`` and priors."""
         return (planes, *self.counted, base_px, self._scale), self._prior
 
-    def loosen_x(self, factor: float) -> None:
-        """Multiply the units of the priors of ``torso_x`` by ``factor``, at any call the same."""
-        self._rules[priors.X_STEP] = factor * self._config.x_step_m
-        self._rules[priors.X_HOME] = factor * self._config.x_home_m
+    def loosen(self, x_factor: float, yaw_unit_rad: float) -> None:
+        """Set the factor on the units of the priors of ``torso_x``, and the unit of the yaw."""
+        self._rules[priors.X_STEP] = x_factor * self._config.x_step_m
+        self._rules[priors.X_HOME] = x_factor * self._config.x_home_m
+        self._rules[priors.YAW_UNIT] = yaw_unit_rad
 
     def hips(self, state: FloatArray) -> tuple[float, float, float]:
         """Return the middle of the hips of a state (14,), x, y, z in the optical frame, metres."""

@@ -31,6 +31,8 @@ class WholeBodyCostConfig:
         pitch_forward_deg: unit of a pitch above this value, deg.
         pitch_back_deg: unit of a pitch below this value, deg.
         yaw_deg: unit of the torso's yaw, deg.
+        located_yaw_deg: the same with points of a detector, which show a turn better than an
+            outline, deg.
         angle_cap: largest cost of one of the torso's angles.
         x_step_m: unit of the torso's motion along the line of sight from frame to frame, m.
         z_step_m: unit of the torso's motion up and down from frame to frame, m.
@@ -59,6 +61,7 @@ class WholeBodyCostConfig:
     pitch_forward_deg: float = 13.0
     pitch_back_deg: float = 8.0
     yaw_deg: float = 14.0
+    located_yaw_deg: float = 24.0
     angle_cap: float = 9.0
     x_step_m: float = 0.1
     z_step_m: float = 0.015
