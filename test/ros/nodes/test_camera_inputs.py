@@ -315,9 +315,9 @@ def test_clocks_that_are_apart_are_told(watching: Watching, apart_s: int) -> Non
         watching.show_depth(number * S // 10 + 2000 * S, np.ones((48, 64)))
     (text,) = watching.source.warnings().values()
     assert f"{abs(apart_s)}.00 s apart" in text
-    # One camera goes on alone: the one whose clock is ahead.
-    ahead = int(apart_s > 0)
-    assert sum(view.headers[ahead] is not None for view in watching.views) == 20
+    # One camera goes on alone: the one whose clock is behind.
+    behind = int(apart_s < 0)
+    assert sum(view.headers[behind] is not None for view in watching.views) == 20
     assert all(None in view.headers for view in watching.views)
 
 

@@ -159,11 +159,13 @@ def nodes_called(name: str, make: Callable[..., Any], folder: Path) -> list[Any]
     if name == "tracker":
         # The network of hands is not part of the package.
         with patch.multiple(tracker_node, HandNetwork=DEFAULT, installed_hands=DEFAULT):
-            looking = make(TrackerNode, keypoints="KEYPOINTS", hands=True)
+            looking = [
+                make(TrackerNode, people=people, keypoints="KEYPOINTS", hands=True)
+                for people in (0, 1)
+            ]
         return [
-            looking,
+            *looking,
             make(TrackerNode, rep155_id="ID", keypoints="KEYPOINTS"),
-            make(TrackerNode, people=1, keypoints="KEYPOINTS"),
             make(TrackerNode, cameras=["CAMERA"], depth="DEPTH", keypoints="KEYPOINTS"),
         ]
     if name == "retarget":
