@@ -156,11 +156,13 @@ class Arrivals(Generic[T]):
             return False
         is_full = max(counts) > _WAITING
         return not any(
-            not count and self._missed[number] < _PATIENCE and not (is_full and self._rests(number))
+            not count
+            and self._missed[number] < _PATIENCE
+            and not (is_full and self._is_silent(number))
             for number, count in enumerate(counts)
         )
 
-    def _rests(self, number: int) -> bool:
+    def _is_silent(self, number: int) -> bool:
         """Return whether another stream has sent several items since the last one of a stream."""
         numbers = zip(self._received, self._before[number], strict=True)
         return any(now - then > _WAITING for now, then in numbers)

@@ -56,7 +56,8 @@ _JOINT_M_PER_S = {SHOULDER: 0.2, ELBOW: 0.5, WRIST: 0.8, KNUCKLES: 0.9}
 _TRUNK_M, _TRUNK_M_PER_S = 0.05, 0.25
 _POINT_PX = 1.5
 # Bones (upper arm, forearm, shoulders): deviation of the component along the line of sight, and
-# mean difference of the detector's from the true one (lab/tools/point_deviations.py).
+# mean difference of the detector's from the true one (lab/tools/point_deviations.py). That of the
+# shoulders also covers the errors of their curve, see _turned.
 _BONE_DEVIATIONS = np.array([0.22, 0.32, 0.22, 0.32, 0.2])
 _BONE_OFFSETS = np.array([0.06, -0.13, 0.06, -0.13, 0.05])
 _OLDEST_S = 1.0
@@ -281,9 +282,10 @@ def projected(posed: Posed) -> FloatArray:
 
 
 def _turned(away: float) -> float:
-    """Return the component of the line of the shoulders, which the detector makes too small.
+    """Return the true component of the line of the shoulders for that of the detector.
 
-    It finds a turn of 35 degrees as one of 22, and one of 80 degrees as it is.
+    The detector makes it too small: it finds a turn of 35 degrees as one of 22, but one of 80
+    degrees as it is.
     """
     away = min(max(away, -1.0), 1.0)
     return away * (3.0 - away**2) / 2.0

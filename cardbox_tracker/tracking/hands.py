@@ -16,8 +16,9 @@ fingers' direction ``h``:
 
 The network's points are good in the image and bad in depth: in films, its fingers are off by 50
 degrees, more than those of a wrist that is taken as straight. So a grid of turns, flexions and
-deviations is rated: by where it puts the bases of the fingers in the image, given the length of the
-palm, by how far people bend their wrists, and by the side to which the network's palm faces.
+deviations is rated: by where each of them puts the bases of the fingers in the image, by how far
+people bend their wrists, and by the side to which the network's palm faces. The length of the palm
+is that of the body model.
 """
 
 from __future__ import annotations
@@ -71,7 +72,8 @@ _LEAST_SCORE = 0.3
 _KEPT_S = 0.5
 # Bases of index, middle, ring and little finger from the wrist, in lengths of the palm: aside to
 # the little finger, and ahead. They are means of the network's own points.
-_BASES, _PALM = [5, 9, 13, 17], np.array([(-0.15, 1.02), (0.0, 1.0), (0.15, 0.97), (0.27, 0.81)])
+_BASES = [*range(_INDEX, _LITTLE + 1, 4)]
+_PALM = np.array([(-0.15, 1.02), (0.0, 1.0), (0.15, 0.97), (0.27, 0.81)])
 # Deviations of these points in lengths of the palm, and of that length as a share.
 _POINT, _LENGTH = 0.25, 0.15
 # Turns about the forearm, flexions and deviations of the hands that are rated, rad.
@@ -82,7 +84,7 @@ _TURNS, _FLEXIONS, _DEVIATIONS = (
 # Deviations of the flexion and deviation of people's wrists, and of the side to which the network's
 # palm faces, rad.
 _FLEXED_RAD, _DEVIATED_RAD, _FACING_RAD = np.radians([20.0, 10.0, 35.0])
-# Part of a palm's normal beside the forearm from which on it shows the turn.
+# A palm's normal shows the turn if its part across the forearm is larger; a smaller one shows less.
 _SHOWS = 0.5
 # Deviation of the forearm, and of a turn of which nothing is known, rad.
 _FOREARM_RAD, _UNKNOWN_RAD = np.radians(10.0), np.pi / np.sqrt(3.0)

@@ -123,11 +123,10 @@ def score_errors(
         normal = normal_postures(estimate.posture, estimate.posture_stddev, SAMPLES, rng)
         particles = tracker.sample(estimate, SAMPLES, rng)
         angles, deviations = neck = estimate.neck, estimate.neck_stddev
+        known = neck, UNKNOWN
         for task, rula in tasks.items():
             drawn = [
-                sampled_scores(tracker.body, estimate.posture, postures, neck, UNKNOWN, rula, rng)[
-                    0
-                ]
+                sampled_scores(tracker.body, estimate.posture, postures, *known, rula, rng)[0]
                 for postures in (normal, particles)
             ]
             mean = np.eye(HIGHEST)[drawn[0].of_mean - 1]

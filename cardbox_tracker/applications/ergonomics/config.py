@@ -11,8 +11,8 @@ from cardbox_tracker.common.settings import Settings, setting, settings_of
 MEASURED, DECLARED, MIXED = "measured", "declared", "mixed"
 """Origins of a part score; tables and the grand score are mixed."""
 NOT_SEEN = "declared, not seen"
-WRISTS = frozenset({"left_wrist", "right_wrist"})
-"""Parts that share one declared input."""
+WRISTS = "left_wrist", "right_wrist"
+"""Parts that share the declared input ``wrist``."""
 
 _DECLARED = "declared, since it is not measured"
 
@@ -222,7 +222,7 @@ def declared(
     known, defaults = settings_of(kind), {one.name: one.default for one in fields(config)}
     found = []
     for name in _INPUTS[kind]:
-        if {"wrist": WRISTS}.get(name, {name}) <= set(measured):
+        if all(part in measured for part in (WRISTS if name == "wrist" else (name,))):
             continue
         value = getattr(config, name)
         text = str(value) if type(value) is int else ("no", "yes")[value]

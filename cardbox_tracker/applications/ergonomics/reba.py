@@ -27,7 +27,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from cardbox_tracker.applications.ergonomics.config import RebaConfig
+from cardbox_tracker.applications.ergonomics.config import WRISTS, RebaConfig
 from cardbox_tracker.applications.ergonomics.recording import RulaRow
 from cardbox_tracker.applications.ergonomics.rula import (
     INDEPENDENT,
@@ -159,7 +159,7 @@ REBA = Method(
         Part("right_wrist", "wrist, right", 3, lambda scores: scores.right.wrist),
     ),
     {},
-    ("neck", "legs", "left_wrist", "right_wrist"),
+    ("neck", "legs", *WRISTS),
 )
 
 # Height above the other foot from which a foot carries no weight, m.

@@ -32,6 +32,7 @@ from cardbox_tracker.applications.ergonomics.config import (
     DECLARED_PARTS,
     MEASURED,
     NOT_SEEN,
+    WRISTS,
     ErgonomicConfig,
     RulaConfig,
     declared,
@@ -193,7 +194,7 @@ class Method(NamedTuple):
 
 RULA = Method(
     *("RULA", HIGHEST, ABOVE, ACTION_LEVELS, PARTS, DECLARED_PARTS),
-    ("neck", "left_wrist", "right_wrist"),
+    ("neck", *WRISTS),
 )
 
 
@@ -263,8 +264,8 @@ def wrist_samples(wrists: FloatArray, count: int, rng: np.random.Generator) -> F
 
 def measured_wrists(wrists: FloatArray) -> frozenset[str]:
     """Return the names of those ``wrists``, see :func:`wrist_samples`, that are known."""
-    names = zip(("left_wrist", "right_wrist"), np.isfinite(wrists[1, :, 0]).tolist(), strict=True)
-    return frozenset(name for name, is_known in names if is_known)
+    known = np.isfinite(wrists[1, :, 0]).tolist()
+    return frozenset(name for name, is_known in zip(WRISTS, known, strict=True) if is_known)
 
 
 def sampled_scores(
@@ -403,9 +404,10 @@ def _arm(
 def wrist_scores(
     wrists: FloatArray, limits_deg: Sequence[float], config: ErgonomicConfig, declared: int
 ) -> ScoreArray:
-    """Return the scores of wrists (..., 2): 1 up to the first limit, 1 more beyond each and aside.
+    """Return the scores of wrists (..., 2), rad: flexion and deviation.
 
-    Wrists with nan have the ``declared`` score.
+    The score is 1 up to the first of the limits of the flexion, and 1 more beyond each of them; a
+    hand that is bent aside adds 1. Wrists with nan have the ``declared`` score.
     """
     bent_deg, aside_deg = np.moveaxis(np.abs(np.degrees(wrists)), -1, 0)
     score = _steps(bent_deg, *limits_deg) + (aside_deg > config.wrist_aside_deg)
