@@ -52,6 +52,7 @@ def track(
     from cardbox_tracker.person.model import PLACEMENT
     from cardbox_tracker.person.model_file import save_body_model
     from cardbox_tracker.person.proportions import USUAL_STATURE_M, USUAL_STDDEV_M
+    from cardbox_tracker.recordings.measured_scene import seen_people, seen_person
     from cardbox_tracker.recordings.quality import Quality
     from cardbox_tracker.recordings.silhouettes import TimeSpan
     from cardbox_tracker.recordings.track import Crowd, track_recording
@@ -94,9 +95,7 @@ def track(
                     "tenth; give --stature M"
                 ]
             )
-    crowd = None
     if person.people is not None:
-        crowd = Crowd(tuple(bodies), person.people or None)
         observers = tuple(partial(_of_person, person.number, observe) for observe in observers)
 
     def judge(frame: RecordedFrame, estimate: Estimate, tracker: Tracker) -> None:
@@ -105,6 +104,13 @@ def track(
     with recording.open() as source:
         early = source.first.remarks
         print_remarks(early)
+        crowd, span = None, (start_s, person.end_s)
+        if person.people is not None:
+            several = source, bodies, request.config, person.people or None
+            bodies = seen_people(*several, request.seed, *span)
+            crowd = Crowd(tuple(bodies), person.people or None)
+        else:
+            bodies = [seen_person(source, bodies[0], request.config, request.seed, *span)]
         total_s = max(1e-9, min(source.first.duration_s, person.end_s) - start_s)
         with ExitStack() as stack:
             observers = (*_writers(request, source, stack), *observers)

@@ -21,10 +21,7 @@ import numpy as np
 from cardbox_tracker.camera.camera import Camera
 from cardbox_tracker.common.errors import InitializationError
 from cardbox_tracker.measuring.outline import filled
-from cardbox_tracker.measuring.part_colors import (
-    seen_appearance,
-    torso_colors,
-)
+from cardbox_tracker.measuring.part_colors import seen_appearance
 from cardbox_tracker.measuring.references import (
     MAX_PERSON_FRACTION,
     MIN_PERSON_FRACTION,
@@ -92,12 +89,10 @@ class FirstSight:
         body: fitted body without unknown values; all are still unknown if the IoU is below
             ``MIN_IOU``.
         iou: IoU of the fitted body and the silhouette.
-        clothes: histogram of the torso in the image, (bins,); None if it is unknown.
     """
 
     body: BodyModel
     iou: float
-    clothes: FloatArray | None = None
 
 
 def fit_first_sight(
@@ -128,14 +123,11 @@ def fit_first_sight(
             f"no body of these proportions fits the silhouette (IoU {rounded_down(iou)}, expected "
             f"{MIN_IOU:.2f} or more)"
         )
-    clothes = None
-    if image is not None:
+    if image is not None and found.appearance is None:
         seen = image, silhouette, found, camera, posture
-        clothes = torso_colors(*seen)
-        if found.appearance is None:
-            found = found.with_values(appearance=seen_appearance(*seen))
+        found = found.with_values(appearance=seen_appearance(*seen))
     unknown = () if iou >= MIN_IOU else body.unknown
-    return FirstSight(found.with_values(unknown=unknown), iou, clothes)
+    return FirstSight(found.with_values(unknown=unknown), iou)
 
 
 class _Search:

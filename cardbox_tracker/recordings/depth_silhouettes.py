@@ -90,7 +90,7 @@ class DepthSilhouetteSource(SilhouetteSource):
         depths = depth_images(self._bag.path, self._within.topic, self.camera)
         streams: list[Iterator[Any]] = [self.images(), depths]
         self._without = 0
-        self._restart_points()
+        self._start_points(start_s, end_s)
         for seen, measured in side_by_side(streams, lambda item: int(item[0]), TOLERANCE_NS):
             if seen is None:
                 continue
@@ -106,6 +106,7 @@ class DepthSilhouetteSource(SilhouetteSource):
             found = self._points(seen, silhouette)
             pictures = brightness_of(image), silhouette, image
             yield RecordedFrame(stamp_ns, time_s, *pictures, measured[1], found, recorded)
+        self._end_points()
 
     @property
     def remarks(self) -> list[str]:

@@ -42,7 +42,7 @@ class DetectorSilhouetteSource(SilhouetteSource):
         self._find_points(None if isinstance(points, Detector) else points, camera)
         self._has_own_points = isinstance(points, Detector)
         self._has_points = points is not None
-        self._detector = self._person = self._started(detector)
+        self._detector = self._started(detector)
         self._finds_people = detector.people > 0
 
     def frames(self, start_s: float = 0.0, end_s: float = float("inf")) -> Iterator[RecordedFrame]:
@@ -50,8 +50,13 @@ class DetectorSilhouetteSource(SilhouetteSource):
 
         The detector starts anew at ``start_s``, so that a frame depends on the span alone.
         """
-        self._restart_points()
-        for prepared, found in self.detections(start_s, end_s):
+        self._start_points(start_s, end_s)
+        for prepared in self.images():
+            if prepared.time_s > end_s:
+                break
+            if prepared.time_s < start_s:
+                continue
+            found = self._found(prepared)
             stamp_ns, time_s, image, recorded, _ = prepared
             silhouette = np.zeros(image.shape[:2], np.uint8)
             for one in found:
@@ -66,19 +71,16 @@ class DetectorSilhouetteSource(SilhouetteSource):
                 yield frame._replace(points=image_points(found[0]))
             else:
                 yield frame._replace(points=self._points(prepared, silhouette))
+        self._end_points()
 
     def detections(
         self, start_s: float = 0.0, end_s: float = float("inf"), period_s: float = 0.0
     ) -> Iterator[tuple[PreparedImage, list[Detection]]]:
         """Yield the images of a span, each with the people in it, at least ``period_s`` apart."""
-        self._person.restart()
+        self._start_points(start_s, end_s)
         for prepared in self.images():
             if prepared.time_s > end_s:
                 break
             if prepared.time_s >= start_s:
                 start_s = prepared.time_s + period_s
-                if self._finds_people:
-                    yield prepared, self._person.all_in(prepared.stamp_ns, prepared.image)
-                    continue
-                person = self._person(prepared.image)
-                yield prepared, [] if person is None else [person]
+                yield prepared, self._found(prepared)

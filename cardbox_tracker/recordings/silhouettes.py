@@ -14,11 +14,13 @@ from cardbox_tracker.camera.camera import Rectifier
 from cardbox_tracker.camera.depth_image import DepthImage
 from cardbox_tracker.camera.encodings import brightness_of
 from cardbox_tracker.common.errors import BagError, CameraError, CardboxError, EncodingError
-from cardbox_tracker.detectors.detector import Detector, PersonDetector
+from cardbox_tracker.detectors.detector import Detector
 from cardbox_tracker.detectors.image_points import ImagePoints
 from cardbox_tracker.detectors.landmarks import image_points
 from cardbox_tracker.detectors.point_table import GivenPoints, Image, PointTable
+from cardbox_tracker.detectors.pose_network import Detection
 from cardbox_tracker.recordings.image_recording import ImageRecording, RecordedImage
+from cardbox_tracker.recordings.kept_detections import KeptDetections
 from cardbox_tracker.segmentation.background_config import BackgroundConfig
 from cardbox_tracker.segmentation.learning import Learning
 from cardbox_tracker.segmentation.silhouettes import SilhouettePipeline
@@ -204,8 +206,8 @@ class SilhouetteSource:
         self._detector = self._started(points) if isinstance(points, Detector) else None
         self._given: GivenPoints | None = None
         self._points: FindPoints = lambda prepared, silhouette: None
-        if (detector := self._detector) is not None:
-            self._points = lambda prepared, silhouette: detector.points(prepared.image)
+        if self._detector is not None:
+            self._points = lambda prepared, silhouette: points_of(self._found(prepared))
         elif isinstance(points, PointTable):
             calibration = self._pipeline.calibration
             given = points.read(camera, (calibration.width, calibration.height))
@@ -217,13 +219,18 @@ class SilhouetteSource:
                 Image(prepared.stamp_ns, prepared.number, prepared.recorded.name), silhouette
             )
 
-    def _started(self, detector: Detector) -> PersonDetector:
+    def _started(self, detector: Detector) -> KeptDetections:
         calibration = self._pipeline.calibration
         across, down = (
             self.camera.width / calibration.width,
             self.camera.height / calibration.height,
         )
-        return detector.start(across, down)
+        return KeptDetections(detector.start(across, down), detector.people > 0)
+
+    def _found(self, prepared: PreparedImage) -> list[Detection]:
+        """Return whom the detector finds in an image."""
+        assert self._detector is not None
+        return self._detector(prepared.number, prepared.stamp_ns, prepared.image)
 
     @property
     def points_fault(self) -> str:
@@ -249,7 +256,7 @@ class SilhouetteSource:
         """Yield every image from ``start_s`` to ``end_s`` in order."""
         # The background adapts from the first image on, so frames do not depend on the span.
         self._pipeline.restart()
-        self._restart_points()
+        self._start_points(start_s, end_s)
         for prepared in self.images():
             stamp_ns, time_s, image, recorded, _ = prepared
             if time_s > end_s:
@@ -262,20 +269,24 @@ class SilhouetteSource:
                     yield frame._replace(people=self._people(prepared))
                 else:
                     yield frame._replace(points=self._points(prepared, silhouette))
+        self._end_points()
 
     def _people(self, prepared: PreparedImage) -> tuple[ImagePoints, ...]:
         """Return the points of all people in an image."""
         if self._given is not None:
             image = Image(prepared.stamp_ns, prepared.number, prepared.recorded.name)
             return tuple(self._given.all_in(image))
-        assert self._detector is not None
-        found = self._detector.all_in(prepared.stamp_ns, prepared.image)
-        return tuple(image_points(one) for one in found)
+        return tuple(image_points(one) for one in self._found(prepared))
 
-    def _restart_points(self) -> None:
-        for source in (self._detector, self._given):
-            if source is not None:
-                source.restart()
+    def _start_points(self, start_s: float, end_s: float) -> None:
+        if self._detector is not None:
+            self._detector.start(start_s, end_s)
+        if self._given is not None:
+            self._given.restart()
+
+    def _end_points(self) -> None:
+        if self._detector is not None:
+            self._detector.end()
 
     def held(self, span: TimeSpan, what: str) -> list[RecordedFrame]:
         """Return the frames of a span in which a posture is held.
@@ -323,10 +334,12 @@ class SilhouetteSource:
             )
         if self._broken:
             remarks.append(self._brokenness())
-        if self._detector is not None and self._detector.missed:
-            remarks.append(f"the detector finds nobody in {self._detector.missed} images")
-        if self._detector is not None and self._detector.remark:
-            remarks.append(self._detector.remark)
+        if self._detector is not None:
+            detector = self._detector.detector
+            if detector.missed:
+                remarks.append(f"the detector finds nobody in {detector.missed} images")
+            if detector.remark:
+                remarks.append(detector.remark)
         if self._given is not None and self._given.remark:
             remarks.append(self._given.remark)
         return remarks
@@ -375,3 +388,8 @@ class SilhouetteSource:
             self._used = max(self._used, used)
             time_ns = image.stamp_ns + self._clock_ns - self._bag.start_ns
             yield PreparedImage(image.stamp_ns, time_ns / 1e9, prepared, image, number - 1)
+
+
+def points_of(found: list[Detection]) -> ImagePoints | None:
+    """Return the points of the first of the people in an image; None if there is nobody."""
+    return image_points(found[0]) if found else None

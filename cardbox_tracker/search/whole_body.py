@@ -124,19 +124,19 @@ class WholeBodyFilter:
         corrector: Corrector | None = None,
     ) -> None:
         """Prepare, and compile the kernels if necessary; see ``MakeFilter``."""
-        self._views, self._corrector = tuple(views), corrector
+        self._corrector = corrector
         self._config = settings = config.whole_body
         self._profile = settings.profile_for(1 + len(views)).scaled(settings.effort)
         self._located = self._profile.scaled(_LOCATED_EFFORT)
         self._rng, self._lost_iou = rng, config.lost_iou
-        self._use_body(silhouette)
+        self.use(silhouette, views)
         self._reference = self._body.reference_state()
         self.approach = Approach(self._profile.home_rate)
         self.forget()
 
-    def _use_body(self, silhouette: SilhouetteTerm) -> None:
-        """Prepare rating and fits for the body of ``silhouette``."""
-        self._body, views = silhouette.body, self._views
+    def use(self, silhouette: SilhouetteTerm, views: Sequence[View]) -> None:
+        """Rate and fit the body of ``silhouette`` from now on; states keep their place."""
+        self._views, self._body = tuple(views), silhouette.body
         self._cost = cost = MultiViewCost(self._body, silhouette.camera, views, self._config.cost)
         self._presence = PersonPresence(cost, self._config)
         self._arm = ArmSearch(cost)

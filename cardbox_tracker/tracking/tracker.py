@@ -13,6 +13,7 @@ import numpy as np
 from cardbox_tracker.camera.camera import Camera
 from cardbox_tracker.camera.view import OtherCamera, View
 from cardbox_tracker.common.settings import restarts
+from cardbox_tracker.measuring.seen_body import SeenBody
 from cardbox_tracker.person.kinematics import clavicles
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.posture import N_STATE, PITCH, TORSO_Y
@@ -41,7 +42,6 @@ from cardbox_tracker.tracking.estimate import (
     Estimate,
 )
 from cardbox_tracker.tracking.facing import Facing
-from cardbox_tracker.tracking.fitting import Fitting
 from cardbox_tracker.tracking.frozen import FrozenCameras
 from cardbox_tracker.tracking.head import HeadTracker
 from cardbox_tracker.tracking.observation import Observation, Observations, stamp_of
@@ -57,6 +57,8 @@ UNKNOWN_TILT_RAD = np.radians(10.0)
 """Standard deviation of a pitch that is too unsure for ``tracking``, rad; that of most cameras,
 which nothing tells more of, is above it."""
 
+# Frames without anybody after which another person is expected.
+_ABSENT_FRAMES = 5
 # A model that overlaps the silhouette less than this is somewhere else.
 _TOUCHING_IOU = 0.05
 
@@ -84,9 +86,10 @@ class Tracker:
         """Set up for ``body``; the camera gets the pitch of the body model.
 
         Args:
-            body: the person. Unknown values are fitted while tracking, which replaces the attribute
-                ``body``. Until then, or if the camera's pitch is not known to 10 degrees, estimates
-                are at best ``uncertain``.
+            body: the person. Unknown values are measured while tracking: the attribute ``body`` has
+                a few versions, see :class:`~cardbox_tracker.measuring.seen_body.SeenBody`. Before
+                the first one, or if the camera's pitch is not known to 10 degrees, estimates are at
+                best ``uncertain``.
             camera: working camera, of the silhouettes' size.
             config: settings; the paper's by default.
             rng: source of all noise; seeded with 0 by default.
@@ -109,18 +112,21 @@ class Tracker:
         if (others or corrector) and (make_filter or not self.config.has_several_views):
             what = "several cameras need" if others else "a corrector needs"
             raise ValueError(f"{what} the filter whole_body: the preset default")
-        self._fitting = None
         self._place = PlaceWatch(body, self.camera)
         self.agreement: CameraAgreement | None = None
         self._frozen = FrozenCameras(1 + len(self._others))
         self.images, self.used = 0, dict[str, int]()
+        self._measuring: SeenBody | None = None
+        self._absent, self._seconds, self._is_first = 0, 0.0, True
         if body.unknown:
+            # The paper's filter cannot go on with another version of a body.
+            pause_s = 1.0 if self.config.has_several_views else np.inf
             fits = self._rng.spawn(1)[0]
-            self._fitting = Fitting(body, self.camera, self.config, fits)
+            self._measuring = SeenBody(body, self.camera, self.config, fits, pause_s)
         self._use(body, silhouette or CompiledSilhouette(body, self.camera))
 
-    def _use(self, body: BodyModel, silhouette: SilhouetteTerm) -> None:
-        """Track ``body`` from the next frame on."""
+    def _use(self, body: BodyModel, silhouette: SilhouetteTerm, is_new_start: bool = True) -> None:
+        """Track ``body`` from the next frame on, else with the states that were found so far."""
         self.body = self.config.with_shoulders(body)
         self._silhouette = silhouette
         self._cameras = [
@@ -130,7 +136,13 @@ class Tracker:
         views = self.views
         earlier = self.agreement
         self.agreement = CameraAgreement(body, self.camera, views, earlier) if views else None
-        self.reset()
+        if is_new_start or not isinstance(self._filter, WholeBodyFilter):
+            self.reset()
+            return
+        for camera in self._cameras:
+            camera.reset(self.config)
+        self._filter.use(silhouette, views)
+        self._head = HeadTracker(self.body, self.camera)
 
     def reset(self) -> None:
         """Forget the posture; the next frame is tracked from the front reference posture."""
@@ -318,24 +330,31 @@ class Tracker:
         ]
 
     def _track(self, frames: list[Frame]) -> Estimate:
-        if self._fitting is None:
+        if self._measuring is None:
             return self._follow(frames)
-        silhouette, image = frames[0].silhouette, frames[0].image
-        points = frames[0].points
-        is_detected = points is not None and points.are_certain
-        fitted = self._fitting.before(silhouette, image, is_detected)
-        if fitted is not None:
-            self._use(fitted, CompiledSilhouette(fitted, self.camera))
-            again = self._silhouette.frame(silhouette)
-            counted = again.rows, again.foreground_px
-            frames[0] = frames[0].changed(rows=counted[0], foreground_px=counted[1], before=None)
+        self._measure(self._measuring, frames)
         estimate = self._follow(frames)
-        iou = None if estimate.iou is None else self._seen_iou
-        self._fitting.after(estimate.state != NO_PERSON, iou)
-        if estimate.posture is not None:
-            there = estimate.placed(self.body)
-            self._fitting.compare(silhouette, image, there, estimate.posture)
+        self._absent = self._absent + 1 if estimate.state == NO_PERSON else 0
+        if self._absent == _ABSENT_FRAMES:
+            # The next one may be somebody else.
+            self._measuring.forget()
+            self._is_first = True
         return estimate
+
+    def _measure(self, measuring: SeenBody, frames: list[Frame]) -> None:
+        """Use the frame of the first camera to measure, and a new version of the body at once."""
+        silhouette, points = frames[0].silhouette, frames[0].points
+        self._seconds += frames[0].interval_s
+        is_detected = points is not None and points.are_certain
+        if not measuring.see(silhouette, frames[0].image, self._seconds, is_detected):
+            return
+        body, is_first = measuring.body, self._is_first
+        self._is_first = bool(body.unknown)
+        self._use(body, CompiledSilhouette(body, self.camera), is_first)
+        again = self._silhouette.frame(silhouette)
+        counted = again.rows, again.foreground_px
+        before = None if is_first else frames[0].before
+        frames[0] = frames[0].changed(rows=counted[0], foreground_px=counted[1], before=before)
 
     def sample(self, estimate: Estimate, count: int, rng: np.random.Generator) -> FloatArray:
         """Sample postures (count, 12) for the last ``estimate``; see ``likely_postures``."""

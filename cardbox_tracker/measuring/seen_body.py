@@ -1,0 +1,104 @@
+"""The unknown values of a body, from a few images of the person in any posture.
+
+The fit to one silhouette (:mod:`.first_sight`) errs with the posture that the person happens to
+have. So it is repeated in further images, and of each size the median of all fits counts. A fit
+takes as long as tracking about a hundred images.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from cardbox_tracker.camera.camera import Camera
+from cardbox_tracker.common.errors import InitializationError
+from cardbox_tracker.measuring.first_sight import FirstSight, fit_first_sight, upper_body
+from cardbox_tracker.person.model import BodyModel
+from cardbox_tracker.search.config import TrackerConfig
+from cardbox_tracker.terms.term import Image, Silhouette
+
+MOST_SIGHTS = 7
+"""Images to which a body is fitted."""
+# Time until another image is tried after one to which no body fits, s.
+_AGAIN_S = 1.0
+
+
+class SeenBody:
+    """Measures one person while images come.
+
+    Attributes:
+        body: the body by all images so far; its values are still unknown before the first fit, or
+            if no fit is good.
+    """
+
+    def __init__(
+        self,
+        guess: BodyModel,
+        camera: Camera,
+        config: TrackerConfig,
+        rng: np.random.Generator,
+        pause_s: float = 1.0,
+        growth: float = 2.0,
+    ) -> None:
+        """Prepare for a person.
+
+        Args:
+            guess: body with ``unknown`` values.
+            camera: working camera.
+            config: settings of the tracker.
+            rng: random numbers of the fits.
+            pause_s: time between the first two images that are used.
+            growth: by how much longer each further pause is.
+        """
+        self._camera, self._config, self._rng = camera, config, rng
+        self._guess, self._pause_s, self._growth = guess, pause_s, growth
+        self.forget()
+
+    def forget(self) -> None:
+        """Expect another person."""
+        self.body, self._next_s = self._guess, float("-inf")
+        self._wait_s = self._pause_s
+        self._fits: list[FirstSight] = []
+
+    def see(
+        self,
+        silhouette: Silhouette,
+        image: Image | None,
+        time_s: float,
+        is_detected: bool = False,
+    ) -> bool:
+        """Use an image if it is time to; return whether ``body`` has changed.
+
+        Args:
+            silhouette: (H, W), 0 or 255.
+            image: of the same time, for the colours; None without one.
+            time_s: time of the image.
+            is_detected: whether a detector finds the person, who may then be small.
+        """
+        if time_s < self._next_s or len(self._fits) == MOST_SIGHTS:
+            return False
+        seen = upper_body(silhouette, is_detected)
+        if seen is None:
+            return False
+        self._next_s = time_s + _AGAIN_S
+        try:
+            fit = fit_first_sight(self._guess, self._camera, seen, image, self._config, self._rng)
+        except InitializationError:
+            return False
+        if not fit.body.unknown:
+            self._fits.append(fit)
+            self._next_s = time_s + self._wait_s
+            self._wait_s *= self._growth
+            self.body = self._median()
+        elif not self._fits and (self.body is self._guess or fit.iou > self._poor_iou):
+            # A body that fits poorly serves until one fits well.
+            self.body, self._poor_iou = fit.body, fit.iou
+        else:
+            return False
+        return True
+
+    def _median(self) -> BodyModel:
+        """Return the body with the place and colours of the image that it fits best."""
+        best = max(self._fits, key=lambda fit: fit.iou).body
+        sizes = np.median([fit.body.sizes for fit in self._fits], axis=0)
+        first = self._fits[0].body
+        return first.with_values(sizes=sizes, appearance=best.appearance)
