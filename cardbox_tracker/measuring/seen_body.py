@@ -55,7 +55,7 @@ class SeenBody:
 
     def forget(self) -> None:
         """Expect another person."""
-        self.body, self._next_s = self._guess, float("-inf")
+        self.body, self._next_s, self._poor_iou = self._guess, float("-inf"), 0.0
         self._wait_s = self._pause_s
         self._fits: list[FirstSight] = []
 
@@ -89,7 +89,7 @@ class SeenBody:
             self._next_s = time_s + self._wait_s
             self._wait_s *= self._growth
             self.body = self._median()
-        elif not self._fits and (self.body is self._guess or fit.iou > self._poor_iou):
+        elif not self._fits and fit.iou > self._poor_iou:
             # A body that fits poorly serves until one fits well.
             self.body, self._poor_iou = fit.body, fit.iou
         else:

@@ -170,6 +170,9 @@ class BodyModel:
             it is no part of a model file.
         shoulder_rise: rise of a shoulder joint per radian of elevation of its arm, in shoulder
             breadths (:mod:`.skeleton`); it is no part of a model file.
+        version: number of a body that is measured while it is tracked live, from 1 on; 0 for
+            others. Equal bodies may have different ones.
+        stamp_ns: stamp of the first image to which this version belongs, ns; 0 without one.
 
     Raises:
         BodyModelError: ``side_turn``, ``source`` or a name in ``unknown`` is not valid.
@@ -184,6 +187,8 @@ class BodyModel:
     unknown: tuple[str, ...] = ()
     stature_stddev: float = 0.0
     shoulder_rise: float = SHOULDER_RISE
+    version: int = field(default=0, compare=False)
+    stamp_ns: int = field(default=0, compare=False)
 
     def __post_init__(self) -> None:
         """Check the names; the parts check themselves."""

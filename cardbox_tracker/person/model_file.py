@@ -23,6 +23,9 @@ _TOP_KEYS = ("format", "units", *CONSTANTS, "side_turn", "sizes")
 _APPEARANCE = "appearance"
 # Without these keys, the person was measured and all values are known.
 _SOURCE, _UNKNOWN = "source", "unknown"
+# A body that is measured while it is tracked live has these keys.
+_VERSION, _STAMP = "version", "stamp_ns"
+_OPTIONAL = (_APPEARANCE, _SOURCE, _UNKNOWN, _VERSION, _STAMP)
 _HEADERS = {
     MEASURED: "# A person measured by cardbox_tracker: what does not change while they are "
     "tracked.",
@@ -41,8 +44,10 @@ def dumps_body_model(model: BodyModel) -> str:
     if model.source != MEASURED:
         lines.append(f"{_SOURCE}: {model.source}")
     if model.unknown:
-        lines.append("# guesses, which are fitted to the first silhouette of a person")
+        lines.append("# guesses, which are fitted to a few images of a person")
         lines.append(f"{_UNKNOWN}: [{', '.join(model.unknown)}]")
+    if model.version:
+        lines += [f"{_VERSION}: {model.version}", f"{_STAMP}: {model.stamp_ns}"]
     for name, (_, _, _, meaning) in CONSTANTS.items():
         lines.append(f"{name}: {_yaml_number(model.constants[name])}  # {meaning}")
     lines.append(f"side_turn: {model.side_turn}  # the way the person turned in the side reference")
@@ -123,7 +128,7 @@ def save_body_model(model: BodyModel, path: str | os.PathLike[str]) -> None:
 def _from_mapping(data: object) -> BodyModel:
     if not isinstance(data, dict):
         raise BodyModelError("expected a mapping with the keys " + ", ".join(_TOP_KEYS))
-    _check_keys(data, _TOP_KEYS, "", optional=(_APPEARANCE, _SOURCE, _UNKNOWN))
+    _check_keys(data, _TOP_KEYS, "", optional=_OPTIONAL)
     if data["format"] != FORMAT:
         raise BodyModelError(f"format is {quoted(data['format'])}; this version reads '{FORMAT}'")
     if not isinstance(data["units"], dict):
@@ -150,7 +155,15 @@ def _from_mapping(data: object) -> BodyModel:
         appearance=_appearance(data[_APPEARANCE]) if _APPEARANCE in data else None,
         source=data.get(_SOURCE, MEASURED),
         unknown=_names(data.get(_UNKNOWN, [])),
+        version=_whole(data.get(_VERSION, 0), _VERSION),
+        stamp_ns=_whole(data.get(_STAMP, 0), _STAMP),
     )
+
+
+def _whole(value: object, key: str) -> int:
+    if isinstance(value, bool) or not isinstance(value, int) or not 0 <= value < 2**63:
+        raise BodyModelError(f"'{key}' is {quoted(value)}; expected a whole number from 0 on")
+    return value
 
 
 def _names(value: object) -> tuple[str, ...]:

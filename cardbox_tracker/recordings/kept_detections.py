@@ -7,6 +7,7 @@ take most of the time, so what they find is kept in a temporary file, with masks
 from __future__ import annotations
 
 import pickle
+import weakref
 import zlib
 from tempfile import SpooledTemporaryFile
 
@@ -28,6 +29,9 @@ class KeptDetections:
         self.detector, self._finds_people = detector, finds_people
         self._span: tuple[float, float] | None = None
         self._is_whole = False
+        self._places: dict[int, int] = {}
+        self._file = SpooledTemporaryFile(_IN_MEMORY)  # noqa: SIM115
+        weakref.finalize(self, self._file.close)
 
     def start(self, start_s: float, end_s: float) -> None:
         """Begin a pass over the images of a span, seconds from the start of the recording."""
@@ -36,9 +40,9 @@ class KeptDetections:
         # Detections depend on the images before, so those of another span do not count.
         self.detector.restart()
         self._span, self._is_whole = (start_s, end_s), False
-        self._places: dict[int, int] = {}
-        # It is read and written until the recording is closed.
-        self._file = SpooledTemporaryFile(_IN_MEMORY)  # noqa: SIM115
+        self._places.clear()
+        self._file.seek(0)
+        self._file.truncate()
 
     def end(self) -> None:
         """End a pass in which all images of the span were seen."""

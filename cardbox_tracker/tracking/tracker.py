@@ -348,7 +348,9 @@ class Tracker:
         is_detected = points is not None and points.are_certain
         if not measuring.see(silhouette, frames[0].image, self._seconds, is_detected):
             return
-        body, is_first = measuring.body, self._is_first
+        version, stamp_ns = self.body.version + 1, frames[0].stamp_ns or 0
+        body = replace(measuring.body, version=version, stamp_ns=stamp_ns)
+        is_first = self._is_first
         self._is_first = bool(body.unknown)
         self._use(body, CompiledSilhouette(body, self.camera), is_first)
         again = self._silhouette.frame(silhouette)

@@ -347,12 +347,13 @@ class TrackerNode(CardboxNode):
         for outputs, report, (estimate, tracker) in zip(
             self._outputs, self._reports, found, strict=True
         ):
-            outputs.publish(seen, estimate, tracker)
             news, named = report.add(estimate, tracker.body), _named(estimate.person)
             for kind, text in news.items():
                 self.diagnostics.say(named + kind, named + text)
+            # Joint states of a new version of the body follow the version.
             if self._found is not None and "body" in news and tracker is self._tracker:
                 self._found.publish(tracker.body, seen.header.frame_id)
+            outputs.publish(seen, estimate, tracker)
         self._agreement.see(self._tracker.agreement)
         self.diagnostics.advice = self._warnings
         self.diagnostics.working(seen.sent_ns)

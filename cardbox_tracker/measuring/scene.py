@@ -1,0 +1,170 @@
+"""A scene: the camera over the floor and the people before it, and its file.
+
+Each number of the camera has a mean, a standard deviation, and where it comes from. The file of one
+film can be given to the next film of the same camera.
+"""
+
+from __future__ import annotations
+
+import math
+import os
+import textwrap
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+from cardbox_tracker.common.errors import CardboxError, quoted
+from cardbox_tracker.common.files import atomic_path
+from cardbox_tracker.common.small_yaml import SmallYamlError, parse_small_yaml, read_small_text
+from cardbox_tracker.person.model import BodyModel
+from cardbox_tracker.person.model_file import dumps_body_model, loads_body_model
+
+FORMAT = "cardbox_scene/1"
+ORIGINS = GIVEN, FOUND, USUAL = "given", "found", "usual"
+"""Where a number comes from: a user or a file; the images; what most cameras have."""
+
+
+class Value(NamedTuple):
+    """A number of a scene.
+
+    Attributes:
+        mean: its value.
+        stddev: its standard deviation.
+        origin: one of ``ORIGINS``.
+    """
+
+    mean: float
+    stddev: float
+    origin: str = FOUND
+
+
+class SceneCamera(NamedTuple):
+    """The camera of a scene.
+
+    Attributes:
+        fov_rad: field of view across the width of the image as it is shown.
+        pitch_rad: downward pitch.
+        roll_rad: clockwise turn about the axis, seen from behind the camera.
+        height_m: height above the floor; None if nothing shows it.
+    """
+
+    fov_rad: Value
+    pitch_rad: Value
+    roll_rad: Value
+    height_m: Value | None = None
+
+
+_NUMBERS = {
+    "fov_deg": ("fov_rad", 180 / math.pi, (10.0, 160.0), "field of view across the image"),
+    "pitch_deg": ("pitch_rad", 180 / math.pi, (-89.0, 89.0), "downward pitch"),
+    "roll_deg": ("roll_rad", 180 / math.pi, (-180.0, 180.0), "clockwise roll"),
+    "height_m": ("height_m", 1.0, (0.05, 20.0), "height above the floor"),
+}
+
+
+@dataclass(frozen=True)
+class Scene:
+    """What does not change in a film.
+
+    Attributes:
+        camera: the camera.
+        people: the body of each person, by number.
+    """
+
+    camera: SceneCamera
+    people: tuple[BodyModel, ...] = ()
+
+    def words(self) -> Iterator[str]:
+        """Yield each number of the camera with its deviation and origin."""
+        for name, value in self._numbers():
+            unit = name.rpartition("_")[2].replace("deg", "degrees")
+            number = f"{value.mean:.3g} +- {value.stddev:.2g} {unit} ({value.origin})"
+            yield f"{_NUMBERS[name][3]} {number}"
+
+    def numbers(self) -> dict[str, dict[str, float | str]]:
+        """Return mean, stddev and origin by the names of the file."""
+        return {name: value._asdict() for name, value in self._numbers()}
+
+    def _numbers(self) -> Iterator[tuple[str, Value]]:
+        for name, (attribute, factor, *_) in _NUMBERS.items():
+            value: Value | None = getattr(self.camera, attribute)
+            if value is not None:
+                yield name, Value(factor * value.mean, factor * value.stddev, value.origin)
+
+
+def dumps_scene(scene: Scene) -> str:
+    """Return the YAML text of a scene; equal scenes give equal texts."""
+    lines = [
+        "# A scene measured by cardbox_tracker; people are body models.",
+        f"format: {FORMAT}",
+        "camera:",
+    ]
+    for name, value in scene.numbers().items():
+        mean, stddev, origin = value.values()
+        entries = f"{{mean: {mean:.6f}, stddev: {stddev:.6f}, origin: {origin}}}"
+        lines.append(f"  {name}: {entries}  # {_NUMBERS[name][3]}")
+    lines.append("people:" if scene.people else "people: []")
+    for body in scene.people:
+        lines += ["  - |", textwrap.indent(dumps_body_model(body), "    ").rstrip()]
+    return "\n".join(lines) + "\n"
+
+
+def save_scene(scene: Scene, path: str | os.PathLike[str]) -> None:
+    """Write a scene atomically.
+
+    Raises:
+        CardboxError: the file cannot be written.
+    """
+    with atomic_path(path) as temporary:
+        temporary.write_text(dumps_scene(scene), encoding="utf-8")
+
+
+def load_scene(path: str | os.PathLike[str]) -> Scene:
+    """Read a scene.
+
+    Raises:
+        CardboxError: the file cannot be read or is no scene; the text names what is wrong.
+    """
+    try:
+        data = parse_small_yaml(read_small_text(path))
+        return _scene_of(data)
+    except (SmallYamlError, ValueError) as error:
+        raise CardboxError(
+            f"cannot read the scene {os.fspath(path)}: {error}; give a file OUT.scene.yaml that "
+            "'cardbox track' has written"
+        ) from None
+
+
+def _scene_of(data: Any) -> Scene:
+    keys = {"format", "camera", "people"}
+    if not isinstance(data, dict) or set(data) != keys:
+        raise ValueError(f"expected a mapping of {', '.join(sorted(keys))}")
+    if data["format"] != FORMAT:
+        raise ValueError(f"format is {quoted(data['format'])}; this version reads '{FORMAT}'")
+    camera, people = data["camera"], data["people"]
+    if not isinstance(camera, dict) or not {"fov_deg", "pitch_deg", "roll_deg"} <= set(camera):
+        raise ValueError("camera lacks fov_deg, pitch_deg or roll_deg")
+    if unknown := set(camera) - set(_NUMBERS):
+        raise ValueError(f"camera has the unknown key {quoted(unknown.pop())}")
+    if not isinstance(people, list) or not all(isinstance(one, str) for one in people):
+        raise ValueError("people is no list of body models")
+    values = {_NUMBERS[name][0]: _value_of(name, given) for name, given in camera.items()}
+    bodies = (loads_body_model(text, f"person {n}") for n, text in enumerate(people, 1))
+    return Scene(SceneCamera(**values), tuple(bodies))
+
+
+def _value_of(name: str, given: Any) -> Value:
+    _, factor, (lowest, highest), _ = _NUMBERS[name]
+    is_value = isinstance(given, dict) and set(given) == set(Value._fields)
+    numbers = (given["mean"], given["stddev"]) if is_value else ()
+    if not is_value or not all(
+        isinstance(one, int | float) and not isinstance(one, bool) for one in numbers
+    ):
+        raise ValueError(f"camera.{name} is no mapping of the numbers mean and stddev and origin")
+    mean, stddev = map(float, numbers)
+    if not lowest <= mean <= highest or not 0.0 <= stddev < math.inf:
+        raise ValueError(
+            f"camera.{name} is {mean:g} +- {stddev:g}; expected {lowest:g} to {highest:g}, and a "
+            "deviation from 0 on"
+        )
+    return Value(mean / factor, stddev / factor, GIVEN)
