@@ -134,6 +134,7 @@ setup(
         "opencv-python-headless>=4.9,<6",
         "PyYAML>=6.0,<7",
         "rosbags>=0.10,<0.12",
+        "scipy>=1.11,<2",
         "tqdm>=4.66,<5",
     ],
     extras_require={

@@ -22,7 +22,7 @@ from cardbox_tracker.commands.request import (
     inputs_of,
     recording_request,
 )
-from cardbox_tracker.commands.tracking import placed
+from cardbox_tracker.commands.tracking import tilt_in
 
 NAME = "initialize"
 HELP = "measure the person in a recording"
@@ -83,9 +83,8 @@ def run(options: argparse.Namespace) -> None:
     problems.check()
     check_outputs((options.output,), options.force, inputs_of(options))
     spans = {name: getattr(options, name) for name in REFERENCES}
-    if options.camera_pitch_deg is None:
-        found = placed(recording, spans["front"])
-        pitch_rad, recording = found.pitch_rad, found.recording
+    if options.camera_pitch_deg is None and recording.detector is not None:
+        pitch_rad, recording = tilt_in(recording, spans["front"])
     config = InitializationConfig(
         distance_m=distance_m,
         camera_pitch_rad=pitch_rad,

@@ -34,6 +34,7 @@ if TYPE_CHECKING:
     from cardbox_tracker.detectors.detector import Detector
     from cardbox_tracker.detectors.person_choice import PersonChoice
     from cardbox_tracker.detectors.point_table import PointTable
+    from cardbox_tracker.measuring.scene import Scene
     from cardbox_tracker.person.model import BodyModel
     from cardbox_tracker.recordings.given_camera import GivenCamera
     from cardbox_tracker.recordings.recording import Recording, Segmentation
@@ -131,12 +132,12 @@ class PersonRequest:
         model: the file of a measured person; None if only the stature is given.
         start_s: seconds from the recording's start at which tracking starts.
         end_s: the same at which it ends; inf for the end of the recording.
-        is_pitch_given: whether ``body`` has the camera's pitch; else it is to be found from the
-            person who stands upright.
+        is_pitch_given: whether ``body`` has the camera's pitch; else it is to be found.
         stature_m: the stature that is given, of the first person; None with ``model``.
         people: number of people to track, 0 for all who come; None for one without a number.
         others: the bodies of the second and further people.
         number: whose results commands use that use those of one.
+        statures_m: the statures that are given, by number.
     """
 
     body: BodyModel
@@ -148,6 +149,7 @@ class PersonRequest:
     people: int | None = None
     others: tuple[BodyModel, ...] = ()
     number: int = 1
+    statures_m: tuple[float, ...] = ()
 
 
 TABLES = ("csv", "parquet")
@@ -162,13 +164,15 @@ class TrackFiles(NamedTuple):
         table: one row for each image, see :func:`~.recordings.result_table.result_table`.
         video: overlay video, at the rate and the resolution of the recording.
         bag: folder of a bag with the topics of the tracker.
-        body: the body at the end of the recording.
+        body: the body that was tracked.
+        scene: camera, floor and people (:mod:`~cardbox_tracker.measuring.scene`).
     """
 
     table: Path | None = None
     video: Path | None = None
     bag: Path | None = None
     body: Path | None = None
+    scene: Path | None = None
 
 
 @dataclass(frozen=True)
@@ -366,6 +370,13 @@ def add_tracking(parser: argparse.ArgumentParser, needs_recording: bool = True) 
         "for all. Of films with --detector, the mean stature of adults is taken without both",
     )
     add(
+        "--scene",
+        type=Path,
+        metavar="OUT.scene.yaml",
+        help="camera, and without --stature and --model also people, of another recording of the "
+        "same camera, as 'cardbox track' wrote them beside its table",
+    )
+    add(
         "--people",
         type=_count,
         metavar="N|auto",
@@ -529,7 +540,7 @@ def recording_request(options: argparse.Namespace, problems: Problems) -> Record
 
 def inputs_of(options: argparse.Namespace) -> tuple[Path, ...]:
     """Return the files and folders that the options of a recording or of tracking name."""
-    names = "recording", "extrinsics", "calibration", "detector", "model", "settings"
+    names = "recording", "extrinsics", "calibration", "detector", "model", "scene", "settings"
     given = (getattr(options, name, None) for name in names)
     # A detector may also be a word, which names no file.
     return tuple(Path(path) for path in given if path)
@@ -549,8 +560,11 @@ def tracking_request(options: argparse.Namespace, faults: Iterable[str] = ()) ->
     from cardbox_tracker.search.config import PRESETS
 
     problems = Problems(options.recording, faults)
+    scene = _scene(options, problems)
+    if scene is not None:
+        options = _with_camera(options, scene)
     recording = recording_request(options, problems)
-    person = _person(options, problems)
+    person = _person(options, problems, scene)
     preset = PRESETS[options.preset]()
     is_more = len(options.cameras) > 1 or options.depth is not None
     if is_more and not preset.has_several_views:
@@ -680,7 +694,31 @@ def points_named(name: str) -> Detector | PointTable:
     return PointTable(path)
 
 
-def _person(options: argparse.Namespace, problems: Problems) -> PersonRequest:
+def _scene(options: argparse.Namespace, problems: Problems) -> Scene | None:
+    from cardbox_tracker.measuring.scene import load_scene
+
+    if options.scene is None:
+        return None
+    if options.model is not None:
+        problems.add("--scene and --model both have the camera's pitch: leave one of them out")
+    return problems.caught(lambda: load_scene(options.scene), None)
+
+
+def _with_camera(options: argparse.Namespace, scene: Scene) -> argparse.Namespace:
+    """Return the options with what the scene says of a film's camera where they say nothing."""
+    from cardbox_tracker.recordings.open_images import is_film
+
+    found, camera = copy.copy(options), scene.camera
+    if is_film(options.recording) and options.fov is None and options.calibration is None:
+        found.fov = math.degrees(camera.fov_rad.mean)
+    if options.camera_roll_deg is None and camera.roll_rad.mean:
+        found.camera_roll_deg = math.degrees(camera.roll_rad.mean)
+    return found
+
+
+def _person(
+    options: argparse.Namespace, problems: Problems, scene: Scene | None = None
+) -> PersonRequest:
     from cardbox_tracker.person.model import MEASURED, BodyModel
     from cardbox_tracker.person.model_file import load_body_model
     from cardbox_tracker.person.proportions import USUAL_STATURE_M
@@ -691,7 +729,12 @@ def _person(options: argparse.Namespace, problems: Problems) -> PersonRequest:
         problems.add("--stature has several values: give one, or --people")
     if options.people is not None and options.model is not None:
         problems.add("--people takes the stature of each person: give --stature, not --model")
-    if options.model is None and options.stature is None and not _is_guessed(options):
+    is_of_scene = scene is not None and bool(scene.people) and options.stature is None
+    if scene is not None and is_of_scene:
+        # They may stand elsewhere now.
+        place = ("distance_m", "hip_height_m")
+        body, *others = (one.with_values(unknown=place) for one in scene.people)
+    elif options.model is None and options.stature is None and not _is_guessed(options):
         problems.miss("--stature M or --model FILE")
     elif None not in (options.model, options.stature):
         problems.add("--stature and --model both say who is tracked: leave one of them out")
@@ -708,7 +751,11 @@ def _person(options: argparse.Namespace, problems: Problems) -> PersonRequest:
         body = problems.caught(lambda: load_body_model(options.model), body)
         if options.start is None and body.source == MEASURED:
             problems.miss("--start T", "a measured person stands as for --front at T")
-    is_pitch_given = options.model is not None or pitch_deg is not None
+    is_pitch_given = options.model is not None or pitch_deg is not None or scene is not None
+    if scene is not None and pitch_deg is None:
+        pitch = scene.camera.pitch_rad
+        tilt = {"camera_pitch_rad": pitch.mean, "pitch_stddev_rad": pitch.stddev}
+        body, *others = (one.with_values(**tilt) for one in (body, *others))
     start_s, end_s = options.start or 0.0, math.inf if options.end is None else options.end
     if end_s <= start_s:
         problems.add(f"--end {end_s:g} is not after --start {start_s:g}: give a later second")
@@ -716,8 +763,9 @@ def _person(options: argparse.Namespace, problems: Problems) -> PersonRequest:
     if options.people and number > options.people:
         problems.add(f"--person {number} is none of {options.people} people")
     stature_m = None if options.stature is None else options.stature[0]
-    several = options.people, tuple(others), number
-    return PersonRequest(body, options.model, start_s, is_pitch_given, stature_m, end_s, *several)
+    several = options.people, tuple(others), number, tuple(options.stature or ())
+    source = options.scene if is_of_scene else options.model
+    return PersonRequest(body, source, start_s, is_pitch_given, stature_m, end_s, *several)
 
 
 def _of_stature(stature_m: float, distance_m: float | None, pitch_rad: float) -> BodyModel:

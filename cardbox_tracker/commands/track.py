@@ -117,12 +117,12 @@ def _track_one(options: argparse.Namespace) -> None:
     name = Path(recording.name if recording.is_dir() else recording.stem)
     table = options.csv or Path(f"{name}.csv")
     check_table(table)
-    body = None
-    if request.person.model is None:
-        # There is no place for a further file beside a pipe.
-        body = body_beside(name if is_written_in_place(table) else table)
-    files = TrackFiles(table, options.video, options.bag, body)
-    written = (table, body, options.video, options.json)
+    # There is no place for a further file beside a pipe.
+    beside = name if is_written_in_place(table) else table
+    body = body_beside(beside) if request.person.model is None else None
+    scene = beside.with_name(f"{beside.stem}.scene.yaml")
+    files = TrackFiles(table, options.video, options.bag, body, scene)
+    written = (table, body, scene, options.video, options.json)
     check_outputs(written, options.force, request.inputs, results=(options.bag,))
     summary = track(replace(request, files=files, force=options.force))
     if options.json is not None:
@@ -142,6 +142,7 @@ def _account(summary: TrackSummary) -> dict[str, Any]:
         "uncertain": summary.frames_uncertain,
         "used": dict(summary.used),
         "assumed": summary.assumptions,
+        "scene": summary.scene,
         "remarks": summary.remarks,
         "cameras": summary.accounts,
     }

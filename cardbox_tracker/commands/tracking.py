@@ -3,31 +3,27 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
-from contextlib import ExitStack
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import ExitStack, contextmanager
 from dataclasses import replace
 from functools import partial
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 from cardbox_tracker.commands.arguments import body_of_person, print_remarks
 
 if TYPE_CHECKING:
     from cardbox_tracker.camera.camera import Camera
     from cardbox_tracker.commands.request import PersonRequest, RecordingRequest, TrackingRequest
+    from cardbox_tracker.measuring.scene import Scene, SceneCamera, Value
+    from cardbox_tracker.measuring.scene_camera import FoundCamera
     from cardbox_tracker.person.model import BodyModel
+    from cardbox_tracker.recordings.measured_scene import Watched
     from cardbox_tracker.recordings.recording import Recording
     from cardbox_tracker.recordings.silhouettes import RecordedFrame, TimeSpan
     from cardbox_tracker.recordings.track import Observer, TrackSummary
+    from cardbox_tracker.search.config import TrackerConfig
     from cardbox_tracker.tracking.estimate import Estimate
     from cardbox_tracker.tracking.tracker import Tracker
-
-_STANDING_S = 1.0
-"""Time for which a person of a given stature stands upright at the start, seconds."""
-_COMES_WITHIN_S = 30.0
-"""Time after the start within which a person of a given stature is sought, seconds."""
-# A given pitch contradicts the one found from this many standard deviations on, and from this
-# difference on, degrees.
-_SURE_STDDEVS, _LEAST_DEG = 2.5, 6.0
 
 
 def track(
@@ -48,69 +44,28 @@ def track(
     """
     from cardbox_tracker.common.progress import progress_bar
     from cardbox_tracker.detectors.hand_network import HandNetwork
-    from cardbox_tracker.measuring.standing_camera import PITCH_PRIOR, USUAL_PITCH
-    from cardbox_tracker.person.model import PLACEMENT
+    from cardbox_tracker.measuring.scene import save_scene
     from cardbox_tracker.person.model_file import save_body_model
-    from cardbox_tracker.person.proportions import USUAL_STATURE_M, USUAL_STDDEV_M
-    from cardbox_tracker.recordings.measured_scene import seen_people, seen_person
     from cardbox_tracker.recordings.quality import Quality
-    from cardbox_tracker.recordings.silhouettes import TimeSpan
     from cardbox_tracker.recordings.track import Crowd, track_recording
 
     qualities: dict[int, Quality] = {}
     recording, person = request.recording, request.person
-    bodies = [person.body, *person.others]
     start_s = person.start_s
     if person.model is not None and person.body.doubt:
         print(f"{person.model}: {person.body.doubt}")
-    if person.model is None:
-        standing = TimeSpan(start_s, start_s + _STANDING_S)
-        # The person may come later.
-        found = placed(recording, standing, start_s + _COMES_WITHIN_S, person)
-        recording = found.recording
-        if not person.is_pitch_given:
-            if recording.detector is None:
-                found = found._replace(stddev_rad=math.hypot(USUAL_PITCH, PITCH_PRIOR))
-                print_remarks(
-                    [
-                        "nothing tells the camera's pitch without a detector: a level camera is "
-                        "assumed, so every posture is at best uncertain; give --camera-pitch-deg "
-                        "(0 for a level camera)"
-                    ]
-                )
-            tilt = {"camera_pitch_rad": found.pitch_rad, "pitch_stddev_rad": found.stddev_rad}
-            bodies = [body.with_values(**tilt) for body in bodies]
-        if found.distance is not None and "distance_m" in person.body.unknown:
-            stature_m = person.stature_m or USUAL_STATURE_M
-            lowest_m, highest_m, *_ = PLACEMENT["distance_m"]
-            distance_m = min(max(found.distance * stature_m, lowest_m), highest_m)
-            bodies = [body.with_values(distance_m=distance_m) for body in bodies]
-        if person.stature_m is None:
-            unsure = USUAL_STDDEV_M / USUAL_STATURE_M
-            bodies = [body.with_values(stature_stddev=unsure) for body in bodies]
-            print_remarks(
-                [
-                    f"the stature is taken as that of most adults, {USUAL_STATURE_M:g} m (standard "
-                    f"deviation {USUAL_STDDEV_M:g}), so sizes and distances may be wrong by a "
-                    "tenth; give --stature M"
-                ]
-            )
     if person.people is not None:
         observers = tuple(partial(_of_person, person.number, observe) for observe in observers)
 
     def judge(frame: RecordedFrame, estimate: Estimate, tracker: Tracker) -> None:
         qualities.setdefault(estimate.person or 0, Quality())(frame, estimate, tracker)
 
-    with recording.open() as source:
+    with measured_scene(recording, person, request.config, request.seed) as (source, scene):
         early = source.first.remarks
         print_remarks(early)
-        crowd, span = None, (start_s, person.end_s)
+        bodies, crowd = scene.people, None
         if person.people is not None:
-            several = source, bodies, request.config, person.people or None
-            bodies = seen_people(*several, request.seed, *span)
-            crowd = Crowd(tuple(bodies), person.people or None)
-        else:
-            bodies = [seen_person(source, bodies[0], request.config, request.seed, *span)]
+            crowd = Crowd(bodies, person.people or None)
         total_s = max(1e-9, min(source.first.duration_s, person.end_s) - start_s)
         with ExitStack() as stack:
             observers = (*_writers(request, source, stack), *observers)
@@ -132,8 +87,9 @@ def track(
             )
         remarks = [remark for remark in source.first.remarks if remark not in early]
         accounts = tuple(one.account for one in source.sources)
-        assumptions = tuple(_assumptions(request, source.first.camera, summary.body or bodies[0]))
-    summary = replace(summary, accounts=accounts, assumptions=assumptions)
+        assumptions = tuple(_assumptions(request, scene))
+    told = {"accounts": accounts, "assumptions": assumptions, "scene": scene.numbers()}
+    summary = replace(summary, **told)
     if show is None and not summary.people:
         print(f"tracked {summary.frames_tracked} of {summary.frames} images")
     print_remarks(remarks, summary.remarks)
@@ -149,10 +105,12 @@ def track(
     for number, one in (summary.people or {1: summary}).items():
         if request.files.body is not None and one.body is not None:
             save_body_model(one.body, body_of_person(request.files.body, number))
+    if request.files.scene is not None:
+        save_scene(scene, request.files.scene)
     if person.people is None:
         return summary
     one = summary.people.get(person.number, summary)
-    return replace(one, accounts=accounts, assumptions=assumptions)
+    return replace(one, **told)
 
 
 def _of_person(
@@ -163,28 +121,16 @@ def _of_person(
         observe(frame, estimate, tracker)
 
 
-def _assumptions(request: TrackingRequest, camera: Camera, body: BodyModel) -> Iterator[str]:
-    """Yield camera, place and stature with where they are from; ``body`` is that of the end."""
+def _assumptions(request: TrackingRequest, scene: Scene) -> Iterator[str]:
+    """Yield camera, place and stature with where they are from."""
     from cardbox_tracker.person.proportions import USUAL_STATURE_M
-    from cardbox_tracker.recordings.given_camera import GUESSED_STDDEV
 
-    person, given = request.person, request.recording.camera
-    lens = "guessed" if camera.focal_stddev >= GUESSED_STDDEV else "from the recording"
-    if given.is_calibrated:
-        lens = "given" if given.calibration is None else f"from {given.calibration.name}"
-    fov_deg = math.degrees(2 * math.atan(camera.width / 2 / camera.fx))
-    yield f"field of view {fov_deg:.0f} degrees ({lens})"
+    person = request.person
+    yield from scene.words()
     source = "given" if person.model is None else f"from {person.model.name}"
-    tilt = body.camera_pose
-    deviation = f"standard deviation {math.degrees(tilt.pitch_stddev_rad):.0f}"
-    pitch = "assumed" if request.recording.detector is None else f"found, {deviation}"
-    pitch_deg = math.degrees(tilt.pitch_rad)
-    yield (
-        f"camera pitch {abs(pitch_deg):.0f} degrees {'down' if pitch_deg >= 0 else 'up'} "
-        f"({source if person.is_pitch_given else pitch})"
-    )
-    distance = "found" if "distance_m" in person.body.unknown else source
-    yield f"distance {body.placement.distance_m:.2f} m ({distance})"
+    if person.people is None:
+        distance = "found" if "distance_m" in person.body.unknown else source
+        yield f"distance {scene.people[0].placement.distance_m:.2f} m ({distance})"
     if person.stature_m is not None:
         yield f"stature {person.stature_m:.2f} m (given), sizes from proportions"
     elif person.model is None:
@@ -207,91 +153,144 @@ def _writers(request: TrackingRequest, source: Recording, stack: ExitStack) -> I
         yield stack.enter_context(result_bag(bag, frame_id, request.force, draw_sharp_overlay))
 
 
-class Placement(NamedTuple):
-    """The camera of a recording.
+@contextmanager
+def measured_scene(
+    recording: RecordingRequest, person: PersonRequest, config: TrackerConfig, seed: int
+) -> Iterator[tuple[Recording, Scene]]:
+    """Open a recording whose scene is measured, in all of it, before it is tracked.
 
-    Attributes:
-        pitch_rad: downward pitch, as it is given or found.
-        recording: the recording with the camera's roll, unless it is given.
-        stddev_rad: standard deviation of a pitch that was found.
-        distance: of the person who stands upright, statures; None without one.
-    """
-
-    pitch_rad: float
-    recording: RecordingRequest
-    stddev_rad: float = math.radians(2.0)
-    distance: float | None = None
-
-
-def placed(
-    recording: RecordingRequest,
-    span: TimeSpan,
-    until_s: float = 0.0,
-    person: PersonRequest | None = None,
-) -> Placement:
-    """Return the camera's pitch and roll, and say what was found, or contradicts what is given.
-
-    They are found from the edges of the room, and from the person who stands upright in ``span`` or
-    later up to ``until_s``, if the recording is read with a detector; else the pitch is 0.
+    A roll that is found turns the images back, unless one is given.
 
     Args:
-        recording: the recording.
-        span: when the person stands upright.
-        until_s: until when the person is sought, seconds from the start.
-        person: what is given of the person and of the pitch; None for nothing.
+        recording: what is read.
+        person: who is tracked, and what is given of them and of the camera.
+        config: settings of the tracker.
+        seed: random seed of the fits.
 
     Raises:
         CardboxError: the recording cannot be read, or the detector cannot be loaded.
     """
-    from cardbox_tracker.recordings.standing import placed_camera
+    from cardbox_tracker.measuring.scene import GIVEN, Scene, SceneCamera, Value
+    from cardbox_tracker.person.proportions import USUAL_STATURE_M
+    from cardbox_tracker.recordings.measured_scene import seen_people, seen_person, watch
 
-    detector, camera = recording.detector, recording.camera
-    given_rad = None
-    if person is not None and person.is_pitch_given:
-        given_rad = person.body.camera_pose.pitch_rad
-    if detector is None:
-        return Placement(given_rad or 0.0, recording)
-    name = recording.cameras[0] if recording.cameras else None
-    found = placed_camera(recording.path, detector, span, camera, name, until_s, given_rad)
-    tilt = found.tilt
-    pitch, deviation = math.degrees(tilt.pitch_rad), math.degrees(tilt.pitch_stddev_rad)
-    sources = ["the vertical edges of the room"] if tilt.has_edges else []
-    if found.span is not None:
-        first_s, last_s = found.span.start_s, found.span.end_s
-        sources.append(
-            f"the person standing upright between the seconds {first_s:g} and {last_s:g}"
-        )
-    number = f"{abs(pitch):.0f} degrees {'down' if pitch >= 0 else 'up'}"
+    with ExitStack() as stack:
+        source = stack.enter_context(recording.open())
+        span = person.start_s, person.end_s
+        bodies, first = [person.body, *person.others], source.first
+        tilt = person.body.camera_pose
+        if person.model is not None and not person.body.unknown:
+            pitch = Value(tilt.pitch_rad, tilt.pitch_stddev_rad, GIVEN)
+            camera = SceneCamera(_lens_of(first.camera), pitch, Value(0.0, 0.0, GIVEN))
+            yield source, Scene(camera, tuple(bodies))
+            return
+        watched = watch(source, *span)
+        found = found_camera(recording, person, watched, first.camera)
+        turned = _turned(recording, found.camera)
+        if turned is not recording:
+            stack.close()
+            source = stack.enter_context(turned.open())
+            watched, first = watch(source, *span), source.first
+        if person.stature_m is None and person.model is None:
+            print_remarks(
+                [
+                    f"the stature is taken as that of most adults, {USUAL_STATURE_M:g} m, so sizes "
+                    "and distances may be wrong by a tenth; give --stature M"
+                ]
+            )
+        bodies = list(_bodies(bodies, person, found))
+        if person.people is None:
+            bodies = [seen_person(watched, bodies[0], first.camera, config, seed)]
+        else:
+            bodies = seen_people(source, bodies, config, person.people or None, seed, *span)
+        yield source, Scene(found.camera, tuple(bodies))
+
+
+def _bodies(
+    bodies: Sequence[BodyModel], person: PersonRequest, found: FoundCamera
+) -> Iterator[BodyModel]:
+    """Yield the bodies with what was found of the camera and of the first person's distance."""
+    from cardbox_tracker.person.model import PLACEMENT
+    from cardbox_tracker.person.proportions import USUAL_STATURE_M, USUAL_STDDEV_M
+
+    pitch = found.camera.pitch_rad
+    for body in bodies:
+        body = body.with_values(camera_pitch_rad=pitch.mean, pitch_stddev_rad=pitch.stddev)
+        if person.people is None and found.distances_m and "distance_m" in body.unknown:
+            lowest_m, highest_m, *_ = PLACEMENT["distance_m"]
+            distance_m = min(max(found.distances_m[0], lowest_m), highest_m)
+            body = body.with_values(distance_m=distance_m)
+        if person.stature_m is None and person.model is None:
+            body = body.with_values(stature_stddev=USUAL_STDDEV_M / USUAL_STATURE_M)
+        yield body
+
+
+def _lens_of(camera: Camera) -> Value:
+    from cardbox_tracker.measuring.scene import GIVEN, USUAL, Value
+    from cardbox_tracker.recordings.given_camera import GUESSED_STDDEV
+
+    fov_rad = 2 * math.atan(camera.width / 2 / camera.fx)
+    origin = USUAL if camera.focal_stddev >= GUESSED_STDDEV else GIVEN
+    return Value(fov_rad, math.sin(fov_rad) * camera.focal_stddev, origin)
+
+
+def _turned(recording: RecordingRequest, found: SceneCamera) -> RecordingRequest:
+    """Return the recording whose images are turned back by the roll that was found, if any."""
+    is_given = recording.camera.roll_rad is not None
+    if not found.roll_rad.mean or is_given or len(recording.cameras) > 1:
+        return recording
+    return replace(recording, camera=replace(recording.camera, roll_rad=found.roll_rad.mean))
+
+
+def found_camera(
+    recording: RecordingRequest, person: PersonRequest, watched: Watched, camera: Camera
+) -> FoundCamera:
+    """Return the camera of a recording, and say what was found, or contradicts what is given."""
+    from cardbox_tracker.measuring.scene_camera import scene_camera
+    from cardbox_tracker.person.proportions import USUAL_STATURE_M
+
+    tilt = person.body.camera_pose
+    given = (tilt.pitch_rad, tilt.pitch_stddev_rad) if person.is_pitch_given else None
+    statures_m = [*person.statures_m, *[USUAL_STATURE_M] * len(watched.people)]
+    people = watched.people
+    found = scene_camera(people, statures_m[: len(people)], watched.pictures, camera, given)
+    shown_by = " and ".join(found.sources)
+    pitch, roll = found.camera.pitch_rad, found.camera.roll_rad
+    degrees, deviation = math.degrees(pitch.mean), math.degrees(pitch.stddev)
+    number = f"{abs(degrees):.0f} degrees {'down' if degrees >= 0 else 'up'}"
     number += f" (standard deviation {deviation:.0f})"
     remarks = []
-    if given_rad is not None:
-        given = math.degrees(given_rad)
-        if abs(given - pitch) > max(_LEAST_DEG, _SURE_STDDEVS * deviation):
-            shown_by = " and ".join(sources) or "most cameras"
-            remarks.append(
-                f"--camera-pitch-deg {given:g} is used, but {shown_by} show {number}; "
-                "leave the option out to use that"
-            )
-    elif sources:
+    if found.contradiction:
         remarks.append(
-            f"camera pitch {number}, found from {' and '.join(sources)}; give --camera-pitch-deg "
-            "if it is known"
+            f"--camera-pitch-deg {degrees:g} is used, but {shown_by} show {found.contradiction}; "
+            "leave the option out to use that"
         )
-    else:
-        end_s = max(span.end_s, until_s)
+    elif given is None and found.sources:
         remarks.append(
-            f"nobody stands upright between the seconds {span.start_s:g} and {end_s:g} and no "
-            "edges of the room are vertical, so the camera's pitch is taken as that of most "
-            f"cameras, {number}; give --camera-pitch-deg if it is known"
+            f"camera pitch {number}, found from {shown_by}; give --camera-pitch-deg if it is known"
         )
-    if tilt.roll_rad and camera.roll_rad is None and len(recording.cameras) < 2:
+    elif given is None:
         remarks.append(
-            f"camera roll {math.degrees(tilt.roll_rad):.1f} degrees, found in the same way: the "
+            "nothing shows the camera's pitch: nobody is seen upright and no edges of the room "
+            f"are vertical, so it is taken as that of most cameras, {number}; give "
+            "--camera-pitch-deg (0 for a level camera)"
+        )
+    if _turned(recording, found.camera) is not recording:
+        remarks.append(
+            f"camera roll {math.degrees(roll.mean):.1f} degrees, found in the same way: the "
             "images are turned back; give --camera-roll-deg 0 to leave them as they are"
         )
-        recording = replace(recording, camera=replace(camera, roll_rad=tilt.roll_rad))
     print_remarks(remarks)
-    distance = None if found.standing is None else found.standing.distance
-    if given_rad is not None:
-        return Placement(given_rad, recording, distance=distance)
-    return Placement(tilt.pitch_rad, recording, tilt.pitch_stddev_rad, distance)
+    return found
+
+
+def tilt_in(recording: RecordingRequest, span: TimeSpan) -> tuple[float, RecordingRequest]:
+    """Return the pitch, rad, by the images of a span, and the recording with the roll by them."""
+    from cardbox_tracker.commands.request import PersonRequest
+    from cardbox_tracker.person.model import BodyModel
+    from cardbox_tracker.recordings.measured_scene import watch
+
+    with recording.open() as source:
+        person = PersonRequest(BodyModel(), None, span.start_s, is_pitch_given=False)
+        found = found_camera(recording, person, watch(source, *span), source.first.camera).camera
+    return found.pitch_rad.mean, _turned(recording, found)

@@ -3,10 +3,17 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from functools import partial
+from typing import Generic, NamedTuple, TypeVar
 
 import numpy as np
+from numpy.typing import NDArray
 
+from cardbox_tracker.camera.camera import Camera
+from cardbox_tracker.detectors.figure import Figure
+from cardbox_tracker.detectors.image_points import POINT_NAMES, ImagePoints
 from cardbox_tracker.measuring.first_sight import upper_body
 from cardbox_tracker.measuring.seen_body import MOST_SIGHTS, SeenBody
 from cardbox_tracker.person.model import BodyModel
@@ -15,57 +22,104 @@ from cardbox_tracker.recordings.silhouettes import RecordedFrame
 from cardbox_tracker.search.config import TrackerConfig
 from cardbox_tracker.tracking.people import People
 
+T = TypeVar("T")
 
-class SpreadFrames:
-    """A few frames spread evenly over however many there are.
+
+# Images in which edges of the room are sought.
+_MOST_PICTURES = 12
+# A person moves less between images, in lengths of the trunk, and is forgotten after this time.
+_SAME, _FORGOTTEN_S = 1.0, 2.0
+
+
+class Spread(Generic[T]):
+    """A few items spread evenly over however many there are.
 
     Attributes:
-        frames: at least half of the number asked for, if there were so many.
+        items: at least half of the number asked for, if there were so many.
     """
 
     def __init__(self, most: int) -> None:
-        """Keep up to ``most`` frames."""
+        """Keep up to ``most`` items."""
         self._most, self._every, self._seen = most, 1, 0
-        self.frames: list[RecordedFrame] = []
+        self.items: list[T] = []
 
-    def add(self, frame: RecordedFrame) -> None:
-        """Take the next frame."""
+    def add(self, make: Callable[[], T]) -> None:
+        """Take the next item, which is made only if it is kept."""
         if self._seen % self._every == 0:
-            self.frames.append(frame)
+            self.items.append(make())
         self._seen += 1
-        if len(self.frames) > self._most:
-            del self.frames[1::2]
+        if len(self.items) > self._most:
+            del self.items[1::2]
             self._every *= 2
 
 
-def seen_person(
-    recording: Recording,
-    guess: BodyModel,
-    config: TrackerConfig,
-    seed: int,
-    start_s: float = 0.0,
-    end_s: float = math.inf,
-) -> BodyModel:
-    """Return the body of the person whom the first camera sees.
+class Watched(NamedTuple):
+    """What the first camera of a recording shows in all of it.
 
-    Args:
-        recording: an open recording.
-        guess: body with ``unknown`` values; without any it is returned.
-        config: settings of the tracker.
-        seed: random seed of the fits.
-        start_s: seconds from the start of the recording from which on the person is tracked.
-        end_s: the same until when.
+    Attributes:
+        frames: some with a whole upper body, for the sizes of one person.
+        pictures: some images as they were recorded, undistorted.
+        people: times, s, and points of each person whom a detector finds.
     """
-    if not guess.unknown:
-        return guess
-    spread = SpreadFrames(MOST_SIGHTS)
+
+    frames: Sequence[RecordedFrame]
+    pictures: Sequence[NDArray[np.uint8]]
+    people: Sequence[Sequence[tuple[float, ImagePoints]]]
+
+
+def watch(recording: Recording, start_s: float = 0.0, end_s: float = math.inf) -> Watched:
+    """Read a recording from ``start_s`` to ``end_s``, seconds from its start."""
+    frames, pictures = Spread[RecordedFrame](MOST_SIGHTS), Spread[NDArray[np.uint8]](_MOST_PICTURES)
+    people: list[list[tuple[float, ImagePoints]]] = []
     for taken in recording.frames(start_s, end_s):
         frame = taken.first
         if upper_body(frame.silhouette, _is_detected(frame)) is not None:
-            spread.add(frame._replace(recorded=None))
-    camera = recording.first.camera.with_pitch(guess.camera_pose.pitch_rad)
+            frames.add(partial(frame._replace, recorded=None))
+        pictures.add(partial(recording.first.full_picture, frame))
+        seen = frame.people if frame.people is not None else (frame.points,)
+        for points in seen:
+            if points is not None:
+                _track_of(people, points, taken.time_s).append((taken.time_s, points))
+    return Watched(frames.items, pictures.items, people)
+
+
+def _track_of(
+    people: list[list[tuple[float, ImagePoints]]], points: ImagePoints, time_s: float
+) -> list[tuple[float, ImagePoints]]:
+    """Return the person among ``people`` who is nearest, or a new one."""
+    figure, near = _figure(points), _SAME
+    found: list[tuple[float, ImagePoints]] | None = None
+    for person in people:
+        last_s, last = person[-1]
+        if 0.0 < time_s - last_s <= _FORGOTTEN_S and (away := figure.apart(_figure(last))) < near:
+            found, near = person, away
+    if found is None:
+        found = []
+        people.append(found)
+    return found
+
+
+def _figure(points: ImagePoints) -> Figure:
+    return Figure(dict(zip(POINT_NAMES, points.px, strict=True)))
+
+
+def seen_person(
+    watched: Watched, guess: BodyModel, camera: Camera, config: TrackerConfig, seed: int
+) -> BodyModel:
+    """Return the body of the person who was watched.
+
+    Args:
+        watched: see :func:`watch`.
+        guess: body with ``unknown`` values; without any it is returned.
+        camera: working camera of the frames.
+        config: settings of the tracker.
+        seed: random seed of the fits.
+    """
+    if not guess.unknown:
+        return guess
+    camera = camera.with_pitch(guess.camera_pose.pitch_rad)
     seen = SeenBody(guess, camera, config, np.random.default_rng(seed), pause_s=0.0)
-    for frame in spread.frames:
+    for frame in watched.frames:
         seen.see(frame.silhouette, frame.image, frame.time_s, _is_detected(frame))
     return seen.body
 
@@ -98,4 +152,5 @@ def seen_people(
     people = People(guesses, recording.first.camera, config, rng, most)
     for taken in recording.frames(start_s, end_s):
         people.track(taken.observations[0], taken.people)
-    return [tracker.body for tracker in people.trackers] or list(guesses)
+    bodies = [replace(tracker.body, version=0, stamp_ns=0) for tracker in people.trackers]
+    return bodies or list(guesses)

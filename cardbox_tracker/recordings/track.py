@@ -40,6 +40,7 @@ class TrackSummary:
         frames_uncertain: number of tracked images whose posture may be wrong.
         remarks: warnings about extrinsics or depth that seem to be wrong.
         body: the body at the end, whose unknown values were fitted.
+        scene: mean, deviation and origin of the camera's numbers by name.
         used: in how many images each optional input was used, by its name.
         accounts: for each camera, what was used of it and what was left out.
         assumptions: what the results rest on, with its numbers and where they are from.
@@ -55,6 +56,7 @@ class TrackSummary:
     body: BodyModel | None = None
     accounts: tuple[str, ...] = ()
     assumptions: tuple[str, ...] = ()
+    scene: Mapping[str, Mapping[str, float | str]] = field(default_factory=dict)
     used: Mapping[str, int] = field(default_factory=dict)
     people: Mapping[int, TrackSummary] = field(default_factory=dict)
 
