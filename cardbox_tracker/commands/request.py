@@ -732,8 +732,8 @@ def _person(
     is_of_scene = scene is not None and bool(scene.people) and options.stature is None
     if scene is not None and is_of_scene:
         # They may stand elsewhere now.
-        place = ("distance_m", "hip_height_m")
-        body, *others = (one.with_values(unknown=place) for one in scene.people)
+        unknown = "distance_m", "hip_height_m"
+        body, *others = (one.with_values(unknown=unknown) for one in scene.people)
     elif options.model is None and options.stature is None and not _is_guessed(options):
         problems.miss("--stature M or --model FILE")
     elif None not in (options.model, options.stature):

@@ -11,6 +11,9 @@ from typing import TYPE_CHECKING
 
 from cardbox_tracker.commands.arguments import body_of_person, print_remarks
 
+# A focal length that is found takes the place of a usual one from this share of its deviation on.
+_BETTER = 0.5
+
 if TYPE_CHECKING:
     from cardbox_tracker.camera.camera import Camera
     from cardbox_tracker.commands.request import PersonRequest, RecordingRequest, TrackingRequest
@@ -88,8 +91,7 @@ def track(
         remarks = [remark for remark in source.first.remarks if remark not in early]
         accounts = tuple(one.account for one in source.sources)
         assumptions = tuple(_assumptions(request, scene))
-    told = {"accounts": accounts, "assumptions": assumptions, "scene": scene.numbers()}
-    summary = replace(summary, **told)
+    summary = replace(summary, accounts=accounts, assumptions=assumptions, scene=scene.numbers())
     if show is None and not summary.people:
         print(f"tracked {summary.frames_tracked} of {summary.frames} images")
     print_remarks(remarks, summary.remarks)
@@ -110,7 +112,7 @@ def track(
     if person.people is None:
         return summary
     one = summary.people.get(person.number, summary)
-    return replace(one, **told)
+    return replace(one, accounts=accounts, assumptions=assumptions, scene=summary.scene)
 
 
 def _of_person(
@@ -186,10 +188,10 @@ def measured_scene(
             return
         watched = watch(source, *span)
         found = found_camera(recording, person, watched, first.camera)
-        turned = _turned(recording, found.camera)
-        if turned is not recording:
+        better = _corrected(recording, found.camera, first.camera)
+        if better is not recording:
             stack.close()
-            source = stack.enter_context(turned.open())
+            source = stack.enter_context(better.open())
             watched, first = watch(source, *span), source.first
         if person.stature_m is None and person.model is None:
             print_remarks(
@@ -216,10 +218,12 @@ def _bodies(
     pitch = found.camera.pitch_rad
     for body in bodies:
         body = body.with_values(camera_pitch_rad=pitch.mean, pitch_stddev_rad=pitch.stddev)
-        if person.people is None and found.distances_m and "distance_m" in body.unknown:
+        distance = found.distances[0] if found.distances else math.nan
+        is_alone = person.people is None and math.isfinite(distance)
+        if is_alone and "distance_m" in body.unknown:
             lowest_m, highest_m, *_ = PLACEMENT["distance_m"]
-            distance_m = min(max(found.distances_m[0], lowest_m), highest_m)
-            body = body.with_values(distance_m=distance_m)
+            distance_m = distance * (person.stature_m or USUAL_STATURE_M)
+            body = body.with_values(distance_m=min(max(distance_m, lowest_m), highest_m))
         if person.stature_m is None and person.model is None:
             body = body.with_values(stature_stddev=USUAL_STDDEV_M / USUAL_STATURE_M)
         yield body
@@ -234,12 +238,18 @@ def _lens_of(camera: Camera) -> Value:
     return Value(fov_rad, math.sin(fov_rad) * camera.focal_stddev, origin)
 
 
-def _turned(recording: RecordingRequest, found: SceneCamera) -> RecordingRequest:
-    """Return the recording whose images are turned back by the roll that was found, if any."""
-    is_given = recording.camera.roll_rad is not None
-    if not found.roll_rad.mean or is_given or len(recording.cameras) > 1:
+def _corrected(recording: RecordingRequest, found: SceneCamera, camera: Camera) -> RecordingRequest:
+    """Return the recording with roll and field of view that were found and are not given."""
+    given = recording.camera
+    if len(recording.cameras) > 1:
         return recording
-    return replace(recording, camera=replace(recording.camera, roll_rad=found.roll_rad.mean))
+    if given.roll_rad is None and found.roll_rad.mean:
+        given = replace(given, roll_rad=found.roll_rad.mean)
+    fov = found.fov_rad
+    focal_stddev = fov.stddev / math.sin(fov.mean)
+    if not given.is_calibrated and focal_stddev < _BETTER * camera.focal_stddev:
+        given = replace(given, fov_deg=math.degrees(fov.mean), focal_stddev=focal_stddev)
+    return recording if given == recording.camera else replace(recording, camera=given)
 
 
 def found_camera(
@@ -247,25 +257,20 @@ def found_camera(
 ) -> FoundCamera:
     """Return the camera of a recording, and say what was found, or contradicts what is given."""
     from cardbox_tracker.measuring.scene_camera import scene_camera
-    from cardbox_tracker.person.proportions import USUAL_STATURE_M
 
+    people = watched.people
+    statures_m = [*person.statures_m, *[person.stature_m] * len(people)][: len(people)]
     tilt = person.body.camera_pose
     given = (tilt.pitch_rad, tilt.pitch_stddev_rad) if person.is_pitch_given else None
-    statures_m = [*person.statures_m, *[USUAL_STATURE_M] * len(watched.people)]
-    people = watched.people
-    found = scene_camera(people, statures_m[: len(people)], watched.pictures, camera, given)
-    shown_by = " and ".join(found.sources)
-    pitch, roll = found.camera.pitch_rad, found.camera.roll_rad
+    # Images are turned back by a roll that is given.
+    roll_rad = None if recording.camera.roll_rad is None else 0.0
+    found = scene_camera(people, watched.pictures, camera, statures_m, given, roll_rad)
+    pitch, shown_by = found.camera.pitch_rad, " and ".join(found.sources)
     degrees, deviation = math.degrees(pitch.mean), math.degrees(pitch.stddev)
     number = f"{abs(degrees):.0f} degrees {'down' if degrees >= 0 else 'up'}"
     number += f" (standard deviation {deviation:.0f})"
-    remarks = []
-    if found.contradiction:
-        remarks.append(
-            f"--camera-pitch-deg {degrees:g} is used, but {shown_by} show {found.contradiction}; "
-            "leave the option out to use that"
-        )
-    elif given is None and found.sources:
+    remarks = list(found.remarks)
+    if given is None and found.sources:
         remarks.append(
             f"camera pitch {number}, found from {shown_by}; give --camera-pitch-deg if it is known"
         )
@@ -275,10 +280,17 @@ def found_camera(
             f"are vertical, so it is taken as that of most cameras, {number}; give "
             "--camera-pitch-deg (0 for a level camera)"
         )
-    if _turned(recording, found.camera) is not recording:
+    better = _corrected(recording, found.camera, camera)
+    if better.camera.roll_rad != recording.camera.roll_rad:
         remarks.append(
-            f"camera roll {math.degrees(roll.mean):.1f} degrees, found in the same way: the "
-            "images are turned back; give --camera-roll-deg 0 to leave them as they are"
+            f"camera roll {math.degrees(found.camera.roll_rad.mean):.1f} degrees, found in the "
+            "same way: the images are turned back; give --camera-roll-deg 0 to leave them as they "
+            "are"
+        )
+    if better.camera.fov_deg != recording.camera.fov_deg:
+        remarks.append(
+            f"field of view {better.camera.fov_deg:.0f} degrees across the image, found from "
+            "people who walk; give --fov if it is known"
         )
     print_remarks(remarks)
     return found
@@ -292,5 +304,6 @@ def tilt_in(recording: RecordingRequest, span: TimeSpan) -> tuple[float, Recordi
 
     with recording.open() as source:
         person = PersonRequest(BodyModel(), None, span.start_s, is_pitch_given=False)
-        found = found_camera(recording, person, watch(source, *span), source.first.camera).camera
-    return found.pitch_rad.mean, _turned(recording, found)
+        camera = source.first.camera
+        found = found_camera(recording, person, watch(source, *span), camera).camera
+    return found.pitch_rad.mean, _corrected(recording, found, camera)

@@ -32,6 +32,8 @@ class GivenCamera:
             images are turned back.
         fps: images a second, in place of the rate that the recording states.
         is_mirrored: whether the images are mirrored; they are turned back.
+        focal_stddev: relative standard deviation of a focal length by ``fov_deg`` that was found;
+            None for one that a person states.
     """
 
     fov_deg: float | None = None
@@ -39,6 +41,7 @@ class GivenCamera:
     roll_rad: float | None = None
     fps: float | None = None
     is_mirrored: bool = False
+    focal_stddev: float | None = None
 
     @property
     def is_calibrated(self) -> bool:
@@ -86,6 +89,8 @@ class GivenCamera:
             found.check_shape(width, height, str(path), str(self.calibration))
         elif self.fov_deg is not None:
             found = Calibration.of_fov(width, height, self.fov_deg)
+            if self.focal_stddev is not None:
+                found = replace(found, focal_stddev=self.focal_stddev)
         elif file is not None:
             fov_deg, is_told = _fov_deg(file, width, height)
             found = Calibration.of_fov(width, height, fov_deg)

@@ -9,12 +9,12 @@ from functools import partial
 from typing import Generic, NamedTuple, TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from cardbox_tracker.camera.camera import Camera
 from cardbox_tracker.detectors.figure import Figure
 from cardbox_tracker.detectors.image_points import POINT_NAMES, ImagePoints
 from cardbox_tracker.measuring.first_sight import upper_body
+from cardbox_tracker.measuring.scene_camera import Picture
 from cardbox_tracker.measuring.seen_body import MOST_SIGHTS, SeenBody
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.recordings.recording import Recording
@@ -58,29 +58,33 @@ class Watched(NamedTuple):
 
     Attributes:
         frames: some with a whole upper body, for the sizes of one person.
-        pictures: some images as they were recorded, undistorted.
+        pictures: times, s, and some images as they were recorded, undistorted.
         people: times, s, and points of each person whom a detector finds.
     """
 
     frames: Sequence[RecordedFrame]
-    pictures: Sequence[NDArray[np.uint8]]
+    pictures: Sequence[Picture]
     people: Sequence[Sequence[tuple[float, ImagePoints]]]
 
 
 def watch(recording: Recording, start_s: float = 0.0, end_s: float = math.inf) -> Watched:
     """Read a recording from ``start_s`` to ``end_s``, seconds from its start."""
-    frames, pictures = Spread[RecordedFrame](MOST_SIGHTS), Spread[NDArray[np.uint8]](_MOST_PICTURES)
+    frames, pictures = Spread[RecordedFrame](MOST_SIGHTS), Spread[Picture](_MOST_PICTURES)
     people: list[list[tuple[float, ImagePoints]]] = []
     for taken in recording.frames(start_s, end_s):
         frame = taken.first
         if upper_body(frame.silhouette, _is_detected(frame)) is not None:
             frames.add(partial(frame._replace, recorded=None))
-        pictures.add(partial(recording.first.full_picture, frame))
+        pictures.add(partial(_picture, recording, frame))
         seen = frame.people if frame.people is not None else (frame.points,)
         for points in seen:
             if points is not None:
                 _track_of(people, points, taken.time_s).append((taken.time_s, points))
     return Watched(frames.items, pictures.items, people)
+
+
+def _picture(recording: Recording, frame: RecordedFrame) -> Picture:
+    return frame.time_s, recording.first.full_picture(frame)
 
 
 def _track_of(
