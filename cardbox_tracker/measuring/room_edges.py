@@ -16,7 +16,7 @@ from cardbox_tracker.camera.camera import Camera
 from cardbox_tracker.person.sizes import FloatArray
 
 PITCHES_RAD = np.radians(np.arange(-40.0, 51.0))
-ROLLS_RAD = np.radians(np.arange(-8.0, 9.0))
+ROLLS_RAD = np.radians(np.arange(-30.0, 31.0))
 
 # Lines that count: their angle from the image's columns, rad; their least length and their least
 # distance from the left and right border, as shares of the longer side. Encoders and black bars

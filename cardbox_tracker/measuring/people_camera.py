@@ -1,0 +1,338 @@
+"""Pitch, roll, height and focal length of a camera from people who stand and walk before it.
+
+Of a person who is upright, the middles of ears, shoulders, hips, knees and ankles lie near a
+vertical line at known shares of the stature. A camera that looks down sees the lower ones farther
+away, so their spacing shows the pitch, as surely as people's proportions are alike. These are the
+same in all images, and so is the floor under the feet: who walks towards the camera shows pitch,
+height and focal length together. Who stays in one place shows little, and the deviations say so.
+
+All images are one robust least-squares problem. Its unknowns are those of the camera; those of each
+person: logarithm of the stature, heights and forward distances of the levels, leans of legs and
+trunk forwards, and aside; and those of each image: the place, the leans, and how far bent legs lower
+the hips. Lengths are in statures.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from cardbox_tracker.camera.camera import Camera
+from cardbox_tracker.detectors.image_points import LEG_POINT_NAMES, POINT_INDEX, ImagePoints
+from cardbox_tracker.person.proportions import USUAL_STATURE_M, USUAL_STDDEV_M
+from cardbox_tracker.person.sizes import FloatArray
+
+Sightings = Sequence[tuple[float, ImagePoints]]
+"""Times, s, and points of one person."""
+
+LEVELS = ("nose", "ear", "shoulder", "hip", "knee", "ankle")
+# Height above the floor and distance before the ankles of each level where MediaPipe marks the
+# joints of people who stand upright, and their standard deviations among people.
+HEIGHTS = np.array([0.915, 0.932, 0.811, 0.507, 0.283, 0.063])
+FORWARD = np.array([0.09, 0.045, 0.0, 0.0, 0.01, 0.0])
+_HEIGHT_STDDEVS = np.array([0.025, 0.016, 0.013, 0.016, 0.014, 0.010])
+_FORWARD_STDDEVS = np.array([0.03, 0.02, 0.015, 0.015, 0.015, 0.01])
+_SHOULDER, _HIP, _KNEE, _ANKLE = range(2, 6)
+# Leans of legs, trunk and aside of a person, rad: means, and deviations among people and images.
+_LEANS = np.radians((0.5, 2.0, 0.0))
+_LEAN_STDDEVS, _LEAN_CHANGES = np.radians((3.0, 4.0, 2.0)), np.radians((3.0, 4.0, 3.0))
+# Deviation of the trunk's lean of people whose straight legs are not seen, rad: some sit.
+_SITTING_LEAN = np.radians(8.0)
+# How far the hips of an image are lowered: legs that are seen straight, others, and who sits.
+_STRAIGHT, _OTHER_LEGS, _SEAT = 0.008, 0.08, 0.4
+# Deviations of a level in an image, aside and along the body; of the ankles of bent legs.
+_SIDE, _ALONG, _STEPPING = 0.02, 0.012, 0.03
+# A trunk that leans more in space is not upright, and a knee not straight; who bends the hips more
+# sits, rad. Somebody who is seen from above seems to lean.
+_BOWED, _BENT, _SITS = np.radians((50.0, 35.0, 35.0))
+_LEAST_SCORE, _LEAST_LEVELS, _BORDER = 0.5, 3, 0.02
+# Images of one person that count, and the time in which people keep posture and errors, s.
+_MOST_IMAGES, _SAME_S, _SITTING_IMAGES = 24, 4.0, 3.0
+# Residual from which on it counts less, deviations; rounds of the fit, and the last step.
+_ROBUST, _ROUNDS, _STEP, _LAST_STEP = 2.0, 60, 1e-5, 1e-6
+# Nearest and farthest logarithm of a distance, statures.
+_NEAREST, _FARTHEST = np.log((0.3, 30.0))
+_SHARED, _OF_PERSON, _OF_IMAGE = 4, 2 * len(LEVELS) + 4, 6
+
+
+class PeopleCamera(NamedTuple):
+    """What people show of a camera.
+
+    Attributes:
+        values: pitch and roll, rad; height above the floor, m; logarithm of the focal length's
+            factor; (4,).
+        covariance: of ``values``, (4, 4).
+        shows_feet: whether feet are seen.
+        distances: level distance of each person in the first image that counts, statures; nan
+            for who is never upright.
+    """
+
+    values: FloatArray
+    covariance: FloatArray
+    shows_feet: bool
+    distances: tuple[float, ...]
+
+
+class _Seen(NamedTuple):
+    """Images of people who are upright; arrays of n images.
+
+    Attributes:
+        rays: of the levels, (n, 6, 2); 0 where a level is not seen.
+        stddevs: of the rays' ends, statures, (n, 6, 2); infinite where it is not seen.
+        facing: where the person faces, to the right and to the camera, (n, 2).
+        lowered: deviation of how far the hips are lowered, (n,).
+        weight: how many images one counts for, (n,).
+        person: number of the person, (n,).
+    """
+
+    rays: FloatArray
+    stddevs: FloatArray
+    facing: FloatArray
+    lowered: FloatArray
+    weight: FloatArray
+    person: FloatArray
+
+
+def people_camera(
+    people: Sequence[Sightings],
+    statures_m: Sequence[float | None],
+    camera: Camera,
+    pitch: tuple[float, float],
+    roll: tuple[float, float],
+) -> PeopleCamera | None:
+    """Return what people show; None if nobody is upright.
+
+    Args:
+        people: times and points of each person, at the resolution of ``camera``.
+        statures_m: stature of each person; None if it is not known.
+        camera: intrinsics with ``focal_stddev``; its pitch is not used.
+        pitch: mean and standard deviation of the pitch before anything is seen, rad.
+        roll: the same of the roll.
+    """
+    every = [_upright(sights, number, camera) for number, sights in enumerate(people)]
+    shown = [one for one in every if one is not None]
+    if not shown:
+        return None
+    seen = _Seen(*(np.concatenate(one) for one in zip(*shown, strict=True)))
+    images = len(seen.rays)
+    known = np.isfinite(seen.stddevs[..., 0])
+    heights = np.where(known, HEIGHTS, np.nan)
+    rows = np.where(known, seen.rays[..., 1], np.nan)
+    columns = np.where(known, seen.rays[..., 0], np.nan)
+    looks = np.hypot(np.ptp(_ends(rows), axis=1), np.ptp(_ends(columns), axis=1))
+    distance = np.ptp(_ends(heights), axis=1) / np.maximum(looks, 1e-3)
+    statures = np.log([one or USUAL_STATURE_M for one in statures_m])
+    unsure = [0.005 if one else USUAL_STDDEV_M / USUAL_STATURE_M for one in statures_m]
+    # Means and variances of the unknowns before anything is seen.
+    usual_m = float(np.exp(statures.mean()))
+    camera_mean = np.array([pitch[0], roll[0], 0.85 * usual_m, 0.0])
+    camera_stddev = np.array([pitch[1], roll[1], 0.6 * usual_m, camera.focal_stddev])
+    levels = np.zeros(2 * len(LEVELS))
+    of_people = np.array([[one, *levels, *_LEANS] for one in statures])
+    spread = (*_HEIGHT_STDDEVS, *_FORWARD_STDDEVS, *_LEAN_STDDEVS)
+    of_people_stddev = np.array([[one, *spread] for one in unsure])
+    for number in range(len(statures)):
+        if not (seen.lowered[seen.person == number] < _OTHER_LEGS).any():
+            of_people_stddev[number, -2] = _SITTING_LEAN
+    place = np.column_stack([seen.rays[:, _SHOULDER, 0] * distance, np.log(distance)])
+    of_images = np.column_stack([place, np.zeros((images, 4))])
+    free = np.full((images, 2), 3.0)
+    leans = np.tile(_LEAN_CHANGES, (images, 1))
+    of_images_stddev = np.column_stack([free, leans, seen.lowered])
+    of_images_stddev /= np.sqrt(seen.weight)[:, None]
+    mean = np.concatenate([camera_mean, of_people.ravel(), of_images.ravel()])
+    precision = np.concatenate([camera_stddev, of_people_stddev.ravel(), of_images_stddev.ravel()])
+    precision **= -2.0
+    person = seen.person.astype(int)
+    first = _SHARED + _OF_PERSON * person
+    last = _SHARED + _OF_PERSON * len(statures) + _OF_IMAGE * np.arange(images)
+    own = np.column_stack(
+        [
+            np.tile(np.arange(_SHARED), (images, 1)),
+            first[:, None] + np.arange(_OF_PERSON),
+            last[:, None] + np.arange(_OF_IMAGE),
+        ]
+    )
+    found, information = _fitted(seen, distance, own, mean, precision)
+    if not np.isfinite(found).all():
+        return None
+    covariance = np.linalg.inv(information)[:_SHARED, :_SHARED]
+    at = np.exp(found[last + 1])
+    distances = [
+        float(at[np.argmax(person == number)]) if (person == number).any() else float("nan")
+        for number in range(len(statures))
+    ]
+    return PeopleCamera(
+        found[:_SHARED], covariance, bool(known[:, _ANKLE].any()), tuple(distances)
+    )
+
+
+def _ends(values: FloatArray) -> FloatArray:
+    return np.column_stack([np.nanmin(values, axis=1), np.nanmax(values, axis=1)])
+
+
+def _fitted(
+    seen: _Seen, distance: FloatArray, own: FloatArray, mean: FloatArray, precision: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Return the unknowns and their information matrix by damped Gauss-Newton steps.
+
+    Args:
+        seen: the images.
+        distance: of each image to begin with, statures, (n,).
+        own: numbers of the unknowns that each image depends on, (n, k).
+        mean: of the unknowns before anything is seen.
+        precision: inverse of their variances.
+    """
+    scale = distance[:, None, None] / seen.stddevs
+
+    def residuals(values: FloatArray) -> FloatArray:
+        return ((_rays(seen, values) - seen.rays) * scale).reshape(len(own), -1)
+
+    def cost(values: FloatArray) -> float:
+        robust = _ROBUST**2 * (np.sqrt(1.0 + (residuals(values[own]) / _ROBUST) ** 2) - 1.0)
+        prior = precision @ (values - mean) ** 2 / 2
+        return float((robust.sum(axis=1) * seen.weight).sum() + prior)
+
+    values, damping, information = mean.copy(), 1e-3, np.diag(precision)
+    before = cost(values)
+    eye = np.eye(own.shape[1])
+    for _ in range(_ROUNDS):
+        away = residuals(values[own])
+        slopes = np.stack([residuals(values[own] + _STEP * one) - away for one in eye], 2) / _STEP
+        weights = seen.weight[:, None] / np.sqrt(1.0 + (away / _ROBUST) ** 2)
+        weighted = slopes * weights[..., None]
+        information, gradient = np.diag(precision), precision * (mean - values)
+        np.add.at(
+            information,
+            (own[:, :, None], own[:, None, :]),
+            slopes.transpose(0, 2, 1) @ weighted,
+        )
+        np.subtract.at(gradient, own, (weighted * away[..., None]).sum(axis=1))
+        diagonal = np.diag(information.diagonal())
+        while damping < 1e6:
+            step = np.linalg.solve(information + damping * diagonal, gradient)
+            after = cost(values + step)
+            if after <= before:
+                break
+            damping *= 4.0
+        else:
+            break
+        values, before, damping = values + step, after, damping / 4.0
+        if np.abs(step).max() < _LAST_STEP:
+            break
+    return values, information
+
+
+def _rays(seen: _Seen, unknowns: FloatArray) -> FloatArray:
+    """Return the rays (n, 6, 2) on which the levels are for the unknowns (n, k) of each image."""
+    count = len(LEVELS)
+    pitch, roll, height_m, log_focal, log_stature = unknowns[:, :5, None].transpose(1, 0, 2)
+    heights = HEIGHTS + unknowns[:, 5 : 5 + count]
+    forward = FORWARD + unknowns[:, 5 + count : 5 + 2 * count]
+    leans, changes = unknowns[:, 5 + 2 * count : 8 + 2 * count], unknowns[:, -4:-1]
+    aside, far = unknowns[:, -6:-5], np.exp(np.clip(unknowns[:, -5:-4], _NEAREST, _FARTHEST))
+    legs = np.minimum(heights, heights[:, _HIP : _HIP + 1]) - heights[:, _ANKLE:]
+    trunk = np.maximum(heights - heights[:, _HIP : _HIP + 1], 0.0)
+    forward = forward + leans[:, :1] * legs + leans[:, 1:2] * trunk
+    lowered = unknowns[:, -1:] * (np.arange(count) <= _HIP)
+    # Optical axes of a level camera: right, down, forward.
+    x = aside + seen.facing[:, :1] * forward + (leans[:, 2:] + changes[:, 2:]) * heights
+    y = height_m / np.exp(log_stature) - heights + lowered
+    z = far - seen.facing[:, 1:] * forward - changes[:, :1] * legs - changes[:, 1:2] * trunk
+    c, s = np.cos(pitch), np.sin(pitch)
+    down, ahead = c * y - s * z, np.maximum(s * y + c * z, 0.05)
+    # A camera that is turned clockwise sees the world turned the other way.
+    c, s = np.cos(roll), np.sin(roll)
+    seen_at = np.stack([c * x + s * down, c * down - s * x], axis=-1) / ahead[..., None]
+    rays: FloatArray = np.exp(log_focal)[..., None] * seen_at
+    return rays
+
+
+def _upright(sights: Sightings, number: int, camera: Camera) -> _Seen | None:
+    """Return some of the images in which a person is upright; None without any."""
+    border = _BORDER * max(camera.width, camera.height)
+    low, high = border - 0.5, np.array([camera.width, camera.height]) - 0.5 - border
+    rows = []
+    for time_s, points in sights:
+        px, known = _levels(points)
+        # The network guesses what is outside of the image, and puts some of it at the border.
+        known &= ((px > low) & (px < high)).all(axis=1)
+        if points.legs is not None:
+            # Ankles are doubtful where heels or toes are cut off.
+            feet = points.legs.px[4:]
+            known[_ANKLE] &= bool(((feet > low) & (feet < high)).all())
+        facing, is_bowed, is_straight, sits = _posture(points)
+        # The network guesses legs that are not in the image.
+        is_straight, sits = is_straight and bool(known[_KNEE]), sits and bool(known[_KNEE])
+        known[_KNEE] &= is_straight
+        known[_ANKLE] &= not sits
+        if not is_bowed and known[[_SHOULDER, _HIP]].all() and known.sum() >= _LEAST_LEVELS:
+            rows.append((time_s, px, known, facing, is_straight, sits))
+    if not rows:
+        return None
+    rows = [rows[i] for i in np.unique(np.linspace(0, len(rows) - 1, _MOST_IMAGES).astype(int))]
+    times_s, px, known, facing, straight, sitting = (np.array(one) for one in zip(*rows, strict=True))
+    stddevs = np.where(known, _ALONG, np.inf)[..., None] * np.array([_SIDE / _ALONG, 1.0])
+    stddevs[~straight, _ANKLE] *= _STEPPING / _ALONG
+    independent = min(len(rows), 1.0 + float(np.ptp(times_s)) / _SAME_S)
+    if not straight.any():
+        independent = min(independent, _SITTING_IMAGES)
+    return _Seen(
+        np.where(known[..., None], camera.rays(px)[..., :2], 0.0),
+        stddevs,
+        facing,
+        np.where(sitting, _SEAT, np.where(straight, _STRAIGHT, _OTHER_LEGS)),
+        np.full(len(rows), independent / len(rows)),
+        np.full(len(rows), float(number)),
+    )
+
+
+def _levels(points: ImagePoints) -> tuple[FloatArray, FloatArray]:
+    """Return the middles (6, 2), px, of the levels, 0 where they are not known, and if they are."""
+    px, known = np.zeros((len(LEVELS), 2)), np.zeros(len(LEVELS), bool)
+    for number, level in enumerate(LEVELS):
+        names = (level,) if level == "nose" else (f"left_{level}", f"right_{level}")
+        if level in ("knee", "ankle"):
+            if points.legs is None:
+                continue
+            at = [LEG_POINT_NAMES.index(name) for name in names]
+            there, scores = points.legs.px[at], points.legs.scores[at]
+        else:
+            at = [POINT_INDEX[name] for name in names]
+            there, scores = points.px[at], points.scores[at]
+        if scores.min() >= _LEAST_SCORE and np.isfinite(there).all():
+            px[number], known[number] = there.mean(axis=0), True
+    return px, known
+
+
+def _posture(points: ImagePoints) -> tuple[tuple[float, float], bool, bool, bool]:
+    """Return where a person faces, and whether they bow, have straight legs, and sit."""
+    if points.spatial_m is None:
+        return (0.0, 1.0), False, True, False
+    there = points.spatial_m
+    shoulders, hips = (
+        np.array([there[POINT_INDEX[f"{side}_{name}"]] for side in ("left", "right")])
+        for name in ("shoulder", "hip")
+    )
+    across = shoulders[0] - shoulders[1]
+    length = max(float(np.hypot(across[0], across[2])), 1e-6)
+    facing = float(across[2] / length), float(across[0] / length)
+    trunk = shoulders.sum(axis=0) - hips.sum(axis=0)
+    elbows = there[[POINT_INDEX["left_elbow"], POINT_INDEX["right_elbow"]]]
+    # Who raises an arm raises the shoulder, too.
+    is_bowed = bool((elbows[:, 1] < shoulders[:, 1]).any())
+    is_bowed |= float(np.hypot(trunk[0], trunk[2])) > np.tan(_BOWED) * -float(trunk[1])
+    if points.legs is None or points.legs.spatial_m is None:
+        return facing, is_bowed, False, False
+    knees, ankles = points.legs.spatial_m[0:2], points.legs.spatial_m[2:4]
+    thighs, shanks = knees - hips, ankles - knees
+    is_straight = all(_angle(*pair) < _BENT for pair in zip(thighs, shanks, strict=True))
+    return facing, is_bowed, is_straight, _angle(thighs.sum(axis=0), -trunk) > _SITS
+
+
+def _angle(a: FloatArray, b: FloatArray) -> float:
+    """Return the angle between two directions, rad."""
+    lengths = float(np.linalg.norm(a) * np.linalg.norm(b))
+    return float(np.arccos(np.clip(a @ b / max(lengths, 1e-9), -1.0, 1.0)))

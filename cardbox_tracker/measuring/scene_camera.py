@@ -1,0 +1,260 @@
+"""The camera of a scene from all that shows it in a film, with standard deviations.
+
+People who stand and walk show pitch, roll, height and focal length, and so do upright edges of the
+room for pitch and roll. Both are combined by Bayes' rule on a grid. Edges can be wrong as a whole,
+such as those of leaning things, so with some probability they mean nothing; then people, and what
+is usual, decide. In the same way people who lean aside show no roll.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import pairwise
+from typing import NamedTuple
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from cardbox_tracker.camera.camera import Camera
+from cardbox_tracker.detectors.image_points import ImagePoints
+from cardbox_tracker.measuring.people_camera import Sightings, people_camera
+from cardbox_tracker.measuring.room_edges import PITCHES_RAD, ROLLS_RAD, edge_likelihoods
+from cardbox_tracker.measuring.scene import FOUND, GIVEN, USUAL, SceneCamera, Value
+from cardbox_tracker.person.sizes import FloatArray
+
+USUAL_PITCH, PITCH_PRIOR = np.radians(10.0), np.radians(13.0)
+"""Mean and standard deviation of the pitch of cameras before anything is seen, rad."""
+FOUND_STDDEV = float(np.radians(9.5))
+"""Standard deviation from which on a pitch is mostly that of most cameras, and not found, rad."""
+GIVEN_STDDEV = float(np.radians(0.5))
+"""Standard deviation of a pitch or roll that is given, rad."""
+# Deviations of the roll of cameras that stand level, and of others; share of the others.
+_LEVEL, _ROLLED, _ROLLED_SHARE = np.radians(1.0), np.radians(15.0), 0.15
+# Chance that people lean aside in a whole film, if their feet are seen, and if not.
+_LEAN_ASIDE, _LEAN_ASIDE_CUT = 0.05, 0.3
+# Chance that edges mean nothing, and systematic error of those that do, steps of the grid.
+_MISLEADING, _SYSTEMATIC = 0.2, 1.5
+# Systematic error of a pitch that people show, rad.
+_PEOPLE = np.radians(0.7)
+# Half of the width of the peak of a pitch, steps of the grid; chance of one standard deviation.
+_PEAK, _WITHIN = 6, 0.68
+# Gain of the likelihood from which on edges are named as a source.
+_SHOWN = 3.0
+# A roll below the first limit, or below so many standard deviations, can be a chance.
+_LEAST_ROLL, _SURE = np.radians(1.0), 2.0
+# Least difference of two sources that is told, rad.
+_TOLD = np.radians(4.0)
+# A shift of most of the background between two images that shows that the camera moves, as a share
+# of the longer side; pairs of images with such a shift, and points that show it.
+_SHIFT, _SHIFTED_PAIRS, _LEAST_POINTS = 0.01, 0.25, 12
+# Deviation of the pitch of a camera that moves, rad; margin around people, share of their height.
+_MOVING, _AROUND = np.radians(6.0), 0.15
+Picture = tuple[float, NDArray[np.uint8]]
+"""Time, s, and an image (H, W) or (H, W, 3) at any resolution, undistorted."""
+
+
+class FoundCamera(NamedTuple):
+    """The camera, and what shows it.
+
+    Attributes:
+        camera: its values. Lengths are in metres; the height is None without people.
+        sources: what the pitch is found from, in words.
+        remarks: sources that contradict each other, and a camera that moves, in words.
+        distances: level distance of each person at first, statures; nan where it is not known.
+        moves: whether the camera moves.
+    """
+
+    camera: SceneCamera
+    sources: tuple[str, ...]
+    remarks: tuple[str, ...]
+    distances: tuple[float, ...]
+    moves: bool
+
+
+def scene_camera(
+    people: Sequence[Sightings],
+    pictures: Sequence[Picture],
+    camera: Camera,
+    statures_m: Sequence[float | None],
+    pitch_rad: float | None = None,
+    roll_rad: float | None = None,
+) -> FoundCamera:
+    """Return the camera of a film.
+
+    Args:
+        people: times and points of each person in the whole film, at the resolution of ``camera``.
+        pictures: some of its images.
+        camera: intrinsics with ``focal_stddev``; its pitch is not used.
+        statures_m: stature of each person; None if it is not known.
+        pitch_rad: downward pitch that is given; None for none.
+        roll_rad: clockwise roll that is given; None for none.
+    """
+    usual_roll = (0.0, _ROLLED) if roll_rad is None else (roll_rad, GIVEN_STDDEV)
+    shown = people_camera(people, statures_m, camera, (USUAL_PITCH, PITCH_PRIOR), usual_roll)
+    pitches, rolls = np.meshgrid(PITCHES_RAD, ROLLS_RAD, indexing="ij")
+    if roll_rad is None:
+        of_roll = (1 - _ROLLED_SHARE) * _normal(rolls, 0.0, _LEVEL)
+        of_roll += _ROLLED_SHARE * _normal(rolls, 0.0, _ROLLED)
+    else:
+        of_roll = _normal(rolls, float(np.clip(roll_rad, *ROLLS_RAD[[0, -1]])), _LEVEL)
+    chances = of_roll * _normal(pitches, USUAL_PITCH, PITCH_PRIOR)
+    if shown is not None:
+        spread = shown.covariance[:2, :2] + np.diag([_PEOPLE**2, 0.0])
+        pitch, roll = shown.values[:2]
+        stddev = np.sqrt(np.diag(spread))
+        share = spread[0, 1] / spread[1, 1]
+        within = np.sqrt(spread[0, 0] - share * spread[0, 1])
+        upright = _normal(rolls, roll, stddev[1])
+        upright *= _normal(pitches, pitch + share * (rolls - roll), within)
+        # Somebody who leans aside as much as the camera could be rolled.
+        leaning = _normal(rolls, roll, _ROLLED) * _normal(pitches, pitch, stddev[0])
+        lean_aside = _LEAN_ASIDE if shown.shows_feet else _LEAN_ASIDE_CUT
+        chances = of_roll * ((1 - lean_aside) * upright + lean_aside * leaning)
+    likelihoods = edge_likelihoods([picture for _, picture in pictures], camera)
+    # How much likelier the lines are than if they meant nothing.
+    lines = np.exp(likelihoods - likelihoods.max())
+    lines /= (lines * of_roll).sum() / of_roll.sum()
+    steps = np.arange(-5, 6)
+    blur = np.exp(-((steps / _SYSTEMATIC) ** 2) / 2)
+    lines = np.apply_along_axis(np.convolve, 0, lines, blur / blur.sum(), "same")
+    has_edges = bool(likelihoods.max() - np.median(likelihoods) > _SHOWN)
+    by_edges, by_people = _pitch((of_roll * lines).sum(axis=1)), _pitch(chances.sum(axis=1))
+    both = chances * ((1 - _MISLEADING) * lines + _MISLEADING)
+    pitch, pitch_stddev = _pitch(both.sum(axis=1))
+    near = both[np.abs(PITCHES_RAD - pitch) <= _PEAK * (PITCHES_RAD[1] - PITCHES_RAD[0])].sum(axis=0)
+    roll = float(near @ ROLLS_RAD / near.sum())
+    roll_stddev = float(np.sqrt(near @ (ROLLS_RAD - roll) ** 2 / near.sum()))
+    if abs(roll) < max(_LEAST_ROLL, _SURE * roll_stddev):
+        roll, roll_stddev = 0.0, float(np.hypot(roll, roll_stddev))
+    remarks, sources = list[str](), list[str]()
+    uses_edges = has_edges and abs(by_edges[0] - pitch) < max(_TOLD, by_edges[1])
+    if uses_edges:
+        sources.append("the upright edges of the room")
+    if shown is not None and (by_people[1] < FOUND_STDDEV or not uses_edges):
+        sources.append("people who stand or walk" if shown.shows_feet else "people's bodies")
+    apart = abs(by_edges[0] - by_people[0])
+    if has_edges and shown is not None and apart > max(_TOLD, _SURE * by_people[1]):
+        remarks.append(
+            f"the upright edges of the room show a camera pitch of {_degrees(by_edges)}, and "
+            f"people show {_degrees(by_people)}; {_degrees((pitch, pitch_stddev))} is used, so "
+            "give --camera-pitch-deg if it is known"
+        )
+    moves = camera_moves(people, pictures, camera)
+    if moves:
+        pitch_stddev = float(np.hypot(pitch_stddev, _MOVING))
+        remarks.append(
+            "the background moves, so the camera does not stand still; postures are those of one "
+            "mean camera and places are unsure: use a tripod"
+        )
+    found = Value(pitch, pitch_stddev, FOUND if sources else USUAL)
+    if pitch_rad is not None:
+        if sources and abs(pitch_rad - pitch) > max(_TOLD, _SURE * pitch_stddev):
+            remarks.append(
+                f"the pitch {np.degrees(pitch_rad):g} that is given is used, but "
+                f"{' and '.join(sources)} show {_degrees(found[:2])}"
+            )
+        found = Value(pitch_rad, GIVEN_STDDEV, GIVEN)
+    turned = Value(roll, roll_stddev, FOUND if roll else USUAL)
+    if roll_rad is not None:
+        turned = Value(roll_rad, GIVEN_STDDEV, GIVEN)
+    fov = Value(1.0, camera.focal_stddev, GIVEN)
+    height, distances = None, tuple(float("nan") for _ in people)
+    if shown is not None:
+        # What follows from the pitch and the roll that are known now.
+        gain = shown.covariance[2:, :2] @ np.linalg.inv(shown.covariance[:2, :2])
+        variances = np.array([found.stddev, turned.stddev]) ** 2
+        tilt = (found.mean, 1e-3), (turned.mean, 1e-3)
+        known = people_camera(people, statures_m, camera, *tilt) or shown
+        rest = known.covariance[2:, 2:] + (gain * variances) @ gain.T
+        stddevs = np.sqrt(np.diag(rest))
+        height = Value(float(known.values[2]), float(stddevs[0]), FOUND)
+        fov = Value(float(np.exp(known.values[3])), float(stddevs[1]), FOUND)
+        distances = known.distances
+    return FoundCamera(
+        SceneCamera(_field_of_view(camera, fov), found, turned, height),
+        tuple(sources),
+        tuple(remarks),
+        distances,
+        moves,
+    )
+
+
+def camera_moves(
+    people: Sequence[Sightings], pictures: Sequence[Picture], camera: Camera
+) -> bool:
+    """Return whether points of the background move from image to image.
+
+    Args:
+        people: times and points of each person, whose surroundings are left out.
+        pictures: images of the film.
+        camera: intrinsics of the points.
+    """
+    shifted = pairs = 0
+    sights = [sight for person in people for sight in person]
+    for (time_s, before), (_, after) in pairwise(pictures):
+        greys = [
+            one if one.ndim == 2 else cv2.cvtColor(one, cv2.COLOR_BGR2GRAY)
+            for one in (before, after)
+        ]
+        height, width = greys[0].shape
+        free = np.full((height, width), 255, np.uint8)
+        for seen_s, points in sights:
+            if abs(seen_s - time_s) < 0.5:
+                _cover(free, points, camera)
+        corners = cv2.goodFeaturesToTrack(greys[0], 200, 0.02, 0.01 * width, mask=free)
+        if corners is None:
+            continue
+        there, is_found, _ = cv2.calcOpticalFlowPyrLK(*greys, corners, None)
+        back, is_back, _ = cv2.calcOpticalFlowPyrLK(greys[1], greys[0], there, None)
+        same = np.linalg.norm(back - corners, axis=-1).ravel() < 1.0
+        same &= (is_found.ravel() > 0) & (is_back.ravel() > 0)
+        if same.sum() < _LEAST_POINTS:
+            continue
+        pairs += 1
+        shifts = np.linalg.norm(np.median((there - corners)[same], axis=0))
+        shifted += bool(shifts > _SHIFT * max(width, height))
+    return pairs > 0 and shifted > _SHIFTED_PAIRS * pairs
+
+
+def _cover(free: NDArray[np.uint8], points: ImagePoints, camera: Camera) -> None:
+    """Set the surroundings of a person to 0."""
+    px = points.px[np.isfinite(points.px[:, 0])]
+    if points.legs is not None:
+        px = np.concatenate([px, points.legs.px])
+    if not len(px):
+        return
+    around = _AROUND * float(np.ptp(px[:, 1]))
+    scale = np.array([free.shape[1] / camera.width, free.shape[0] / camera.height])
+    left, top = np.maximum((px.min(axis=0) - around) * scale, 0.0).astype(int)
+    right, bottom = np.maximum((px.max(axis=0) + around) * scale, 0.0).astype(int)
+    free[top:bottom, left:right] = 0
+
+
+def _pitch(chances: FloatArray) -> tuple[float, float]:
+    """Return the peak of the chances of ``PITCHES_RAD`` and its standard deviation, rad."""
+    middle = int(np.argmax(chances))
+    peak = slice(max(0, middle - _PEAK), middle + _PEAK + 1)
+    pitch = float(np.average(PITCHES_RAD[peak], weights=chances[peak]))
+    away = np.abs(PITCHES_RAD - pitch)
+    order = np.argsort(away)
+    within = np.cumsum(chances[order]) / chances.sum()
+    return pitch, float(np.interp(_WITHIN, within, away[order]))
+
+
+def _field_of_view(camera: Camera, factor: Value) -> Value:
+    """Return the field of view across the image for a factor of the focal length."""
+    tangent = camera.width / 2 / (camera.fx * factor.mean)
+    slope = 2 * tangent / (1 + tangent**2)
+    return Value(2 * float(np.arctan(tangent)), slope * factor.stddev, factor.origin)
+
+
+def _degrees(value: tuple[float, ...]) -> str:
+    pitch, stddev = np.degrees(value[0]), np.degrees(value[1])
+    word = "down" if pitch >= 0 else "up"
+    return f"{abs(pitch):.0f} degrees {word} (standard deviation {stddev:.0f})"
+
+
+def _normal(values: FloatArray, mean: float | FloatArray, stddev: float) -> FloatArray:
+    density: FloatArray = np.exp(-(((values - mean) / stddev) ** 2) / 2) / stddev
+    return density
