@@ -84,7 +84,7 @@ def run(options: argparse.Namespace) -> None:
     check_outputs((options.output,), options.force, inputs_of(options))
     spans = {name: getattr(options, name) for name in REFERENCES}
     if options.camera_pitch_deg is None:
-        found = placed(recording, spans["front"])
+        found = placed(recording)
         pitch_rad, recording = found.pitch_rad, found.recording
     config = InitializationConfig(
         distance_m=distance_m,

@@ -16,18 +16,10 @@ if TYPE_CHECKING:
     from cardbox_tracker.commands.request import PersonRequest, RecordingRequest, TrackingRequest
     from cardbox_tracker.person.model import BodyModel
     from cardbox_tracker.recordings.recording import Recording
-    from cardbox_tracker.recordings.silhouettes import RecordedFrame, TimeSpan
+    from cardbox_tracker.recordings.silhouettes import RecordedFrame
     from cardbox_tracker.recordings.track import Observer, TrackSummary
     from cardbox_tracker.tracking.estimate import Estimate
     from cardbox_tracker.tracking.tracker import Tracker
-
-_STANDING_S = 1.0
-"""Time for which a person of a given stature stands upright at the start, seconds."""
-_COMES_WITHIN_S = 30.0
-"""Time after the start within which a person of a given stature is sought, seconds."""
-# A given pitch contradicts the one found from this many standard deviations on, and from this
-# difference on, degrees.
-_SURE_STDDEVS, _LEAST_DEG = 2.5, 6.0
 
 
 def track(
@@ -48,13 +40,12 @@ def track(
     """
     from cardbox_tracker.common.progress import progress_bar
     from cardbox_tracker.detectors.hand_network import HandNetwork
-    from cardbox_tracker.measuring.standing_camera import PITCH_PRIOR, USUAL_PITCH
+    from cardbox_tracker.measuring.people_camera import PITCH_PRIOR, USUAL_PITCH
     from cardbox_tracker.person.model import PLACEMENT
     from cardbox_tracker.person.model_file import save_body_model
     from cardbox_tracker.person.proportions import USUAL_STATURE_M, USUAL_STDDEV_M
     from cardbox_tracker.recordings.measured_scene import seen_people, seen_person
     from cardbox_tracker.recordings.quality import Quality
-    from cardbox_tracker.recordings.silhouettes import TimeSpan
     from cardbox_tracker.recordings.track import Crowd, track_recording
 
     qualities: dict[int, Quality] = {}
@@ -64,9 +55,7 @@ def track(
     if person.model is not None and person.body.doubt:
         print(f"{person.model}: {person.body.doubt}")
     if person.model is None:
-        standing = TimeSpan(start_s, start_s + _STANDING_S)
-        # The person may come later.
-        found = placed(recording, standing, start_s + _COMES_WITHIN_S, person)
+        found = placed(recording, start_s, person.end_s, person)
         recording = found.recording
         if not person.is_pitch_given:
             if recording.detector is None:
@@ -214,7 +203,7 @@ class Placement(NamedTuple):
         pitch_rad: downward pitch, as it is given or found.
         recording: the recording with the camera's roll, unless it is given.
         stddev_rad: standard deviation of a pitch that was found.
-        distance: of the person who stands upright, statures; None without one.
+        distance: of the person at first, statures; None if it is not known.
     """
 
     pitch_rad: float
@@ -225,25 +214,25 @@ class Placement(NamedTuple):
 
 def placed(
     recording: RecordingRequest,
-    span: TimeSpan,
-    until_s: float = 0.0,
+    start_s: float = 0.0,
+    end_s: float = math.inf,
     person: PersonRequest | None = None,
 ) -> Placement:
     """Return the camera's pitch and roll, and say what was found, or contradicts what is given.
 
-    They are found from the edges of the room, and from the person who stands upright in ``span`` or
-    later up to ``until_s``, if the recording is read with a detector; else the pitch is 0.
+    They are found from a person and the edges of the room in the whole span, if the recording is
+    read with a detector; else the pitch is 0.
 
     Args:
         recording: the recording.
-        span: when the person stands upright.
-        until_s: until when the person is sought, seconds from the start.
+        start_s: seconds from the start of the recording.
+        end_s: the same.
         person: what is given of the person and of the pitch; None for nothing.
 
     Raises:
         CardboxError: the recording cannot be read, or the detector cannot be loaded.
     """
-    from cardbox_tracker.recordings.standing import placed_camera
+    from cardbox_tracker.recordings.standing import recorded_camera
 
     detector, camera = recording.detector, recording.camera
     given_rad = None
@@ -252,46 +241,34 @@ def placed(
     if detector is None:
         return Placement(given_rad or 0.0, recording)
     name = recording.cameras[0] if recording.cameras else None
-    found = placed_camera(recording.path, detector, span, camera, name, until_s, given_rad)
-    tilt = found.tilt
-    pitch, deviation = math.degrees(tilt.pitch_rad), math.degrees(tilt.pitch_stddev_rad)
-    sources = ["the vertical edges of the room"] if tilt.has_edges else []
-    if found.span is not None:
-        first_s, last_s = found.span.start_s, found.span.end_s
-        sources.append(
-            f"the person standing upright between the seconds {first_s:g} and {last_s:g}"
-        )
+    stature_m = None if person is None else person.stature_m
+    shown = recorded_camera(
+        recording.path, detector, camera, name, stature_m, given_rad, start_s, end_s
+    )
+    tilt, roll_rad = shown.camera.pitch_rad, shown.camera.roll_rad.mean
+    pitch, deviation = math.degrees(tilt.mean), math.degrees(tilt.stddev)
     number = f"{abs(pitch):.0f} degrees {'down' if pitch >= 0 else 'up'}"
     number += f" (standard deviation {deviation:.0f})"
     remarks = []
-    if given_rad is not None:
-        given = math.degrees(given_rad)
-        if abs(given - pitch) > max(_LEAST_DEG, _SURE_STDDEVS * deviation):
-            shown_by = " and ".join(sources) or "most cameras"
-            remarks.append(
-                f"--camera-pitch-deg {given:g} is used, but {shown_by} show {number}; "
-                "leave the option out to use that"
-            )
-    elif sources:
+    if given_rad is None and shown.sources:
         remarks.append(
-            f"camera pitch {number}, found from {' and '.join(sources)}; give --camera-pitch-deg "
-            "if it is known"
+            f"camera pitch {number}, found from {' and '.join(shown.sources)}; give "
+            "--camera-pitch-deg if it is known"
         )
-    else:
-        end_s = max(span.end_s, until_s)
+    elif given_rad is None:
         remarks.append(
-            f"nobody stands upright between the seconds {span.start_s:g} and {end_s:g} and no "
-            "edges of the room are vertical, so the camera's pitch is taken as that of most "
-            f"cameras, {number}; give --camera-pitch-deg if it is known"
+            "nobody stands upright and no edges of the room are upright, so the camera's pitch is "
+            f"taken as that of most cameras, {number}; give --camera-pitch-deg if it is known"
         )
-    if tilt.roll_rad and camera.roll_rad is None and len(recording.cameras) < 2:
+    remarks += shown.remarks
+    if roll_rad and camera.roll_rad is None and len(recording.cameras) < 2:
         remarks.append(
-            f"camera roll {math.degrees(tilt.roll_rad):.1f} degrees, found in the same way: the "
+            f"camera roll {math.degrees(roll_rad):.1f} degrees, found in the same way: the "
             "images are turned back; give --camera-roll-deg 0 to leave them as they are"
         )
-        recording = replace(recording, camera=replace(camera, roll_rad=tilt.roll_rad))
+        recording = replace(recording, camera=replace(camera, roll_rad=roll_rad))
     print_remarks(remarks)
-    distance = None if found.standing is None else found.standing.distance
+    distance = None if math.isnan(shown.distances[0]) else shown.distances[0]
     if given_rad is not None:
         return Placement(given_rad, recording, distance=distance)
-    return Placement(tilt.pitch_rad, recording, tilt.pitch_stddev_rad, distance)
+    return Placement(tilt.mean, recording, tilt.stddev, distance)

@@ -6,10 +6,10 @@ away, so their spacing shows the pitch, as surely as people's proportions are al
 same in all images, and so is the floor under the feet: who walks towards the camera shows pitch,
 height and focal length together. Who stays in one place shows little, and the deviations say so.
 
-All images are one robust least-squares problem. Its unknowns are those of the camera; those of each
-person: logarithm of the stature, heights and forward distances of the levels, leans of legs and
-trunk forwards, and aside; and those of each image: the place, the leans, and how far bent legs lower
-the hips. Lengths are in statures.
+All images are one robust least-squares problem. Its unknowns are those of the camera; those of
+each person: logarithm of the stature, heights and forward distances of the levels, leans of legs
+and trunk forwards, and aside; and those of each image: the place, the leans, and how far bent legs
+lower the hips. Lengths are in statures.
 """
 
 from __future__ import annotations
@@ -27,6 +27,12 @@ from cardbox_tracker.person.sizes import FloatArray
 Sightings = Sequence[tuple[float, ImagePoints]]
 """Times, s, and points of one person."""
 
+USUAL_PITCH, PITCH_PRIOR = np.radians(10.0), np.radians(13.0)
+"""Mean and standard deviation of the pitch of cameras before anything is seen, rad."""
+ROLL_PRIOR = np.radians(15.0)
+"""Standard deviation of the roll of cameras that do not stand level, rad."""
+FOUND_STDDEV = float(np.radians(9.5))
+"""Standard deviation from which on a pitch is mostly that of most cameras, and not found, rad."""
 LEVELS = ("nose", "ear", "shoulder", "hip", "knee", "ankle")
 # Height above the floor and distance before the ankles of each level where MediaPipe marks the
 # joints of people who stand upright, and their standard deviations among people.
@@ -99,8 +105,8 @@ def people_camera(
     people: Sequence[Sightings],
     statures_m: Sequence[float | None],
     camera: Camera,
-    pitch: tuple[float, float],
-    roll: tuple[float, float],
+    pitch: tuple[float, float] = (USUAL_PITCH, PITCH_PRIOR),
+    roll: tuple[float, float] = (0.0, ROLL_PRIOR),
 ) -> PeopleCamera | None:
     """Return what people show; None if nobody is upright.
 
@@ -164,9 +170,7 @@ def people_camera(
         float(at[np.argmax(person == number)]) if (person == number).any() else float("nan")
         for number in range(len(statures))
     ]
-    return PeopleCamera(
-        found[:_SHARED], covariance, bool(known[:, _ANKLE].any()), tuple(distances)
-    )
+    return PeopleCamera(found[:_SHARED], covariance, bool(known[:, _ANKLE].any()), tuple(distances))
 
 
 def _ends(values: FloatArray) -> FloatArray:
@@ -273,7 +277,9 @@ def _upright(sights: Sightings, number: int, camera: Camera) -> _Seen | None:
     if not rows:
         return None
     rows = [rows[i] for i in np.unique(np.linspace(0, len(rows) - 1, _MOST_IMAGES).astype(int))]
-    times_s, px, known, facing, straight, sitting = (np.array(one) for one in zip(*rows, strict=True))
+    times_s, px, known, facing, straight, sitting = (
+        np.array(one) for one in zip(*rows, strict=True)
+    )
     stddevs = np.where(known, _ALONG, np.inf)[..., None] * np.array([_SIDE / _ALONG, 1.0])
     stddevs[~straight, _ANKLE] *= _STEPPING / _ALONG
     independent = min(len(rows), 1.0 + float(np.ptp(times_s)) / _SAME_S)

@@ -18,26 +18,29 @@ from numpy.typing import NDArray
 
 from cardbox_tracker.camera.camera import Camera
 from cardbox_tracker.detectors.image_points import ImagePoints
-from cardbox_tracker.measuring.people_camera import Sightings, people_camera
+from cardbox_tracker.measuring.people_camera import (
+    FOUND_STDDEV,
+    PITCH_PRIOR,
+    ROLL_PRIOR,
+    USUAL_PITCH,
+    Sightings,
+    people_camera,
+)
 from cardbox_tracker.measuring.room_edges import PITCHES_RAD, ROLLS_RAD, edge_likelihoods
 from cardbox_tracker.measuring.scene import FOUND, GIVEN, USUAL, SceneCamera, Value
 from cardbox_tracker.person.sizes import FloatArray
 
-USUAL_PITCH, PITCH_PRIOR = np.radians(10.0), np.radians(13.0)
-"""Mean and standard deviation of the pitch of cameras before anything is seen, rad."""
-FOUND_STDDEV = float(np.radians(9.5))
-"""Standard deviation from which on a pitch is mostly that of most cameras, and not found, rad."""
 GIVEN_STDDEV = float(np.radians(0.5))
 """Standard deviation of a pitch or roll that is given, rad."""
 # Deviations of the roll of cameras that stand level, and of others; share of the others.
-_LEVEL, _ROLLED, _ROLLED_SHARE = np.radians(1.0), np.radians(15.0), 0.15
+_LEVEL, _ROLLED, _ROLLED_SHARE = np.radians(1.0), ROLL_PRIOR, 0.15
 # Chance that people lean aside in a whole film, if their feet are seen, and if not.
-_LEAN_ASIDE, _LEAN_ASIDE_CUT = 0.05, 0.3
+_LEAN_ASIDE, _LEAN_ASIDE_CUT = 0.03, 0.1
 # Chance that edges mean nothing, and systematic error of those that do, steps of the grid.
 _MISLEADING, _SYSTEMATIC = 0.2, 1.5
 # Systematic error of a pitch that people show, rad.
 _PEOPLE = np.radians(0.7)
-# Half of the width of the peak of a pitch, steps of the grid; chance of one standard deviation.
+# Half of the width of a peak, steps of the grid; chance of one standard deviation.
 _PEAK, _WITHIN = 6, 0.68
 # Gain of the likelihood from which on edges are named as a source.
 _SHOWN = 3.0
@@ -119,12 +122,12 @@ def scene_camera(
     blur = np.exp(-((steps / _SYSTEMATIC) ** 2) / 2)
     lines = np.apply_along_axis(np.convolve, 0, lines, blur / blur.sum(), "same")
     has_edges = bool(likelihoods.max() - np.median(likelihoods) > _SHOWN)
-    by_edges, by_people = _pitch((of_roll * lines).sum(axis=1)), _pitch(chances.sum(axis=1))
+    by_edges = _peak(PITCHES_RAD, (of_roll * lines).sum(axis=1))
+    by_people = _peak(PITCHES_RAD, chances.sum(axis=1))
     both = chances * ((1 - _MISLEADING) * lines + _MISLEADING)
-    pitch, pitch_stddev = _pitch(both.sum(axis=1))
-    near = both[np.abs(PITCHES_RAD - pitch) <= _PEAK * (PITCHES_RAD[1] - PITCHES_RAD[0])].sum(axis=0)
-    roll = float(near @ ROLLS_RAD / near.sum())
-    roll_stddev = float(np.sqrt(near @ (ROLLS_RAD - roll) ** 2 / near.sum()))
+    pitch, pitch_stddev = _peak(PITCHES_RAD, both.sum(axis=1))
+    near = np.abs(PITCHES_RAD - pitch) <= _PEAK * (PITCHES_RAD[1] - PITCHES_RAD[0])
+    roll, roll_stddev = _peak(ROLLS_RAD, both[near].sum(axis=0))
     if abs(roll) < max(_LEAST_ROLL, _SURE * roll_stddev):
         roll, roll_stddev = 0.0, float(np.hypot(roll, roll_stddev))
     remarks, sources = list[str](), list[str]()
@@ -151,8 +154,9 @@ def scene_camera(
     if pitch_rad is not None:
         if sources and abs(pitch_rad - pitch) > max(_TOLD, _SURE * pitch_stddev):
             remarks.append(
-                f"the pitch {np.degrees(pitch_rad):g} that is given is used, but "
-                f"{' and '.join(sources)} show {_degrees(found[:2])}"
+                f"--camera-pitch-deg {np.degrees(pitch_rad):g} is used, but "
+                f"{' and '.join(sources)} show {_degrees(found[:2])}; leave the option out to use "
+                "that"
             )
         found = Value(pitch_rad, GIVEN_STDDEV, GIVEN)
     turned = Value(roll, roll_stddev, FOUND if roll else USUAL)
@@ -180,9 +184,7 @@ def scene_camera(
     )
 
 
-def camera_moves(
-    people: Sequence[Sightings], pictures: Sequence[Picture], camera: Camera
-) -> bool:
+def camera_moves(people: Sequence[Sightings], pictures: Sequence[Picture], camera: Camera) -> bool:
     """Return whether points of the background move from image to image.
 
     Args:
@@ -212,8 +214,12 @@ def camera_moves(
         if same.sum() < _LEAST_POINTS:
             continue
         pairs += 1
-        shifts = np.linalg.norm(np.median((there - corners)[same], axis=0))
-        shifted += bool(shifts > _SHIFT * max(width, height))
+        shifts = (there - corners)[same].reshape(-1, 2)
+        shift = np.median(shifts, axis=0)
+        # Points of noise move, too, but not together.
+        spread = float(np.median(np.linalg.norm(shifts - shift, axis=1)))
+        least = max(_SHIFT * max(width, height), 2 * spread)
+        shifted += bool(np.linalg.norm(shift) > least)
     return pairs > 0 and shifted > _SHIFTED_PAIRS * pairs
 
 
@@ -231,15 +237,15 @@ def _cover(free: NDArray[np.uint8], points: ImagePoints, camera: Camera) -> None
     free[top:bottom, left:right] = 0
 
 
-def _pitch(chances: FloatArray) -> tuple[float, float]:
-    """Return the peak of the chances of ``PITCHES_RAD`` and its standard deviation, rad."""
+def _peak(values: FloatArray, chances: FloatArray) -> tuple[float, float]:
+    """Return where the chances of values have their peak, and the standard deviation there."""
     middle = int(np.argmax(chances))
     peak = slice(max(0, middle - _PEAK), middle + _PEAK + 1)
-    pitch = float(np.average(PITCHES_RAD[peak], weights=chances[peak]))
-    away = np.abs(PITCHES_RAD - pitch)
+    mean = float(np.average(values[peak], weights=chances[peak]))
+    away = np.abs(values - mean)
     order = np.argsort(away)
     within = np.cumsum(chances[order]) / chances.sum()
-    return pitch, float(np.interp(_WITHIN, within, away[order]))
+    return mean, float(np.interp(_WITHIN, within, away[order]))
 
 
 def _field_of_view(camera: Camera, factor: Value) -> Value:

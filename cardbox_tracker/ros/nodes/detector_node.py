@@ -18,9 +18,10 @@ from cardbox_tracker.camera.camera import Calibration, Camera
 from cardbox_tracker.camera.stamps import WINDOW, StampOrder
 from cardbox_tracker.camera.unrectify import unrectified
 from cardbox_tracker.detectors.detector import Detector, PersonDetector
-from cardbox_tracker.detectors.landmarks import LANDMARKS
+from cardbox_tracker.detectors.image_points import ImagePoints
+from cardbox_tracker.detectors.landmarks import LANDMARKS, image_points
 from cardbox_tracker.detectors.pose_network import Detection
-from cardbox_tracker.measuring.standing_camera import middles, standing_camera
+from cardbox_tracker.measuring.people_camera import FOUND_STDDEV, people_camera
 from cardbox_tracker.ros.messages.conversions import ImageArray, stamp_ns
 from cardbox_tracker.ros.messages.keypoints import (
     people_message,
@@ -58,26 +59,30 @@ class CameraPitch:
 
     def restart(self) -> None:
         """Look again, because the camera is another one."""
-        self._seen: list[Detection] = []
+        self._seen: list[ImagePoints] = []
         self._is_found = False
 
     def see(self, found: Detection, camera: Camera) -> None:
         """Add a person in the image of ``camera``."""
         if self._is_found:
             return
-        self._seen.append(found)
+        self._seen.append(image_points(found))
         if len(self._seen) < _IMAGES:
             return
-        standing = standing_camera(middles(self._seen), camera)
+        # Images of one posture count as one.
+        shown = people_camera([[(0.0, points) for points in self._seen]], [None], camera)
         self._seen.clear()
-        if standing is None or not standing.is_pitch_found:
+        if shown is None:
+            return
+        pitch_rad, stddev_rad = float(shown.values[0]), math.sqrt(shown.covariance[0, 0])
+        if stddev_rad > FOUND_STDDEV:
             return
         self._is_found = True
-        self._publisher.publish(Float64(data=standing.pitch_rad))
-        degrees = math.degrees(standing.pitch_rad)
+        self._publisher.publish(Float64(data=pitch_rad))
+        degrees = math.degrees(pitch_rad)
         self._node.get_logger().info(
             f"camera pitch {abs(degrees):.0f} degrees {'down' if degrees >= 0 else 'up'} (standard "
-            f"deviation {math.degrees(standing.pitch_stddev_rad):.0f}), found from the person "
+            f"deviation {math.degrees(stddev_rad):.0f}), found from the person "
             "standing upright"
         )
 

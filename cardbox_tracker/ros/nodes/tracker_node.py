@@ -19,7 +19,7 @@ from cardbox_tracker.common.progress import told
 from cardbox_tracker.common.settings import restarts
 from cardbox_tracker.detectors.hand_network import HandNetwork
 from cardbox_tracker.detectors.model_files import installed_hands
-from cardbox_tracker.measuring.standing_camera import FOUND_STDDEV
+from cardbox_tracker.measuring.people_camera import FOUND_STDDEV
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.model_file import dumps_body_model, load_body_model, loads_body_model
 from cardbox_tracker.person.skeleton import PLACE_NAMES

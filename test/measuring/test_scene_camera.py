@@ -1,0 +1,143 @@
+"""People who walk on a floor, and edges, show the camera within the deviations that are told."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import cv2
+import numpy as np
+import pytest
+
+from cardbox_tracker.camera.camera import Camera
+from cardbox_tracker.detectors.image_points import (
+    LEG_POINT_NAMES,
+    POINT_NAMES,
+    ImagePoints,
+    LegPoints,
+)
+from cardbox_tracker.measuring.people_camera import FORWARD, HEIGHTS, LEVELS, people_camera
+from cardbox_tracker.measuring.scene_camera import FoundCamera, scene_camera
+
+CAMERA = Camera(640, 480, 500.0, 500.0, 319.5, 239.5)
+STATURE_M, HEIGHT_M = 1.7, 1.5
+WALK = [(2.6 + 0.5 * k, 0.4 * (-1) ** k) for k in range(6)]
+STAND = [(3.0, 0.0)] * 6
+BLANK = np.full((480, 640), 128, np.uint8)
+
+
+def points(distance_m: float, aside_m: float, pitch_deg: float, roll_deg: float) -> ImagePoints:
+    """Return who stands at a place before a camera ``HEIGHT_M`` above the floor."""
+    view = CAMERA.with_pitch(np.radians(pitch_deg))
+    c, s = np.cos(np.radians(roll_deg)), np.sin(np.radians(roll_deg))
+    px = dict[str, np.ndarray]()
+    for name in (*POINT_NAMES, *LEG_POINT_NAMES):
+        # Heels and toes are at the ankles.
+        level = name.split("_")[-1].replace("heel", "ankle").replace("foot", "ankle")
+        at = LEVELS.index(level) if level in LEVELS else LEVELS.index("shoulder")
+        across_m = 0.0 if name == "nose" else 0.12 * (1 if "left" in name else -1)
+        there = np.array(
+            (
+                STATURE_M * FORWARD[at] - distance_m,
+                aside_m + across_m,
+                STATURE_M * HEIGHTS[at] - HEIGHT_M,
+            )
+        )
+        u, v = view.project(view.reference_to_optical(there)) - (CAMERA.cx, CAMERA.cy)
+        px[name] = np.array((c * u + s * v + CAMERA.cx, c * v - s * u + CAMERA.cy))
+    legs = LegPoints(np.array([px[name] for name in LEG_POINT_NAMES]), np.ones(8))
+    whole = np.array([px[name] for name in POINT_NAMES])
+    return ImagePoints(whole, np.ones(len(POINT_NAMES)), legs=legs)
+
+
+def film(
+    places: Sequence[tuple[float, float]], pitch_deg: float, roll_deg: float = 0.0
+) -> list[tuple[float, ImagePoints]]:
+    """Return the points at places, ten seconds apart."""
+    return [(10.0 * k, points(*at, pitch_deg, roll_deg)) for k, at in enumerate(places)]
+
+
+def doors(pitch_deg: float, shift_px: int = 0) -> np.ndarray:
+    """Return the image (480, 640) of doors, 4 m before a camera that looks down."""
+    image = np.full((480, 640), 90, np.uint8)
+    view = CAMERA.with_pitch(np.radians(pitch_deg))
+    for left_m in (-1.6, -0.3, 1.1):
+        corners = [
+            (-4.0, left_m + across, up) for across, up in ((0, 2), (0.5, 2), (0.5, -3), (0, -3))
+        ]
+        px = view.project(view.reference_to_optical(np.array(corners)))
+        cv2.fillPoly(image, [np.rint(px * 16).astype(np.int32)], 200, cv2.LINE_AA, 4)
+    return np.roll(image, shift_px, axis=1)
+
+
+def found(
+    pitch_deg: float,
+    image: np.ndarray = BLANK,
+    places: Sequence[tuple[float, float]] = WALK,
+    pitch_rad: float | None = None,
+    roll_deg: float = 0.0,
+) -> FoundCamera:
+    people = [film(places, pitch_deg, roll_deg)]
+    return scene_camera(people, [(0.0, image)], CAMERA, [STATURE_M], pitch_rad)
+
+
+@pytest.mark.parametrize("pitch_deg", [-8.0, 5.0, 25.0])
+def test_who_walks_shows_pitch_height_and_focal_length(pitch_deg: float) -> None:
+    factor, places = 1.2, [(at_m + 0.8, aside_m) for at_m, aside_m in WALK]
+    wrong = Camera(640, 480, 500.0 * factor, 500.0 * factor, 319.5, 239.5, focal_stddev=0.2)
+    shown = people_camera([film(places, pitch_deg)], [STATURE_M], wrong)
+    assert shown is not None
+    errors = shown.values - (np.radians(pitch_deg), 0.0, HEIGHT_M, -np.log(factor))
+    stddevs = np.sqrt(np.diag(shown.covariance))
+    assert (np.abs(errors) < 2 * stddevs).all()
+    assert stddevs[0] < np.radians(4.0)
+    # A camera that looks ahead sees the same with any focal length from another distance.
+    assert stddevs[3] < (0.15 if pitch_deg == 25.0 else 0.21)
+    assert shown.distances[0] * STATURE_M == pytest.approx(places[0][0], rel=0.05)
+
+
+def test_who_stays_in_one_place_shows_little() -> None:
+    walks, stands = (found(15.0, places=places).camera for places in (WALK, STAND))
+    assert walks.pitch_rad.stddev < np.radians(2.0)
+    assert stands.pitch_rad.stddev > np.radians(4.0)
+    assert stands.height_m is not None and walks.height_m is not None
+    assert stands.height_m.stddev > 2 * walks.height_m.stddev
+    nobody = scene_camera([[]], [(0.0, BLANK)], CAMERA, [None])
+    assert nobody.camera.height_m is None and not nobody.sources
+    assert nobody.camera.pitch_rad.origin == "usual"
+    assert nobody.camera.pitch_rad.stddev > np.radians(11.0)
+
+
+@pytest.mark.parametrize("roll_deg", [12.0, 25.0, -12.0])
+def test_a_roll_is_found(roll_deg: float) -> None:
+    shown = found(8.0, places=[(at_m + 1.0, 0.0) for at_m, _ in WALK], roll_deg=roll_deg)
+    roll = shown.camera.roll_rad
+    assert np.degrees(roll.mean) == pytest.approx(roll_deg, abs=2.0)
+    assert roll.origin == "found"
+
+
+def test_edges_decide_where_people_show_little_and_lose_against_who_walks() -> None:
+    edges = found(12.0, doors(14.0), STAND)
+    assert np.degrees(edges.camera.pitch_rad.mean) == pytest.approx(14.0, abs=1.0)
+    assert edges.camera.pitch_rad.stddev < np.radians(2.5)
+    against = found(12.0, doors(25.0), WALK)
+    assert np.degrees(against.camera.pitch_rad.mean) == pytest.approx(12.0, abs=1.5)
+    assert any("25 degrees" in one and "12 degrees" in one for one in against.remarks)
+
+
+def test_a_given_pitch_is_kept_and_what_contradicts_it_is_told() -> None:
+    shown = found(12.0, pitch_rad=np.radians(12.0))
+    assert not shown.remarks and shown.camera.pitch_rad.origin == "given"
+    wrong = found(12.0, pitch_rad=np.radians(30.0))
+    assert wrong.camera.pitch_rad.mean == np.radians(30.0)
+    assert any("--camera-pitch-deg 30 is used" in one and "12 deg" in one for one in wrong.remarks)
+
+
+def test_a_camera_that_moves_is_told() -> None:
+    people = [film(WALK, 8.0)]
+    noise = np.random.default_rng(1).integers(0, 255, (60, 80)).astype(np.uint8)
+    room = cv2.resize(noise, (640, 480), interpolation=cv2.INTER_CUBIC)
+    for shift_px, moves in ((0, False), (15, True)):
+        pictures = [(10.0 * k, np.roll(room, shift_px * k, axis=1)) for k in range(4)]
+        shown = scene_camera(people, pictures, CAMERA, [STATURE_M])
+        assert shown.moves is moves
+        assert any("camera does not stand still" in one for one in shown.remarks) is moves
