@@ -6,10 +6,10 @@ away, so their spacing shows the pitch, as surely as people's proportions are al
 same in all images, and so is the floor under the feet: who walks towards the camera shows pitch,
 height and focal length together. Who stays in one place shows little, and the deviations say so.
 
-All images are one robust least-squares problem. Its unknowns are those of the camera; those of each
-person: logarithm of the stature, heights and forward distances of the levels, leans of legs and
-trunk forwards, and aside; and those of each image: the place, the leans, and how far bent legs lower
-the hips. Lengths are in statures.
+All images are one robust least-squares problem. Its unknowns are those of the camera; those of
+each person: logarithm of the stature, heights and forward distances of the levels, leans of legs
+and trunk forwards, and aside; and those of each image: the place, the leans, and how far bent legs
+lower the hips. Lengths are in statures.
 """
 
 from __future__ import annotations

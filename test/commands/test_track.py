@@ -17,10 +17,9 @@ from cardbox_tracker.commands.request import RETIRED
 from cardbox_tracker.common.settings import settings_below
 from cardbox_tracker.detectors import detector as detector_module
 from cardbox_tracker.detectors.model_files import ModelFiles
-from cardbox_tracker.measuring.camera_tilt import Tilt
-from cardbox_tracker.measuring.standing_camera import StandingCamera
+from cardbox_tracker.measuring.scene import SceneCamera, Value
+from cardbox_tracker.measuring.scene_camera import FoundCamera
 from cardbox_tracker.person.model_file import load_body_model
-from cardbox_tracker.recordings import standing
 from cardbox_tracker.recordings.bag_reader import BagReader
 from cardbox_tracker.recordings.silhouettes import SilhouetteSource, TimeSpan
 from cardbox_tracker.recordings.truth import beside_shoulders
@@ -290,28 +289,22 @@ def test_somebody_is_measured_in_a_film(
 
 
 @pytest.mark.parametrize(
-    ("found", "expected"),
+    ("pitch_deg", "roll_deg", "sources", "expected"),
     [
         (
-            Tilt(np.radians(12.0), np.radians(5.0), np.radians(4.0), has_edges=False),
-            (
-                "pitch 12 degrees down (standard deviation 5), found from the person",
-                "upright between the seconds 20 and 21",
-                "roll 4.0 degrees",
-            ),
+            12.0,
+            14.0,
+            ("people who stand or walk",),
+            ("pitch 12 degrees down (standard deviation 5), found from people", "roll 14.0"),
         ),
-        (Tilt(-0.1, 0.02, 0.0, has_edges=True), ("pitch 6 degrees up", "edges of the room")),
-        (
-            None,
-            (
-                "nobody stands upright between the seconds 16 and 46",
-                "taken as that of most cameras",
-            ),
-        ),
+        (-6.0, 0.0, ("the edges",), ("pitch 6 degrees up", "found from the edges", "it moves")),
+        (10.0, 0.0, (), ("nobody is seen upright", "taken as that of most cameras")),
     ],
 )
-def test_the_cameras_pitch_is_found_from_who_stands_upright(
-    found: Tilt | None,
+def test_the_cameras_pitch_is_found_from_the_recording(
+    pitch_deg: float,
+    roll_deg: float,
+    sources: tuple[str, ...],
     expected: tuple[str, ...],
     film: Path,
     fov: str,
@@ -320,13 +313,11 @@ def test_the_cameras_pitch_is_found_from_who_stands_upright(
 ) -> None:
     """The detector, an optional library, is replaced by the silhouettes of the empty scene."""
     monkeypatch.setattr(detector_module, "installed_models", lambda: ModelFiles(film, film))
-    tilt = found or Tilt(np.radians(8.0), np.radians(11.0), 0.0, has_edges=False)
-    stands = found is not None and not found.has_edges
-    span = TimeSpan(20.0, 21.0) if stands else None
-    # A person of 1.72 m is 2 m away.
-    person = StandingCamera(tilt.pitch_rad, 0.1, 0.0, 0.1, 2.0 / 1.72) if stands else None
-    placed = standing.Placed(tilt, span, person)
-    monkeypatch.setattr(standing, "placed_camera", lambda *_: placed)
+    pitch, roll = (Value(float(np.radians(d)), 0.0873) for d in (pitch_deg, roll_deg))
+    tilt = SceneCamera(Value(1.0, 0.01), pitch, roll)
+    remarks = ("it moves",) if pitch_deg < 0.0 else ()
+    found = FoundCamera(tilt, sources, remarks, (2.0 / 1.72,), moves=False)
+    monkeypatch.setattr("cardbox_tracker.measuring.scene_camera.scene_camera", lambda *_: found)
 
     def opened(bag: Any, detector: Any, camera: Any, points: Any) -> SilhouetteSource:
         rolls.append(bag.calibration().roll_rad)
@@ -340,16 +331,10 @@ def test_the_cameras_pitch_is_found_from_who_stands_upright(
     for part in expected:
         assert part in done.err
     pitch_rad = load_body_model("me.body.yaml").camera_pose.pitch_rad
-    assert pitch_rad == pytest.approx(tilt.pitch_rad)
-    assert rolls == [tilt.roll_rad]
-    # What is given is used; what contradicts it is said with both numbers.
-    close_deg = round(np.degrees(tilt.pitch_rad)) - 3
-    agreeing = cardbox("track", film, *words, "--camera-pitch-deg", close_deg, "--force").err
-    assert "camera-pitch-deg" not in agreeing
-    contradicted = cardbox(
-        "track", film, *words, "--camera-pitch-deg", close_deg + 40, "--force"
-    ).err
-    assert f"--camera-pitch-deg {close_deg + 40} is used, but" in contradicted
-    assert f"{abs(np.degrees(tilt.pitch_rad)):.0f} degrees" in contradicted
+    assert pitch_rad == pytest.approx(pitch.mean)
+    # Images are turned back when the roll is known.
+    assert rolls == [0.0, roll.mean] if roll.mean else [0.0]
+    # What is given is used.
+    cardbox("track", film, *words, "--camera-pitch-deg", 30, "--force")
     pitch_rad = load_body_model("me.body.yaml").camera_pose.pitch_rad
-    assert pitch_rad == pytest.approx(np.radians(close_deg + 40))
+    assert pitch_rad == pytest.approx(np.radians(30))

@@ -16,7 +16,7 @@ from cardbox_tracker.camera.camera import Camera
 from cardbox_tracker.camera.rasterisation import render
 from cardbox_tracker.detectors.landmarks import LANDMARKS
 from cardbox_tracker.detectors.pose_network import Detection
-from cardbox_tracker.measuring.standing_camera import FOUND_STDDEV, LEVELS
+from cardbox_tracker.measuring.people_camera import FORWARD, FOUND_STDDEV, HEIGHTS, LEVELS
 from cardbox_tracker.person.cardbox import cardbox_patches
 from cardbox_tracker.person.model_file import dumps_body_model, loads_body_model
 from cardbox_tracker.person.posture import reference_posture
@@ -108,9 +108,11 @@ def test_a_standing_person_shows_the_detector_the_pitch(bus: Any, shown: bool) -
     pitch = CameraPitch(bus.start(lambda **options: CardboxNode("detector", **options)))
     camera, px = CAMERA.with_pitch(0.2), np.zeros((33, 2))
     for number, name in enumerate(LANDMARKS):
-        level = LEVELS.get(name.removeprefix("left_").removeprefix("right_"))
-        if level is not None:
-            there = np.array((-2.5 + 1.8 * level.forward, 0.0, 1.8 * level.height - 1.6))
+        level = name.removeprefix("left_").removeprefix("right_")
+        level = "ankle" if level in ("heel", "foot_index") else level
+        if level in LEVELS:
+            at = LEVELS.index(level)
+            there = np.array((-2.5 + 1.8 * FORWARD[at], 0.0, 1.8 * HEIGHTS[at] - 1.6))
             px[number] = camera.project(camera.reference_to_optical(there))
     scores = np.full(33, 0.9 if shown else 0.1)
     for _ in range(40):
