@@ -8,11 +8,11 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from cardbox_tracker.commands.arguments import add_force, at_least, body_beside, check_outputs
+from cardbox_tracker.commands.arguments import add_force, at_least, check_outputs
 from cardbox_tracker.commands.request import FORMATS, TrackFiles, add_tracking, tracking_request
 from cardbox_tracker.commands.tracking import track
 from cardbox_tracker.common.errors import CardboxError
-from cardbox_tracker.common.files import atomic_path, is_written_in_place
+from cardbox_tracker.common.files import atomic_path, body_beside, is_written_in_place
 
 if TYPE_CHECKING:
     from cardbox_tracker.recordings.track import TrackSummary
@@ -32,8 +32,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         type=Path,
         metavar="OUT.csv|OUT.parquet",
         help="table to write, one row per image (docs/results.md); by default it has the name of "
-        "the recording and is in the current folder. With --stature, OUT.body.yaml beside it is "
-        "the body that was used",
+        "the recording and is in the current folder. OUT.body.yaml beside it is the body that was "
+        "tracked",
     )
     parser.add_argument(
         "--bag", type=Path, metavar="OUT", help="also write the topics of the tracker"
@@ -117,10 +117,11 @@ def _track_one(options: argparse.Namespace) -> None:
     name = Path(recording.name if recording.is_dir() else recording.stem)
     table = options.csv or Path(f"{name}.csv")
     check_table(table)
-    body = None
-    if request.person.model is None:
-        # There is no place for a further file beside a pipe.
-        body = body_beside(name if is_written_in_place(table) else table)
+    # There is no place for a further file beside a pipe.
+    is_piped = is_written_in_place(table)
+    body = body_beside(name if is_piped else table)
+    if is_piped and request.person.model is not None:
+        body = None
     files = TrackFiles(table, options.video, options.bag, body)
     written = (table, body, options.video, options.json)
     check_outputs(written, options.force, request.inputs, results=(options.bag,))

@@ -25,7 +25,6 @@ import numba
 import numpy as np
 
 import cardbox_tracker
-from cardbox_tracker.commands.arguments import body_beside
 from cardbox_tracker.commands.request import (
     FORMATS,
     TABLES,
@@ -39,6 +38,7 @@ from cardbox_tracker.common import interrupts
 from cardbox_tracker.common.errors import CardboxError, plain
 from cardbox_tracker.common.files import (
     UnreadableFileError,
+    body_beside,
     claimed_name,
     read_regular,
     write_table,
@@ -288,7 +288,7 @@ def _prepared(
     place.parent.mkdir()
     paths = {ending: place.with_name(f"{place.name}.{ending}") for ending in formats}
     table = next(paths[ending] for ending in TABLES if ending in paths)
-    body = None if job.request.person.model else place.with_name(f"{place.name}{_BODY}")
+    body = place.with_name(f"{place.name}{_BODY}")
     files = TrackFiles(table, paths.get("mp4"), paths.get("bag"), body)
     request = replace(job.request, files=files)
     return job._replace(request=request, progress=progress, number=number)

@@ -9,7 +9,8 @@ from dataclasses import replace
 from functools import partial
 from typing import TYPE_CHECKING, NamedTuple
 
-from cardbox_tracker.commands.arguments import body_of_person, print_remarks
+from cardbox_tracker.commands.arguments import print_remarks
+from cardbox_tracker.common.files import body_of_person
 
 if TYPE_CHECKING:
     from cardbox_tracker.camera.camera import Camera
@@ -94,6 +95,10 @@ def track(
                     "tenth; give --stature M"
                 ]
             )
+    else:
+        roll_rad = person.body.camera_pose.roll_rad
+        recording = replace(recording, camera=recording.camera.standing(roll_rad))
+    bodies = [body.with_values(camera_roll_rad=recording.camera.stands_rad) for body in bodies]
     crowd = None
     if person.people is not None:
         crowd = Crowd(tuple(bodies), person.people or None)

@@ -237,14 +237,19 @@ class TrackerNode(CardboxNode):
     def _on_model(self, message: String, _: int) -> None:
         if self._found is not None and message.data == self._found.text:
             return
-        body = loads_body_model(message.data, source=self._model_topic)
+        body = self._rolled(loads_body_model(message.data, source=self._model_topic))
         if body != self._body:
             self._use(body)
         if self._found is not None:
             self._found.replace(message.data)
 
+    def _rolled(self, body: BodyModel) -> BodyModel:
+        """Return the body before this camera, as it stands."""
+        roll_rad = math.radians(self.parameters.value.camera_roll_deg)
+        return body.with_values(camera_roll_rad=roll_rad)
+
     def _use(self, body: BodyModel) -> None:
-        self._body = body
+        self._body = body = self._rolled(body)
         needs_images = body.appearance is not None or bool(body.unknown) or bool(self._look)
         self._inputs.wait_for_images(needs_images)
         if body.doubt:

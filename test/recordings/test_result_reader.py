@@ -10,14 +10,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from cardbox_tracker.applications.exporting import motion_reader
 from cardbox_tracker.applications.exporting.motion import Motion
-from cardbox_tracker.applications.exporting.motion_reader import read_motion
 from cardbox_tracker.camera.camera import Camera
 from cardbox_tracker.common.errors import CardboxError
 from cardbox_tracker.person.kinematics import pose
 from cardbox_tracker.person.model import BodyModel
+from cardbox_tracker.recordings import result_reader
 from cardbox_tracker.recordings.result_bag import result_bag
+from cardbox_tracker.recordings.result_reader import read_results
 from cardbox_tracker.recordings.result_table import columns, result_table
 from cardbox_tracker.recordings.silhouettes import RecordedFrame
 from cardbox_tracker.tracking.estimate import Estimate
@@ -26,6 +26,11 @@ from cardbox_tracker.tracking.tracker import Tracker
 BODY = BodyModel.of(hip_height_m=-0.51)
 CAMERA = Camera(64, 48, 66.0, 66.0, 31.5, 23.5)
 GREY = np.zeros((48, 64), np.uint8)
+
+
+def read_motion(path: Path, person: int | None = None) -> tuple[Motion, BodyModel | None]:
+    results = read_results(path, person)
+    return Motion.of(results), results.body
 
 
 def estimates() -> list[Estimate]:
@@ -135,12 +140,13 @@ def without_postures(rows: list[list[str]]) -> None:
     ("change", "expected"),
     [
         (without_column, "has no column right_shoulder_flexion; give a table"),
-        (with_text, "image 3: .*much.*docs/results.md"),
-        (with_state, "image 1: .*sleeping"),
-        (with_empty_cell, "image 1: "),
+        (with_text, "line 4: left_shoulder_abduction is .much.; .*docs/results.md"),
+        (with_state, "line 2: the state is .sleeping"),
+        (with_empty_cell, "line 2: left_hand_z is "),
         (lambda rows: rows[2].__setitem__(STAMP_NS, str(10**30)), "the stamp is 1000"),
         (lambda rows: rows[2].__setitem__(STAMP_NS, "-1"), "the stamp is -1"),
-        (lambda rows: rows.__delitem__(slice(1, None)), "no image with a posture"),
+        (lambda rows: rows.__delitem__(slice(1, None)), "has no image"),
+        (lambda rows: rows[1:].__class__(rows.sort(reverse=True)), "has no column stamp_ns"),
         (without_postures, "no image with a posture"),
     ],
 )
@@ -198,7 +204,7 @@ def test_a_parquet_table_of_several_batches_is_read_whole(
     with (tmp_path / "a.csv").open(newline="", encoding="utf-8") as file:
         rows = list(csv.DictReader(file))
     parquet.write_table(arrow.Table.from_pylist(rows), tmp_path / "a.parquet")
-    monkeypatch.setattr(motion_reader, "_BATCH", 2)
+    monkeypatch.setattr(result_reader, "_BATCH", 2)
     found, _ = read_motion(tmp_path / "a.parquet")
     np.testing.assert_array_equal(found.stamp_ns, expected.stamp_ns)
     np.testing.assert_array_equal(found.states, expected.states)
