@@ -8,7 +8,7 @@ from __future__ import annotations
 import csv
 import io
 from collections import Counter
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -138,7 +138,8 @@ class _Rows:
         Raises:
             ValueError: a value is not that of a result; the text names it.
         """
-        stamp_ns, time_s, state = int(row["stamp_ns"]), float(row["time_s"]), str(row["state"])
+        stamp_ns = _number(row, "stamp_ns", int)
+        time_s, state = _number(row, "time_s"), str(row["state"])
         if state not in (*_SEEN, *_GAPS):
             raise ValueError(f"the state is {quoted(state)}")
         if not 0 <= stamp_ns <= _LATEST_NS:
@@ -164,16 +165,18 @@ class _Rows:
     def _numbers(self, row: Mapping[str, Any]) -> FloatArray:
         cells = [row[name] for name in self.names]
         is_empty = np.array([cell is None or cell == "" for cell in cells], bool)
+        cells = ["0" if empty else cell for empty, cell in zip(is_empty, cells, strict=True)]
         try:
-            values = np.array(["0" if cell in (None, "") else cell for cell in cells], float)
+            values = np.array(cells, float)
         except ValueError:
-            values = np.array([_number(*one) for one in zip(self.names, cells, strict=True)])
+            known = dict(zip(self.names, cells, strict=True))
+            values = np.array([_number(known, name) for name in self.names])
         # A comparison with nan is false.
         is_wrong = ~(np.abs(values) < _MOST) | (self._is_deviation & (values < 0.0))
         is_wrong |= is_empty & self._is_needed
         if is_wrong.any():
             wrong = int(np.argmax(is_wrong))
-            raise ValueError(f"{self.names[wrong]} is {quoted(str(cells[wrong]))}")
+            raise ValueError(f"{self.names[wrong]} is {quoted(str(row[self.names[wrong]]))}")
         values[is_empty] = np.nan
         return values
 
@@ -199,11 +202,11 @@ class _Rows:
         )
 
 
-def _number(name: str, cell: Any) -> float:
+def _number(row: Mapping[str, Any], name: str, kind: Callable[[Any], Any] = float) -> Any:
     try:
-        return float(cell or 0)
-    except (TypeError, ValueError):
-        raise ValueError(f"{name} is {quoted(str(cell))}") from None
+        return kind(row[name])
+    except (TypeError, ValueError, OverflowError):
+        raise ValueError(f"{name} is {quoted(str(row[name]))}") from None
 
 
 def read_results(path: Path, person: int | None = None) -> Results:
@@ -234,12 +237,12 @@ def read_results(path: Path, person: int | None = None) -> Results:
         if person is not None and PERSON not in row:
             raise CardboxError(f"{path} has no column {PERSON}: it is of one person")
         try:
-            if int(row.get(PERSON) or 1) != (person or 1):
+            if PERSON in row and _number(row, PERSON, int) != (person or 1):
                 continue
             found = found or _Rows(path, row, _NEEDED)
             found.add(row)
-        except (KeyError, TypeError, ValueError, OverflowError) as error:
-            raise CardboxError(f"{path}, {line}: {quoted(str(error))}; {_REMEDY}") from None
+        except ValueError as error:
+            raise CardboxError(f"{path}, {line}: {error}; {_REMEDY}") from None
     if found is None:
         text = "image" if person is None else f"person {person}"
         raise CardboxError(f"{path} has no {text}; give the table of a recording with one")

@@ -127,6 +127,14 @@ def with_state(rows: list[list[str]]) -> None:
     rows[1][1] = "sleeping"
 
 
+def with_negative_deviation(rows: list[list[str]]) -> None:
+    rows[3][rows[0].index("torso_roll_stddev_rad")] = "-12.0"
+
+
+def with_state_of_keypoint(rows: list[list[str]]) -> None:
+    rows[1][rows[0].index("left_hand_state")] = "sleeping"
+
+
 def with_empty_cell(rows: list[list[str]]) -> None:
     rows[1][20] = ""
 
@@ -139,14 +147,20 @@ def without_postures(rows: list[list[str]]) -> None:
 @pytest.mark.parametrize(
     ("change", "expected"),
     [
-        (without_column, "has no column right_shoulder_flexion; give a table"),
-        (with_text, "line 4: left_shoulder_abduction is .much.; .*docs/results.md"),
+        (without_column, "has no column right_shoulder_flexion; give the table"),
+        (with_text, "line 4: torso_yaw is .much.; .*docs/results.md"),
         (with_state, "line 2: the state is .sleeping"),
-        (with_empty_cell, "line 2: left_hand_z is "),
+        (with_empty_cell, "line 2: left_hand_x is "),
         (lambda rows: rows[2].__setitem__(STAMP_NS, str(10**30)), "the stamp is 1000"),
         (lambda rows: rows[2].__setitem__(STAMP_NS, "-1"), "the stamp is -1"),
         (lambda rows: rows.__delitem__(slice(1, None)), "has no image"),
-        (lambda rows: rows[1:].__class__(rows.sort(reverse=True)), "has no column stamp_ns"),
+        (lambda rows: rows.append(rows[1]), "line 7: the stamp 7 ns is not after .* 400000007 ns"),
+        (lambda rows: rows.append(rows[-1]), "line 7: the stamp .* not in order of time"),
+        (lambda rows: [row.append(row[2]) for row in rows], "has several columns torso_y"),
+        (lambda rows: rows[3].__setitem__(2, "nan"), "line 4: torso_y is .nan."),
+        (lambda rows: rows[3].__setitem__(2, "1e300"), "line 4: torso_y is .1e300."),
+        (with_negative_deviation, "line 4: torso_roll_stddev_rad is .-12.0."),
+        (with_state_of_keypoint, "line 2: left_hand_state is .sleeping."),
         (without_postures, "no image with a posture"),
     ],
 )
