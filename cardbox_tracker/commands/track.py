@@ -119,9 +119,8 @@ def _track_one(options: argparse.Namespace) -> None:
     check_table(table)
     # There is no place for a further file beside a pipe.
     is_piped = is_written_in_place(table)
-    body = body_beside(name if is_piped else table)
-    if is_piped and request.person.model is not None:
-        body = None
+    has_body = not is_piped or request.person.model is None
+    body = body_beside(name if is_piped else table) if has_body else None
     files = TrackFiles(table, options.video, options.bag, body)
     written = (table, body, options.video, options.json)
     check_outputs(written, options.force, request.inputs, results=(options.bag,))

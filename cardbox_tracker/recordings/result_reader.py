@@ -63,7 +63,6 @@ _MOST_ROWS, _MOST_BYTES = 3_000_000, 4 * 1024**3
 # Rows that are read at once.
 _BATCH = 10_000
 _LATEST_NS = np.iinfo(np.int64).max
-_REMEDY = "give the table as 'cardbox track' wrote it (docs/results.md)"
 
 
 @dataclass(frozen=True)
@@ -242,7 +241,10 @@ def read_results(path: Path, person: int | None = None) -> Results:
             found = found or _Rows(path, row, _NEEDED)
             found.add(row)
         except ValueError as error:
-            raise CardboxError(f"{path}, {line}: {error}; {_REMEDY}") from None
+            raise CardboxError(
+                f"{path}, {line}: {error}; give the table as 'cardbox track' wrote it "
+                "(docs/results.md)"
+            ) from None
     if found is None:
         text = "image" if person is None else f"person {person}"
         raise CardboxError(f"{path} has no {text}; give the table of a recording with one")
@@ -303,7 +305,10 @@ def _check(path: Path, names: Sequence[str]) -> None:
     for name in _NEEDED:
         if names.count(name) != 1:
             problem = "several columns" if name in names else "no column"
-            raise CardboxError(f"{path} has {problem} {name}; {_REMEDY}")
+            raise CardboxError(
+                f"{path} has {problem} {name}; give the table as 'cardbox track' wrote it "
+                "(docs/results.md)"
+            )
 
 
 def has_results(bag: BagReader) -> bool:

@@ -57,7 +57,7 @@ def _limbs(motion: Motion) -> dict[str, FloatArray]:
 
     A hand or leg that is not known keeps its last rotation, or is at rest before the first.
     """
-    found = {}
+    found: dict[str, FloatArray] = {}
     rest = 0.0, 0.0, np.pi / 2
     for number, suffix in enumerate("lr"):
         if motion.has_legs:

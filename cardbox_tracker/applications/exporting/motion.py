@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, fields, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -125,7 +126,8 @@ class Motion:
         def emptied(values: FloatArray) -> FloatArray:
             return np.where(is_gap.reshape(-1, *[1] * (values.ndim - 1)), np.nan, values)
 
-        return replace(self, **{name: emptied(getattr(self, name)) for name in _VALUES})
+        changed: dict[str, Any] = {name: emptied(getattr(self, name)) for name in _VALUES}
+        return replace(self, **changed)
 
     def evenly(self) -> Motion:
         """Return the motion at moments of equal distance, for formats with a constant rate.
@@ -150,12 +152,13 @@ class Motion:
         wanted_ns = np.arange(count) * step_ns
         nearest = np.searchsorted((since_ns[:-1] + since_ns[1:]) / 2, wanted_ns)
         is_gap = np.abs(since_ns[nearest] - wanted_ns) > step_ns / 2
+        taken: dict[str, Any] = {name: getattr(self, name)[nearest] for name in _VALUES}
         return replace(
             self,
             stamp_ns=self.stamp_ns[0] + np.round(wanted_ns).astype(np.int64),
             time_s=self.time_s[0] + wanted_ns / 1e9,
             state=tuple(np.where(is_gap, MISSING, np.array(self.state)[nearest]).tolist()),
-            **{name: getattr(self, name)[nearest] for name in _VALUES},
+            **taken,
         ).without(is_gap)
 
 

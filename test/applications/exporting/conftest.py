@@ -30,8 +30,12 @@ def motion_of(
     points = pose(body, states, clavicles_m=np.tile(rises_m, (len(states), 1))).keypoints_m
     tilt, n = body.camera_pose, len(states)
     shapes = {
-        "neck": (2,), "wrists": (2, 3), "palms": (2, 3), "legs": (8,),
-        "leg_points_m": (6, 3), "leg_stddev_m": (6,),
+        "neck": (2,),
+        "wrists": (2, 3),
+        "palms": (2, 3),
+        "legs": (8,),
+        "leg_points_m": (6, 3),
+        "leg_stddev_m": (6,),
     }
     unknown = {name: np.full((n, *shape), np.nan) for name, shape in shapes.items()}
     stamps = np.arange(len(states)) * STEP_NS
