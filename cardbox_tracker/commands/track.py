@@ -32,8 +32,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         type=Path,
         metavar="OUT.csv|OUT.parquet",
         help="table to write, one row per image (docs/results.md); by default it has the name of "
-        "the recording and is in the current folder. OUT.body.yaml beside it is the body that was "
-        "tracked",
+        "the recording and is in the current folder. OUT.body.yaml beside it is the body that "
+        "was used",
     )
     parser.add_argument(
         "--bag", type=Path, metavar="OUT", help="also write the topics of the tracker"

@@ -122,7 +122,7 @@ class _Rows:
         self._path = path
         known = [name for name in units(*[True] * 4) if name in found and name not in _TIMES]
         texts = set(text_columns())
-        self.names = [name for name in known if name not in texts and name != PERSON]
+        self.names = [name for name in known if name not in (*texts, PERSON, "stamp")]
         self._texts = [name for name in known if name in texts]
         self._is_deviation = np.array(["_stddev_" in name for name in self.names])
         self._is_needed = np.array([name in needed for name in self.names])
