@@ -17,6 +17,7 @@ import sys
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import redirect_stderr, redirect_stdout
 from dataclasses import fields, is_dataclass, replace
+from glob import escape
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -321,15 +322,16 @@ def _publish(job: Job, output: Path) -> None:
     _remove(output, job.name)
     place = (output / job.name).parent
     place.mkdir(parents=True, exist_ok=True)
-    for path in job.request.files:
-        if path is not None and path.exists():
-            path.rename(place / path.name)
+    assert job.request.files.table is not None
+    # Each of several people has a body.
+    for path in sorted(job.request.files.table.parent.iterdir()):
+        path.rename(place / path.name)
 
 
 def _remove(output: Path, name: str) -> None:
     """Remove the former results of a recording."""
-    for ending in (*(f".{ending}" for ending in FORMATS), _BODY):
-        path = output / f"{name}{ending}"
+    paths = [output / f"{name}{ending}" for ending in (*(f".{one}" for one in FORMATS), _BODY)]
+    for path in (*paths, *output.glob(f"{escape(name)}.person_*{_BODY}")):
         try:
             if path.is_dir():
                 shutil.rmtree(path)

@@ -64,7 +64,8 @@ def write_bag(path: Path) -> Path:
     tracker = Tracker(BODY, CAMERA)
     with result_bag(path, "camera") as add:
         for number, estimate in enumerate(estimates()):
-            add(RecordedFrame(START_NS + number * 10**8, number / 10, GREY, GREY), estimate, tracker)
+            frame = RecordedFrame(START_NS + number * 10**8, number / 10, GREY, GREY)
+            add(frame, estimate, tracker)
     return path
 
 
@@ -156,7 +157,7 @@ def without_postures(rows: list[list[str]]) -> None:
         (lambda rows: rows[2].__setitem__(STAMP_NS, str(10**30)), "the stamp is 1000"),
         (lambda rows: rows[2].__setitem__(STAMP_NS, "-1"), "the stamp is -1"),
         (lambda rows: rows.__delitem__(slice(1, None)), "has no image"),
-        (lambda rows: rows.append(rows[1]), "line 7: the stamp 17.*007 ns is not after .*400000007 ns"),
+        (lambda rows: rows.append(rows[1]), "line 7: the stamp 17.*007 ns is not after"),
         (lambda rows: rows.append(rows[-1]), "line 7: the stamp .* not in order of time"),
         (lambda rows: [row.append(row[2]) for row in rows], "has several columns torso_y"),
         (lambda rows: rows[3].__setitem__(2, "nan"), "line 4: torso_y is .nan."),
