@@ -109,7 +109,7 @@ def test_joints_have_the_error_of_the_table_in_all_formats(
     below_m = floor_m(load_body_model(exported / "person.yaml"))
     for name, points_m in found_m.items():
         assert points_m.shape == truth_m.shape, name
-        points_m = points_m + (0.0, below_m, 0.0)  # from the floor to the camera
+        points_m = points_m + np.array([0.0, below_m, 0.0])  # above the camera
         errors_m[name] = np.linalg.norm(points_m - truth_m @ TO_LABORATORY.T, axis=2)
     means_cm = {name: 100 * error.mean() for name, error in errors_m.items()}
     print({name: f"{mean:.2f} cm" for name, mean in means_cm.items()})
