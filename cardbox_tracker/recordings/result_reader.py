@@ -9,7 +9,7 @@ import csv
 import io
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -53,6 +53,7 @@ _STATE, _JOINTS, _STDDEV = "/tracking_state", "/joint_states", "/joint_states_st
 _KEYPOINTS, _HANDS = "/keypoints", "/hands"
 
 _SEEN, _GAPS = (TRACKING, UNCERTAIN), (LOST, NO_PERSON)
+_KEYPOINT_STATES = frozenset(map(str, KeypointState))
 _TIMES = ("stamp_ns", "time_s", "state")
 _POSTURE = (*JOINT_NAMES, *PLACE_NAMES)
 _NEEDED = (*_TIMES, *_POSTURE, *POINT_COLUMNS)
@@ -154,7 +155,7 @@ class _Rows:
         self._rows.append(self._numbers(row) if is_seen else np.full(len(self.names), np.nan))
         for name in self._texts:
             text = str(row[name] or "") if is_seen else ""
-            if text and name.endswith("_state") and text not in tuple(KeypointState):
+            if text and name.endswith("_state") and text not in _KEYPOINT_STATES:
                 raise ValueError(f"{name} is {quoted(text)}")
             self._found_texts[name].append(text)
         self._times.append((stamp_ns, time_s, state))
@@ -164,10 +165,10 @@ class _Rows:
     def _numbers(self, row: Mapping[str, Any]) -> FloatArray:
         cells = [row[name] for name in self.names]
         is_empty = np.array([cell is None or cell == "" for cell in cells], bool)
-        cells = ["0" if empty else cell for empty, cell in zip(is_empty, cells, strict=True)]
         try:
-            values = np.array(cells, float)
-        except ValueError:
+            values = np.array([float(cell or 0) for cell in cells])
+        except (TypeError, ValueError):
+            cells = ["0" if empty else cell for empty, cell in zip(is_empty, cells, strict=True)]
             known = dict(zip(self.names, cells, strict=True))
             values = np.array([_number(known, name) for name in self.names])
         # A comparison with nan is false.
@@ -251,7 +252,7 @@ def read_results(path: Path, person: int | None = None) -> Results:
     beside = body_of_person(body_beside(path), person or 1)
     body = load_body_model(beside) if beside.is_file() else None
     results = found.results(())
-    return Results(**{**vars(results), "bodies": (body,) * len(results.state)})
+    return replace(results, bodies=(body,) * len(results.state))
 
 
 def _csv_cells(path: Path) -> Iterator[tuple[str, Mapping[str, Any]]]:
