@@ -15,8 +15,8 @@ FRONT = reference_posture("front")
 
 
 def test_the_skeletons_marker_has_the_gaze_last() -> None:
-    plain = marker_shapes(BODY, CAMERA, FRONT)[1].points_m
-    looking = marker_shapes(BODY, CAMERA, FRONT, neck=np.array([0.5, 0.2]))[1].points_m
+    plain = marker_shapes(BODY, FRONT)[1].points_m
+    looking = marker_shapes(BODY, FRONT, neck=np.array([0.5, 0.2]))[1].points_m
     np.testing.assert_array_equal(looking[:-2], plain)
     start, end = CAMERA.optical_to_reference(looking[-2:])
     direction = (end - start) / np.linalg.norm(end - start)

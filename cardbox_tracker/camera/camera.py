@@ -34,14 +34,24 @@ a person states."""
 _MOST_SIDE_PX = 65535
 
 
-def level_to_optical(pitch_rad: float) -> FloatArray:
-    """Return the rotation (3, 3) from the level reference frame into that of a pitched camera."""
+def roll_turn(roll_rad: float) -> FloatArray:
+    """Return the rotation (3, 3) from the optical frame of a rolled camera into the upright one."""
+    c, s = np.cos(roll_rad), np.sin(roll_rad)
+    return np.array([(c, -s, 0.0), (s, c, 0.0), (0.0, 0.0, 1.0)])
+
+
+def level_to_optical(pitch_rad: float, roll_rad: float = 0.0) -> FloatArray:
+    """Return the rotation (3, 3) from the level reference frame into the optical frame.
+
+    Without ``roll_rad`` it is the frame of the images that are turned upright, else that of the
+    camera as it stands.
+    """
     # Level camera: x_optical = Y, y_optical = -Z, z_optical = -X of the reference frame.
     level = np.array([(0.0, 1.0, 0.0), (0.0, 0.0, -1.0), (-1.0, 0.0, 0.0)])
     c, s = np.cos(pitch_rad), np.sin(pitch_rad)
     look_down = np.array([(1.0, 0.0, 0.0), (0.0, c, -s), (0.0, s, c)])
     rotation: FloatArray = look_down @ level
-    return rotation
+    return roll_turn(roll_rad).T @ rotation if roll_rad else rotation
 
 
 @dataclass(frozen=True)
@@ -308,8 +318,7 @@ class Calibration:
 
     def turn(self) -> FloatArray:
         """Return the matrix (3, 3) that makes rays of the camera level, and mirrors them back."""
-        c, s = np.cos(self.roll_rad), np.sin(self.roll_rad)
-        turn = np.array([(c, -s, 0.0), (s, c, 0.0), (0.0, 0.0, 1.0)])
+        turn = roll_turn(self.roll_rad)
         return turn * [(-1.0,), (1.0,), (1.0,)] if self.is_mirrored else turn
 
     def rectified(self, px: FloatArray, width: int, height: int) -> FloatArray:

@@ -263,11 +263,6 @@ def _is_same(path: Path, other: Path) -> bool:
         return False
 
 
-def body_beside(table: Path) -> Path:
-    """Return the file beside a table of ``cardbox track --stature`` with the body that it used."""
-    return table.with_name(f"{table.stem}.body.yaml")
-
-
 def add_person(parser: argparse.ArgumentParser) -> None:
     """Add ``--person``, the number of one of several people in results."""
     parser.add_argument(
@@ -276,13 +271,6 @@ def add_person(parser: argparse.ArgumentParser) -> None:
         metavar="K",
         help="results of several people: the number of the person (default: 1)",
     )
-
-
-def body_of_person(body: Path, number: int) -> Path:
-    """Return the file of the body of one of several people; ``body`` is that of the first."""
-    if number == 1:
-        return body
-    return body.with_name(body.name.replace(".body.yaml", f".person_{number}.body.yaml"))
 
 
 def print_remarks(*remarks: Iterable[str]) -> None:

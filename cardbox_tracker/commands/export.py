@@ -8,11 +8,9 @@ from pathlib import Path
 from cardbox_tracker.commands.arguments import (
     add_force,
     add_person,
-    body_beside,
-    body_of_person,
     check_outputs,
 )
-from cardbox_tracker.common.errors import CardboxError
+from cardbox_tracker.common.files import body_beside, body_of_person
 
 NAME = "export"
 HELP = "write results as TRC, MOT, BVH or C3D, or as joint angles of the ISB"
@@ -48,8 +46,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         type=Path,
         metavar="MODEL.yaml",
         help="the person with whom the results were tracked, which bvh needs; trc, mot "
-        "and c3d take the pitch of the camera from it, and the places of hips and neck. A bag "
-        "contains it, and OUT.body.yaml beside the table OUT.csv is found",
+        "and c3d take the pitch of the camera and the floor from it, and the places of hips and "
+        "neck. A bag contains it, and OUT.body.yaml beside the table OUT.csv is found",
     )
     add_person(parser)
     add_force(parser)
@@ -58,9 +56,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(options: argparse.Namespace) -> None:
     """Read the results and write the file."""
     from cardbox_tracker.applications.exporting.formats import FORMATS
-    from cardbox_tracker.applications.exporting.motion_reader import read_motion
+    from cardbox_tracker.applications.exporting.motion import Motion
     from cardbox_tracker.applications.exporting.placed import images_of_body
+    from cardbox_tracker.person.legs import floor_m
     from cardbox_tracker.person.model_file import load_body_model
+    from cardbox_tracker.recordings.result_reader import read_results
     from cardbox_tracker.tracking.estimate import UNCERTAIN
 
     chosen = FORMATS[options.to]
@@ -69,20 +69,13 @@ def run(options: argparse.Namespace) -> None:
     check_outputs((output,), options.force, inputs=(options.results, options.model, beside))
     chosen.check()
     given = None if options.model is None else load_body_model(options.model)
-    motion, recorded = read_motion(options.results, options.person)
-    body = given or recorded
+    results = read_results(options.results, options.person)
+    motion = Motion.of(results)
+    body = given or results.body
     images, seen = len(motion.state), int(motion.is_seen.sum())
     if body is not None and chosen.has_places:
         motion = images_of_body(motion, body)
-    elif chosen.has_places and beside.is_file():
-        found = load_body_model(beside)
-        try:
-            motion, body = images_of_body(motion, found), found
-        except CardboxError:
-            if chosen.needs_body:
-                raise
-            print(f"most images were tracked with another body than that of {beside}: not used")
-        else:
+        if given is None and beside.is_file():
             print(f"took the body of {beside}; --model gives another")
     chosen.write(output, motion, body)
     print(
@@ -93,5 +86,7 @@ def run(options: argparse.Namespace) -> None:
     if others:
         print(f"{others} of these images were tracked with another body and are gaps, too")
     if body is None and chosen.has_places:
-        print("the camera is taken as level; --model gives its pitch")
+        print("the camera is taken as level, and the floor is not known; --model gives both")
+    elif chosen.has_places and body is not None and floor_m(body) is None:
+        print("the floor is not known, so heights are those above the camera")
     print(f"wrote {output}")

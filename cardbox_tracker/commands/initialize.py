@@ -102,6 +102,7 @@ def run(options: argparse.Namespace) -> None:
             result = initialize_from_cameras(source, spans, config, show)
         remarks, accounts = source.first.remarks, [one.account for one in source.sources]
     print_remarks(remarks)
-    save_body_model(result.body, options.output)
+    roll_rad = recording.camera.stands_rad
+    save_body_model(result.body.with_values(camera_roll_rad=roll_rad), options.output)
     print(describe(result))
     print(f"wrote {options.output}", *accounts, sep="\n")

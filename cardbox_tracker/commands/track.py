@@ -8,11 +8,11 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from cardbox_tracker.commands.arguments import add_force, at_least, body_beside, check_outputs
+from cardbox_tracker.commands.arguments import add_force, at_least, check_outputs
 from cardbox_tracker.commands.request import FORMATS, TrackFiles, add_tracking, tracking_request
 from cardbox_tracker.commands.tracking import track
 from cardbox_tracker.common.errors import CardboxError
-from cardbox_tracker.common.files import atomic_path, is_written_in_place
+from cardbox_tracker.common.files import atomic_path, body_beside, is_written_in_place
 
 if TYPE_CHECKING:
     from cardbox_tracker.recordings.track import TrackSummary
@@ -32,8 +32,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         type=Path,
         metavar="OUT.csv|OUT.parquet",
         help="table to write, one row per image (docs/results.md); by default it has the name of "
-        "the recording and is in the current folder. With --stature, OUT.body.yaml beside it is "
-        "the body that was used",
+        "the recording and is in the current folder. OUT.body.yaml beside it is the body that "
+        "was used",
     )
     parser.add_argument(
         "--bag", type=Path, metavar="OUT", help="also write the topics of the tracker"
@@ -118,8 +118,10 @@ def _track_one(options: argparse.Namespace) -> None:
     table = options.csv or Path(f"{name}.csv")
     check_table(table)
     # There is no place for a further file beside a pipe.
-    beside = name if is_written_in_place(table) else table
-    body = body_beside(beside) if request.person.model is None else None
+    is_piped = is_written_in_place(table)
+    beside = name if is_piped else table
+    has_body = not is_piped or request.person.model is None
+    body = body_beside(beside) if has_body else None
     scene = beside.with_name(f"{beside.stem}.scene.yaml")
     files = TrackFiles(table, options.video, options.bag, body, scene)
     written = (table, body, scene, options.video, options.json)

@@ -17,6 +17,7 @@ import sys
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import redirect_stderr, redirect_stdout
 from dataclasses import fields, is_dataclass, replace
+from glob import escape
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -25,7 +26,6 @@ import numba
 import numpy as np
 
 import cardbox_tracker
-from cardbox_tracker.commands.arguments import body_beside
 from cardbox_tracker.commands.request import (
     FORMATS,
     TABLES,
@@ -39,6 +39,7 @@ from cardbox_tracker.common import interrupts
 from cardbox_tracker.common.errors import CardboxError, plain
 from cardbox_tracker.common.files import (
     UnreadableFileError,
+    body_beside,
     claimed_name,
     read_regular,
     write_table,
@@ -288,7 +289,7 @@ def _prepared(
     place.parent.mkdir()
     paths = {ending: place.with_name(f"{place.name}.{ending}") for ending in formats}
     table = next(paths[ending] for ending in TABLES if ending in paths)
-    body = None if job.request.person.model else place.with_name(f"{place.name}{_BODY}")
+    body = place.with_name(f"{place.name}{_BODY}")
     files = TrackFiles(table, paths.get("mp4"), paths.get("bag"), body)
     request = replace(job.request, files=files)
     return job._replace(request=request, progress=progress, number=number)
@@ -321,15 +322,16 @@ def _publish(job: Job, output: Path) -> None:
     _remove(output, job.name)
     place = (output / job.name).parent
     place.mkdir(parents=True, exist_ok=True)
-    for path in job.request.files:
-        if path is not None and path.exists():
-            path.rename(place / path.name)
+    assert job.request.files.table is not None
+    # Each of several people has a body.
+    for path in sorted(job.request.files.table.parent.iterdir()):
+        path.rename(place / path.name)
 
 
 def _remove(output: Path, name: str) -> None:
     """Remove the former results of a recording."""
-    for ending in (*(f".{ending}" for ending in FORMATS), _BODY):
-        path = output / f"{name}{ending}"
+    paths = [output / f"{name}{ending}" for ending in (*(f".{one}" for one in FORMATS), _BODY)]
+    for path in (*paths, *output.glob(f"{escape(name)}.person_*{_BODY}")):
         try:
             if path.is_dir():
                 shutil.rmtree(path)

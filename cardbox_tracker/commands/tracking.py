@@ -9,7 +9,8 @@ from dataclasses import replace
 from functools import partial
 from typing import TYPE_CHECKING
 
-from cardbox_tracker.commands.arguments import body_of_person, print_remarks
+from cardbox_tracker.commands.arguments import print_remarks
+from cardbox_tracker.common.files import body_of_person
 
 # A focal length that is found takes the place of a usual one from this share of its deviation on.
 _BETTER = 0.5
@@ -176,6 +177,9 @@ def measured_scene(
     from cardbox_tracker.person.proportions import USUAL_STATURE_M
     from cardbox_tracker.recordings.measured_scene import seen_people, seen_person, watch
 
+    if person.model is not None and not person.body.unknown:
+        roll_rad = person.body.camera_pose.roll_rad
+        recording = replace(recording, camera=recording.camera.standing(roll_rad))
     with ExitStack() as stack:
         source = stack.enter_context(recording.open())
         span = person.start_s, person.end_s
@@ -183,7 +187,9 @@ def measured_scene(
         tilt = person.body.camera_pose
         if person.model is not None and not person.body.unknown:
             pitch = Value(tilt.pitch_rad, tilt.pitch_stddev_rad, GIVEN)
-            camera = SceneCamera(_lens_of(first.camera), pitch, Value(0.0, 0.0, GIVEN))
+            roll_rad = recording.camera.stands_rad
+            camera = SceneCamera(_lens_of(first.camera), pitch, Value(roll_rad, 0.0, GIVEN))
+            bodies = [body.with_values(camera_roll_rad=roll_rad) for body in bodies]
             yield source, Scene(camera, tuple(bodies))
             return
         watched = watch(source, *span)
@@ -200,7 +206,8 @@ def measured_scene(
                     "and distances may be wrong by a tenth; give --stature M"
                 ]
             )
-        bodies = list(_bodies(bodies, person, found))
+        stands = {"camera_roll_rad": better.camera.stands_rad}
+        bodies = [body.with_values(**stands) for body in _bodies(bodies, person, found)]
         if person.people is None:
             bodies = [seen_person(watched, bodies[0], first.camera, config, seed)]
         else:

@@ -116,11 +116,14 @@ def _results_of(options: argparse.Namespace) -> list[Path]:
     """
     from cardbox_tracker.recordings.bag_reader import BagReader
     from cardbox_tracker.recordings.open_images import is_bag
-    from cardbox_tracker.recordings.result_reader import has_results
+    from cardbox_tracker.recordings.result_reader import has_results, read_results
 
     if is_bag(options.recording) or not options.recording.exists():
         with BagReader(options.recording) as bag:
             if has_results(bag):
+                for path in (options.recording, options.beside):
+                    if path is not None:
+                        read_results(path, options.person)
                 return [path for path in (options.recording, options.beside) if path is not None]
     return []
 

@@ -287,3 +287,15 @@ def write_table(path: Path, header: Sequence[str], rows: Iterable[Sequence[str]]
         table = csv.writer(file, lineterminator="\n")
         table.writerow(header)
         table.writerows(rows)
+
+
+def body_beside(table: Path) -> Path:
+    """Return the file beside a table of results with the body that was tracked."""
+    return table.with_name(f"{table.stem}.body.yaml")
+
+
+def body_of_person(body: Path, number: int) -> Path:
+    """Return the file of the body of one of several people; ``body`` is that of the first."""
+    if number == 1:
+        return body
+    return body.with_name(body.name.replace(".body.yaml", f".person_{number}.body.yaml"))

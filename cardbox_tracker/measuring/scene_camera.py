@@ -51,8 +51,9 @@ _TOLD = np.radians(4.0)
 # A shift of most of the background between two images that shows that the camera moves, as a share
 # of the longer side; pairs of images with such a shift, and points that show it.
 _SHIFT, _SHIFTED_PAIRS, _LEAST_POINTS = 0.01, 0.25, 12
-# Deviation of the pitch of a camera that moves, rad; margin around people, share of their height.
-_MOVING, _AROUND = np.radians(6.0), 0.15
+# Deviation of the pitch of a camera that moves, rad, with which nothing is sure; margin around
+# people, share of their height.
+_MOVING, _AROUND = np.radians(12.0), 0.15
 Picture = tuple[float, NDArray[np.uint8]]
 """Time, s, and an image (H, W) or (H, W, 3) at any resolution, undistorted."""
 

@@ -19,7 +19,8 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from cardbox_tracker.person.parts import BodyParts
+from cardbox_tracker.person.model import BodyModel
+from cardbox_tracker.person.parts import BodyParts, body_parts
 from cardbox_tracker.person.sizes import FloatArray
 from cardbox_tracker.person.skeleton import (
     FIXED,
@@ -36,12 +37,46 @@ from cardbox_tracker.person.skeleton import (
 HIP_SHARE, THIGH_SHARE, SHANK_SHARE = 0.06, 0.245, 0.246
 """Hip joint from the middle of the hips, thigh, and shank up to the ankle, as shares of the
 stature; the latter two are those of Drillis & Contini (:mod:`.proportions`)."""
+ANKLE_SHARE = 0.039
+"""Height of the ankle above the floor, as a share of the stature (Drillis & Contini)."""
 _CROWN_SHARE = 0.83 / 1.72
 
 
 def stature_of(parts: BodyParts[float]) -> float:
     """Return the stature of a person with this trunk and head, m, see :mod:`.proportions`."""
     return parts.head.top_m / _CROWN_SHARE
+
+
+def floor_m(body: BodyModel) -> float | None:
+    """Return the height of the floor above the camera, m, on which the measured person stood.
+
+    None if the height of the hips is not known.
+    """
+    if "hip_height_m" in body.unknown:
+        return None
+    leg_m = (THIGH_SHARE + SHANK_SHARE + ANKLE_SHARE) * stature_of(body_parts(body.sizes))
+    return body.placement.hip_height_m - leg_m
+
+
+def legs_m(body: BodyModel, hips_m: FloatArray, yaw: FloatArray, angles: FloatArray) -> FloatArray:
+    """Return hips, knees and ankles, ordered as ``LEG_KEYPOINT_NAMES``, (n, 6, 3), metres.
+
+    Args:
+        body: the person, whose bones have the mean lengths of people of their stature.
+        hips_m: middle of the hips, (n, 3), in the reference frame, as the result.
+        yaw: ``torso_yaw``, (n,), rad.
+        angles: ``LEG_NAMES``, (n, 8), rad.
+    """
+    stature_m, turn = stature_of(body_parts(body.sizes)), rotation_z(yaw)
+    points = []
+    for number, side in enumerate((1.0, -1.0)):
+        thigh, shank = leg_directions(angles[:, 4 * number : 4 * number + 4], side)
+        aside = np.broadcast_to((0.0, side * HIP_SHARE, 0.0), thigh.shape)
+        hip = hips_m + stature_m * np.einsum("nij,nj->ni", turn, aside)
+        knee = hip + stature_m * np.einsum("nij,nj->ni", turn, THIGH_SHARE * thigh)
+        ankle = knee + stature_m * np.einsum("nij,nj->ni", turn, SHANK_SHARE * shank)
+        points += [hip, knee, ankle]
+    return np.stack(points, axis=1)
 
 
 def _deg(lowest: float, highest: float) -> tuple[float, float]:

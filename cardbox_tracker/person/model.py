@@ -36,6 +36,8 @@ PLACEMENT = {
     "lateral_m": (-5.0, 5.0, "m", "torso_y in the front reference posture"),
 }
 CAMERA_POSE = {"camera_pitch_rad": (-1.4, 1.4, "rad", "how far the camera looks down")}
+CAMERA_ROLL = "camera_roll_rad"
+"""Name of the camera's roll, which a model file has only if it is not 0."""
 CONSTANTS = {**PLACEMENT, **CAMERA_POSE}
 """Range, unit and meaning of the numbers of placement and camera pose, by name."""
 
@@ -139,18 +141,22 @@ class CameraPose:
     Attributes:
         pitch_rad: downward pitch, rad.
         pitch_stddev_rad: its standard deviation, rad; it is no part of a model file.
+        roll_rad: how far the camera is turned clockwise about its axis, seen from behind it. The
+            tracker's images are turned back, and its results are those of the camera as it stands.
 
     Raises:
-        BodyModelError: the pitch is not finite or outside of its range.
+        BodyModelError: an angle is not finite or outside of its range.
     """
 
     pitch_rad: float = 0.0
     pitch_stddev_rad: float = math.radians(2.0)
+    roll_rad: float = 0.0
 
     def __post_init__(self) -> None:
-        """Check the pitch."""
+        """Check the angles."""
         lowest, highest, unit, _ = CAMERA_POSE["camera_pitch_rad"]
         check_range("camera_pitch_rad", self.pitch_rad, lowest, highest, unit)
+        check_range(CAMERA_ROLL, self.roll_rad, -math.pi, math.pi, "rad")
 
 
 @dataclass(frozen=True)
@@ -211,8 +217,8 @@ class BodyModel:
 
         Args:
             sizes: shape (18,), metres; None for the default sizes.
-            values: any of ``CONSTANTS``, ``side_turn``, ``appearance``, ``source``,
-                ``unknown`` and ``shoulder_rise``; missing values have their defaults.
+            values: any of ``CONSTANTS``, ``CAMERA_ROLL``, ``side_turn``, ``appearance``,
+                ``source``, ``unknown`` and ``shoulder_rise``; missing values have their defaults.
 
         Raises:
             BodyModelError: a number is outside of its range; the text names it.
@@ -224,8 +230,8 @@ class BodyModel:
         """Return the same model with other numbers.
 
         Args:
-            values: any of ``sizes``, ``CONSTANTS``, ``side_turn``, ``appearance``, ``source``,
-                ``unknown`` and ``shoulder_rise``.
+            values: any of ``sizes``, ``CONSTANTS``, ``CAMERA_ROLL``, ``side_turn``,
+                ``appearance``, ``source``, ``unknown`` and ``shoulder_rise``.
 
         Raises:
             BodyModelError: a number is outside of its range; the text names it.
@@ -233,7 +239,11 @@ class BodyModel:
         changed: dict[str, Any] = {}
         if "sizes" in values:
             changed["person"] = Person(values.pop("sizes"))
-        tilt = {"camera_pitch_rad": "pitch_rad", "pitch_stddev_rad": "pitch_stddev_rad"}
+        tilt = {
+            "camera_pitch_rad": "pitch_rad",
+            "pitch_stddev_rad": "pitch_stddev_rad",
+            CAMERA_ROLL: "roll_rad",
+        }
         tilted = {tilt[name]: values.pop(name) for name in tilt if name in values}
         place = {name: values.pop(name) for name in PLACEMENT if name in values}
         changed["camera_pose"] = replace(self.camera_pose, **tilted)

@@ -13,7 +13,13 @@ from cardbox_tracker.common.errors import BodyModelError, CardboxError, cut, quo
 from cardbox_tracker.common.files import atomic_path
 from cardbox_tracker.common.small_yaml import SmallYamlError, parse_small_yaml, read_small_text
 from cardbox_tracker.person.appearance import Appearance
-from cardbox_tracker.person.model import CONSTANTS, MEASURED, PROPORTIONS, BodyModel
+from cardbox_tracker.person.model import (
+    CAMERA_ROLL,
+    CONSTANTS,
+    MEASURED,
+    PROPORTIONS,
+    BodyModel,
+)
 from cardbox_tracker.person.sizes import SIZE_NAMES, SIZES
 
 FORMAT = "cardbox_body_model/1"
@@ -25,7 +31,7 @@ _APPEARANCE = "appearance"
 _SOURCE, _UNKNOWN = "source", "unknown"
 # A body that is measured while it is tracked live has these keys.
 _VERSION, _STAMP = "version", "stamp_ns"
-_OPTIONAL = (_APPEARANCE, _SOURCE, _UNKNOWN, _VERSION, _STAMP)
+_OPTIONAL = (_APPEARANCE, _SOURCE, _UNKNOWN, _VERSION, _STAMP, CAMERA_ROLL)
 _HEADERS = {
     MEASURED: "# A person measured by cardbox_tracker: what does not change while they are "
     "tracked.",
@@ -50,6 +56,9 @@ def dumps_body_model(model: BodyModel) -> str:
         lines += [f"{_VERSION}: {model.version}", f"{_STAMP}: {model.stamp_ns}"]
     for name, (_, _, _, meaning) in CONSTANTS.items():
         lines.append(f"{name}: {_yaml_number(model.constants[name])}  # {meaning}")
+    if model.camera_pose.roll_rad:
+        roll = _yaml_number(model.camera_pose.roll_rad)
+        lines.append(f"{CAMERA_ROLL}: {roll}  # how far the camera is turned clockwise")
     lines.append(f"side_turn: {model.side_turn}  # the way the person turned in the side reference")
     lines.append("sizes:")
     for size, value in zip(SIZES, model.sizes, strict=True):
@@ -151,6 +160,7 @@ def _from_mapping(data: object) -> BodyModel:
     return BodyModel.of(
         sizes=[_number(sizes[name], f"sizes.{name}") for name in SIZE_NAMES],  # type: ignore[arg-type]
         **{name: _number(data[name], name) for name in CONSTANTS},
+        **{name: _number(data[name], name) for name in (CAMERA_ROLL,) if name in data},
         side_turn=data["side_turn"],
         appearance=_appearance(data[_APPEARANCE]) if _APPEARANCE in data else None,
         source=data.get(_SOURCE, MEASURED),

@@ -12,6 +12,9 @@ where ``keypoints`` has them:
     torso_yaw -hip_flexion-> -hip_abduction-> -hip_rotation-> thigh -knee_flexion-> shank
     -(fixed)-> foot, where legs are measured
 
+If the height of the hips is known, so is the frame ``floor``, which is level below the camera, at
+the height of the feet of the person who was measured.
+
 The root ``camera_level`` follows REP-103: origin at the camera's centre, X forward (away from the
 camera), Y left, Z up, level even when the camera is pitched. The person faces the camera, so the
 hips are turned by half a turn; they stay where the person was measured. The visuals are the patches
@@ -41,7 +44,13 @@ from xml.etree import ElementTree as Xml
 import numpy as np
 
 from cardbox_tracker.person.hands import HANDS
-from cardbox_tracker.person.legs import LEGS
+from cardbox_tracker.person.legs import (
+    LEGS,
+    SHANK_SHARE,
+    THIGH_SHARE,
+    floor_m,
+    stature_of,
+)
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.parts import Part, body_parts
 from cardbox_tracker.person.posture import place_limits
@@ -85,8 +94,14 @@ def urdf_from_body(
     if optical_frame:
         # Optical axes in the axes of REP-103, then rotated down by the pitch about X.
         tilted = -math.pi / 2 - body.camera_pose.pitch_rad, 0.0, -math.pi / 2
+        if body.camera_pose.roll_rad:
+            # The reference frame has X and Y the other way round.
+            tilted = _rpy((_optical(body) * (-1.0, -1.0, 1.0)).T)
         robot.fix(f"{ROOT_LINK}_to_optical", ROOT_LINK, optical_frame, _ZERO, tilted)
     hips_m = body.placement.distance_m, 0.0, body.placement.hip_height_m
+    height_m = floor_m(body)
+    if height_m is not None:
+        robot.fix("camera_to_floor", ROOT_LINK, "floor", (0.0, 0.0, height_m), _ZERO)
     robot.fix("camera_to_hips", ROOT_LINK, "hips", hips_m, (0.0, 0.0, math.pi))
     more = *(HANDS if hands else ()), *(LEGS if legs else ())
     robot.add(body, (*SKELETON, *more), torso_place, "hips")
@@ -99,6 +114,11 @@ def urdf_from_body(
     for side in ("left", "right"):
         robot.show(f"{side}_upper_arm", side, parts.upper_arm)
         robot.show(f"{side}_forearm", side, parts.forearm)
+        for link, share in (("thigh", THIGH_SHARE), ("shank", SHANK_SHARE)):
+            if legs:
+                length_m = share * stature_of(parts)
+                width_m = parts.upper_arm.mean_width_m
+                robot.box(f"{side}_{link}", side, (width_m, width_m, length_m), -length_m / 2)
     return robot.text()
 
 
@@ -213,8 +233,17 @@ def _text(values: Iterable[float]) -> str:
 
 def _seen_from_camera(body: BodyModel) -> tuple[Vector, Vector]:
     """Return place and roll, pitch, yaw of the hips in the optical frame while d1 is 0."""
-    down = body.camera_pose.pitch_rad
-    # Columns: the body's X (to the camera), Y (to the right of the image) and Z (up).
+    rotation = _optical(body)
+    x, y, z = (rotation @ (-body.placement.distance_m, 0.0, body.placement.hip_height_m)).tolist()
+    return (x, y, z), _rpy(rotation)
+
+
+def _optical(body: BodyModel) -> FloatArray:
+    """Return the rotation (3, 3) from the reference frame into the optical frame.
+
+    Columns: the body's X (to the camera), Y (to the right of the image) and Z (up).
+    """
+    down, roll = body.camera_pose.pitch_rad, body.camera_pose.roll_rad
     rotation = np.array(
         [
             (0.0, 1.0, 0.0),
@@ -222,8 +251,8 @@ def _seen_from_camera(body: BodyModel) -> tuple[Vector, Vector]:
             (-math.cos(down), 0.0, -math.sin(down)),
         ]
     )
-    x, y, z = (rotation @ (-body.placement.distance_m, 0.0, body.placement.hip_height_m)).tolist()
-    return (x, y, z), _rpy(rotation)
+    c, s = math.cos(roll), math.sin(roll)
+    return np.array([(c, s, 0.0), (-s, c, 0.0), (0.0, 0.0, 1.0)]) @ rotation if roll else rotation
 
 
 def _rpy(rotation: FloatArray) -> Vector:

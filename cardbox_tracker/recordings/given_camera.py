@@ -48,6 +48,17 @@ class GivenCamera:
         """Whether field of view or calibration is given."""
         return self.fov_deg is not None or self.calibration is not None
 
+    @property
+    def stands_rad(self) -> float:
+        """Roll of the camera itself: a mirrored image of it seems to be turned the other way."""
+        return (self.roll_rad or 0.0) * (-1.0 if self.is_mirrored else 1.0)
+
+    def standing(self, roll_rad: float) -> GivenCamera:
+        """Return this camera with the roll of the camera itself, unless one is given."""
+        if self.roll_rad is not None or not roll_rad:
+            return self
+        return replace(self, roll_rad=-roll_rad if self.is_mirrored else roll_rad)
+
     def check(self) -> None:
         """Check what is given, as far as it can be without the images.
 

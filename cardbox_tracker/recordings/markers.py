@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from cardbox_tracker.camera.camera import Camera
+from cardbox_tracker.camera.camera import level_to_optical
 from cardbox_tracker.person.cardbox import PATCH_NAMES, patches_at
 from cardbox_tracker.person.kinematics import gaze_m, pose
 from cardbox_tracker.person.model import BodyModel
@@ -47,17 +47,16 @@ class MarkerShape(NamedTuple):
 
 
 def marker_shapes(
-    body: BodyModel,
-    camera: Camera,
-    posture: FloatArray,
-    neck: FloatArray | None = None,
+    body: BodyModel, posture: FloatArray, neck: FloatArray | None = None
 ) -> tuple[MarkerShape, MarkerShape]:
-    """Return the patches and the skeleton of ``body`` in a posture (12,) before ``camera``.
+    """Return the patches and the skeleton of ``body`` in a posture (12,) before its camera.
 
     If ``neck`` (2,), rad, is given, the skeleton has a line in the direction of the face.
     """
     frames = pose(body, posture)
-    corners = camera.reference_to_optical(patches_at(body, frames))
+    tilt = body.camera_pose
+    to_optical = level_to_optical(tilt.pitch_rad, tilt.roll_rad).T
+    corners = patches_at(body, frames) @ to_optical
     colors = [
         color
         for name in PATCH_NAMES
@@ -78,7 +77,7 @@ def marker_shapes(
         ),
         MarkerShape(
             *("skeleton", LINE_LIST, _SKELETON_WIDTH_M),
-            camera.reference_to_optical(np.array(bones)).reshape(-1, 3),
+            (np.array(bones) @ to_optical).reshape(-1, 3),
             _SKELETON_RGBA,
         ),
     )

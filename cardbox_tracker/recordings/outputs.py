@@ -300,7 +300,7 @@ def _markers(estimate: Estimate, tracker: Tracker) -> Markers | None:
     if estimate.posture is None:
         return None
     body = estimate.placed(tracker.body)
-    return Markers(marker_shapes(body, tracker.camera, estimate.posture, estimate.neck))
+    return Markers(marker_shapes(body, estimate.posture, estimate.neck))
 
 
 def outputs(torso_place: bool = True, hands: bool = True) -> tuple[Output, ...]:
@@ -364,6 +364,7 @@ class OutputStream:
     ) -> Iterator[tuple[Output, Value]]:
         """Yield the values to send for the image of a stamp; only ``wanted`` ones are computed."""
         is_new, self._state = estimate.state != self._state, estimate.state
+        estimate = estimate.as_camera_stands(tracker.body.camera_pose.roll_rad)
         velocities = self._motion.velocities(stamp_ns, estimate, tracker)
         for output in self._topics:
             has_value = estimate.posture is not None or not output.needs_posture

@@ -1,57 +1,315 @@
-"""Read a bag of results from ``cardbox track --bag`` or from running nodes."""
+"""Reads results: tables of ``cardbox track``, and bags of the same or of running nodes.
+
+All that use results read them here, so that the same files are accepted and refused by all.
+"""
 
 from __future__ import annotations
 
+import csv
+import io
+from collections import Counter
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
+from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
-from cardbox_tracker.common.errors import BagError
+from cardbox_tracker.common.errors import BagError, CardboxError, quoted
+from cardbox_tracker.common.files import (
+    UnreadableFileError,
+    body_beside,
+    body_of_person,
+    regular_file,
+)
+from cardbox_tracker.person.hands import HAND_NAMES, HAND_OPEN_NAMES
 from cardbox_tracker.person.model import BodyModel
-from cardbox_tracker.person.model_file import loads_body_model
+from cardbox_tracker.person.model_file import load_body_model, loads_body_model
 from cardbox_tracker.person.sizes import FloatArray
+from cardbox_tracker.person.skeleton import JOINT_NAMES, NECK_NAMES, PLACE_NAMES, KeypointState
 from cardbox_tracker.recordings.bag_reader import BagReader, stamp_ns_of
+from cardbox_tracker.recordings.open_images import is_bag
 from cardbox_tracker.recordings.outputs import (
     JointValues,
-    neck_from,
-    open_hands_from,
     person_space,
-    place_from,
+    positions_of,
     posture_from,
 )
-from cardbox_tracker.tracking.estimate import NO_PERSON, TRACKING, UNCERTAIN
+from cardbox_tracker.recordings.result_table import (
+    PARQUET,
+    PERSON,
+    POINT_COLUMNS,
+    deviation_columns,
+    pyarrow_or_error,
+    text_columns,
+    units,
+)
+from cardbox_tracker.tracking.estimate import LOST, NO_PERSON, TRACKING, UNCERTAIN
 
 MODEL = "/body_model"
 _STATE, _JOINTS, _STDDEV = "/tracking_state", "/joint_states", "/joint_states_stddev"
 _KEYPOINTS, _HANDS = "/keypoints", "/hands"
 
+_SEEN, _GAPS = (TRACKING, UNCERTAIN), (LOST, NO_PERSON)
+_KEYPOINT_STATES = frozenset(map(str, KeypointState))
+_TIMES = ("stamp_ns", "time_s", "state")
+_POSTURE = (*JOINT_NAMES, *PLACE_NAMES)
+_NEEDED = (*_TIMES, *_POSTURE, *POINT_COLUMNS)
+# All lengths, angles and numbers of pixels are far below.
+_MOST = 1e6
+# A day at 30 Hz has 2.6 million images.
+_MOST_ROWS, _MOST_BYTES = 3_000_000, 4 * 1024**3
+# Rows that are read at once.
+_BATCH = 10_000
+_LATEST_NS = np.iinfo(np.int64).max
+
 
 @dataclass(frozen=True)
-class Result:
-    """The tracker's result for one image.
+class Results:
+    """Results of n images in order of time; those of a gap, without a posture, are nan.
 
     Attributes:
-        stamp_ns: stamp of the image.
-        state: tracking state.
-        body: the measured person; None before it was published.
-        posture: d1..d12, rad and metres, and the neck if the bag has it, (12,) or (14,); None if
-            there is no estimate.
-        stddev: standard deviations, without the neck where it is not known, (12,) or (14,); None
-            if they are not known.
-        place_m: ``torso_x`` and ``torso_z``, (2,); None if the bag has none.
-        keypoints_m: (n, 3), metres in the optical frame of the first camera; None without any.
-        hands_open: how open both hands are, (2,), nan for one that is not known; None without any.
+        path: table or bag.
+        stamp_ns: stamps of the images, (n,), rising.
+        time_s: seconds from the start of the recording, (n,).
+        state: tracking state of each image, n texts.
+        numbers: values (n,) by the names of the columns of a table (``docs/results.md``), in their
+            units; nan where they are unknown.
+        texts: the same for columns of texts, such as the states of keypoints.
+        bodies: the person as of each image; None where it is not known.
     """
 
-    stamp_ns: int
-    state: str
-    body: BodyModel | None = None
-    posture: FloatArray | None = None
-    stddev: FloatArray | None = None
-    place_m: FloatArray | None = None
-    keypoints_m: FloatArray | None = None
-    hands_open: FloatArray | None = None
+    path: Path
+    stamp_ns: NDArray[np.int64]
+    time_s: FloatArray
+    state: tuple[str, ...]
+    numbers: Mapping[str, FloatArray]
+    texts: Mapping[str, tuple[str, ...]]
+    bodies: tuple[BodyModel | None, ...]
+
+    @property
+    def body(self) -> BodyModel | None:
+        """The person as of most images with a posture; None if not known.
+
+        A running tracker may get another body from the initializer.
+        """
+        pairs = zip(self.bodies, self.state, strict=True)
+        known = {id(body): body for body in self.bodies}
+        counts = Counter(id(body) for body, state in pairs if body and state in _SEEN)
+        return known[counts.most_common(1)[0][0]] if counts else None
+
+    def of(self, names: Sequence[str]) -> FloatArray:
+        """Return the values (n, number of names) of columns; nan for those that are missing."""
+        nothing = np.full(len(self.state), np.nan)
+        columns = [self.numbers.get(name, nothing) for name in names]
+        return np.stack(columns, axis=1) if columns else np.zeros((len(self.state), 0))
+
+    def deviations_of(self, joints: Sequence[str]) -> FloatArray:
+        """Return the standard deviations (n, number of joints), rad and metres; nan if unknown."""
+        return self.of(deviation_columns(joints))
+
+    def texts_of(self, name: str) -> tuple[str, ...]:
+        """Return the texts (n) of a column; empty ones if it is missing."""
+        return self.texts.get(name, ("",) * len(self.state))
+
+
+class _Rows:
+    """Checks the values of image after image, and collects them."""
+
+    def __init__(self, path: Path, names: Iterable[str], needed: Sequence[str]) -> None:
+        found = set(names)
+        self._path = path
+        known = [name for name in units(*[True] * 4) if name in found and name not in _TIMES]
+        texts = set(text_columns())
+        self.names = [name for name in known if name not in (*texts, PERSON, "stamp")]
+        self._texts = [name for name in known if name in texts]
+        self._is_deviation = np.array(["_stddev_" in name for name in self.names])
+        self._is_needed = np.array([name in needed for name in self.names])
+        self._times: list[tuple[int, float, str]] = []
+        self._blocks: list[FloatArray] = []
+        self._rows: list[FloatArray] = []
+        self._found_texts: dict[str, list[str]] = {name: [] for name in self._texts}
+
+    def add(self, row: Mapping[str, Any]) -> None:
+        """Take the values of an image by name, as numbers or texts; None and "" are unknown.
+
+        Raises:
+            ValueError: a value is not that of a result; the text names it.
+        """
+        stamp_ns = _number(row, "stamp_ns", int)
+        time_s, state = _number(row, "time_s"), str(row["state"])
+        if state not in (*_SEEN, *_GAPS):
+            raise ValueError(f"the state is {quoted(state)}")
+        if not 0 <= stamp_ns <= _LATEST_NS:
+            raise ValueError(f"the stamp is {quoted(stamp_ns)} ns")
+        if not abs(time_s) < _MOST**2:
+            raise ValueError(f"the time is {time_s} s")
+        if self._times and not (stamp_ns > self._times[-1][0] and time_s >= self._times[-1][1]):
+            raise ValueError(
+                f"the stamp {stamp_ns} ns is not after that of the image before, "
+                f"{self._times[-1][0]} ns, so the images are not in order of time"
+            )
+        is_seen = state in _SEEN
+        self._rows.append(self._numbers(row) if is_seen else np.full(len(self.names), np.nan))
+        for name in self._texts:
+            text = str(row[name] or "") if is_seen else ""
+            if text and name.endswith("_state") and text not in _KEYPOINT_STATES:
+                raise ValueError(f"{name} is {quoted(text)}")
+            self._found_texts[name].append(text)
+        self._times.append((stamp_ns, time_s, state))
+        if len(self._rows) == _BATCH:
+            self._pack()
+
+    def _numbers(self, row: Mapping[str, Any]) -> FloatArray:
+        cells = [row[name] for name in self.names]
+        is_empty = np.array([cell is None or cell == "" for cell in cells], bool)
+        try:
+            values = np.array([float(cell or 0) for cell in cells])
+        except (TypeError, ValueError):
+            cells = ["0" if empty else cell for empty, cell in zip(is_empty, cells, strict=True)]
+            known = dict(zip(self.names, cells, strict=True))
+            values = np.array([_number(known, name) for name in self.names])
+        # A comparison with nan is false.
+        is_wrong = ~(np.abs(values) < _MOST) | (self._is_deviation & (values < 0.0))
+        is_wrong |= is_empty & self._is_needed
+        if is_wrong.any():
+            wrong = int(np.argmax(is_wrong))
+            raise ValueError(f"{self.names[wrong]} is {quoted(str(row[self.names[wrong]]))}")
+        values[is_empty] = np.nan
+        return values
+
+    def _pack(self) -> None:
+        if self._rows:
+            self._blocks.append(np.array(self._rows, float))
+        self._rows = []
+
+    def results(self, bodies: Sequence[BodyModel | None]) -> Results:
+        """Return what was taken."""
+        self._pack()
+        nothing = np.zeros((0, len(self.names)))
+        values = np.concatenate([nothing, *self._blocks])
+        stamps, times, states = zip(*self._times, strict=True) if self._times else ((), (), ())
+        return Results(
+            self._path,
+            np.array(stamps, np.int64),
+            np.array(times, float),
+            states,
+            dict(zip(self.names, values.T, strict=True)),
+            {name: tuple(texts) for name, texts in self._found_texts.items()},
+            tuple(bodies),
+        )
+
+
+def _number(row: Mapping[str, Any], name: str, kind: Callable[[Any], Any] = float) -> Any:
+    try:
+        return kind(row[name])
+    except (TypeError, ValueError, OverflowError):
+        raise ValueError(f"{name} is {quoted(str(row[name]))}") from None
+
+
+def read_results(path: Path, person: int | None = None) -> Results:
+    """Return the results in a table or a bag, and the body with which they were tracked.
+
+    That of a table is in the file OUT.body.yaml beside it.
+
+    Args:
+        path: table of ``cardbox track``, or bag of ``cardbox track --bag`` or of nodes.
+        person: number of one of several people; without it, the first one counts.
+
+    Raises:
+        CardboxError: the file cannot be read, or contains what no result is; the text names the
+            line.
+    """
+    if not path.exists():
+        raise CardboxError(
+            f"there are no results {path}; give a table or a bag that 'cardbox track' has written"
+        )
+    if is_bag(path):
+        with BagReader(path) as bag:
+            return results_in(bag, person)
+    if not path.is_file():
+        raise CardboxError(f"{path} is no table and no bag; give the results of 'cardbox track'")
+    found: _Rows | None = None
+    cells = _parquet_cells(path) if path.suffix == PARQUET else _csv_cells(path)
+    for line, row in cells:
+        if person is not None and PERSON not in row:
+            raise CardboxError(f"{path} has no column {PERSON}: it is of one person")
+        try:
+            if PERSON in row and _number(row, PERSON, int) != (person or 1):
+                continue
+            found = found or _Rows(path, row, _NEEDED)
+            found.add(row)
+        except ValueError as error:
+            raise CardboxError(
+                f"{path}, {line}: {error}; give the table as 'cardbox track' wrote it "
+                "(docs/results.md)"
+            ) from None
+    if found is None:
+        text = "image" if person is None else f"person {person}"
+        raise CardboxError(f"{path} has no {text}; give the table of a recording with one")
+    beside = body_of_person(body_beside(path), person or 1)
+    body = load_body_model(beside) if beside.is_file() else None
+    results = found.results(())
+    return replace(results, bodies=(body,) * len(results.state))
+
+
+def _csv_cells(path: Path) -> Iterator[tuple[str, Mapping[str, Any]]]:
+    """Yield each row of a CSV table, and where it is."""
+    try:
+        # Spreadsheets begin a file with a byte order mark.
+        with (
+            regular_file(path, _MOST_BYTES) as data,
+            io.TextIOWrapper(data, newline="", encoding="utf-8-sig") as file,
+        ):
+            rows = csv.DictReader(file)
+            _check(path, rows.fieldnames or ())
+            for row in rows:
+                yield f"line {rows.line_num}", row
+    except UnreadableFileError as error:
+        raise CardboxError(f"cannot read {path}: {error}; give a table or a bag") from None
+    except OSError as error:
+        raise CardboxError(f"cannot read {path}: {error.strerror}") from None
+    except (UnicodeDecodeError, csv.Error) as error:
+        raise CardboxError(
+            f"{path} is not a table in UTF-8 ({quoted(str(error))}); give a table or a bag that "
+            "'cardbox track' has written"
+        ) from None
+
+
+def _parquet_cells(path: Path) -> Iterator[tuple[str, Mapping[str, Any]]]:
+    """Yield each row of a Parquet table, and where it is."""
+    arrow, parquet = pyarrow_or_error()
+    try:
+        with parquet.ParquetFile(path) as file:
+            rows, names = file.metadata.num_rows, file.schema_arrow.names
+            # A small file can claim any number of equal rows.
+            if rows > _MOST_ROWS:
+                raise CardboxError(
+                    f"{path} has {rows} images, expected at most {_MOST_ROWS}; give a table that "
+                    "'cardbox track' wrote"
+                )
+            _check(path, names)
+            number = 0
+            for batch in file.iter_batches(_BATCH, columns=list(names)):
+                for row in batch.to_pylist():
+                    number += 1
+                    yield f"row {number}", row
+    except (OSError, arrow.ArrowException) as error:
+        raise CardboxError(
+            f"cannot read {path}: {quoted(str(error))}; give a table that 'cardbox track' wrote"
+        ) from None
+
+
+def _check(path: Path, names: Sequence[str]) -> None:
+    for name in _NEEDED:
+        if names.count(name) != 1:
+            problem = "several columns" if name in names else "no column"
+            raise CardboxError(
+                f"{path} has {problem} {name}; give the table as 'cardbox track' wrote it "
+                "(docs/results.md)"
+            )
 
 
 def has_results(bag: BagReader) -> bool:
@@ -95,63 +353,74 @@ def points_of(message: Any) -> FloatArray:
     return np.array(points, np.float64).reshape(-1, 3)
 
 
-def read_results(bag: BagReader, person: int | None = None) -> list[Result]:
-    """Return the results of the images in order of their stamps; the last one of each stamp.
-
-    ``person`` is as in :func:`namespace_of`.
+def results_in(bag: BagReader, person: int | None = None) -> Results:
+    """Return the results in an open bag, the last one of each stamp; see :func:`read_results`.
 
     Raises:
         BagError: the bag has no results of the tracker, or is damaged.
     """
     space = namespace_of(bag, person)
     topics = [space + name for name in (MODEL, _STATE, _JOINTS, _STDDEV, _KEYPOINTS, _HANDS)]
-    found = _Results()
+    found = _Messages()
     for message in bag.messages([topic for topic in topics if topic in bag.topics]):
         content = bag.deserialize(message)
+        damaged = partial(_damaged, f"{message.topic} of {bag.path}")
         try:
             found.take(message.topic.removeprefix(space), message.time_ns, content)
         except (AttributeError, TypeError, ValueError) as error:
             # The message type is defined by the recording and may lack fields.
-            where = f"{message.topic} of {bag.path}"
-            raise BagError(f"{where} has a damaged message: {error}; record it again") from None
-    return [one for _, one in sorted(found.by_stamp.items())]
+            raise damaged(error) from None
+    rows = _Rows(bag.path, {name for row in found.by_stamp.values() for name in row}, JOINT_NAMES)
+    every = dict.fromkeys(rows.names)
+    bodies = []
+    for number, (stamp_ns, row) in enumerate(sorted(found.by_stamp.items()), 1):
+        time_s = (stamp_ns - min(found.by_stamp)) / 1e9
+        bodies.append(row.pop("body"))
+        try:
+            rows.add({**every, **row, "stamp_ns": stamp_ns, "time_s": time_s})
+        except ValueError as error:
+            raise _damaged(f"image {number} of {bag.path}", error) from None
+    return rows.results(bodies)
 
 
-class _Results:
+def _damaged(where: str, error: Exception) -> BagError:
+    return BagError(f"{where} has a damaged message: {error}; record it again")
+
+
+class _Messages:
     """Joins the messages of each image, of which joints, deviations and points have its stamp."""
 
     def __init__(self) -> None:
         self._state = NO_PERSON
         self._body: BodyModel | None = None
-        self.by_stamp: dict[int, Result] = {}
+        self.by_stamp: dict[int, dict[str, Any]] = {}
 
     def take(self, name: str, time_ns: int, message: Any) -> None:
         if name == MODEL:
             self._body = loads_body_model(str(message.data), source=name)
         elif name == _STATE:
             self._state = str(message.data)
-            if self._state not in (TRACKING, UNCERTAIN):
-                self.by_stamp[time_ns] = Result(time_ns, self._state, self._body)
+            if self._state not in _SEEN:
+                self.by_stamp[time_ns] = {"state": self._state, "body": self._body}
         elif name == _JOINTS:
-            stamp_ns, joints = stamp_ns_of(message), joints_of(message)
-            self.by_stamp[stamp_ns] = Result(
-                stamp_ns,
-                self._state,
-                self._body,
-                _with_neck(joints),
-                place_m=place_from(joints),
-            )
+            joints = joints_of(message)
+            posture_from(joints)
+            row: dict[str, Any] = {"state": self._state, "body": self._body}
+            # A node without the place of the torso keeps it constant.
+            row |= dict.fromkeys(PLACE_NAMES, 0.0) | positions_of(joints)
+            self.by_stamp[stamp_ns_of(message)] = row
         elif (found := self.by_stamp.get(stamp_ns_of(message))) is not None:
             if name == _KEYPOINTS:
-                found = replace(found, keypoints_m=points_of(message))
+                points_m = points_of(message).ravel().tolist()
+                if len(points_m) != len(POINT_COLUMNS):
+                    raise ValueError(f"{len(points_m) // 3} keypoints")
+                found |= zip(POINT_COLUMNS, points_m, strict=True)
             elif name == _HANDS:
-                found = replace(found, hands_open=open_hands_from(joints_of(message)))
+                values = positions_of(joints_of(message))
+                found |= {name: values[name] for name in HAND_OPEN_NAMES if name in values}
             else:
-                found = replace(found, stddev=_with_neck(joints_of(message)))
-            self.by_stamp[found.stamp_ns] = found
-
-
-def _with_neck(joints: JointValues) -> FloatArray:
-    """Return the joints of the posture, and of the neck if they are there, (12,) or (14,)."""
-    posture, neck = posture_from(joints), neck_from(joints)
-    return posture if neck is None else np.concatenate([posture, neck])
+                values = positions_of(joints_of(message))
+                found |= zip(deviation_columns(values), values.values(), strict=True)
+                # Joints that are not known have a position, but no deviation.
+                for joint in {*NECK_NAMES, *HAND_NAMES} - values.keys():
+                    found.pop(joint, None)

@@ -54,7 +54,11 @@ POINT_COLUMNS = tuple(f"{name}_{axis}" for name in KEYPOINT_NAMES for axis in "x
 
 
 _SIDES = "left", "right"
+PALM_COLUMNS = tuple(f"{side}_palm_{axis}" for side in _SIDES for axis in "xyz")
+"""Columns of the normals out of the palms, in the optical frame of the first camera."""
 _WRIST = "wrist_flexion", "wrist_deviation", "forearm_rotation"
+WRIST_COLUMNS = tuple(f"{side}_{name}" for side in _SIDES for name in _WRIST)
+"""Columns of flexion, deviation and rotation of the forearm of both hands, rad."""
 _HAND = {"hand_open": "", **dict.fromkeys(("palm_x", "palm_y", "palm_z"), "")} | dict.fromkeys(
     _WRIST, "rad"
 )
@@ -120,7 +124,7 @@ LEG_POINT_COLUMNS = tuple(f"{name}_{axis}" for name in LEG_KEYPOINT_NAMES for ax
 def _leg_units() -> dict[str, str]:
     return {
         **dict.fromkeys(LEG_NAMES, "rad"),
-        **dict.fromkeys((f"{name}_stddev_rad" for name in LEG_NAMES), "rad"),
+        **_deviation_units(LEG_NAMES),
         **dict.fromkeys(LEG_POINT_COLUMNS, "m"),
         **{f"{name}_state": "" for name in LEG_KEYPOINT_NAMES},
         **{f"{name}_stddev_m": "m" for name in LEG_KEYPOINT_NAMES},
@@ -132,7 +136,19 @@ def _units(joints: Iterable[str]) -> dict[str, str]:
 
 
 def _deviation_units(joints: Iterable[str]) -> dict[str, str]:
-    return {f"{name}_stddev_{UNITS[name]}": UNITS[name] for name in joints}
+    known = {name: UNITS.get(name, "rad") for name in joints}
+    return {f"{name}_stddev_{unit}": unit for name, unit in known.items()}
+
+
+def deviation_columns(joints: Iterable[str]) -> list[str]:
+    """Return the columns of the standard deviations of joints."""
+    return list(_deviation_units(joints))
+
+
+def text_columns() -> tuple[str, ...]:
+    """Return the columns of texts."""
+    keypoints = (f"{name}_state" for name in (*KEYPOINT_NAMES, *LEG_KEYPOINT_NAMES))
+    return ("state", *keypoints, "place_state", "place_rests_on")
 
 
 def row_of(
@@ -238,10 +254,8 @@ def result_table(
             yield lambda frame, estimate: rows.append(
                 row_of(frame.stamp_ns, frame.time_s, estimate, *has)
             )
-            keypoints = (f"{name}_state" for name in (*KEYPOINT_NAMES, *LEG_KEYPOINT_NAMES))
-            texts = ("state", *keypoints, "place_state", "place_rests_on")
             whole = dict.fromkeys(("stamp_ns", PERSON), arrow.int64())
-            types = whole | dict.fromkeys(texts, arrow.string())
+            types = whole | dict.fromkeys(text_columns(), arrow.string())
             schema = arrow.schema(
                 arrow.field(name, types.get(name, arrow.float64()), metadata={"unit": unit})
                 for name, unit in units(*has).items()

@@ -167,7 +167,8 @@ def track_recording(
                     leg_reader = leg_readers.setdefault(estimate.person, LegReader())
                     estimate = leg_reader.see(points, estimate, *person, time_s)
                 if add_row is not None:
-                    add_row(taken.first, estimate)
+                    roll_rad = tracker.body.camera_pose.roll_rad
+                    add_row(taken.first, estimate.as_camera_stands(roll_rad))
                 for observe in observers:
                     observe(taken.first, estimate, tracker)
                 if tracker.agreement is not None and tracker.agreement.is_due:

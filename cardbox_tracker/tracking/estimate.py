@@ -8,11 +8,12 @@ foreground pixels for a person). Only ``tracking`` and ``uncertain`` have a post
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
 
+from cardbox_tracker.camera.camera import roll_turn
 from cardbox_tracker.person.hands import limited
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.sizes import FloatArray
@@ -163,6 +164,22 @@ class Estimate:
     person_chance: float | None = None
     hands: tuple[Hand | None, Hand | None] | None = None
     legs: Legs | None = None
+
+    def as_camera_stands(self, roll_rad: float) -> Estimate:
+        """Return the estimate in the optical frame of a camera that is rolled.
+
+        The points of the tracker are those in images that are turned upright.
+        """
+        if not roll_rad or self.keypoints_m is None:
+            return self
+        turn = roll_turn(roll_rad)
+        hands, legs = self.hands, self.legs
+        if hands is not None:
+            left, right = (one and one._replace(palm=one.palm @ turn) for one in hands)
+            hands = left, right
+        if legs is not None:
+            legs = legs._replace(points_m=legs.points_m @ turn)
+        return replace(self, keypoints_m=self.keypoints_m @ turn, hands=hands, legs=legs)
 
     def placed(self, body: BodyModel) -> BodyModel:
         """Return ``body`` at the place of this estimate."""

@@ -142,7 +142,9 @@ def film_figures(
         estimates: one for each image of the film.
         body: the body at the end.
     """
-    by_stamp = dict(zip(film.stamps_ns, estimates, strict=True))
+    roll_rad = 0.0 if body is None else body.camera_pose.roll_rad
+    standing = [estimate.as_camera_stands(roll_rad) for estimate in estimates]
+    by_stamp = dict(zip(film.stamps_ns, standing, strict=True))
     # The time of an image is not measured.
     run = run_of(film.session, body, "", by_stamp, [float("nan")])
     every = people_figures(film.session, run)

@@ -10,7 +10,7 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -154,6 +154,11 @@ def test_workers_with_several_threads_are_refused() -> None:
         pass
 
 
+def files_of(names: Iterable[str]) -> set[str]:
+    """Return the files of recordings that are done: a table and a body each."""
+    return {SUMMARY, *(f"{name}{end}" for name in names for end in (".csv", ".body.yaml"))}
+
+
 class Tracked:
     """Stands for the tracking of a recording: it writes the table and notes the name.
 
@@ -209,7 +214,7 @@ def track(files: Path, tmp_path: Path, cardbox: Callable, tracked: Tracked) -> C
 def test_finished_recordings_are_not_done_again(track: Callable, tmp_path: Path) -> None:
     assert track() == ["a", "b", "c"]
     before = results(tmp_path / "out")
-    assert sorted(before) == [SUMMARY, "a.csv", "b.csv", "c.csv"]
+    assert before.keys() == files_of("abc")
     assert track() == []
     assert "3 of 3 recordings are finished" in track.done.out
     assert results(tmp_path / "out") == before
@@ -224,7 +229,7 @@ def test_changes_are_done_again(track: Callable, tmp_path: Path) -> None:
     assert (out / "a.csv").read_text() == "a with effort 2.0"
     assert track("--effort=2", "--formats", "csv", "mp4") == ["a", "b", "c"]
     assert track() == ["a", "b", "c"]
-    assert sorted(results(out)) == [SUMMARY, "a.csv", "b.csv", "c.csv"]
+    assert results(out).keys() == files_of("abc")
     (films / "b.mp4").write_text("longer")
     assert track() == ["b"]
     (films / "c.options").write_text("--effort 0.5")
@@ -254,7 +259,7 @@ def test_a_failure_is_named_and_tried_again(
     assert "  b: unexpected ZeroDivisionError: by zero; 'cardbox track'" in track.done.err
     assert "c: a remark\n" in track.done.err
     # Results of other settings would be taken for those of this run.
-    assert sorted(results(tmp_path / "out")) == [SUMMARY, "c.csv"]
+    assert results(tmp_path / "out").keys() == files_of("c")
     tracked.errors = {}
     assert track("--effort=2") == ["a", "b"]
 
@@ -301,7 +306,7 @@ def test_an_interrupted_run_leaves_nothing_half_done(
     tracked.errors = {"b": KeyboardInterrupt()}
     track(code=130)
     done = sorted(set(tracked.names) - {"b"})
-    assert sorted(results(tmp_path / "out")) == [SUMMARY, *(f"{name}.csv" for name in done)]
+    assert results(tmp_path / "out").keys() == files_of(done)
     assert sorted(rows(tmp_path / "out")) == done
     tracked.errors = {}
     assert track() == sorted({"a", "b", "c"} - set(done))
@@ -318,7 +323,7 @@ def test_a_published_result_has_its_row_after_ctrl_c(
 
     monkeypatch.setattr(track_folder, "_publish", interrupted)
     (first,) = track(code=130)
-    assert sorted(results(tmp_path / "out")) == [SUMMARY, f"{first}.csv"]
+    assert results(tmp_path / "out").keys() == files_of(first)
     assert list(rows(tmp_path / "out")) == [first]
 
 
@@ -352,7 +357,7 @@ def test_the_person_may_be_in_the_files_alone(
     done = cardbox("track", tmp_path, "--fov=60", "--output", tmp_path / "out", "--jobs=1")
     assert (done.code, tracked.names) == (1, ["a"])
     assert f"  b: {tmp_path / 'b.mp4'} needs --stature M or --model FILE" in done.err
-    assert sorted(results(tmp_path / "out")) == [SUMMARY, "a.body.yaml", "a.csv"]
+    assert results(tmp_path / "out").keys() == files_of("a")
 
 
 def test_ctrl_c_ends_all_processes_without_a_traceback(files: Path, tmp_path: Path) -> None:
@@ -377,7 +382,7 @@ def test_ctrl_c_ends_all_processes_without_a_traceback(files: Path, tmp_path: Pa
     # Finished results are whole, and nothing else is left.
     done = rows(out)
     assert 1 <= len(done) < 8
-    assert sorted(results(out)) == [*(f"{name}.csv" for name in sorted(done)), SUMMARY]
+    assert results(out).keys() == files_of(done)
 
 
 def test_results_of_a_name_too_long_for_a_file_are_not_there(tmp_path: Path) -> None:

@@ -15,7 +15,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from cardbox_tracker.camera.camera import Camera
+from cardbox_tracker.camera.camera import Camera, roll_turn
 from cardbox_tracker.commands.main import main
 from cardbox_tracker.common.compiling import kernel
 from cardbox_tracker.person.kinematics import clavicles, gaze_m, keypoints, pose
@@ -132,12 +132,21 @@ def somebody(share: np.ndarray, pitch_rad: float) -> BodyModel:
 
 
 @settings(max_examples=60, deadline=None)
-@given(bodies, states, st.floats(-1.0, 1.0), st.sampled_from(["default", "paper"]), st.booleans())
+@given(
+    *(bodies, states, st.floats(-1.0, 1.0), st.sampled_from([0.0, 0.3, -1.6])),
+    *(st.sampled_from(["default", "paper"]), st.booleans()),
+)
 def test_urdf_and_joint_states_have_the_joints_where_keypoints_are(
-    sizes: np.ndarray, share: np.ndarray, pitch_rad: float, preset: str, is_rep155: bool
+    sizes: np.ndarray,
+    share: np.ndarray,
+    pitch_rad: float,
+    roll_rad: float,
+    preset: str,
+    is_rep155: bool,
 ) -> None:
     """For anybody in any posture; what a tracker publishes, without its search."""
     body = PRESETS[preset]().with_shoulders(somebody(sizes, pitch_rad))
+    body = body.with_values(camera_roll_rad=roll_rad)
     low, high = state_limits(body.placement.distance_m).T
     state = low + share * (high - low)
     posture, place = np.split(state, [N_JOINTS])
@@ -160,7 +169,7 @@ def test_urdf_and_joint_states_have_the_joints_where_keypoints_are(
         poses = link_poses(urdf_from_body(body, "eye"), positions_of(said))
         links = list(KEYPOINT_LINKS)
     to_eye = np.linalg.inv(poses["eye"])
-    for point, link in zip(keypoints_m, links, strict=True):
+    for point, link in zip(keypoints_m @ roll_turn(roll_rad), links, strict=True):
         at = to_eye @ poses[link][:, 3]
         # An angle of REP-155 that means nothing is left as it was.
         np.testing.assert_allclose(at[:3], point, atol=1e-3 if is_rep155 else 1e-9, err_msg=link)
@@ -242,6 +251,14 @@ def test_optical_frame_is_pitched_as_the_body_model_says() -> None:
         np.testing.assert_allclose(
             poses["cam_optical"][:3, :3] @ optical, TO_ROOT @ point, atol=1e-9
         )
+
+
+def test_the_floor_is_where_the_measured_person_stands() -> None:
+    """By hand: hips 0.4 m below the camera, on legs of 53 % of a stature of 1.72 m."""
+    poses = link_poses(urdf_from_body(BodyModel.of(hip_height_m=-0.4)), dict.fromkeys(ALL_NAMES, 0))
+    np.testing.assert_allclose(poses["floor"][:3, 3], (0.0, 0.0, -0.4 - 0.53 * 1.72), atol=1e-9)
+    np.testing.assert_array_equal(poses["floor"][:3, :3], np.eye(3))
+    assert "floor" not in urdf_from_body(BodyModel.of(unknown=("hip_height_m",)))
 
 
 def test_movable_joints_are_those_of_the_joint_state_with_limits() -> None:

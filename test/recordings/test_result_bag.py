@@ -16,7 +16,7 @@ from cardbox_tracker.common.errors import BagError
 from cardbox_tracker.recordings.bag_reader import BagReader
 from cardbox_tracker.recordings.recording import Recording
 from cardbox_tracker.recordings.result_bag import result_bag
-from cardbox_tracker.recordings.result_reader import namespace_of, read_results
+from cardbox_tracker.recordings.result_reader import namespace_of, results_in
 from cardbox_tracker.recordings.silhouettes import SilhouetteSource
 from cardbox_tracker.recordings.track import TrackSummary, track_recording
 from cardbox_tracker.search.config import default_preset
@@ -159,6 +159,6 @@ def test_several_people_have_a_namespace_each(
         silhouettes = list(bag.messages(["/silhouette"]))
         assert len(silhouettes) == len(frames)
         assert namespace_of(bag) == "/person_1" and namespace_of(bag, 2) == "/person_2"
-        assert len(read_results(bag, 2)) == len(frames)
+        assert len(results_in(bag, 2).state) == len(frames)
         with pytest.raises(BagError, match="has no results of person 3"):
             namespace_of(bag, 3)

@@ -15,7 +15,6 @@ import numpy as np
 import pytest
 import yaml
 
-from cardbox_tracker.applications.exporting.motion_reader import read_motion
 from cardbox_tracker.applications.retargeting.joint_map import load_joint_map
 from cardbox_tracker.applications.retargeting.robot import load_robot
 from cardbox_tracker.applications.simulation.session import SessionFormat, synthesize_session
@@ -26,6 +25,7 @@ from cardbox_tracker.common.errors import CardboxError
 from cardbox_tracker.detectors.point_table import PointTable
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.model_file import dumps_body_model, load_body_model
+from cardbox_tracker.recordings.result_reader import read_results
 from cardbox_tracker.recordings.result_table import result_table
 from cardbox_tracker.recordings.silhouettes import RecordedFrame
 from cardbox_tracker.recordings.truth import load_ground_truth
@@ -173,7 +173,7 @@ def tables(tmp_path: Path) -> dict[str, tuple[Callable[[Path], Any], list[list[s
         results = list(csv.reader(file))
     points = [["stamp_ns", "joint", "u", "v", "score"], ["1", "nose", "3", "4", "0.5"]]
     return {
-        "results": (read_motion, results),
+        "results": (read_results, results),
         "points": (lambda path: PointTable(path).read(None, SIZE), points),
     }
 
@@ -203,7 +203,7 @@ def test_no_export_has_a_time_that_is_no_number(time_s: str, tables: Any, tmp_pa
     with path.open("w", newline="") as file:
         csv.writer(file).writerows(rows)
     with pytest.raises(CardboxError, match="the time is"):
-        read_motion(path)
+        read_results(path)
 
 
 @pytest.mark.promise(PROMISE)

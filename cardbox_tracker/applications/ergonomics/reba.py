@@ -19,9 +19,7 @@ heels.
 
 from __future__ import annotations
 
-import csv
-import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import NamedTuple
 
@@ -47,7 +45,6 @@ from cardbox_tracker.applications.ergonomics.rula import (
     wrist_scores,
 )
 from cardbox_tracker.common.errors import CardboxError
-from cardbox_tracker.common.files import UnreadableFileError, regular_file
 from cardbox_tracker.person.hands import WRIST_NAMES
 from cardbox_tracker.person.legs import (
     LEG_KEYPOINT_NAMES,
@@ -58,12 +55,12 @@ from cardbox_tracker.person.posture import LEFT_ARM, PITCH, RIGHT_ARM
 from cardbox_tracker.person.sizes import FloatArray
 from cardbox_tracker.person.skeleton import (
     JOINT_NAMES,
-    KEYPOINT_NAMES,
     NECK_NAMES,
-    UNITS,
     KeypointState,
     arm_directions,
 )
+from cardbox_tracker.recordings.result_reader import Results, read_results
+from cardbox_tracker.recordings.result_table import LEG_POINT_COLUMNS, POINT_COLUMNS
 from cardbox_tracker.tracking.sampling import normal_postures
 
 TABLE_A: ScoreArray = table_of(
@@ -196,59 +193,46 @@ class Seen(NamedTuple):
 
 
 def read_table(path: Path, person: int = 1) -> list[Seen]:
-    """Return the images of a CSV table of ``cardbox track --legs``; of several people, of one.
+    """Return the images of a table of ``cardbox track --legs``; of several people, of one.
 
     Raises:
         CardboxError: the file cannot be read, or lacks columns of the legs.
     """
-    try:
-        with regular_file(path, 2**31) as data:
-            rows = list(csv.DictReader(data.read().decode("utf-8-sig").splitlines()))
-        known = rows[0].keys() if rows else ()
-        missing = [name for name in (*JOINT_NAMES, *LEG_NAMES) if name not in known]
-        if missing:
-            raise CardboxError(
-                f"{path} has no column {missing[0]}; make a table with 'cardbox track RECORDING "
-                "--detector mediapipe --legs --csv OUT.csv'"
-            )
-        found = [_seen(row) for row in rows if row.get("person") in (None, str(person))]
-    except UnreadableFileError as error:
-        raise CardboxError(f"cannot read {path}: {error}; give a CSV table") from None
-    except (OSError, UnicodeDecodeError, ValueError, KeyError, csv.Error) as error:
+    results = read_results(path, None if person == 1 else person)
+    missing = [name for name in LEG_NAMES if name not in results.numbers]
+    if missing:
         raise CardboxError(
-            f"{path} is no table of 'cardbox track --legs' ({error}); make it anew"
-        ) from None
-    if not found:
-        raise CardboxError(f"{path} has no person {person}; give --person with another number")
-    return found
+            f"{path} has no column {missing[0]}; make a table with 'cardbox track RECORDING "
+            "--detector mediapipe --legs --csv OUT.csv'"
+        )
+    shape = len(results.state), 2, 3, 3
+    legs_m = results.of(LEG_POINT_COLUMNS).reshape(shape)
+    shoulders_m = results.of(POINT_COLUMNS).reshape(shape)[:, :, 0].mean(axis=1)
+    trunk_m = np.linalg.norm(shoulders_m - legs_m[:, :, 0].mean(axis=1), axis=-1)
+    bones_m = np.linalg.norm(np.diff(legs_m, axis=2), axis=-1).reshape(len(legs_m), 4)
+    states = [results.texts_of(f"{name}_state") for name in LEG_KEYPOINT_NAMES]
+    are_tracked = np.all(np.array(states) == KeypointState.TRACKED, axis=0)
+    posture, neck, legs, *wrists = (
+        _pairs(results, names) for names in (JOINT_NAMES, NECK_NAMES, LEG_NAMES, *WRIST_NAMES)
+    )
+
+    def known(pair: FloatArray) -> FloatArray | None:
+        return pair if np.isfinite(pair).all() else None
+
+    return [
+        Seen(
+            *(stamp_ns, float(results.time_s[i]), results.state[i]),
+            *(known(posture[i]), known(neck[i]), np.stack([one[i] for one in wrists], axis=1)),
+            *(known(legs[i]) if are_tracked[i] else None, np.hstack([trunk_m[i], bones_m[i]])),
+        )
+        for i, stamp_ns in enumerate(results.stamp_ns.tolist())
+    ]
 
 
-def _seen(row: Mapping[str, str]) -> Seen:
-    stamp = int(row["stamp_ns"]), float(row["time_s"]), row["state"]
-    if not row[JOINT_NAMES[0]]:
-        return Seen(*stamp, None, None, np.full((2, 2, 2), np.nan), None, np.zeros(5))
-
-    def pair(names: Sequence[str]) -> FloatArray | None:
-        deviations = [f"{name}_stddev_{UNITS.get(name, 'rad')}" for name in names]
-        texts = [row.get(name, "") for name in (*names, *deviations)]
-        return np.array(texts, float).reshape(2, -1) if all(texts) else None
-
-    def point(name: str) -> FloatArray:
-        return np.array([row[f"{name}_{axis}"] or math.nan for axis in "xyz"], float)
-
-    chains = LEG_KEYPOINT_NAMES[:3], LEG_KEYPOINT_NAMES[3:]
-    legs_m = np.array([[point(name) for name in chain] for chain in chains])
-    shoulders_m = np.mean([point(KEYPOINT_NAMES[0]), point(KEYPOINT_NAMES[3])], axis=0)
-    trunk_m = np.linalg.norm(shoulders_m - legs_m[:, 0].mean(axis=0))
-    lengths_m = [trunk_m, *np.linalg.norm(np.diff(legs_m, axis=1), axis=-1).ravel()]
-    are_tracked = all(row[f"{name}_state"] == KeypointState.TRACKED for name in LEG_KEYPOINT_NAMES)
-    legs = pair(LEG_NAMES) if are_tracked else None
-    wrists = np.full((2, 2, 2), np.nan)
-    for number, names in enumerate(WRIST_NAMES):
-        found = pair(names)
-        if found is not None:
-            wrists[:, number] = found
-    return Seen(*stamp, pair(JOINT_NAMES), pair(NECK_NAMES), wrists, legs, np.array(lengths_m))
+def _pairs(results: Results, names: Sequence[str]) -> FloatArray:
+    """Return values and deviations (n, 2, k) of joints; nan unless all of them are known."""
+    both = np.stack([results.of(names), results.deviations_of(names)], axis=1)
+    return np.where(np.isfinite(both).all(axis=(1, 2), keepdims=True), both, np.nan)
 
 
 def score_table(images: Sequence[Seen], config: RebaConfig, seed: int) -> list[RulaRow]:

@@ -4,7 +4,8 @@ Its axes are X to the left of a person who faces the camera, Y up, Z to the came
 rest, with all rotations 0, the person is upright with hanging arms, so that the rotations of torso,
 neck and elbows are the joint angles of :mod:`cardbox_tracker.person.kinematics`, axis by axis. The
 bones from the middle of the chest to the shoulders turn about Z alone and lift the shoulders,
-which is within 4 mm of the line on which the tracker lifts them.
+which is within 4 mm of the line on which the tracker lifts them. Legs that are not measured hang.
+The origin is on the floor below the camera, or is the camera if the floor is not known.
 """
 
 from __future__ import annotations
@@ -14,10 +15,17 @@ from typing import NamedTuple
 
 import numpy as np
 
-from cardbox_tracker.applications.exporting.motion import Motion
-from cardbox_tracker.applications.exporting.placed import frames_of
+from cardbox_tracker.applications.exporting.motion import Motion, held
+from cardbox_tracker.applications.exporting.placed import floor_below, frames_of
 from cardbox_tracker.common.errors import CardboxError
 from cardbox_tracker.common.files import atomic_path
+from cardbox_tracker.person.legs import (
+    ANKLE_SHARE,
+    HIP_SHARE,
+    SHANK_SHARE,
+    THIGH_SHARE,
+    stature_of,
+)
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.parts import body_parts
 from cardbox_tracker.person.posture import (
@@ -39,6 +47,9 @@ _FINGERS_TO_FOREARM = 0.25
 _CLAVICLE = 0.43
 _TURN_BOW_BEND = ("Yrotation", "Xrotation", "Zrotation")
 _SWING = ("Zrotation", "Xrotation", "Yrotation")
+_STRIDE = ("Xrotation", "Zrotation", "Yrotation")
+# From the ankle to the toes, as a share of the stature.
+_TOES = 0.1
 _PLACE = ("Xposition", "Yposition", "Zposition")
 _SIDES = (("Left", 1.0), ("Right", -1.0))
 
@@ -81,7 +92,16 @@ def skeleton(body: BodyModel) -> Bone:
         arms.append(Bone(f"{side}Shoulder", inner, _SWING, (arm,)))
     chest = Bone("Chest", (0.0, parts.torso.bottom_m, 0.0), _TURN_BOW_BEND, (neck, *arms))
     spine = Bone("Spine", (0.0, 0.0, 0.0), _TURN_BOW_BEND, (chest,))
-    return Bone("Hips", (0.0, 0.0, 0.0), (*_PLACE, *_TURN_BOW_BEND), (spine,))
+    stature_m = stature_of(parts)
+    legs = []
+    for side, sign in _SIDES:
+        toes = Bone("", (0.0, -ANKLE_SHARE * stature_m, _TOES * stature_m))
+        foot = Bone(f"{side}Foot", (0.0, -SHANK_SHARE * stature_m, 0.0), _STRIDE, (toes,))
+        shank = Bone(f"{side}Leg", (0.0, -THIGH_SHARE * stature_m, 0.0), _STRIDE, (foot,))
+        legs.append(
+            Bone(f"{side}UpLeg", (sign * HIP_SHARE * stature_m, 0.0, 0.0), _STRIDE, (shank,))
+        )
+    return Bone("Hips", (0.0, 0.0, 0.0), (*_PLACE, *_TURN_BOW_BEND), (spine, *legs))
 
 
 def _clavicle_m(body: BodyModel) -> float:
@@ -96,12 +116,12 @@ def channel_values(motion: Motion, body: BodyModel) -> dict[str, FloatArray]:
     """
     frames = frames_of(motion, body)
     parts = body_parts(body.sizes)
-    states, hip = _held(motion.states), _held(frames.hip)
+    states, hip = held(motion.states), held(frames.hip - floor_below(body))
     zero = np.zeros(len(states))
     angles = {
         "Hips": (states[:, YAW], zero, zero),
         "Spine": (zero, states[:, PITCH], states[:, ROLL]),
-        "Neck": (*_held(motion.neck).T, zero),
+        "Neck": (*held(motion.neck).T, zero),
     }
     for (name, side), arm, first in zip(
         _SIDES, (frames.left, frames.right), FIRST_ANGLES, strict=True
@@ -109,26 +129,22 @@ def channel_values(motion: Motion, body: BodyModel) -> dict[str, FloatArray]:
         local = np.einsum("nji,nj->ni", frames.torso_rotation, arm.shoulder - frames.hip)
         aside = side * local[:, 1] - (parts.shoulder_aside_m - _clavicle_m(body))
         up = local[:, 2] - parts.shoulder_height_m
-        lift = _held(side * np.arctan2(up, aside)[:, None])[:, 0]
+        lift = held(side * np.arctan2(up, aside)[:, None])[:, 0]
         turned = states[:, first : first + 4]
         raised = side * turned[:, SHOULDER_ABDUCTION] - lift
         angles[f"{name}Shoulder"] = (lift, zero, zero)
         angles[f"{name}Arm"] = (raised, -turned[:, SHOULDER_FLEXION], zero)
         bent = side * turned[:, ELBOW_ABDUCTION]
         angles[f"{name}ForeArm"] = (bent, -turned[:, ELBOW_FLEXION], zero)
+    for number, (name, side) in enumerate(_SIDES):
+        flexion, abduction, rotation, bend = held(
+            motion.legs[:, 4 * number : 4 * number + 4]
+        ).T * np.array([[-1.0], [side], [-side], [1.0]])
+        angles[f"{name}UpLeg"] = (flexion, abduction, rotation)
+        angles[f"{name}Leg"] = (bend, zero, zero)
     values = {name: np.degrees(np.stack(three, axis=1)) for name, three in angles.items()}
     place_m = np.stack([hip[:, 1], hip[:, 2], hip[:, 0]], axis=1)
     return values | {"Hips": np.hstack([place_m, values["Hips"]])}
-
-
-def _held(values: FloatArray) -> FloatArray:
-    """Return values (n, k) with unknown rows replaced by the last known ones, or the first."""
-    known = np.isfinite(values).all(1)
-    if not known.any():
-        return np.zeros_like(values)
-    last = np.maximum.accumulate(np.where(known, np.arange(len(values)), -1))
-    held: FloatArray = values[np.where(last < 0, np.argmax(known), last)]
-    return held
 
 
 def write_bvh(path: Path, motion: Motion, body: BodyModel | None) -> None:
@@ -140,7 +156,7 @@ def write_bvh(path: Path, motion: Motion, body: BodyModel | None) -> None:
     if body is None:
         raise CardboxError(
             "BVH needs the bones of the person: give --model MODEL.yaml, with which the results "
-            "were tracked, or a bag of results, which contains it"
+            "were tracked; OUT.body.yaml beside the table OUT.csv is found, and a bag contains it"
         )
     even = motion.evenly()
     root = skeleton(body)

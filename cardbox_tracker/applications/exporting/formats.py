@@ -50,19 +50,17 @@ class Format(NamedTuple):
         write: writes a motion of a body to a file; the body may be unknown.
         check: raises CardboxError if a library is missing.
         has_places: whether it depends on the pitch of the camera.
-        needs_body: whether it has the sizes of the body.
     """
 
     suffix: str
     write: Callable[[Path, Motion, BodyModel | None], None]
     check: Callable[[], object] = lambda: None
     has_places: bool = True
-    needs_body: bool = False
 
 
 FORMATS: dict[str, Format] = {
     "trc": Format(".trc", write_trc),
-    "bvh": Format(".bvh", write_bvh, needs_body=True),
+    "bvh": Format(".bvh", write_bvh),
     "c3d": Format(".c3d", write_c3d, ezc3d_or_error),
     "mot": Format(".mot", write_mot),
     "isb": Format(".isb.csv", write_isb, has_places=False),

@@ -1,8 +1,9 @@
 """Coordinates of a tracked motion as OpenSim's MOT, in the names of its models with arms.
 
-The models' axes are X forwards, Y up, Z to the right; a left arm is the mirror image of a right
-one. The pelvis is not seen: it stays level and faces the camera, so that the lumbar joint has all
-of the trunk's rotation. The elbow's axis is taken as Z; the models lean it by 13 degrees.
+The models' axes are X forwards, Y up, Z to the right; a left limb is the mirror image of a right
+one. The pelvis stays level. Where legs are measured, it turns with the trunk; otherwise it faces
+the camera, so that the lumbar joint has all of the trunk's rotation. The elbow's axis is taken as
+Z; the models lean it by 13 degrees.
 """
 
 from __future__ import annotations
@@ -11,12 +12,12 @@ from pathlib import Path
 
 import numpy as np
 
-from cardbox_tracker.applications.exporting.motion import Motion
-from cardbox_tracker.applications.exporting.placed import frames_of
+from cardbox_tracker.applications.exporting.motion import Motion, held
+from cardbox_tracker.applications.exporting.placed import floor_below, frames_of
 from cardbox_tracker.common.files import atomic_path
 from cardbox_tracker.person.isb_angles import LABORATORY, LEAST_BENT_RAD, thorax_angles
 from cardbox_tracker.person.model import BodyModel
-from cardbox_tracker.person.posture import LEFT_ARM, RIGHT_ARM
+from cardbox_tracker.person.posture import LEFT_ARM, RIGHT_ARM, YAW
 from cardbox_tracker.person.sizes import FloatArray
 from cardbox_tracker.person.skeleton import arm_directions, rotation_x, rotation_z
 
@@ -25,7 +26,13 @@ LUMBAR = ("lumbar_extension", "lumbar_bending", "lumbar_rotation")
 ARM = ("arm_flex", "arm_add", "arm_rot", "elbow_flex")
 """Rotations of the upper arm about Z, X' and Y'', then of the forearm about Z."""
 PELVIS = ("pelvis_tx", "pelvis_ty", "pelvis_tz")
-"""Place of the middle of the hips, m, with the camera at the origin."""
+"""Place of the middle of the hips, m, above the floor if it is known, else above the camera."""
+LEG = ("hip_flexion", "hip_adduction", "hip_rotation", "knee_angle")
+"""Rotations of the thigh about Z, X' and Y'', then of the shank: those of our legs, whose second
+one is an abduction."""
+HAND = ("wrist_flex", "wrist_dev", "pro_sup")
+"""Rotations of the hand to the palm and to the little finger, and of the forearm, whose 0 is full
+supination: 90 degrees from ours."""
 
 _MIRROR = np.array([1.0, 1.0, -1.0])
 
@@ -42,6 +49,23 @@ def coordinates_of(states: FloatArray) -> dict[str, FloatArray]:
         mirror = _MIRROR if side > 0 else np.ones(3)
         angles = _arm_angles(*(one @ LABORATORY.T * mirror for one in directions))
         found |= {f"{name}_{suffix}": angles[:, i] for i, name in enumerate(ARM)}
+    return found
+
+
+def _limbs(motion: Motion) -> dict[str, FloatArray]:
+    """Return the rotations of legs and hands, (n,), rad, as far as an image has them.
+
+    A hand or leg that is not known keeps its last rotation, or is at rest before the first.
+    """
+    found: dict[str, FloatArray] = {}
+    rest = 0.0, 0.0, np.pi / 2
+    for number, suffix in enumerate("lr"):
+        if motion.has_legs:
+            angles = held(motion.legs[:, 4 * number : 4 * number + 4]) * (1.0, -1.0, 1.0, 1.0)
+            found |= {f"{name}_{suffix}": angles[:, i] for i, name in enumerate(LEG)}
+        if motion.has_hands:
+            angles = np.hstack([held(motion.wrists[:, number, i, None]) for i in range(3)]) + rest
+            found |= {f"{name}_{suffix}": angles[:, i] for i, name in enumerate(HAND)}
     return found
 
 
@@ -75,9 +99,18 @@ def write_mot(path: Path, motion: Motion, body: BodyModel | None) -> None:
         CardboxError: the file cannot be written.
     """
     seen = motion.is_seen
-    columns = {name: np.degrees(of) for name, of in coordinates_of(motion.states[seen]).items()}
+    states, turned = motion.states[seen], {}
+    if motion.has_legs:
+        turned = dict.fromkeys(("pelvis_tilt", "pelvis_list"), np.zeros(len(states)))
+        turned["pelvis_rotation"] = states[:, YAW]
+        states = states.copy()
+        states[:, YAW] = 0.0
+    limbs = {name: of[seen] for name, of in _limbs(motion).items()}
+    columns = {
+        name: np.degrees(of) for name, of in (coordinates_of(states) | limbs | turned).items()
+    }
     if body is not None:
-        hips_m = (frames_of(motion, body).hip @ LABORATORY.T)[seen]
+        hips_m = ((frames_of(motion, body).hip - floor_below(body)) @ LABORATORY.T)[seen]
         columns |= dict(zip(PELVIS, hips_m.T, strict=True))
     rows = np.column_stack([motion.time_s[seen], *columns.values()])
     header = (

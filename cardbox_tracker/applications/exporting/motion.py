@@ -2,19 +2,32 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from cardbox_tracker.common.errors import CardboxError
+from cardbox_tracker.person.legs import LEG_KEYPOINT_NAMES, LEG_NAMES
 from cardbox_tracker.person.sizes import FloatArray
-from cardbox_tracker.person.skeleton import KEYPOINT_NAMES
+from cardbox_tracker.person.skeleton import (
+    JOINT_NAMES,
+    KEYPOINT_NAMES,
+    NECK_NAMES,
+    PLACE_NAMES,
+    KeypointState,
+)
+from cardbox_tracker.recordings.result_reader import Results
+from cardbox_tracker.recordings.result_table import (
+    LEG_POINT_COLUMNS,
+    PALM_COLUMNS,
+    POINT_COLUMNS,
+    WRIST_COLUMNS,
+)
 
 MISSING = "missing"
 """State of a moment at which there is no image."""
-
-_MOST_FRAMES = 1_000_000
 
 
 @dataclass(frozen=True)
@@ -22,13 +35,20 @@ class Motion:
     """Results for n images in order of time; gaps are images without a posture.
 
     Attributes:
-        stamp_ns: stamps of the images, (n,), ascending.
+        stamp_ns: stamps of the images, (n,), rising.
         time_s: seconds from the start of the recording, (n,).
         state: tracking state of each image, n texts.
         states: d1..d12, ``torso_x`` and ``torso_z``, (n, 14), rad and metres; nan in gaps.
         neck: ``neck_yaw`` and ``neck_pitch``, (n, 2), rad; nan while the face is not seen.
         keypoints_m: (n, 6, 3), ordered as ``KEYPOINT_NAMES``, metres in the optical frame of the
             first camera; nan in gaps.
+        wrists: flexion, deviation and rotation of the forearm of both hands, (n, 2, 3), rad; nan
+            where they are unknown, as all that follows.
+        palms: normals out of the palms, (n, 2, 3), unit vectors in the optical frame.
+        legs: ``LEG_NAMES``, (n, 8), rad.
+        leg_points_m: (n, 6, 3), ordered as ``LEG_KEYPOINT_NAMES``, in the optical frame; nan where
+            they are hidden.
+        leg_stddev_m: their standard deviations, (n, 6).
     """
 
     stamp_ns: NDArray[np.int64]
@@ -37,6 +57,45 @@ class Motion:
     states: FloatArray
     neck: FloatArray
     keypoints_m: FloatArray
+    wrists: FloatArray
+    palms: FloatArray
+    legs: FloatArray
+    leg_points_m: FloatArray
+    leg_stddev_m: FloatArray
+
+    @classmethod
+    def of(cls, results: Results) -> Motion:
+        """Return the motion of results.
+
+        Raises:
+            CardboxError: no image has a posture.
+        """
+        n = len(results.state)
+        hidden = np.array(
+            [
+                [text == KeypointState.HIDDEN for text in results.texts_of(f"{name}_state")]
+                for name in LEG_KEYPOINT_NAMES
+            ]
+        ).T
+        points_m = results.of(LEG_POINT_COLUMNS).reshape(n, len(LEG_KEYPOINT_NAMES), 3)
+        motion = cls(
+            results.stamp_ns,
+            results.time_s,
+            results.state,
+            results.of((*JOINT_NAMES, *PLACE_NAMES)),
+            results.of(NECK_NAMES),
+            results.of(POINT_COLUMNS).reshape(n, len(KEYPOINT_NAMES), 3),
+            results.of(WRIST_COLUMNS).reshape(n, 2, 3),
+            results.of(PALM_COLUMNS).reshape(n, 2, 3),
+            results.of(LEG_NAMES),
+            np.where(hidden[..., None], np.nan, points_m),
+            results.of([f"{name}_stddev_m" for name in LEG_KEYPOINT_NAMES]),
+        )
+        if not motion.is_seen.any():
+            raise CardboxError(
+                f"{results.path} has no image with a posture; track a recording of a person"
+            )
+        return motion
 
     @property
     def is_seen(self) -> NDArray[np.bool_]:
@@ -46,6 +105,16 @@ class Motion:
         return np.asarray(known.all(axis=1))
 
     @property
+    def has_legs(self) -> bool:
+        """Whether an image has legs."""
+        return bool(np.isfinite(self.legs).any())
+
+    @property
+    def has_hands(self) -> bool:
+        """Whether an image has a hand."""
+        return bool(np.isfinite(self.palms).any())
+
+    @property
     def rate_hz(self) -> float:
         """Images per second: the inverse of the median time between them; 1 for a single image."""
         steps_ns = np.diff(self.stamp_ns)
@@ -53,12 +122,12 @@ class Motion:
 
     def without(self, is_gap: NDArray[np.bool_]) -> Motion:
         """Return the motion with gaps at the images (n,) of the mask."""
-        return replace(
-            self,
-            states=np.where(is_gap[:, None], np.nan, self.states),
-            neck=np.where(is_gap[:, None], np.nan, self.neck),
-            keypoints_m=np.where(is_gap[:, None, None], np.nan, self.keypoints_m),
-        )
+
+        def emptied(values: FloatArray) -> FloatArray:
+            return np.where(is_gap.reshape(-1, *[1] * (values.ndim - 1)), np.nan, values)
+
+        changed: dict[str, Any] = {name: emptied(getattr(self, name)) for name in _VALUES}
+        return replace(self, **changed)
 
     def evenly(self) -> Motion:
         """Return the motion at moments of equal distance, for formats with a constant rate.
@@ -67,25 +136,43 @@ class Motion:
         of a constant rate stay as they are.
 
         Raises:
-            CardboxError: there are too many moments, which is due to wrong stamps.
+            CardboxError: most moments have no image, because the stamps jump.
         """
         since_ns = self.stamp_ns - self.stamp_ns[0]
         step_ns = 1e9 / self.rate_hz
         count = round(float(since_ns[-1]) / step_ns) + 1
-        if count > _MOST_FRAMES:
+        if count > 2 * len(since_ns):
+            jump = int(np.argmax(np.diff(since_ns)))
             raise CardboxError(
-                f"the images span {since_ns[-1] / 1e9:.0f} s, which are {count} frames of "
-                f"{self.rate_hz:g} Hz; expected at most {_MOST_FRAMES}: remove images with wrong "
-                "stamps"
+                f"the stamps jump by {np.diff(since_ns)[jump] / 1e9:.6g} s after the image at "
+                f"{self.time_s[jump]:.3f} s, so {count} frames at {self.rate_hz:g} Hz would be "
+                f"made of {len(since_ns)} images; export --to trc or mot, which have the time of "
+                "each image, or tables of the images before and after the jump"
             )
         wanted_ns = np.arange(count) * step_ns
         nearest = np.searchsorted((since_ns[:-1] + since_ns[1:]) / 2, wanted_ns)
         is_gap = np.abs(since_ns[nearest] - wanted_ns) > step_ns / 2
-        return Motion(
-            self.stamp_ns[0] + np.round(wanted_ns).astype(np.int64),
-            self.time_s[0] + wanted_ns / 1e9,
-            tuple(np.where(is_gap, MISSING, np.array(self.state)[nearest]).tolist()),
-            self.states[nearest],
-            self.neck[nearest],
-            self.keypoints_m[nearest],
+        taken: dict[str, Any] = {name: getattr(self, name)[nearest] for name in _VALUES}
+        return replace(
+            self,
+            stamp_ns=self.stamp_ns[0] + np.round(wanted_ns).astype(np.int64),
+            time_s=self.time_s[0] + wanted_ns / 1e9,
+            state=tuple(np.where(is_gap, MISSING, np.array(self.state)[nearest]).tolist()),
+            **taken,
         ).without(is_gap)
+
+
+def held(values: FloatArray) -> FloatArray:
+    """Return values (n, k) with unknown rows replaced by the last known ones, or the first.
+
+    They are 0 if none is known.
+    """
+    known = np.isfinite(values).all(1)
+    if not known.any():
+        return np.zeros_like(values)
+    last = np.maximum.accumulate(np.where(known, np.arange(len(values)), -1))
+    found: FloatArray = values[np.where(last < 0, np.argmax(known), last)]
+    return found
+
+
+_VALUES = [entry.name for entry in fields(Motion)][3:]

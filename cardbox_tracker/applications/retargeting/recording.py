@@ -7,11 +7,16 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
+import numpy as np
+
 from cardbox_tracker.applications.retargeting.retargeter import Command, Moment, Retargeter
 from cardbox_tracker.common.files import write_table
+from cardbox_tracker.person.hands import HAND_OPEN_NAMES
+from cardbox_tracker.person.skeleton import JOINT_NAMES, NECK_NAMES
 from cardbox_tracker.recordings.bag_reader import BagReader
 from cardbox_tracker.recordings.bag_writer import BagWriter
-from cardbox_tracker.recordings.result_reader import read_results
+from cardbox_tracker.recordings.result_reader import results_in
+from cardbox_tracker.tracking.estimate import TRACKING, UNCERTAIN
 
 SPACE = "/retarget"
 """Namespace of the robot's topics in the bag, equal to the node's."""
@@ -50,16 +55,22 @@ def retarget_bag(
         BagError: the bag has no results of the tracker, or is damaged.
     """
     motion = Motion([], [])
-    for found in read_results(bag, person):
-        if found.posture is not None and found.stddev is None:
-            continue
+    results = results_in(bag, person)
+    joints = (*JOINT_NAMES, *NECK_NAMES)
+    each = results.of(joints), results.deviations_of(joints), results.of(HAND_OPEN_NAMES)
+    images = zip(results.stamp_ns.tolist(), results.state, results.bodies, *each, strict=True)
+    for stamp_ns, state, body, values, deviations, hands in images:
+        posture = stddev = None
+        if state in (TRACKING, UNCERTAIN):
+            # The joints of the neck are there if the face is seen.
+            known = np.isfinite(deviations)
+            if not known[: len(JOINT_NAMES)].all():
+                continue
+            posture, stddev = values[known], deviations[known]
         if motion.commands:
-            motion.way.extend(_until(found.stamp_ns, motion.commands, retargeter, rate_hz))
-        command = retargeter.update(
-            *(found.stamp_ns, found.state, found.body, found.posture, found.stddev),
-            hands=found.hands_open,
-        )
-        motion.commands.append(StampedCommand(found.stamp_ns, command))
+            motion.way.extend(_until(stamp_ns, motion.commands, retargeter, rate_hz))
+        command = retargeter.update(stamp_ns, state, body, posture, stddev, hands=hands)
+        motion.commands.append(StampedCommand(stamp_ns, command))
     if motion.commands:
         last = motion.commands[-1]
         end_ns = last.stamp_ns + round(last.command.duration_s * 1e9)

@@ -11,8 +11,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cardbox_tracker.applications.viewing.viewer import rerun
-from cardbox_tracker.camera.camera import Camera
+from cardbox_tracker.camera.camera import level_to_optical
 from cardbox_tracker.common.errors import CardboxError, cut
+from cardbox_tracker.person.hands import HAND_NAMES
+from cardbox_tracker.person.legs import LEG_NAMES
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.model_file import loads_body_model
 from cardbox_tracker.person.sizes import FloatArray
@@ -41,8 +43,15 @@ _GROUPS: dict[str, tuple[str, ...]] = {
     "head": NECK_NAMES,
     "place": ("torso_y", *PLACE_NAMES),
     "shoulders": CLAVICLE_NAMES,
+    "left_leg": LEG_NAMES[:4],
+    "right_leg": LEG_NAMES[4:],
+    "hands": HAND_NAMES,
 }
 """Joints by plot: angles in degrees, place and rise of the shoulders in metres."""
+_METRES = ("place", "shoulders")
+# Interval, degrees and metres, at which that of a joint ends: a wider one tells nothing, and would
+# leave no room for the curve.
+_WIDEST = {"deg": 60.0, "m": 0.5}
 
 # The viewpoint is beside the camera and looks at a person two metres before it.
 _EYE_M, _TARGET_M = (0.1, -1.1, 0.5), (2.0, 0.35, -0.1)
@@ -114,10 +123,9 @@ def layout(
     views = rerun().blueprint
     # The heights of plots with joints, errors and states.
     error, shares = ([_plot(shown, _ERROR, "error [cm]")], [2]) if has_truth else ([], [])
-    units = ("deg", "deg", "deg", "deg", "m", "m")
     plots = [
-        _plot(shown, f"{_JOINTS}/{name}", f"{name.replace('_', ' ')} [{unit}]")
-        for name, unit in zip(_GROUPS, units, strict=True)
+        _plot(shown, f"{_JOINTS}/{name}", f"{name.replace('_', ' ')} [{_unit_of(name)}]")
+        for name in _GROUPS
     ]
     states = views.TextLogView(
         origin="/", contents=[f"+ /{one.prefix}{_STATE}" for one in shown], name="state"
@@ -201,6 +209,8 @@ class Scene:
         self._styled: set[str] = set()
         self._trees: dict[str, dict[str, Any]] = {}
         self._body: BodyModel | None = None
+        # Whether the person has legs and hands.
+        self._limbs = False, False
         # Joints and states of keypoints wait for what has the same stamp.
         self._joints: tuple[int, JointValues] | None = None
         self._states: tuple[int, Sequence[str]] | None = None
@@ -214,7 +224,12 @@ class Scene:
         body = loads_body_model(text, source=source)
         if body != self._body:
             self._body = body
-            self._robot("person", urdf_from_body(body))
+            self._describe()
+
+    def _describe(self) -> None:
+        assert self._body is not None
+        legs, hands = self._limbs
+        self._robot("person", urdf_from_body(self._body, legs=legs, hands=hands))
 
     def robot(self, name: str, urdf: str) -> None:
         """Show a robot beside the person; it faces the camera.
@@ -247,6 +262,10 @@ class Scene:
     def joints(self, stamp_ns: int, joints: JointValues) -> None:
         """Move the person, and plot the joints, rad and metres."""
         self._joints = stamp_ns, joints
+        limbs = LEG_NAMES[0] in joints.names, HAND_NAMES[0] in joints.names
+        if limbs != self._limbs and self._body is not None:
+            self._limbs = limbs
+            self._describe()
         self.robot_joints(stamp_ns, "person", joints)
         for name, value in _shown(joints).items():
             group, number = _plot_of(name)
@@ -260,8 +279,8 @@ class Scene:
         spread = _shown(deviations)
         for name, value in _shown(self._joints[1]).items():
             group, number = _plot_of(name)
-            for which, off in (("low", -_DEVIATIONS), ("high", _DEVIATIONS)):
-                reach = value + off * spread.get(name, 0.0)
+            width = min(_DEVIATIONS * spread.get(name, 0.0), _WIDEST[_unit_of(group)])
+            for which, reach in (("low", value - width), ("high", value + width)):
                 entity = f"{_JOINTS}/{group}/{_SPREAD}/{name}/{which}"
                 self._plot(entity, f"{name} {which}", reach, number, 0.5)
 
@@ -336,7 +355,8 @@ class Scene:
     ) -> None:
         if self._body is None:
             return  # the camera's pitch is still unknown
-        points = level_points(points_m, self._body.camera_pose.pitch_rad)
+        tilt = self._body.camera_pose
+        points = level_points(points_m, tilt.pitch_rad, tilt.roll_rad)
         strips = [points[list(arm)] for arm in _ARMS]
         bones = self._rr.LineStrips3D(strips, colors=[rgb] * len(strips), radii=_RADIUS_M / 3)
         joints = self._rr.Points3D(points, colors=list(joint_rgb) or rgb, radii=_RADIUS_M)
@@ -380,15 +400,20 @@ def errors_cm(points_m: FloatArray, truth_m: FloatArray) -> dict[str, float]:
     }
 
 
-def level_points(points_m: FloatArray, pitch_rad: float) -> FloatArray:
+def level_points(points_m: FloatArray, pitch_rad: float, roll_rad: float = 0.0) -> FloatArray:
     """Transform optical points (n, 3) to the level frame of the URDF's root: X ahead, Y left, Z up.
 
     Args:
         points_m: points in the optical frame, metres: x to the right, y down, z ahead.
         pitch_rad: downward pitch of the camera.
+        roll_rad: its roll.
     """
-    camera = Camera(1, 1, 1.0, 1.0, 0.0, 0.0, pitch_rad)
-    return camera.optical_to_reference(points_m) * (-1.0, -1.0, 1.0)
+    return np.asarray(points_m @ level_to_optical(pitch_rad, roll_rad) * (-1.0, -1.0, 1.0))
+
+
+def _unit_of(group: str) -> str:
+    """Return the unit of a plot."""
+    return "m" if group in _METRES else "deg"
 
 
 def _plot_of(joint: str) -> tuple[str, int]:

@@ -38,7 +38,7 @@ class ShownTracking:
 
     def __call__(self, frame: RecordedFrame, estimate: Estimate, tracker: Tracker) -> None:
         """Show one image."""
-        scene, stamp_ns = self._scene, frame.stamp_ns
+        scene, stamp_ns, tilt = self._scene, frame.stamp_ns, tracker.body.camera_pose
         if tracker.body is not self._described:
             scene.model(dumps_body_model(tracker.body), "the tracker")
         self._described = tracker.body
@@ -52,7 +52,8 @@ class ShownTracking:
         if estimate.keypoint_states is not None:
             scene.keypoint_states(stamp_ns, estimate.keypoint_states)
         if estimate.keypoints_m is not None:
-            scene.keypoints(stamp_ns, np.asarray(estimate.keypoints_m))
+            standing = estimate.as_camera_stands(tilt.roll_rad)
+            scene.keypoints(stamp_ns, np.asarray(standing.keypoints_m))
 
 
 def show_together(

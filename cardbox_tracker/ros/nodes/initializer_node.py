@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 import sys
 import threading
@@ -197,6 +198,8 @@ class InitializerNode(CardboxNode):
         self._show(measuring(fraction))
 
     def _publish(self, body: BodyModel) -> None:
+        settings = self.parameters.value
+        body = body.with_values(camera_roll_rad=math.radians(settings.camera_roll_deg))
         self._body = body
         self._model.publish(String(data=dumps_body_model(body)))
         self._describe(body)

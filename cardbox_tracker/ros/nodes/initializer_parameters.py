@@ -11,6 +11,7 @@ from cardbox_tracker.measuring.config import (
     InitializationConfig,
 )
 from cardbox_tracker.ros.nodes.shared_parameters import (
+    camera_roll_parameter,
     cameras_parameter,
     depth_parameter,
     extrinsics_parameter,
@@ -35,6 +36,7 @@ class InitializerParameters(NodeParameters):
         limits=(-_MAX_PITCH_DEG, _MAX_PITCH_DEG),
         effect=_NEXT_MEASUREMENT,
     )
+    camera_roll_deg: float = camera_roll_parameter()
     side_turn: str = shared(InitializationConfig, "side_turn", effect=_NEXT_GUIDANCE)
     hypotheses: int = shared(InitializationConfig, "hypotheses", effect=_NEXT_MEASUREMENT)
     max_rounds: int = shared(InitializationConfig, "max_rounds", effect=_NEXT_MEASUREMENT)

@@ -54,8 +54,9 @@ def camera_roll_parameter() -> Any:
     return parameter(
         0.0,
         "how far the camera is turned clockwise about its axis, seen from behind it: 180 if its "
-        "top is below, 90 or -90 on its side; silhouettes and results are those of the level "
-        "camera; background, detector and tracker need the same value",
+        "top is below, 90 or -90 on its side; silhouettes are those of the level camera, results "
+        "those of the camera as it stands; background, detector, initializer and tracker need the "
+        "same value",
         unit="degrees",
         limits=(-180.0, 180.0),
         effect=AT_START,

@@ -176,6 +176,7 @@ class FoundBody:
         self._description.publish(String(data=urdf))
 
 
+_SAME_ROLL_RAD = math.radians(0.1)
 _DOES = "Follow the measured person: silhouettes in, joint states out."
 _PREPARING = "preparing (the very first start compiles for one to two minutes)"
 
@@ -237,14 +238,25 @@ class TrackerNode(CardboxNode):
     def _on_model(self, message: String, _: int) -> None:
         if self._found is not None and message.data == self._found.text:
             return
-        body = loads_body_model(message.data, source=self._model_topic)
+        body = self._rolled(loads_body_model(message.data, source=self._model_topic))
         if body != self._body:
             self._use(body)
         if self._found is not None:
             self._found.replace(message.data)
 
+    def _rolled(self, body: BodyModel) -> BodyModel:
+        """Return the body before this camera, as it stands."""
+        roll_rad = math.radians(self.parameters.value.camera_roll_deg)
+        found_rad = body.camera_pose.roll_rad
+        if found_rad and abs(found_rad - roll_rad) > _SAME_ROLL_RAD:
+            self.get_logger().warning(
+                f"the body model is of a camera with a roll of {math.degrees(found_rad):.1f} "
+                f"degrees, but camera_roll_deg is {math.degrees(roll_rad):.1f}, which is used"
+            )
+        return body.with_values(camera_roll_rad=roll_rad)
+
     def _use(self, body: BodyModel) -> None:
-        self._body = body
+        self._body = body = self._rolled(body)
         needs_images = body.appearance is not None or bool(body.unknown) or bool(self._look)
         self._inputs.wait_for_images(needs_images)
         if body.doubt:

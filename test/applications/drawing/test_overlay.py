@@ -116,7 +116,7 @@ def test_raised_arms_are_drawn_where_the_filter_has_them(body: BodyModel) -> Non
     view = CAMERA.scaled(960, 720)
     for u, v in view.project(points_m).round().astype(int):
         assert near(overlay, JOINT_BGR)[v, u]
-    skeleton = marker_shapes(body, CAMERA, state[:12])[1].points_m
+    skeleton = marker_shapes(body, state[:12])[1].points_m
     for point in points_m:
         assert np.linalg.norm(skeleton - point, axis=1).min() < 1e-9
 

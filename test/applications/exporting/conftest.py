@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from cardbox_tracker.applications.exporting.motion import Motion
-from cardbox_tracker.camera.camera import Camera
+from cardbox_tracker.camera.camera import level_to_optical
 from cardbox_tracker.person.kinematics import pose
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.skeleton import rotation_x, rotation_y, rotation_z
@@ -19,22 +19,33 @@ STEP_NS = 100_000_000
 TURNS: dict[str, Callable[..., np.ndarray]] = {"X": rotation_x, "Y": rotation_y, "Z": rotation_z}
 
 
-def motion_of(states: np.ndarray, body: BodyModel, rises_m: tuple[float, float] = (0, 0)) -> Any:
+def motion_of(
+    states: np.ndarray, body: BodyModel, rises_m: tuple[float, float] = (0, 0), **more: np.ndarray
+) -> Any:
     """Return the motion of states (n, 14), 10 a second; rows of nan are gaps.
 
-    ``rises_m`` raise the left and right shoulder.
+    ``rises_m`` raise the left and right shoulder; ``more`` are other arrays of the motion.
     """
     states = np.atleast_2d(np.asarray(states, float))
     points = pose(body, states, clavicles_m=np.tile(rises_m, (len(states), 1))).keypoints_m
-    camera = Camera(1, 1, 1.0, 1.0, 0.0, 0.0, body.camera_pose.pitch_rad)
+    tilt, n = body.camera_pose, len(states)
+    shapes = {
+        "neck": (2,),
+        "wrists": (2, 3),
+        "palms": (2, 3),
+        "legs": (8,),
+        "leg_points_m": (6, 3),
+        "leg_stddev_m": (6,),
+    }
+    unknown = {name: np.full((n, *shape), np.nan) for name, shape in shapes.items()}
     stamps = np.arange(len(states)) * STEP_NS
     return Motion(
         stamps,
         stamps / 1e9,
         tuple("lost" if np.isnan(row).any() else "tracking" for row in states),
         states,
-        np.full((len(states), 2), np.nan),
-        camera.reference_to_optical(points),
+        keypoints_m=points @ level_to_optical(tilt.pitch_rad, tilt.roll_rad).T,
+        **(unknown | more),
     )
 
 

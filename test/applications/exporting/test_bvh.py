@@ -15,6 +15,7 @@ from hypothesis.extra.numpy import arrays
 from cardbox_tracker.applications.exporting.bvh import write_bvh
 from cardbox_tracker.applications.exporting.markers import markers_of
 from cardbox_tracker.common.errors import CardboxError
+from cardbox_tracker.person.legs import LEG_LIMITS
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.posture import state_limits
 
@@ -97,8 +98,29 @@ def test_bones_are_those_of_the_body_and_angles_those_of_the_table(
     places = joints_of_bvh(tmp_path / "a.bvh")
     assert set(places) == {
         *("Hips", "Spine", "Chest", "Neck", "Head", "LeftShoulder", "RightShoulder"),
+        *(f"{side}{bone}" for side in ("Left", "Right") for bone in ("UpLeg", "Leg", "Foot")),
         *JOINTS,
     }
+
+
+def test_legs_are_where_the_markers_have_them_and_stand_if_they_are_not_measured(
+    motion_of: Callable, joints_of_bvh: Callable, body: BodyModel, tmp_path: Path
+) -> None:
+    states = np.zeros((3, 14))
+    states[:, 3] = 0.4, -0.9, 0.2
+    low, high = LEG_LIMITS.T
+    legs = low + np.random.default_rng(5).uniform(0, 1, (3, 8)) * (high - low)
+    motion = motion_of(states, body, legs=legs)
+    write_bvh(tmp_path / "a.bvh", motion, body)
+    found, markers = joints_of_bvh(tmp_path / "a.bvh"), markers_of(motion, body)
+    for bone, marker in zip(("UpLeg", "Leg", "Foot"), ("Hip", "Knee", "Ankle"), strict=True):
+        for side in ("Left", "Right"):
+            expected_m = markers.points_m[:, markers.names.index(f"{side[0]}{marker}")]
+            assert found[f"{side}{bone}"] @ TO_LABORATORY.T == pytest.approx(expected_m, abs=1e-3)
+    write_bvh(tmp_path / "b.bvh", motion_of(states, body), body)
+    feet = joints_of_bvh(tmp_path / "b.bvh")["LeftFoot"]
+    ankle_m = 0.039 * 1.72
+    assert feet[:, 1] == pytest.approx([ankle_m] * 3, abs=1e-3)
 
 
 def test_gaps_repeat_the_posture_before(

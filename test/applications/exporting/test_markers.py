@@ -16,13 +16,19 @@ from cardbox_tracker.common.errors import CardboxError
 from cardbox_tracker.person.model import BodyModel
 
 GAP = np.full(14, np.nan)
+# The floor below the hips of a body with the default sizes.
+FLOOR_M = 0.53 * 1.72
 NAMES = ["LShoulder", "LElbow", "LHand", "RShoulder", "RElbow", "RHand", "Hip", "Neck"]
 
 
 def test_places_by_hand(motion_of: Callable) -> None:
-    """A person two metres before a level camera: torso 0.53 m, shoulders 0.05 m below its top."""
+    """A person two metres before a level camera: torso 0.53 m, shoulders 0.05 m below its top.
+
+    The stature is 1.72 m, of which the hips are at 53 %.
+    """
     body = BodyModel.of(distance_m=2.0, hip_height_m=-0.5)
-    names, points_m = markers_of(motion_of(np.zeros(14), body), body)
+    names, points_m, _ = markers_of(motion_of(np.zeros(14), body), body)
+    points_m = points_m - (0.0, 0.5 + FLOOR_M, 0.0)  # as above the camera
     assert list(names) == NAMES
     assert points_m[0] == pytest.approx(
         np.array(
@@ -44,9 +50,10 @@ def test_the_place_moves_all_markers(motion_of: Callable, body: BodyModel) -> No
 
 def test_without_a_body_the_camera_is_level(motion_of: Callable, body: BodyModel) -> None:
     motion = motion_of(np.zeros(14), body)
-    names, points_m = markers_of(motion, None)
+    names, points_m, _ = markers_of(motion, None)
     x, y, z = motion.keypoints_m[0].T
     assert list(names) == NAMES[:6]
+    # Without a body there is no floor either.
     assert points_m[0] == pytest.approx(np.stack([-z, -y, -x], axis=1))
     upright = markers_of(motion, body).points_m[0]
     assert upright[0, 0] == pytest.approx(upright[2, 0])
@@ -67,14 +74,45 @@ def test_another_body_is_refused(motion_of: Callable, body: BodyModel) -> None:
         images_of_body(raised, body)
 
 
-def test_images_of_an_earlier_fit_are_gaps(motion_of: Callable, body: BodyModel) -> None:
-    """The guess of the first image puts the person 0.2 m farther than the body that follows."""
+def test_images_of_another_body_are_gaps(motion_of: Callable, body: BodyModel) -> None:
+    """In the first image the person is 0.2 m farther than with the body that follows."""
     motion = motion_of(np.zeros((3, 14)), body)
     states = motion.states.copy()
     states[0, 12] = 0.2
     fitted = images_of_body(replace(motion, states=states), body)
     assert fitted.is_seen.tolist() == [False, True, True]
     assert np.isnan(markers_of(fitted, body).points_m[0]).all()
+
+
+def test_legs_and_hands_by_hand(motion_of: Callable) -> None:
+    """A left thigh forwards and its shank down; a right leg that hangs; a left palm to the body."""
+    body = BodyModel.of(distance_m=2.0, hip_height_m=-0.5)
+    legs, palms = np.radians([[90.0, 0, 0, 90, 0, 0, 0, 0]]), np.full((1, 2, 3), np.nan)
+    palms[0, 0] = -1.0, 0.0, 0.0  # to the left of the image, optical frame
+    # A bag has no points of the legs, so the bones have the lengths of people of this stature.
+    names, points_m, _ = markers_of(motion_of(np.zeros(14), body, legs=legs, palms=palms), body)
+    at = dict(zip(names, points_m[0], strict=True))
+    thigh, shank, aside, ankle = 0.245 * 1.72, 0.246 * 1.72, 0.06 * 1.72, 0.039 * 1.72
+    assert at["LKnee"] == pytest.approx([-2 + thigh, FLOOR_M, -aside])
+    assert at["LAnkle"] == pytest.approx([-2 + thigh, FLOOR_M - shank, -aside])
+    assert at["RAnkle"] == pytest.approx([-2, ankle, aside])
+    wrist = 0.75 * at["LHand"] + 0.25 * at["LElbow"]
+    assert at["LWrist"] == pytest.approx(wrist)
+    assert at["LPalm"] == pytest.approx((wrist + at["LHand"]) / 2 + (0.0, 0.0, 0.05))
+    assert np.isnan([at["RWrist"], at["RPalm"]]).all()
+
+
+@pytest.mark.parametrize("roll_deg", [12.0, 25.0, -90.0])
+def test_a_rolled_camera_gives_the_same_markers(
+    motion_of: Callable, body: BodyModel, roll_deg: float
+) -> None:
+    """The points of the results are in the frame of the camera as it stands."""
+    state = np.random.default_rng(3).uniform(-0.3, 0.5, 14)
+    rolled = body.with_values(camera_roll_rad=np.radians(roll_deg))
+    motion = motion_of(state, rolled)
+    assert np.abs(motion.keypoints_m - motion_of(state, body).keypoints_m).max() > 0.1
+    expected_m = markers_of(motion_of(state, body), body).points_m
+    assert markers_of(motion, rolled).points_m == pytest.approx(expected_m)
 
 
 def test_trc_by_hand(motion_of: Callable, tmp_path: Path) -> None:
@@ -90,7 +128,7 @@ def test_trc_by_hand(motion_of: Callable, tmp_path: Path) -> None:
     assert rows[2] == ["10", "10", "3", "8", "m", "10", "1", "3"]
     assert rows[3][:5] == ["Frame#", "Time", "LShoulder", "", ""]
     assert rows[4][:6] == ["", "", "X1", "Y1", "Z1", "X2"]
-    assert rows[6][:5] == ["1", "0.000000", "-2.000000", "-0.020000", "-0.180000"]
+    assert rows[6][:5] == ["1", "0.000000", "-2.000000", f"{0.48 + FLOOR_M:.6f}", "-0.180000"]
     assert rows[7] == ["2", "0.100000", *[""] * 25]
     assert rows[8][:2] == ["3", "0.200000"]
     # A row ends in a tab, without which OpenSim misses the last cell of a gap.

@@ -11,6 +11,7 @@ import pytest
 from cardbox_tracker.applications.exporting.mot import ARM, LUMBAR, coordinates_of, write_mot
 from cardbox_tracker.person.isb_angles import LABORATORY
 from cardbox_tracker.person.kinematics import pose
+from cardbox_tracker.person.legs import floor_m, leg_directions
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.posture import LEFT_ARM, RIGHT_ARM
 from cardbox_tracker.person.skeleton import arm_directions, rotation_x, rotation_y, rotation_z
@@ -81,7 +82,40 @@ def test_the_file_has_degrees_metres_and_no_row_in_a_gap(
     expected = np.degrees(coordinates_of(states[[0, 2, 3]])["arm_flex_r"])
     np.testing.assert_allclose(column["arm_flex_r"], expected, atol=1e-5)
     hips = pose(body, states[[0, 2, 3]]).hip
-    np.testing.assert_allclose(column["pelvis_ty"], hips[:, 2], atol=1e-5)
+    np.testing.assert_allclose(column["pelvis_ty"], hips[:, 2] - floor_m(body), atol=1e-5)
     np.testing.assert_allclose(column["pelvis_tx"], hips[:, 0], atol=1e-5)
     write_mot(tmp_path / "bare.mot", motion, None)
     assert "pelvis" not in (tmp_path / "bare.mot").read_text()
+
+
+def test_legs_and_hands_turn_as_opensim_s_joints(
+    tmp_path: Path, motion_of: Callable, body: BodyModel
+) -> None:
+    """The left joints turn about -X and -Y; the pelvis turns with the trunk."""
+    legs = np.radians([[40.0, 20, 10, 50, 30, 15, -10, 70]])
+    wrists = np.radians([[[20.0, 10, -30], [np.nan, np.nan, np.nan]]])
+    state = np.zeros(14)
+    state[3] = 0.5
+    motion = motion_of(state, body, legs=legs, wrists=wrists, palms=np.ones((1, 2, 3)))
+    write_mot(tmp_path / "a.mot", motion, body)
+    names, row = (tmp_path / "a.mot").read_text().splitlines()[-2:]
+    found = dict(zip(names.split("\t"), map(float, row.split("\t")), strict=True))
+    for side, suffix, angles in ((1.0, "l", legs[:, :4]), (-1.0, "r", legs[:, 4:])):
+        flexion, adduction, rotation, knee = (
+            np.radians(found[f"{name}_{suffix}"])
+            for name in ("hip_flexion", "hip_adduction", "hip_rotation", "knee_angle")
+        )
+        thigh = rotation_z(flexion) @ rotation_x(-side * adduction) @ rotation_y(-side * rotation)
+        down = np.array([0.0, -1.0, 0.0])
+        for bone, expected in zip(
+            (thigh @ down, thigh @ rotation_z(-knee) @ down),
+            leg_directions(angles, side),
+            strict=True,
+        ):
+            np.testing.assert_allclose(bone, LABORATORY @ expected[0], atol=1e-6)
+    assert found["pelvis_rotation"] == pytest.approx(np.degrees(0.5), abs=1e-5)
+    assert found["lumbar_rotation"] == pytest.approx(0.0, abs=1e-5)
+    # OpenSim counts the forearm's rotation from full supination; an unknown hand is at rest.
+    left = [found[f"{name}_l"] for name in ("wrist_flex", "wrist_dev", "pro_sup")]
+    right = [found[f"{name}_r"] for name in ("wrist_flex", "wrist_dev", "pro_sup")]
+    assert left == pytest.approx([20.0, 10.0, 60.0]) and right == pytest.approx([0.0, 0.0, 90.0])

@@ -15,10 +15,9 @@ def motion_at(*times_ms: int) -> Motion:
     """A motion whose torso_y is the time in seconds."""
     stamps = np.array(times_ms, np.int64) * 1_000_000
     states = np.repeat(stamps[:, None] / 1e9, 14, axis=1)
-    known = np.zeros((len(stamps), 6, 3))
-    return Motion(
-        stamps, stamps / 1e9, ("tracking",) * len(stamps), states, np.zeros((len(stamps), 2)), known
-    )
+    shapes = (2,), (6, 3), (2, 3), (2, 3), (8,), (6, 3), (6,)
+    others = [np.zeros((len(stamps), *shape)) for shape in shapes]
+    return Motion(stamps, stamps / 1e9, ("tracking",) * len(stamps), states, *others)
 
 
 def test_images_of_a_constant_rate_stay() -> None:
@@ -43,9 +42,10 @@ def test_a_single_image_has_a_rate() -> None:
     assert motion.evenly().states.tolist() == motion.states.tolist()
 
 
-def test_stamps_of_another_clock_are_named() -> None:
-    with pytest.raises(CardboxError, match=r"frames of 10 Hz; expected at most .*: remove images"):
-        motion_at(0, 100, 200, 10**10).evenly()
+def test_a_clock_that_jumps_is_named() -> None:
+    """Hours without an image are no motion of a constant rate."""
+    with pytest.raises(CardboxError, match=r"jump by 3600 s after the image at 0\.200 s, so 36003"):
+        motion_at(0, 100, 200, 3_600_200).evenly()
 
 
 def test_an_image_without_keypoints_is_a_gap() -> None:

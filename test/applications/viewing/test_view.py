@@ -262,7 +262,7 @@ REFUSALS: list[Refusal] = [
     ((), "expected either BAG or --live"),
     (("BAG", "--live"), "expected either BAG or --live"),
     (("BAG", "--save", "FOLDER/missing/v.rrd"), "No such file or directory"),
-    (("BAG", "--beside", "FOLDER/missing"), "there is no recording"),
+    (("BAG", "--beside", "FOLDER/missing"), "there are no results"),
     (("--live", "--beside", "BAG"), "--beside needs a bag of results"),
 ]
 

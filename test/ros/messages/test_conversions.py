@@ -236,7 +236,7 @@ def test_joint_state_has_velocities_where_they_are_known() -> None:
 def test_markers_are_the_patches_and_the_skeleton_in_the_optical_frame() -> None:
     body, posture = BodyModel(), reference_posture("front")
     patches, skeleton = results.markers_message(
-        HEADER, Markers(marker_shapes(body, CAMERA, posture))
+        HEADER, Markers(marker_shapes(body, posture))
     ).markers
     corners = CAMERA.reference_to_optical(cardbox_patches(body, posture))
     assert (patches.type, len(patches.points), len(patches.colors)) == (

@@ -10,14 +10,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from cardbox_tracker.applications.exporting import motion_reader
 from cardbox_tracker.applications.exporting.motion import Motion
-from cardbox_tracker.applications.exporting.motion_reader import read_motion
 from cardbox_tracker.camera.camera import Camera
 from cardbox_tracker.common.errors import CardboxError
 from cardbox_tracker.person.kinematics import pose
 from cardbox_tracker.person.model import BodyModel
+from cardbox_tracker.recordings import result_reader
 from cardbox_tracker.recordings.result_bag import result_bag
+from cardbox_tracker.recordings.result_reader import read_results
 from cardbox_tracker.recordings.result_table import columns, result_table
 from cardbox_tracker.recordings.silhouettes import RecordedFrame
 from cardbox_tracker.tracking.estimate import Estimate
@@ -25,7 +25,14 @@ from cardbox_tracker.tracking.tracker import Tracker
 
 BODY = BodyModel.of(hip_height_m=-0.51)
 CAMERA = Camera(64, 48, 66.0, 66.0, 31.5, 23.5)
+# As of a clock, which is far beyond all other numbers.
+START_NS = 1_700_000_000_000_000_007
 GREY = np.zeros((48, 64), np.uint8)
+
+
+def read_motion(path: Path, person: int | None = None) -> tuple[Motion, BodyModel | None]:
+    results = read_results(path, person)
+    return Motion.of(results), results.body
 
 
 def estimates() -> list[Estimate]:
@@ -49,7 +56,7 @@ def estimates() -> list[Estimate]:
 def write_table(path: Path) -> Path:
     with result_table(path, has_points=True) as add:
         for number, estimate in enumerate(estimates()):
-            add(RecordedFrame(number * 10**8 + 7, 2 + number / 10, GREY, GREY), estimate)
+            add(RecordedFrame(START_NS + number * 10**8, 2 + number / 10, GREY, GREY), estimate)
     return path
 
 
@@ -57,13 +64,14 @@ def write_bag(path: Path) -> Path:
     tracker = Tracker(BODY, CAMERA)
     with result_bag(path, "camera") as add:
         for number, estimate in enumerate(estimates()):
-            add(RecordedFrame(number * 10**8 + 7, number / 10, GREY, GREY), estimate, tracker)
+            frame = RecordedFrame(START_NS + number * 10**8, number / 10, GREY, GREY)
+            add(frame, estimate, tracker)
     return path
 
 
 def assert_is_what_was_written(motion: Motion) -> None:
     written = estimates()
-    assert motion.stamp_ns.tolist() == [7 + i * 10**8 for i in range(5)]
+    assert motion.stamp_ns.tolist() == [START_NS + i * 10**8 for i in range(5)]
     assert motion.state == ("tracking", "lost", "uncertain", "no_person", "tracking")
     assert motion.is_seen.tolist() == [True, False, True, False, True]
     for number in (0, 2, 4):
@@ -122,6 +130,14 @@ def with_state(rows: list[list[str]]) -> None:
     rows[1][1] = "sleeping"
 
 
+def with_negative_deviation(rows: list[list[str]]) -> None:
+    rows[3][rows[0].index("torso_roll_stddev_rad")] = "-12.0"
+
+
+def with_state_of_keypoint(rows: list[list[str]]) -> None:
+    rows[1][rows[0].index("left_hand_state")] = "sleeping"
+
+
 def with_empty_cell(rows: list[list[str]]) -> None:
     rows[1][20] = ""
 
@@ -134,13 +150,20 @@ def without_postures(rows: list[list[str]]) -> None:
 @pytest.mark.parametrize(
     ("change", "expected"),
     [
-        (without_column, "has no column right_shoulder_flexion; give a table"),
-        (with_text, "image 3: .*much.*docs/results.md"),
-        (with_state, "image 1: .*sleeping"),
-        (with_empty_cell, "image 1: "),
+        (without_column, "has no column right_shoulder_flexion; give the table"),
+        (with_text, "line 4: torso_yaw is .much.; .*docs/results.md"),
+        (with_state, "line 2: the state is .sleeping"),
+        (with_empty_cell, "line 2: left_hand_x is "),
         (lambda rows: rows[2].__setitem__(STAMP_NS, str(10**30)), "the stamp is 1000"),
         (lambda rows: rows[2].__setitem__(STAMP_NS, "-1"), "the stamp is -1"),
-        (lambda rows: rows.__delitem__(slice(1, None)), "no image with a posture"),
+        (lambda rows: rows.__delitem__(slice(1, None)), "has no image"),
+        (lambda rows: rows.append(rows[1]), "line 7: the stamp 17.*007 ns is not after"),
+        (lambda rows: rows.append(rows[-1]), "line 7: the stamp .* not in order of time"),
+        (lambda rows: [row.append(row[2]) for row in rows], "has several columns torso_y"),
+        (lambda rows: rows[3].__setitem__(2, "nan"), "line 4: torso_y is .nan."),
+        (lambda rows: rows[3].__setitem__(2, "1e300"), "line 4: torso_y is .1e300."),
+        (with_negative_deviation, "line 4: torso_roll_stddev_rad is .-12.0."),
+        (with_state_of_keypoint, "line 2: left_hand_state is .sleeping."),
         (without_postures, "no image with a posture"),
     ],
 )
@@ -198,7 +221,7 @@ def test_a_parquet_table_of_several_batches_is_read_whole(
     with (tmp_path / "a.csv").open(newline="", encoding="utf-8") as file:
         rows = list(csv.DictReader(file))
     parquet.write_table(arrow.Table.from_pylist(rows), tmp_path / "a.parquet")
-    monkeypatch.setattr(motion_reader, "_BATCH", 2)
+    monkeypatch.setattr(result_reader, "_BATCH", 2)
     found, _ = read_motion(tmp_path / "a.parquet")
     np.testing.assert_array_equal(found.stamp_ns, expected.stamp_ns)
     np.testing.assert_array_equal(found.states, expected.states)
