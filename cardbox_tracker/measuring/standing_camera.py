@@ -16,8 +16,7 @@ from typing import NamedTuple
 import numpy as np
 
 from cardbox_tracker.camera.camera import Camera
-from cardbox_tracker.detectors.landmarks import LANDMARKS
-from cardbox_tracker.detectors.pose_network import Detection
+from cardbox_tracker.detectors.pose_network import LANDMARKS, Detection
 from cardbox_tracker.person.sizes import FloatArray
 
 

@@ -80,5 +80,5 @@ class DetectorSilhouetteSource(SilhouetteSource):
                 if self._finds_people:
                     yield prepared, self._person.all_in(prepared.stamp_ns, prepared.image)
                     continue
-                person = self._person(prepared.image)
+                person = self._person(prepared.image, prepared.stamp_ns)
                 yield prepared, [] if person is None else [person]

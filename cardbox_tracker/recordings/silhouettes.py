@@ -205,7 +205,9 @@ class SilhouetteSource:
         self._given: GivenPoints | None = None
         self._points: FindPoints = lambda prepared, silhouette: None
         if (detector := self._detector) is not None:
-            self._points = lambda prepared, silhouette: detector.points(prepared.image)
+            self._points = lambda prepared, silhouette: detector.points(
+                prepared.image, prepared.stamp_ns
+            )
         elif isinstance(points, PointTable):
             calibration = self._pipeline.calibration
             given = points.read(camera, (calibration.width, calibration.height))

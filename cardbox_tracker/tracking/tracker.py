@@ -13,6 +13,9 @@ import numpy as np
 from cardbox_tracker.camera.camera import Camera
 from cardbox_tracker.camera.view import OtherCamera, View
 from cardbox_tracker.common.settings import restarts
+from cardbox_tracker.detectors.figure import Figure
+from cardbox_tracker.detectors.identity import Identity, colours_in
+from cardbox_tracker.detectors.image_points import POINT_NAMES
 from cardbox_tracker.person.kinematics import clavicles
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.posture import N_STATE, PITCH, TORSO_Y
@@ -30,6 +33,8 @@ from cardbox_tracker.search.pose_filter import (
 from cardbox_tracker.search.whole_body import WholeBodyFilter
 from cardbox_tracker.terms.compiled import CompiledSilhouette
 from cardbox_tracker.terms.inner_cue import InnerCueTerm
+from cardbox_tracker.terms.joint_points import projected
+from cardbox_tracker.terms.joint_points_kernels import HIPS, POINTS_OF_ARM, SHOULDER
 from cardbox_tracker.terms.silhouette import SilhouetteTerm
 from cardbox_tracker.terms.term import USUAL_INTERVAL_S, Frame, Image, Posed, Silhouette
 from cardbox_tracker.tracking.camera_agreement import CameraAgreement
@@ -139,6 +144,8 @@ class Tracker:
             make_filter = partial(WholeBodyFilter, corrector=self._corrector)
         for camera in self._cameras:
             camera.reset(self.config)
+        self._identities = [Identity() for _ in self._cameras]
+        self._now_ns = 0
         rng = self._rng.spawn(1)[0]
         self._filter = make_filter(self.config, self._silhouette, rng, self.views)
         self._head = HeadTracker(self.body, self.camera)
@@ -246,8 +253,8 @@ class Tracker:
                 )
         if self._others:
             observations = self._frozen.without(observations)
-        frames = self._frames_of(observations)
-        estimate = self._placed(frames, self._track(frames))
+        frames = [self._of_person(*one) for one in enumerate(self._frames_of(observations))]
+        estimate = self._placed(frames, self._same(frames[0], self._track(frames)))
         is_tilt_unknown = self.body.camera_pose.pitch_stddev_rad > UNKNOWN_TILT_RAD
         if estimate.state == TRACKING and (self.body.unknown or is_tilt_unknown):
             estimate = replace(estimate, state=UNCERTAIN)
@@ -316,6 +323,49 @@ class Tracker:
             camera.frame(observation, self._before, is_sure, interval_s)
             for camera, observation in zip_longest(self._cameras, observations)
         ]
+
+    def _of_person(self, camera: int, frame: Frame) -> Frame:
+        """Return the frame of a camera without points of somebody who is not the person."""
+        if camera == 0:
+            usual_ns = self._now_ns + round(1e9 * frame.interval_s)
+            self._now_ns = usual_ns if frame.stamp_ns is None else frame.stamp_ns
+        points, identity = frame.points, self._identities[camera]
+        if points is None or points.is_empty:
+            return frame
+        seen_ns = self._now_ns if points.stamp_ns is None else points.stamp_ns
+        figure = Figure(dict(zip(POINT_NAMES, points.px, strict=True)))
+        if identity.is_same(figure, _colours_of(figure, frame), seen_ns):
+            return frame
+        return frame.changed(channels={**frame.channels, "points": None})
+
+    def _same(self, frame: Frame, estimate: Estimate) -> Estimate:
+        """Return the estimate, which is lost if it is that of somebody else than the points were.
+
+        Without the person's points, the place of the estimate itself must be one that the person
+        can have reached, with the colours of the person.
+        """
+        identity = self._identities[0]
+        if self._others or estimate.posture is None or identity.is_new:
+            return estimate
+        points = frame.points
+        if points is None or points.is_empty:
+            assert self._before is not None
+            there = projected(Posed(self._cameras[0].posable, self._before[None]))[:, :2]
+            joints = {"left_shoulder": there[SHOULDER], "left_hip": there[HIPS]}
+            joints |= {"right_shoulder": there[POINTS_OF_ARM + SHOULDER], "right_hip": there[HIPS]}
+            figure = Figure(joints)
+            silhouette = frame.silhouette
+            is_seen = (figure.trunk(silhouette.shape) & silhouette).any()
+            colours = _colours_of(figure, frame)
+            if not is_seen or not identity.is_same(figure, colours, self._now_ns):
+                self._before = None
+                self._filter.forget()
+                return Estimate(LOST)
+        if not identity.is_doubtful or estimate.state != TRACKING:
+            return estimate
+        states = estimate.keypoint_states
+        states = None if states is None else doubted(states)
+        return replace(estimate, state=UNCERTAIN, keypoint_states=states)
 
     def _track(self, frames: list[Frame]) -> Estimate:
         if self._fitting is None:
@@ -408,6 +458,13 @@ class Tracker:
             self._facing.see(frame, Posed(self._cameras[0].posable, self._before[None]))
             return self._facing.shows_back
         return self.agreement is not None and self.agreement.is_contradicted
+
+
+def _colours_of(figure: Figure, frame: Frame) -> FloatArray | None:
+    """Return the colours of the trunk of a figure in a frame; None if they are not seen."""
+    if frame.image is None:
+        return None
+    return colours_in(frame.image, figure.trunk(frame.silhouette.shape) & frame.silhouette)
 
 
 def _silhouettes(frames: Sequence[Frame]) -> tuple[Silhouette, list[Silhouette]]:

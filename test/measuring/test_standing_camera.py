@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from cardbox_tracker.camera.camera import Camera
-from cardbox_tracker.detectors.landmarks import LANDMARKS
-from cardbox_tracker.detectors.pose_network import Detection
+from cardbox_tracker.detectors.pose_network import LANDMARKS, Detection
 from cardbox_tracker.measuring.standing_camera import (
     LEVELS,
     USUAL_PITCH,

@@ -13,9 +13,8 @@ import pytest
 
 from cardbox_tracker.camera.camera import Camera
 from cardbox_tracker.detectors.detector import Detector
-from cardbox_tracker.detectors.landmarks import LANDMARKS
 from cardbox_tracker.detectors.model_files import ModelFiles
-from cardbox_tracker.detectors.pose_network import Detection
+from cardbox_tracker.detectors.pose_network import LANDMARKS, Detection
 from cardbox_tracker.measuring.standing_camera import LEVELS, PITCH_PRIOR, USUAL_PITCH
 from cardbox_tracker.recordings import standing
 from cardbox_tracker.recordings.silhouettes import TimeSpan

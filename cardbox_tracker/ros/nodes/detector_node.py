@@ -18,8 +18,7 @@ from cardbox_tracker.camera.camera import Calibration, Camera
 from cardbox_tracker.camera.stamps import WINDOW, StampOrder
 from cardbox_tracker.camera.unrectify import unrectified
 from cardbox_tracker.detectors.detector import Detector, PersonDetector
-from cardbox_tracker.detectors.landmarks import LANDMARKS
-from cardbox_tracker.detectors.pose_network import Detection
+from cardbox_tracker.detectors.pose_network import LANDMARKS, Detection
 from cardbox_tracker.measuring.standing_camera import middles, standing_camera
 from cardbox_tracker.ros.messages.conversions import ImageArray, stamp_ns
 from cardbox_tracker.ros.messages.keypoints import (
@@ -198,7 +197,7 @@ class DetectorNode(CardboxNode):
         """Return the people in an image, or the one who is followed."""
         if self.parameters.value.people:
             return self._person.all_in(at_ns, image)
-        person = self._person(image)
+        person = self._person(image, at_ns)
         return [] if person is None else [person]
 
     def _is_due(self, at_ns: int) -> bool:
