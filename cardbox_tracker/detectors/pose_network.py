@@ -189,14 +189,14 @@ class PoseNetwork:
             if located is not None and self._is_same(image, located):
                 if identity.is_doubtful and people is None:
                     people = self._people(rgb)
-                if not identity.is_doubtful or len(people or ()) < 2:
+                if not identity.is_doubtful or not self.several:
                     return self._follow(located)
         people = self._people(rgb) if people is None else people
         self._square = None
         if not identity.is_known and people:
             identity.forget()
             people = [people[0] if self.choose is None else self.choose(people)]
-        elif len(people) > 1:
+        elif self.several:
             identity.lose()
         for square in people:
             located = self.located(rgb, square)

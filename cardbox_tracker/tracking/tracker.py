@@ -18,7 +18,15 @@ from cardbox_tracker.detectors.identity import Identity, colours_in
 from cardbox_tracker.detectors.image_points import POINT_NAMES
 from cardbox_tracker.person.kinematics import clavicles
 from cardbox_tracker.person.model import BodyModel
-from cardbox_tracker.person.posture import N_STATE, PITCH, TORSO_Y
+from cardbox_tracker.person.posture import (
+    LEFT_ARM,
+    N_STATE,
+    PITCH,
+    RIGHT_ARM,
+    TORSO_Y,
+    TURNING_LIMITS,
+    TURNS,
+)
 from cardbox_tracker.person.sizes import FloatArray
 from cardbox_tracker.search.config import TrackerConfig
 from cardbox_tracker.search.cycles import Cycles
@@ -64,6 +72,8 @@ which nothing tells more of, is above it."""
 
 # A model that overlaps the silhouette less than this is somewhere else.
 _TOUCHING_IOU = 0.05
+# A joint is at its limit within this angle, rad.
+_AT_LIMIT_RAD = np.radians(0.5)
 
 
 class Tracker:
@@ -258,6 +268,9 @@ class Tracker:
         is_tilt_unknown = self.body.camera_pose.pitch_stddev_rad > UNKNOWN_TILT_RAD
         if estimate.state == TRACKING and (self.body.unknown or is_tilt_unknown):
             estimate = replace(estimate, state=UNCERTAIN)
+        posture = estimate.posture
+        if self.config.has_several_views and posture is not None and is_at_two_limits(posture):
+            estimate = _unsure(estimate)
         self._count(observations, frames, estimate)
         return self._head.see(frames[0], estimate)
 
@@ -272,14 +285,10 @@ class Tracker:
         # The trunk leans in the level frame, which the camera's pitch defines.
         stddev[PITCH] = np.hypot(stddev[PITCH], self.body.camera_pose.pitch_stddev_rad)
         moved_m = np.hypot(estimate.offset_stddev_m, place.stddev_m[[0, 2]])
-        state, states = estimate.state, estimate.keypoint_states
         if self._place.is_too_large:
-            state = UNCERTAIN if state == TRACKING else state
-            states = None if states is None else doubted(states)
+            estimate = _unsure(estimate)
         return replace(
             estimate,
-            state=state,
-            keypoint_states=states,
             posture_stddev=stddev,
             offset_stddev_m=moved_m,
             place=place,
@@ -344,28 +353,22 @@ class Tracker:
         Without the person's points, the place of the estimate itself must be one that the person
         can have reached, with the colours of the person.
         """
-        identity = self._identities[0]
+        identity, points = self._identities[0], frame.points
         if self._others or estimate.posture is None or identity.is_new:
             return estimate
-        points = frame.points
         if points is None or points.is_empty:
             assert self._before is not None
             there = projected(Posed(self._cameras[0].posable, self._before[None]))[:, :2]
             joints = {"left_shoulder": there[SHOULDER], "left_hip": there[HIPS]}
             joints |= {"right_shoulder": there[POINTS_OF_ARM + SHOULDER], "right_hip": there[HIPS]}
-            figure = Figure(joints)
-            silhouette = frame.silhouette
+            figure, silhouette = Figure(joints), frame.silhouette
             is_seen = (figure.trunk(silhouette.shape) & silhouette).any()
             colours = _colours_of(figure, frame)
             if not is_seen or not identity.is_same(figure, colours, self._now_ns):
                 self._before = None
                 self._filter.forget()
                 return Estimate(LOST)
-        if not identity.is_doubtful or estimate.state != TRACKING:
-            return estimate
-        states = estimate.keypoint_states
-        states = None if states is None else doubted(states)
-        return replace(estimate, state=UNCERTAIN, keypoint_states=states)
+        return _unsure(estimate) if identity.is_doubtful else estimate
 
     def _track(self, frames: list[Frame]) -> Estimate:
         if self._fitting is None:
@@ -458,6 +461,23 @@ class Tracker:
             self._facing.see(frame, Posed(self._cameras[0].posable, self._before[None]))
             return self._facing.shows_back
         return self.agreement is not None and self.agreement.is_contradicted
+
+
+def _unsure(estimate: Estimate) -> Estimate:
+    """Return an estimate of which nothing is ``tracking``."""
+    states = estimate.keypoint_states
+    state = UNCERTAIN if estimate.state == TRACKING else estimate.state
+    states = None if states is None else doubted(states)
+    return replace(estimate, state=state, keypoint_states=states)
+
+
+def is_at_two_limits(posture: FloatArray) -> bool:
+    """Return whether two joints of the trunk, or of one arm, are at their limits.
+
+    People hardly do that, but a search that finds no way on does.
+    """
+    is_at = (np.abs(posture[:, None] - TURNING_LIMITS) < _AT_LIMIT_RAD).any(axis=1)
+    return any(np.count_nonzero(is_at[part]) >= 2 for part in (TURNS, LEFT_ARM, RIGHT_ARM))
 
 
 def _colours_of(figure: Figure, frame: Frame) -> FloatArray | None:

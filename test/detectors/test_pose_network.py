@@ -192,9 +192,16 @@ def test_somebody_who_steps_before_the_person_is_not_followed() -> None:
     assert columns_of(network, 10)[3:] == [-1.0] * 7
     network.people = [(66.0, RED), (50.0, BLUE)]
     assert columns_of(network, 3) == [50.0] * 3
-    # Alone, they may hold something before the chest.
-    network.people = [(50.0, GREEN)]
-    assert columns_of(network, 10) == [50.0] * 10
+    # Nobody who is hidden for longer is mistaken for the one who hides them.
+    network.people = [(60.0, RED)]
+    assert columns_of(network, 10)[3:] == [-1.0] * 7
+
+
+def test_somebody_who_is_alone_may_hold_something_before_the_chest() -> None:
+    network = SeveralPeople((60.0, BLUE))
+    columns_of(network, 6)
+    network.people = [(62.0, RED)]
+    assert columns_of(network, 10) == [62.0] * 10
 
 
 def test_several_people_are_noticed_while_one_is_followed() -> None:
