@@ -352,7 +352,8 @@ def why_not(silhouette: NDArray[np.uint8], person: ImagePoints) -> str:
     if near is None or person.is_empty:
         return ""
     share, exchanged = inside(near, person), ImagePoints(person.px[:, ::-1], person.scores)
-    if _lies(person) and inside(near, exchanged) >= share:
+    is_tall = near.any(axis=1).sum() > near.any(axis=0).sum()
+    if is_tall and _lies(person) and inside(near, exchanged) >= share:
         return _EXCHANGED
     if share >= _MOST_DOUBTFUL:
         return ""

@@ -155,7 +155,7 @@ class Tracker:
         for camera in self._cameras:
             camera.reset(self.config)
         self._identities = [Identity() for _ in self._cameras]
-        self._now_ns = 0
+        self._now_ns, self._sees_other = 0, False
         rng = self._rng.spawn(1)[0]
         self._filter = make_filter(self.config, self._silhouette, rng, self.views)
         self._head = HeadTracker(self.body, self.camera)
@@ -338,6 +338,7 @@ class Tracker:
         if camera == 0:
             usual_ns = self._now_ns + round(1e9 * frame.interval_s)
             self._now_ns = usual_ns if frame.stamp_ns is None else frame.stamp_ns
+            self._sees_other = False
         points, identity = frame.points, self._identities[camera]
         if points is None or points.is_empty:
             return frame
@@ -345,6 +346,7 @@ class Tracker:
         figure = Figure(dict(zip(POINT_NAMES, points.px, strict=True)))
         if identity.is_same(figure, _colours_of(figure, frame), seen_ns):
             return frame
+        self._sees_other |= camera == 0
         return frame.changed(channels={**frame.channels, "points": None})
 
     def _same(self, frame: Frame, estimate: Estimate) -> Estimate:
@@ -354,8 +356,10 @@ class Tracker:
         can have reached, with the colours of the person.
         """
         identity, points = self._identities[0], frame.points
-        if self._others or estimate.posture is None or identity.is_new:
+        if self._others or identity.is_new:
             return estimate
+        if estimate.posture is None:
+            return Estimate(LOST) if self._sees_other else estimate
         if points is None or points.is_empty:
             assert self._before is not None
             there = projected(Posed(self._cameras[0].posable, self._before[None]))[:, :2]
@@ -484,7 +488,8 @@ def _colours_of(figure: Figure, frame: Frame) -> FloatArray | None:
     """Return the colours of the trunk of a figure in a frame; None if they are not seen."""
     if frame.image is None:
         return None
-    return colours_in(frame.image, figure.trunk(frame.silhouette.shape) & frame.silhouette)
+    # The silhouette lacks whoever is far from the last posture.
+    return colours_in(frame.image, figure.trunk(frame.silhouette.shape))
 
 
 def _silhouettes(frames: Sequence[Frame]) -> tuple[Silhouette, list[Silhouette]]:

@@ -1,4 +1,4 @@
-"""Whether somebody is the person of the images before: places, clothes, and what the tracker says."""
+"""Whether somebody is the person of the images before: places, clothes, and the tracker."""
 
 from __future__ import annotations
 

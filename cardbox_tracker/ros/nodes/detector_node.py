@@ -235,6 +235,8 @@ class DetectorNode(CardboxNode):
             "images without a person": str(self._person.missed),
             "ignored CameraInfo": str(self._images.watch.ignored),
         }
+        if self._person.remark:
+            values["several people"] = self._person.remark
         if self._took_ms:
             values["time of an image (ms)"] = f"{np.median(self._took_ms):.1f}"
         if self._silhouettes is not None:
