@@ -98,11 +98,17 @@ def track(
     print_remarks(remarks, summary.remarks)
     if show is None:
         print(f"assumed: {', '.join(summary.assumptions)}")
+        unseen = 0
         for number, quality in sorted(qualities.items()):
+            if number and not summary.people[number].frames_tracked:
+                unseen += 1
+                continue
             if number:
                 one = summary.people[number]
                 print(f"person {number}: tracked {one.frames_tracked} of {one.frames} images")
             print(*quality.lines(), sep="\n")
+        if unseen:
+            print(f"{unseen} more, of {len(summary.people)} people, in no image")
         if summary.used_text:
             print(summary.used_text)
     for number, one in (summary.people or {1: summary}).items():

@@ -78,9 +78,9 @@ class PersonDetector:
             self._people.forget()
         self.missed = 0
 
-    def __call__(self, image: Image) -> Detection | None:
-        """Return the person in an image (H, W) or (H, W, 3), bgr; None if there is nobody."""
-        found = self._network(color(image))
+    def __call__(self, image: Image, stamp_ns: int | None = None) -> Detection | None:
+        """Return the person in an image (H, W) or (H, W, 3), bgr, of a time; None if not seen."""
+        found = self._network(color(image), stamp_ns)
         self.missed += found is None
         return found
 
@@ -102,9 +102,9 @@ class PersonDetector:
             "chooses, and --people follows all"
         )
 
-    def points(self, image: Image) -> ImagePoints | None:
-        """Return the points in an image at the working size."""
-        found = self(image)
+    def points(self, image: Image, stamp_ns: int | None = None) -> ImagePoints | None:
+        """Return the points in an image at the working size, of a time."""
+        found = self(image, stamp_ns)
         return None if found is None else image_points(found)
 
 

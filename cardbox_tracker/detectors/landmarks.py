@@ -1,4 +1,4 @@
-"""Names of the 33 points of MediaPipe's pose network, and their conversion for the tracker."""
+"""Conversion of the 33 points of MediaPipe's pose network for the tracker."""
 
 from __future__ import annotations
 
@@ -10,44 +10,7 @@ from cardbox_tracker.detectors.image_points import (
     ImagePoints,
     LegPoints,
 )
-from cardbox_tracker.detectors.pose_network import Detection
-
-LANDMARKS = (
-    "nose",
-    "left_eye_inner",
-    "left_eye",
-    "left_eye_outer",
-    "right_eye_inner",
-    "right_eye",
-    "right_eye_outer",
-    "left_ear",
-    "right_ear",
-    "mouth_left",
-    "mouth_right",
-    "left_shoulder",
-    "right_shoulder",
-    "left_elbow",
-    "right_elbow",
-    "left_wrist",
-    "right_wrist",
-    "left_little_finger",
-    "right_little_finger",
-    "left_index",
-    "right_index",
-    "left_thumb",
-    "right_thumb",
-    "left_hip",
-    "right_hip",
-    "left_knee",
-    "right_knee",
-    "left_ankle",
-    "right_ankle",
-    "left_heel",
-    "right_heel",
-    "left_foot",
-    "right_foot",
-)
-"""``left`` is the person's left; fingers are their knuckles at the base."""
+from cardbox_tracker.detectors.pose_network import LANDMARKS, Detection
 
 _USED = np.array([LANDMARKS.index(name) for name in POINT_NAMES])
 _LEGS = np.array([LANDMARKS.index(name) for name in LEG_POINT_NAMES])

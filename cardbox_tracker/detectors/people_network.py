@@ -14,12 +14,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cardbox_tracker.detectors.figure import Figure
-from cardbox_tracker.detectors.landmarks import LANDMARKS
 from cardbox_tracker.detectors.pose_network import (
     ColorImage,
     Detection,
     PoseNetwork,
     Square,
+    figure_of,
 )
 
 Mask = NDArray[np.uint8]
@@ -48,11 +48,6 @@ class _Followed:
     def of(cls, found: Detection, square: Square, stamp_ns: int) -> _Followed:
         figure = figure_of(found)
         return cls(square, found, figure, stamp_ns, figure.drawn(found.mask.shape))
-
-
-def figure_of(found: Detection) -> Figure:
-    """Return the figure of a detection."""
-    return Figure(dict(zip(LANDMARKS, found.points_px, strict=True)))
 
 
 class PeopleNetwork:

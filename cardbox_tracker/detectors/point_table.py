@@ -349,7 +349,13 @@ def why_not(silhouette: NDArray[np.uint8], person: ImagePoints) -> str:
     Points that are wrong in another way than their place may lie on the person in part.
     """
     near = near_person(silhouette)
-    if near is None or person.is_empty or (share := inside(near, person)) >= _MOST_DOUBTFUL:
+    if near is None or person.is_empty:
+        return ""
+    share, exchanged = inside(near, person), ImagePoints(person.px[:, ::-1], person.scores)
+    is_tall = near.any(axis=1).sum() > near.any(axis=0).sum()
+    if is_tall and _lies(person) and inside(near, exchanged) >= share:
+        return _EXCHANGED
+    if share >= _MOST_DOUBTFUL:
         return ""
     mirrored = np.stack([silhouette.shape[1] - 1 - person.px[:, 0], person.px[:, 1]], axis=1)
     others = {_EXCHANGED: person.px[:, ::-1], _MIRRORED: mirrored}
@@ -358,6 +364,16 @@ def why_not(silhouette: NDArray[np.uint8], person: ImagePoints) -> str:
     if shares[best] >= _LEAST_SURE:
         return best
     return _BESIDE if share < LEAST_INSIDE else ""
+
+
+def _lies(person: ImagePoints) -> bool:
+    """Return whether the trunk is rather level than upright in the image."""
+    shoulders, hips = (
+        person.px[[POINT_INDEX[f"{side}_{joint}"] for side in ("left", "right")]].mean(axis=0)
+        for joint in ("shoulder", "hip")
+    )
+    across_px, down_px = np.abs(hips - shoulders).tolist()
+    return bool(across_px > down_px)
 
 
 def placed(person: ImagePoints, calibration: Calibration, size: Size) -> ImagePoints:

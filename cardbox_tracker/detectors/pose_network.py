@@ -23,12 +23,50 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cardbox_tracker.common.errors import CardboxError
+from cardbox_tracker.detectors.figure import Figure
+from cardbox_tracker.detectors.identity import Identity, colours_in
 
 FloatArray = NDArray[np.float64]
 ColorImage = NDArray[np.uint8]
 
-POINTS = 33
-"""Points of a person; ``LANDMARKS`` of :mod:`.landmarks` names them."""
+LANDMARKS = (
+    "nose",
+    "left_eye_inner",
+    "left_eye",
+    "left_eye_outer",
+    "right_eye_inner",
+    "right_eye",
+    "right_eye_outer",
+    "left_ear",
+    "right_ear",
+    "mouth_left",
+    "mouth_right",
+    "left_shoulder",
+    "right_shoulder",
+    "left_elbow",
+    "right_elbow",
+    "left_wrist",
+    "right_wrist",
+    "left_little_finger",
+    "right_little_finger",
+    "left_index",
+    "right_index",
+    "left_thumb",
+    "right_thumb",
+    "left_hip",
+    "right_hip",
+    "left_knee",
+    "right_knee",
+    "left_ankle",
+    "right_ankle",
+    "left_heel",
+    "right_heel",
+    "left_foot",
+    "right_foot",
+)
+"""``left`` is the person's left; fingers are their knuckles at the base."""
+POINTS = len(LANDMARKS)
+"""Points of a person."""
 
 _DETECTOR_PX, _LANDMARK_PX = 224, 256
 # Cells of the detector's feature maps: pixels a cell, anchors a cell.
@@ -37,8 +75,8 @@ _LEAST_DETECTION, _LEAST_PRESENCE = 0.5, 0.5
 _SAME_PERSON_IOU = 0.3
 # Hips of two people are at least this share of a square apart.
 _LEAST_APART = 0.2
-# Images between those that are also searched for further people.
-_LOOK_AROUND = 30
+# Images between those that are also searched for further people, and usual time between images.
+_LOOK_AROUND, _USUAL_NS = 30, 33_333_333
 # A chance of one half.
 _LEAST_MASK = 128
 # Grey of pixels that the landmark network does not see.
@@ -96,6 +134,11 @@ class Detection(NamedTuple):
         return np.where(self.mask >= _LEAST_MASK, 255, 0).astype(np.uint8)
 
 
+def figure_of(found: Detection) -> Figure:
+    """Return the figure of a detection."""
+    return Figure(dict(zip(LANDMARKS, found.points_px, strict=True)))
+
+
 Choose = Callable[[Sequence[Square]], Square]
 """Takes the squares around several people, the most certain one first; returns one of them."""
 
@@ -121,31 +164,58 @@ class PoseNetwork:
         self.forget()
 
     def forget(self) -> None:
-        """Search the whole next image instead of around the last person."""
+        """Search the whole next image instead of around the last person, for whoever is there."""
         self._square: Square | None = None
-        self._last: Square | None = None
-        self._images = self.several = 0
+        self._images = self._now_ns = self.several = 0
+        self._identity = Identity()
 
-    def __call__(self, image: ColorImage) -> Detection | None:
-        """Return the person in ``image`` (H, W, 3), bgr; None where there is nobody."""
-        image = np.ascontiguousarray(image[..., ::-1])
+    def __call__(self, image: ColorImage, stamp_ns: int | None = None) -> Detection | None:
+        """Return the person in an image; None where the one who is followed is not seen.
+
+        Whom it found first it follows, and nobody else.
+
+        Args:
+            image: (H, W, 3), bgr.
+            stamp_ns: its time, ns; None for 1/30 s after the last image.
+        """
+        rgb = np.ascontiguousarray(image[..., ::-1])
         self._images += 1
+        self._now_ns = self._now_ns + _USUAL_NS if stamp_ns is None else stamp_ns
+        identity, people = self._identity, None
         if self._square is not None:
             if self._images % _LOOK_AROUND == 0:
-                self._people(image)
-            if (found := self._located(image, self._square)) is not None:
-                return found
-        square = self._chosen(self._people(image))
+                people = self._people(rgb)
+            located = self.located(rgb, self._square)
+            if located is not None and self._is_same(image, located):
+                if identity.is_doubtful and people is None:
+                    people = self._people(rgb)
+                if not identity.is_doubtful or not self.several:
+                    return self._follow(located)
+        people = self._people(rgb) if people is None else people
         self._square = None
-        return None if square is None else self._located(image, square)
+        if not identity.is_known and people:
+            identity.forget()
+            people = [people[0] if self.choose is None else self.choose(people)]
+        elif self.several:
+            identity.lose()
+        for square in people:
+            located = self.located(rgb, square)
+            if located is not None and self._is_same(image, located):
+                return self._follow(located)
+        if not people:
+            identity.nobody(self._now_ns)
+        return None
 
-    def _chosen(self, people: Sequence[Square]) -> Square | None:
-        """Return the most certain person, or the chosen one, who is followed from then on."""
-        if self.choose is None or not people:
-            return people[0] if people else None
-        if (last := self._last) is not None:
-            return min(people, key=lambda one: hypot(one.u - last.u, one.v - last.v))
-        return self.choose(people)
+    def _follow(self, located: tuple[Detection, Square]) -> Detection:
+        found, self._square = located
+        return found
+
+    def _is_same(self, image: ColorImage, located: tuple[Detection, Square]) -> bool:
+        """Return whether somebody in a bgr image is the person who is followed."""
+        found = located[0]
+        figure = figure_of(found)
+        trunk = figure.trunk(found.mask.shape) & found.silhouette()
+        return self._identity.is_same(figure, colours_in(image, trunk), self._now_ns)
 
     def _people(self, image: ColorImage) -> list[Square]:
         """Return the squares around the people in an rgb image, the most certain one first."""
@@ -153,15 +223,6 @@ class PoseNetwork:
         people = self.detected(image, Square(width / 2, height / 2, max(height, width), 0.0))
         self.several += len(people) > 1
         return people
-
-    def _located(self, image: ColorImage, square: Square) -> Detection | None:
-        """Return the person in a square of an rgb image, who is followed from then on."""
-        located = self.located(image, square)
-        if located is None:
-            return None
-        found, self._square = located
-        self._last = self._square
-        return found
 
     def detected(self, image: ColorImage, view: Square) -> list[Square]:
         """Return squares around people in a view of an rgb image, the most certain one first."""

@@ -56,7 +56,7 @@ class KeptDetections:
         if self._finds_people:
             found = self.detector.all_in(stamp_ns, image)
         else:
-            person = self.detector(image)
+            person = self.detector(image, stamp_ns)
             found = [] if person is None else [person]
         self._file.seek(0, 2)
         self._places[number] = self._file.tell()

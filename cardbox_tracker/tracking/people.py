@@ -19,6 +19,7 @@ import numpy as np
 
 from cardbox_tracker.camera.camera import Camera
 from cardbox_tracker.detectors.figure import Figure
+from cardbox_tracker.detectors.identity import ALIKE, GONE_NS, apart, colours_in
 from cardbox_tracker.detectors.image_points import POINT_NAMES, ImagePoints
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.sizes import FloatArray
@@ -26,7 +27,7 @@ from cardbox_tracker.person.skeleton import KeypointState
 from cardbox_tracker.search.config import TrackerConfig
 from cardbox_tracker.search.doubt import doubted
 from cardbox_tracker.terms.term import Image, Silhouette
-from cardbox_tracker.tracking.estimate import NO_PERSON, UNCERTAIN, Estimate
+from cardbox_tracker.tracking.estimate import LOST, NO_PERSON, UNCERTAIN, Estimate
 from cardbox_tracker.tracking.observation import Observation
 from cardbox_tracker.tracking.person_masks import PersonDrawer
 from cardbox_tracker.tracking.tracker import Tracker
@@ -38,9 +39,6 @@ MOST_PEOPLE = 6
 _PLACE, _PLACE_PER_S = 0.5, 2.0
 # Deviation of the colours of one person: Bhattacharyya distance of the trunk's histograms.
 _COLOURS = 0.3
-# The distance up to which colours alone tell that it is the same person; different clothes have 0.8
-# to 1, those of one person 0.1 to 0.4.
-_ALIKE = 0.6
 # Change of that distance that changes the odds of being the same person by a factor of e.
 _ALIKE_SPREAD = 0.07
 # Squared deviations above which a figure is somebody else.
@@ -55,8 +53,8 @@ _HIDDEN, _MIXED = 0.15, 0.5
 _SEEN = 0.4
 # Time for which somebody whom the detector misses stays where they were if nobody hides them, ns.
 _DROPPED_NS = 300_000_000
-# Time for which a hidden person stays where they were, and after which the place means nothing, ns.
-_HELD_NS, _GONE_NS = 3_000_000_000, 1_500_000_000
+# Time for which a hidden person stays where they were, ns.
+_HELD_NS = 3_000_000_000
 # Images in a row in which somebody new is seen before they are tracked, after the first images.
 _PROVED = 3
 # Least area and height of the region of a new person, as shares of the image.
@@ -242,11 +240,11 @@ class People:
             # Free regions are not those of people who are tracked.
             return _OTHER
         # Unknown colours, such as those of a person in a grey image, agree with all.
-        other = _ALIKE / 2
+        other = ALIKE / 2
         if colours is not None and person.colours is not None:
-            other = _distance(person.colours, colours)
-        if away_ns > _GONE_NS or one.figure is None or person.figure is None:
-            return _OTHER * (other / _ALIKE) ** 2
+            other = apart(person.colours, colours)
+        if away_ns > GONE_NS or one.figure is None or person.figure is None:
+            return _OTHER * (other / ALIKE) ** 2
         deviation = _PLACE + _PLACE_PER_S * away_ns / 1e9
         return (other / _COLOURS) ** 2 + (person.figure.apart(one.figure) / deviation) ** 2
 
@@ -283,7 +281,7 @@ class People:
         return added
 
     def _see(self, person: _Person, one: Shown, colours: FloatArray | None, stamp_ns: int) -> None:
-        if person.seen_ns is not None and stamp_ns - person.seen_ns > _GONE_NS:
+        if person.seen_ns is not None and stamp_ns - person.seen_ns > GONE_NS:
             person.tracker.reset()
             person.chance = _chance_of_same(person.colours, colours)
         person.points = one.points
@@ -310,7 +308,7 @@ class People:
             colours = _colours_of(Shown(None, None, own), image, own)
         if colours is None or person.colours is None:
             return False
-        is_other = _distance(person.colours, colours) > _ALIKE
+        is_other = apart(person.colours, colours) > ALIKE
         person.others_images = person.others_images + 1 if is_other else 0
         return person.others_images >= _OTHERS_IMAGES
 
@@ -371,6 +369,10 @@ class People:
                     return _held(last, hidden=True)
                 if now_ns - person.seen_ns <= _DROPPED_NS:
                     return _held(last)
+        if is_detected and now_ns - person.seen_ns > GONE_NS:
+            # The rest of the silhouette is that of others: only an image of them brings them back.
+            gone = Estimate(NO_PERSON if last.state == NO_PERSON else LOST)
+            return replace(gone, person=person.number, person_chance=person.chance)
         found = replace(
             person.tracker.track(one), person=person.number, person_chance=person.chance
         )
@@ -427,29 +429,13 @@ def _colours_of(one: Shown, image: Image | None, silhouette: Silhouette) -> Floa
     else:
         trunk = one.figure.trunk(silhouette.shape)
     trunk &= silhouette
-    if cv2.countNonZero(trunk) < 20:
-        return None
-    if image.ndim == 2:
-        found = cv2.calcHist([image], [0], trunk, [16], [0, 256])
-    else:
-        lab = cv2.cvtColor(image, cv2.COLOR_BGR2LAB)
-        found = cv2.calcHist([lab], [0, 1, 2], trunk, [4, 16, 16], [0, 256] * 3)
-    histogram: FloatArray = np.asarray(found, np.float64).ravel()
-    histogram /= max(float(histogram.sum()), 1.0)
-    return histogram
-
-
-def _distance(one: FloatArray, other: FloatArray) -> float:
-    """Return the Bhattacharyya distance of two histograms, 0 to 1 (Hellinger)."""
-    if len(one) != len(other):
-        return 1.0
-    return float(np.sqrt(max(1.0 - np.sqrt(one * other).sum(), 0.0)))
+    return colours_in(image, trunk)
 
 
 def _chance_of_same(before: FloatArray | None, now: FloatArray | None) -> float:
     """Return the probability that colours are those of one person; without them, it is even."""
-    away = _ALIKE if before is None or now is None else _distance(before, now)
-    return float(1.0 / (1.0 + np.exp((away - _ALIKE) / _ALIKE_SPREAD)))
+    away = ALIKE if before is None or now is None else apart(before, now)
+    return float(1.0 / (1.0 + np.exp((away - ALIKE) / _ALIKE_SPREAD)))
 
 
 def _cheapest(costs: FloatArray) -> dict[int, int]:

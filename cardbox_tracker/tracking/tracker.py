@@ -13,10 +13,21 @@ import numpy as np
 from cardbox_tracker.camera.camera import Camera
 from cardbox_tracker.camera.view import OtherCamera, View
 from cardbox_tracker.common.settings import restarts
+from cardbox_tracker.detectors.figure import Figure
+from cardbox_tracker.detectors.identity import Identity, colours_in
+from cardbox_tracker.detectors.image_points import POINT_NAMES
 from cardbox_tracker.measuring.seen_body import SeenBody
 from cardbox_tracker.person.kinematics import clavicles
 from cardbox_tracker.person.model import BodyModel
-from cardbox_tracker.person.posture import N_STATE, PITCH, TORSO_Y
+from cardbox_tracker.person.posture import (
+    LEFT_ARM,
+    N_STATE,
+    PITCH,
+    RIGHT_ARM,
+    TORSO_Y,
+    TURNING_LIMITS,
+    TURNS,
+)
 from cardbox_tracker.person.sizes import FloatArray
 from cardbox_tracker.search.config import TrackerConfig
 from cardbox_tracker.search.cycles import Cycles
@@ -31,6 +42,8 @@ from cardbox_tracker.search.pose_filter import (
 from cardbox_tracker.search.whole_body import WholeBodyFilter
 from cardbox_tracker.terms.compiled import CompiledSilhouette
 from cardbox_tracker.terms.inner_cue import InnerCueTerm
+from cardbox_tracker.terms.joint_points import projected
+from cardbox_tracker.terms.joint_points_kernels import HIPS, POINTS_OF_ARM, SHOULDER
 from cardbox_tracker.terms.silhouette import SilhouetteTerm
 from cardbox_tracker.terms.term import USUAL_INTERVAL_S, Frame, Image, Posed, Silhouette
 from cardbox_tracker.tracking.camera_agreement import CameraAgreement
@@ -61,6 +74,8 @@ which nothing tells more of, is above it."""
 _ABSENT_FRAMES = 5
 # A model that overlaps the silhouette less than this is somewhere else.
 _TOUCHING_IOU = 0.05
+# A joint is at its limit within this angle, rad.
+_AT_LIMIT_RAD = np.radians(0.5)
 
 
 class Tracker:
@@ -151,6 +166,8 @@ class Tracker:
             make_filter = partial(WholeBodyFilter, corrector=self._corrector)
         for camera in self._cameras:
             camera.reset(self.config)
+        self._identities = [Identity() for _ in self._cameras]
+        self._now_ns, self._sees_other = 0, False
         rng = self._rng.spawn(1)[0]
         self._filter = make_filter(self.config, self._silhouette, rng, self.views)
         self._head = HeadTracker(self.body, self.camera)
@@ -258,11 +275,14 @@ class Tracker:
                 )
         if self._others:
             observations = self._frozen.without(observations)
-        frames = self._frames_of(observations)
-        estimate = self._placed(frames, self._track(frames))
+        frames = [self._of_person(*one) for one in enumerate(self._frames_of(observations))]
+        estimate = self._placed(frames, self._same(frames[0], self._track(frames)))
         is_tilt_unknown = self.body.camera_pose.pitch_stddev_rad > UNKNOWN_TILT_RAD
         if estimate.state == TRACKING and (self.body.unknown or is_tilt_unknown):
             estimate = replace(estimate, state=UNCERTAIN)
+        posture = estimate.posture
+        if self.config.has_several_views and posture is not None and is_at_two_limits(posture):
+            estimate = _unsure(estimate)
         self._count(observations, frames, estimate)
         return self._head.see(frames[0], estimate)
 
@@ -277,14 +297,10 @@ class Tracker:
         # The trunk leans in the level frame, which the camera's pitch defines.
         stddev[PITCH] = np.hypot(stddev[PITCH], self.body.camera_pose.pitch_stddev_rad)
         moved_m = np.hypot(estimate.offset_stddev_m, place.stddev_m[[0, 2]])
-        state, states = estimate.state, estimate.keypoint_states
         if self._place.is_too_large:
-            state = UNCERTAIN if state == TRACKING else state
-            states = None if states is None else doubted(states)
+            estimate = _unsure(estimate)
         return replace(
             estimate,
-            state=state,
-            keypoint_states=states,
             posture_stddev=stddev,
             offset_stddev_m=moved_m,
             place=place,
@@ -328,6 +344,47 @@ class Tracker:
             camera.frame(observation, self._before, is_sure, interval_s)
             for camera, observation in zip_longest(self._cameras, observations)
         ]
+
+    def _of_person(self, camera: int, frame: Frame) -> Frame:
+        """Return the frame of a camera without points of somebody who is not the person."""
+        if camera == 0:
+            usual_ns = self._now_ns + round(1e9 * frame.interval_s)
+            self._now_ns = usual_ns if frame.stamp_ns is None else frame.stamp_ns
+            self._sees_other = False
+        points, identity = frame.points, self._identities[camera]
+        if points is None or points.is_empty:
+            return frame
+        seen_ns = self._now_ns if points.stamp_ns is None else points.stamp_ns
+        figure = Figure(dict(zip(POINT_NAMES, points.px, strict=True)))
+        if identity.is_same(figure, _colours_of(figure, frame), seen_ns):
+            return frame
+        self._sees_other |= camera == 0
+        return frame.changed(channels={**frame.channels, "points": None})
+
+    def _same(self, frame: Frame, estimate: Estimate) -> Estimate:
+        """Return the estimate, which is lost if it is that of somebody else than the points were.
+
+        Without the person's points, the place of the estimate itself must be one that the person
+        can have reached, with the colours of the person.
+        """
+        identity, points = self._identities[0], frame.points
+        if self._others or identity.is_new:
+            return estimate
+        if estimate.posture is None:
+            return Estimate(LOST) if self._sees_other else estimate
+        if points is None or points.is_empty:
+            assert self._before is not None
+            there = projected(Posed(self._cameras[0].posable, self._before[None]))[:, :2]
+            joints = {"left_shoulder": there[SHOULDER], "left_hip": there[HIPS]}
+            joints |= {"right_shoulder": there[POINTS_OF_ARM + SHOULDER], "right_hip": there[HIPS]}
+            figure, silhouette = Figure(joints), frame.silhouette
+            is_seen = (figure.trunk(silhouette.shape) & silhouette).any()
+            colours = _colours_of(figure, frame)
+            if not is_seen or not identity.is_same(figure, colours, self._now_ns):
+                self._before = None
+                self._filter.forget()
+                return Estimate(LOST)
+        return _unsure(estimate) if identity.is_doubtful else estimate
 
     def _track(self, frames: list[Frame]) -> Estimate:
         if self._measuring is None:
@@ -429,6 +486,31 @@ class Tracker:
             self._facing.see(frame, Posed(self._cameras[0].posable, self._before[None]))
             return self._facing.shows_back
         return self.agreement is not None and self.agreement.is_contradicted
+
+
+def _unsure(estimate: Estimate) -> Estimate:
+    """Return an estimate of which nothing is ``tracking``."""
+    states = estimate.keypoint_states
+    state = UNCERTAIN if estimate.state == TRACKING else estimate.state
+    states = None if states is None else doubted(states)
+    return replace(estimate, state=state, keypoint_states=states)
+
+
+def is_at_two_limits(posture: FloatArray) -> bool:
+    """Return whether two joints of the trunk, or of one arm, are at their limits.
+
+    People hardly do that, but a search that finds no way on does.
+    """
+    is_at = (np.abs(posture[:, None] - TURNING_LIMITS) < _AT_LIMIT_RAD).any(axis=1)
+    return any(np.count_nonzero(is_at[part]) >= 2 for part in (TURNS, LEFT_ARM, RIGHT_ARM))
+
+
+def _colours_of(figure: Figure, frame: Frame) -> FloatArray | None:
+    """Return the colours of the trunk of a figure in a frame; None if they are not seen."""
+    if frame.image is None:
+        return None
+    # The silhouette lacks whoever is far from the last posture.
+    return colours_in(frame.image, figure.trunk(frame.silhouette.shape))
 
 
 def _silhouettes(frames: Sequence[Frame]) -> tuple[Silhouette, list[Silhouette]]:

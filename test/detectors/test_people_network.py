@@ -8,9 +8,8 @@ import numpy as np
 import pytest
 
 from cardbox_tracker.detectors import people_network
-from cardbox_tracker.detectors.landmarks import LANDMARKS
 from cardbox_tracker.detectors.people_network import PeopleNetwork
-from cardbox_tracker.detectors.pose_network import Detection, Square
+from cardbox_tracker.detectors.pose_network import LANDMARKS, Detection, Square
 
 IMAGE = np.zeros((120, 200, 3), np.uint8)
 STEP_NS = 50_000_000

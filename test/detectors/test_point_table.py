@@ -13,7 +13,7 @@ from cardbox_tracker.camera.camera import Calibration
 from cardbox_tracker.common.errors import CardboxError
 from cardbox_tracker.detectors.image_points import COCO_NAMES, POINT_INDEX, ImagePoints
 from cardbox_tracker.detectors.keypoint_json import LAYOUTS
-from cardbox_tracker.detectors.point_table import GivenPoints, Image, PointTable
+from cardbox_tracker.detectors.point_table import GivenPoints, Image, PointTable, why_not
 
 K = np.array([(500.0, 0.0, 320.0), (0.0, 510.0, 240.0), (0.0, 0.0, 1.0)])
 PLAIN = Calibration(640, 480, K, np.zeros(5))
@@ -158,6 +158,9 @@ def test_a_file_that_cannot_be_read_is_named(tmp_path: Path) -> None:
         PointTable(binary).read(None)
 
 
+SIDES = ("left", 1.0), ("right", -1.0)
+
+
 def person(column: float, row: float = 240.0) -> list[float]:
     """Return the points of COCO in a figure around a place, 200 px high, as JSON has them."""
     around = np.random.default_rng(0).uniform((-40, -100), (40, 100), (17, 2))
@@ -257,6 +260,21 @@ def test_points_beside_the_person_are_not_used_and_the_reason_is_said(
     assert "used in 0 of 3 images" in found.fault and reason in found.fault
     assert "the points of 3 of 3 images are not used" in found.remark and reason in found.remark
     assert found.at(Image(0, 0), NONE) is not None  # an empty silhouette contradicts nothing
+
+
+def test_exchanged_points_in_the_middle_of_the_person_are_told() -> None:
+    """The person stands at (240, 240), where columns and rows are alike."""
+    shown = np.zeros((480, 640), np.uint8)
+    shown[130:350, 170:310] = 255
+    at = {"shoulder": (18.0, 180.0), "hip": (12.0, 240.0), "wrist": (50.0, 230.0)}
+    joints = {f"{s}_{n}": (240.0 + k * u, v, 0.9) for n, (u, v) in at.items() for s, k in SIDES}
+    person = ImagePoints.of(joints)
+    assert why_not(shown, person) == ""
+    assert "columns and rows are exchanged" in why_not(
+        shown, ImagePoints(person.px[:, ::-1], person.scores)
+    )
+    # Somebody who lies is as wide as that.
+    assert why_not(shown.T.copy(), ImagePoints(person.px[:, ::-1], person.scores)) == ""
 
 
 def test_wrong_points_are_not_used_where_they_lie_on_the_person_by_chance(tmp_path: Path) -> None:

@@ -14,7 +14,12 @@ from cardbox_tracker.detectors import pose_network
 from cardbox_tracker.detectors.detector import PersonDetector
 from cardbox_tracker.detectors.model_files import installed_models
 from cardbox_tracker.detectors.person_choice import PersonChoice
-from cardbox_tracker.detectors.pose_network import Detection, PoseNetwork, Square
+from cardbox_tracker.detectors.pose_network import (
+    LANDMARKS,
+    Detection,
+    PoseNetwork,
+    Square,
+)
 
 
 def test_a_square_that_is_not_turned_keeps_the_axes_of_the_image() -> None:
@@ -125,51 +130,86 @@ def test_images_of_odd_sizes_are_searched(network: PoseNetwork, shape: tuple[int
     assert found is None or isinstance(found, Detection)
 
 
-class SeveralPeople(PoseNetwork):
-    """A network before people at fixed places, of whom it loses the one it follows at times."""
+RED, BLUE, GREEN = (40, 40, 220), (220, 60, 40), (40, 200, 60)
 
-    def __init__(self, *columns: float) -> None:
-        self.people = [Square(column, 50.0, 60.0, 0.0) for column in columns]
-        self.loses, self.choose, self.searched = False, None, 0
+
+class SeveralPeople(PoseNetwork):
+    """A network before people at columns in clothes of one colour, whom it misses at times."""
+
+    def __init__(self, *people: tuple[float, tuple[int, int, int]]) -> None:
+        self.people, self.misses, self.choose, self.searched = list(people), False, None, 0
         self.forget()
 
     def _people(self, image: np.ndarray) -> list[Square]:
         self.searched += 1
         self.several += len(self.people) > 1
-        return self.people
+        return [Square(column, 50.0, 60.0, 0.0) for column, _ in self.people]
 
-    def _located(self, image: np.ndarray, square: Square) -> Detection | None:
-        if self.loses:
+    def located(self, image: np.ndarray, square: Square, others: object = None) -> object:
+        columns = [c for c, _ in self.people if abs(c - square.u) < 30.0 and not self.misses]
+        if not columns:
             return None
-        self._square = self._last = square
-        return Detection(np.full((33, 2), square.u), np.ones(33), image[..., 0])
+        column = min(columns, key=lambda one: abs(one - square.u))
+        points = np.tile([column, 50.0], (len(LANDMARKS), 1))
+        for side, sign in (("left", 1.0), ("right", -1.0)):
+            points[LANDMARKS.index(f"{side}_shoulder")] += sign * 8.0, -20.0
+            points[LANDMARKS.index(f"{side}_hip")] += sign * 6.0, 10.0
+        mask = np.full(image.shape[:2], 255, np.uint8)
+        found = Detection(points, np.ones(len(LANDMARKS)), mask)
+        return found, Square(column, 50.0, 60.0, 0.0)
 
 
-def columns_of(network: PoseNetwork, images: int) -> list[float]:
+def columns_of(network: SeveralPeople, images: int) -> list[float]:
     image = np.zeros((100, 200, 3), np.uint8)
+    for column, colour in reversed(network.people):
+        image[:, int(column) - 15 : int(column) + 15] = colour
     found = [network(image) for _ in range(images)]
     return [-1.0 if one is None else float(one.points_px[0, 0]) for one in found]
 
 
-def test_the_chosen_person_is_followed_also_after_a_loss() -> None:
-    network = SeveralPeople(120.0, 40.0)
-    assert columns_of(network, 2) == [120.0, 120.0]
+def test_who_was_chosen_is_followed_and_nobody_else() -> None:
+    network = SeveralPeople((120.0, RED), (40.0, BLUE))
+    assert columns_of(network, 6) == [120.0] * 6
     network.forget()
     network.choose = PersonChoice("left")
-    assert columns_of(network, 2) == [40.0, 40.0]
-    network.loses = True
-    assert columns_of(network, 1) == [-1.0]
-    # They pass each other meanwhile, and a third one comes from the left.
-    network.loses, network.people = False, [Square(x, 50.0, 60.0, 0.0) for x in (10.0, 55.0, 150.0)]
-    assert columns_of(network, 1) == [55.0]
+    assert columns_of(network, 6) == [40.0] * 6
+    # The person leaves; others are there, one of them in the same place.
+    network.people = [(120.0, RED), (45.0, GREEN)]
+    assert columns_of(network, 60)[2:] == [-1.0] * 58
+    # The person comes back elsewhere, which the clothes tell.
+    network.people.append((170.0, BLUE))
+    assert columns_of(network, 2) == [170.0] * 2
+    # A cut: no person moves so far within an image, whatever they wear.
+    network.people = [(20.0, BLUE)]
+    assert columns_of(network, 3) == [-1.0] * 3
+
+
+def test_somebody_who_steps_before_the_person_is_not_followed() -> None:
+    network = SeveralPeople((60.0, BLUE), (150.0, RED))
+    assert columns_of(network, 6) == [60.0] * 6
+    # The square of the person shows who is in front; the other one stands beside them.
+    network.people = [(62.0, RED), (150.0, GREEN)]
+    assert columns_of(network, 10)[3:] == [-1.0] * 7
+    network.people = [(66.0, RED), (50.0, BLUE)]
+    assert columns_of(network, 3) == [50.0] * 3
+    # Nobody who is hidden for longer is mistaken for the one who hides them.
+    network.people = [(60.0, RED)]
+    assert columns_of(network, 10)[3:] == [-1.0] * 7
+
+
+def test_somebody_who_is_alone_may_hold_something_before_the_chest() -> None:
+    network = SeveralPeople((60.0, BLUE))
+    columns_of(network, 6)
+    network.people = [(62.0, RED)]
+    assert columns_of(network, 10) == [62.0] * 10
 
 
 def test_several_people_are_noticed_while_one_is_followed() -> None:
-    network = SeveralPeople(120.0)
+    network = SeveralPeople((120.0, RED))
     detector = PersonDetector(network)
     columns_of(network, 25)
     assert detector.remark == "" and network.searched == 1
-    network.people.append(Square(30.0, 50.0, 60.0, 0.0))
+    network.people.append((30.0, BLUE))
     columns_of(network, 10)
     assert "sees several people and follows the most certain one; --person" in detector.remark
     assert network.searched == 2

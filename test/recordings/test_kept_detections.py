@@ -15,7 +15,7 @@ IMAGES = np.zeros((3, 5, 7, 3), np.uint8)
 def detector() -> Mock:
     rng = np.random.default_rng(0)
 
-    def find(_: object) -> Detection | None:
+    def find(*_: object) -> Detection | None:
         mask = rng.integers(0, 256, (5, 7)).astype(np.uint8)
         return Detection(rng.random((33, 2)), rng.random(33), mask, rng.random((33, 3)))
 

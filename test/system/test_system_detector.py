@@ -8,8 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from cardbox_tracker.detectors.landmarks import LANDMARKS
-from cardbox_tracker.detectors.pose_network import Detection
+from cardbox_tracker.detectors.pose_network import LANDMARKS, Detection
 from cardbox_tracker.person.kinematics import pose
 from cardbox_tracker.person.model_file import save_body_model
 from cardbox_tracker.person.posture import reference_posture

@@ -13,8 +13,8 @@ pages 201-205. Upper arms are scored as in :mod:`.rula`; the other parts as foll
 
 Load, coupling and activity come from the settings, and so do neck, legs and wrists where they were
 not measured. A foot that is 10 cm higher than the other one carries no weight, so a step of a walk
-counts as standing on one leg. Whoever would fall backwards sits: the centre of mass lies behind the
-heels.
+counts as standing on one leg. Bent knees count unless the person is seen to sit: for a second, the
+thighs are level and the centre of mass lies behind the heels, from where anybody else would fall.
 """
 
 from __future__ import annotations
@@ -166,6 +166,8 @@ _LIFTED_M = 0.10
 # Motor Control of Human Movement"); heel behind the ankle, m, and margin of the centre of mass, m.
 _MASSES, _CENTRES = (0.678, 0.2, 0.122), (0.626, 0.433, 0.606)
 _HEEL_M, _MARGIN_M = 0.05, 0.05
+# Slope up to which thighs are level, rad; time after which somebody like that sits, ns.
+_LEVEL_RAD, _SITS_NS = math.radians(30.0), 1_000_000_000
 
 
 class Seen(NamedTuple):
@@ -238,20 +240,43 @@ def _pairs(results: Results, names: Sequence[str]) -> FloatArray:
 def score_table(images: Sequence[Seen], config: RebaConfig, seed: int) -> list[RulaRow]:
     """Return the scores of each image, for samples of its posture as in :mod:`.rula`."""
     rng = np.random.default_rng(seed)
+    is_seated = _seated(images)
     return [
         RulaRow(
             seen.stamp_ns,
             seen.state,
-            None if seen.posture is None else _distribution(seen, config, rng),
+            None if seen.posture is None else _distribution(seen, config, rng, is_sitting),
             seen.time_s,
             frozenset(name for name in ("neck", "legs") if getattr(seen, name) is not None)
             | measured_wrists(seen.wrists),
         )
-        for seen in images
+        for seen, is_sitting in zip(images, is_seated, strict=True)
     ]
 
 
-def _distribution(seen: Seen, config: RebaConfig, rng: np.random.Generator) -> ScoreDistribution:
+def _seated(images: Sequence[Seen]) -> list[bool]:
+    """Return for each image whether the person is seen to sit; hidden legs change nothing."""
+    found, run, began_ns, last_ns = [False] * len(images), list[int](), 0, 0
+    for number, seen in enumerate(images):
+        if seen.legs is None or seen.posture is None:
+            continue
+        pitch = np.asarray(seen.posture[0, PITCH])
+        if not sits(seen.legs[0], pitch, seen.lengths_m):
+            run.clear()
+            continue
+        if not run or seen.stamp_ns - last_ns > _SITS_NS:
+            run, began_ns = [], seen.stamp_ns
+        run.append(number)
+        last_ns = seen.stamp_ns
+        if last_ns - began_ns >= _SITS_NS:
+            for one in run:
+                found[one] = True
+    return found
+
+
+def _distribution(
+    seen: Seen, config: RebaConfig, rng: np.random.Generator, is_seated: bool
+) -> ScoreDistribution:
     assert seen.posture is not None
     mean, stddev = seen.posture
     postures = normal_postures(mean, INDEPENDENT * stddev, SAMPLES, rng)
@@ -262,7 +287,7 @@ def _distribution(seen: Seen, config: RebaConfig, rng: np.random.Generator) -> S
         angles, deviations = seen.legs
         legs = angles + INDEPENDENT * deviations * rng.standard_normal((SAMPLES, len(angles)))
     wrists = wrist_samples(seen.wrists, SAMPLES, rng)
-    scores = reba_scores(postures, config, necks, legs, seen.lengths_m, wrists)
+    scores = reba_scores(postures, config, necks, legs, seen.lengths_m, wrists, is_seated)
     of_mean = reba_scores(
         mean,
         config,
@@ -270,6 +295,7 @@ def _distribution(seen: Seen, config: RebaConfig, rng: np.random.Generator) -> S
         None if seen.legs is None else seen.legs[0],
         seen.lengths_m,
         seen.wrists[0],
+        is_seated,
     )
     return distribution_of(scores, REBA, int(of_mean.grand))
 
@@ -281,6 +307,7 @@ def reba_scores(
     legs: FloatArray | None = None,
     lengths_m: FloatArray | None = None,
     wrists: FloatArray | None = None,
+    is_seated: bool = False,
 ) -> RebaScores:
     """Return the scores of postures.
 
@@ -292,6 +319,7 @@ def reba_scores(
         lengths_m: see :class:`Seen`; needed with legs.
         wrists: flexion and deviation of the left and the right wrist in each posture,
             (..., 2, 2), rad; nan or None if unknown.
+        is_seated: whether the person sits, so that bent knees do not count.
     """
     d = np.asarray(postures, np.float64)
     if wrists is None:
@@ -301,7 +329,7 @@ def reba_scores(
     neck = np.full(trunk.shape, config.neck) if necks is None else _neck(necks, config)
     leg = np.full(trunk.shape, config.legs)
     if legs is not None and lengths_m is not None:
-        leg = _legs(legs, d[..., PITCH], lengths_m)
+        leg = _legs(legs, lengths_m, is_seated)
     table_a = TABLE_A[trunk - 1, neck - 1, leg - 1]
     body = np.minimum(table_a + config.load, 12)
     left = _arm(d[..., LEFT_ARM], 1.0, wrists[..., 0, :], body, config)
@@ -315,20 +343,39 @@ def _neck(necks: FloatArray, config: RebaConfig) -> ScoreArray:
     return np.asarray(score + (np.abs(yaw_deg) > config.neck_twisted_deg))
 
 
-def _legs(angles: FloatArray, pitch: FloatArray, lengths_m: FloatArray) -> ScoreArray:
-    """Return the scores of legs (..., 8) below a trunk with a pitch (...), rad."""
-    trunk_m, *limbs_m = lengths_m.tolist()
+def _legs(angles: FloatArray, lengths_m: FloatArray, is_seated: bool) -> ScoreArray:
+    """Return the scores of legs (..., 8)."""
+    _, ankle_m = _limbs_m(angles, lengths_m)
+    carries = ankle_m[..., 2] <= ankle_m[..., 2].min(axis=0) + _LIFTED_M
+    if is_seated:
+        return np.ones(carries.shape[1:], int)
+    bent_deg = np.where(carries, np.degrees(angles[..., [3, 7]].T.reshape(carries.shape)), 0.0)
+    most_deg = bent_deg.max(axis=0)
+    bent = np.where(most_deg > 60.0, 2, np.where(most_deg >= 30.0, 1, 0))
+    return np.asarray(np.where(carries.all(axis=0), 1, 2) + bent)
+
+
+def _limbs_m(angles: FloatArray, lengths_m: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return both knees and ankles (2, ..., 3) below the hips; X points forwards, Z up."""
     knees, ankles = [], []
     for number, side in enumerate((1.0, -1.0)):
         thigh, shank = leg_directions(angles[..., 4 * number : 4 * number + 4], side)
-        knees.append(limbs_m[2 * number] * thigh)
-        ankles.append(knees[-1] + limbs_m[2 * number + 1] * shank)
-    knee_m, ankle_m = np.stack(knees), np.stack(ankles)
-    # X points forwards from the hips, Z up.
-    low_m = ankle_m[..., 2].min(axis=0)
-    carries = ankle_m[..., 2] <= low_m + _LIFTED_M
+        knees.append(lengths_m[1 + 2 * number] * thigh)
+        ankles.append(knees[-1] + lengths_m[2 + 2 * number] * shank)
+    return np.stack(knees), np.stack(ankles)
+
+
+def sits(angles: FloatArray, pitch: FloatArray, lengths_m: FloatArray) -> ScoreArray:
+    """Return whether thighs are level, and the weight is behind the feet.
+
+    Args:
+        angles: ``LEG_NAMES``, (..., 8), rad.
+        pitch: of the trunk, (...), rad.
+        lengths_m: see :class:`Seen`.
+    """
+    knee_m, ankle_m = _limbs_m(angles, lengths_m)
     ahead_m = (
-        trunk_m * np.sin(pitch),
+        float(lengths_m[0]) * np.sin(pitch),
         knee_m[..., 0].mean(axis=0),
         (knee_m[..., 0] + _CENTRES[2] * (ankle_m - knee_m)[..., 0]).mean(axis=0),
     )
@@ -336,11 +383,9 @@ def _legs(angles: FloatArray, pitch: FloatArray, lengths_m: FloatArray) -> Score
     parts = zip(_MASSES, shares, ahead_m, strict=True)
     centre_m = sum(mass * share * at_m for mass, share, at_m in parts)
     heels_m = ankle_m[..., 0].min(axis=0) - _HEEL_M
-    is_seated = centre_m < heels_m - _MARGIN_M
-    bent_deg = np.where(carries, np.degrees(angles[..., [3, 7]].T.reshape(carries.shape)), 0.0)
-    most_deg = bent_deg.max(axis=0)
-    bent = np.where(is_seated, 0, np.where(most_deg > 60.0, 2, np.where(most_deg >= 30.0, 1, 0)))
-    return np.asarray(np.where(carries.all(axis=0) | is_seated, 1, 2) + bent)
+    slopes_rad = np.abs(np.arcsin(knee_m[..., 2] / np.linalg.norm(knee_m, axis=-1)))
+    is_level = (slopes_rad < _LEVEL_RAD).all(axis=0)
+    return np.asarray(is_level & (centre_m < heels_m - _MARGIN_M))
 
 
 def _arm(

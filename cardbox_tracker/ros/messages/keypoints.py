@@ -15,8 +15,8 @@ from std_msgs.msg import Header
 
 from cardbox_tracker.common.errors import CardboxError
 from cardbox_tracker.detectors.image_points import COCO_NAMES, POINT_NAMES, ImagePoints
-from cardbox_tracker.detectors.landmarks import LANDMARKS
 from cardbox_tracker.detectors.point_checks import Size, person_of
+from cardbox_tracker.detectors.pose_network import LANDMARKS
 from cardbox_tracker.person.sizes import FloatArray
 from cardbox_tracker.ros.messages.types import optional_class
 

@@ -19,8 +19,8 @@ from cardbox_tracker.camera.stamps import WINDOW, StampOrder
 from cardbox_tracker.camera.unrectify import unrectified
 from cardbox_tracker.detectors.detector import Detector, PersonDetector
 from cardbox_tracker.detectors.image_points import ImagePoints
-from cardbox_tracker.detectors.landmarks import LANDMARKS, image_points
-from cardbox_tracker.detectors.pose_network import Detection
+from cardbox_tracker.detectors.landmarks import image_points
+from cardbox_tracker.detectors.pose_network import LANDMARKS, Detection
 from cardbox_tracker.measuring.people_camera import FOUND_STDDEV, people_camera
 from cardbox_tracker.ros.messages.conversions import ImageArray, stamp_ns
 from cardbox_tracker.ros.messages.keypoints import (
@@ -203,7 +203,7 @@ class DetectorNode(CardboxNode):
         """Return the people in an image, or the one who is followed."""
         if self.parameters.value.people:
             return self._person.all_in(at_ns, image)
-        person = self._person(image)
+        person = self._person(image, at_ns)
         return [] if person is None else [person]
 
     def _is_due(self, at_ns: int) -> bool:
@@ -241,6 +241,8 @@ class DetectorNode(CardboxNode):
             "images without a person": str(self._person.missed),
             "ignored CameraInfo": str(self._images.watch.ignored),
         }
+        if self._person.remark:
+            values["several people"] = self._person.remark
         if self._took_ms:
             values["time of an image (ms)"] = f"{np.median(self._took_ms):.1f}"
         if self._silhouettes is not None:

@@ -102,9 +102,17 @@ def test_scores_of_the_legs() -> None:
     assert legs_of({0: 60.0, 3: 60.0}) == 2
 
 
-def test_knees_do_not_count_for_who_sits() -> None:
-    found = reba_scores(np.zeros(12), CONFIG, legs=SEATED, lengths_m=LENGTHS_M)
-    assert found.legs == 1
+def test_knees_do_not_count_for_who_sits(tmp_path: Path) -> None:
+    def legs_in(angles: FloatArray, period_s: float) -> list[float]:
+        path = table(tmp_path / "sits.csv", angles, period_s=period_s)
+        rows = score_table(read_table(path), CONFIG, seed=1)
+        return [float(row.scores.parts["legs"].argmax()) + 1 for row in rows if row.scores]
+
+    assert legs_in(SEATED, 0.5) == [1.0] * 4
+    # For 0.6 s, nobody knows whether the person falls or sits down.
+    assert legs_in(SEATED, 0.2) == [3.0] * 4
+    # Thighs that slope by 45 degrees: a squat whose trunk was found too upright.
+    assert legs_in(np.radians([45.0, 0.0, 0.0, 85.0] * 2), 0.5) == [3.0] * 4
 
 
 def test_what_is_not_measured_counts_as_declared() -> None:
@@ -161,9 +169,14 @@ def seen(angles: FloatArray, state: KeypointState = KeypointState.TRACKED) -> Es
     return Estimate("tracking", np.zeros(12), np.full(12, 0.02), keypoints, 100, 0.9, legs=legs)
 
 
-def table(path: Path, angles: FloatArray, state: KeypointState = KeypointState.TRACKED) -> Path:
-    found = seen(angles, state)
-    rows = [row_of(10**9 * i, float(i), found, has_legs=True) for i in range(4)]
+def table(
+    path: Path,
+    angles: FloatArray,
+    state: KeypointState = KeypointState.TRACKED,
+    period_s: float = 1.0,
+) -> Path:
+    found, times_s = seen(angles, state), period_s * np.arange(4)
+    rows = [row_of(round(1e9 * t), t, found, has_legs=True) for t in times_s.tolist()]
     rows.append(row_of(4 * 10**9, 4.0, Estimate("lost"), has_legs=True))
     with path.open("w", newline="") as file:
         writer = csv.writer(file)

@@ -16,7 +16,7 @@ from std_msgs.msg import Header
 
 from cardbox_tracker.common.errors import CardboxError
 from cardbox_tracker.detectors.image_points import POINT_INDEX, POINT_NAMES
-from cardbox_tracker.detectors.landmarks import LANDMARKS
+from cardbox_tracker.detectors.pose_network import LANDMARKS
 from cardbox_tracker.ros.messages.keypoints import (
     COCO_NAMES,
     MESSAGE_NAMES,

@@ -19,8 +19,7 @@ from cardbox_tracker.camera.camera import Calibration
 from cardbox_tracker.common.errors import CardboxError
 from cardbox_tracker.detectors.detector import PersonDetector
 from cardbox_tracker.detectors.image_points import POINT_INDEX
-from cardbox_tracker.detectors.landmarks import LANDMARKS
-from cardbox_tracker.detectors.pose_network import Detection
+from cardbox_tracker.detectors.pose_network import LANDMARKS, Detection
 from cardbox_tracker.ros.messages.conversions import calibration_message, image_message
 from cardbox_tracker.ros.messages.keypoints import MESSAGE_NAMES, persons_of_polygon
 from cardbox_tracker.ros.nodes.detector_node import DetectorNode

@@ -18,8 +18,7 @@ from cardbox_tracker.camera.rasterisation import render
 from cardbox_tracker.common.errors import CardboxError
 from cardbox_tracker.detectors.hand_network import HandPoints
 from cardbox_tracker.detectors.image_points import POINT_INDEX
-from cardbox_tracker.detectors.landmarks import LANDMARKS
-from cardbox_tracker.detectors.pose_network import Square
+from cardbox_tracker.detectors.pose_network import LANDMARKS, Square
 from cardbox_tracker.person.cardbox import cardbox_patches
 from cardbox_tracker.person.hands import HAND_NAMES
 from cardbox_tracker.person.model import BodyModel

@@ -14,8 +14,7 @@ from std_msgs.msg import Float64, Header, String
 
 from cardbox_tracker.camera.camera import Camera
 from cardbox_tracker.camera.rasterisation import render
-from cardbox_tracker.detectors.landmarks import LANDMARKS
-from cardbox_tracker.detectors.pose_network import Detection
+from cardbox_tracker.detectors.pose_network import LANDMARKS, Detection
 from cardbox_tracker.measuring.people_camera import FORWARD, FOUND_STDDEV, HEIGHTS, LEVELS
 from cardbox_tracker.person.cardbox import cardbox_patches
 from cardbox_tracker.person.model_file import dumps_body_model, loads_body_model

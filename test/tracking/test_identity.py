@@ -1,0 +1,96 @@
+"""Whether somebody is the person of the images before: places, clothes, and the tracker."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from cardbox_tracker.camera.camera import Camera
+from cardbox_tracker.camera.rasterisation import render
+from cardbox_tracker.detectors.figure import Figure
+from cardbox_tracker.detectors.identity import Identity
+from cardbox_tracker.detectors.image_points import ImagePoints
+from cardbox_tracker.person.cardbox import cardbox_patches
+from cardbox_tracker.person.model import BodyModel
+from cardbox_tracker.person.posture import PITCH, ROLL, TORSO_Y, reference_posture
+from cardbox_tracker.search.config import default_preset
+from cardbox_tracker.tracking.estimate import LOST, TRACKING
+from cardbox_tracker.tracking.observation import Observation
+from cardbox_tracker.tracking.tracker import Tracker, is_at_two_limits
+
+CAMERA = Camera(320, 240, 260.0, 260.0, 159.5, 119.5)
+BODY = BodyModel.of(distance_m=2.6, hip_height_m=-0.25)
+RED, BLUE = (40, 40, 220), (220, 60, 40)
+STEP_NS = 66_666_667
+CLOTHES, OTHERS = np.array([1.0, 0.0]), np.array([0.0, 1.0])
+
+
+def figure(column: float) -> Figure:
+    """A trunk of 100 px, which is half a metre."""
+    at = {"shoulder": (20.0, -50.0), "hip": (15.0, 50.0)}
+    sides = ("left", 1.0), ("right", -1.0)
+    return Figure(
+        {f"{s}_{n}": np.array([column + k * u, v]) for n, (u, v) in at.items() for s, k in sides}
+    )
+
+
+@given(st.floats(0.0, 3.0), st.floats(0.01, 1.4), st.booleans())
+def test_nobody_runs_faster_than_4_metres_a_second(
+    moved_m: float, away_s: float, is_alike: bool
+) -> None:
+    identity = Identity()
+    for number in range(6):
+        assert identity.is_same(figure(0.0), CLOTHES, number * STEP_NS)
+    now_ns = 5 * STEP_NS + round(1e9 * away_s)
+    found = identity.is_same(figure(200.0 * moved_m), CLOTHES if is_alike else OTHERS, now_ns)
+    if abs(moved_m - 0.2 - 4.0 * away_s) > 1e-3:
+        assert found == (moved_m < 0.2 + 4.0 * away_s)
+
+
+def test_who_was_away_is_known_by_the_clothes_until_the_scene_was_empty() -> None:
+    identity = Identity()
+    for number in range(6):
+        identity.is_same(figure(0.0), CLOTHES, number * STEP_NS)
+    assert not identity.is_same(figure(0.0), OTHERS, 5_000_000_000)
+    assert identity.is_same(figure(900.0), CLOTHES, 5_100_000_000)
+    identity.nobody(65_200_000_000)
+    assert identity.is_same(figure(0.0), OTHERS, 65_300_000_000)
+
+
+def test_two_joints_of_one_part_at_their_limits() -> None:
+    posture = np.zeros(12)
+    posture[[ROLL, 4]] = np.radians([45.0, 180.0])
+    assert not is_at_two_limits(posture)
+    posture[PITCH] = np.radians(-24.8)
+    assert is_at_two_limits(posture)
+    posture[[PITCH, 5]] = np.radians([20.0, -60.0])
+    assert is_at_two_limits(posture)
+
+
+@pytest.mark.parametrize("has_image", [True, False])
+def test_points_of_somebody_else_are_lost_and_the_person_comes_back(
+    detected: Callable[..., ImagePoints], has_image: bool
+) -> None:
+    tracker, states = Tracker(BODY, CAMERA, default_preset()), []
+    # The detector hops to somebody in other clothes for a second.
+    for number in range(30):
+        is_other = 8 <= number < 20
+        state = np.zeros(14)
+        state[:12] = reference_posture("front")
+        state[TORSO_Y] = 0.7 if is_other else -0.7
+        shown = render(cardbox_patches(BODY, state[:12]), CAMERA) > 0
+        image = np.full((CAMERA.height, CAMERA.width, 3), 128, np.uint8)
+        image[shown] = BLUE if is_other else RED
+        silhouette = np.where(shown, np.uint8(255), np.uint8(0))
+        points = detected(BODY, CAMERA, state)
+        seen = Observation(
+            silhouette, image if has_image else None, points=points, stamp_ns=number * STEP_NS
+        )
+        states.append(tracker.track(seen).state)
+    assert states[5] == states[-1] == TRACKING
+    # Without an image, only the speed tells: 1.4 m take 0.3 s.
+    assert set(states[8 : 20 if has_image else 12]) == {LOST}
