@@ -10,7 +10,7 @@ where ``keypoints`` has them:
     torso -clavicle_elevation-> clavicle -abduction (X)-> -flexion (Y)-> upper arm
     upper arm -abduction-> -flexion-> forearm -(fixed)-> hand
     torso_yaw -hip_flexion-> -hip_abduction-> -hip_rotation-> thigh -knee_flexion-> shank
-    -(fixed)-> foot, where legs are measured
+    -(fixed)-> foot
 
 The root ``camera_level`` follows REP-103: origin at the camera's centre, X forward (away from the
 camera), Y left, Z up, level even when the camera is pitched. The person faces the camera, so the
@@ -67,7 +67,6 @@ def urdf_from_body(
     body: BodyModel,
     optical_frame: str | None = None,
     torso_place: bool = True,
-    legs: bool = False,
     hands: bool = False,
 ) -> str:
     """Return the URDF of ``body`` as XML text.
@@ -76,9 +75,9 @@ def urdf_from_body(
         body: the measured person.
         optical_frame: name of the camera's optical frame; if given, it is added with the camera's
             pitch, so that markers and keypoints are in the same tree.
-        torso_place: add the joints beside the 12 of the posture; the joint states then must contain
+        torso_place: add the joints beside the 12 of the posture, those of the legs among them, whose
+            lengths are the mean ones of people of that size; the joint states then must contain
             them, or the transforms beyond are missing.
-        legs: also add those of the legs, whose lengths are the mean ones of people of that size.
         hands: also add those of the hands.
     """
     robot = _Robot("cardbox_person", ROOT_LINK)
@@ -88,7 +87,7 @@ def urdf_from_body(
         robot.fix(f"{ROOT_LINK}_to_optical", ROOT_LINK, optical_frame, _ZERO, tilted)
     hips_m = body.placement.distance_m, 0.0, body.placement.hip_height_m
     robot.fix("camera_to_hips", ROOT_LINK, "hips", hips_m, (0.0, 0.0, math.pi))
-    more = *(HANDS if hands else ()), *(LEGS if legs else ())
+    more = *(HANDS if hands else ()), *(LEGS if torso_place else ())
     robot.add(body, (*SKELETON, *more), torso_place, "hips")
     parts = body_parts(body.sizes)
     robot.show("torso", "torso", parts.torso)
