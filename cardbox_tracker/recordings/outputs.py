@@ -15,7 +15,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from cardbox_tracker.person.hands import HAND_NAMES, HAND_OPEN_NAMES, HANDS, WRIST_NAMES
+from cardbox_tracker.person.hands import HAND_NAMES, HAND_OPEN_NAMES, WRIST_NAMES
 from cardbox_tracker.person.legs import LEG_LIMITS, LEG_NAMES
 from cardbox_tracker.person.sizes import FloatArray
 from cardbox_tracker.person.skeleton import (
@@ -23,7 +23,6 @@ from cardbox_tracker.person.skeleton import (
     JOINT_NAMES,
     JOINT_STATE_NAMES,
     KEYPOINT_NAMES,
-    NECK_LIMITS,
     NECK_NAMES,
     PLACE_NAMES,
     KeypointState,
@@ -165,7 +164,8 @@ class Metric:
 # The mean velocity over a longer gap is not that of the moment.
 _NECK = [JOINT_STATE_NAMES.index(name) for name in NECK_NAMES]
 _LEGS = slice(-len(LEG_NAMES), None)
-_HAND_LIMITS = np.array([joint.limits for joint in HANDS[:3]])
+# Standard deviation of values all over their range.
+_ANY_LEGS = np.ptp(LEG_LIMITS, axis=1) / np.sqrt(12.0)
 _LONGEST_NS = 1_000_000_000
 
 
@@ -194,31 +194,23 @@ def joint_values(estimate: Estimate, torso_place: bool = True) -> JointValues | 
 
 
 def joint_deviations(estimate: Estimate, torso_place: bool = True) -> JointValues | None:
-    """Return the standard deviation of each of :func:`joint_values`; None if unknown.
+    """Return the standard deviation of each joint; None if unknown.
 
-    Of joints that are not known, it is that of values all over their range.
+    The joints of the neck, or of a hand, are among them only if it was seen. Legs that are not
+    known may be anywhere in their range.
     """
     if estimate.posture_stddev is None or not torso_place:
         return _joints(JOINT_NAMES, estimate.posture_stddev)
-    names: tuple[str, ...] = JOINT_STATE_NAMES
-    known = [
-        _or_zeros(estimate.offset_stddev_m),
-        _anywhere(NECK_LIMITS) if estimate.neck_stddev is None else estimate.neck_stddev,
-        _or_zeros(estimate.clavicles_stddev_m),
-    ]
-    if estimate.hands is not None:
-        names = *names, *HAND_NAMES
-        unknown = _anywhere(_HAND_LIMITS)
-        known += [unknown if hand is None else hand.joints_stddev for hand in estimate.hands]
-    known.append(
-        _anywhere(LEG_LIMITS) if estimate.legs is None else estimate.legs.angles_stddev
-    )
+    names, known = [*JOINT_NAMES, *PLACE_NAMES], [_or_zeros(estimate.offset_stddev_m)]
+    if estimate.neck_stddev is not None:
+        names, known = [*names, *NECK_NAMES], [*known, estimate.neck_stddev]
+    names, known = [*names, *CLAVICLE_NAMES], [*known, _or_zeros(estimate.clavicles_stddev_m)]
+    for number, hand in enumerate(estimate.hands or ()):
+        if hand is not None:
+            names = [*names, *HAND_NAMES[3 * number : 3 * number + 3]]
+            known = [*known, hand.joints_stddev]
+    known = [*known, _ANY_LEGS if estimate.legs is None else estimate.legs.angles_stddev]
     return _joints((*names, *LEG_NAMES), estimate.posture_stddev, *known)
-
-
-def _anywhere(limits: FloatArray) -> FloatArray:
-    """Return the standard deviations (n,) of joints that may be anywhere in ``limits`` (n, 2)."""
-    return np.asarray((limits[:, 1] - limits[:, 0]) / np.sqrt(12.0))
 
 
 def open_hands(estimate: Estimate) -> JointValues | None:

@@ -132,9 +132,9 @@ def test_wrists_of_a_table_are_read(tmp_path: Path) -> None:
     hand = Hand(0.5, np.array([0.0, 0.0, 1.0]), np.full(3, 0.4), np.full(3, 0.1))
     with path.open("w", newline="") as file:
         writer = csv.writer(file)
-        writer.writerow(columns(has_hands=True, has_legs=True))
+        writer.writerow(columns(has_points=True, has_hands=True))
         for found in (seen(SEATED), replace(seen(SEATED), hands=(None, hand))):
-            cells = row_of(10**9, 0.0, found, has_hands=True, has_legs=True)
+            cells = row_of(10**9, 0.0, found, has_points=True, has_hands=True)
             writer.writerow(["" if cell is None else cell for cell in cells])
     before, after = score_table(read_table(path), CONFIG, seed=1)
     assert (before.measured, after.measured) == ({"legs"}, {"legs", "right_wrist"})
@@ -162,11 +162,11 @@ def seen(angles: FloatArray, state: KeypointState = KeypointState.TRACKED) -> Es
 
 def table(path: Path, angles: FloatArray, state: KeypointState = KeypointState.TRACKED) -> Path:
     found = seen(angles, state)
-    rows = [row_of(10**9 * i, float(i), found, has_legs=True) for i in range(4)]
-    rows.append(row_of(4 * 10**9, 4.0, Estimate("lost"), has_legs=True))
+    rows = [row_of(10**9 * i, float(i), found, has_points=True) for i in range(4)]
+    rows.append(row_of(4 * 10**9, 4.0, Estimate("lost"), has_points=True))
     with path.open("w", newline="") as file:
         writer = csv.writer(file)
-        writer.writerow(columns(has_legs=True))
+        writer.writerow(columns(has_points=True))
         writer.writerows(["" if cell is None else cell for cell in row] for row in rows)
     return path
 
