@@ -75,9 +75,9 @@ def urdf_from_body(
         body: the measured person.
         optical_frame: name of the camera's optical frame; if given, it is added with the camera's
             pitch, so that markers and keypoints are in the same tree.
-        torso_place: add the joints beside the 12 of the posture, those of the legs among them, whose
-            lengths are the mean ones of people of that size; the joint states then must contain
-            them, or the transforms beyond are missing.
+        torso_place: add the joints beside the 12 of the posture; the joint states then must contain
+            them, or the transforms beyond are missing. Legs have the mean lengths of people of
+            that size.
         hands: also add those of the hands.
     """
     robot = _Robot("cardbox_person", ROOT_LINK)

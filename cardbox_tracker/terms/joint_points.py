@@ -57,9 +57,9 @@ _JOINT_M = {SHOULDER: 0.025, ELBOW: 0.02, WRIST: 0.02, KNUCKLES: 0.04}
 _JOINT_M_PER_S = {SHOULDER: 0.2, ELBOW: 0.5, WRIST: 0.8, KNUCKLES: 0.9}
 _TRUNK_M, _TRUNK_M_PER_S = 0.05, 0.25
 _POINT_PX = 1.5
-# Bones (upper arm, forearm, shoulders, trunk): deviation of the component along the line of sight, and
-# mean difference of the detector's from the true one (lab/tools/point_deviations.py). That of the
-# shoulders also covers the errors of their curve, see _turned.
+# Bones (upper arm, forearm, shoulders, trunk): deviation of the component along the line of sight,
+# and mean difference of the detector's from the true one (lab/tools/point_deviations.py). That of
+# the shoulders also covers the errors of their curve, see _turned.
 _BONE_DEVIATIONS = np.array([0.22, 0.32, 0.22, 0.32, 0.2, 0.12])
 _BONE_OFFSETS = np.array([0.06, -0.13, 0.06, -0.13, 0.05, -0.1])
 _OLDEST_S = 1.0
@@ -127,7 +127,8 @@ class JointPointsTerm:
         is_back = self._exchanged_s is not None and self._exchanged_s >= _BACK_S
         if frame.before is None:
             is_back = _from_behind(evidence[0])
-        return JointPointsObservation(evidence, weight, is_back)
+        shows_legs = points.legs is not None and points.legs.are_certain
+        return JointPointsObservation(evidence, weight, is_back, shows_legs)
 
     def _newest(self, frame: Frame) -> ImagePoints | None:
         """Return the newest points of this person, which may be of an earlier frame, if any."""
@@ -204,11 +205,13 @@ class JointPointsObservation(TermObservation):
         weight_px: cost of a squared residual of 1, px.
         shows_back: whether left and right have been exchanged for long, so that the person faces
             the other way; at the start of tracking, whether the points are those of a back.
+        shows_legs: whether points of the legs are certain.
     """
 
     seen: EvidenceTuple
     weight_px: float
     shows_back: bool = False
+    shows_legs: bool = False
     locates = True
 
     def rate(self, posed: Posed) -> FloatArray:

@@ -124,7 +124,7 @@ def _place_body(
     posed: PosedArm,
     points: Floats,
 ) -> None:
-    """Write points and neck (11, 3) of the torso of ``state`` with the arms of ``arms_of``, (14,)."""
+    """Write points and neck (11, 3) of the torso of ``state``, with the arms of ``arms_of``."""
     rotation, hip = scratch
     state_pose(state, of.place, of.camera, rotation, hip)
     _place_trunk(rotation, hip, of, points)

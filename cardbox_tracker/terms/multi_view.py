@@ -98,13 +98,19 @@ class MultiViewCost:
             cost.see(silhouette, to_view(state))
 
     def expect(
-        self, x_m: float, z_m: float, home_m: float, yaw_rad: float, is_located: bool = False
+        self,
+        x_m: float,
+        z_m: float,
+        home_m: float,
+        yaw_rad: float,
+        is_located: bool = False,
+        shows_legs: bool = False,
     ) -> None:
         """Set the anchor of the priors: place of the last frame, home of x, and expected yaw.
 
         The yaw is that of somebody who faces the camera, 0 if nothing else is known. An outline of
-        a person who is twice as far away determines the distance half as well. Yaw and height are
-        freer if the person ``is_located`` by points, which also show who squats.
+        a person who is twice as far away determines the distance half as well. The yaw is freer if
+        the person ``is_located`` by points, and the height if these show the legs: who squats.
         """
         facing_rad = self.facing_rad
         # Who walks to one side turns from the back to it the other way round.
@@ -113,7 +119,7 @@ class MultiViewCost:
         config = self._config
         self.yaw_unit_rad = np.radians(config.located_yaw_deg if is_located else config.yaw_deg)
         self._z_units_m = config.z_step_m, config.z_home_m
-        if is_located:
+        if shows_legs:
             self._z_units_m = config.located_z_m, config.located_z_m
         self.costs[0].loosen(self.x_factor, self.yaw_unit_rad, self._z_units_m)
 

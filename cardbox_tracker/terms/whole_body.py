@@ -166,9 +166,7 @@ class WholeBodyCost:
         """Return the arguments of the kernels that rate by pixels of ``planes`` and priors."""
         return (planes, *self.counted, base_px, self._scale), self._prior
 
-    def loosen(
-        self, x_factor: float, yaw_unit_rad: float, z_units_m: tuple[float, float]
-    ) -> None:
+    def loosen(self, x_factor: float, yaw_unit_rad: float, z_units_m: tuple[float, float]) -> None:
         """Set the factor on the units of ``torso_x``, and the units of yaw and ``torso_z``.
 
         The latter are those of step and home.

@@ -39,7 +39,7 @@ class WholeBodyCostConfig:
         step_cap: largest cost of a motion.
         x_home_m: unit of the torso's distance from its usual place along the line of sight, m.
         z_home_m: unit of the torso's distance from the measured height, m.
-        located_z_m: unit of both with points of a detector, which show who squats or sits, m.
+        located_z_m: unit of both with points of the legs, which show who squats or sits, m.
         home_cap: largest cost of such a distance.
         penetration: cost of a hand, forearm or elbow on the axis of trunk or head; 0 at the
             surface.

@@ -129,7 +129,8 @@ def test_joints_have_the_place_after_the_posture() -> None:
     assert joints is not None
     assert deviations is not None
     assert (joints.names, deviations.names) == (ALL_NAMES, (*BODY_NAMES, *CLAVICLES, *LEG_NAMES))
-    np.testing.assert_array_equal(joints.values, [*POSTURE, 0.25, -0.05, 0.0, 0.0, 0.02, 0.03, *NO_LEGS])
+    place = 0.25, -0.05, 0.0, 0.0, 0.02, 0.03
+    np.testing.assert_array_equal(joints.values, [*POSTURE, *place, *NO_LEGS])
     np.testing.assert_array_equal(deviations.values[:16], [0.1] * 12 + [0.03, 0.01, 0.002, 0.003])
 
 
@@ -138,7 +139,8 @@ def test_the_neck_follows_and_has_deviations_if_it_was_seen() -> None:
     assert joints is not None
     assert deviations is not None
     assert joints.names == deviations.names == ALL_NAMES
-    np.testing.assert_array_equal(joints.values, [*POSTURE, 0.25, -0.05, 0.4, -0.1, 0.02, 0.03, *NO_LEGS])
+    place = 0.25, -0.05, 0.4, -0.1, 0.02, 0.03
+    np.testing.assert_array_equal(joints.values, [*POSTURE, *place, *NO_LEGS])
     np.testing.assert_array_equal(deviations.values[-12:-8], (0.1, 0.2, 0.002, 0.003))
     np.testing.assert_array_equal(cast(Any, neck_from(joints)), (0.4, -0.1))
     assert neck_from(JointValues(BODY_NAMES, np.zeros(14))) is None
@@ -270,13 +272,14 @@ def test_a_missing_joint_is_named() -> None:
 
 def test_joints_of_the_legs_are_always_the_last_ones() -> None:
     """Knees that are not known may be bent by 0 to 150 degrees, all alike."""
-    for found, knee, stddev in ((replace(SEEN, legs=LEGS), 0.7, 0.07), (SEEN, 0.0, np.radians(43.3))):
+    known = replace(SEEN, legs=LEGS)
+    for found, knee, stddev in ((known, 0.7, 0.07), (SEEN, 0.0, np.radians(43.3))):
         joints, stddevs = joint_values(found), joint_deviations(found)
         assert joints is not None and stddevs is not None
         assert joints.names == stddevs.names == ALL_NAMES
         assert joints.values[-1] == pytest.approx(knee)
         assert stddevs.values[-1] == pytest.approx(stddev, rel=1e-3)
-    only = joint_values(found, torso_place=False)
+    only = joint_values(known, torso_place=False)
     assert only is not None and only.names == JOINT_NAMES
 
 

@@ -298,7 +298,7 @@ def test_points_show_who_squats_from_a_standing_state(
     wanted = FRONT.copy()
     wanted[PITCH], wanted[TORSO_Z] = np.radians(pitch_deg), -lower_m
     seen = Seen(FRONT)
-    seen.cost.expect(0.0, 0.0, 0.0, 0.0, is_located=True)
+    seen.cost.expect(0.0, 0.0, 0.0, 0.0, is_located=True, shows_legs=True)
     hips_m = np.array(seen.cost.costs[0].hips(wanted))
     trunk_m = seen.cost.keypoints(wanted)[[0, 3]].mean(axis=0) - hips_m
     spatial_m = np.zeros((len(POINT_NAMES), 3))

@@ -103,7 +103,7 @@ def frame(points: ImagePoints | None) -> Frame:
 def read(angles: FloatArray, found: Estimate, images: int = 10) -> Estimate:
     reader = LegReader(BODY, CAMERA)
     points = seen(joints_m(angles, found), found)
-    for number in range(images):
+    for _ in range(images):
         result = reader.see(frame(points), found)
     return result
 
@@ -126,7 +126,7 @@ def test_a_lifted_leg_is_not_pulled_to_the_floor() -> None:
     lifted = STANDING.copy()
     lifted[:4] = np.radians([70.0, 5.0, 0.0, 80.0])
     reader, found = LegReader(BODY, CAMERA), estimate()
-    for number in range(10):
+    for _ in range(10):
         reader.see(frame(seen(joints_m(STANDING, found), found)), found)
     result = reader.see(frame(seen(joints_m(lifted, found), found)), found)
     assert result.legs is not None
@@ -140,9 +140,7 @@ def test_what_the_detector_does_not_see_is_hidden_and_less_exact() -> None:
     assert points.legs is not None and known is not None
     scores = points.legs.scores.copy()
     scores[LEG_POINT_NAMES.index("left_ankle")] = 0.1
-    part = reader.see(
-        frame(replace(points, legs=points.legs._replace(scores=scores))), found
-    ).legs
+    part = reader.see(frame(replace(points, legs=points.legs._replace(scores=scores))), found).legs
     assert part is not None
     assert part.states[2] == KeypointState.HIDDEN and part.states[5] == KeypointState.TRACKED
     none = reader.see(frame(None), found).legs
@@ -173,7 +171,7 @@ def test_lengths_approach_those_that_are_seen_and_do_not_run_away() -> None:
     reader, found = LegReader(BODY, CAMERA), estimate()
     joints = joints_m(STANDING, found, scales=(0.95, 1.05))
     lengths = []
-    for number in range(300):
+    for _ in range(300):
         result = reader.see(frame(seen(joints, found)), found)
         assert result.legs is not None
         first = result.legs.points_m[:3]
@@ -188,7 +186,7 @@ def test_the_floor_shows_the_distance() -> None:
     """The floor is known; then the tracker's distance of the same image is wrong by 0.12 m."""
     reader, there = LegReader(BODY, CAMERA), estimate()
     joints = joints_m(STANDING, there)
-    for number in range(60):
+    for _ in range(60):
         reader.see(frame(seen(joints, there)), there)
     # The hips look the same from a place farther away along their ray.
     hip = pose(BODY, np.zeros(12)).hip
@@ -196,7 +194,7 @@ def test_the_floor_shows_the_distance() -> None:
     wrong = estimate((float(moved[0]), float(moved[2])))
     points = seen(joints, there)
     result = wrong
-    for number in range(60, 90):
+    for _ in range(60, 90):
         result = reader.see(frame(points), wrong)
     assert result.offset_m is not None and result.posture is not None
     assert wrong.keypoints_m is not None and result.keypoints_m is not None
@@ -252,6 +250,6 @@ def test_legs_that_no_points_have_shown_are_not_there() -> None:
 def test_without_feet_the_tracker_alone_has_the_distance() -> None:
     reader, found = LegReader(BODY, CAMERA), estimate()
     points = seen(joints_m(STANDING, found, scales=(1.3, 1.3)), found, score=0.1)
-    for number in range(30):
+    for _ in range(30):
         result = reader.see(frame(points), found)
     assert result.offset_m == pytest.approx([0.0, 0.0], abs=1e-4)
