@@ -404,9 +404,10 @@ class _Motion:
             return None
         found: FloatArray = (joints.values - before[1]) / (step_ns / 1e9)
         # A face that appears does not turn, and legs that appear do not move.
-        for joints_of, *known in zip((_NECK, _LEGS), has, before[2], strict=True):
-            if not all(known):
-                found[joints_of] = 0.0
+        if not (has[0] and before[2][0]):
+            found[_NECK] = 0.0
+        if not (has[1] and before[2][1]):
+            found[_LEGS] = 0.0
         if estimate.hands is not None:
             # A hand is looked at every other image at most, and may not be known in one.
             found[[name in HAND_NAMES for name in joints.names]] = 0.0
