@@ -189,7 +189,6 @@ class TrackingRequest:
         hands: network file that finds the points of hands; None if they are not measured.
         files: results to write.
         force: whether an existing bag is replaced.
-        legs: whether legs are measured.
     """
 
     recording: RecordingRequest
@@ -201,7 +200,6 @@ class TrackingRequest:
     hands: Path | None = None
     files: TrackFiles = TrackFiles()
     force: bool = False
-    legs: bool = False
 
 
 class OptionsError(CardboxError):
@@ -579,8 +577,7 @@ def tracking_request(options: argparse.Namespace, faults: Iterable[str] = ()) ->
     config = problems.caught(lambda: _config(options, preset), preset)
     hands = _hands(options, recording, problems)
     # The option of this name of "cardbox rula" is a score.
-    legs = getattr(options, "legs", False) is True
-    if legs and not isinstance(recording.points, Detector):
+    if getattr(options, "legs", False) is True and not isinstance(recording.points, Detector):
         problems.add("--legs needs the detector's knees and ankles: give --detector mediapipe")
     problems.check()
     return TrackingRequest(
@@ -591,7 +588,6 @@ def tracking_request(options: argparse.Namespace, faults: Iterable[str] = ()) ->
         options.seed,
         inputs_of(options),
         hands,
-        legs=legs,
     )
 
 

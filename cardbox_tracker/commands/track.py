@@ -47,8 +47,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--legs",
         action="store_true",
-        help="with --detector mediapipe: also measure hips, knees and ankles, in further columns, "
-        "joints and in the video (docs/results.md)",
+        help="has no effect: with --detector, hips, knees and ankles are always measured "
+        "(docs/results.md)",
     )
     parser.add_argument("--video", type=Path, metavar="OUT.mp4", help="also write an overlay video")
     parser.add_argument(

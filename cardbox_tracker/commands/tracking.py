@@ -87,7 +87,6 @@ def track(
                 person.end_s,
                 crowd,
                 None if request.hands is None else HandNetwork(request.hands),
-                request.legs,
             )
         remarks = [remark for remark in source.first.remarks if remark not in early]
         accounts = tuple(one.account for one in source.sources)

@@ -70,6 +70,11 @@ class LegPoints(NamedTuple):
     scores: FloatArray
     spatial_m: FloatArray | None = None
 
+    @property
+    def are_certain(self) -> bool:
+        """Whether a knee and an ankle are."""
+        return bool((self.scores[:4].reshape(2, 2).max(axis=1) >= _CERTAIN).all())
+
     def exchanged(self) -> LegPoints:
         """Return the points with left and right exchanged."""
         other = np.arange(len(LEG_POINT_NAMES)) ^ 1

@@ -10,7 +10,7 @@ where ``keypoints`` has them:
     torso -clavicle_elevation-> clavicle -abduction (X)-> -flexion (Y)-> upper arm
     upper arm -abduction-> -flexion-> forearm -(fixed)-> hand
     torso_yaw -hip_flexion-> -hip_abduction-> -hip_rotation-> thigh -knee_flexion-> shank
-    -(fixed)-> foot, where legs are measured
+    -(fixed)-> foot
 
 If the height of the hips is known, so is the frame ``floor``, which is level below the camera, at
 the height of the feet of the person who was measured.
@@ -76,7 +76,6 @@ def urdf_from_body(
     body: BodyModel,
     optical_frame: str | None = None,
     torso_place: bool = True,
-    legs: bool = False,
     hands: bool = False,
 ) -> str:
     """Return the URDF of ``body`` as XML text.
@@ -86,8 +85,8 @@ def urdf_from_body(
         optical_frame: name of the camera's optical frame; if given, it is added with the camera's
             pitch, so that markers and keypoints are in the same tree.
         torso_place: add the joints beside the 12 of the posture; the joint states then must contain
-            them, or the transforms beyond are missing.
-        legs: also add those of the legs, whose lengths are the mean ones of people of that size.
+            them, or the transforms beyond are missing. Legs have the mean lengths of people of
+            that size.
         hands: also add those of the hands.
     """
     robot = _Robot("cardbox_person", ROOT_LINK)
@@ -103,7 +102,7 @@ def urdf_from_body(
     if height_m is not None:
         robot.fix("camera_to_floor", ROOT_LINK, "floor", (0.0, 0.0, height_m), _ZERO)
     robot.fix("camera_to_hips", ROOT_LINK, "hips", hips_m, (0.0, 0.0, math.pi))
-    more = *(HANDS if hands else ()), *(LEGS if legs else ())
+    more = *(HANDS if hands else ()), *(LEGS if torso_place else ())
     robot.add(body, (*SKELETON, *more), torso_place, "hips")
     parts = body_parts(body.sizes)
     robot.show("torso", "torso", parts.torso)
@@ -115,7 +114,7 @@ def urdf_from_body(
         robot.show(f"{side}_upper_arm", side, parts.upper_arm)
         robot.show(f"{side}_forearm", side, parts.forearm)
         for link, share in (("thigh", THIGH_SHARE), ("shank", SHANK_SHARE)):
-            if legs:
+            if torso_place:
                 length_m = share * stature_of(parts)
                 width_m = parts.upper_arm.mean_width_m
                 robot.box(f"{side}_{link}", side, (width_m, width_m, length_m), -length_m / 2)

@@ -16,7 +16,7 @@ from typing import NamedTuple
 import numpy as np
 
 from cardbox_tracker.person.hands import HAND_NAMES, HAND_OPEN_NAMES, WRIST_NAMES
-from cardbox_tracker.person.legs import LEG_NAMES
+from cardbox_tracker.person.legs import LEG_LIMITS, LEG_NAMES
 from cardbox_tracker.person.sizes import FloatArray
 from cardbox_tracker.person.skeleton import (
     CLAVICLE_NAMES,
@@ -163,6 +163,9 @@ class Metric:
 
 # The mean velocity over a longer gap is not that of the moment.
 _NECK = [JOINT_STATE_NAMES.index(name) for name in NECK_NAMES]
+_LEGS = slice(-len(LEG_NAMES), None)
+# Standard deviation of values all over their range.
+_ANY_LEGS = np.ptp(LEG_LIMITS, axis=1) / np.sqrt(12.0)
 _LONGEST_NS = 1_000_000_000
 
 
@@ -174,8 +177,8 @@ def person_space(number: int) -> str:
 def joint_values(estimate: Estimate, torso_place: bool = True) -> JointValues | None:
     """Return the joints of an estimate; None without a posture.
 
-    Without ``torso_place``, these are the 12 joints of the posture. Where hands and legs are
-    measured, theirs are the last ones; those of a hand that is not known are 0.
+    Without ``torso_place``, these are the 12 joints of the posture. The legs are the last ones,
+    behind the hands where those are measured; joints that are not known are 0.
     """
     if estimate.posture is None or not torso_place:
         return _joints(JOINT_NAMES, estimate.posture)
@@ -186,15 +189,15 @@ def joint_values(estimate: Estimate, torso_place: bool = True) -> JointValues | 
     if estimate.hands is not None:
         names = *names, *HAND_NAMES
         known += [np.zeros(3) if hand is None else hand.joints for hand in estimate.hands]
-    if estimate.legs is not None:
-        names, known = (*names, *LEG_NAMES), [*known, estimate.legs.angles]
-    return _joints(names, estimate.posture, *known)
+    known.append(np.zeros(len(LEG_NAMES)) if estimate.legs is None else estimate.legs.angles)
+    return _joints((*names, *LEG_NAMES), estimate.posture, *known)
 
 
 def joint_deviations(estimate: Estimate, torso_place: bool = True) -> JointValues | None:
     """Return the standard deviation of each joint; None if unknown.
 
-    The joints of the neck, or of a hand, are among them only if it was seen.
+    The joints of the neck, or of a hand, are among them only if it was seen. Legs that are not
+    known may be anywhere in their range.
     """
     if estimate.posture_stddev is None or not torso_place:
         return _joints(JOINT_NAMES, estimate.posture_stddev)
@@ -206,9 +209,8 @@ def joint_deviations(estimate: Estimate, torso_place: bool = True) -> JointValue
         if hand is not None:
             names = [*names, *HAND_NAMES[3 * number : 3 * number + 3]]
             known = [*known, hand.joints_stddev]
-    if estimate.legs is not None:
-        names, known = [*names, *LEG_NAMES], [*known, estimate.legs.angles_stddev]
-    return _joints(tuple(names), estimate.posture_stddev, *known)
+    known = [*known, _ANY_LEGS if estimate.legs is None else estimate.legs.angles_stddev]
+    return _joints((*names, *LEG_NAMES), estimate.posture_stddev, *known)
 
 
 def open_hands(estimate: Estimate) -> JointValues | None:
@@ -383,10 +385,10 @@ class _Motion:
     """Velocities of the joints, from the results of two images that follow each other."""
 
     def __init__(self) -> None:
-        self._last: tuple[int, FloatArray, bool, Tracker] | None = None
+        self._last: tuple[int, FloatArray, tuple[bool, bool], Tracker] | None = None
 
     def velocities(self, stamp_ns: int, estimate: Estimate, tracker: Tracker) -> FloatArray | None:
-        """Return those of ``JOINT_STATE_NAMES``, rad/s and m/s; None without an image before.
+        """Return those of :func:`joint_values`, rad/s and m/s; None without an image before.
 
         An image counts that has a posture of the same tracker, at most ``_LONGEST_NS`` before.
         """
@@ -394,17 +396,19 @@ class _Motion:
         joints = joint_values(estimate)
         if joints is None:
             return None
-        has_neck = estimate.neck is not None
-        self._last = stamp_ns, joints.values, has_neck, tracker
+        has = estimate.neck is not None, estimate.legs is not None
+        self._last = stamp_ns, joints.values, has, tracker
         if before is None or before[3] is not tracker:
             return None
         step_ns = stamp_ns - before[0]
         if not 0 < step_ns <= _LONGEST_NS:
             return None
         found: FloatArray = (joints.values - before[1]) / (step_ns / 1e9)
-        if not (has_neck and before[2]):
-            # A face that appears does not turn.
+        # A face that appears does not turn, and legs that appear do not move.
+        if not (has[0] and before[2][0]):
             found[_NECK] = 0.0
+        if not (has[1] and before[2][1]):
+            found[_LEGS] = 0.0
         if estimate.hands is not None:
             # A hand is looked at every other image at most, and may not be known in one.
             found[[name in HAND_NAMES for name in joints.names]] = 0.0

@@ -171,19 +171,15 @@ class _ResultBag:
         self._space, self._is_first = space, is_first
         self._transforms = BagTransforms(bag)
         self._described: BodyModel | None = None
-        self._more: dict[str, bool] = {}
         self._outputs = OutputStream()
 
     def __call__(self, frame: RecordedFrame, estimate: Estimate, tracker: Tracker) -> None:
         bag, transforms = self._bag, self._transforms
         stamp, optical = frame.stamp_ns, self._frame_id
         body, camera = tracker.body, tracker.camera
-        more = {"legs": estimate.legs is not None, "hands": estimate.hands is not None}
-        more = {name: has or self._more.get(name, False) for name, has in more.items()}
-        if body is not self._described or more != self._more:
-            self._more = more
+        if body is not self._described:
             bag.write_string(f"{self._space}/body_model", stamp, dumps_body_model(body))
-            urdf = urdf_from_body(body, optical or None, **more)
+            urdf = urdf_from_body(body, optical or None, hands=estimate.hands is not None)
             bag.write_string(f"{self._space}/robot_description", stamp, urdf)
             # The links of several people have the same names.
             if not self._space:

@@ -25,6 +25,7 @@ from cardbox_tracker.person.skeleton import (
     NECK_NAMES,
     PLACE_NAMES,
     UNITS,
+    KeypointState,
 )
 from cardbox_tracker.recordings.outputs import (
     METRICS,
@@ -69,24 +70,21 @@ def columns(
     has_points: bool = False,
     has_people: bool = False,
     has_hands: bool = False,
-    has_legs: bool = False,
 ) -> tuple[str, ...]:
     """Return the names of the columns, see :func:`units`."""
-    return tuple(units(has_points, has_people, has_hands, has_legs))
+    return tuple(units(has_points, has_people, has_hands))
 
 
 def units(
     has_points: bool = False,
     has_people: bool = False,
     has_hands: bool = False,
-    has_legs: bool = False,
 ) -> dict[str, str]:
     """Return the unit of each column by its name, in their order; empty for none.
 
     The names up to the person's place are fixed, because scripts read them; standard deviations end
-    in their unit. With ``has_points``, for recordings with points of the person, the neck is among
-    them; with ``has_people``, the number of the person; with ``has_hands``, both hands; with
-    ``has_legs``, both legs.
+    in their unit. With ``has_points``, for recordings with points of the person, neck and legs are
+    among them; with ``has_people``, the number of the person; with ``has_hands``, both hands.
     """
     return {
         "stamp": "s",
@@ -108,7 +106,7 @@ def units(
         **dict.fromkeys(ANATOMICAL_NAMES, "deg"),
         **(dict.fromkeys((PERSON, PERSON_CHANCE), "") if has_people else {}),
         **(_HAND_UNITS if has_hands else {}),
-        **(_leg_units() if has_legs else {}),
+        **(_leg_units() if has_points else {}),
     }
 
 
@@ -158,10 +156,9 @@ def row_of(
     has_points: bool = False,
     has_people: bool = False,
     has_hands: bool = False,
-    has_legs: bool = False,
 ) -> list[Cell]:
     """Return the row of one image, in the order of :func:`columns`."""
-    names = columns(has_points, has_people, has_hands, has_legs)
+    names = columns(has_points, has_people, has_hands)
     stamp = Decimal(stamp_ns).scaleb(-9)
     known: dict[str, Cell] = {"stamp": stamp, "state": estimate.state}
     known |= {"stamp_ns": stamp_ns, "time_s": time_s, PERSON: estimate.person}
@@ -170,8 +167,6 @@ def row_of(
     if joints is None or estimate.keypoints_m is None:
         return [known.get(name) for name in names]
     known |= positions_of(joints)
-    if estimate.neck is None:
-        known |= dict.fromkeys(NECK_NAMES)
     angles = anatomical_angles(np.asarray(estimate.posture, float)).tolist()
     known |= {name: x for name, x in zip(ANATOMICAL_NAMES, angles, strict=True) if x == x}
     points_m = np.asarray(estimate.keypoints_m, float).ravel()
@@ -188,8 +183,11 @@ def row_of(
         place = estimate.place
         known |= {"place_state": str(place.state), "place_chance": place.chance}
         known["place_rests_on"] = place.rests_on
-    # The joints of a hand that is not known are not 0 here.
-    known |= dict.fromkeys(HAND_NAMES)
+    # Joints that are not known are not 0 here.
+    known |= dict.fromkeys((*HAND_NAMES, *LEG_NAMES))
+    known |= {f"{name}_state": str(KeypointState.HIDDEN) for name in LEG_KEYPOINT_NAMES}
+    if estimate.neck is None:
+        known |= dict.fromkeys((*NECK_NAMES, *_deviation_units(NECK_NAMES)))
     for side, hand in zip(_SIDES, estimate.hands or (None, None), strict=True):
         if hand is not None:
             known |= _hand_cells(side, hand)
@@ -231,7 +229,6 @@ def result_table(
     has_points: bool,
     has_people: bool = False,
     has_hands: bool = False,
-    has_legs: bool = False,
 ) -> Iterator[Callable[[RecordedFrame, Estimate], None]]:
     """Context of a function that adds the row of an image to a table, which appears on exit.
 
@@ -240,12 +237,11 @@ def result_table(
         has_points: see :func:`columns`.
         has_people: see :func:`columns`; then each person of an image has a row.
         has_hands: see :func:`columns`.
-        has_legs: see :func:`columns`.
 
     Raises:
         CardboxError: the file cannot be written, or pyarrow is missing.
     """
-    has = has_points, has_people, has_hands, has_legs
+    has = has_points, has_people, has_hands
     names = columns(*has)
     if path.suffix == PARQUET:
         arrow, parquet = pyarrow_or_error()

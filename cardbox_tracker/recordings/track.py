@@ -20,7 +20,6 @@ from cardbox_tracker.recordings.silhouettes import RecordedFrame
 from cardbox_tracker.search.config import TrackerConfig
 from cardbox_tracker.tracking.estimate import UNCERTAIN, Estimate
 from cardbox_tracker.tracking.hands import HandReader, Look
-from cardbox_tracker.tracking.legs import LegReader
 from cardbox_tracker.tracking.people import People
 from cardbox_tracker.tracking.tracker import Tracker
 
@@ -113,7 +112,6 @@ def track_recording(
     end_s: float = math.inf,
     crowd: Crowd | None = None,
     hands: Look | None = None,
-    legs: bool = False,
 ) -> TrackSummary:
     """Track every image from ``start_s`` to ``end_s``.
 
@@ -130,7 +128,6 @@ def track_recording(
         end_s: seconds from the recording's start after which no image is tracked.
         crowd: people to track in place of ``body``, with the first camera alone.
         hands: finds the points of hands, which are then part of the estimates and the table.
-        legs: whether legs are measured, which are then part of them, too; this needs a detector.
 
     Raises:
         CardboxError: no image lies after ``start_s``, or a file cannot be written.
@@ -144,8 +141,7 @@ def track_recording(
         people = People(crowd.bodies, first.camera, config, rng, crowd.most)
         track = partial(_track_people, people)
     hand_readers: dict[int | None, HandReader] = {}
-    leg_readers: dict[int | None, LegReader] = {}
-    has = first.has_points, crowd is not None, hands is not None, legs
+    has = first.has_points, crowd is not None, hands is not None
     with nullcontext() if table is None else result_table(table, *has) as add_row:
         frames = 0
         for taken in recording.frames(start_s, end_s):
@@ -163,9 +159,6 @@ def track_recording(
                     estimate = hand_reader.see(picture, points, estimate, *person, time_s)
                     is_seen = any(estimate.hands or ())
                     tracker.used["hands"] = tracker.used.get("hands", 0) + is_seen
-                if legs:
-                    leg_reader = leg_readers.setdefault(estimate.person, LegReader())
-                    estimate = leg_reader.see(points, estimate, *person, time_s)
                 if add_row is not None:
                     roll_rad = tracker.body.camera_pose.roll_rad
                     add_row(taken.first, estimate.as_camera_stands(roll_rad))

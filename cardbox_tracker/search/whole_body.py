@@ -222,7 +222,8 @@ class WholeBodyFilter:
         approach, z_m = self.approach, float(before[TORSO_Z])
         approach.see(float(before[TORSO_X]))
         expected = approach.expected_m, z_m, approach.home_m, self._locator.yaw_rad
-        cost.expect(*expected, is_located=bool(self._cues))
+        shows_legs = any(cue.shows_legs for _, cue in self._cues)
+        cost.expect(*expected, bool(self._cues), shows_legs)
         self.rated = RatedStates(cost)
         search = Search(
             cost,

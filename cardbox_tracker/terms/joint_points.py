@@ -6,7 +6,8 @@ space, the directions of the bones along the line of sight. Detectors of single 
 camera for level, so these directions are compared along the horizontal line of sight.
 
 The directions of arms are used only for people who were not measured, that of the line of the
-shoulders for all.
+shoulders for all, and that of the trunk if the legs are in the image. Then the detector knows how
+the camera is pitched, so the trunk is compared along the optical axis.
 
 Without new points, the last ones count for up to a second, less and less, because joints may have
 moved. Points that fit the last posture only with left and right exchanged are exchanged; if this
@@ -38,6 +39,7 @@ from cardbox_tracker.terms.joint_points_kernels import (
     POINTS_OF_ARM,
     SHOULDER,
     SHOULDERS,
+    TRUNK,
     WRIST,
     EvidenceTuple,
 )
@@ -55,11 +57,11 @@ _JOINT_M = {SHOULDER: 0.025, ELBOW: 0.02, WRIST: 0.02, KNUCKLES: 0.04}
 _JOINT_M_PER_S = {SHOULDER: 0.2, ELBOW: 0.5, WRIST: 0.8, KNUCKLES: 0.9}
 _TRUNK_M, _TRUNK_M_PER_S = 0.05, 0.25
 _POINT_PX = 1.5
-# Bones (upper arm, forearm, shoulders): deviation of the component along the line of sight, and
-# mean difference of the detector's from the true one (lab/tools/point_deviations.py). That of the
-# shoulders also covers the errors of their curve, see _turned.
-_BONE_DEVIATIONS = np.array([0.22, 0.32, 0.22, 0.32, 0.2])
-_BONE_OFFSETS = np.array([0.06, -0.13, 0.06, -0.13, 0.05])
+# Bones (upper arm, forearm, shoulders, trunk): deviation of the component along the line of sight,
+# and mean difference of the detector's from the true one (lab/tools/point_deviations.py). That of
+# the shoulders also covers the errors of their curve, see _turned.
+_BONE_DEVIATIONS = np.array([0.22, 0.32, 0.22, 0.32, 0.2, 0.12])
+_BONE_OFFSETS = np.array([0.06, -0.13, 0.06, -0.13, 0.05, -0.1])
 _OLDEST_S = 1.0
 # Points belong to somebody else if the median of their distances from the last posture is larger;
 # after this number of such frames the last posture is taken to be wrong.
@@ -125,7 +127,8 @@ class JointPointsTerm:
         is_back = self._exchanged_s is not None and self._exchanged_s >= _BACK_S
         if frame.before is None:
             is_back = _from_behind(evidence[0])
-        return JointPointsObservation(evidence, weight, is_back)
+        shows_legs = points.legs is not None and points.legs.are_certain
+        return JointPointsObservation(evidence, weight, is_back, shows_legs)
 
     def _newest(self, frame: Frame) -> ImagePoints | None:
         """Return the newest points of this person, which may be of an earlier frame, if any."""
@@ -179,7 +182,7 @@ class JointPointsTerm:
         deviations[[HIPS, EARS]] = hypot(_TRUNK_M, age_s * _TRUNK_M_PER_S), _POINT_PX
         bones = np.zeros((N_BONES, 3))
         bones[:, 2] = _BONE_DEVIATIONS * (1.0 + age_s / 0.1)
-        away = np.array([0.0, 0.0, 1.0])
+        away = np.tile([0.0, 0.0, 1.0], (N_BONES, 1))
         shoulders = found[[SHOULDER, POINTS_OF_ARM + SHOULDER]]
         if points.spatial_m is not None and shoulders[:, 2].min() > 0.0:
             bones[:, :2] = bones_of(points.spatial_m, found)
@@ -187,7 +190,9 @@ class JointPointsTerm:
             bones[SHOULDERS, 0] = _turned(bones[SHOULDERS, 0])
             if not self._uses_arms:
                 bones[:SHOULDERS, :2] = 0.0
-            away = level_sight(self._camera, float(shoulders[:, 0].mean()))
+            if points.legs is None or not points.legs.are_certain:
+                bones[TRUNK, :2] = 0.0
+            away[:TRUNK] = level_sight(self._camera, float(shoulders[:, 0].mean()))
         return found, deviations, bones, away
 
 
@@ -200,11 +205,13 @@ class JointPointsObservation(TermObservation):
         weight_px: cost of a squared residual of 1, px.
         shows_back: whether left and right have been exchanged for long, so that the person faces
             the other way; at the start of tracking, whether the points are those of a back.
+        shows_legs: whether points of the legs are certain.
     """
 
     seen: EvidenceTuple
     weight_px: float
     shows_back: bool = False
+    shows_legs: bool = False
     locates = True
 
     def rate(self, posed: Posed) -> FloatArray:
@@ -250,7 +257,7 @@ class JointPointsObservation(TermObservation):
                 length, number = float(np.linalg.norm(bone)), 2 * arm + k - 1
                 found["foreshortened"][at] = abs(float(bone[2])) / max(length, 1e-6)
                 if bones[number, 1] > 0.0:
-                    off_m += float(bone @ away) - length * float(bones[number, 0])
+                    off_m += float(bone @ away[number]) - length * float(bones[number, 0])
                 found["depth difference"][at] = abs(off_m)
             # A hand also has the error of the upper arm.
             found["elbow foreshortened"][3 * arm + 2] = found["foreshortened"][3 * arm + 1]
@@ -319,10 +326,10 @@ def points_of(points: ImagePoints) -> FloatArray:
 
 
 def bones_of(spatial_m: FloatArray, found: FloatArray) -> FloatArray:
-    """Return component along z as a fraction of the length, and score, of each bone, (5, 2).
+    """Return component along z as a fraction of the length, and score, of each bone, (6, 2).
 
-    The bones are upper arm and forearm of each arm, the left one first, and the line from the right
-    to the left shoulder.
+    The bones are upper arm and forearm of each arm, the left one first, the line from the right
+    to the left shoulder, and that from the middle of the hips to that of the shoulders.
 
     Args:
         spatial_m: ``ImagePoints.spatial_m``, (17, 3).
@@ -343,6 +350,8 @@ def bones_of(spatial_m: FloatArray, found: FloatArray) -> FloatArray:
         bones[2 * arm + 1] = _depth(forearm), min(scores[ELBOW], scores[WRIST])
     shoulders = found[SHOULDER, 2], found[POINTS_OF_ARM + SHOULDER, 2]
     bones[SHOULDERS] = _depth(at("left_shoulder") - at("right_shoulder")), min(shoulders)
+    trunk = at("left_shoulder", "right_shoulder") - at("left_hip", "right_hip")
+    bones[TRUNK] = _depth(trunk), min(*shoulders, found[HIPS, 2])
     bones[~np.isfinite(bones).all(axis=1)] = 0.0
     return bones
 

@@ -2,8 +2,8 @@
 
 The residual of a point is its distance in the image from the projected joint, in units of its
 deviation; a joint's deviation in metres becomes smaller in the image with the distance. The
-residual of a bone is the difference between its component along the horizontal line of sight, as a
-fraction of its length, and that of the detector's own points in space. Both are limited:
+residual of a bone is the difference between its component along a line of sight, as a fraction of
+its length, and that of the detector's own points in space. Both are limited:
 
     cost = sum of score * MOST * (1 - exp(-residual^2 / MOST))
 """
@@ -43,8 +43,11 @@ from cardbox_tracker.terms.kernel_arguments import (
 # Joints with a point: four of each arm, the middle of the hips, and the middle of the ears.
 SHOULDER, ELBOW, WRIST, KNUCKLES = 0, 1, 2, 3
 POINTS_OF_ARM, HIPS, EARS, N_POINTS = 4, 8, 9, 10
-# Bones: upper arm and forearm of each arm, and the line from the right to the left shoulder.
-SHOULDERS, N_BONES = 4, 5
+# The middle of the shoulders, which has no point of its own.
+NECK = N_POINTS
+# Bones: upper arm and forearm of each arm, the line from the right to the left shoulder, and the
+# trunk from the hips to the neck.
+SHOULDERS, TRUNK, N_BONES = 4, 5, 6
 N_RESIDUALS = 2 * N_POINTS + N_BONES
 # The rigid segment to which each point belongs; the arm's elevation raises its shoulder.
 _SEGMENT = (1, 1, 2, 2, 3, 3, 4, 4, 0, 0)
@@ -66,8 +69,8 @@ class Evidence(NamedTuple):
         points: column, row and score of each point, (10, 3); a score of 0 for an unknown point.
         deviations: of each point, metres and px, (10, 2).
         bones: component along ``away`` as a fraction of the length, score and deviation of each
-            bone, (5, 3).
-        away: horizontal direction from the camera to the person in the optical frame, (3,).
+            bone, (6, 3).
+        away: unit vector in the optical frame for each bone, (6, 3).
     """
 
     points: Floats
@@ -121,12 +124,14 @@ def _place_body(
     posed: PosedArm,
     points: Floats,
 ) -> None:
-    """Write all points (10, 3) of the torso of ``state`` with the arms of ``arms_of``, (14,)."""
+    """Write points and neck (11, 3) of the torso of ``state``, with the arms of ``arms_of``."""
     rotation, hip = scratch
     state_pose(state, of.place, of.camera, rotation, hip)
     _place_trunk(rotation, hip, of, points)
     for arm in range(2):
         _place_arm(angles_in(arms_of, arm), arm, rotation, hip, of, posed, points)
+    for c in range(3):
+        points[NECK, c] = 0.5 * (points[SHOULDER, c] + points[POINTS_OF_ARM + SHOULDER, c])
 
 
 @inlined_kernel
@@ -154,6 +159,8 @@ def _along(begin: int, end: int, points: Floats, away: Floats) -> float:
 @inlined_kernel
 def bone_ends(bone: int) -> tuple[int, int]:
     """Return the points at which a bone begins and ends."""
+    if bone == TRUNK:
+        return HIPS, NECK
     if bone == SHOULDERS:
         return POINTS_OF_ARM + SHOULDER, SHOULDER
     first, is_forearm = POINTS_OF_ARM * (bone // 2), bone % 2 == 1
@@ -165,7 +172,7 @@ def bone_ends(bone: int) -> tuple[int, int]:
 def bone_residual(bone: int, points: Floats, seen: Evidence) -> float:
     """Return the residual of a bone, in units of its deviation."""
     begin, end = bone_ends(bone)
-    along = _along(begin, end, points, seen.away)
+    along = _along(begin, end, points, seen.away[bone])
     residual: float = (along - seen.bones[bone, 0]) / seen.bones[bone, 2]
     return residual
 
@@ -207,7 +214,7 @@ def _cost_of_arm(arm: int, points: Floats, camera: Intrinsics, seen: Evidence) -
 def _cost_of_trunk(points: Floats, camera: Intrinsics, seen: Evidence) -> float:
     total: float = _cost_of_point(HIPS, points, camera, seen)
     total += _cost_of_point(EARS, points, camera, seen)
-    total += _cost_of_bone(SHOULDERS, points, seen)
+    total += _cost_of_bone(SHOULDERS, points, seen) + _cost_of_bone(TRUNK, points, seen)
     return total
 
 
@@ -226,7 +233,7 @@ def rate(
     (1, 14), raise.
     """
     of, seen = body_of(body), Evidence(*evidence)
-    scratch, posed, points = (np.empty((3, 3)), np.empty(3)), new_arm(), np.empty((N_POINTS, 3))
+    scratch, posed, points = (np.empty((3, 3)), np.empty(3)), new_arm(), np.empty((NECK + 1, 3))
     for i in range(states.shape[0]):
         lifting = arms_of[i if arms_of.shape[0] > 1 else 0]
         _place_body(states[i], lifting, of, scratch, posed, points)
@@ -247,8 +254,8 @@ def residuals(states: Floats, body: BodyTuple, evidence: EvidenceTuple, found: F
     """
     of, seen = body_of(body), Evidence(*evidence)
     values, jacobian, costs = found
-    scratch, posed, points = (np.empty((3, 3)), np.empty(3)), new_arm(), np.empty((N_POINTS, 3))
-    twists, moved = np.empty((N_STATE, TWIST)), np.zeros((N_POINTS, 3, N_STATE))
+    scratch, posed, points = (np.empty((3, 3)), np.empty(3)), new_arm(), np.empty((NECK + 1, 3))
+    twists, moved = np.empty((N_STATE, TWIST)), np.zeros((NECK + 1, 3, N_STATE))
     for n in range(states.shape[0]):
         state = states[n]
         _place_body(state, state, of, scratch, posed, points)
@@ -257,6 +264,7 @@ def residuals(states: Floats, body: BodyTuple, evidence: EvidenceTuple, found: F
             for d in range(N_STATE):
                 if moves(d, _SEGMENT[i]):
                     write_velocity(twists[d], points[i], moved[i, :, d])
+        moved[NECK] = 0.5 * (moved[SHOULDER] + moved[POINTS_OF_ARM + SHOULDER])
         costs[n] = 0.0
         for i in range(N_POINTS):
             u, v = residual(i, points, of.camera, seen) if seen.points[i, 2] > 0.0 else (0.0, 0.0)
@@ -283,17 +291,17 @@ def residuals(states: Floats, body: BodyTuple, evidence: EvidenceTuple, found: F
             costs[n] += _pulled(score, value * value)
             values[n, row] = root * value
             begin, end = bone_ends(bone)
-            length, along = 1e-18, 0.0
+            away, length, along = seen.away[bone], 1e-18, 0.0
             for c in range(3):
                 part = points[end, c] - points[begin, c]
                 length += part * part
-                along += part * seen.away[c]
+                along += part * away[c]
             length = sqrt(length)
             along /= length
             for d in range(N_STATE):
                 change = 0.0
                 for c in range(3):
-                    towards = seen.away[c] - along * (points[end, c] - points[begin, c]) / length
+                    towards = away[c] - along * (points[end, c] - points[begin, c]) / length
                     change += towards * (moved[end, c, d] - moved[begin, c, d])
                 jacobian[n, row, d] = root * change / (length * seen.bones[bone, 2])
 
@@ -302,7 +310,7 @@ def residuals(states: Floats, body: BodyTuple, evidence: EvidenceTuple, found: F
 def project(state: Floats, body: BodyTuple, pixels: Floats) -> None:
     """Write column, row and depth of all points of a state (14,) to ``pixels`` (10, 3)."""
     of = body_of(body)
-    scratch, posed, points = (np.empty((3, 3)), np.empty(3)), new_arm(), np.empty((N_POINTS, 3))
+    scratch, posed, points = (np.empty((3, 3)), np.empty(3)), new_arm(), np.empty((NECK + 1, 3))
     _place_body(state, state, of, scratch, posed, points)
     for i in range(N_POINTS):
         z = max(points[i, 2], _NEAREST_M)

@@ -75,6 +75,7 @@ class MultiViewCost:
         self.parts, self.girdle = first.parts, first.girdle
         self.place, self.view, self.body = first.place, first.view, first.body
         self.x_factor, self.yaw_unit_rad = 1.0, np.radians(config.yaw_deg)
+        self._z_units_m = config.z_step_m, config.z_home_m
         self.anchor = first.anchor
         self.face(0.0)
 
@@ -97,13 +98,19 @@ class MultiViewCost:
             cost.see(silhouette, to_view(state))
 
     def expect(
-        self, x_m: float, z_m: float, home_m: float, yaw_rad: float, is_located: bool = False
+        self,
+        x_m: float,
+        z_m: float,
+        home_m: float,
+        yaw_rad: float,
+        is_located: bool = False,
+        shows_legs: bool = False,
     ) -> None:
         """Set the anchor of the priors: place of the last frame, home of x, and expected yaw.
 
         The yaw is that of somebody who faces the camera, 0 if nothing else is known. An outline of
         a person who is twice as far away determines the distance half as well. The yaw is freer if
-        the person ``is_located`` by points.
+        the person ``is_located`` by points, and the height if these show the legs: who squats.
         """
         facing_rad = self.facing_rad
         # Who walks to one side turns from the back to it the other way round.
@@ -111,7 +118,10 @@ class MultiViewCost:
         self.x_factor = max((self.place[0] - x_m) / _NORMAL_M, 1.0)
         config = self._config
         self.yaw_unit_rad = np.radians(config.located_yaw_deg if is_located else config.yaw_deg)
-        self.costs[0].loosen(self.x_factor, self.yaw_unit_rad)
+        self._z_units_m = config.z_step_m, config.z_home_m
+        if shows_legs:
+            self._z_units_m = config.located_z_m, config.located_z_m
+        self.costs[0].loosen(self.x_factor, self.yaw_unit_rad, self._z_units_m)
 
     def choose(self, seeing: Sequence[int]) -> None:
         """Use only the cameras with these indices in this frame."""
@@ -150,7 +160,7 @@ class MultiViewCost:
         step, home = (self.x_factor * np.array([config.x_step_m, config.x_home_m])) ** -2
         inverse[TORSO_X] = step + home
         mean[TORSO_X] = (step * x_m + home * home_m) / inverse[TORSO_X]
-        step, home = config.z_step_m**-2, config.z_home_m**-2
+        step, home = (unit_m**-2 for unit_m in self._z_units_m)
         inverse[TORSO_Z] = step + home
         mean[TORSO_Z] = step * z_m / inverse[TORSO_Z]
         return mean, inverse

@@ -187,9 +187,11 @@ class TermObservation:
             proposed, and the search needs fewer others.
         shows_back: whether the person faces the other way than in the last states; at the start of
             tracking, away from the camera.
+        shows_legs: whether the person's legs are in the image.
     """
 
     locates = False
+    shows_legs = False
     shows_back = False
 
     def rate(self, posed: Posed) -> FloatArray:

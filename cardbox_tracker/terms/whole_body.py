@@ -166,11 +166,15 @@ class WholeBodyCost:
         """Return the arguments of the kernels that rate by pixels of ``planes`` and priors."""
         return (planes, *self.counted, base_px, self._scale), self._prior
 
-    def loosen(self, x_factor: float, yaw_unit_rad: float) -> None:
-        """Set the factor on the units of the priors of ``torso_x``, and the unit of the yaw."""
+    def loosen(self, x_factor: float, yaw_unit_rad: float, z_units_m: tuple[float, float]) -> None:
+        """Set the factor on the units of ``torso_x``, and the units of yaw and ``torso_z``.
+
+        The latter are those of step and home.
+        """
         self._rules[priors.X_STEP] = x_factor * self._config.x_step_m
         self._rules[priors.X_HOME] = x_factor * self._config.x_home_m
         self._rules[priors.YAW_UNIT] = yaw_unit_rad
+        self._rules[priors.Z_STEP], self._rules[priors.Z_HOME] = z_units_m
 
     def hips(self, state: FloatArray) -> tuple[float, float, float]:
         """Return the middle of the hips of a state (14,), x, y, z in the optical frame, metres."""

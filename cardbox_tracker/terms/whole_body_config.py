@@ -39,6 +39,7 @@ class WholeBodyCostConfig:
         step_cap: largest cost of a motion.
         x_home_m: unit of the torso's distance from its usual place along the line of sight, m.
         z_home_m: unit of the torso's distance from the measured height, m.
+        located_z_m: unit of both with points of the legs, which show who squats or sits, m.
         home_cap: largest cost of such a distance.
         penetration: cost of a hand, forearm or elbow on the axis of trunk or head; 0 at the
             surface.
@@ -68,6 +69,8 @@ class WholeBodyCostConfig:
     step_cap: float = 2.0
     x_home_m: float = 0.08
     z_home_m: float = 0.06
+    # With less, somebody who squats is taken for somebody who stands nearer.
+    located_z_m: float = 0.4
     home_cap: float = 4.0
     penetration: float = 3.0
     unknown_nats: float = FLOOR_NATS

@@ -103,6 +103,10 @@ class Legs(NamedTuple):
     points_stddev_m: FloatArray
     states: tuple[KeypointState, ...]
 
+    def hidden(self) -> Legs:
+        """Return the legs of an image that does not show them."""
+        return self._replace(states=(KeypointState.HIDDEN,) * len(self.states))
+
 
 @dataclass(frozen=True)
 class Estimate:
@@ -141,7 +145,7 @@ class Estimate:
             were away; None if only one is tracked.
         hands: the left and the right hand, None for one that is not known; None unless hands are
             looked at.
-        legs: None without a posture, or unless legs are looked at.
+        legs: None without a posture, and as long as no points have shown them.
     """
 
     state: str

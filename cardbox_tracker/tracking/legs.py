@@ -11,9 +11,10 @@ units of its deviation:
 - the angles, from those of the image before and from a leg that hangs.
 
 Lengths of thigh and shank, and the height of the floor, are the same in all images. They are
-unknowns of each fit whose prior is what the images before have shown. So is the distance of the
-hips, with the tracker's as prior: feet on a floor that is known show it better than the trunk's
-size. The whole person is moved along the line of sight to it.
+unknowns of each fit whose prior is what the images before have shown, and the floor that is given.
+So is the distance of the hips, with the tracker's as prior: feet on a floor that is known show it
+better than the trunk's size. The whole person is moved along the line of sight to it, unless depth
+images or a further camera show the distance.
 
 A leg that the detector does not see keeps its angles, with growing deviations, and is ``hidden``.
 """
@@ -51,12 +52,14 @@ from cardbox_tracker.person.skeleton import (
     KeypointState,
     rotation_z,
 )
+from cardbox_tracker.terms.term import Frame
 from cardbox_tracker.tracking.estimate import Estimate, Legs
+from cardbox_tracker.tracking.place import DEPTH, SECOND_CAMERA
 
 _SIDES = 1.0, -1.0
 _N = len(LEG_NAMES)
 # Values of a fit: the angles, the logarithms of the lengths' factors, the floor, the distance.
-_SHARED, _DISTANCE = slice(_N, _N + 3), _N + 3
+_LENGTHS, _SHARED, _DISTANCE = slice(_N, _N + 2), slice(_N, _N + 3), _N + 3
 # Knee and ankle, left and right, among the points.
 _ENDS = [
     [LEG_POINT_NAMES.index(f"{side}_{name}") for name in ("knee", "ankle")]
@@ -80,8 +83,8 @@ _CONTACT_M, _LIFTED_M = 0.02, 0.06
 # Of the priors: angles of a hanging leg, and change of an angle and its growth a second, rad.
 _REST = np.tile(np.radians([60.0, 15.0, 15.0, 60.0]), 2)
 _CHANGE, _CHANGE_PER_S = np.radians(8.0), np.radians(200.0)
-# Logarithms of the lengths' factors, and the floor before it is seen, m.
-_LENGTH, _FLOOR_M = 0.04, 0.12
+# Logarithms of the lengths' factors, the largest one of people, and the floor before it is seen, m.
+_LENGTH, _MOST_LENGTH, _FLOOR_M = 0.04, 0.12, 0.12
 # Relative deviation of the tracker's distance of the hips.
 _DISTANCE_SHARE = 0.05
 _FIXED = 1e-6
@@ -121,38 +124,63 @@ class _Seen(NamedTuple):
     shows_back: bool
 
 
+class Floor(NamedTuple):
+    """The floor, as something other than the feet of the person shows it.
+
+    Attributes:
+        height_m: height in the level frame of the first camera, whose origin is the camera, so that
+            a floor 1.5 m below it is at -1.5 m.
+        stddev_m: its standard deviation.
+    """
+
+    height_m: float
+    stddev_m: float
+
+
 class LegReader:
     """Adds the legs to the estimates of one person, from the first camera's points."""
 
-    def __init__(self) -> None:
-        """Start without knowledge of lengths and floor."""
+    def __init__(self, body: BodyModel, camera: Camera, floor: Floor | None = None) -> None:
+        """Start with the usual lengths.
+
+        Args:
+            body: the person.
+            camera: working camera, with the pitch of the body model.
+            floor: what is known of it; None for nothing.
+        """
+        self._body, self._camera = body, camera
+        self.forget()
+        stature_m = stature_of(body_parts(body.sizes))
+        lengths_m = (THIGH_SHARE + SHANK_SHARE + _ANKLE_SHARE) * stature_m
+        self._usual = np.array([0.0, 0.0, body.placement.hip_height_m - lengths_m])
+        self._usual_stddev = np.array([_LENGTH, _LENGTH, _FLOOR_M])
+        if floor is not None:
+            self._usual[2], self._usual_stddev[2] = floor
+        self._mean_information, self._mean_vector = np.zeros((3, 3)), np.zeros(3)
+        self._seen_s = self._time_s = 0.0
+        self._is_known = False
+
+    def forget(self) -> None:
+        """Forget the posture; lengths and floor stay."""
         self._last: FloatArray | None = None
         self._last_stddev = _REST
         self._last_s, self._last_share = 0.0, 0.0
-        self._usual: FloatArray | None = None
-        self._mean_information, self._mean_vector = np.zeros((3, 3)), np.zeros(3)
-        self._seen_s = 0.0
 
-    def see(
-        self,
-        points: ImagePoints | None,
-        estimate: Estimate,
-        body: BodyModel,
-        camera: Camera,
-        time_s: float,
-    ) -> Estimate:
-        """Return ``estimate`` with the legs.
+    def see(self, frame: Frame, estimate: Estimate) -> Estimate:
+        """Return ``estimate`` with the legs, as soon as points have shown them.
 
         Args:
-            points: of the person in the image of ``camera``; None if nobody is found.
-            estimate: of the same image; without a posture it stays as it is.
-            body: the person, as the tracker has it.
-            camera: working camera, with the pitch of the body model.
-            time_s: time of the image.
+            frame: of the first camera.
+            estimate: of the same time; without a posture it stays as it is.
         """
-        if estimate.posture is None or estimate.keypoints_m is None:
+        points, camera = frame.points, self._camera
+        self._time_s += frame.interval_s
+        is_shown = points is not None and points.legs is not None
+        if estimate.posture is None or not (is_shown or self._is_known):
             return estimate
-        fit = _Fit(estimate, body, camera)
+        self._is_known = True
+        fit = _Fit(estimate, self._body, camera)
+        time_s = self._time_s
         elapsed_s = abs(time_s - self._last_s)
         change, steady = np.full(_N, np.inf), np.inf
         if self._last is not None and elapsed_s <= _KEPT_S:
@@ -160,9 +188,7 @@ class LegReader:
             steady = _DISTANCE_CHANGE + _DISTANCE_PER_S * elapsed_s
         else:
             self._last = np.zeros(_N)
-        if self._usual is None:
-            self._usual = np.array([0.0, 0.0, fit.usual_floor_m])
-        usual = np.diag(np.array([_LENGTH, _LENGTH, _FLOOR_M]) ** -2.0)
+        usual = np.diag(self._usual_stddev**-2.0)
         information = usual + _IMAGES * self._mean_information
         vector = usual @ self._usual + _IMAGES * self._mean_vector
         shared: FloatArray = np.asarray(np.linalg.solve(information, vector), np.float64)
@@ -228,10 +254,10 @@ class _Fit:
         self._lengths_m = np.array([THIGH_SHARE, SHANK_SHARE]) * stature_m
         self._ankle_m = _ANKLE_SHARE * stature_m
         self._sight = camera.optical_to_reference(np.array([0.0, 0.0, 1.0]))
+        place = estimate.place
         # A filter that keeps the distance constant has no values for another one.
-        self._distance_share = _FIXED if estimate.offset_m is None else _DISTANCE_SHARE
-        place = body.placement
-        self.usual_floor_m = place.hip_height_m - float(self._lengths_m.sum()) - self._ankle_m
+        is_fixed = place is None or place.rests_on in (DEPTH, SECOND_CAMERA)
+        self._distance_share = _FIXED if is_fixed else _DISTANCE_SHARE
 
     def seen(self, points: ImagePoints | None) -> _Seen | None:
         """Return what the points show; None if they do not show the legs."""
@@ -307,6 +333,7 @@ class _Fit:
                 step = np.linalg.solve(information, jacobian.T @ residuals[0])
                 values = values - np.clip(step, -_LARGEST_STEP, _LARGEST_STEP)
                 values[:_N] = np.clip(values[:_N], *LEG_LIMITS.T)
+                values[_LENGTHS] = np.clip(values[_LENGTHS], -_MOST_LENGTH, _MOST_LENGTH)
             count = 1 if seen is None else 4 + 8
             rms = float(np.sqrt(np.sum(residuals[0] ** 2) / count))
             if best is None or rms < best.rms:

@@ -395,7 +395,8 @@ def _held(last: Estimate, hidden: bool = False) -> Estimate:
     states: tuple[KeypointState, ...] = (KeypointState.HIDDEN,) * 6
     if not hidden and last.keypoint_states is not None:
         states = doubted(last.keypoint_states)
-    return replace(last, state=UNCERTAIN, keypoint_states=states)
+    legs = None if last.legs is None else last.legs.hidden()
+    return replace(last, state=UNCERTAIN, keypoint_states=states, legs=legs)
 
 
 def _figures(points: Sequence[ImagePoints], shape: tuple[int, ...]) -> list[Shown]:

@@ -57,6 +57,7 @@ from cardbox_tracker.tracking.estimate import (
 from cardbox_tracker.tracking.facing import Facing
 from cardbox_tracker.tracking.frozen import FrozenCameras
 from cardbox_tracker.tracking.head import HeadTracker
+from cardbox_tracker.tracking.legs import Floor, LegReader
 from cardbox_tracker.tracking.observation import Observation, Observations, stamp_of
 from cardbox_tracker.tracking.place import PlaceWatch
 from cardbox_tracker.tracking.sampling import likely_postures
@@ -97,6 +98,7 @@ class Tracker:
         make_filter: MakeFilter | None = None,
         others: Sequence[OtherCamera] = (),
         corrector: Corrector | None = None,
+        floor: Floor | None = None,
     ) -> None:
         """Set up for ``body``; the camera gets the pitch of the body model.
 
@@ -113,6 +115,7 @@ class Tracker:
             others: further cameras; they need the filter ``whole_body``.
             corrector: changes the fitted state of each frame before it becomes the result; joints
                 are kept within their limits. It needs the filter ``whole_body``.
+            floor: on which the person stands, which shows the place; by default, feet show it.
 
         Raises:
             CameraError: the person was not measured in front of one of ``others``.
@@ -123,7 +126,7 @@ class Tracker:
         self.config = config or TrackerConfig()
         self._rng = rng or np.random.default_rng(0)
         self._make_filter, self._corrector = make_filter, corrector
-        self._others = tuple(others)
+        self._others, self._floor = tuple(others), floor
         if (others or corrector) and (make_filter or not self.config.has_several_views):
             what = "several cameras need" if others else "a corrector needs"
             raise ValueError(f"{what} the filter whole_body: the preset default")
@@ -151,6 +154,7 @@ class Tracker:
         views = self.views
         earlier = self.agreement
         self.agreement = CameraAgreement(body, self.camera, views, earlier) if views else None
+        self._legs = LegReader(self.body, self.camera, self._floor)
         if is_new_start or not isinstance(self._filter, WholeBodyFilter):
             self.reset()
             return
@@ -171,6 +175,7 @@ class Tracker:
         rng = self._rng.spawn(1)[0]
         self._filter = make_filter(self.config, self._silhouette, rng, self.views)
         self._head = HeadTracker(self.body, self.camera)
+        self._legs.forget()
         # The outlines of several cameras determine the direction; the paper has no such doubt.
         is_alone = self.config.has_several_views and not self._others
         self._facing = Facing(self.body) if is_alone else None
@@ -284,7 +289,7 @@ class Tracker:
         if self.config.has_several_views and posture is not None and is_at_two_limits(posture):
             estimate = _unsure(estimate)
         self._count(observations, frames, estimate)
-        return self._head.see(frames[0], estimate)
+        return self._legs.see(frames[0], self._head.see(frames[0], estimate))
 
     def _placed(self, frames: Sequence[Frame], estimate: Estimate) -> Estimate:
         """Return the estimate with its place, which no deviation of it is surer than."""

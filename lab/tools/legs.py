@@ -6,17 +6,16 @@ A session is as for :mod:`.people`, with hips, knees and ankles in its truth. Ea
 alone; statures and the camera's pitch are given. Of hips, knees and ankles that are ``tracked`` and
 not covered, *place* is the mean error, *shape* that after both skeletons are shifted to the middle
 of their shoulders, and *legs* after a shift to the middle of the hips, without the hips. The
-network is the detector's points in space, which have no metric place. *Knee* is the mean error of
-its bend, without and with the sign. *Upper* is the mean error of
-shoulders, elbows and hands without and with ``--legs``. People are numbered from left to right
-if they come together, and statures are given in this order.
+network is the detector's points in space, which have no metric place. *Knee* is the error of its
+bend: the root of the mean square, and the mean. *Upper* is the mean error of shoulders, elbows and
+hands. People are numbered from left to right if they come together, and statures are given in this
+order.
 """
 
 from __future__ import annotations
 
 import argparse
 import json
-import time
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -36,7 +35,6 @@ from cardbox_tracker.recordings.recording import Segmentation, open_recording
 from cardbox_tracker.recordings.silhouettes import TimeSpan
 from cardbox_tracker.search.config import default_preset
 from cardbox_tracker.tracking.estimate import Estimate
-from cardbox_tracker.tracking.legs import LegReader
 from cardbox_tracker.tracking.people import People
 from lab.tools.people import joints_of, matched
 
@@ -53,7 +51,7 @@ def main() -> None:
     given = [float(one) for one in options.stature.split(",")] if options.stature else None
     print(
         "camera, person, images, tracked, cm: place, shape, legs; network: shape, legs; "
-        "upper without and with legs; knee degrees: error, too bent by; ms"
+        "upper; knee degrees: rms, too bent by"
     )
     for folder in options.sessions:
         truth = json.loads((folder / "ground_truth.json").read_text())
@@ -73,45 +71,36 @@ def _lines(folder: Path, truth: Any, camera: Any, given: list[float] | None) -> 
     empty = next((one for one in truth["segments"] if one["name"] == "empty"), None)
     scene: Segmentation = finder if empty is None else TimeSpan(empty["start_s"], empty["end_s"])
     names = [name] if len(truth.get("cameras", ())) > 1 else []
-    found: dict[int, list[tuple[Estimate, Estimate, ImagePoints | None]]] = {}
-    readers: dict[int | None, LegReader] = {}
-    spent_s, looks = 0.0, 0
+    found: dict[int, list[tuple[Estimate, ImagePoints | None]]] = {}
     with open_recording(folder / "bag", scene, names, points=finder) as recording:
         tracked = People(bodies, recording.first.camera, default_preset(), count=len(people))
         for taken in recording.frames():
             there = found.setdefault(taken.stamp_ns, [])
-            for estimate, tracker in tracked.track(taken.observations[0], taken.people):
+            for estimate, _ in tracked.track(taken.observations[0], taken.people):
                 assert estimate.person is not None
-                points = tracked.points_of(estimate.person)
-                reader = readers.setdefault(estimate.person, LegReader())
-                seen = points, estimate, tracker.body, tracker.camera, taken.stamp_ns / 1e9
-                begin_s = time.process_time()
-                there.append((reader.see(*seen), estimate, points))
-                spent_s, looks = spent_s + time.process_time() - begin_s, looks + 1
+                there.append((estimate, tracked.points_of(estimate.person)))
     rows: list[list[FloatArray]] = [[] for _ in people]
     for i, frame in enumerate(truth["frames"]):
         seen_people = [joints_of(person["frames"][i], name) for person in people]
         both = {id(one[0]): one for one in found.get(frame["stamp_ns"], [])}
-        estimates = [one for one, *_ in both.values() if one.posture is not None]
+        estimates = [one for one, _ in both.values() if one.legs is not None]
         for k, estimate in matched(seen_people, estimates):
             there_m = people[k]["frames"][i]["cameras"][name]
             rows[k].append(_errors(*both[id(estimate)], there_m))
     for person, row in zip(people, rows, strict=True):
         mean = np.nanmean(np.array(row), axis=0)
+        mean[6] = np.sqrt(mean[6])
         cm = 100 * mean
         yield (
             f"{name}, {person['name']}, {len(row)}, {mean[-1]:.0%}, {cm[0]:.1f}, {cm[1]:.1f}, "
-            f"{cm[2]:.1f}; {cm[3]:.1f}, {cm[4]:.1f}; {cm[5]:.1f}, {cm[6]:.1f}; "
-            f"{mean[7]:.0f}, {mean[8]:.0f}; {1e3 * spent_s / looks:.1f}"
+            f"{cm[2]:.1f}; {cm[3]:.1f}, {cm[4]:.1f}; {cm[5]:.1f}; {mean[6]:.1f}, {mean[7]:.1f}"
         )
 
 
-def _errors(
-    estimate: Estimate, before: Estimate, points: ImagePoints | None, there: Any
-) -> FloatArray:
+def _errors(estimate: Estimate, points: ImagePoints | None, there: Any) -> FloatArray:
     """Return the errors of one image, m and degrees, and the share that is ``tracked``."""
     legs = estimate.legs
-    assert legs is not None and estimate.keypoints_m is not None and before.keypoints_m is not None
+    assert legs is not None and estimate.keypoints_m is not None
 
     def true_m(names: tuple[str, ...]) -> FloatArray:
         return np.array([there["joints_m"].get(name, [np.nan] * 3) for name in names])
@@ -139,16 +128,13 @@ def _errors(
         shoulders = np.array([named[KEYPOINT_NAMES[at]] for at in _SHOULDERS])
         network = np.array([named[name] for name in LEG_KEYPOINT_NAMES])
         of_network = shape_and_legs(network, shoulders)
-    arms = [
-        _mean(np.linalg.norm(np.asarray(one.keypoints_m) - upper, axis=1))
-        for one in (before, estimate)
-    ]
+    arms = _mean(np.linalg.norm(np.asarray(estimate.keypoints_m) - upper, axis=1))
     bend_deg = _bend_deg(legs.points_m) - _bend_deg(true)
     bend_deg[~is_tracked.reshape(2, 3).all(axis=1)] = np.nan
-    bends = [_mean(np.abs(bend_deg)), _mean(bend_deg)]
+    bends = [_mean(bend_deg**2), _mean(bend_deg)]
     known = np.isfinite(true).all(axis=1) & is_free
     share = is_tracked[known].mean() if known.any() else np.nan
-    return np.array([*found, *of_network, *arms, *bends, share])
+    return np.array([*found, *of_network, arms, *bends, share])
 
 
 def _bend_deg(points_m: FloatArray) -> FloatArray:

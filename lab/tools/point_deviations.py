@@ -41,6 +41,7 @@ from cardbox_tracker.terms.joint_points_kernels import (
     POINTS_OF_ARM,
     SHOULDER,
     SHOULDERS,
+    TRUNK,
     WRIST,
     WRIST_SHARE,
 )
@@ -56,7 +57,12 @@ POINTS = {
     "hips": (HIPS,),
 }
 """Rows of :func:`points_of` of each kind."""
-BONES = {"upper arm": (0, 2), "forearm": (1, 3), "shoulders": (SHOULDERS,)}
+BONES = {
+    "upper arm": (0, 2),
+    "forearm": (1, 3),
+    "shoulders": (SHOULDERS,),
+    "trunk": (TRUNK,),
+}
 """Rows of :func:`bones_of` of each kind."""
 LEAST_SCORE = 0.5
 """Points with a smaller score are not compared."""
@@ -74,8 +80,8 @@ class Differences(NamedTuple):
         source: origin of the session.
         px: offset of each point outwards and down, px, (n, 9, 2).
         metres: the same at the joint's depth, (n, 9, 2).
-        bones: component along the horizontal line of sight, as a fraction, (n, 5).
-        unturned: component along the camera's axis, as a fraction, (n, 5).
+        bones: component along the horizontal line of sight, as a fraction, (n, 6).
+        unturned: component along the camera's axis, as a fraction, (n, 6).
     """
 
     source: str
@@ -128,13 +134,14 @@ def differences_of(
 
 
 def _true_bones(joints_m: FloatArray) -> FloatArray:
-    """Return the directions of the bones, (5, 3), in the order of :func:`bones_of`."""
+    """Return the directions of the bones, (6, 3), in the order of :func:`bones_of`."""
     bones = np.empty((N_BONES, 3))
     for arm in range(2):
         first = POINTS_OF_ARM * arm
         bones[2 * arm] = joints_m[first + ELBOW] - joints_m[first + SHOULDER]
         bones[2 * arm + 1] = joints_m[first + KNUCKLES] - joints_m[first + ELBOW]
     bones[SHOULDERS] = joints_m[SHOULDER] - joints_m[POINTS_OF_ARM + SHOULDER]
+    bones[TRUNK] = joints_m[[SHOULDER, POINTS_OF_ARM + SHOULDER]].mean(axis=0) - joints_m[HIPS]
     directions: FloatArray = bones / np.linalg.norm(bones, axis=1, keepdims=True)
     return directions
 

@@ -23,10 +23,10 @@ def results(tmp_path: Path) -> Path:
     path = tmp_path / "film.csv"
     with path.open("w", newline="") as file:
         writer = csv.writer(file)
-        writer.writerow(columns(has_people=True, has_legs=True))
+        writer.writerow(columns(has_points=True, has_people=True))
         for number in range(10):
             found = Estimate("tracking", *arms, 100, 0.9, person=1, legs=legs)
-            row = row_of(10**8 * number, number / 10, found, has_people=True, has_legs=True)
+            row = row_of(10**8 * number, number / 10, found, has_points=True, has_people=True)
             writer.writerow(["" if cell is None else cell for cell in row])
     return path
 

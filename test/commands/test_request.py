@@ -168,8 +168,8 @@ def test_hands_need_the_detector_and_its_file(film: Path, monkeypatch: pytest.Mo
 def test_legs_need_the_detector(film: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(detector_module, "installed_models", lambda: ModelFiles(film, film))
     given = ("--fov", 60, "--stature", 1.7)
-    assert asked(film, *given, "--detector", "mediapipe", "--legs").legs is True
-    assert asked(film, *given, "--detector", "mediapipe").legs is False
+    with_legs = asked(film, *given, "--detector", "mediapipe", "--legs")
+    assert with_legs == asked(film, *given, "--detector", "mediapipe")
     points = "--detector", film.parent / "points.csv"
     for words in ((), points, ("--silhouettes", "detector")):
         assert "--legs needs the detector" in refused(film, *given, *words, "--legs")

@@ -52,7 +52,7 @@ def test_directions_by_hand(side: float) -> None:
 
 def test_the_description_with_legs_moves_as_they_do() -> None:
     angles = np.radians([70.0, 20.0, 10.0, 60.0, 15.0, -5.0, -20.0, 30.0])
-    links = LinkTransforms(urdf_from_body(BODY, legs=True))
+    links = LinkTransforms(urdf_from_body(BODY))
     positions = dict.fromkeys(JOINT_STATE_NAMES, 0.0) | {"torso_yaw": 0.4}
     positions |= dict(zip(LEG_NAMES, angles.tolist(), strict=True))
     assert set(links.joint_names) == set(positions)
@@ -79,6 +79,6 @@ def test_the_description_with_legs_moves_as_they_do() -> None:
         assert place(f"{name}_foot") == pytest.approx(expected, abs=1e-3)
 
 
-def test_without_the_option_the_description_has_no_legs() -> None:
-    assert urdf_from_body(BODY) == urdf_from_body(BODY, legs=False)
-    assert "thigh" not in urdf_from_body(BODY)
+def test_a_description_of_the_posture_alone_has_no_legs() -> None:
+    assert "thigh" in urdf_from_body(BODY)
+    assert "thigh" not in urdf_from_body(BODY, torso_place=False)

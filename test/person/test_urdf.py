@@ -19,6 +19,7 @@ from cardbox_tracker.camera.camera import Camera, roll_turn
 from cardbox_tracker.commands.main import main
 from cardbox_tracker.common.compiling import kernel
 from cardbox_tracker.person.kinematics import clavicles, gaze_m, keypoints, pose
+from cardbox_tracker.person.legs import LEG_LIMITS, LEG_NAMES, LEGS
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.model_file import load_body_model
 from cardbox_tracker.person.parts import body_parts
@@ -57,10 +58,10 @@ KEYPOINT_LINKS = (
 )
 # From the reference frame (X to the camera, Y right) to the URDF's root (X away, Y left).
 TO_ROOT = np.diag([-1.0, -1.0, 1.0])
-ALL_NAMES = (*JOINT_NAMES, *PLACE_NAMES, *NECK_NAMES, *CLAVICLE_NAMES)
+ALL_NAMES = (*JOINT_NAMES, *PLACE_NAMES, *NECK_NAMES, *CLAVICLE_NAMES, *LEG_NAMES)
 REP155_LINKS = ("l_shoulder", "l_elbow", "l_wrist", "r_shoulder", "r_elbow", "r_wrist")
 PLACE_LIMITS = place_limits(2.0)
-ALL_LIMITS = np.vstack([TURNING_LIMITS, PLACE_LIMITS, NECK_LIMITS, [[0.0, 0.15]] * 2])
+ALL_LIMITS = np.vstack([TURNING_LIMITS, PLACE_LIMITS, NECK_LIMITS, [[0.0, 0.15]] * 2, LEG_LIMITS])
 
 
 def child(element: Xml.Element, tag: str) -> dict[str, str]:
@@ -200,8 +201,10 @@ def test_torso_x_is_nearer_to_the_camera_and_torso_z_is_higher() -> None:
 def test_without_the_place_it_and_neck_and_clavicles_are_missing() -> None:
     full = Xml.fromstring(urdf_from_body(BodyModel(), "eye"))
     short = Xml.fromstring(urdf_from_body(BodyModel(), "eye", torso_place=False))
+    of_legs = [name for joint in LEGS for name in (joint.name, joint.link)]
+    missing = {*ALL_NAMES[12:], *CLAVICLE_LINKS, *of_legs}
     for element in [*full.findall("link"), *full.findall("joint")]:
-        if element.attrib["name"].removesuffix("_link") in (*ALL_NAMES[12:], *CLAVICLE_LINKS):
+        if element.attrib["name"].removesuffix("_link") in missing:
             full.remove(element)
     raised = "left_shoulder_abduction", "right_shoulder_abduction"
     for joint, link in (("torso_y", "hips"), *((name, "torso") for name in ("neck", *raised))):
@@ -222,7 +225,7 @@ def test_without_the_place_it_and_neck_and_clavicles_are_missing() -> None:
 @pytest.mark.parametrize("posture", random_postures(2))
 def test_the_head_turns_as_the_neck_does(posture: np.ndarray, neck: tuple[float, float]) -> None:
     body = BodyModel.of(distance_m=2.3, hip_height_m=-0.4)
-    values = [*posture, 0.0, 0.0, *neck, 0.0, 0.0]
+    values = [*posture, 0.0, 0.0, *neck, *[0.0] * 10]
     head = link_poses(urdf_from_body(body), dict(zip(ALL_NAMES, values, strict=True)))["head"]
     frames = pose(body.rigid, posture)
     turned = frames.torso_rotation @ neck_rotation(np.array(neck))
@@ -290,7 +293,7 @@ def test_yourdfpy_loads_it_and_agrees() -> None:
     posture, place = random_postures(1)[0], random_places(1)[0]
     robot = yourdfpy.URDF.load(io.BytesIO(urdf_from_body(body).encode()))
     assert robot.validate()
-    robot.update_cfg(dict(zip(ALL_NAMES, [*posture, *place, 0.4, -0.2, 0.0, 0.0], strict=True)))
+    robot.update_cfg(dict(zip(ALL_NAMES, [*posture, *place, 0.4, -0.2, *[0.0] * 10], strict=True)))
     placed = Estimate(TRACKING, posture, offset_m=place).placed(body)
     for point, link in zip(pose(placed.rigid, posture).keypoints_m, KEYPOINT_LINKS, strict=True):
         np.testing.assert_allclose(

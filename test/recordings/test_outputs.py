@@ -74,7 +74,8 @@ LEGS = Legs(
 )
 BODY_NAMES = (*JOINT_NAMES, "torso_x", "torso_z")
 CLAVICLES = ("left_clavicle_elevation", "right_clavicle_elevation")
-ALL_NAMES = (*BODY_NAMES, "neck_yaw", "neck_pitch", *CLAVICLES)
+ALL_NAMES = (*BODY_NAMES, "neck_yaw", "neck_pitch", *CLAVICLES, *LEG_NAMES)
+NO_LEGS = [0.0] * 8
 TOPICS = [
     *("tracking_state", "keypoint_states", "place_state", "joint_states", "joint_states_stddev"),
     *("keypoints", "markers"),
@@ -107,9 +108,9 @@ def test_a_posture_is_all_topics_in_their_order() -> None:
             "contradiction": "the distance differs",
         },
     )
-    assert (joints.names, deviations.names) == (ALL_NAMES, (*BODY_NAMES, *CLAVICLES))
-    np.testing.assert_array_equal(joints.values, [*POSTURE, *[0.0] * 6])
-    np.testing.assert_array_equal(deviations.values, [0.1] * 12 + [0.0] * 4)
+    assert (joints.names, deviations.names) == (ALL_NAMES, (*BODY_NAMES, *CLAVICLES, *LEG_NAMES))
+    np.testing.assert_array_equal(joints.values, [*POSTURE, *[0.0] * 14])
+    np.testing.assert_array_equal(deviations.values[:16], [0.1] * 12 + [0.0] * 4)
     assert points.points_m.shape == (6, 3)
     patches, skeleton = markers.shapes
     assert (patches.namespace, patches.kind, patches.points_m.shape) == ("patches", 11, (90, 3))
@@ -127,9 +128,10 @@ def test_joints_have_the_place_after_the_posture() -> None:
     joints, deviations = joint_values(PLACED), joint_deviations(PLACED)
     assert joints is not None
     assert deviations is not None
-    assert (joints.names, deviations.names) == (ALL_NAMES, (*BODY_NAMES, *CLAVICLES))
-    np.testing.assert_array_equal(joints.values, [*POSTURE, 0.25, -0.05, 0.0, 0.0, 0.02, 0.03])
-    np.testing.assert_array_equal(deviations.values, [0.1] * 12 + [0.03, 0.01, 0.002, 0.003])
+    assert (joints.names, deviations.names) == (ALL_NAMES, (*BODY_NAMES, *CLAVICLES, *LEG_NAMES))
+    place = 0.25, -0.05, 0.0, 0.0, 0.02, 0.03
+    np.testing.assert_array_equal(joints.values, [*POSTURE, *place, *NO_LEGS])
+    np.testing.assert_array_equal(deviations.values[:16], [0.1] * 12 + [0.03, 0.01, 0.002, 0.003])
 
 
 def test_the_neck_follows_and_has_deviations_if_it_was_seen() -> None:
@@ -137,8 +139,9 @@ def test_the_neck_follows_and_has_deviations_if_it_was_seen() -> None:
     assert joints is not None
     assert deviations is not None
     assert joints.names == deviations.names == ALL_NAMES
-    np.testing.assert_array_equal(joints.values, [*POSTURE, 0.25, -0.05, 0.4, -0.1, 0.02, 0.03])
-    np.testing.assert_array_equal(deviations.values[-4:], (0.1, 0.2, 0.002, 0.003))
+    place = 0.25, -0.05, 0.4, -0.1, 0.02, 0.03
+    np.testing.assert_array_equal(joints.values, [*POSTURE, *place, *NO_LEGS])
+    np.testing.assert_array_equal(deviations.values[-12:-8], (0.1, 0.2, 0.002, 0.003))
     np.testing.assert_array_equal(cast(Any, neck_from(joints)), (0.4, -0.1))
     assert neck_from(JointValues(BODY_NAMES, np.zeros(14))) is None
 
@@ -213,11 +216,11 @@ def test_joints_have_velocities_from_the_second_image_on_by_hand() -> None:
     found = velocities_of(stream, 1.1, moved, TRACKER)
     # The neck appears only now.
     np.testing.assert_allclose(
-        found, [*np.arange(12) / 10, 2.5, -0.5, 0.0, 0.0, 0.2, 0.3], atol=1e-12
+        found, [*np.arange(12) / 10, 2.5, -0.5, 0.0, 0.0, 0.2, 0.3, *NO_LEGS], atol=1e-12
     )
     turned = replace(moved, neck=np.array([0.5, -0.1]))
     found = velocities_of(stream, 1.3, turned, TRACKER)
-    np.testing.assert_allclose(found, [*[0.0] * 14, 0.5, 0.0, 0.0, 0.0], atol=1e-12)
+    np.testing.assert_allclose(found, [*[0.0] * 14, 0.5, 0.0, 0.0, 0.0, *NO_LEGS], atol=1e-12)
 
 
 def test_velocities_begin_anew_after_a_gap_another_tracker_or_a_jump_of_the_stamps() -> None:
@@ -267,16 +270,27 @@ def test_a_missing_joint_is_named() -> None:
         posture_from(JointValues(JOINT_NAMES[1:], POSTURE[1:]))
 
 
-def test_joints_of_the_legs_are_the_last_ones_and_only_with_legs() -> None:
-    found = replace(SEEN, legs=LEGS)
-    without, joints, stddevs = joint_values(SEEN), joint_values(found), joint_deviations(found)
-    assert without is not None and joints is not None and stddevs is not None
-    assert joints.names[: len(without.names)] == without.names == ALL_NAMES
-    assert joints.names[-1] == stddevs.names[-1] == "right_knee_flexion"
-    assert joints.values[-8:] == pytest.approx(np.arange(8) / 10)
-    assert stddevs.values[-8:] == pytest.approx(np.arange(8) / 100)
-    only = joint_values(found, torso_place=False)
+def test_joints_of_the_legs_are_always_the_last_ones() -> None:
+    """Knees that are not known may be bent by 0 to 150 degrees, all alike."""
+    known = replace(SEEN, legs=LEGS)
+    for found, knee, stddev in ((known, 0.7, 0.07), (SEEN, 0.0, np.radians(43.3))):
+        joints, stddevs = joint_values(found), joint_deviations(found)
+        assert joints is not None and stddevs is not None
+        assert joints.names == stddevs.names == ALL_NAMES
+        assert joints.values[-1] == pytest.approx(knee)
+        assert stddevs.values[-1] == pytest.approx(stddev, rel=1e-3)
+    only = joint_values(known, torso_place=False)
     assert only is not None and only.names == JOINT_NAMES
+
+
+def test_legs_that_appear_have_no_velocity() -> None:
+    stream = OutputStream()
+    velocities_of(stream, 1.0, SEEN, TRACKER)
+    found = velocities_of(stream, 1.1, replace(SEEN, legs=LEGS), TRACKER)
+    np.testing.assert_array_equal(found, np.zeros(len(ALL_NAMES)))
+    bent = replace(SEEN, legs=LEGS._replace(angles=LEGS.angles + 0.1))
+    found = velocities_of(stream, 1.2, bent, TRACKER)
+    np.testing.assert_allclose(cast(Any, found)[-8:], np.ones(8))
 
 
 def test_joints_of_the_hands_are_0_without_deviation_while_one_is_not_known() -> None:
@@ -284,8 +298,8 @@ def test_joints_of_the_hands_are_0_without_deviation_while_one_is_not_known() ->
     found = replace(SEEN, hands=(None, hand), legs=LEGS)
     joints, stddevs = joint_values(found), joint_deviations(found)
     assert joints is not None and stddevs is not None
-    assert joints.names == (*ALL_NAMES, *HAND_NAMES, *LEG_NAMES)
-    assert joints.values[len(ALL_NAMES) :][:6] == pytest.approx([0.0, 0.0, 0.0, 0.4, 0.2, 0.1])
+    assert joints.names == (*ALL_NAMES[:-8], *HAND_NAMES, *LEG_NAMES)
+    assert joints.values[-14:-8] == pytest.approx([0.0, 0.0, 0.0, 0.4, 0.2, 0.1])
     assert [name in stddevs.names for name in HAND_NAMES] == [False] * 3 + [True] * 3
     opened = open_hands(found)
     assert opened is not None and opened.names == ("right_hand_open",)

@@ -14,9 +14,20 @@ from hypothesis import strategies as st
 from cardbox_tracker.camera.camera import Camera
 from cardbox_tracker.camera.extrinsics import Extrinsics
 from cardbox_tracker.camera.view import OtherCamera, View
-from cardbox_tracker.detectors.image_points import POINT_INDEX, ImagePoints
+from cardbox_tracker.detectors.image_points import (
+    POINT_INDEX,
+    POINT_NAMES,
+    ImagePoints,
+    LegPoints,
+)
 from cardbox_tracker.person.model import BodyModel
-from cardbox_tracker.person.posture import reference_posture, state_limits
+from cardbox_tracker.person.posture import (
+    PITCH,
+    TORSO_X,
+    TORSO_Z,
+    reference_posture,
+    state_limits,
+)
 from cardbox_tracker.search.arms import ARM_LIMITS
 from cardbox_tracker.search.mirroring import mirrored_states
 from cardbox_tracker.search.refiner import Cue, Prior, Refiner
@@ -275,3 +286,29 @@ def test_mirror_images_have_almost_the_same_pixels(arms: list[float], torso: lis
     pixels = Posed(body, images).keypoints_px
     # Half an arm's length nearer, everything is a fifth larger.
     assert np.linalg.norm(pixels[inside] - pixels[0], axis=2).max() < 20.0
+
+
+@pytest.mark.parametrize(
+    ("lower_m", "pitch_deg"), [(0.4, 35.0), (0.35, 5.0), (0.02, 60.0)], ids=["squat", "sit", "bow"]
+)
+def test_points_show_who_squats_from_a_standing_state(
+    detected: Detect, lower_m: float, pitch_deg: float
+) -> None:
+    """Hips that had to stay at their height would be taken for nearer ones."""
+    wanted = FRONT.copy()
+    wanted[PITCH], wanted[TORSO_Z] = np.radians(pitch_deg), -lower_m
+    seen = Seen(FRONT)
+    seen.cost.expect(0.0, 0.0, 0.0, 0.0, is_located=True, shows_legs=True)
+    hips_m = np.array(seen.cost.costs[0].hips(wanted))
+    trunk_m = seen.cost.keypoints(wanted)[[0, 3]].mean(axis=0) - hips_m
+    spatial_m = np.zeros((len(POINT_NAMES), 3))
+    for side, aside_m in (("left", 0.2), ("right", -0.2)):
+        # The detector leans people forward by 0.1 of their trunk.
+        leaning_m = trunk_m / np.linalg.norm(trunk_m) + (aside_m, 0.0, -0.1)
+        spatial_m[POINT_INDEX[f"{side}_shoulder"]] = leaning_m
+    legs = LegPoints(np.zeros((8, 2)), np.ones(8))
+    points = replace(detected(BODY, CAMERA, wanted, 1.0), spatial_m=spatial_m, legs=legs)
+    found, _ = seen.refine(FRONT[None], [points_cue(points)], Prior(*seen.cost.prior()), 12)
+    assert found[0, TORSO_Z] == pytest.approx(-lower_m, abs=0.1)
+    assert found[0, TORSO_X] == pytest.approx(0.0, abs=0.1)
+    assert np.degrees(found[0, PITCH]) == pytest.approx(pitch_deg, abs=15.0)

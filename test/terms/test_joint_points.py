@@ -13,7 +13,12 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from cardbox_tracker.camera.camera import Camera
-from cardbox_tracker.detectors.image_points import POINT_INDEX, POINT_NAMES, ImagePoints
+from cardbox_tracker.detectors.image_points import (
+    POINT_INDEX,
+    POINT_NAMES,
+    ImagePoints,
+    LegPoints,
+)
 from cardbox_tracker.person.kinematics import pose
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.posture import reference_posture, state_limits
@@ -247,6 +252,27 @@ def test_bones_are_compared_along_the_horizontal_line_of_sight(
     assert of_shoulders > 0.1
 
 
+@pytest.mark.parametrize(("score", "counts"), [(0.9, True), (0.4, False)], ids=["legs", "none"])
+def test_a_trunk_is_compared_along_the_optical_axis_if_legs_are_seen(
+    detected: Detect, score: float, counts: bool
+) -> None:
+    """The trunk leans to the camera by 0.6 of its length, 0.5 without the detector's offset."""
+    points = detected(BODY, CAMERA, STATE, 1.0)
+    spatial_m = np.zeros((len(POINT_NAMES), 3))
+    spatial_m[[POINT_INDEX[f"{side}_shoulder"] for side in ("left", "right")]] = 0.0, -0.8, -0.6
+    spatial_m[POINT_INDEX["left_shoulder"], 0] += 0.2
+    spatial_m[POINT_INDEX["right_shoulder"], 0] -= 0.2
+    legs = LegPoints(np.zeros((8, 2)), np.full(8, score))
+    alike = observed(replace(points, spatial_m=spatial_m))
+    found = rated(observed(replace(points, spatial_m=spatial_m, legs=legs)), STATE[None])
+    found -= rated(alike, STATE[None])
+    joints_m = COST.keypoints(STATE)
+    trunk_m = joints_m[[0, 3]].mean(axis=0) - np.array(COST.hips(STATE))
+    square = ((trunk_m[2] / np.linalg.norm(trunk_m) + 0.5) / 0.12) ** 2
+    expected = 16.0 * (1.0 - exp(-square / 16.0)) if counts else 0.0
+    assert found[0] / WEIGHT_PX == pytest.approx(expected, rel=1e-3)
+
+
 def test_what_is_not_finite_in_space_costs_nothing(detected: Detect) -> None:
     points = detected(GUESSED, CAMERA, STATE, 1.0)
     for value in (np.nan, np.inf, -np.inf, 1e300):
@@ -473,7 +499,7 @@ def test_evidence_of_bones_is_their_difference_in_depth(detected: Detect) -> Non
     )["depth difference"]
     for first in (0, 3):
         vectors = np.diff(joints_m[first : first + 3], axis=0)
-        off_m = vectors @ away - 0.8 * np.linalg.norm(vectors, axis=1)
+        off_m = vectors @ away[0] - 0.8 * np.linalg.norm(vectors, axis=1)
         # A hand has the difference of the elbow, too; shoulders have none.
         expected = [0.0, abs(off_m[0]), abs(off_m[0] + off_m[1])]
         assert found[first : first + 3].tolist() == pytest.approx(expected)

@@ -30,8 +30,10 @@ from cardbox_tracker.person.sizes import FloatArray
 from cardbox_tracker.person.skeleton import (
     KeypointState,
 )
-from cardbox_tracker.tracking.estimate import Estimate
-from cardbox_tracker.tracking.legs import LegReader
+from cardbox_tracker.terms.term import Frame
+from cardbox_tracker.tracking.estimate import Estimate, Place
+from cardbox_tracker.tracking.legs import Floor, LegReader
+from cardbox_tracker.tracking.place import SECOND_CAMERA
 
 PITCH_RAD = float(np.radians(8.0))
 CAMERA = Camera(480, 640, 500.0, 500.0, 239.5, 319.5, PITCH_RAD)
@@ -43,8 +45,13 @@ SITTING = np.radians([85.0, 10.0, 0.0, 88.0, 85.0, 8.0, 0.0, 88.0])
 FACTORS, OFFSETS = np.array([0.93, 0.68]), np.array([-0.04, -0.08])
 
 
-def estimate(offset_m: tuple[float, float] = (0.0, 0.0)) -> Estimate:
-    found = Estimate("tracking", np.zeros(12), np.full(12, 0.05), offset_m=np.array(offset_m))
+def estimate(
+    offset_m: tuple[float, float] = (0.0, 0.0), rests_on: str = "given stature"
+) -> Estimate:
+    place = Place(np.full(3, 0.1), 0.0, rests_on)
+    found = Estimate(
+        "tracking", np.zeros(12), np.full(12, 0.05), offset_m=np.array(offset_m), place=place
+    )
     points_m = pose(found.placed(BODY), np.zeros(12)).keypoints_m
     return replace(found, keypoints_m=CAMERA.reference_to_optical(points_m))
 
@@ -88,11 +95,16 @@ def seen(joints: FloatArray, found: Estimate, score: float = 1.0) -> ImagePoints
     return ImagePoints(px, scores, spatial_m=spatial, legs=legs)
 
 
+def frame(points: ImagePoints | None) -> Frame:
+    channels = {"silhouette": np.zeros((640, 480), np.uint8), "points": points}
+    return Frame(CAMERA, channels, 640, 0)
+
+
 def read(angles: FloatArray, found: Estimate, images: int = 10) -> Estimate:
-    reader = LegReader()
+    reader = LegReader(BODY, CAMERA)
     points = seen(joints_m(angles, found), found)
-    for number in range(images):
-        result = reader.see(points, found, BODY, CAMERA, number / 15)
+    for _ in range(images):
+        result = reader.see(frame(points), found)
     return result
 
 
@@ -113,27 +125,25 @@ def test_legs_are_found_where_they_are(angles: FloatArray, lower_m: float) -> No
 def test_a_lifted_leg_is_not_pulled_to_the_floor() -> None:
     lifted = STANDING.copy()
     lifted[:4] = np.radians([70.0, 5.0, 0.0, 80.0])
-    reader, found = LegReader(), estimate()
-    for number in range(10):
-        reader.see(seen(joints_m(STANDING, found), found), found, BODY, CAMERA, number / 15)
-    result = reader.see(seen(joints_m(lifted, found), found), found, BODY, CAMERA, 10 / 15)
+    reader, found = LegReader(BODY, CAMERA), estimate()
+    for _ in range(10):
+        reader.see(frame(seen(joints_m(STANDING, found), found)), found)
+    result = reader.see(frame(seen(joints_m(lifted, found), found)), found)
     assert result.legs is not None
     assert np.degrees(result.legs.angles)[[0, 3, 4, 7]] == pytest.approx([70, 80, 2, 4], abs=15)
 
 
 def test_what_the_detector_does_not_see_is_hidden_and_less_exact() -> None:
-    reader, found = LegReader(), estimate()
+    reader, found = LegReader(BODY, CAMERA), estimate()
     points = seen(joints_m(STANDING, found), found)
-    known = reader.see(points, found, BODY, CAMERA, 0.0).legs
+    known = reader.see(frame(points), found).legs
     assert points.legs is not None and known is not None
     scores = points.legs.scores.copy()
     scores[LEG_POINT_NAMES.index("left_ankle")] = 0.1
-    part = reader.see(
-        replace(points, legs=points.legs._replace(scores=scores)), found, BODY, CAMERA, 0.1
-    ).legs
+    part = reader.see(frame(replace(points, legs=points.legs._replace(scores=scores))), found).legs
     assert part is not None
     assert part.states[2] == KeypointState.HIDDEN and part.states[5] == KeypointState.TRACKED
-    none = reader.see(None, found, BODY, CAMERA, 0.3).legs
+    none = reader.see(frame(None), found).legs
     assert none is not None
     assert set(none.states) == {KeypointState.HIDDEN}
     assert (none.points_stddev_m[[1, 2, 4, 5]] > known.points_stddev_m[[1, 2, 4, 5]]).all()
@@ -142,7 +152,7 @@ def test_what_the_detector_does_not_see_is_hidden_and_less_exact() -> None:
 
 def test_without_a_posture_there_are_no_legs() -> None:
     lost = Estimate("lost")
-    assert LegReader().see(None, lost, BODY, CAMERA, 0.0) is lost
+    assert LegReader(BODY, CAMERA).see(frame(None), lost) is lost
 
 
 def test_exchanged_sides_are_exchanged_back() -> None:
@@ -151,18 +161,18 @@ def test_exchanged_sides_are_exchanged_back() -> None:
     turned[:4] = np.radians([60.0, 5.0, 0.0, 70.0])
     found = estimate()
     points = seen(joints_m(turned, found), found).exchanged()
-    legs = LegReader().see(points, found, BODY, CAMERA, 0.0).legs
+    legs = LegReader(BODY, CAMERA).see(frame(points), found).legs
     assert legs is not None
     assert legs.angles[3] > 0.8 and legs.angles[7] < 0.5
     assert set(legs.states) == {KeypointState.UNCERTAIN}
 
 
 def test_lengths_approach_those_that_are_seen_and_do_not_run_away() -> None:
-    reader, found = LegReader(), estimate()
+    reader, found = LegReader(BODY, CAMERA), estimate()
     joints = joints_m(STANDING, found, scales=(0.95, 1.05))
     lengths = []
-    for number in range(300):
-        result = reader.see(seen(joints, found), found, BODY, CAMERA, number / 15)
+    for _ in range(300):
+        result = reader.see(frame(seen(joints, found)), found)
         assert result.legs is not None
         first = result.legs.points_m[:3]
         lengths.append(np.linalg.norm(np.diff(first, axis=0), axis=1) / STATURE_M)
@@ -174,18 +184,18 @@ def test_lengths_approach_those_that_are_seen_and_do_not_run_away() -> None:
 
 def test_the_floor_shows_the_distance() -> None:
     """The floor is known; then the tracker's distance of the same image is wrong by 0.12 m."""
-    reader, there = LegReader(), estimate()
+    reader, there = LegReader(BODY, CAMERA), estimate()
     joints = joints_m(STANDING, there)
-    for number in range(60):
-        reader.see(seen(joints, there), there, BODY, CAMERA, number / 15)
+    for _ in range(60):
+        reader.see(frame(seen(joints, there)), there)
     # The hips look the same from a place farther away along their ray.
     hip = pose(BODY, np.zeros(12)).hip
     moved = hip * 0.12 / abs(hip[0])
     wrong = estimate((float(moved[0]), float(moved[2])))
     points = seen(joints, there)
     result = wrong
-    for number in range(60, 90):
-        result = reader.see(points, wrong, BODY, CAMERA, number / 15)
+    for _ in range(60, 90):
+        result = reader.see(frame(points), wrong)
     assert result.offset_m is not None and result.posture is not None
     assert wrong.keypoints_m is not None and result.keypoints_m is not None
     assert abs(float(result.offset_m[0])) < 0.08
@@ -198,15 +208,48 @@ def test_the_floor_shows_the_distance() -> None:
 
 
 def test_a_filter_with_a_constant_place_keeps_it() -> None:
-    found = replace(estimate(), offset_m=None)
-    result = LegReader().see(seen(joints_m(STANDING, found), found), found, BODY, CAMERA, 0.0)
+    found = replace(estimate(), offset_m=None, place=None)
+    points = seen(joints_m(STANDING, found), found)
+    result = LegReader(BODY, CAMERA).see(frame(points), found)
     assert result.offset_m is None and result.legs is not None
     assert result.posture == pytest.approx(found.posture)
 
 
+@pytest.mark.parametrize(
+    ("rests_on", "left_m"), [("given stature", 0.06), (SECOND_CAMERA, 0.12)], ids=str
+)
+def test_a_given_floor_shows_the_distance_in_the_first_image(rests_on: str, left_m: float) -> None:
+    """The tracker's distance is wrong by 0.12 m; that of two cameras is believed."""
+    there = estimate()
+    floor_m = BODY.placement.hip_height_m - (THIGH_SHARE + SHANK_SHARE + 0.039) * STATURE_M
+    hip = pose(BODY, np.zeros(12)).hip
+    moved = hip * 0.12 / abs(hip[0])
+    wrong = estimate((float(moved[0]), float(moved[2])), rests_on)
+    points = seen(joints_m(np.zeros(8), there), there)
+    result = LegReader(BODY, CAMERA, Floor(floor_m, 0.01)).see(frame(points), wrong)
+    assert result.offset_m is not None
+    assert abs(float(result.offset_m[0])) == pytest.approx(left_m, abs=0.04)
+
+
+def test_bones_are_not_longer_than_those_of_people() -> None:
+    """A knee and an ankle that are another person's do not stretch the leg to them."""
+    found = estimate()
+    joints = joints_m(STANDING, found)
+    joints[:, 1:] += (0.0, 1.0, 0.0)
+    legs = LegReader(BODY, CAMERA).see(frame(seen(joints, found)), found).legs
+    assert legs is not None
+    thigh_m = np.linalg.norm(legs.points_m[1] - legs.points_m[0])
+    assert thigh_m <= np.exp(0.12) * THIGH_SHARE * STATURE_M + 1e-6
+
+
+def test_legs_that_no_points_have_shown_are_not_there() -> None:
+    found = estimate()
+    assert LegReader(BODY, CAMERA).see(frame(None), found) is found
+
+
 def test_without_feet_the_tracker_alone_has_the_distance() -> None:
-    reader, found = LegReader(), estimate()
+    reader, found = LegReader(BODY, CAMERA), estimate()
     points = seen(joints_m(STANDING, found, scales=(1.3, 1.3)), found, score=0.1)
-    for number in range(30):
-        result = reader.see(points, found, BODY, CAMERA, number / 15)
+    for _ in range(30):
+        result = reader.see(frame(points), found)
     assert result.offset_m == pytest.approx([0.0, 0.0], abs=1e-4)

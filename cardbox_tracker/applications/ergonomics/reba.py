@@ -19,6 +19,7 @@ thighs are level and the centre of mass lies behind the heels, from where anybod
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from pathlib import Path
 from typing import NamedTuple

@@ -209,8 +209,7 @@ class Scene:
         self._styled: set[str] = set()
         self._trees: dict[str, dict[str, Any]] = {}
         self._body: BodyModel | None = None
-        # Whether the person has legs and hands.
-        self._limbs = False, False
+        self._has_hands = False
         # Joints and states of keypoints wait for what has the same stamp.
         self._joints: tuple[int, JointValues] | None = None
         self._states: tuple[int, Sequence[str]] | None = None
@@ -228,8 +227,7 @@ class Scene:
 
     def _describe(self) -> None:
         assert self._body is not None
-        legs, hands = self._limbs
-        self._robot("person", urdf_from_body(self._body, legs=legs, hands=hands))
+        self._robot("person", urdf_from_body(self._body, hands=self._has_hands))
 
     def robot(self, name: str, urdf: str) -> None:
         """Show a robot beside the person; it faces the camera.
@@ -262,9 +260,9 @@ class Scene:
     def joints(self, stamp_ns: int, joints: JointValues) -> None:
         """Move the person, and plot the joints, rad and metres."""
         self._joints = stamp_ns, joints
-        limbs = LEG_NAMES[0] in joints.names, HAND_NAMES[0] in joints.names
-        if limbs != self._limbs and self._body is not None:
-            self._limbs = limbs
+        has_hands = HAND_NAMES[0] in joints.names
+        if has_hands != self._has_hands and self._body is not None:
+            self._has_hands = has_hands
             self._describe()
         self.robot_joints(stamp_ns, "person", joints)
         for name, value in _shown(joints).items():

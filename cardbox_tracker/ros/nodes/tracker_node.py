@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import replace
 from functools import partial
 from typing import Any
 
@@ -373,8 +374,11 @@ class TrackerNode(CardboxNode):
     def _with_hands(self, seen: ObservationSet, estimate: Estimate, tracker: Tracker) -> Estimate:
         """Return the estimate of an image with the hands, if they are looked at."""
         first = seen.observations[0]
-        if not self._hands or first.image is None:
+        if not self._hands:
             return estimate
+        if first.image is None:
+            # The joints of the hands stay among the others.
+            return replace(estimate, hands=(None, None))
         time_s = conversions.stamp_ns(seen.header.stamp) / 1e9
         number, points = estimate.person or 1, first.points
         if self._people is not None:

@@ -140,10 +140,10 @@ def test_wrists_of_a_table_are_read(tmp_path: Path) -> None:
     hand = Hand(0.5, np.array([0.0, 0.0, 1.0]), np.full(3, 0.4), np.full(3, 0.1))
     with path.open("w", newline="") as file:
         writer = csv.writer(file)
-        writer.writerow(columns(has_hands=True, has_legs=True))
+        writer.writerow(columns(has_points=True, has_hands=True))
         for i, hands in enumerate((None, (None, hand))):
             found = replace(seen(SEATED), hands=hands)
-            cells = row_of(10**9 + i, 0.0, found, has_hands=True, has_legs=True)
+            cells = row_of(10**9 + i, 0.0, found, has_points=True, has_hands=True)
             writer.writerow(["" if cell is None else cell for cell in cells])
     before, after = score_table(read_table(path), CONFIG, seed=1)
     assert (before.measured, after.measured) == ({"legs"}, {"legs", "right_wrist"})
@@ -176,11 +176,11 @@ def table(
     period_s: float = 1.0,
 ) -> Path:
     found, times_s = seen(angles, state), period_s * np.arange(4)
-    rows = [row_of(round(1e9 * t), t, found, has_legs=True) for t in times_s.tolist()]
-    rows.append(row_of(4 * 10**9, 4.0, Estimate("lost"), has_legs=True))
+    rows = [row_of(round(1e9 * t), t, found, has_points=True) for t in times_s.tolist()]
+    rows.append(row_of(4 * 10**9, 4.0, Estimate("lost"), has_points=True))
     with path.open("w", newline="") as file:
         writer = csv.writer(file)
-        writer.writerow(columns(has_legs=True))
+        writer.writerow(columns(has_points=True))
         writer.writerows(["" if cell is None else cell for cell in row] for row in rows)
     return path
 
