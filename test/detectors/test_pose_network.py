@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from numpy.typing import NDArray
 
 from cardbox_tracker.common.errors import CardboxError
 from cardbox_tracker.detectors import pose_network
@@ -145,7 +146,9 @@ class SeveralPeople(PoseNetwork):
         self.several += len(self.people) > 1
         return [Square(column, 50.0, 60.0, 0.0) for column, _ in self.people]
 
-    def located(self, image: np.ndarray, square: Square, others: object = None) -> object:
+    def located(
+        self, image: np.ndarray, square: Square, others: NDArray[np.uint8] | None = None
+    ) -> tuple[Detection, Square] | None:
         columns = [c for c, _ in self.people if abs(c - square.u) < 30.0 and not self.misses]
         if not columns:
             return None
