@@ -277,7 +277,7 @@ def _upright(sights: Sightings, number: int, camera: Camera) -> _Seen | None:
     if not rows:
         return None
     rows = [rows[i] for i in np.unique(np.linspace(0, len(rows) - 1, _MOST_IMAGES).astype(int))]
-    times_s, px, known, facing, straight, sitting = (
+    times_s, px, known, faces, straight, sitting = (
         np.array(one) for one in zip(*rows, strict=True)
     )
     stddevs = np.where(known, _ALONG, np.inf)[..., None] * np.array([_SIDE / _ALONG, 1.0])
@@ -288,7 +288,7 @@ def _upright(sights: Sightings, number: int, camera: Camera) -> _Seen | None:
     return _Seen(
         np.where(known[..., None], camera.rays(px)[..., :2], 0.0),
         stddevs,
-        facing,
+        faces,
         np.where(sitting, _SEAT, np.where(straight, _STRAIGHT, _OTHER_LEGS)),
         np.full(len(rows), independent / len(rows)),
         np.full(len(rows), float(number)),
