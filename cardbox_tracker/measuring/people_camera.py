@@ -18,6 +18,7 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from cardbox_tracker.camera.camera import Camera
 from cardbox_tracker.detectors.image_points import LEG_POINT_NAMES, POINT_INDEX, ImagePoints
@@ -164,7 +165,7 @@ def people_camera(
     found, information = _fitted(seen, distance, own, mean, precision)
     if not np.isfinite(found).all():
         return None
-    covariance = np.linalg.inv(information)[:_SHARED, :_SHARED]
+    covariance: FloatArray = np.linalg.inv(information)[:_SHARED, :_SHARED].astype(np.float64)
     at = np.exp(found[last + 1])
     distances = [
         float(at[np.argmax(person == number)]) if (person == number).any() else float("nan")
@@ -178,7 +179,11 @@ def _ends(values: FloatArray) -> FloatArray:
 
 
 def _fitted(
-    seen: _Seen, distance: FloatArray, own: FloatArray, mean: FloatArray, precision: FloatArray
+    seen: _Seen,
+    distance: FloatArray,
+    own: NDArray[np.int64],
+    mean: FloatArray,
+    precision: FloatArray,
 ) -> tuple[FloatArray, FloatArray]:
     """Return the unknowns and their information matrix by damped Gauss-Newton steps.
 
@@ -277,7 +282,7 @@ def _upright(sights: Sightings, number: int, camera: Camera) -> _Seen | None:
     if not rows:
         return None
     rows = [rows[i] for i in np.unique(np.linspace(0, len(rows) - 1, _MOST_IMAGES).astype(int))]
-    times_s, px, known, facing, straight, sitting = (
+    times_s, px, known, faces, straight, sitting = (
         np.array(one) for one in zip(*rows, strict=True)
     )
     stddevs = np.where(known, _ALONG, np.inf)[..., None] * np.array([_SIDE / _ALONG, 1.0])
@@ -288,14 +293,14 @@ def _upright(sights: Sightings, number: int, camera: Camera) -> _Seen | None:
     return _Seen(
         np.where(known[..., None], camera.rays(px)[..., :2], 0.0),
         stddevs,
-        facing,
+        faces,
         np.where(sitting, _SEAT, np.where(straight, _STRAIGHT, _OTHER_LEGS)),
         np.full(len(rows), independent / len(rows)),
         np.full(len(rows), float(number)),
     )
 
 
-def _levels(points: ImagePoints) -> tuple[FloatArray, FloatArray]:
+def _levels(points: ImagePoints) -> tuple[FloatArray, NDArray[np.bool_]]:
     """Return the middles (6, 2), px, of the levels, 0 where they are not known, and if they are."""
     px, known = np.zeros((len(LEVELS), 2)), np.zeros(len(LEVELS), bool)
     for number, level in enumerate(LEVELS):

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from itertools import pairwise
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import cv2
 import numpy as np
@@ -192,6 +192,8 @@ def camera_moves(people: Sequence[Sightings], pictures: Sequence[Picture], camer
         pictures: images of the film.
         camera: intrinsics of the points.
     """
+    # The type of its third point argument lacks None.
+    flow: Any = cv2.calcOpticalFlowPyrLK
     shifted = pairs = 0
     sights = [sight for person in people for sight in person]
     for (time_s, before), (_, after) in pairwise(pictures):
@@ -204,11 +206,11 @@ def camera_moves(people: Sequence[Sightings], pictures: Sequence[Picture], camer
         for seen_s, points in sights:
             if abs(seen_s - time_s) < 0.5:
                 _cover(free, points, camera)
-        corners = cv2.goodFeaturesToTrack(greys[0], 200, 0.02, 0.01 * width, mask=free)
+        corners: Any = cv2.goodFeaturesToTrack(greys[0], 200, 0.02, 0.01 * width, mask=free)
         if corners is None:
             continue
-        there, is_found, _ = cv2.calcOpticalFlowPyrLK(*greys, corners, None)
-        back, is_back, _ = cv2.calcOpticalFlowPyrLK(greys[1], greys[0], there, None)
+        there, is_found, _ = flow(*greys, corners, None)
+        back, is_back, _ = flow(greys[1], greys[0], there, None)
         same = np.linalg.norm(back - corners, axis=-1).ravel() < 1.0
         same &= (is_found.ravel() > 0) & (is_back.ravel() > 0)
         if same.sum() < _LEAST_POINTS:

@@ -108,7 +108,7 @@ def test_a_standing_person_shows_the_detector_the_pitch(bus: Any, shown: bool) -
     camera, px = CAMERA.with_pitch(0.2), np.zeros((33, 2))
     for number, name in enumerate(LANDMARKS):
         level = name.removeprefix("left_").removeprefix("right_")
-        level = "ankle" if level in ("heel", "foot_index") else level
+        level = "ankle" if level in ("heel", "foot") else level
         if level in LEVELS:
             at = LEVELS.index(level)
             there = np.array((-2.5 + 1.8 * FORWARD[at], 0.0, 1.8 * HEIGHTS[at] - 1.6))
