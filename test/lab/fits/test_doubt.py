@@ -266,9 +266,11 @@ def test_only_one_camera_is_tracked_by_the_papers_filter(
 
 
 def test_people_of_mean_proportions_learn_from_measured_ones() -> None:
-    by_source = {Source.OUTLINE: {"c": [SOURCES[2]]}, Source.MEASURED: {"a": [SOURCES[0]]}}
-    stored = fit_all(by_source)
-    for source, learned in ((Source.OUTLINE, SOURCES[::2][::-1]), (Source.MEASURED, SOURCES[:1])):
-        intercept, _ = stored[source.value]["models"]["hand"]
-        orders = [fit(each, "hand", sorted(NAMES))[0] for each in (learned, learned[::-1])]
-        assert intercept == pytest.approx(orders[0], abs=1e-4), orders
+    first, second, own = SOURCES
+    measured = {"a": [first], "b": [second]}
+    stored = fit_all({Source.OUTLINE: {"c": [own]}, Source.MEASURED: measured})
+    for source, learned in ((Source.OUTLINE, SOURCES), (Source.MEASURED, [first, second])):
+        intercept, coefficients = stored[source.value]["models"]["hand"]
+        expected = fit(learned, "hand", NAMES)
+        assert intercept == pytest.approx(expected[0], abs=1e-4)
+        assert coefficients == pytest.approx(expected[1], abs=1e-4)
