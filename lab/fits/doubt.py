@@ -247,7 +247,8 @@ def collect(folder: Path, seed: int) -> list[tuple[Source, Samples]]:
         detector: Detector | None = Detector.installed()
     except CardboxError:
         detector = None
-    whole, found = load_session(folder), []
+    whole = load_session(folder)
+    found: list[tuple[Source, Samples]] = []
     for cameras in [()] if whole.has_references else choices_of_cameras(whole):
         session = load_session(folder, cameras)
         truth = dict(zip(session.stamps_ns.tolist(), session.keypoints_m, strict=True))
