@@ -350,7 +350,8 @@ class WholeBodyFilter:
         mirrored = mirrored_states(result, cost.body, ARM_LIMITS)[_ONE_MIRRORED]
         found = cost.bodies(np.concatenate([fitted[None], result[None], mirrored]))
         ratings, points = found.ratings, found.points
-        differs_px, cost_px, drawn_px, area_px = *found.costs_px[:2], *found.areas_px[:2]
+        differs_px, cost_px = found.costs_px[:2]
+        drawn_px, area_px = found.areas_px[:2]
         deviations, total = doubt.deviations_of(stddev), cost.silhouette_px
         fit_iou = iou_of(total, drawn_px, differs_px)
         pixels = float(total), float(cost.frontal_px_at(result)), float(area_px), float(cost_px)
