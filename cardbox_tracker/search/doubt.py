@@ -7,9 +7,10 @@ logistic regressions
     p = 1 / (1 + exp(-(intercept + sum of coefficient * evidence)))
 
 of what search, silhouette and terms say about the result. There is one model for each kind of
-keypoint and for the whole, and one set of models for outlines alone, with points, and for the
-paper's filter. ``python -m lab.fits.doubt`` fits them on recorded sessions with ground truth and
-checks each on sessions that were left out (``doubt.json`` beside this file).
+keypoint and for the whole, and one set of models for outlines of a measured person, for outlines
+of a person of mean proportions, with points, and for the paper's filter. ``python -m
+lab.fits.doubt`` fits them on recorded sessions with ground truth and checks each on sessions that
+were left out (``doubt.json`` beside this file).
 """
 
 from __future__ import annotations
@@ -18,7 +19,7 @@ import json
 from collections.abc import Mapping, Sequence
 from enum import StrEnum
 from functools import cache
-from math import exp, log
+from math import exp, log, sqrt
 from pathlib import Path
 from types import MappingProxyType
 from typing import NamedTuple
@@ -26,7 +27,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from cardbox_tracker.common.compiling import kernel
+from cardbox_tracker.common.compiling import inlined_kernel, kernel
 from cardbox_tracker.person.kinematics import keypoints
 from cardbox_tracker.person.posture import (
     LEFT_ARM,
@@ -60,10 +61,18 @@ KINDS = ("shoulder", "elbow", "hand") * 2
 _FILE = Path(__file__).with_name("doubt.json")
 # Weight of the previous probability of loss in the smoothed one.
 _MEMORY = 0.5
+# What stays, from one image to the next, of the doubt about hands beyond the present one: an arm
+# that was wrongly chosen is often rated well in single images.
+_DOUBT_STAYS = 0.85
 _FRESH_FRAMES = 15.0
 _AREAS, _PRIORS = (0.1, 3.0), (-0.2, 0.3)
 # Step of the numerical derivatives, rad and m.
 _STEP = 1e-3
+# How much better than its rivals a result is rated, as a share of the silhouette: least, usual and
+# highest value; rating by which a mirrored arm is less likely by e; least move that counts, m.
+_BETTER, _MIRROR_RATING, _LEAST_MOVE_M = (1e-3, 0.03, 0.5), 0.05, 0.02
+# How far outside of the trunk a joint counts as seen, or as hidden inside, m.
+_BESIDE_M = 0.2
 
 # Deviations of the states do not include errors of model and silhouette. These factors and floors,
 # chosen on motion capture, make two deviations cover about 95 % of the errors.
@@ -81,6 +90,7 @@ class Source(StrEnum):
     """What a result rests on; each has its own models."""
 
     OUTLINE = "outline"
+    MEASURED = "measured outline"
     POINTS = "points"
     PAPER = "paper"
 
@@ -103,10 +113,14 @@ class Models(NamedTuple):
     Attributes:
         uncertain_from: probability of being wrong above which a keypoint is uncertain: the highest
             one with which at most 2 % of the tracked keypoints of left-out sources are wrong.
+        doubtful_from: that of a hand, over time (:func:`remembered`), above which the posture is
+            uncertain: the highest one with which at most 2 % of the images that are ``tracking``
+            have a wrong keypoint.
         by_kind: models by the names of :data:`KINDS`, and ``whole``.
     """
 
     uncertain_from: float
+    doubtful_from: float
     by_kind: Mapping[str, Model]
 
 
@@ -139,6 +153,7 @@ class Doubt:
     def forget(self) -> None:
         """Forget the previous results."""
         self._whole: float | None = None
+        self._hands = 0.0
 
     def judge(
         self, evidence: Values, source: Source, hidden: BoolArray, vetoes: Sequence[bool] = ()
@@ -146,12 +161,13 @@ class Doubt:
         """Return the doubt about a result.
 
         Args:
-            evidence: see :func:`evidence_of_search`, and ``TermObservation.evidence``.
+            evidence: see :func:`evidence_of_search`, :func:`evidence_of_arms`, and
+                ``TermObservation.evidence``.
             source: what the result rests on.
             hidden: whether no camera sees a keypoint, (6,).
             vetoes: facts of which each makes the whole result uncertain, such as a person's back.
         """
-        uncertain_from, of = self._models[source]
+        uncertain_from, doubtful_from, of = self._models[source]
         values = {name: each.tolist() for name, each in evidence.items()}
         chances = np.array([_chance(of[kind], values, i) for i, kind in enumerate(KINDS)])
         whole = _chance(of["whole"], values, 0)
@@ -161,28 +177,22 @@ class Doubt:
             _state_of(chance, is_hidden, is_doubted or chance > uncertain_from)
             for chance, is_hidden in zip(chances.tolist(), hidden.tolist(), strict=True)
         )
+        self._hands = remembered(self._hands, float(chances[HANDS].max()))
         # The paper's filter finds hands so badly that its state only says whether it is lost.
         needs_hands = source is not Source.PAPER
-        is_uncertain = is_doubted or (needs_hands and bool((chances[HANDS] > uncertain_from).any()))
+        is_uncertain = is_doubted or (needs_hands and self._hands > doubtful_from)
         return Judgement(chances, states, is_uncertain, self._whole > WHOLE_LOST_FROM, evidence)
+
+
+def remembered(before: float, chance: float) -> float:
+    """Return the doubt about hands after one image: it rises at once, and fades slowly."""
+    return max(chance, _DOUBT_STAYS * before + (1.0 - _DOUBT_STAYS) * chance)
 
 
 def doubted(states: Sequence[KeypointState]) -> tuple[KeypointState, ...]:
     """Return the ``states`` of a result that is doubtful as a whole: nothing is tracked."""
     doubt = {KeypointState.TRACKED: KeypointState.UNCERTAIN}
     return tuple(doubt.get(state, state) for state in states)
-
-
-def reasons(judgement: Judgement, source: Source) -> list[str]:
-    """Return the evidence that speaks most against the most doubtful keypoint, worst first."""
-    worst = int(np.argmax(judgement.chances))
-    of = models()[source].by_kind[KINDS[worst]].coefficients
-    weights = {
-        name: coefficient * float(judgement.evidence[name][worst])
-        for name, coefficient in of.items()
-        if name in judgement.evidence
-    }
-    return sorted((name for name in weights if weights[name] > 0.0), key=lambda n: -weights[n])
 
 
 @cache
@@ -193,6 +203,7 @@ def models() -> Mapping[Source, Models]:
         {
             Source(source): Models(
                 one["uncertain_from"],
+                one["doubtful_from"],
                 {kind: Model(*model) for kind, model in one["models"].items()},
             )
             for source, one in stored.items()
@@ -262,6 +273,92 @@ def evidence_of_search(
         [left_elbow, left_elbow, left_hand, right_elbow, right_elbow, right_hand]
     )
     return found
+
+
+def evidence_of_arms(
+    keypoints_m: FloatArray,
+    rating: float,
+    rated: tuple[FloatArray, FloatArray],
+    mirrored: tuple[FloatArray, FloatArray],
+) -> dict[str, FloatArray]:
+    """Return the evidence of single arms: whether others fit as well, and whether they are seen.
+
+    One outline is that of several arms. They are those that the search rated, and the mirror images
+    of the result in depth, whose outlines hardly differ.
+
+    Args:
+        keypoints_m: of the result, (6, 3), metres in the optical frame.
+        rating: rating of the result.
+        rated: keypoints (N, 6, 3) and ratings (N,) of the search.
+        mirrored: keypoints (6, 6, 3) and ratings (6,) of the result with its upper arm, its
+            forearm, and both mirrored in depth, of the left arm, then of the right one.
+
+    Returns:
+        By name: ``better``, by how much states are rated worse in which the keypoint is more than
+        ``FAR_M`` away (logarithm); ``sure``, that times how little the mirrored arms move it;
+        ``slope``, the cosine between upper arm and line of sight; ``beside trunk``, how far the
+        joints up to the keypoint are beside or above the trunk in the image, m.
+    """
+    found = np.zeros((4, 6))
+    _arms(keypoints_m, rating, *rated, *mirrored, found)
+    return dict(zip(("better", "sure", "slope", "beside trunk"), found, strict=True))
+
+
+@inlined_kernel
+def _apart_m(one_m: FloatArray, other_m: FloatArray, point: int) -> float:
+    """Return how far a keypoint is apart in two results (6, 3), beside the shoulders' middle."""
+    squares = 0.0
+    for axis in range(3):
+        change = one_m[point, axis] - other_m[point, axis]
+        middle = one_m[0, axis] + one_m[3, axis] - other_m[0, axis] - other_m[3, axis]
+        squares += (change - 0.5 * middle) ** 2
+    return sqrt(squares)
+
+
+@kernel
+def _arms(
+    points_m: FloatArray,
+    rating: float,
+    rated_m: FloatArray,
+    ratings: FloatArray,
+    mirrored_m: FloatArray,
+    mirrored_ratings: FloatArray,
+    found: FloatArray,
+) -> None:
+    """Write the evidence (4, 6) of :func:`evidence_of_arms`."""
+    least, usual, most = _BETTER
+    middle_m = 0.5 * (points_m[0] + points_m[3])
+    breadth_m = sqrt(
+        (points_m[0, 0] - points_m[3, 0]) ** 2 + (points_m[0, 1] - points_m[3, 1]) ** 2
+    )
+    best = min(rating, ratings.min())
+    for arm in range(2):
+        shoulder = 3 * arm
+        beside_m = _BESIDE_M
+        upper_m, elbow_m = points_m[shoulder + 1] - points_m[shoulder], points_m[shoulder + 1]
+        along = abs((upper_m * elbow_m).sum())
+        slope = along / (sqrt((upper_m**2).sum() * (elbow_m**2).sum()) + 1e-9)
+        for point in range(shoulder + 1, shoulder + 3):
+            rival = np.inf
+            for i in range(rated_m.shape[0]):
+                if ratings[i] < rival and _apart_m(rated_m[i], points_m, point) > FAR_M:
+                    rival = ratings[i]
+            weights, squares = 1.0, 0.0
+            for i in range(shoulder, shoulder + 3):
+                moved_m = _apart_m(mirrored_m[i], points_m, point)
+                weight = exp(-max(mirrored_ratings[i] - rating, 0.0) / _MIRROR_RATING)
+                weights, squares = weights + weight, squares + weight * moved_m**2
+                if moved_m > FAR_M:
+                    rival = min(rival, mirrored_ratings[i])
+            better = log(min(max(rival - best, least), most) / usual)
+            move_m = max(sqrt(squares / weights), _LEAST_MOVE_M)
+            scale = middle_m[2] / max(points_m[point, 2], 1e-3)
+            aside_m = abs(points_m[point, 0] * scale - middle_m[0]) - 0.5 * breadth_m
+            above_m = middle_m[1] - points_m[point, 1] * scale
+            beside_m = min(beside_m, max(aside_m, above_m, -_BESIDE_M))
+            found[0, point] = better
+            found[1, point] = max(better, 0.0) * max(log(FAR_M / move_m), 0.0)
+            found[2, point], found[3, point] = slope, beside_m
 
 
 def evidence_of_particles(

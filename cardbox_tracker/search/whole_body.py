@@ -15,6 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from cardbox_tracker.camera.view import View
+from cardbox_tracker.person.model import MEASURED
 from cardbox_tracker.person.parts import BOTTOM, HEIGHT, TORSO
 from cardbox_tracker.person.posture import (
     ARM_ANGLES,
@@ -66,6 +67,8 @@ _NEAR = (0.7 * np.array([0.1, 0.1, 0.1, 0.2, *[0.2] * (2 * ARM_ANGLES), 0.1, 0.1
 _LOCATED = np.array([0.03, 0.05, 0.05, 0.08, *[0.2] * (2 * ARM_ANGLES), 0.05, 0.02]) ** -2
 # Yaw beside the direction that somebody faces from which they face the other way, rad.
 _ASIDE_RAD = np.radians(95.0)
+# Mirror images of a state (:func:`mirrored_states`) in which one arm differs.
+_ONE_MIRRORED = [1, 2, 3, 4, 8, 12]
 # Weight of the last correction by the outline in the next one, against jitter.
 _KEPT = 0.6
 
@@ -144,6 +147,8 @@ class WholeBodyFilter:
         self._locator = Locator(cost, self._body.placement.distance_m, views, crosses)
         self.refine = Refiner(cost, views)
         self._doubt = doubt.Doubt()
+        is_measured = self._body.source == MEASURED
+        self._outline = doubt.Source.MEASURED if is_measured else doubt.Source.OUTLINE
 
     def forget(self) -> None:
         """See :class:`~.pose_filter.PoseFilter`."""
@@ -343,21 +348,31 @@ class WholeBodyFilter:
         if self._cues:
             # The image in which somebody is found to have turned counts as one of a back, too.
             fitted, result = self._turned(np.array([fitted, result]))
-        both = np.array([fitted, result])
-        ratings, (differs_px, cost_px), (drawn_px, area_px), points = cost.bodies(both)
+        mirrored = mirrored_states(result, cost.body, ARM_LIMITS)[_ONE_MIRRORED]
+        found = cost.bodies(np.concatenate([fitted[None], result[None], mirrored]))
+        ratings, points = found.ratings, found.points
+        differs_px, cost_px = found.costs_px[:2]
+        drawn_px, area_px = found.areas_px[:2]
         deviations, total = doubt.deviations_of(stddev), cost.silhouette_px
         fit_iou = iou_of(total, drawn_px, differs_px)
         pixels = float(total), float(cost.frontal_px_at(result)), float(area_px), float(cost_px)
         prior = float(ratings[1]) - float(cost_px) / max(total, 1)
         ahead = result.copy()
         ahead[YAW] -= cost.facing_rad
-        found = pixels, prior, self._arm.spreads_m, (ahead, deviations), cost.body, self._age
-        evidence = doubt.evidence_of_search(*found)
+        evidence = doubt.evidence_of_search(
+            pixels, prior, self._arm.spreads_m, (ahead, deviations), cost.body, self._age
+        )
+        evidence |= doubt.evidence_of_arms(
+            points.keypoints_m[1],
+            float(ratings[1]),
+            (self.rated.keypoints_m, self.rated.ratings),
+            (points.keypoints_m[2:], ratings[2:]),
+        )
         for number, cue in self._cues:
             there = cost.to_views[number](result[None])
             evidence |= cue.evidence(Posed(cost.costs[number].body, there))
         evidence["cameras"] = np.full(6, float(len(self._seeing) > 1))
-        source = doubt.Source.POINTS if self._cues else doubt.Source.OUTLINE
+        source = doubt.Source.POINTS if self._cues else self._outline
         is_back = is_back or cost.facing_rad != 0.0
         evidence["back"] = np.full(6, float(is_back))
         vetoes = not is_trackable(cost, fitted), is_back

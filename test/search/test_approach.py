@@ -21,7 +21,7 @@ from cardbox_tracker.terms.whole_body_config import WholeBodyCostConfig
 from cardbox_tracker.tracking.estimate import LOST, TRACKING, Estimate
 from cardbox_tracker.tracking.tracker import Tracker
 
-UNCERTAIN_ABOVE = models()[Source.OUTLINE].uncertain_from
+DOUBTFUL_ABOVE = models()[Source.MEASURED].doubtful_from
 CAMERA = Camera(320, 240, 220.0, 220.0, 159.5, 119.5)
 HIP_HEIGHT_M = -0.51
 FRONT = reference_posture("front")
@@ -51,7 +51,7 @@ def test_a_person_who_walks_metres_is_followed(begin_m: float, end_m: float) -> 
     assert distance_of(found[-1], begin_m) == pytest.approx(end_m, rel=0.06)
     # Far away a keypoint may be in doubt, and the state follows the hands.
     assert found[-1].keypoint_chances is not None and found[-1].keypoint_states is not None
-    is_sure = bool((found[-1].keypoint_chances[HANDS] <= UNCERTAIN_ABOVE).all())
+    is_sure = bool((found[-1].keypoint_chances[HANDS] <= DOUBTFUL_ABOVE).all())
     assert (found[-1].state == TRACKING) == is_sure
     assert KeypointState.LOST not in found[-1].keypoint_states
 

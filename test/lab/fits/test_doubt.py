@@ -10,13 +10,23 @@ from typing import cast
 import numpy as np
 import pytest
 
+from cardbox_tracker.common.errors import CardboxError
 from cardbox_tracker.search import doubt as package
 from cardbox_tracker.search.config import TrackerConfig
 from cardbox_tracker.search.doubt import Doubt, Source
 from cardbox_tracker.tracking.estimate import Estimate
 from cardbox_tracker.tracking.tracker import Tracker
 from lab.fits import doubt
-from lab.fits.doubt import Collector, Samples, chances, fit, fit_all, row_of, threshold_of
+from lab.fits.doubt import (
+    Collector,
+    Samples,
+    chances,
+    fit,
+    fit_all,
+    row_of,
+    threshold_of,
+    thresholds_of,
+)
 
 # Intercept, and coefficients of evidence of different size, for each kind of keypoint.
 TRUE = {
@@ -116,7 +126,9 @@ def test_chances_are_those_that_the_package_computes(monkeypatch: pytest.MonkeyP
     some = samples(5, 4)
     found = chances(some, models)
     own = {kind: package.Model(*model) for kind, model in models.items()}
-    monkeypatch.setattr(package, "models", lambda: dict.fromkeys(Source, package.Models(0.1, own)))
+    monkeypatch.setattr(
+        package, "models", lambda: dict.fromkeys(Source, package.Models(0.1, 0.1, own))
+    )
     for number, row in enumerate(found):
         one = Doubt()
         evidence = {name: values[number] for name, values in some.evidence.items()}
@@ -132,46 +144,49 @@ def errors_of(aligned_m: np.ndarray) -> Samples:
 def test_a_row_of_the_table_by_hand() -> None:
     aligned_m = np.full((4, 6), 0.05)
     said = np.full((4, 7), 0.01)
-    # A lost result; an uncertain hand off by 20 cm; an uncertain elbow; a wrong tracked one.
+    # A lost result; an uncertain elbow; a wrong tracked one; an uncertain hand off by 20 cm.
     said[0, 6] = 0.6
-    aligned_m[1, 2], said[1, 2] = 0.2, 0.2
-    said[2, 1] = 0.2
-    aligned_m[3, 4] = 0.4
-    row = row_of("person", errors_of(aligned_m), said, 0.1)
+    said[1, 1] = 0.2
+    aligned_m[2, 4] = 0.4
+    aligned_m[3, 2], said[3, 2] = 0.2, 0.2
+    row = row_of("person", errors_of(aligned_m), said, 0.1, 0.1)
     cells = [cell.strip() for cell in row.strip("|").split("|")]
-    # Two are `tracking`, one of them with a wrong joint; 22 of 24 keypoints are tracked, one of
-    # these wrong; one of two uncertain ones is off by 15 cm; 22 say 1 %, two 20 %; one is wrong.
-    assert cells == ["person", "4", "50.0", "50.0", "91.7", "4.5", "50.0", "2.6", "4.2"]
+    # Two are `tracking`, one of three right ones and a wrong one; 22 of 24 keypoints are tracked,
+    # one of these wrong; one of two uncertain ones is off by 15 cm; 22 say 1 %, two 20 %.
+    assert cells == ["person", "4", "50.0", "33.3", "50.0", "91.7", "4.5", "50.0", "2.6", "4.2"]
 
 
 def test_shares_of_nothing_are_empty() -> None:
     said = np.full((2, 7), 0.9)
-    cells = row_of("person", errors_of(np.full((2, 6), 0.05)), said, 0.1).split("|")
-    assert [cell.strip() for cell in cells[3:8]] == ["0.0", "", "0.0", "", ""]
+    cells = row_of("person", errors_of(np.full((2, 6), 0.05)), said, 0.1, 0.1).split("|")
+    assert [cell.strip() for cell in cells[3:9]] == ["0.0", "0.0", "", "0.0", "", ""]
 
 
-def test_the_threshold_leaves_few_wrong_keypoints_among_tracked_ones() -> None:
-    said = np.full((40, 7), 0.99)
-    said[:, :6] = 0.001 * np.arange(1, 241).reshape(40, 6)
-    aligned_m = np.full(240, 0.05)
-    # Of the first 130 keypoints 3 are wrong, 2.3 %; of the first 150 these are 2 %.
-    aligned_m[[99, 119, 129]] = aligned_m[150:] = 0.4
-    aligned_m = aligned_m.reshape(40, 6)
-    halves = [
-        (errors_of(aligned_m[part]), said[part]) for part in (slice(1, 40, 2), slice(0, 40, 2))
-    ]
-    assert threshold_of(halves) == 0.15
+def test_the_threshold_leaves_few_wrong_ones_below_it() -> None:
+    said = 0.001 * np.arange(1, 241)
+    wrong = np.zeros(240, bool)
+    # Of the first 130 3 are wrong, 2.3 %; of the first 150 these are 2 %.
+    wrong[[99, 119, 129]] = wrong[150:] = True
+    order = np.random.default_rng(0).permutation(240)
+    assert threshold_of(wrong[order], said[order]) == 0.15
     # Never above a quarter, also if nothing is wrong.
-    assert threshold_of([(errors_of(np.full((40, 6), 0.05)), 4.0 * said)]) == 0.25
-    assert threshold_of([(errors_of(np.full((40, 6), 0.4)), said)]) == 0.0
+    assert threshold_of(np.zeros(240, bool), 4.0 * said) == 0.25
+    assert threshold_of(np.ones(240, bool), said) == 0.0
 
 
 def test_the_threshold_is_not_rounded_up_to_where_too_many_are_wrong() -> None:
-    said, aligned_m = np.full((30, 7), 0.05), np.full((30, 6), 0.05)
-    said[10:20] = 0.1006
-    # 0.101 would have these among the tracked ones.
-    said[20:], aligned_m[20:] = 0.1008, 0.4
-    assert threshold_of([(errors_of(aligned_m), said)]) == 0.1
+    # 0.101 would have the last ten below it.
+    said = np.repeat([0.05, 0.1006, 0.1008], 10)
+    assert threshold_of(np.repeat([False, False, True], 10), said) == 0.1
+
+
+def test_an_image_needs_surer_hands_than_a_keypoint_if_wrong_keypoints_are_in_many_images() -> None:
+    aligned_m, said = np.full((200, 6), 0.05), np.full((200, 7), 0.01)
+    # Half of the images have a hand of 0.06, and one of these in ten is wrong: 0.8 % of the
+    # keypoints, but 5 % of the images. Later ones, in which the whole is lost, do not count.
+    said[100:, 2], aligned_m[100::10, 2] = 0.06, 0.4
+    said[190:, 6] = 0.9
+    assert thresholds_of([(errors_of(aligned_m), said)]) == (0.25, 0.059)
 
 
 def test_what_is_stored_is_what_the_package_reads(
@@ -190,8 +205,8 @@ def test_what_is_stored_is_what_the_package_reads(
     monkeypatch.setattr(package, "_FILE", path)
     read = package.models.__wrapped__()
     assert set(read) == set(by_source)
-    uncertain_from, by_kind = read[Source.OUTLINE]
-    assert 0.0 <= uncertain_from <= doubt.HIGHEST
+    uncertain_from, doubtful_from, by_kind = read[Source.OUTLINE]
+    assert 0.0 <= doubtful_from <= uncertain_from <= doubt.HIGHEST
     assert set(by_kind) == set(doubt.MODELS)
     expected = fit(SOURCES, "hand", NAMES)
     assert by_kind["hand"].intercept == pytest.approx(expected[0], abs=1e-4)
@@ -240,6 +255,22 @@ def test_only_one_camera_is_tracked_by_the_papers_filter(
 
     monkeypatch.setattr(doubt, "load_session", load)
     monkeypatch.setattr(doubt, "track_session", track)
-    assert list(doubt.collect(Path("session"), (0,), None)) == []
+
+    def missing() -> None:
+        raise CardboxError("not installed")
+
+    monkeypatch.setattr(doubt.Detector, "installed", missing)
+    assert list(doubt.collect(Path("session"), 0)) == []
     alone = [(name, preset) for name in "ab" for preset in ("whole_body", "hierarchical")]
     assert tracked == [("ab", "whole_body"), *([] if has_references else alone)]
+
+
+def test_people_of_mean_proportions_learn_from_measured_ones() -> None:
+    first, second, own = SOURCES
+    measured = {"a": [first], "b": [second]}
+    stored = fit_all({Source.OUTLINE: {"c": [own]}, Source.MEASURED: measured})
+    for source, learned in ((Source.OUTLINE, SOURCES), (Source.MEASURED, [first, second])):
+        intercept, coefficients = stored[source.value]["models"]["hand"]
+        expected = fit(learned, "hand", NAMES)
+        assert intercept == pytest.approx(expected[0], abs=1e-4)
+        assert coefficients == pytest.approx(expected[1], abs=1e-4)
