@@ -23,7 +23,7 @@ _WINDOW, _LEAST = 15, 6
 # Frames between samples, and between those of the first frames, so that a verdict comes early.
 _EVERY, _EVERY_AT_FIRST, _FIRST = 6, 2, 60
 # Least median heights of an inverted pose and of any wrong pose, rad. Right poses have at most
-# 0.7 degrees (docs/research/two-cameras.md).
+# 0.7 degrees (docs/research.md#several-cameras).
 _INVERTED_RAD, _WRONG_RAD = np.radians(0.3), np.radians(2.5)
 # An inverted pose's height is more than that of its inverse divided by this.
 _BETTER = 0.25

@@ -17,7 +17,7 @@ the arms are measured before the fit, with the proportions of people:
 
 Proportions are from anthropometry where it has them. Where rendered bodies differ from it, whose
 joints are known exactly but were placed by artists, the mean of three sources is taken: the
-literature, MakeHuman and Microsoft Rocketbox. docs/research/sizes.md has the figures.
+literature, MakeHuman and Microsoft Rocketbox. docs/research.md#sizes has the figures.
 """
 
 from __future__ import annotations

@@ -37,7 +37,7 @@ _LEAST_PARTS = MappingProxyType(
 class SearchProfile:
     """Constants of the search; ``docs/architecture.md`` explains the stages.
 
-    The values were chosen on recorded sessions with ground truth (``docs/research/search.md``).
+    The values were chosen on recorded sessions with ground truth (``docs/research.md#search``).
 
     Attributes:
         survivors: states kept from frame to frame.
@@ -162,7 +162,7 @@ SEVERAL_CAMERAS = replace(
     smoothing=1.0 / 3.0,
 )
 """Several outlines determine a posture better than one, so other steps are efficient: with as few
-arms as one camera needs, some searches fail (``docs/research/two-cameras.md``)."""
+arms as one camera needs, some searches fail (``docs/research.md#several-cameras``)."""
 
 
 @dataclass(frozen=True)

@@ -1,6 +1,6 @@
 """Constants of the whole-body rating: the drawn model and the priors.
 
-Values without a source were chosen on recorded sessions with ground truth (``docs/research``).
+Values without a source were chosen on recorded sessions with ground truth (``docs/research.md``).
 """
 
 from __future__ import annotations

@@ -9,7 +9,7 @@ A roll of the camera hardly changes the fit, because the model leans with it. It
 the planes through both cameras that touch the person
 (:mod:`cardbox_tracker.measuring.silhouette_tangents`). The same planes show an inverted pose and
 exchanged images within seconds (:mod:`cardbox_tracker.measuring.pose_direction`).
-``docs/research/two-cameras.md`` has detection rates.
+``docs/research.md#several-cameras`` has detection rates.
 """
 
 from __future__ import annotations

@@ -3,7 +3,7 @@
 The depth image of another camera may have the same size. If it belongs to the silhouettes' camera,
 the depth grows at the person's outline, since what is seen beside a person is farther away. Pairs
 of pixels on both sides of the outline are compared: anywhere else in a depth image, the depth
-shrinks as often as it grows. ``docs/research/two-cameras.md`` has figures.
+shrinks as often as it grows. ``docs/research.md#several-cameras`` has figures.
 """
 
 from __future__ import annotations

@@ -7,7 +7,7 @@ second with the face: more by a quarter, and a third in all, shows the back of t
 
 Bald heads, hair in the colour of the skin, necks shaved to the height of the ears and grey images
 show nothing. A person who leans forward shows the top of the head, so nothing is said meanwhile.
-``docs/research/deviations-and-loss.md`` has figures.
+``docs/research.md#deviations-and-loss`` has figures.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
-"""Write the README's tables of accuracy from the committed results of evaluation.
+"""Write the README's table of accuracy from the committed results of evaluation.
 
-``python -m lab.tools.readme_figures`` replaces the parts between the marks in ``README.md``; with
+``python -m lab.tools.readme_figures`` replaces the part between the marks in ``README.md``; with
 ``--check`` it only compares them.
 """
 
@@ -19,12 +19,8 @@ from cardbox_tracker.common.files import atomic_path
 from lab.evaluation.people_report import replaced
 from lab.evaluation.report import mean_of
 from lab.evaluation.results import read_json
-from lab.experiments.report import MEANING
 
 BEGIN, END = "<!-- accuracy:begin -->", "<!-- accuracy:end -->"
-PAPER_BEGIN, PAPER_END = "<!-- paper:begin -->", "<!-- paper:end -->"
-METHODS = ("DRS, Table I", "SRS, Table I", "SRS, tempered", "annealed particle filter", "CMA-ES")
-"""Methods in the README's table of the paper's method."""
 RESULTS = Path("docs/evaluation")
 # MediaPipe's error on the clips of gestures, from their description; they have no file of it, cm.
 _GESTURES_CM = 7.7
@@ -58,30 +54,28 @@ class Row(NamedTuple):
 ROWS = (
     Row(
         "a woman who gestures, seven clips",
-        "stature, distance, camera pitch, empty scene (reconstructed)",
+        "stature, distance, pitch, empty scene",
         (("P0_", ()),),
         True,
         _GESTURES_CM,
     ),
     Row(
         "a man at a desk, from the front",
-        "stature, distance, camera pitch, the detector's masks",
+        "stature, distance, pitch, masks",
         (("real_desk", ("cam2",)),),
     ),
     Row(
         "a man on a treadmill, from the front",
-        "stature, distance, camera pitch, the detector's masks",
+        "stature, distance, pitch, masks",
         (("real_balance", ("cam02",)),),
     ),
     Row(
         "both men, two cameras",
-        "the same, poses of the cameras",
+        "the same, cameras' poses",
         (("real_desk", ("cam2", "cam3")), ("real_balance", ("cam02", "cam01"))),
     ),
 )
 """The rows of real people; the last row of the table is that of the rendered recordings."""
-# Cameras that see the man at the desk in profile and from aside.
-_ASIDE = (("cam3",), ("cam1",))
 
 
 def section(
@@ -101,8 +95,8 @@ def section(
         cells.insert(0, _film_cells(films["films"]))
     cells.append(
         (
-            f"{len(recordings)} recordings of rendered people",
-            "distance, camera pitch, sizes from three postures, empty scene",
+            f"{len(recordings)} rendered recordings",
+            "distance, pitch, sizes, empty scene",
             *map(_cm, (_mean(recordings, "aligned"), None, float(np.mean(peers)))),
             _cm(_mean(recordings, "absolute")),
         )
@@ -113,36 +107,14 @@ def section(
         [one for one in alone if (one["points"] == "none") is is_without]
         for is_without in (True, False)
     )
-    aside = [one for one in points if tuple(one["cameras"]) in _ASIDE]
     text = (
         f"One camera and the detector call {_tracking(points)}; without a detector, one camera "
-        f"calls {_tracking(silhouettes)}. Cameras that see the man at the desk from aside have "
-        f"{' and '.join(_cm(_mean([one], 'aligned')) for one in aside)} with the detector. From "
+        f"calls {_tracking(silhouettes)} (place included). From "
         f"silhouette to posture an image takes {_mean(recordings, 'ms'):.1f} ms on one core, "
         f"{_mean(points, 'ms'):.1f} ms with points."
     )
     lines = [f"| {' | '.join(row)} |" for row in (titles, ("---",) * len(titles), *cells)]
     return "\n".join([*lines, "", *textwrap.wrap(text, 100)])
-
-
-def paper_section(synthetic: Mapping[str, Any], recorded: Mapping[str, Any]) -> str:
-    """Return the text of the paper's method: the figures of two files ``results.json``."""
-    sources = synthetic, recorded
-    rows = [
-        ("600 ratings an image", "synthetic person", "rendered person `person_a`"),
-        ("---",) * 3,
-        *((name, *(_with_error(one, name) for one in sources)) for name in METHODS),
-    ]
-    origins = dict.fromkeys(f"{one['commit'][:12]} (digest {one['digest']})" for one in sources)
-    text = f"{MEANING} Measured at commit {' and '.join(origins)}; in brackets the number of runs."
-    lines = [f"| {' | '.join(row)} |" for row in rows]
-    return "\n".join([*lines, "", *textwrap.wrap(text, 100)])
-
-
-def _with_error(results: Mapping[str, Any], method: str) -> str:
-    figures = results["methods"][method]["mean"]
-    error, stderr = 100 * figures["mpjpe_m"], 100 * figures["stderr_mpjpe_m"]
-    return f"{error:.1f} ± {stderr:.1f} cm ({figures['runs']:.0f})"
 
 
 def _tracking(sessions: Sequence[Session]) -> str:
@@ -153,7 +125,7 @@ def _tracking(sessions: Sequence[Session]) -> str:
     share = 100.0 * tracking / sum(run["frames"] for run in runs)
     return (
         f"{share:.0f} % of the images of real people `tracking`, of which "
-        f"{100.0 * wrong / max(tracking, 1):.1f} % have a joint beyond 30 cm, place included"
+        f"{100.0 * wrong / max(tracking, 1):.1f} % have a joint beyond 30 cm"
     )
 
 
@@ -166,9 +138,7 @@ def current(root: Path) -> str:
         read_json(folder / "sessions.json"),
         read_json(films) if films.is_file() else None,
     )
-    text = replaced((root / "README.md").read_text(encoding="utf-8"), text, BEGIN, END)
-    paper = (read_json(folder / name / "results.json") for name in ("", "person_a"))
-    return replaced(text, paper_section(*paper), PAPER_BEGIN, PAPER_END)
+    return replaced((root / "README.md").read_text(encoding="utf-8"), text, BEGIN, END)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -231,8 +201,8 @@ def _film_cells(films: Sequence[Session]) -> tuple[str, ...]:
         for key in ("aligned", "absolute")
     )
     return (
-        "the three below as films, as people make them",
-        "film, field of view and stature",
+        "the three below, as films",
+        "field of view, stature",
         "",
         *map(_cm, (shape, float(np.mean(peers)), place)),
     )
