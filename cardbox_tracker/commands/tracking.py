@@ -230,6 +230,9 @@ def _bodies(
     pitch = found.camera.pitch_rad
     for body in bodies:
         body = body.with_values(camera_pitch_rad=pitch.mean, pitch_stddev_rad=pitch.stddev)
+        if (height := found.camera.height_m) is not None:
+            above = {"camera_height_m": height.mean, "height_stddev_m": height.stddev}
+            body = body.with_values(**above)
         distance = found.distances[0] if found.distances else math.nan
         is_alone = person.people is None and math.isfinite(distance)
         if is_alone and "distance_m" in body.unknown:

@@ -48,10 +48,12 @@ def stature_of(parts: BodyParts[float]) -> float:
 
 
 def floor_m(body: BodyModel) -> float | None:
-    """Return the height of the floor above the camera, m, on which the measured person stood.
+    """Return the height of the floor above the camera, m; None if nothing is known of it.
 
-    None if the height of the hips is not known.
+    It is that of the scene, or that on which the measured person stood.
     """
+    if body.camera_pose.height_m is not None:
+        return -body.camera_pose.height_m
     if "hip_height_m" in body.unknown:
         return None
     leg_m = (THIGH_SHARE + SHANK_SHARE + ANKLE_SHARE) * stature_of(body_parts(body.sizes))

@@ -38,6 +38,8 @@ PLACEMENT = {
 CAMERA_POSE = {"camera_pitch_rad": (-1.4, 1.4, "rad", "how far the camera looks down")}
 CAMERA_ROLL = "camera_roll_rad"
 """Name of the camera's roll, which a model file has only if it is not 0."""
+CAMERA_HEIGHT = "camera_height_m"
+"""Name of the camera's height above the floor, which a model file has only if it is known."""
 CONSTANTS = {**PLACEMENT, **CAMERA_POSE}
 """Range, unit and meaning of the numbers of placement and camera pose, by name."""
 
@@ -143,20 +145,26 @@ class CameraPose:
         pitch_stddev_rad: its standard deviation, rad; it is no part of a model file.
         roll_rad: how far the camera is turned clockwise about its axis, seen from behind it. The
             tracker's images are turned back, and its results are those of the camera as it stands.
+        height_m: height above the floor, metres; None if it is not known.
+        height_stddev_m: its standard deviation, metres; it is no part of a model file.
 
     Raises:
-        BodyModelError: an angle is not finite or outside of its range.
+        BodyModelError: a value is not finite or outside of its range.
     """
 
     pitch_rad: float = 0.0
     pitch_stddev_rad: float = math.radians(2.0)
     roll_rad: float = 0.0
+    height_m: float | None = None
+    height_stddev_m: float = 0.1
 
     def __post_init__(self) -> None:
-        """Check the angles."""
+        """Check the values."""
         lowest, highest, unit, _ = CAMERA_POSE["camera_pitch_rad"]
         check_range("camera_pitch_rad", self.pitch_rad, lowest, highest, unit)
         check_range(CAMERA_ROLL, self.roll_rad, -math.pi, math.pi, "rad")
+        if self.height_m is not None:
+            check_range(CAMERA_HEIGHT, self.height_m, -20.0, 20.0, "m")
 
 
 @dataclass(frozen=True)
@@ -230,8 +238,9 @@ class BodyModel:
         """Return the same model with other numbers.
 
         Args:
-            values: any of ``sizes``, ``CONSTANTS``, ``CAMERA_ROLL``, ``side_turn``,
-                ``appearance``, ``source``, ``unknown`` and ``shoulder_rise``.
+            values: any of ``sizes``, ``CONSTANTS``, ``CAMERA_ROLL``, ``CAMERA_HEIGHT``,
+                ``height_stddev_m``, ``side_turn``, ``appearance``, ``source``, ``unknown`` and
+                ``shoulder_rise``.
 
         Raises:
             BodyModelError: a number is outside of its range; the text names it.
@@ -243,6 +252,8 @@ class BodyModel:
             "camera_pitch_rad": "pitch_rad",
             "pitch_stddev_rad": "pitch_stddev_rad",
             CAMERA_ROLL: "roll_rad",
+            CAMERA_HEIGHT: "height_m",
+            "height_stddev_m": "height_stddev_m",
         }
         tilted = {tilt[name]: values.pop(name) for name in tilt if name in values}
         place = {name: values.pop(name) for name in PLACEMENT if name in values}

@@ -14,6 +14,7 @@ from cardbox_tracker.common.files import atomic_path
 from cardbox_tracker.common.small_yaml import SmallYamlError, parse_small_yaml, read_small_text
 from cardbox_tracker.person.appearance import Appearance
 from cardbox_tracker.person.model import (
+    CAMERA_HEIGHT,
     CAMERA_ROLL,
     CONSTANTS,
     MEASURED,
@@ -31,7 +32,8 @@ _APPEARANCE = "appearance"
 _SOURCE, _UNKNOWN = "source", "unknown"
 # A body that is measured while it is tracked live has these keys.
 _VERSION, _STAMP = "version", "stamp_ns"
-_OPTIONAL = (_APPEARANCE, _SOURCE, _UNKNOWN, _VERSION, _STAMP, CAMERA_ROLL)
+_CAMERA = CAMERA_ROLL, CAMERA_HEIGHT
+_OPTIONAL = (_APPEARANCE, _SOURCE, _UNKNOWN, _VERSION, _STAMP, *_CAMERA)
 _HEADERS = {
     MEASURED: "# A person measured by cardbox_tracker: what does not change while they are "
     "tracked.",
@@ -59,6 +61,9 @@ def dumps_body_model(model: BodyModel) -> str:
     if model.camera_pose.roll_rad:
         roll = _yaml_number(model.camera_pose.roll_rad)
         lines.append(f"{CAMERA_ROLL}: {roll}  # how far the camera is turned clockwise")
+    if model.camera_pose.height_m is not None:
+        height = _yaml_number(model.camera_pose.height_m)
+        lines.append(f"{CAMERA_HEIGHT}: {height}  # of the camera above the floor")
     lines.append(f"side_turn: {model.side_turn}  # the way the person turned in the side reference")
     lines.append("sizes:")
     for size, value in zip(SIZES, model.sizes, strict=True):
@@ -160,7 +165,7 @@ def _from_mapping(data: object) -> BodyModel:
     return BodyModel.of(
         sizes=[_number(sizes[name], f"sizes.{name}") for name in SIZE_NAMES],  # type: ignore[arg-type]
         **{name: _number(data[name], name) for name in CONSTANTS},
-        **{name: _number(data[name], name) for name in (CAMERA_ROLL,) if name in data},
+        **{name: _number(data[name], name) for name in _CAMERA if name in data},
         side_turn=data["side_turn"],
         appearance=_appearance(data[_APPEARANCE]) if _APPEARANCE in data else None,
         source=data.get(_SOURCE, MEASURED),

@@ -124,29 +124,15 @@ class _Seen(NamedTuple):
     shows_back: bool
 
 
-class Floor(NamedTuple):
-    """The floor, as something other than the feet of the person shows it.
-
-    Attributes:
-        height_m: height in the level frame of the first camera, whose origin is the camera, so that
-            a floor 1.5 m below it is at -1.5 m.
-        stddev_m: its standard deviation.
-    """
-
-    height_m: float
-    stddev_m: float
-
-
 class LegReader:
     """Adds the legs to the estimates of one person, from the first camera's points."""
 
-    def __init__(self, body: BodyModel, camera: Camera, floor: Floor | None = None) -> None:
+    def __init__(self, body: BodyModel, camera: Camera) -> None:
         """Start with the usual lengths.
 
         Args:
-            body: the person.
+            body: the person, with the height of the camera above the floor if it is known.
             camera: working camera, with the pitch of the body model.
-            floor: what is known of it; None for nothing.
         """
         self._body, self._camera = body, camera
         self.forget()
@@ -154,8 +140,9 @@ class LegReader:
         lengths_m = (THIGH_SHARE + SHANK_SHARE + _ANKLE_SHARE) * stature_m
         self._usual = np.array([0.0, 0.0, body.placement.hip_height_m - lengths_m])
         self._usual_stddev = np.array([_LENGTH, _LENGTH, _FLOOR_M])
-        if floor is not None:
-            self._usual[2], self._usual_stddev[2] = floor
+        stands = body.camera_pose
+        if stands.height_m is not None:
+            self._usual[2], self._usual_stddev[2] = -stands.height_m, stands.height_stddev_m
         self._mean_information, self._mean_vector = np.zeros((3, 3)), np.zeros(3)
         self._seen_s = self._time_s = 0.0
         self._is_known = False

@@ -57,7 +57,7 @@ from cardbox_tracker.tracking.estimate import (
 from cardbox_tracker.tracking.facing import Facing
 from cardbox_tracker.tracking.frozen import FrozenCameras
 from cardbox_tracker.tracking.head import HeadTracker
-from cardbox_tracker.tracking.legs import Floor, LegReader
+from cardbox_tracker.tracking.legs import LegReader
 from cardbox_tracker.tracking.observation import Observation, Observations, stamp_of
 from cardbox_tracker.tracking.place import PlaceWatch
 from cardbox_tracker.tracking.sampling import likely_postures
@@ -98,7 +98,6 @@ class Tracker:
         make_filter: MakeFilter | None = None,
         others: Sequence[OtherCamera] = (),
         corrector: Corrector | None = None,
-        floor: Floor | None = None,
     ) -> None:
         """Set up for ``body``; the camera gets the pitch of the body model.
 
@@ -115,7 +114,6 @@ class Tracker:
             others: further cameras; they need the filter ``whole_body``.
             corrector: changes the fitted state of each frame before it becomes the result; joints
                 are kept within their limits. It needs the filter ``whole_body``.
-            floor: on which the person stands, which shows the place; by default, feet show it.
 
         Raises:
             CameraError: the person was not measured in front of one of ``others``.
@@ -126,7 +124,7 @@ class Tracker:
         self.config = config or TrackerConfig()
         self._rng = rng or np.random.default_rng(0)
         self._make_filter, self._corrector = make_filter, corrector
-        self._others, self._floor = tuple(others), floor
+        self._others = tuple(others)
         if (others or corrector) and (make_filter or not self.config.has_several_views):
             what = "several cameras need" if others else "a corrector needs"
             raise ValueError(f"{what} the filter whole_body: the preset default")
@@ -154,7 +152,7 @@ class Tracker:
         views = self.views
         earlier = self.agreement
         self.agreement = CameraAgreement(body, self.camera, views, earlier) if views else None
-        self._legs = LegReader(self.body, self.camera, self._floor)
+        self._legs = LegReader(self.body, self.camera)
         if is_new_start or not isinstance(self._filter, WholeBodyFilter):
             self.reset()
             return

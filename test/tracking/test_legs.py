@@ -32,7 +32,7 @@ from cardbox_tracker.person.skeleton import (
 )
 from cardbox_tracker.terms.term import Frame
 from cardbox_tracker.tracking.estimate import Estimate, Place
-from cardbox_tracker.tracking.legs import Floor, LegReader
+from cardbox_tracker.tracking.legs import LegReader
 from cardbox_tracker.tracking.place import SECOND_CAMERA
 
 PITCH_RAD = float(np.radians(8.0))
@@ -226,7 +226,8 @@ def test_a_given_floor_shows_the_distance_in_the_first_image(rests_on: str, left
     moved = hip * 0.12 / abs(hip[0])
     wrong = estimate((float(moved[0]), float(moved[2])), rests_on)
     points = seen(joints_m(np.zeros(8), there), there)
-    result = LegReader(BODY, CAMERA, Floor(floor_m, 0.01)).see(frame(points), wrong)
+    body = BODY.with_values(camera_height_m=-floor_m, height_stddev_m=0.01)
+    result = LegReader(body, CAMERA).see(frame(points), wrong)
     assert result.offset_m is not None
     assert abs(float(result.offset_m[0])) == pytest.approx(left_m, abs=0.04)
 
