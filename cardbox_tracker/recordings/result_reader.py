@@ -14,6 +14,7 @@ from cardbox_tracker.person.sizes import FloatArray
 from cardbox_tracker.recordings.bag_reader import BagReader, stamp_ns_of
 from cardbox_tracker.recordings.outputs import (
     JointValues,
+    chances_of,
     neck_from,
     open_hands_from,
     person_space,
@@ -24,7 +25,7 @@ from cardbox_tracker.tracking.estimate import NO_PERSON, TRACKING, UNCERTAIN
 
 MODEL = "/body_model"
 _STATE, _JOINTS, _STDDEV = "/tracking_state", "/joint_states", "/joint_states_stddev"
-_KEYPOINTS, _HANDS = "/keypoints", "/hands"
+_KEYPOINTS, _HANDS, _STATES = "/keypoints", "/hands", "/keypoint_states"
 
 
 @dataclass(frozen=True)
@@ -42,6 +43,7 @@ class Result:
         place_m: ``torso_x`` and ``torso_z``, (2,); None if the bag has none.
         keypoints_m: (n, 3), metres in the optical frame of the first camera; None without any.
         hands_open: how open both hands are, (2,), nan for one that is not known; None without any.
+        chances: state and probability of an error of each keypoint by name; None without them.
     """
 
     stamp_ns: int
@@ -52,6 +54,7 @@ class Result:
     place_m: FloatArray | None = None
     keypoints_m: FloatArray | None = None
     hands_open: FloatArray | None = None
+    chances: dict[str, tuple[str, float]] | None = None
 
 
 def has_results(bag: BagReader) -> bool:
@@ -104,7 +107,9 @@ def read_results(bag: BagReader, person: int | None = None) -> list[Result]:
         BagError: the bag has no results of the tracker, or is damaged.
     """
     space = namespace_of(bag, person)
-    topics = [space + name for name in (MODEL, _STATE, _JOINTS, _STDDEV, _KEYPOINTS, _HANDS)]
+    topics = [
+        space + name for name in (MODEL, _STATE, _JOINTS, _STDDEV, _KEYPOINTS, _HANDS, _STATES)
+    ]
     found = _Results()
     for message in bag.messages([topic for topic in topics if topic in bag.topics]):
         content = bag.deserialize(message)
@@ -123,6 +128,7 @@ class _Results:
     def __init__(self) -> None:
         self._state = NO_PERSON
         self._body: BodyModel | None = None
+        self._chances: tuple[int, dict[str, tuple[str, float]]] | None = None
         self.by_stamp: dict[int, Result] = {}
 
     def take(self, name: str, time_ns: int, message: Any) -> None:
@@ -132,14 +138,19 @@ class _Results:
             self._state = str(message.data)
             if self._state not in (TRACKING, UNCERTAIN):
                 self.by_stamp[time_ns] = Result(time_ns, self._state, self._body)
+        elif name == _STATES:
+            # They come before the joints of their image.
+            self._chances = stamp_ns_of(message), chances_of(message)
         elif name == _JOINTS:
             stamp_ns, joints = stamp_ns_of(message), joints_of(message)
+            of_image = self._chances is not None and self._chances[0] == stamp_ns
             self.by_stamp[stamp_ns] = Result(
                 stamp_ns,
                 self._state,
                 self._body,
                 _with_neck(joints),
                 place_m=place_from(joints),
+                chances=self._chances[1] if self._chances and of_image else None,
             )
         elif (found := self.by_stamp.get(stamp_ns_of(message))) is not None:
             if name == _KEYPOINTS:

@@ -58,6 +58,7 @@ def retarget_bag(
         command = retargeter.update(
             *(found.stamp_ns, found.state, found.body, found.posture, found.stddev),
             hands=found.hands_open,
+            keypoints=found.chances,
         )
         motion.commands.append(StampedCommand(found.stamp_ns, command))
     if motion.commands:
