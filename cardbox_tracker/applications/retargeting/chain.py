@@ -52,13 +52,15 @@ class Arm:
         roles = dict.fromkeys(self.joints, "arm") | {self.gripper: "gripper"}
         roles |= dict.fromkeys(self.stays, "stays")
         rows = [("joint", "role", "limits", "speed")]
-        for one in robot.joints.values():
-            if one.name in roles:
-                unit = "m" if one.kind == "prismatic" else "rad"
-                speed = min(one.speed, max_speed)
-                given = "" if np.isfinite(one.speed) else ", the URDF gives none"
-                limits = f"{one.lower:.2f} to {one.upper:.2f} {unit}"
-                rows.append((one.name, roles[one.name], limits, f"{speed:g} {unit}/s{given}"))
+        for name in dict.fromkeys((*_names(self.path), *roles)):
+            if not name:
+                continue
+            one = robot.joints[name]
+            unit = "m" if one.kind == "prismatic" else "rad"
+            speed = min(one.speed, max_speed)
+            given = "" if np.isfinite(one.speed) else ", the URDF gives none"
+            limits = f"{one.lower:.2f} to {one.upper:.2f} {unit}"
+            rows.append((name, roles[name], limits, f"{speed:g} {unit}/s{given}"))
         widths = [max(len(row[column]) for row in rows) for column in range(4)]
         lines = ("  ".join(map(str.ljust, row, widths)).rstrip() for row in rows)
         return "\n".join((*lines, f"hand: {self.tip}"))
