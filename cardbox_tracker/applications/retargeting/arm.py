@@ -49,7 +49,8 @@ def directions_of(body: BodyModel, posture: FloatArray, side: str) -> FloatArray
 
 def _units(upper: FloatArray, fore: FloatArray) -> FloatArray:
     vectors = np.stack([upper, fore, upper + fore])
-    return vectors / np.maximum(np.linalg.norm(vectors, axis=1, keepdims=True), 1e-9)
+    found: FloatArray = vectors / np.maximum(np.linalg.norm(vectors, axis=1, keepdims=True), 1e-9)
+    return found
 
 
 class _Places(NamedTuple):

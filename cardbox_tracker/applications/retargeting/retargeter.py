@@ -271,11 +271,8 @@ class Retargeter:
         if body is None:
             return self._stop("no body model", now_ns)
         held = self._held(posture, stddev, keypoints or {})
-        if (
-            (held[self._follows].all()
-            and self._follows.any())
-            or not np.isfinite(posture[:N_JOINTS]).all()
-        ):
+        is_blind = self._follows.any() and held[self._follows].all()
+        if is_blind or not np.isfinite(posture[:N_JOINTS]).all():
             return self._stop("too uncertain", now_ns)
         whole = with_head_and_hands(posture, stddev, self._config.max_stddev_rad, hands)
         point = self._motion.set_point(now_ns)

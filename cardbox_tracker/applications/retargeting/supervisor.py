@@ -48,7 +48,8 @@ class Supervisor:
         self.phase = Phase.DISABLED
         self._retargeter, self._config = retargeter, config
         self._timeout_ns = round(timeout_s * 1e9)
-        self._is_wanted, self._gripped_ns = False, None
+        self._is_wanted = False
+        self._gripped_ns: int | None = None
         self._robot: tuple[int, FloatArray] | None = None
         self._heard_ns = self._stopped_ns = 0
         self._reason = ""
