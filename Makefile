@@ -80,11 +80,11 @@ lint: $(VENV)/package
 	$(BIN)/ruff check .
 	$(BIN)/mypy
 
-# Their tests would be skipped without these optional libraries, 170 MB for 'view', 80 for
-# 'retarget' and 60 for 'detector', whose network files may be missing. They are installed by name, because '.[view]' would install the package once more.
+# Their tests would be skipped without these optional libraries, 170 MB for 'view'
+# and 60 for 'detector', whose network files may be missing. They are installed by name, because '.[view]' would install the package once more.
 NEEDED = import importlib.metadata, re; print(*(line.split(";")[0] for line in \
 	importlib.metadata.requires("cardbox_tracker") \
-	if re.search("extra == .(view|retarget|detector|parquet|export|docs)", line)), sep="\n")
+	if re.search("extra == .(view|detector|parquet|export|docs)", line)), sep="\n")
 $(VENV)/extras: setup.py | $(VENV)/package
 	$(BIN)/python -I -c '$(NEEDED)' > $@.txt
 	$(PIP) install --quiet --requirement $@.txt

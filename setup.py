@@ -33,8 +33,6 @@ TEST = [
 ]
 # The viewer, 170 MB; its interface changes with each minor version.
 VIEW = ["rerun-sdk>=0.41,<0.42"]
-# Inverse kinematics of a robot's hand; a joint map needs none of these.
-RETARGET = ["daqp>=0.5,<1", "pin>=3.4,<5", "pin-pink>=4,<5"]
 # Writes tables of results in Parquet; what is used of it has not changed for many versions.
 PARQUET = ["pyarrow>=15,<30"]
 # Writes results as C3D; the other formats of 'cardbox export' need no library.
@@ -142,7 +140,6 @@ setup(
         "test": TEST,
         "colcon": COLCON,
         "view": VIEW,
-        "retarget": RETARGET,
         "detector": DETECTOR,
         "parquet": PARQUET,
         "docs": DOCS,

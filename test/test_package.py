@@ -280,8 +280,6 @@ def test_what_is_imported_is_declared() -> None:
         "ai_edge_litert": "ai-edge-litert",
         "cv2": "opencv-python-headless",
         "PIL": "pillow",
-        "pink": "pin-pink",
-        "pinocchio": "pin",
         "rerun": "rerun-sdk",
         "rerun_cli": "rerun-sdk",
         "yaml": "pyyaml",

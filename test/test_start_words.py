@@ -42,22 +42,6 @@ def test_a_missing_package_is_told_in_words(name: str, missing: str) -> None:
     assert "Traceback" not in done.stderr
 
 
-def test_a_missing_library_of_the_robot_is_told_in_words() -> None:
-    pytest.importorskip("rclpy", reason="rclpy is not installed")
-    given = ["--ros-args", "-p", f"robot_file:={ROOT / 'config' / 'example_arm.urdf'}"]
-    done = subprocess.run(
-        [sys.executable, "-c", WITHOUT.format(name="retarget"), "daqp", *given],
-        capture_output=True,
-        text=True,
-        cwd=ROOT,
-        check=False,
-    )
-    said = done.stdout + done.stderr
-    assert done.returncode == 1
-    assert "pip install '.[retarget]'" in said and "joint_map_file" in said
-    assert "Traceback" not in said
-
-
 def test_another_fault_keeps_its_traceback() -> None:
     with pytest.raises(ModuleNotFoundError):
         start("tracker", lambda: import_module("cardbox_tracker.nothing").main())

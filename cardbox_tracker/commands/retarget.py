@@ -31,12 +31,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         type=Path,
         metavar="MAP.yaml",
         help="which joint moves which, as in config/example_joint_map.yaml; without it the robot's "
-        "hand follows the person's by inverse kinematics",
-    )
-    parser.add_argument(
-        "--hand",
-        metavar="LINK",
-        help="the robot's hand; without it, the link with the most joints before it",
+        "arm is found and points as the person's",
     )
     parser.add_argument(
         "--csv",
@@ -73,7 +68,9 @@ def run(options: argparse.Namespace) -> None:
         results=() if options.bag is None else (options.bag,),
     )
     config = settings_from(options, RetargetConfig)
-    robot, retargeter = make_retargeter(options.robot, options.map, options.hand or "", config)
+    robot, retargeter, table = make_retargeter(options.robot, options.map, config)
+    if table:
+        print(table)
     with BagReader(options.results) as bag:
         motion = retarget_bag(bag, retargeter, config.rate_hz, options.person)
         if options.csv is not None:

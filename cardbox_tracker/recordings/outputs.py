@@ -11,7 +11,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -287,6 +287,14 @@ def open_hands_from(joints: JointValues) -> FloatArray:
     """Return how open both hands are, (2,), from their topic; nan for one that is missing."""
     by_name = positions_of(joints)
     return np.array([by_name.get(name, np.nan) for name in HAND_OPEN_NAMES])
+
+
+def chances_of(message: Any) -> dict[str, tuple[str, float]]:
+    """Return state and probability of an error by keypoint, of a message of their states."""
+    return {
+        one.name: (one.message, float(one.values[0].value) if one.values else 1.0)
+        for one in message.status
+    }
 
 
 def positions_of(joints: JointValues) -> dict[str, float]:

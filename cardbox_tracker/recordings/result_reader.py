@@ -33,6 +33,7 @@ from cardbox_tracker.recordings.bag_reader import BagReader, stamp_ns_of
 from cardbox_tracker.recordings.open_images import is_bag
 from cardbox_tracker.recordings.outputs import (
     JointValues,
+    chances_of,
     person_space,
     positions_of,
     posture_from,
@@ -50,7 +51,7 @@ from cardbox_tracker.tracking.estimate import LOST, NO_PERSON, TRACKING, UNCERTA
 
 MODEL = "/body_model"
 _STATE, _JOINTS, _STDDEV = "/tracking_state", "/joint_states", "/joint_states_stddev"
-_KEYPOINTS, _HANDS = "/keypoints", "/hands"
+_KEYPOINTS, _HANDS, _STATES = "/keypoints", "/hands", "/keypoint_states"
 
 _SEEN, _GAPS = (TRACKING, UNCERTAIN), (LOST, NO_PERSON)
 _KEYPOINT_STATES = frozenset(map(str, KeypointState))
@@ -360,7 +361,8 @@ def results_in(bag: BagReader, person: int | None = None) -> Results:
         BagError: the bag has no results of the tracker, or is damaged.
     """
     space = namespace_of(bag, person)
-    topics = [space + name for name in (MODEL, _STATE, _JOINTS, _STDDEV, _KEYPOINTS, _HANDS)]
+    of_images = _STATE, _JOINTS, _STDDEV, _KEYPOINTS, _HANDS, _STATES
+    topics = [space + name for name in (MODEL, *of_images)]
     found = _Messages()
     for message in bag.messages([topic for topic in topics if topic in bag.topics]):
         content = bag.deserialize(message)
@@ -415,6 +417,9 @@ class _Messages:
                 if len(points_m) != len(POINT_COLUMNS):
                     raise ValueError(f"{len(points_m) // 3} keypoints")
                 found |= zip(POINT_COLUMNS, points_m, strict=True)
+            elif name == _STATES:
+                for keypoint, (state, chance) in chances_of(message).items():
+                    found |= {f"{keypoint}_state": state, f"{keypoint}_chance": chance}
             elif name == _HANDS:
                 values = positions_of(joints_of(message))
                 found |= {name: values[name] for name in HAND_OPEN_NAMES if name in values}

@@ -1,186 +1,79 @@
-"""Measure how far a robot that follows the tracker is from one that follows the true joints.
+"""Measure how far a robot's arm points from where the person's arm points.
 
-python -m lab.tools.retarget_accuracy SESSION...
+python -m lab.tools.retarget_accuracy --robot URDF [--robot URDF ...] SESSION...
 
-Each session is a folder with ``bag/`` and ``ground_truth.json``. The robot is
-``config/example_arm.urdf``, once for each arm of the person. The table of the means replaces that
-between the marks in ``docs/retargeting.md``; the errors of each session are printed.
+Each session is a folder with ``bag/`` and ``ground_truth.json``. The robots follow the true
+postures without limits of speed, so the figures are those of the transfer, not of the tracker.
+The table replaces that between the marks in ``docs/retargeting.md`` with ``--write``.
 """
 
 from __future__ import annotations
 
 import argparse
 import sys
-from collections.abc import Sequence
-from dataclasses import dataclass, fields, replace
+import time
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from cardbox_tracker.applications.retargeting.arm import ArmFollower, directions_of
 from cardbox_tracker.applications.retargeting.config import RetargetConfig
-from cardbox_tracker.applications.retargeting.hand import HandFollower
-from cardbox_tracker.applications.retargeting.retargeter import Retargeter
 from cardbox_tracker.applications.retargeting.robot import Robot, load_robot
 from cardbox_tracker.person.model import BodyModel
+from cardbox_tracker.person.proportions import body_from_proportions
 from cardbox_tracker.person.sizes import FloatArray
-from cardbox_tracker.search.config import PRESETS, TrackerConfig
-from cardbox_tracker.tracking.estimate import TRACKING, Estimate
-from cardbox_tracker.tracking.tracker import Tracker
-from lab.evaluation.angles import comparable, true_postures
+from lab.evaluation.angles import true_postures
 from lab.evaluation.people_report import replaced
-from lab.evaluation.session import RecordedSession, load_session
-from lab.evaluation.tracking import track_session
+from lab.evaluation.session import load_session
 
 ROOT = Path(__file__).resolve().parents[2]
 DOCUMENT, ROBOT = ROOT / "docs" / "retargeting.md", ROOT / "config" / "example_arm.urdf"
 BEGIN, END = "<!-- retarget-accuracy:begin -->", "<!-- retarget-accuracy:end -->"
-OTHERS_RAD = (0.4, 0.55, 1.0)
-"""Further values of ``max_stddev_rad``, for the last rows."""
-_HEAD = (
-    *("session", "standing still", "mean, moving", "half below", "nine in ten below"),
-    "mean, all images",
-)
-BoolArray = NDArray[np.bool_]
-
-SIDES = ("left", "right")
+_HEAD = ("robot", "side", "upper arm", "forearm", "shoulder to hand", "at a limit", "time")
 
 
-@dataclass(frozen=True)
-class HandError:
-    """Distances between the two robots' hands, cm, over the images of both arms.
+def row(robot: Robot, name: str, side: str, body: BodyModel, postures: FloatArray) -> str:
+    """Return a row of the table: median and nine in ten of the angles, degrees.
 
-    Attributes:
-        images: scored images.
-        frozen: share of images in which the robot stood still, per arm.
-        mean: distance while it moved.
-        percentile_50: half of the distances are below.
-        percentile_90: nine in ten are below.
-        with_frozen: mean distance over all images; the true arm moves on while the robot stands.
+    ``postures`` (n, 12) are followed one after the other, as those of a recording.
     """
-
-    images: int
-    frozen: float
-    mean: float
-    percentile_50: float
-    percentile_90: float
-    with_frozen: float
-
-
-def hand_errors(
-    session: RecordedSession,
-    tracker: TrackerConfig,
-    seed: int,
-    robot: Robot,
-    configs: Sequence[RetargetConfig],
-) -> list[HandError]:
-    """Track a session and compare robots that follow the measured and the true arms.
-
-    Args:
-        session: the recording.
-        tracker: settings of the tracker.
-        seed: of initialization and filters.
-        robot: the arm.
-        configs: settings, one for each returned error; ``side`` is ignored.
-
-    Raises:
-        CardboxError: the recording or the robot cannot be used.
-        ValueError: the truth lacks the torso's angles, or nobody was tracked.
-    """
-    found: dict[int, Estimate] = {}
-    body: list[BodyModel] = []
-
-    def observe(_: int, stamp_ns: int, estimate: Estimate, of: Tracker) -> None:
-        found[stamp_ns] = estimate
-        body[:] = [of.body]
-
-    track_session(session, tracker, (seed,), observe=observe)
-    known = comparable(session, found)
-    stamps = session.stamps_ns[known].tolist()
-    truth = true_postures(session)[known]
-    estimates = [found[stamp] for stamp in stamps]
-    return [
-        _error(
-            [
-                _distances(robot, replace(config, side=side), body[0], stamps, estimates, truth)
-                for side in SIDES
-            ]
-        )
-        for config in configs
-    ]
-
-
-def _error(sides: Sequence[tuple[FloatArray, BoolArray]]) -> HandError:
-    """Return the error of both arms from their distances and whether the robot moved."""
-    distance_cm = np.concatenate([distance for distance, _ in sides])
-    moving = np.concatenate([is_moving for _, is_moving in sides])
-    while_moving = distance_cm[moving] if moving.any() else np.array([np.nan])
-    half, most = np.percentile(while_moving, (50, 90)).tolist()
-    return HandError(
-        images=len(distance_cm) // len(sides),
-        frozen=float(1.0 - moving.mean()),
-        mean=float(while_moving.mean()),
-        percentile_50=half,
-        percentile_90=most,
-        with_frozen=float(distance_cm.mean()),
-    )
-
-
-def _distances(
-    robot: Robot,
-    config: RetargetConfig,
-    body: BodyModel,
-    stamps_ns: list[int],
-    estimates: list[Estimate],
-    truth: FloatArray,
-) -> tuple[FloatArray, BoolArray]:
-    """Return the distance of the hands (n,), cm, and whether the robot moved (n,)."""
-    follower = HandFollower(robot, config)
-    measured, true = (Retargeter(robot, follower, config) for _ in range(2))
-    distances, moved = [], []
-    for stamp_ns, one, posture in zip(stamps_ns, estimates, truth, strict=True):
-        command = measured.update(stamp_ns, one.state, body, one.posture, one.posture_stddev)
-        wanted = true.update(stamp_ns, TRACKING, body, posture, np.zeros(12))
-        hands = [follower.hand_m(each.positions) for each in (command, wanted)]
-        distances.append(100 * float(np.linalg.norm(hands[0] - hands[1])))
-        moved.append(command.is_moving)
-    return np.array(distances), np.array(moved)
-
-
-def row(name: str, error: HandError) -> str:
-    """Return one row of the table."""
-    distances = (error.mean, error.percentile_50, error.percentile_90, error.with_frozen)
-    cells = (name, f"{error.frozen:.0%}", *(f"{distance:.1f} cm" for distance in distances))
+    follower = ArmFollower(robot, RetargetConfig(side=side))
+    lower, upper, _ = robot.limits_of(follower.arm.joints)
+    hidden = np.full((len(postures), 4), np.nan)
+    now, cosines, limited = np.zeros(len(follower.joints)), [], []
+    begun = time.perf_counter()
+    for posture in np.hstack([postures, hidden]):
+        now = follower.target(body, posture, now)
+        arm = now[: len(lower)]
+        found = follower.kinematics.directions(arm)
+        cosines.append((found * directions_of(body, posture, side)).sum(axis=1))
+        limited.append(bool(((arm < lower + 1e-6) | (arm > upper - 1e-6)).any()))
+    took_ms = 1000 * (time.perf_counter() - begun) / len(postures)
+    angles = np.degrees(np.arccos(np.clip(cosines, -1.0, 1.0)))
+    shares = (f"{half:.1f} / {most:.1f}°" for half, most in np.percentile(angles, (50, 90), 0).T)
+    cells = (name, side, *shares, f"{np.mean(limited):.0%}", f"{took_ms:.0f} ms")
     return f"| {' | '.join(cells)} |"
 
 
-def mean_of(errors: Sequence[HandError]) -> HandError:
-    """Return the mean over sessions; the images are added."""
-    names = [field.name for field in fields(HandError) if field.name != "images"]
-    means = {name: float(np.nanmean([getattr(one, name) for one in errors])) for name in names}
-    return HandError(images=sum(one.images for one in errors), **means)
-
-
 def main(args: list[str] | None = None) -> int:
-    """Measure and write the table."""
+    """Measure and print the table."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("sessions", nargs="+", type=Path, metavar="SESSION")
-    parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--robot", action="append", type=Path, metavar="URDF")
+    parser.add_argument("--write", action="store_true", help="write the table into the document")
     given = parser.parse_args(args)
-    robot, preset = load_robot(ROBOT), PRESETS["default"]()
+    body = body_from_proportions(1.75, 2.0)
+    found = [true_postures(load_session(folder)) for folder in given.sessions]
+    postures = np.concatenate(found)
+    postures = postures[np.isfinite(postures).all(axis=1)]
     rows = [f"| {' | '.join(_HEAD)} |", "|---" * len(_HEAD) + "|"]
-    configs = [RetargetConfig(), *(RetargetConfig(max_stddev_rad=most) for most in OTHERS_RAD)]
-    found = []
-    for folder in given.sessions:
-        session = load_session(folder)
-        found.append(hand_errors(session, preset, given.seed, robot, configs))
-        print(row(session.name, found[-1][0]), flush=True)
-    for config, errors in zip(configs, zip(*found, strict=True), strict=True):
-        name = f"**mean**, `max_stddev_rad` {config.max_stddev_rad:g}"
-        rows.append(row(name, mean_of(errors)))
-    text, table = DOCUMENT.read_text(encoding="utf-8"), "\n".join(rows)
-    DOCUMENT.write_text(replaced(text, f"\n{table}\n", BEGIN, END), encoding="utf-8")
-    print(table)
+    for path in given.robot or [ROBOT]:
+        for side in ("left", "right"):
+            rows.append(row(load_robot(path), path.stem, side, body, postures))
+            print(rows[-1], flush=True)
+    if given.write:
+        text, table = DOCUMENT.read_text(encoding="utf-8"), "\n".join(rows)
+        DOCUMENT.write_text(replaced(text, f"\n{table}\n", BEGIN, END), encoding="utf-8")
     return 0
 
 

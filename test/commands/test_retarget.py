@@ -42,6 +42,7 @@ def test_the_robot_follows_and_stands_still(
     table, bag = tmp_path / "arm.csv", tmp_path / "with_arm"
     done = cardbox(
         *("retarget", results, "--robot", ROBOT, "--map", MAP, "--max-speed", "0.5"),
+        *("--soft-start-s", "0"),
         *("--csv", table, "--bag", bag),
     )
     assert done.code == 0, done.err
@@ -49,15 +50,15 @@ def test_the_robot_follows_and_stands_still(
     assert "frozen: lost: 1 of 5 images" in done.out
     with table.open(encoding="utf-8") as file:
         rows = list(csv.DictReader(file))
-    assert [row["status"] for row in rows] == (
+    assert [row["status"] for row in rows[:26]] == (
         ["moving"] * 10 + ["frozen: lost"] * 5 + ["moving"] * 11
     )
     assert np.diff([int(row["stamp_ns"]) for row in rows]).tolist() == [20_000_000] * 25
-    # 0.5 rad/s from the second image on, which comes after 0.1 s; no way to the third is left.
-    roll = [float(row["shoulder_roll"]) for row in rows]
-    ways = [*np.arange(0, -0.05, -0.01), *[-0.05] * 5, *np.arange(-0.05, -0.151, -0.01)]
-    assert roll == pytest.approx([0.0] * 5 + ways, abs=1e-6)
-    assert float(rows[7]["shoulder_roll_velocity"]) == pytest.approx(-0.5)
+    # 0.5 rad/s from the second image on, which comes after 0.1 s; it arrives later.
+    roll = np.array([float(row["shoulder_roll"]) for row in rows])
+    assert roll[5] == 0.0 and (np.diff(roll) <= 0.0).all() and roll[-1] < -0.05
+    assert np.abs(np.diff(roll)).max() <= 0.5 * 0.02 + 1e-6
+    assert float(rows[9]["shoulder_roll_velocity"]) < -0.2
     with BagReader(bag) as read, BagReader(results) as before:
         kinds = read.topics
         assert kinds["/retarget/joint_trajectory"] == "trajectory_msgs/msg/JointTrajectory"
@@ -92,13 +93,14 @@ def test_a_head_in_a_bag_is_followed_while_the_face_is_known(
     table = tmp_path / "head.csv"
     done = cardbox(
         *("retarget", results, "--robot", robot, "--map", joint_map, "--max-speed", "2"),
+        *("--soft-start-s", "0", "--max-acceleration", "1000", "--max-jerk", "1000000"),
         *("--csv", table),
     )
     assert done.code == 0, done.err
     with table.open(encoding="utf-8") as file:
         yaw = [float(row["head_yaw"]) for row in csv.DictReader(file)]
     # 0.2 rad from the second image on, the rest from the third, and no way back to 0.
-    assert [yaw[10], yaw[15], yaw[-1]] == pytest.approx([0.2, 0.3, 0.3])
+    assert [yaw[10], yaw[15], yaw[-1]] == pytest.approx([0.2, 0.3, 0.3], abs=0.01)
 
 
 @pytest.mark.parametrize(
@@ -107,9 +109,10 @@ def test_a_head_in_a_bag_is_followed_while_the_face_is_known(
         (("--robot", "FOLDER/missing.urdf"), "missing.urdf: No such file or directory"),
         (("--robot", str(MAP)), "expected the URDF"),
         (("--map", str(ROBOT)), "config/example_joint_map.yaml"),
-        (("--map", str(MAP), "--hand", "hand_link"), "either a joint map or a hand"),
+        (("--map", str(MAP), "--hand", "hand_link"), "either a joint map or hand, not both"),
         (("--max-speed", "100"), "--max-speed is 100; expected 0.01 to 20"),
-        (("--side", "both"), "--side: invalid choice: 'both'"),
+        (("--map", str(MAP), "--side", "both"), "either a joint map or both sides"),
+        (("--side", "none"), "--side: invalid choice: 'none'"),
     ],
 )
 def test_mistakes_of_retarget(

@@ -15,19 +15,65 @@ class RetargetConfig(Settings):
         ValueError: a value is out of its range; the text names it.
     """
 
-    side: str = setting("right", "arm of the person that is followed", choices=("left", "right"))
+    side: str = setting(
+        "right",
+        "arm of the person that is followed; both: one robot with two arms",
+        choices=("left", "right", "both"),
+    )
+    base: str = setting("", "link at which the robot's arm begins; empty: it is found")
+    hand: str = setting("", "link of the robot's hand; empty: it is found")
+    gripper: str = setting("", "joint that opens the robot's hand; empty: it is found")
+    gripper_open: str = setting(
+        "upper", "limit of the gripper at which it is open", choices=("lower", "upper")
+    )
     max_speed: float = setting(
         1.0,
         "no joint of the robot moves faster, nor faster than its URDF says",
         unit="rad/s or m/s",
         limits=(0.01, 20.0),
     )
+    max_acceleration: float = setting(
+        20.0,
+        "no joint of the robot changes its speed faster",
+        unit="rad/s² or m/s²",
+        limits=(0.1, 1000.0),
+    )
+    max_jerk: float = setting(
+        400.0,
+        "no joint of the robot changes its acceleration faster",
+        unit="rad/s³ or m/s³",
+        limits=(1.0, 1e6),
+    )
+    soft_start_s: float = setting(
+        1.0,
+        "time in which the robot's speed rises to max_speed after it begins to follow",
+        unit="s",
+        limits=(0.0, 60.0),
+    )
+    clutch: bool = setting(
+        False,
+        "the robot begins where it is and follows movements from there, not postures",
+    )
+    enable_after_lost: bool = setting(
+        False, "after lost or no_person the robot has to be enabled again"
+    )
+    start: str = setting(
+        "",
+        "positions of the robot's joints at the beginning, JOINT=VALUE,..., where it does not tell "
+        "them; others begin at 0 or the limit nearest to it",
+    )
     max_stddev_rad: float = setting(
         0.7,
-        "dead-man: the robot stands still while the standard deviation of a followed joint is "
-        "larger",
+        "dead-man: a joint of the robot stands still while the standard deviation of one behind "
+        "it is larger",
         unit="rad",
         limits=(0.05, 3.2),
+    )
+    max_chance: float = setting(
+        0.5,
+        "dead-man: a joint of the robot stands still while elbow or hand behind it is more "
+        "probably wrong than this, or not tracked",
+        limits=(0.0, 1.0),
     )
     rate_hz: float = setting(
         50.0,

@@ -104,10 +104,10 @@ class JointMap:
     offset_rad: FloatArray
 
     @property
-    def sources(self) -> tuple[str, ...]:
-        """Joints of the posture behind the angles; none for the neck."""
-        behind = (_ELBOW.get(angle, (angle,)) for angle in self.angles if angle)
-        return tuple(dict.fromkeys(j for joints in behind for j in joints if j in JOINT_NAMES))
+    def sources(self) -> tuple[tuple[str, ...], ...]:
+        """For each joint, those of the posture behind its angle; none for the neck and hands."""
+        behind = (_ELBOW.get(angle, (angle,)) if angle else () for angle in self.angles)
+        return tuple(tuple(one for one in names if one in JOINT_NAMES) for names in behind)
 
     def target(self, _: BodyModel, posture: FloatArray, now: FloatArray) -> FloatArray:
         """See :class:`~.retargeter.Method`; a joint stays while its angle is unknown."""

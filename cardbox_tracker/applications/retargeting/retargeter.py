@@ -2,31 +2,36 @@
 
 from __future__ import annotations
 
+import math
 import os
+from collections.abc import Mapping
 from typing import NamedTuple, Protocol
 
 import numpy as np
+from numpy.typing import NDArray
 
+from cardbox_tracker.applications.retargeting.arm import ArmFollower
 from cardbox_tracker.applications.retargeting.config import RetargetConfig
-from cardbox_tracker.applications.retargeting.hand import HandFollower
 from cardbox_tracker.applications.retargeting.joint_map import load_joint_map, with_head_and_hands
 from cardbox_tracker.applications.retargeting.robot import Robot, load_robot
-from cardbox_tracker.common.errors import CardboxError
+from cardbox_tracker.common.errors import CardboxError, quoted
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.posture import N_JOINTS
 from cardbox_tracker.person.sizes import FloatArray
 from cardbox_tracker.person.skeleton import JOINT_NAMES
-from cardbox_tracker.tracking.estimate import TRACKING
+from cardbox_tracker.tracking.estimate import TRACKING, UNCERTAIN
 
 MOVING = "moving"
+# The first of the speeds with which a robot begins to follow, of its highest.
+_SLOWEST = 0.1
 
 
 class Method(Protocol):
     """A mapping from postures to joint positions of a robot."""
 
     @property
-    def sources(self) -> tuple[str, ...]:
-        """Names of the person's joints on which the target depends."""
+    def sources(self) -> tuple[tuple[str, ...], ...]:
+        """For each joint of the robot, the person's joints on which its target depends."""
 
     @property
     def joints(self) -> tuple[str, ...]:
@@ -55,47 +60,110 @@ class Moment(NamedTuple):
     velocities: FloatArray
 
 
+class _Segment(NamedTuple):
+    """The set-point from a time on, s: position (n,) then, and velocity (n,)."""
+
+    begun_s: float
+    position: FloatArray
+    velocity: FloatArray
+
+
+def _still(position: FloatArray) -> _Segment:
+    return _Segment(-math.inf, position, np.zeros(len(position)))
+
+
 class SafeMotion:
-    """A motion with constant velocities that ends at the goal and stands still from there.
+    """A motion within limits of position, speed, acceleration and jerk, whatever is asked for.
+
+    A set-point moves within the limits of position and speed. Its mean over two times, one after
+    the other, is where the robot is: so it keeps these limits; its acceleration is at most twice
+    the speed over the first time, and its jerk twice the acceleration over the second one. The
+    robot is late by half of both times.
 
     Attributes:
-        goal: joint positions (n,) at the end, rad or m.
+        settles_ns: after this time a stopped robot stands still, ns.
     """
 
-    def __init__(self, limits: Limits) -> None:
-        """Stand still at 0 or the limit nearest to 0."""
+    def __init__(self, limits: Limits, start: FloatArray, acceleration: float, jerk: float) -> None:
+        """Stand still at ``start`` (n,), or the limits nearest to it."""
         self._limits = limits
-        zero = np.zeros(len(limits.lower))
-        self.goal: FloatArray = np.clip(zero, limits.lower, limits.upper)
-        self._start, self._begun_ns, self._duration_ns = self.goal, 0, 0
+        fastest = float(limits.speed.max())
+        self._times_s = max(2 * fastest / acceleration, 1e-3), max(2 * acceleration / jerk, 1e-3)
+        self.settles_ns = math.ceil(sum(self._times_s) * 1e9) + 1
+        self.begin(start)
+
+    def begin(self, position: FloatArray) -> None:
+        """Stand still at ``position`` (n,), or the limits nearest to it, at all times."""
+        position = np.clip(position, self._limits.lower, self._limits.upper)
+        self._segments = [_still(position)]
+
+    def set_point(self, now_ns: int) -> FloatArray:
+        """Return where the set-point is (n,); the robot follows it a little later."""
+        now_s = now_ns / 1e9
+        begun = (one for one in reversed(self._segments) if one.begun_s <= now_s)
+        last = next(begun, self._segments[0])
+        if not last.velocity.any():
+            return last.position
+        return np.clip(
+            last.position + (now_s - last.begun_s) * last.velocity,
+            self._limits.lower,
+            self._limits.upper,
+        )
 
     def at(self, now_ns: int) -> Moment:
         """Return positions and velocities at a time of the robot's clock, ns."""
-        passed_ns, whole_ns = now_ns - self._begun_ns, self._duration_ns
-        if not 0 <= passed_ns < whole_ns:
-            return Moment(self.goal, np.zeros(len(self.goal)))
-        way = self.goal - self._start
-        return Moment(self._start + passed_ns / whole_ns * way, way / (whole_ns / 1e9))
+        now_s = now_ns / 1e9
+        first = self._segments[0]
+        position, velocity = first.position.copy(), first.velocity.copy()
+        if velocity.any():
+            position += (now_s - first.begun_s - 0.5 * sum(self._times_s)) * velocity
+        for before, after in zip(self._segments, self._segments[1:], strict=False):
+            way, speed = self._ramp(now_s - after.begun_s)
+            change = after.velocity - before.velocity
+            position += way * change
+            velocity += speed * change
+        return Moment(np.clip(position, self._limits.lower, self._limits.upper), velocity)
 
-    def stop(self, now_ns: int) -> FloatArray:
-        """Stand still from ``now_ns`` on and return the positions (n,)."""
-        self.goal = self.at(now_ns).positions
-        self._duration_ns = 0
-        return self.goal
+    def _ramp(self, passed_s: float) -> tuple[float, float]:
+        """Return position and velocity after a set-point has moved at 1 for a time."""
+        first_s, second_s = self._times_s
+        if passed_s >= first_s + second_s:
+            return passed_s - 0.5 * (first_s + second_s), 1.0
+        corners = ((0.0, 1), (first_s, -1), (second_s, -1))
+        since = [(max(passed_s - corner, 0.0), sign) for corner, sign in corners]
+        area = first_s * second_s
+        return (
+            sum(sign * time**3 for time, sign in since) / (6 * area),
+            sum(sign * time**2 for time, sign in since) / (2 * area),
+        )
 
-    def move(self, target: FloatArray, now_ns: int, duration_ns: int) -> FloatArray:
-        """Move towards ``target`` (n,) for a time from now on and return the goal (n,).
+    def stop(self, now_ns: int) -> None:
+        """Stop the set-point at ``now_ns``; the robot decelerates."""
+        point, now_s = self.set_point(now_ns), now_ns / 1e9
+        kept = [one for one in self._segments if one.begun_s < now_s]
+        settled = [i for i, one in enumerate(kept) if one.begun_s <= now_s - sum(self._times_s)]
+        self._segments = kept[settled[-1] if settled else 0 :] or [_still(point)]
+        if self._segments[-1].velocity.any():
+            self._segments.append(_Segment(now_s, point, np.zeros(len(point))))
 
-        The robot stands still unless the target is finite and the time is positive.
+    def move(self, target: FloatArray, now_ns: int, duration_ns: int, share: float = 1.0) -> None:
+        """Move the set-point towards ``target`` (n,) for a time from now on, then stop it.
+
+        It stands still unless the target is finite and the time is positive; ``share`` is of the
+        highest speed.
         """
         self.stop(now_ns)
-        if np.isfinite(target).all() and duration_ns > 0:
-            lower, upper, speed = self._limits
-            most = np.minimum(speed * (duration_ns / 1e9), upper - lower)
-            step = np.clip(np.clip(target, lower, upper) - self.goal, -most, most)
-            self._start, self._begun_ns, self._duration_ns = self.goal, now_ns, duration_ns
-            self.goal = np.clip(self._start + step, lower, upper)
-        return self.goal
+        if not np.isfinite(target).all() or duration_ns <= 0:
+            return
+        start, duration_s = self.set_point(now_ns), duration_ns / 1e9
+        lower, upper, speed = self._limits
+        most = share * speed * duration_s
+        goal = start + np.clip(np.clip(target, lower, upper) - start, -most, most)
+        now_s = now_ns / 1e9
+        self._segments += [
+            _Segment(now_s, start, (goal - start) / duration_s),
+            _Segment(now_s + duration_s, goal, np.zeros(len(goal))),
+        ]
 
 
 class Command(NamedTuple):
@@ -118,32 +186,51 @@ class Command(NamedTuple):
 
 
 class Retargeter:
-    """Makes one robot command an image, always within the limits of position and speed.
+    """Makes one robot command an image, always within the limits of its motion.
 
     Between two images :meth:`at` has positions and velocities for any time of the robot's clock.
+
+    Attributes:
+        joints: names of the robot's joints.
+        settles_ns: time in which the robot stops, ns.
     """
 
     def __init__(self, robot: Robot, method: Method, config: RetargetConfig) -> None:
-        """Begin at 0, or at the limit nearest to 0, for each joint.
+        """Begin at ``config.start``, at 0, or at the limit nearest to 0, for each joint.
 
         Raises:
-            CardboxError: the robot lacks a joint of ``method``.
+            CardboxError: the robot lacks a joint of ``method``, or ``config.start`` does not fit.
         """
         self.joints = method.joints
-        lower, upper, speed = robot.limits_of(method.joints)
-        self._motion = SafeMotion(Limits(lower, upper, np.minimum(speed, config.max_speed)))
+        limits = Limits(*robot.limits_of(method.joints))
+        limits = limits._replace(speed=np.minimum(limits.speed, config.max_speed))
+        self._motion = SafeMotion(
+            limits,
+            _start(config.start, method.joints, limits),
+            config.max_acceleration,
+            config.max_jerk,
+        )
+        self.settles_ns = self._motion.settles_ns
         self._method, self._config = method, config
-        self._sources = [JOINT_NAMES.index(name) for name in method.sources]
+        self._sources = method.sources
+        self._follows = np.array([bool(names) for names in method.sources])
         self._before_ns: int | None = None
         self._commanded_ns: int | None = None
+        self._followed_ns: int | None = None
+        self._offset = np.zeros(len(method.joints))
+
+    def begin(self, positions: FloatArray) -> None:
+        """Stand still at the robot's ``positions`` (n,); the next image counts as the first."""
+        self._motion.begin(positions)
+        self._before_ns = self._followed_ns = None
 
     def at(self, now_ns: int) -> Moment:
         """Return positions and velocities of ``joints`` at a time of the robot's clock, ns."""
         return self._motion.at(now_ns)
 
     def hold(self, reason: str, now_ns: int) -> Command:
-        """Return the command to stand still from now on; the next image counts as the first."""
-        self._before_ns = None
+        """Return the command to stop from now on; the next image counts as the first."""
+        self._before_ns = self._followed_ns = None
         return self._stop(reason, now_ns)
 
     def update(
@@ -155,76 +242,150 @@ class Retargeter:
         stddev: FloatArray | None = None,
         now_ns: int | None = None,
         hands: FloatArray | None = None,
+        keypoints: Mapping[str, tuple[str, float]] | None = None,
     ) -> Command:
         """Return the command for an image.
 
         Args:
             stamp_ns: stamp of the image.
-            state: tracking state; the robot moves only in the state ``tracking``.
+            state: tracking state; the robot moves in the state ``tracking``, and those of its
+                joints whose keypoints are ``tracked`` also in the state ``uncertain``.
             body: the person.
             posture: d1..d12, rad and metres, and the angles of the neck if known; (12,) or (14,).
             stddev: their standard deviations, (12,) or (14,).
             now_ns: time of the robot's clock; None if that is the stamp. The robot moves for no
                 longer than since the command before, whatever the stamps say.
             hands: how open both hands are, (2,), 0 to 1, nan for one that is not known.
+            keypoints: state and chance to be wrong of each keypoint by name; None if not known.
         """
         now_ns = stamp_ns if now_ns is None else now_ns
+        now_ns = max(now_ns, self._commanded_ns or now_ns)
         before_ns, self._before_ns = self._before_ns, stamp_ns
         commanded_ns, self._commanded_ns = self._commanded_ns, now_ns
-        reason = self._reason(state, posture, stddev)
-        if reason or body is None or posture is None or stddev is None:
-            return self._stop(reason or "no body model", now_ns)
+        if state != TRACKING and not (state == UNCERTAIN and keypoints):
+            if state != UNCERTAIN:
+                self._followed_ns = None
+            return self._stop(state.replace("_", " ") or "no state yet", now_ns)
+        if posture is None or stddev is None:
+            return self._stop("no posture", now_ns)
+        if body is None:
+            return self._stop("no body model", now_ns)
+        held = self._held(posture, stddev, keypoints or {})
+        is_blind = self._follows.any() and held[self._follows].all()
+        if is_blind or not np.isfinite(posture[:N_JOINTS]).all():
+            return self._stop("too uncertain", now_ns)
         whole = with_head_and_hands(posture, stddev, self._config.max_stddev_rad, hands)
-        target = self._method.target(body, whole, self.at(now_ns).positions)
+        point = self._motion.set_point(now_ns)
+        target = np.where(held, point, self._method.target(body, whole, point))
         if not np.isfinite(target).all():
             return self._stop("no solution", now_ns)
+        if self._followed_ns is None:
+            self._followed_ns = now_ns
+            self._offset = point - target if self._config.clutch else np.zeros(len(target))
         elapsed_ns = 0 if before_ns is None else stamp_ns - before_ns
         waited_ns = elapsed_ns if commanded_ns is None else now_ns - commanded_ns
         longest_ns = round(self._config.longest_step_s * 1e9)
         duration_ns = max(min(elapsed_ns, waited_ns, longest_ns), 0)
-        return Command(self._motion.move(target, now_ns, duration_ns), MOVING, duration_ns / 1e9)
+        followed_s, soft_s = (now_ns - self._followed_ns) / 1e9, self._config.soft_start_s
+        share = min(max(followed_s / soft_s, _SLOWEST), 1.0) if soft_s else 1.0
+        goal = np.where(held, point, target + self._offset)
+        self._motion.move(goal, now_ns, duration_ns, share)
+        return Command(self.at(now_ns + duration_ns).positions, MOVING, duration_ns / 1e9)
 
     def _stop(self, reason: str, now_ns: int) -> Command:
-        return Command(self._motion.stop(now_ns), f"frozen: {reason.replace('_', ' ')}", 0.0)
+        self._motion.stop(now_ns)
+        end = self.at(now_ns + self.settles_ns).positions
+        return Command(end, f"frozen: {reason.replace('_', ' ')}", self.settles_ns / 1e9)
 
-    def _reason(self, state: str, posture: FloatArray | None, stddev: FloatArray | None) -> str:
-        """Return why the robot must not move; empty if it may."""
-        if state != TRACKING:
-            return state.replace("_", " ") or "no state yet"
-        if posture is None or stddev is None:
-            return "no posture"
-        worst = stddev[self._sources]
-        if not (
-            np.isfinite(posture[:N_JOINTS]).all() and (worst <= self._config.max_stddev_rad).all()
-        ):
-            return "too uncertain"
-        return ""
+    def _held(
+        self,
+        posture: FloatArray,
+        stddev: FloatArray,
+        keypoints: Mapping[str, tuple[str, float]],
+    ) -> NDArray[np.bool_]:
+        """Return which joints (n,) of the robot stay because theirs are not sure."""
+        sure = (stddev[:N_JOINTS] <= self._config.max_stddev_rad) & np.isfinite(posture[:N_JOINTS])
+        for number, name in enumerate(JOINT_NAMES):
+            side, _, joint = name.partition("_")
+            # The angles at the shoulder are those of the elbow's place, these of the hand's.
+            end = "hand" if joint.startswith("elbow") else "elbow"
+            state, chance = keypoints.get(f"{side}_{end}", ("tracked", 0.0))
+            if state != "tracked" or chance > self._config.max_chance:
+                sure[number] = False
+        unsure = {name for name, is_sure in zip(JOINT_NAMES, sure, strict=True) if not is_sure}
+        return np.array([not unsure.isdisjoint(names) for names in self._sources])
+
+
+def _start(text: str, joints: tuple[str, ...], limits: Limits) -> FloatArray:
+    """Return the positions (n,) of a text ``JOINT=VALUE,...``."""
+    positions = np.clip(np.zeros(len(joints)), limits.lower, limits.upper)
+    for part in filter(None, (part.strip() for part in text.split(","))):
+        name, _, value = part.partition("=")
+        try:
+            number = joints.index(name.strip())
+            positions[number] = float(value)
+        except ValueError:
+            raise CardboxError(
+                f"the start {quoted(part)} is not JOINT=VALUE with one of {', '.join(joints)}"
+            ) from None
+        lower, upper = limits.lower[number], limits.upper[number]
+        if not lower <= positions[number] <= upper:
+            raise CardboxError(
+                f"the start {quoted(part)} is beyond the joint's limits; expected {lower:g} to "
+                f"{upper:g}"
+            )
+    return positions
+
+
+class _Both:
+    """A :class:`Method` of two arms of one robot."""
+
+    def __init__(self, parts: tuple[ArmFollower, ArmFollower]) -> None:
+        self._parts = parts
+        if set(parts[0].joints) & set(parts[1].joints):
+            raise CardboxError(
+                "the robot has one arm, or one hand was given; expected two arms for the "
+                "side 'both'"
+            )
+        self.joints = (*parts[0].joints, *parts[1].joints)
+        self.sources = (*parts[0].sources, *parts[1].sources)
+
+    def target(self, body: BodyModel, posture: FloatArray, now: FloatArray) -> FloatArray:
+        first = len(self._parts[0].joints)
+        parts = zip(self._parts, (now[:first], now[first:]), strict=True)
+        return np.concatenate([one.target(body, posture, part) for one, part in parts])
 
 
 def make_retargeter(
     robot_file: str | os.PathLike[str],
     joint_map: str | os.PathLike[str] | None,
-    hand_link: str,
     config: RetargetConfig,
-) -> tuple[Robot, Retargeter]:
-    """Return a robot and its retargeter.
+) -> tuple[Robot, Retargeter, str]:
+    """Return a robot, its retargeter, and a table of the joints that were found.
 
     Args:
         robot_file: URDF of the robot.
-        joint_map: file of a joint map; if None, the hand is followed by inverse kinematics.
-        hand_link: link of the robot's hand; if empty, the link with the longest joint chain.
+        joint_map: file of a joint map; if None, the robot's arm is found and follows.
         config: settings.
 
     Raises:
-        CardboxError: a file cannot be read, the robot lacks a joint or link, or the libraries for
-            inverse kinematics are not installed.
+        CardboxError: a file cannot be read, the robot lacks a joint or link, its arm is not clear,
+            or a setting is given that a joint map does not need.
     """
     robot = load_robot(robot_file)
-    method: Method
     if joint_map:
-        if hand_link:
-            raise CardboxError("expected either a joint map or a hand, not both")
-        method = load_joint_map(joint_map)
-    else:
-        method = HandFollower(robot, config, hand_link)
-    return robot, Retargeter(robot, method, config)
+        given = [name for name in ("base", "hand", "gripper") if getattr(config, name)]
+        if given or config.side == "both":
+            raise CardboxError(
+                f"expected either a joint map or {', '.join(given) or 'both sides'}, not both"
+            )
+        method: Method = load_joint_map(joint_map)
+        return robot, Retargeter(robot, method, config), ""
+    sides = ("left", "right") if config.side == "both" else (config.side,)
+    arms = [ArmFollower(robot, config, side) for side in sides]
+    method = arms[0] if len(arms) == 1 else _Both((arms[0], arms[1]))
+    tables = [
+        f"{side} arm\n{one.arm.table(robot, config.max_speed)}"
+        for side, one in zip(sides, arms, strict=True)
+    ]
+    return robot, Retargeter(robot, method, config), "\n".join(tables)

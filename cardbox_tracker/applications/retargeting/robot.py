@@ -1,11 +1,11 @@
-"""A robot's joints and their limits from its URDF."""
+"""A robot's joints, their places and their limits from its URDF."""
 
 from __future__ import annotations
 
 import math
 import os
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from xml.etree import ElementTree as Xml
 
 import numpy as np
@@ -13,6 +13,7 @@ import numpy as np
 from cardbox_tracker.common.errors import CardboxError, cut, quoted
 from cardbox_tracker.common.files import UnreadableFileError, read_regular
 from cardbox_tracker.person.sizes import FloatArray
+from cardbox_tracker.person.skeleton import rotation_x, rotation_y, rotation_z
 
 _MOVABLE = ("revolute", "continuous", "prismatic")
 # Some descriptions mean no limit by 1e16; differences of larger ones would not be finite.
@@ -30,12 +31,39 @@ _FREEDOMS = {"fixed": 0, "planar": 3, "floating": 6}
 
 @dataclass(frozen=True)
 class Joint:
-    """One movable joint with limits in rad or m; ``speed`` in rad/s or m/s is inf if not given."""
+    """One joint between two links.
+
+    Attributes:
+        kind: ``revolute``, ``continuous``, ``prismatic`` or any that stays, such as ``fixed``.
+        parent: name of a link.
+        child: name of a link.
+        origin_m: (3,), in the frame of ``parent``.
+        turn: rotation matrix (3, 3) from the child at 0 to ``parent``.
+        axis: unit vector (3,) in the frame of ``child``.
+        lower: lowest position, rad or m; half a turn back for a ``continuous`` joint.
+        upper: highest position, rad or m.
+        speed: highest speed, rad/s or m/s; inf if the description gives none, or 0.
+        mimics: the joint that it copies, ``multiplier * position + offset``; empty for none.
+    """
 
     name: str
-    lower: float
-    upper: float
-    speed: float
+    kind: str
+    parent: str
+    child: str
+    origin_m: FloatArray
+    turn: FloatArray
+    axis: FloatArray
+    lower: float = 0.0
+    upper: float = 0.0
+    speed: float = math.inf
+    mimics: str = ""
+    multiplier: float = 1.0
+    offset: float = 0.0
+
+    @property
+    def moves(self) -> bool:
+        """True unless it stays or follows another joint."""
+        return self.upper > self.lower and not self.mimics
 
 
 @dataclass(frozen=True)
@@ -43,28 +71,26 @@ class Robot:
     """A robot.
 
     Attributes:
-        urdf: description, in which continuous joints have limits of half a turn in each direction.
-        joints: movable joints by name, in the order of the description.
-        parents: for each link but the root, the names of its joint and its parent link.
+        urdf: description.
+        all_joints: every joint by the name of its child link.
     """
 
     urdf: str
-    joints: dict[str, Joint]
-    parents: dict[str, tuple[str, str]]
+    all_joints: dict[str, Joint]
+
+    @property
+    def joints(self) -> dict[str, Joint]:
+        """The joints that can be moved, by name, in the order of the description."""
+        return {one.name: one for one in self.all_joints.values() if one.moves}
 
     @property
     def links(self) -> tuple[str, ...]:
         """All links; the root is the first one."""
-        roots = {parent for _, parent in self.parents.values()} - self.parents.keys()
-        return (*sorted(roots), *self.parents)
+        roots = {one.parent for one in self.all_joints.values()} - self.all_joints.keys()
+        return (*sorted(roots), *self.all_joints)
 
-    @property
-    def last_link(self) -> str:
-        """The link with the longest chain of movable joints."""
-        return max(reversed(self.links), key=lambda link: len(self.chain(link)))
-
-    def chain(self, link: str) -> tuple[str, ...]:
-        """Return the movable joints from the root to ``link``.
+    def path(self, link: str) -> tuple[Joint, ...]:
+        """Return all joints from the root to ``link``.
 
         Raises:
             CardboxError: there is no such link.
@@ -73,11 +99,10 @@ class Robot:
             raise CardboxError(
                 f"the robot has no link {quoted(link)}; it has {cut(', '.join(self.links))}"
             )
-        found = []
-        while link in self.parents:
-            joint, link = self.parents[link]
-            if joint in self.joints:
-                found.append(joint)
+        found: list[Joint] = []
+        while link in self.all_joints:
+            found.append(self.all_joints[link])
+            link = found[-1].parent
         return tuple(reversed(found))
 
     def limits_of(self, names: Sequence[str]) -> tuple[FloatArray, FloatArray, FloatArray]:
@@ -105,40 +130,34 @@ def load_robot(path: str | os.PathLike[str]) -> Robot:
         CardboxError: the file cannot be read, or is not a URDF with movable joints.
     """
     try:
-        text = read_regular(path, _LARGEST_BYTES).decode("utf-8")
+        content = read_regular(path, _LARGEST_BYTES)
     except UnreadableFileError as error:
         raise CardboxError(f"cannot read the robot {path}: {error}; expected a URDF file") from None
-    except UnicodeDecodeError:
-        raise CardboxError(f"{path} is not a text file; expected the URDF of a robot") from None
-    return parse_robot(text, str(path))
+    return parse_robot(content, str(path))
 
 
-def parse_robot(text: str, source: str = "the description") -> Robot:
-    """Parse a URDF; ``source`` names it in errors.
+def parse_robot(content: str | bytes, source: str = "the description") -> Robot:
+    """Parse a URDF; ``source`` names it in errors. Bytes have the encoding that they declare.
 
     Raises:
-        CardboxError: see :func:`load_robot`; or it defines entities, or has too many levels,
-            elements or joints.
+        CardboxError: see :func:`load_robot`; or it is unprocessed xacro, defines entities, or has
+            too many levels, elements or joints.
     """
-    if "xmlns:xacro" in text:
-        raise CardboxError(f"{source} is xacro; convert it first: xacro FILE > robot.urdf")
-    if "<!DOCTYPE" in text:
-        # Few lines of entities can make gigabytes.
-        raise CardboxError(f"{source} defines entities, which no URDF needs; remove them")
-    parser = Xml.XMLParser(target=_BoundedBuilder(source), encoding="utf-8")
-    content = text.encode("utf-8", "replace")
+    encoding = "utf-8" if isinstance(content, str) else None
+    data = content.encode("utf-8", "replace") if isinstance(content, str) else content
+    parser = Xml.XMLParser(target=_BoundedBuilder(source), encoding=encoding)
     try:
         # A parser reads to the end of what it is fed, also after an error.
-        for begin in range(0, len(content), _CHUNK):
-            parser.feed(content[begin : begin + _CHUNK])
+        for begin in range(0, len(data), _CHUNK):
+            parser.feed(data[begin : begin + _CHUNK])
         return _robot(parser.close())
-    except Xml.ParseError as error:
-        raise CardboxError(f"{source} is not XML: {error}; expected the URDF of a robot") from None
     except (KeyError, ValueError) as error:
         raise CardboxError(
             f"{source} is not a URDF with movable joints: {cut(str(error))}; every joint needs "
             "name, type, parent and child, and a revolute or prismatic joint finite limits"
         ) from None
+    except (Xml.ParseError, LookupError) as error:
+        raise CardboxError(f"{source} is not XML: {error}; expected the URDF of a robot") from None
 
 
 class _BoundedBuilder(Xml.TreeBuilder):
@@ -151,6 +170,10 @@ class _BoundedBuilder(Xml.TreeBuilder):
     def start(self, tag: str, attributes: Mapping[str, str]) -> Xml.Element:
         """Count an element; the joints of a robot lie in its root, others in transmissions."""
         is_joint = tag == "joint" and self._counts["levels of nested elements"] == 1
+        if "xacro" in tag or any("${" in value for value in attributes.values()):
+            raise CardboxError(
+                f"{self._source} is xacro; convert it first: xacro FILE > robot.urdf"
+            )
         freedoms = _FREEDOMS.get(attributes.get("type", ""), 1)
         more = (1, 1, is_joint, is_joint * freedoms)
         for (what, most), added in zip(_MOST.items(), more, strict=True):
@@ -162,6 +185,10 @@ class _BoundedBuilder(Xml.TreeBuilder):
                 )
         return super().start(tag, dict(attributes))
 
+    def doctype(self, *_: str | None) -> None:
+        """Refuse entities, few lines of which can make gigabytes."""
+        raise CardboxError(f"{self._source} defines entities, which no URDF needs; remove them")
+
     def end(self, tag: str) -> Xml.Element:
         """Count a level less."""
         self._counts["levels of nested elements"] -= 1
@@ -169,26 +196,34 @@ class _BoundedBuilder(Xml.TreeBuilder):
 
 
 def _robot(root: Xml.Element) -> Robot:
+    links = [element.attrib["name"] for element in root.findall("link")]
     joints: dict[str, Joint] = {}
-    parents: dict[str, tuple[str, str]] = {}
     for element in root.findall("joint"):
-        name, kind = element.attrib["name"], element.attrib["type"]
-        parent, child = (_link(element, which) for which in ("parent", "child"))
-        if child in parents or name in joints:
-            raise ValueError(f"the link {child} has two parents, or two joints are named {name}")
-        parents[child] = name, parent
-        if kind in _MOVABLE and element.find("mimic") is None:
-            joints[name] = _joint(element, name, kind)
-    for link in parents:
-        seen, at = {link}, parents[link][1]
-        while at in parents:
+        one = _joint(element)
+        if one.child in joints or any(one.name == other.name for other in joints.values()):
+            raise ValueError(
+                f"the link {one.child} has two parents, or two joints are named {one.name}"
+            )
+        if not {one.parent, one.child} <= set(links):
+            raise ValueError(f"the joint {one.name} is at a link that the description lacks")
+        joints[one.child] = one
+    for link in joints:
+        seen, at = {link}, joints[link].parent
+        while at in joints:
             if at in seen:
                 raise ValueError(f"the link {at} is its own ancestor")
             seen.add(at)
-            at = parents[at][1]
-    if not joints:
-        raise ValueError("it has no movable joint")
-    return Robot(Xml.tostring(root, encoding="unicode"), joints, parents)
+            at = joints[at].parent
+    if len(set(links)) < len(links) or len(set(links) - joints.keys()) > 1:
+        raise ValueError("two links have one name, or no joint leads to several links")
+    robot = Robot(Xml.tostring(root, encoding="unicode"), joints)
+    if not robot.joints:
+        still = [one.name for one in joints.values() if one.kind in _MOVABLE and not one.mimics]
+        why = (
+            f"; the limits of {', '.join(still)} are equal, or missing, which is 0" if still else ""
+        )
+        raise ValueError(f"it has no movable joint{why}")
+    return robot
 
 
 def _link(joint: Xml.Element, which: str) -> str:
@@ -198,17 +233,49 @@ def _link(joint: Xml.Element, which: str) -> str:
     return found.attrib["link"]
 
 
-def _joint(element: Xml.Element, name: str, kind: str) -> Joint:
-    limit = element.find("limit")
-    if limit is None:
-        if kind != "continuous":
-            raise ValueError(f"the joint {name} has no limit")
-        limit = Xml.SubElement(element, "limit", effort="0", velocity="0")
+def _vector(joint: Xml.Element, tag: str, attribute: str, default: str) -> FloatArray:
+    element = joint.find(tag)
+    text = default if element is None else element.get(attribute, default)
+    found = np.array([float(word) for word in text.split()])
+    if found.shape != (3,) or not (np.abs(found) <= _WIDEST).all():
+        raise ValueError(
+            f"the {attribute} of the {tag} of the joint {joint.get('name')} is {quoted(text)}; "
+            "expected three finite numbers"
+        )
+    return found
+
+
+def _joint(element: Xml.Element) -> Joint:
+    name, kind = element.attrib["name"], element.attrib["type"]
+    roll, pitch, yaw = _vector(element, "origin", "rpy", "0 0 0").tolist()
+    joint = Joint(
+        *(name, kind, _link(element, "parent"), _link(element, "child")),
+        _vector(element, "origin", "xyz", "0 0 0"),
+        rotation_z(yaw) @ rotation_y(pitch) @ rotation_x(roll),
+        np.array([1.0, 0.0, 0.0]),
+    )
+    if kind not in _MOVABLE:
+        return joint
+    axis = _vector(element, "axis", "xyz", "1 0 0")
+    length = float(np.linalg.norm(axis))
+    if not length > 0.0:
+        raise ValueError(f"the joint {name} has an axis without direction")
+    limit, mimic = element.find("limit"), element.find("mimic")
+    if limit is None and kind != "continuous":
+        raise ValueError(f"the joint {name} has no limit")
+    given = {} if limit is None else limit.attrib
+    lower, upper, speed = (float(given.get(one, 0.0)) for one in ("lower", "upper", "velocity"))
     if kind == "continuous":
-        # Half a turn suffices for an arm, and pinocchio has one number for a limited joint.
-        element.set("type", "revolute")
-        limit.attrib |= {"lower": repr(-math.pi), "upper": repr(math.pi)}
-    lower, upper, speed = (float(limit.get(one, 0.0)) for one in ("lower", "upper", "velocity"))
+        # Half a turn each way suffices for an arm.
+        lower, upper = -math.pi, math.pi
     if not (-_WIDEST <= lower <= upper <= _WIDEST and speed >= 0.0):
         raise ValueError(f"the joint {name} has limits {lower} to {upper} and the speed {speed}")
-    return Joint(name, lower, upper, speed or math.inf)
+    joint = replace(joint, axis=axis / length, lower=lower, upper=upper, speed=speed or math.inf)
+    if mimic is None:
+        return joint
+    multiplier, offset = (
+        float(mimic.get(one, default)) for one, default in (("multiplier", 1), ("offset", 0))
+    )
+    if not math.isfinite(multiplier * offset):
+        raise ValueError(f"the joint {name} mimics by {multiplier} and {offset}")
+    return replace(joint, mimics=mimic.attrib["joint"], multiplier=multiplier, offset=offset)

@@ -12,8 +12,14 @@ from hypothesis import strategies as st
 
 from cardbox_tracker.applications.retargeting.config import RetargetConfig
 from cardbox_tracker.applications.retargeting.joint_map import load_joint_map
-from cardbox_tracker.applications.retargeting.retargeter import Limits, Retargeter, SafeMotion
+from cardbox_tracker.applications.retargeting.retargeter import (
+    Limits,
+    Retargeter,
+    SafeMotion,
+    make_retargeter,
+)
 from cardbox_tracker.applications.retargeting.robot import load_robot
+from cardbox_tracker.common.errors import CardboxError
 from cardbox_tracker.person.posture import reference_posture
 from cardbox_tracker.person.proportions import body_from_proportions
 from cardbox_tracker.person.skeleton import JOINT_NAMES
@@ -24,6 +30,7 @@ MAP = load_joint_map(CONFIG / "example_joint_map.yaml")
 BODY = body_from_proportions(1.75, 2.0)
 SURE = np.full(12, 0.1)
 PERIOD_NS = 66_666_667
+MAP_ORDER = [MAP.joints.index("shoulder_roll"), MAP.joints.index("elbow_pitch")]
 
 numbers = st.floats(allow_nan=True, allow_infinity=True)
 twelve = st.lists(numbers, min_size=12, max_size=12).map(np.array)
@@ -39,88 +46,123 @@ images = st.lists(
 settings = st.builds(
     RetargetConfig,
     max_speed=st.floats(0.01, 20),
+    max_acceleration=st.floats(1, 100),
+    max_jerk=st.floats(10, 10_000),
     max_stddev_rad=st.floats(0.05, 3.2),
     longest_step_s=st.floats(0.01, 1),
+    soft_start_s=st.floats(0, 2),
+    clutch=st.booleans(),
 )
+STEP_NS = 5_000_000
 
 
-@given(images, st.lists(st.integers(0, 10**9), min_size=12, max_size=12), settings)
-def test_limits_and_speeds_hold_for_any_input(
+def assert_within(positions: np.ndarray, limits: Limits, config: RetargetConfig) -> None:
+    """Check a motion (k, n) sampled each 5 ms, by its differences."""
+    step_s = STEP_NS / 1e9
+    assert (positions >= limits.lower).all() and (positions <= limits.upper).all()
+    most = (np.minimum(limits.speed, config.max_speed), config.max_acceleration, config.max_jerk)
+    for number, highest in enumerate(most, 1):
+        change = np.diff(positions, number, axis=0) / step_s**number
+        assert (np.abs(change) <= highest * (1 + 1e-6) + 1e-12 / step_s**number).all()
+
+
+@given(images, st.lists(st.integers(0, 100), min_size=12, max_size=12), settings)
+def test_all_limits_hold_for_any_input(
     sequence: list[tuple[int, str, np.ndarray | None, np.ndarray | None]],
-    waits_ns: list[int],
+    waits: list[int],
     config: RetargetConfig,
 ) -> None:
     robot = Retargeter(ROBOT, MAP, config)
-    lower, upper, speed = ROBOT.limits_of(MAP.joints)
-    most = np.minimum(speed, config.max_speed)
-    before, stamp_ns, now_ns = robot.at(0).positions, 0, 0
-    for (step_ns, state, posture, stddev), wait_ns in zip(sequence, waits_ns, strict=False):
-        stamp_ns, now_ns = stamp_ns + step_ns, now_ns + wait_ns
-        found = robot.at(now_ns)
-        assert (np.abs(found.positions - before) <= most * wait_ns / 1e9 + 1e-9).all()
+    stamp_ns, now_ns, way = 0, 0, []
+    for (step_ns, state, posture, stddev), wait in zip(sequence, waits, strict=False):
+        for _ in range(wait):
+            way.append(robot.at(now_ns).positions)
+            now_ns += STEP_NS
+        stamp_ns += step_ns
+        before = robot.at(now_ns)
         command = robot.update(stamp_ns, state, BODY, posture, stddev, now_ns)
-        assert robot.at(now_ns).positions == pytest.approx(found.positions, abs=1e-12)
-        for positions, velocities in (robot.at(now_ns), robot.at(now_ns + 10**7)):
-            assert (positions >= lower).all() and (positions <= upper).all()
-            assert (np.abs(velocities) <= most * (1 + 1e-6)).all()
-        # Never for longer than the time that really passed, nor than the longest step.
-        assert command.duration_s <= min(wait_ns / 1e9, config.longest_step_s) + 1e-9
-        if state != "tracking" or posture is None or stddev is None:
+        after = robot.at(now_ns)
+        np.testing.assert_allclose(after.positions, before.positions, atol=1e-9)
+        np.testing.assert_allclose(after.velocities, before.velocities, atol=1e-6)
+        if posture is None or stddev is None or state not in ("tracking", "uncertain"):
             assert not command.is_moving
         if not command.is_moving:
-            assert (robot.at(now_ns + 10**9).positions == command.positions).all()
-            assert not robot.at(now_ns).velocities.any()
-        before = found.positions
+            still = robot.at(now_ns + robot.settles_ns)
+            np.testing.assert_allclose(still.positions, command.positions, atol=1e-9)
+            assert not still.velocities.any()
+    way += [robot.at(now_ns + i * STEP_NS).positions for i in range(60)]
+    assert_within(np.array(way), Limits(*ROBOT.limits_of(MAP.joints)), config)
 
 
-@given(
-    st.lists(st.lists(numbers, min_size=2, max_size=2), max_size=10),
-    st.lists(st.integers(-(10**9), 10**11), min_size=10, max_size=10),
-)
-def test_the_last_step_holds_for_any_target(
-    targets: list[list[float]], times_ns: list[int]
-) -> None:
-    limits = Limits(np.array([-1.0, 0.5]), np.array([2.0, 0.75]), np.array([1.0, math.inf]))
-    motion = SafeMotion(limits)
-    for target, time_ns in zip(targets, times_ns, strict=False):
-        before = motion.goal
-        after = motion.move(np.array(target), 0, time_ns)
-        assert (after >= limits.lower).all() and (after <= limits.upper).all()
-        assert abs(after[0] - before[0]) <= max(time_ns / 1e9, 0.0) + 1e-12
-        motion.stop(max(time_ns, 0))
+def test_the_way_of_a_set_point_is_the_mean_over_both_times() -> None:
+    """At 1 rad/s for 1 s, with means over 0.1 and 0.2 s: 0.15 s late, and 1 rad at the end."""
+    limits = Limits(np.array([-9.0]), np.array([9.0]), np.array([1.0]))
+    motion = SafeMotion(limits, np.zeros(1), acceleration=20.0, jerk=200.0)
+    motion.move(np.array([5.0]), 0, 10**9)
+    assert motion.settles_ns == pytest.approx(3e8, abs=2)
+    # At 0.1 s the mean over 0.1 s has moved as t^2/0.2, whose mean over 0.2 s is t^3/(0.6*0.2).
+    assert motion.at(10**8).positions == pytest.approx(0.1**3 / 0.12)
+    assert motion.at(5 * 10**8).positions == pytest.approx(0.35)
+    assert motion.at(5 * 10**8).velocities == pytest.approx(1.0)
+    assert motion.at(13 * 10**8 + 1).positions == pytest.approx(1.0)
+    motion.move(np.array([math.nan]), 5 * 10**8, 10**9)  # it decelerates for 0.3 s
+    assert motion.at(8 * 10**8).positions == pytest.approx(0.5)
+    assert not motion.at(8 * 10**8 + 1).velocities.any()
 
 
-def test_between_two_images_the_arm_moves_evenly() -> None:
-    """From -0.1 to -0.2 rad in 100 ms, at 1 rad/s; a stop on the way is at once."""
-    robot = Retargeter(ROBOT, MAP, RetargetConfig(max_speed=1.0))
-    for tenth in range(3):
-        robot.update(tenth * 10**8, "tracking", BODY, reference_posture("arms"), SURE)
-    way = [robot.at(200_000_000 + 20_000_000 * step) for step in range(7)]
-    roll = [moment.positions[0] for moment in way]
-    assert roll == pytest.approx([-0.1, -0.12, -0.14, -0.16, -0.18, -0.2, -0.2])
-    assert [moment.velocities[0] for moment in way] == pytest.approx([-1.0] * 5 + [0.0] * 2)
-    stopped = robot.hold("lost", 250_000_000)
-    assert stopped.positions[0] == pytest.approx(-0.15)
-    assert robot.at(10**9).positions[0] == pytest.approx(-0.15)
-
-
-def test_an_early_image_goes_on_from_where_the_arm_is() -> None:
-    robot = Retargeter(ROBOT, MAP, RetargetConfig(max_speed=1.0))
-    for stamp_ns in (0, 10**8, 15 * 10**7):
-        command = robot.update(stamp_ns, "tracking", BODY, reference_posture("arms"), SURE)
-    assert robot.at(15 * 10**7).positions[0] == pytest.approx(-0.05)
-    assert command.positions[0] == pytest.approx(-0.1)
+def follow(robot: Retargeter, images: int, posture: np.ndarray | None = None) -> None:
+    """Show a posture at 10 Hz for a time."""
+    posture = reference_posture("arms") if posture is None else posture
+    for tenth in range(images):
+        robot.update(tenth * 10**8, "tracking", BODY, posture, SURE)
 
 
 def test_an_arm_gets_where_it_is_wanted_at_its_speed() -> None:
-    robot = Retargeter(ROBOT, MAP, RetargetConfig(max_speed=1.0))
-    posture = reference_posture("arms")  # abduction 80 degrees
-    positions = [
-        robot.update(i * 10**8, "tracking", BODY, posture, SURE).positions for i in range(20)
-    ]
-    assert positions[0] == pytest.approx([0.0] * 7)
-    assert positions[5] == pytest.approx([-0.5, *[0.0] * 6])
-    assert positions[-1] == pytest.approx([-math.radians(80), *[0.0] * 6])
+    robot = Retargeter(ROBOT, MAP, RetargetConfig(max_speed=1.0, soft_start_s=0.0))
+    follow(robot, 30)
+    assert robot.at(3 * 10**9).positions == pytest.approx([-math.radians(80), *[0.0] * 6])
+
+
+def test_the_start_is_soft_and_where_the_robot_is() -> None:
+    robot = Retargeter(ROBOT, MAP, RetargetConfig(soft_start_s=1.0, start="shoulder_roll=0.4"))
+    assert robot.at(0).positions[0] == 0.4
+    follow(robot, 2)
+    # A tenth of the speed for the second image.
+    assert robot.at(10**9).positions[0] == pytest.approx(0.39)
+    robot.begin(np.full(7, 0.05))
+    assert robot.at(2 * 10**9).positions.tolist() == [0.05] * 7
+    with pytest.raises(CardboxError, match="'wheel=1' is not JOINT=VALUE"):
+        Retargeter(ROBOT, MAP, RetargetConfig(start="wheel=1"))
+    with pytest.raises(CardboxError, match="'shoulder_roll=1' is beyond"):
+        Retargeter(ROBOT, MAP, RetargetConfig(start="shoulder_roll=1"))
+
+
+def test_with_a_clutch_only_movements_are_followed() -> None:
+    robot = Retargeter(ROBOT, MAP, RetargetConfig(clutch=True, max_speed=20.0))
+    follow(robot, 20)
+    assert robot.at(2 * 10**9).positions == pytest.approx(np.zeros(7))
+    moved = reference_posture("arms")
+    moved[JOINT_NAMES.index("right_shoulder_flexion")] += 0.1
+    for tenth in range(20, 60):
+        robot.update(tenth * 10**8, "tracking", BODY, moved, SURE)
+    assert robot.at(6 * 10**9).positions[1] == pytest.approx(-0.1)
+
+
+def test_a_joint_holds_while_its_own_keypoints_are_not_tracked() -> None:
+    """The elbow follows the hand, the shoulder the elbow; another arm does not matter."""
+    posture = np.full(12, 0.3)
+    seen = {"right_elbow": ("tracked", 0.1), "left_hand": ("lost", 0.9)}
+    for hand, moves in (("tracked", True), ("hidden", False)):
+        robot = Retargeter(ROBOT, MAP, RetargetConfig())
+        for tenth in range(9):
+            keypoints = {**seen, "right_hand": (hand, 0.1)}
+            robot.update(tenth * 10**8, "uncertain", BODY, posture, SURE, keypoints=keypoints)
+        velocities = robot.at(8 * 10**8).velocities[MAP_ORDER]
+        assert velocities[0] != 0.0
+        assert (velocities[1] != 0.0) == moves
+    keypoints = {**seen, "right_elbow": ("tracked", 0.6), "right_hand": ("tracked", 0.6)}
+    command = robot.update(10**9, "uncertain", BODY, posture, SURE, keypoints=keypoints)
+    assert not command.is_moving or not robot.at(2 * 10**9).velocities.any()
 
 
 @pytest.mark.parametrize(
@@ -138,25 +180,41 @@ def test_an_arm_gets_where_it_is_wanted_at_its_speed() -> None:
 def test_the_dead_man(state: str, deviation: float, status: str) -> None:
     robot = Retargeter(ROBOT, MAP, RetargetConfig())
     posture = reference_posture("arms")
-    robot.update(0, "tracking", BODY, posture, SURE)
-    before = robot.update(PERIOD_NS, "tracking", BODY, posture, SURE).positions
-    stddev = SURE.copy()
-    stddev[JOINT_NAMES.index("right_elbow_flexion")] = deviation
-    command = robot.update(2 * PERIOD_NS, state, BODY, posture, stddev)
-    assert command.status == status
-    assert (command.positions == before).all() == (status != "moving")
-
-
-def test_what_is_not_followed_may_be_uncertain() -> None:
-    robot = Retargeter(ROBOT, MAP, RetargetConfig())
-    stddev = SURE.copy()
-    stddev[JOINT_NAMES.index("left_elbow_flexion")] = 3.0
-    assert robot.update(0, "tracking", BODY, reference_posture("arms"), stddev).is_moving
+    follow(robot, 5)
+    assert robot.update(5 * 10**8, state, BODY, posture, np.full(12, deviation)).status == status
+    assert robot.at(5 * 10**8).velocities.any()  # it decelerates
+    assert not robot.at(10**9).velocities.any()
+    assert robot.update(10**9, "tracking", None, posture, SURE).status == "frozen: no body model"
 
 
 def test_after_holding_nothing_is_made_up_for() -> None:
     robot = Retargeter(ROBOT, MAP, RetargetConfig())
-    posture = reference_posture("arms")
-    before = robot.update(0, "tracking", BODY, posture, SURE).positions
+    robot.update(0, "tracking", BODY, reference_posture("arms"), SURE)
     assert robot.hold("no posture", 10**8).status == "frozen: no posture"
-    assert (robot.update(10**9, "tracking", BODY, posture, SURE).positions == before).all()
+    robot.update(10**9, "tracking", BODY, reference_posture("arms"), SURE)
+    assert not robot.at(2 * 10**9).positions.any()
+
+
+def test_two_arms_of_one_robot_follow_at_once(tmp_path: Path) -> None:
+    """Each arm is the example arm, by its names."""
+    text = ROBOT.urdf
+    names = [*(f'"{link}"' for link in ROBOT.links if link != "base_link")]
+    names += [f'"{name}"' for name in ROBOT.joints]
+    body = text[text.index("<joint") : text.rindex("</robot>")]
+    arms = []
+    for side in ("left", "right"):
+        part = body
+        for name in names:
+            part = part.replace(name, f'"{side}_{name[1:]}')
+        arms.append(part)
+    path = tmp_path / "two.urdf"
+    path.write_text(f'<robot name="two"><link name="base_link"/>{"".join(arms)}</robot>')
+    _, robot, table = make_retargeter(path, None, RetargetConfig(side="both"))
+    assert robot.joints == tuple(
+        f"{side}_{name}" for side in ("left", "right") for name in ROBOT.joints
+    )
+    assert "left_shoulder_roll" in table and "right_shoulder_roll" in table
+    follow(robot, 10)
+    assert robot.at(9 * 10**8).velocities[[0, 7]].all()
+    with pytest.raises(CardboxError, match="the robot has one arm"):
+        make_retargeter(CONFIG / "example_arm.urdf", None, RetargetConfig(side="both"))

@@ -105,7 +105,7 @@ def interface_of(node: Any) -> tuple[set[Topic], set[str]]:
     services = {
         service.srv_name
         for service in node.services
-        if kind_text(service.srv_type) == "std_srvs/Trigger"
+        if kind_text(service.srv_type).startswith("std_srvs/")
     }
     return topics, {
         name if name.startswith("/") else node.resolve_service_name(name) for name in services

@@ -13,7 +13,7 @@ import pytest
 rclpy = pytest.importorskip("rclpy", reason="rclpy is not installed")
 
 from sensor_msgs.msg import JointState  # noqa: E402
-from std_msgs.msg import String  # noqa: E402
+from std_msgs.msg import Bool, String  # noqa: E402
 
 from cardbox_tracker.applications.retargeting.robot import load_robot  # noqa: E402
 from cardbox_tracker.common.errors import CardboxError  # noqa: E402
@@ -43,106 +43,150 @@ def clock(monkeypatch: pytest.MonkeyPatch) -> Clock:
     return made
 
 
+START = "shoulder_roll=0.1"
+
+
 @pytest.fixture
-def robot(bus: Any, clock: Clock) -> Any:
-    """Return the bus of a node that moves an arm."""
-    joint_map = str(CONFIG / "example_joint_map.yaml")
-    bus.start(RetargetNode, robot_file=str(ARM), joint_map_file=joint_map)
-    bus.send("/body_model", MODEL)
+def start(bus: Any, clock: Clock) -> Callable[..., Any]:
+    """Return a function that starts a node which moves an arm, and enables it."""
+
+    def begin(**parameters: Any) -> Any:
+        given = {"joint_map_file": str(CONFIG / "example_joint_map.yaml"), **parameters}
+        node = bus.start(RetargetNode, robot_file=str(ARM), soft_start_s=0.0, **given)
+        bus.send("/body_model", MODEL)
+        node._supervisor.enable(True, int(clock.now_s * 1e9))
+        return node
+
+    return begin
+
+
+@pytest.fixture
+def robot(bus: Any, start: Any) -> Any:
+    """Return the bus of a node that moves an arm from a known start."""
+    start(start=START)
     return bus
 
 
 @pytest.fixture
-def send(robot: Any, joints: Any, clock: Clock) -> Callable[..., None]:
+def send(bus: Any, joints: Any, clock: Clock) -> Callable[..., None]:
     """Return a function that sends the tracker's messages of one image, after some time."""
 
     def hand_over(
         tenth: int, state: str = "tracking", deviation: float = 0.1, after_s: float = 0.1
     ) -> None:
         clock.now_s += after_s
-        robot.send("/tracking_state", String(data=state))
-        robot.send("/joint_states", joints(tenth, {"right_shoulder_abduction": 1.0}))
-        robot.send("/joint_states_stddev", joints(tenth, {}, other=deviation))
-        robot.tick()
+        bus.send("/tracking_state", String(data=state))
+        bus.send("/joint_states", joints(tenth, {"right_shoulder_abduction": 1.0}))
+        bus.send("/joint_states_stddev", joints(tenth, {}, other=deviation))
+        bus.tick()
 
     return hand_over
 
 
-def test_an_arm_moves_at_its_speed_and_stops_when_the_person_is_lost(
+def test_an_arm_moves_at_its_speed_and_decelerates_when_the_person_is_lost(
     robot: Any, send: Any, clock: Clock
 ) -> None:
-    for tenth in range(3):
+    for tenth in range(6):
         send(tenth)
-    moved = np.array([data.tolist() for data in robot.texts(COMMANDS)])
-    # The way of each image begins when it comes.
-    np.testing.assert_allclose(moved[:, 0], [0, 0, -0.1], atol=1e-9)
-    clock.now_s += 0.05
+    moved = positions(robot)[:, 0]
+    assert moved[0] == 0.1
+    assert np.diff(moved)[-1] == pytest.approx(-0.1)
     robot.send("/tracking_state", String(data="lost"))
-    robot.send("/tracking_state", String(data="lost"))
-    assert robot.texts(SAID) == ["moving", "frozen: lost"]
-    assert len(robot.sent[COMMANDS]) == 4  # the command to stand still is sent once
-    assert robot.texts(COMMANDS)[-1].tolist() == pytest.approx([-0.15, *[0] * 6])
+    for _ in range(15):
+        clock.now_s += 0.02
+        robot.tick()
+    assert robot.texts(SAID) == ["disabled", "moving", "frozen: lost"]
+    stopping = positions(robot)[6:, 0]
+    assert (np.abs(np.diff(stopping)) <= 0.02 + 1e-9).all()
+    assert np.ptp(stopping[-3:]) < 1e-9 and stopping[-1] < moved[-1]
     last = robot.sent["/retarget/joint_trajectory"][-1]
-    assert last.joint_names == list(load_robot(ARM).chain("hand_link"))
-    assert last.points[0].positions.tolist() == pytest.approx([-0.15, *[0] * 6])
+    assert last.joint_names == list(load_robot(ARM).joints)
+    assert last.points[0].positions[0] == pytest.approx(stopping[-1])
     assert (last.header.stamp.sec, last.header.stamp.nanosec) == (0, 0)
 
 
+def test_nothing_is_sent_before_all_is_known(bus: Any, start: Any, send: Any, clock: Clock) -> None:
+    node = start()
+    assert node._supervisor.phase.value == "ready"
+    for tenth in range(5):
+        send(tenth)
+    bus.send("/retarget/robot_joint_states", JointState(name=["elbow_pitch"], position=[0.5]))
+    send(5)
+    assert not bus.sent[COMMANDS] and not bus.sent["/retarget/joint_trajectory"]
+    assert bus.texts(SAID)[-1] == "ready: the robot's joint states are not known"
+    names = list(load_robot(ARM).joints)
+    where = JointState(name=names[::-1], position=[0.0] * 6 + [-0.2])
+    bus.send("/retarget/robot_joint_states", where)
+    send(6)
+    assert positions(bus).tolist() == [[-0.2, *[0.0] * 6]]
+
+
+def test_a_grip_enables_while_it_is_repeated(bus: Any, start: Any, send: Any, clock: Clock) -> None:
+    node = start(start=START)
+    node._supervisor.enable(False, int(clock.now_s * 1e9))
+    for tenth in range(3):
+        send(tenth)
+    assert not bus.sent[COMMANDS]
+    for tenth in range(3, 6):
+        bus.send("/retarget/grip", Bool(data=True))
+        send(tenth)
+    assert bus.texts(SAID)[-1] == "moving"
+    for tenth in range(6, 12):
+        send(tenth)
+    assert bus.texts(SAID)[-2:] == ["not gripped", "disabled: not gripped"]
+    sent = len(bus.sent[COMMANDS])
+    send(12)
+    assert len(bus.sent[COMMANDS]) == sent
+
+
 def test_an_uncertain_posture_moves_nothing(robot: Any, send: Any) -> None:
-    send(0)
-    send(1, deviation=2.0)
+    for tenth in range(2):
+        send(tenth, deviation=2.0)
     send(2, state="uncertain")
-    assert {tuple(data) for data in robot.texts(COMMANDS)} == {(0.0,) * 7}
-    assert robot.texts(SAID) == ["moving", "frozen: too uncertain", "frozen: uncertain"]
+    assert not robot.sent[COMMANDS]
+    assert robot.texts(SAID)[1:] == ["ready: frozen: too uncertain", "ready: frozen: uncertain"]
 
 
-def test_without_a_body_model_the_robot_stands_still_and_the_node_says_why(
-    bus: Any, joints: Any
+def test_without_a_body_model_nothing_is_sent_and_the_node_says_why(
+    bus: Any, clock: Clock, send: Any
 ) -> None:
     joint_map = str(CONFIG / "example_joint_map.yaml")
-    node = bus.start(RetargetNode, robot_file=str(ARM), joint_map_file=joint_map)
+    node = bus.start(RetargetNode, robot_file=str(ARM), joint_map_file=joint_map, start=START)
+    node._supervisor.enable(True, int(clock.now_s * 1e9))
     for tenth in range(2):
-        bus.send("/tracking_state", String(data="tracking"))
-        bus.send("/joint_states", joints(tenth, {}))
-        bus.send("/joint_states_stddev", joints(tenth, {}, other=0.1))
-    assert bus.texts(SAID) == ["frozen: no body model"]
+        send(tenth)
+    assert bus.texts(SAID)[-1] == "ready: frozen: no body model"
     assert (
         "the body model on /body_model; the node initializer" in node.diagnostics.status().message
     )
     bus.send("/body_model", MODEL)
-    bus.send("/tracking_state", String(data="tracking"))
-    bus.send("/joint_states", joints(2, {}))
-    bus.send("/joint_states_stddev", joints(2, {}, other=0.1))
+    send(2)
     assert bus.texts(SAID)[-1] == "moving"
     assert "body model" not in node.diagnostics.status().message
 
 
 def test_silence_is_a_dead_man_too(robot: Any, send: Any, clock: Clock) -> None:
     send(0)
-    robot.tick()
-    assert robot.texts(SAID) == ["moving"]
+    assert robot.texts(SAID)[-1] == "moving"
     clock.now_s += 1.0
     robot.tick()
-    assert robot.texts(SAID) == ["moving", "frozen: no posture for 0.5 s"]
+    assert robot.texts(SAID)[-1] == "frozen: no posture for 0.5 s"
 
 
-def test_the_way_between_two_images_has_the_rate_of_the_robot(
+def test_positions_by_name_have_velocities_and_stamps_that_go_on(
     robot: Any, send: Any, clock: Clock
 ) -> None:
-    for tenth in range(2):
+    for tenth in range(8):
         send(tenth)
     robot.sent["/retarget/joint_states"].clear()
-    for _ in range(6):
+    for _ in range(4):
         clock.now_s += 0.02
         robot.tick()
     sent = robot.sent["/retarget/joint_states"]
-    assert [message.position[0] for message in sent] == pytest.approx(
-        [-0.02, -0.04, -0.06, -0.08, -0.1, -0.1]
-    )
-    assert [message.velocity[0] for message in sent] == pytest.approx([-1.0] * 4 + [0.0] * 2)
-    # The stamps go on from that of the image.
+    assert np.diff([message.position[0] for message in sent]) == pytest.approx([-0.02] * 3)
+    assert [message.velocity[0] for message in sent] == pytest.approx([-1.0] * 4)
     seconds = [m.header.stamp.sec + 1e-9 * m.header.stamp.nanosec for m in sent]
-    assert np.diff(seconds) == pytest.approx([0.02] * 5)
+    assert np.diff(seconds) == pytest.approx([0.02] * 3)
 
 
 def test_the_rate_is_a_parameter(bus: Any, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -168,23 +212,21 @@ def positions(robot: Any) -> np.ndarray:
 def test_an_arm_stops_with_its_input_and_stays(
     robot: Any, send: Any, clock: Clock, is_repeated: bool
 ) -> None:
-    for tenth in range(4):
+    for tenth in range(8):
         send(tenth)
     (point,) = robot.sent["/retarget/joint_trajectory"][-1].points
     reached_s = point.time_from_start.sec + 1e-9 * point.time_from_start.nanosec
     assert reached_s <= 0.1 + 1e-9
-    clock.now_s += 0.1
-    robot.tick()
-    stopped = positions(robot)[-1]
-    assert stopped[0] == pytest.approx(-0.3)
-    for _ in range(600):
+    for count in range(600):
         if is_repeated:
-            send(3)  # the last image again and again
+            send(7)  # the last image again and again
         else:
             clock.now_s += 0.1
         robot.tick()
-    assert (positions(robot)[5:] == stopped).all()
-    assert robot.texts(SAID) == ["moving", "frozen: no posture for 0.5 s"]
+        if count == 5:
+            stopped = positions(robot)[-1]
+    assert (positions(robot)[-500:] == stopped).all()
+    assert robot.texts(SAID)[-1] == "frozen: no posture for 0.5 s"
     send(700)  # the first image after silence moves nothing
     assert (positions(robot)[-1] == stopped).all()
 
@@ -206,7 +248,7 @@ def test_no_stamp_makes_an_arm_faster(
     began_s = clock.now_s
     for tenth in tenths:
         send(tenth, after_s=1 / 300)
-        assert np.abs(positions(robot)[-1]).max() <= clock.now_s - began_s + 1e-9
+        assert np.abs(positions(robot)[-1]).max() <= 0.1 + clock.now_s - began_s + 1e-9
 
 
 def test_a_node_without_a_robot_does_not_start(bus: Any, tmp_path: Path) -> None:
@@ -217,22 +259,21 @@ def test_a_node_without_a_robot_does_not_start(bus: Any, tmp_path: Path) -> None
 
 
 def test_a_gripper_follows_the_hand_of_the_same_image(
-    bus: Any, clock: Clock, joints: Any, tmp_path: Path
+    bus: Any, start: Any, clock: Clock, joints: Any, tmp_path: Path
 ) -> None:
     joint_map = tmp_path / "map.yaml"
     joint_map.write_text("joints: [{from: right_hand_open, to: wrist_roll, scale: 0.2}]")
-    bus.start(RetargetNode, robot_file=str(ARM), joint_map_file=str(joint_map))
-    bus.send("/body_model", MODEL)
-    for tenth, opened in enumerate((1.0, 1.0, 1.0, None)):
+    start(joint_map_file=str(joint_map), start="wrist_roll=0")
+    for tenth in range(12):
         clock.now_s += 0.1
         bus.send("/tracking_state", String(data="tracking"))
         bus.send("/joint_states", joints(tenth, {}))
-        if opened is not None:
+        if tenth < 3:
             header = joints(tenth, {}).header
             bus.send("/hands", JointState(header=header, name=["right_hand_open"], position=[1.0]))
         bus.send("/joint_states_stddev", joints(tenth, {}, other=0.1))
         bus.tick()
     goals = [one.points[0].positions[0] for one in bus.sent["/retarget/joint_trajectory"]]
     # The robot moves by its speed, and stays where it is without a hand.
-    assert goals[0] == 0.0 and 0.0 < goals[1] < goals[2] <= 0.2
-    assert goals[3] == pytest.approx(goals[2])
+    assert goals[0] == 0.0 and 0.0 < goals[1] < goals[2]
+    assert goals[-1] == pytest.approx(0.2) == goals[-2]

@@ -1,0 +1,311 @@
+"""Retargeting of an arm: the directions of upper arm, forearm and hand of the robot and the person.
+
+The three directions, in the frame of the torso, are the same for the robot as for the person, as
+far as its joints allow. Damped least squares find the joint positions, from those before and, where
+these fit badly, from others.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from cardbox_tracker.applications.retargeting.chain import Arm, find_arm
+from cardbox_tracker.applications.retargeting.config import RetargetConfig
+from cardbox_tracker.applications.retargeting.joint_map import WITH_HEAD_AND_HANDS
+from cardbox_tracker.applications.retargeting.robot import Robot
+from cardbox_tracker.common.errors import CardboxError
+from cardbox_tracker.person.model import BodyModel
+from cardbox_tracker.person.parts import body_parts
+from cardbox_tracker.person.posture import LEFT_ARM, RIGHT_ARM
+from cardbox_tracker.person.sizes import FloatArray
+from cardbox_tracker.person.skeleton import arm_directions, rotation_x, rotation_y, rotation_z
+
+ARM_JOINTS = ("shoulder_abduction", "shoulder_flexion", "elbow_abduction", "elbow_flexion")
+_STEPS, _CLOSE = 12, 1e-2
+# The joints are pulled to the middle of their range, so that redundant ones do not drift.
+_REST = 0.03
+_DAMPING = 1e-3
+# Where the directions are off by more than about 15 degrees, another start is tried in each image,
+# and taken if it fits much better: a robot must not swing to another solution for a small gain.
+_BAD, _MUCH_BETTER = 0.07, 0.5
+_STARTS = 8
+# Where a robot cannot have all three directions, its hand is where the person's is.
+_WEIGHTS = (1.0, 1.0, 2.0)
+_IDENTITY = np.eye(3)
+_SHORTEST_M, _LONGEST_M = 0.01, 100.0
+_LEAST_PART, _LEAST_SINE = 0.2, 0.5
+
+
+def directions_of(body: BodyModel, posture: FloatArray, side: str) -> FloatArray:
+    """Return unit vectors (3, 3) in the torso frame: upper arm, forearm, shoulder to hand."""
+    sign = 1.0 if side == "left" else -1.0
+    upper, fore = arm_directions(posture[LEFT_ARM if side == "left" else RIGHT_ARM], sign)
+    parts = body_parts(body.sizes)
+    return _units(parts.upper_arm.height_m * upper, parts.forearm.height_m * fore)
+
+
+def _units(upper: FloatArray, fore: FloatArray) -> FloatArray:
+    vectors = np.stack([upper, fore, upper + fore])
+    found: FloatArray = vectors / np.maximum(np.linalg.norm(vectors, axis=1, keepdims=True), 1e-9)
+    return found
+
+
+class _Places(NamedTuple):
+    """Origins (n, 3), m, and axes (n, 3) of the moving joints, and the tip (3,), m."""
+
+    origins_m: FloatArray
+    axes: FloatArray
+    tip_m: FloatArray
+
+
+class _Step(NamedTuple):
+    """A moving joint: its place after the one before, and how it moves."""
+
+    origin_m: FloatArray
+    turn: FloatArray
+    axis: FloatArray
+    cross: FloatArray
+    cross_twice: FloatArray
+    slides: bool
+    number: int
+    is_own: bool
+    multiplier: float
+    offset: float
+
+
+class Kinematics:
+    """Where the joints of an arm are.
+
+    Attributes:
+        shoulder: number of the joint at the shoulder, the second one.
+        elbow: number of the joint at the elbow.
+        reach_m: length of the stretched arm from the shoulder to the tip.
+    """
+
+    def __init__(self, arm: Arm) -> None:
+        """Prepare.
+
+        Raises:
+            CardboxError: the arm has an impossible length, or no elbow and hand.
+        """
+        self._steps, self._tip_m = _steps(arm)
+        self._slides = np.array([step.slides for step in self._steps if step.is_own])
+        first = next(i for i, one in enumerate(arm.path) if one.name == arm.joints[0])
+        offsets = [float(np.linalg.norm(one.origin_m)) for one in arm.path[first:]]
+        moving = [i for i, one in enumerate(arm.path[first:]) if one.name in arm.joints]
+        self.shoulder = 1
+        lengths = [sum(offsets[moving[1] + 1 : number + 1]) for number in moving]
+        self.reach_m = sum(offsets[moving[1] + 1 :])
+        if not _SHORTEST_M <= self.reach_m <= _LONGEST_M:
+            raise CardboxError(
+                f"the robot's arm is {self.reach_m:g} m long from its second joint to {arm.tip}; "
+                f"expected {_SHORTEST_M:g} to {_LONGEST_M:g} m: a URDF has metres, and a hand that "
+                "is not its last joint"
+            )
+        self.elbow = self._find_elbow(lengths)
+
+    def _find_elbow(self, lengths: list[float]) -> int:
+        """Return the first joint after the shoulder that bends the arm, not one that twists it."""
+        places = self.at(np.zeros(len(lengths)))
+        for number in range(2, len(lengths)):
+            share = lengths[number] / self.reach_m
+            upper = places.origins_m[number] - places.origins_m[self.shoulder]
+            sine = np.linalg.norm(np.cross(places.axes[number], upper))
+            if share > _LEAST_PART and sine > _LEAST_SINE * np.linalg.norm(upper):
+                if share < 1.0 - _LEAST_PART:
+                    return number
+                break
+        # Without an elbow the arm is one straight part.
+        return len(lengths)
+
+    def at(self, positions: FloatArray) -> _Places:
+        """Return the places, in the frame of the robot's root, at joint positions (n,)."""
+        turn, place = np.eye(3), np.zeros(3)
+        origins, turns = [], []
+        for step in self._steps:
+            place = place + turn @ step.origin_m
+            turn = turn @ step.turn
+            if step.is_own:
+                origins.append(place)
+                turns.append(turn @ step.axis)
+            value = step.multiplier * float(positions[step.number]) + step.offset
+            if step.slides:
+                place = place + turn @ (value * step.axis)
+            else:
+                sine, cosine = math.sin(value), 1.0 - math.cos(value)
+                turn = turn @ (_IDENTITY + sine * step.cross + cosine * step.cross_twice)
+        tip = place + turn @ self._tip_m
+        return _Places(np.array(origins), np.array(turns), tip)
+
+    def directions(self, positions: FloatArray) -> FloatArray:
+        """Return unit vectors (3, 3) as :func:`directions_of`, in the frame of the root."""
+        return self._directions(self.at(positions))[0]
+
+    def _directions(self, places: _Places) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Return the directions, their lengths (3,), and derivatives of the parts (2, 3, n)."""
+        ends = np.vstack([places.origins_m, places.tip_m])
+        shoulder, elbow = ends[self.shoulder], ends[min(self.elbow, len(ends) - 1)]
+        if self.elbow == len(ends) - 1:
+            shoulder, elbow = ends[self.shoulder], 0.5 * (ends[self.shoulder] + places.tip_m)
+        numbers = np.arange(len(places.axes))
+
+        def moved(point: FloatArray, before: int) -> FloatArray:
+            turned = _cross(places.axes, point - places.origins_m)
+            found = np.where(self._slides[:, None], places.axes, turned)
+            return np.where((numbers < before)[:, None], found, 0.0).T
+
+        at_shoulder, at_tip = moved(shoulder, self.shoulder), moved(places.tip_m, len(numbers))
+        if self.elbow == len(ends) - 1:
+            at_elbow = 0.5 * (at_shoulder + at_tip)
+        else:
+            at_elbow = moved(elbow, self.elbow)
+        upper, fore = elbow - shoulder, places.tip_m - elbow
+        lengths = np.linalg.norm(np.stack([upper, fore, upper + fore]), axis=1)
+        return (
+            _units(upper, fore),
+            np.maximum(lengths, 1e-6),
+            np.stack([at_elbow - at_shoulder, at_tip - at_elbow]),
+        )
+
+    def residual(self, positions: FloatArray, wanted: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return how far the directions are off, (9,), and the derivatives (9, n)."""
+        found, lengths, parts = self._directions(self.at(positions))
+        changes = [parts[0], parts[1], parts[0] + parts[1]]
+        rows = [
+            weight / length * (change - np.outer(unit, unit @ change))
+            for weight, change, unit, length in zip(_WEIGHTS, changes, found, lengths, strict=True)
+        ]
+        weights = np.array(_WEIGHTS)[:, None]
+        return (weights * (found - wanted)).ravel(), np.concatenate(rows)
+
+
+def _cross(left: FloatArray, right: FloatArray) -> FloatArray:
+    """Return the cross products of two (n, 3); numpy's takes several times as long."""
+    return left[:, [1, 2, 0]] * right[:, [2, 0, 1]] - left[:, [2, 0, 1]] * right[:, [1, 2, 0]]
+
+
+def _steps(arm: Arm) -> tuple[list[_Step], FloatArray]:
+    """Return the moving joints to the tip, and the tip (3,) after the last one, m."""
+    found: list[_Step] = []
+    turn, place = np.eye(3), np.zeros(3)
+    for one in arm.path:
+        place, turn = place + turn @ one.origin_m, turn @ one.turn
+        leader = one.mimics or one.name
+        if leader not in arm.joints or one.upper <= one.lower:
+            continue
+        x, y, z = one.axis.tolist()
+        cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+        found.append(
+            _Step(
+                *(place, turn, one.axis, cross, cross @ cross, one.kind == "prismatic"),
+                *(arm.joints.index(leader), not one.mimics, one.multiplier, one.offset),
+            )
+        )
+        turn, place = np.eye(3), np.zeros(3)
+    return found, place
+
+
+class ArmFollower:
+    """A :class:`~.retargeter.Method` by which the robot's arm points as the person's arm.
+
+    Attributes:
+        arm: what was found in the robot.
+        kinematics: where its joints are.
+        joints: the arm's joints and the gripper, if there is one.
+        sources: for each joint, the joints of the person's arm; none for the gripper.
+    """
+
+    def __init__(self, robot: Robot, config: RetargetConfig, side: str = "") -> None:
+        """Prepare.
+
+        Args:
+            robot: the robot.
+            config: settings; its ``base``, ``hand`` and ``gripper`` choose the arm.
+            side: ``left`` or ``right``; ``config.side`` if empty.
+
+        Raises:
+            CardboxError: see :func:`~.chain.find_arm` and :class:`Kinematics`.
+        """
+        self._side = side or config.side
+        self.arm = find_arm(robot, self._side, config.base, config.hand, config.gripper)
+        self.kinematics = Kinematics(self.arm)
+        gripper = (self.arm.gripper,) if self.arm.gripper else ()
+        self.joints = (*self.arm.joints, *gripper)
+        behind = tuple(f"{self._side}_{name}" for name in ARM_JOINTS)
+        self.sources = (*(behind for _ in self.arm.joints), *(() for _ in gripper))
+        self._lower, self._upper, _ = robot.limits_of(self.joints)
+        if config.gripper_open == "lower":
+            self._closed, self._open = self._upper[-1], self._lower[-1]
+        else:
+            self._closed, self._open = self._lower[-1], self._upper[-1]
+        self._hand = WITH_HEAD_AND_HANDS.index(f"{self._side}_hand_open")
+        angles = np.radians([config.mount_roll_deg, config.mount_pitch_deg, config.mount_yaw_deg])
+        self._mount = rotation_z(angles[2]) @ rotation_y(angles[1]) @ rotation_x(angles[0])
+        self._solution: FloatArray | None = None
+        self._turn = 0
+        random = np.random.default_rng(0)
+        count = len(self.arm.joints)
+        self._low, self._high = self._lower[:count], self._upper[:count]
+        # A slide or an arm of several turns has a wide range, of which a turn suffices.
+        self._rest = np.clip(0.5 * (self._low + self._high), -np.pi, np.pi)
+        width = np.minimum(self._high - self._low, 2 * np.pi)
+        self._starts = np.vstack(
+            [self._rest, self._rest + width * (random.random((_STARTS, count)) - 0.5)]
+        )
+
+    def target(self, body: BodyModel, posture: FloatArray, now: FloatArray) -> FloatArray:
+        """See :class:`~.retargeter.Method`."""
+        wanted = directions_of(body, posture, self._side) @ self._mount
+        before = now[: len(self.arm.joints)] if self._solution is None else self._solution
+        best, error = self._solved(before, wanted)
+        if error > _BAD:
+            self._turn = (self._turn + 1) % len(self._starts)
+            other, least = self._solved(self._starts[self._turn], wanted)
+            if least < _MUCH_BETTER * error:
+                best = other
+        self._solution = best
+        found = np.array([*best, *now[len(best) :]])
+        if self.arm.gripper and np.isfinite(posture[self._hand]):
+            found[-1] = self._closed + float(posture[self._hand]) * (self._open - self._closed)
+        return found
+
+    def _solved(self, start: FloatArray, wanted: FloatArray) -> tuple[FloatArray, float]:
+        """Return joint positions (n,) within the limits and the squared error of directions."""
+        positions = np.clip(start, self._low, self._high)
+        pull = _REST * np.eye(len(positions))
+        off, slope = self.kinematics.residual(positions, wanted)
+        cost = float(off @ off + np.sum((_REST * (positions - self._rest)) ** 2))
+        damping = _DAMPING
+        for _ in range(_STEPS):
+            slopes = np.vstack([slope, pull])
+            errors = np.concatenate([off, _REST * (positions - self._rest)])
+            gradient = slopes.T @ errors
+            # A joint at its limit that would go on beyond it stays there.
+            free = ~(
+                ((positions <= self._low) & (gradient > 0))
+                | ((positions >= self._high) & (gradient < 0))
+            )
+            normal = slopes[:, free].T @ slopes[:, free] + damping * np.eye(int(free.sum()))
+            step = np.zeros(len(positions))
+            step[free] = -np.linalg.solve(normal, gradient[free])
+            tried = np.clip(positions + np.clip(step, -0.8, 0.8), self._low, self._high)
+            new_off, new_slope = self.kinematics.residual(tried, wanted)
+            new_cost = float(new_off @ new_off + np.sum((_REST * (tried - self._rest)) ** 2))
+            if new_cost >= cost:
+                damping *= 10.0
+                if damping > 1e3:
+                    break
+                continue
+            is_close = cost - new_cost < _CLOSE * (cost + _CLOSE)
+            positions, off, slope, cost = tried, new_off, new_slope, new_cost
+            damping = max(0.2 * damping, 1e-6)
+            if is_close:
+                break
+        return positions, float(off @ off)
+
+    def hand_m(self, positions: FloatArray) -> FloatArray:
+        """Return the robot's hand (3,), metres in its root frame, at positions of ``joints``."""
+        return self.kinematics.at(positions[: len(self.arm.joints)]).tip_m

@@ -1,0 +1,139 @@
+"""The robot's arm points as the person's, as far as its joints allow."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import settings as hypothesis_settings
+from hypothesis import strategies as st
+
+from cardbox_tracker.applications.retargeting.arm import ArmFollower, directions_of
+from cardbox_tracker.applications.retargeting.config import RetargetConfig
+from cardbox_tracker.applications.retargeting.robot import load_robot, parse_robot
+from cardbox_tracker.common.errors import CardboxError
+from cardbox_tracker.person.posture import JOINT_LIMITS
+from cardbox_tracker.person.proportions import body_from_proportions
+from cardbox_tracker.person.skeleton import JOINT_NAMES
+
+ROBOT = load_robot(Path(__file__).parents[3] / "config" / "example_arm.urdf")
+BODY = body_from_proportions(1.75, 2.0)
+
+
+def posture(**angles_deg: float) -> np.ndarray:
+    """Return a posture with unknown head and hands, (16,)."""
+    d = np.array([*np.zeros(12), *np.full(4, np.nan)])
+    for name, value in angles_deg.items():
+        d[JOINT_NAMES.index(name)] = np.radians(value)
+    return d
+
+
+@pytest.mark.parametrize(
+    ("angles_deg", "upper", "fore"),
+    [
+        ({}, (0, 0, -1), (0, 0, -1)),
+        ({"right_shoulder_flexion": 90}, (1, 0, 0), (1, 0, 0)),
+        ({"right_elbow_flexion": 90, "torso_yaw": 50}, (0, 0, -1), (1, 0, 0)),
+    ],
+)
+def test_directions_are_those_in_the_torso(
+    angles_deg: dict[str, float], upper: tuple[float, ...], fore: tuple[float, ...]
+) -> None:
+    found = directions_of(BODY, posture(**angles_deg), "right")
+    np.testing.assert_allclose(found[:2], [upper, fore], atol=1e-9)
+
+
+@pytest.mark.parametrize("turn_deg", [0.0, 90.0])
+def test_the_robots_segments_point_as_the_persons(turn_deg: float) -> None:
+    follower = ArmFollower(ROBOT, RetargetConfig(mount_yaw_deg=turn_deg))
+    assert follower.arm.joints[follower.kinematics.elbow] == "elbow_pitch"
+    assert follower.kinematics.reach_m == pytest.approx(0.68)  # the lengths of the URDF
+    wanted = posture(right_shoulder_abduction=40, right_shoulder_flexion=20, right_elbow_flexion=60)
+    found = np.zeros(7)
+    for _ in range(4):
+        found = follower.target(BODY, wanted, found)
+    # The robot's X is to the person's left if it is turned by a quarter.
+    quarter = np.array([[0, -1, 0], [1, 0, 0], [0, 0, 1.0]])
+    mount = quarter if turn_deg else np.eye(3)
+    expected = directions_of(BODY, wanted, "right") @ mount
+    cosines = (follower.kinematics.directions(found) * expected).sum(axis=1)
+    # Beyond the limits of its shoulder the robot cannot have all of them.
+    assert (cosines > np.cos(np.radians(6.0 if not turn_deg else 90.0))).all()
+    assert cosines[2] > np.cos(np.radians(6.0))
+
+
+@hypothesis_settings(max_examples=15, deadline=None)
+@given(st.lists(st.floats(-1, 1), min_size=7, max_size=7))
+def test_the_derivatives_are_those_of_the_directions(positions: list[float]) -> None:
+    kinematics = ArmFollower(ROBOT, RetargetConfig()).kinematics
+    q, zero = np.array(positions), np.zeros((3, 3))
+    off, slope = kinematics.residual(q, zero)
+    for number in range(7):
+        step = 1e-6 * np.eye(7)[number]
+        there, _ = kinematics.residual(q + step, zero)
+        np.testing.assert_allclose((there - off) / 1e-6, slope[:, number], atol=1e-4)
+
+
+@hypothesis_settings(max_examples=15, deadline=None)
+@given(st.lists(st.floats(0, 1), min_size=12, max_size=12))
+def test_the_target_is_within_the_limits(share: list[float]) -> None:
+    follower = ArmFollower(ROBOT, RetargetConfig())
+    lower, upper, _ = ROBOT.limits_of(follower.joints)
+    wanted = posture()
+    wanted[:12] = JOINT_LIMITS[:, 0] + np.array(share) * np.ptp(JOINT_LIMITS, axis=1)
+    found = follower.target(BODY, wanted, np.zeros(7))
+    assert (found >= lower).all() and (found <= upper).all()
+
+
+GRIPPER = """<robot name="g"><link name="a"/><link name="b"/><link name="c"/><link name="d"/>
+<link name="tcp"/><link name="jaw"/>
+<joint name="pan" type="continuous"><parent link="a"/><child link="b"/>
+<origin xyz="0 0 0.1"/><axis xyz="0 0 1"/></joint>
+<joint name="lift" type="revolute"><parent link="b"/><child link="c"/><axis xyz="0 1 0"/>
+<limit lower="-2" upper="2" velocity="0"/></joint>
+<joint name="elbow" type="revolute"><parent link="c"/><child link="d"/>
+<origin xyz="0 0 0.3"/><axis xyz="0 1 0"/><limit lower="-2" upper="2" velocity="1"/></joint>
+<joint name="end" type="fixed"><parent link="d"/><child link="tcp"/><origin xyz="0 0 0.3"/></joint>
+<joint name="jaw_slide" type="prismatic"><parent link="tcp"/><child link="jaw"/>
+<limit lower="0" upper="0.04" velocity="1"/></joint></robot>"""
+
+
+@pytest.mark.parametrize(("open_at", "expected"), [("upper", 0.03), ("lower", 0.01)])
+def test_the_gripper_opens_with_the_hand(open_at: str, expected: float) -> None:
+    follower = ArmFollower(parse_robot(GRIPPER), RetargetConfig(gripper_open=open_at))
+    assert follower.joints == ("pan", "lift", "elbow", "jaw_slide")
+    wanted = posture()
+    assert follower.target(BODY, wanted, np.full(4, 0.02))[3] == 0.02  # no hand: it stays
+    wanted[15] = 0.75
+    assert follower.target(BODY, wanted, np.full(4, 0.02))[3] == pytest.approx(expected)
+
+
+def test_a_mimic_moves_with_its_joint() -> None:
+    """A second elbow that copies the first by half bends the forearm by a half more."""
+    text = GRIPPER.replace(
+        '<joint name="end" type="fixed">',
+        '<joint name="copy" type="revolute"><mimic joint="elbow" multiplier="0.5"/>'
+        '<axis xyz="0 1 0"/><limit lower="-2" upper="2" velocity="1"/>',
+    )
+    follower = ArmFollower(parse_robot(text), RetargetConfig(hand="tcp"))
+    # The tip is before the turn of the copy; the elbow alone turns it.
+    assert follower.arm.joints == ("pan", "lift", "elbow")
+    ahead = text.replace('<link name="jaw"/>', '<link name="jaw"/><link name="end"/>').replace(
+        "</robot>",
+        '<joint name="last" type="fixed"><parent link="tcp"/><child link="end"/>'
+        '<origin xyz="0 0 0.1"/></joint></robot>',
+    )
+    follower = ArmFollower(parse_robot(ahead), RetargetConfig(hand="end"))
+    hand = follower.hand_m(np.array([0, 0, np.pi / 2, 0.0]))
+    turned = 0.75 * np.pi
+    expected = [0.3 + 0.1 * np.sin(turned), 0.0, 0.4 + 0.1 * np.cos(turned)]
+    assert hand == pytest.approx(expected)
+
+
+def test_a_robot_that_is_no_arm_is_told() -> None:
+    with pytest.raises(CardboxError, match="no link 'foot'"):
+        ArmFollower(ROBOT, RetargetConfig(hand="foot"))
+    with pytest.raises(CardboxError, match="1 joint"):
+        ArmFollower(ROBOT, RetargetConfig(hand="shoulder_roll_link"))
