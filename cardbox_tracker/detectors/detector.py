@@ -7,8 +7,6 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from cardbox_tracker.detectors.image_points import ImagePoints
-from cardbox_tracker.detectors.landmarks import image_points
 from cardbox_tracker.detectors.model_files import ModelFiles, installed_models
 from cardbox_tracker.detectors.people_network import PeopleNetwork
 from cardbox_tracker.detectors.person_choice import PersonChoice
@@ -101,11 +99,6 @@ class PersonDetector:
             f"the detector sees several people and follows {whom}; --person left|right|largest|X,Y "
             "chooses, and --people follows all"
         )
-
-    def points(self, image: Image, stamp_ns: int | None = None) -> ImagePoints | None:
-        """Return the points in an image at the working size, of a time."""
-        found = self(image, stamp_ns)
-        return None if found is None else image_points(found)
 
 
 def color(image: Image) -> Image:

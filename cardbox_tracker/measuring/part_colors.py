@@ -169,21 +169,6 @@ def seen_appearance(
     return Appearance.of(histograms, brightness)
 
 
-def torso_colors(
-    image: Image, silhouette: Silhouette, body: BodyModel, camera: Camera, posture: FloatArray
-) -> FloatArray | None:
-    """Return the torso's histogram (bins,) as in :func:`seen_appearance`; None if not visible."""
-    torso = image[part_labels(body, camera, posture, silhouette) == TORSO]
-    if len(torso) < _MIN_PX:
-        return None
-    pixels = torso.reshape(len(torso), 1, -1)
-    brightness = np.median(pixels[:, 0].astype(np.float64), axis=0)
-    bins = _bins(pixels, steps_of_levels(brightness, brightness)).ravel()
-    counts = np.bincount(bins, minlength=bins_of(pixels.shape[2])).astype(np.float64)
-    colors: FloatArray = _smoothed(counts[None], pixels.shape[2])[0]
-    return colors
-
-
 def _histograms(counts: FloatArray, channels: int) -> FloatArray:
     """Return histograms (5, bins) from counts (6, bins); the last row counts the face."""
     counts[HEAD] += counts[_FACE]

@@ -10,9 +10,8 @@ from cardbox_tracker.camera.encodings import brightness_of
 from cardbox_tracker.detectors.detector import Detector
 from cardbox_tracker.detectors.landmarks import image_points
 from cardbox_tracker.detectors.point_table import PointTable
-from cardbox_tracker.detectors.pose_network import Detection
 from cardbox_tracker.recordings.image_recording import ImageRecording
-from cardbox_tracker.recordings.silhouettes import PreparedImage, RecordedFrame, SilhouetteSource
+from cardbox_tracker.recordings.silhouettes import RecordedFrame, SilhouetteSource
 
 
 class DetectorSilhouetteSource(SilhouetteSource):
@@ -72,15 +71,3 @@ class DetectorSilhouetteSource(SilhouetteSource):
             else:
                 yield frame._replace(points=self._points(prepared, silhouette))
         self._end_points()
-
-    def detections(
-        self, start_s: float = 0.0, end_s: float = float("inf"), period_s: float = 0.0
-    ) -> Iterator[tuple[PreparedImage, list[Detection]]]:
-        """Yield the images of a span, each with the people in it, at least ``period_s`` apart."""
-        self._start_points(start_s, end_s)
-        for prepared in self.images():
-            if prepared.time_s > end_s:
-                break
-            if prepared.time_s >= start_s:
-                start_s = prepared.time_s + period_s
-                yield prepared, self._found(prepared)

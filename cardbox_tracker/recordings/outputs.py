@@ -213,6 +213,12 @@ def joint_deviations(estimate: Estimate, torso_place: bool = True) -> JointValue
     return _joints((*names, *LEG_NAMES), estimate.posture_stddev, *known)
 
 
+def are_unseen(deviations: Mapping[str, float]) -> bool:
+    """Return whether deviations by joint are those of legs that are not known."""
+    found = [deviations.get(name, 0.0) for name in LEG_NAMES]
+    return bool(np.allclose(found, _ANY_LEGS, atol=1e-6))
+
+
 def open_hands(estimate: Estimate) -> JointValues | None:
     """Return how open each hand is, 0 to 1, as far as it is known; None if nothing is."""
     found = {

@@ -25,6 +25,7 @@ from cardbox_tracker.common.files import (
     regular_file,
 )
 from cardbox_tracker.person.hands import HAND_NAMES, HAND_OPEN_NAMES
+from cardbox_tracker.person.legs import LEG_NAMES
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.model_file import load_body_model, loads_body_model
 from cardbox_tracker.person.sizes import FloatArray
@@ -33,6 +34,7 @@ from cardbox_tracker.recordings.bag_reader import BagReader, stamp_ns_of
 from cardbox_tracker.recordings.open_images import is_bag
 from cardbox_tracker.recordings.outputs import (
     JointValues,
+    are_unseen,
     chances_of,
     person_space,
     positions_of,
@@ -122,7 +124,7 @@ class _Rows:
     def __init__(self, path: Path, names: Iterable[str], needed: Sequence[str]) -> None:
         found = set(names)
         self._path = path
-        known = [name for name in units(*[True] * 4) if name in found and name not in _TIMES]
+        known = [name for name in units(*[True] * 3) if name in found and name not in _TIMES]
         texts = set(text_columns())
         self.names = [name for name in known if name not in (*texts, PERSON, "stamp")]
         self._texts = [name for name in known if name in texts]
@@ -427,5 +429,9 @@ class _Messages:
                 values = positions_of(joints_of(message))
                 found |= zip(deviation_columns(values), values.values(), strict=True)
                 # Joints that are not known have a position, but no deviation.
-                for joint in {*NECK_NAMES, *HAND_NAMES} - values.keys():
+                unknown = {*NECK_NAMES, *HAND_NAMES} - values.keys()
+                if are_unseen(values):
+                    unknown |= set(LEG_NAMES)
+                    found |= dict.fromkeys(deviation_columns(LEG_NAMES))
+                for joint in unknown:
                     found.pop(joint, None)

@@ -94,7 +94,7 @@ def whole_body(tmp_path_factory: pytest.TempPathFactory) -> Path:
     body = BodyModel.of(hip_height_m=-0.51, camera_pitch_rad=0.3, camera_roll_rad=0.2)
     tracker = Tracker(body, Camera(64, 48, 66.0, 66.0, 31.5, 23.5))
     grey, rng = np.zeros((48, 64), np.uint8), np.random.default_rng(0)
-    has = dict.fromkeys(("has_points", "has_people", "has_hands", "has_legs"), True)
+    has = dict.fromkeys(("has_points", "has_people", "has_hands"), True)
     with (
         result_bag(folder / "all_bag", "camera") as bag,
         result_table(folder / "all.csv", **has) as table,

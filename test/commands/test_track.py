@@ -184,7 +184,7 @@ def test_a_film_is_tracked_with_a_stature(
     more = ("--video", "out.mp4", "--json", "out.json")
     done = cardbox("track", film, "--fov", fov, *GIVEN, *more)
     assert done.code == 0, done.err
-    written = ["me.body.yaml", "me.csv", "out.json", "out.mp4"]
+    written = ["me.body.yaml", "me.csv", "me.scene.yaml", "out.json", "out.mp4"]
     assert all(f"wrote {name}" in done.out for name in written)
     assert sorted(path.name for path in tmp_path.iterdir()) == written
     with (tmp_path / "me.csv").open(encoding="utf-8") as file:
@@ -312,12 +312,17 @@ def test_the_cameras_pitch_is_found_from_the_recording(
     cardbox: Callable[..., Any],
 ) -> None:
     """The detector, an optional library, is replaced by the silhouettes of the empty scene."""
+
+    def found_in(*seen: Any) -> FoundCamera:
+        pitch_of = pitch if seen[4] is None else Value(*seen[4])
+        return found._replace(camera=tilt._replace(pitch_rad=pitch_of))
+
     monkeypatch.setattr(detector_module, "installed_models", lambda: ModelFiles(film, film))
     pitch, roll = (Value(float(np.radians(d)), 0.0873) for d in (pitch_deg, roll_deg))
     tilt = SceneCamera(Value(1.0, 0.01), pitch, roll)
     remarks = ("it moves",) if pitch_deg < 0.0 else ()
     found = FoundCamera(tilt, sources, remarks, (2.0 / 1.72,), moves=False)
-    monkeypatch.setattr("cardbox_tracker.measuring.scene_camera.scene_camera", lambda *_: found)
+    monkeypatch.setattr("cardbox_tracker.measuring.scene_camera.scene_camera", found_in)
 
     def opened(bag: Any, detector: Any, camera: Any, points: Any) -> SilhouetteSource:
         rolls.append(bag.calibration().roll_rad)

@@ -100,4 +100,4 @@ def test_joints_are_kept_within_their_limits() -> None:
 
 def test_a_measured_body_has_hands_only_if_they_are_asked_for() -> None:
     assert "palm" not in urdf_from_body(BODY)
-    assert urdf_from_body(BODY, hands=True).count('type="revolute"') == 19
+    assert urdf_from_body(BODY, hands=True).count('type="revolute"') == 27

@@ -282,9 +282,9 @@ def test_links_form_one_tree(torso_place: bool) -> None:
     assert sorted([*children, ROOT_LINK]) == sorted(links)
 
 
-def test_visuals_are_the_fifteen_patches() -> None:
+def test_visuals_are_the_fifteen_patches_and_the_legs() -> None:
     robot = Xml.fromstring(urdf_from_body(BodyModel()))
-    assert len(robot.findall("link/visual")) == 15
+    assert len(robot.findall("link/visual")) == 15 + 4
 
 
 def test_yourdfpy_loads_it_and_agrees() -> None:

@@ -228,7 +228,7 @@ def test_the_masks_of_a_detector_are_the_silhouettes(
         def forget(self) -> None:
             pass
 
-        def __call__(self, image: np.ndarray) -> Detection | None:
+        def __call__(self, image: np.ndarray, _: int) -> Detection | None:
             assert image.ndim == 3
             if image.std() < 10:
                 return None

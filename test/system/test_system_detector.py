@@ -34,6 +34,8 @@ JOINTS = [f"{side}_{name}" for side in ("left", "right") for name in ("shoulder"
 class Network:
     """Stands for the network files: it sees who is bright and knows how they stand."""
 
+    several = 0
+
     def __init__(self, scene: Any) -> None:
         posture = reference_posture("front")
         posture[0] = scene.body.placement.lateral_m
@@ -45,7 +47,7 @@ class Network:
     def forget(self) -> None:
         pass
 
-    def __call__(self, image: np.ndarray) -> Detection | None:
+    def __call__(self, image: np.ndarray, _: int | None = None) -> Detection | None:
         mask = np.where(image[..., 0] > 140, 255, 0).astype(np.uint8)
         return Detection(self._px, self._scores, mask) if mask.any() else None
 

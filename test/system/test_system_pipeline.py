@@ -16,6 +16,7 @@ import pytest
 from numpy.typing import NDArray
 
 from cardbox_tracker.person.kinematics import pose
+from cardbox_tracker.person.legs import LEG_NAMES
 from cardbox_tracker.person.model_file import loads_body_model
 from cardbox_tracker.person.posture import N_STATE, reference_posture
 from cardbox_tracker.person.skeleton import JOINT_NAMES, JOINT_STATE_NAMES
@@ -35,7 +36,7 @@ from cardbox_tracker.ros.messages.conversions import camera_info_message, image_
 from cardbox_tracker.ros.runtime import qos  # noqa: E402
 
 LEARN_IMAGES = 10
-ALL_NAMES = JOINT_STATE_NAMES
+ALL_NAMES = (*JOINT_STATE_NAMES, *LEG_NAMES)
 
 
 class Session:

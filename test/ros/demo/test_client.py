@@ -13,6 +13,7 @@ pytest.importorskip("rclpy", reason="rclpy is not installed")
 
 from rclpy.serialization import serialize_message
 
+from cardbox_tracker.person.legs import LEG_NAMES
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.skeleton import JOINT_STATE_NAMES
 from cardbox_tracker.person.urdf import urdf_from_body
@@ -38,8 +39,8 @@ def recorded(
             for topic, (kind, _) in topics_of().items():
                 message = kind()
                 if topic.startswith("joint_states"):
-                    message.name = list(JOINT_STATE_NAMES)
-                    message.position = [0.0] * len(JOINT_STATE_NAMES)
+                    message.name = [*JOINT_STATE_NAMES, *LEG_NAMES]
+                    message.position = [0.0] * len(message.name)
                 if topic == "robot_description":
                     message.data = urdf_from_body(BodyModel())
                 client.recorder(topic, kind)(serialize_message(message))

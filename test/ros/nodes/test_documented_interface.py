@@ -22,6 +22,7 @@ from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy  # noqa: E
 
 from cardbox_tracker.applications.simulation.session import session_camera  # noqa: E402
 from cardbox_tracker.detectors.detector import PersonDetector  # noqa: E402
+from cardbox_tracker.person.legs import LEG_NAMES  # noqa: E402
 from cardbox_tracker.person.model import BodyModel  # noqa: E402
 from cardbox_tracker.person.skeleton import JOINT_NAMES, JOINT_STATE_NAMES  # noqa: E402
 from cardbox_tracker.person.urdf import (  # noqa: E402
@@ -60,7 +61,7 @@ ARM = {
 }
 # rclpy adds these to every node.
 OF_EVERY_NODE = ("/rosout", "/parameter_events")
-ALL_NAMES = JOINT_STATE_NAMES
+ALL_NAMES = (*JOINT_STATE_NAMES, *LEG_NAMES)
 BAG_TOPIC = "/of_the_bag/camera_info"
 
 

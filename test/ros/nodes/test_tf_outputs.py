@@ -61,7 +61,7 @@ def test_every_link_is_sent_in_the_posture_of_its_image() -> None:
     assert joints is not None
     expected = LinkTransforms(urdf_from_body(BODY, "eye")).at(positions_of(joints))
     # There are 18 joints, hips, head, two wrists, and the camera's optical frame.
-    assert len(message.transforms) == len(expected) == 23
+    assert len(message.transforms) == len(expected) == 34
     for sent, link in zip(message.transforms, expected, strict=True):
         assert (sent.header.frame_id, sent.child_frame_id) == (link.parent, link.child)
         assert sent.header.stamp.sec == 7

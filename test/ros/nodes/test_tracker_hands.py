@@ -21,6 +21,7 @@ from cardbox_tracker.detectors.image_points import POINT_INDEX
 from cardbox_tracker.detectors.pose_network import LANDMARKS, Square
 from cardbox_tracker.person.cardbox import cardbox_patches
 from cardbox_tracker.person.hands import HAND_NAMES
+from cardbox_tracker.person.legs import LEG_NAMES
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.model_file import dumps_body_model
 from cardbox_tracker.person.posture import reference_posture
@@ -80,8 +81,9 @@ def test_hands_are_published_with_their_joints(
     opened, joints = (bus.sent[f"{space}/{name}"][-1] for name in ("hands", "joint_states"))
     assert opened.name == ["left_hand_open", "right_hand_open"]
     assert min(opened.position) > 0.75
-    assert tuple(joints.name[-6:]) == HAND_NAMES
-    assert any(joints.position[-6:]) and not any(joints.velocity[-6:])
+    hands = slice(-6 - len(LEG_NAMES), -len(LEG_NAMES))
+    assert tuple(joints.name[hands]) == HAND_NAMES
+    assert any(joints.position[hands]) and not any(joints.velocity[hands])
     values = {value.key: value.value for value in bus.tick().values}
     person = "person 1 " if people else ""
     assert values[f"{person}hands used"] == "8 of 8"
