@@ -238,7 +238,7 @@ def test_a_made_up_quote_would_be_noticed() -> None:
     texts = spoken()
     assert is_spoken("the brightness of the whole scene has changed", texts)
     assert not is_spoken("the whole scene turned upside down", texts)
-    assert not is_spoken("the tracker has run out of particles", texts)
+    assert not is_spoken("every camera dreams of electric sheep", texts)
 
 
 def test_joint_limits_of_the_conventions_are_those_of_the_code() -> None:

@@ -69,10 +69,10 @@ def run(options: argparse.Namespace) -> None:
     )
     config = settings_from(options, RetargetConfig)
     robot, retargeter, table = make_retargeter(options.robot, options.map, config)
-    if table:
-        print(table)
     with BagReader(options.results) as bag:
         motion = retarget_bag(bag, retargeter, config.rate_hz, options.person)
+        if table:
+            print(table)
         if options.csv is not None:
             write_csv(motion.way, retargeter.joints, options.csv)
         if options.bag is not None:

@@ -55,6 +55,7 @@ from cardbox_tracker.tracking.precompile import compile_all
 TRACKED, FAILED = "tracked", "failed"
 
 _BODY = body_beside(Path("NAME.csv")).name.removeprefix("NAME")
+_SCENE = ".scene.yaml"
 # Most names of recordings in a line; the table has all.
 _MOST_NAMES = 10
 # A summary of 100,000 recordings.
@@ -290,7 +291,8 @@ def _prepared(
     paths = {ending: place.with_name(f"{place.name}.{ending}") for ending in formats}
     table = next(paths[ending] for ending in TABLES if ending in paths)
     body = place.with_name(f"{place.name}{_BODY}")
-    files = TrackFiles(table, paths.get("mp4"), paths.get("bag"), body)
+    scene = place.with_name(f"{place.name}{_SCENE}")
+    files = TrackFiles(table, paths.get("mp4"), paths.get("bag"), body, scene)
     request = replace(job.request, files=files)
     return job._replace(request=request, progress=progress, number=number)
 
@@ -330,7 +332,9 @@ def _publish(job: Job, output: Path) -> None:
 
 def _remove(output: Path, name: str) -> None:
     """Remove the former results of a recording."""
-    paths = [output / f"{name}{ending}" for ending in (*(f".{one}" for one in FORMATS), _BODY)]
+    paths = [
+        output / f"{name}{ending}" for ending in (*(f".{one}" for one in FORMATS), _BODY, _SCENE)
+    ]
     for path in (*paths, *output.glob(f"{escape(name)}.person_*{_BODY}")):
         try:
             if path.is_dir():

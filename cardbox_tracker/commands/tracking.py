@@ -12,9 +12,6 @@ from typing import TYPE_CHECKING
 from cardbox_tracker.commands.arguments import print_remarks
 from cardbox_tracker.common.files import body_of_person
 
-# A focal length that is found takes the place of a usual one from this share of its deviation on.
-_BETTER = 0.5
-
 if TYPE_CHECKING:
     from cardbox_tracker.camera.camera import Camera
     from cardbox_tracker.commands.request import PersonRequest, RecordingRequest, TrackingRequest
@@ -199,7 +196,7 @@ def measured_scene(
             return
         watched = watch(source, *span)
         found = found_camera(recording, person, watched, first.camera)
-        better = _corrected(recording, found.camera, first.camera)
+        better = _corrected(recording, found.camera)
         if better is not recording:
             stack.close()
             source = stack.enter_context(better.open())
@@ -253,16 +250,18 @@ def _lens_of(camera: Camera) -> Value:
     return Value(fov_rad, math.sin(fov_rad) * camera.focal_stddev, origin)
 
 
-def _corrected(recording: RecordingRequest, found: SceneCamera, camera: Camera) -> RecordingRequest:
+def _corrected(recording: RecordingRequest, found: SceneCamera) -> RecordingRequest:
     """Return the recording with roll and field of view that were found and are not given."""
+    from cardbox_tracker.measuring.scene import FOUND
+
     given = recording.camera
     if len(recording.cameras) > 1:
         return recording
     if given.roll_rad is None and found.roll_rad.mean:
         given = replace(given, roll_rad=found.roll_rad.mean)
     fov = found.fov_rad
-    focal_stddev = fov.stddev / math.sin(fov.mean)
-    if not given.is_calibrated and focal_stddev < _BETTER * camera.focal_stddev:
+    if not given.is_calibrated and fov.origin == FOUND:
+        focal_stddev = fov.stddev / math.sin(fov.mean)
         given = replace(given, fov_deg=math.degrees(fov.mean), focal_stddev=focal_stddev)
     return recording if given == recording.camera else replace(recording, camera=given)
 
@@ -271,12 +270,27 @@ def found_camera(
     recording: RecordingRequest, person: PersonRequest, watched: Watched, camera: Camera
 ) -> FoundCamera:
     """Return the camera of a recording, and say what was found, or contradicts what is given."""
-    from cardbox_tracker.measuring.scene_camera import scene_camera
+    from cardbox_tracker.measuring.people_camera import PITCH_PRIOR, USUAL_PITCH
+    from cardbox_tracker.measuring.scene import GIVEN, USUAL, SceneCamera, Value
+    from cardbox_tracker.measuring.scene_camera import FoundCamera, scene_camera
 
     people = watched.people
     statures_m = [*person.statures_m, *[person.stature_m] * len(people)][: len(people)]
     tilt = person.body.camera_pose
     given = (tilt.pitch_rad, tilt.pitch_stddev_rad) if person.is_pitch_given else None
+    if recording.detector is None and recording.points is None:
+        pitch = Value(0.0, math.hypot(USUAL_PITCH, PITCH_PRIOR), USUAL)
+        if given is None:
+            print_remarks(
+                [
+                    "nothing tells the camera's pitch without a detector: a level camera is "
+                    "assumed, so every posture is at best uncertain; give --camera-pitch-deg "
+                    "(0 for a level camera)"
+                ]
+            )
+        else:
+            pitch = Value(*given, GIVEN)
+        return FoundCamera(SceneCamera(_lens_of(camera), pitch, Value(0.0, 0.0, USUAL)))
     # Images are turned back by a roll that is given.
     roll_rad = None if recording.camera.roll_rad is None else 0.0
     found = scene_camera(people, watched.pictures, camera, statures_m, given, roll_rad)
@@ -295,7 +309,7 @@ def found_camera(
             f"are vertical, so it is taken as that of most cameras, {number}; give "
             "--camera-pitch-deg (0 for a level camera)"
         )
-    better = _corrected(recording, found.camera, camera)
+    better = _corrected(recording, found.camera)
     if better.camera.roll_rad != recording.camera.roll_rad:
         remarks.append(
             f"camera roll {math.degrees(found.camera.roll_rad.mean):.1f} degrees, found in the "
@@ -321,4 +335,4 @@ def tilt_in(recording: RecordingRequest, span: TimeSpan) -> tuple[float, Recordi
         person = PersonRequest(BodyModel(), None, span.start_s, is_pitch_given=False)
         camera = source.first.camera
         found = found_camera(recording, person, watch(source, *span), camera).camera
-    return found.pitch_rad.mean, _corrected(recording, found, camera)
+    return found.pitch_rad.mean, _corrected(recording, found)

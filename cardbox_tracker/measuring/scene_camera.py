@@ -46,6 +46,9 @@ _PEAK, _WITHIN = 6, 0.68
 _SHOWN = 3.0
 # A roll below the first limit, or below so many standard deviations, can be a chance.
 _LEAST_ROLL, _SURE = np.radians(2.0), 2.0
+# Relative deviation from which on a focal length is only a usual one, and share of it from which on
+# one that is found takes its place.
+_GUESSED, _BETTER = 0.1, 0.5
 # Least difference of two sources that is told, rad.
 _TOLD = np.radians(4.0)
 # A shift of most of the background between two images that shows that the camera moves, as a share
@@ -70,10 +73,10 @@ class FoundCamera(NamedTuple):
     """
 
     camera: SceneCamera
-    sources: tuple[str, ...]
-    remarks: tuple[str, ...]
-    distances: tuple[float, ...]
-    moves: bool
+    sources: tuple[str, ...] = ()
+    remarks: tuple[str, ...] = ()
+    distances: tuple[float, ...] = ()
+    moves: bool = False
 
 
 def scene_camera(
@@ -144,7 +147,8 @@ def scene_camera(
             f"people show {_degrees(by_people)}; {_degrees((pitch, pitch_stddev))} is used, so "
             "give --camera-pitch-deg if it is known"
         )
-    moves = camera_moves(people, pictures, camera)
+    # Without points, nothing tells the people from the background.
+    moves = bool(people) and camera_moves(people, pictures, camera)
     if moves:
         pitch_stddev = float(np.hypot(pitch_stddev, _MOVING))
         remarks.append(
@@ -162,7 +166,8 @@ def scene_camera(
     turned = Value(roll, roll_stddev, FOUND if roll else USUAL)
     if roll_rad is not None:
         turned = Value(roll_rad, GIVEN_STDDEV, GIVEN)
-    fov = Value(1.0, camera.focal_stddev, GIVEN)
+    is_guessed = camera.focal_stddev > _GUESSED
+    fov = Value(1.0, camera.focal_stddev, USUAL if is_guessed else GIVEN)
     height, distances = None, tuple(float("nan") for _ in people)
     if shown is not None:
         # What follows from the pitch and the roll that are known now.
@@ -173,7 +178,8 @@ def scene_camera(
         rest = known.covariance[2:, 2:] + (gain * variances) @ gain.T
         stddevs = np.sqrt(np.diag(rest))
         height = Value(float(known.values[2]), float(stddevs[0]), FOUND)
-        fov = Value(float(np.exp(known.values[3])), float(stddevs[1]), FOUND)
+        if is_guessed and stddevs[1] < _BETTER * camera.focal_stddev:
+            fov = Value(float(np.exp(known.values[3])), float(stddevs[1]), FOUND)
         distances = known.distances
     return FoundCamera(
         SceneCamera(_field_of_view(camera, fov), found, turned, height),

@@ -7,6 +7,8 @@ takes as long as tracking about a hundred images.
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from cardbox_tracker.camera.camera import Camera
@@ -101,4 +103,5 @@ class SeenBody:
         best = max(self._fits, key=lambda fit: fit.iou).body
         sizes = np.median([fit.body.sizes for fit in self._fits], axis=0)
         first = self._fits[0].body
-        return first.with_values(sizes=sizes, appearance=best.appearance)
+        found = first.with_values(sizes=sizes, appearance=best.appearance)
+        return replace(found, is_distance_found="distance_m" in self._guess.unknown)

@@ -184,6 +184,8 @@ class BodyModel:
             it is no part of a model file.
         shoulder_rise: rise of a shoulder joint per radian of elevation of its arm, in shoulder
             breadths (:mod:`.skeleton`); it is no part of a model file.
+        is_distance_found: whether the images show the distance, and nobody has given it; it is no
+            part of a model file.
         version: number of a body that is measured while it is tracked live, from 1 on; 0 for
             others. Equal bodies may have different ones.
         stamp_ns: stamp of the first image to which this version belongs, ns; 0 without one.
@@ -201,6 +203,7 @@ class BodyModel:
     unknown: tuple[str, ...] = ()
     stature_stddev: float = 0.0
     shoulder_rise: float = SHOULDER_RISE
+    is_distance_found: bool = field(default=False, compare=False)
     version: int = field(default=0, compare=False)
     stamp_ns: int = field(default=0, compare=False)
 

@@ -119,7 +119,8 @@ class PlaceWatch:
         """
         self._body, self._camera = body, camera
         self._scale = MEASURED_BODY if body.source == MEASURED else STATURE
-        self._is_given = body.source != MEASURED and "distance_m" not in body.unknown
+        is_found = body.is_distance_found or "distance_m" in body.unknown
+        self._is_given = body.source != MEASURED and not is_found
         self._compared: list[tuple[float, float]] = []
         self._first_ns: int | None = None
         self._apart_m = 0.0

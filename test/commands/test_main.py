@@ -187,7 +187,8 @@ def test_the_course_of_the_readme(
     assert f"distance 2.00 m (from {model.name}), sizes from {model.name}\n" in done.out
     assert re.search(r"(?m)^sure: \d+% of \d+ images, \d+% of the hands in them, ", done.out)
     assert "mean cost" not in done.out
-    assert f"wrote {table}\nwrote {bag}\n" in done.out
+    written = table, table.with_suffix(".body.yaml"), table.with_suffix(".scene.yaml"), bag
+    assert "\n".join(f"wrote {path}" for path in written) in done.out
     done = cardbox("urdf", model)
     assert done.code == 0
     assert "<robot" in done.out

@@ -195,7 +195,7 @@ def test_a_film_is_tracked_with_a_stature(
     told = json.loads((tmp_path / "out.json").read_text(encoding="utf-8"))
     assert told["images"] == told["tracked"] == told["uncertain"] == len(rows)
     assert told["used"] == {"colours": len(rows) - 1}
-    assert "camera pitch 0 degrees down (assumed)" in told["assumed"]
+    assert "downward pitch 0 +- 16 degrees (usual)" in told["assumed"]
     assert [float(row["time_s"]) for row in rows[:3]] == pytest.approx([16.0, 16.25, 16.5])
     apart_m = beside_shoulders(off_m(tmp_path / "me.csv", files / "session"))
     errors_m = np.linalg.norm(apart_m, axis=2)

@@ -156,7 +156,10 @@ def test_workers_with_several_threads_are_refused() -> None:
 
 def files_of(names: Iterable[str]) -> set[str]:
     """Return the files of recordings that are done: a table and a body each."""
-    return {SUMMARY, *(f"{name}{end}" for name in names for end in (".csv", ".body.yaml"))}
+    return {
+        SUMMARY,
+        *(f"{name}{end}" for name in names for end in (".csv", ".body.yaml", ".scene.yaml")),
+    }
 
 
 class Tracked:

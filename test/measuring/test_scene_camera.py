@@ -73,11 +73,11 @@ def found(
     pitch_deg: float,
     image: np.ndarray = BLANK,
     places: Sequence[tuple[float, float]] = WALK,
-    pitch_rad: float | None = None,
+    given: tuple[float, float] | None = None,
     roll_deg: float = 0.0,
 ) -> FoundCamera:
     people = [film(places, pitch_deg, roll_deg)]
-    return scene_camera(people, [(0.0, image)], CAMERA, [STATURE_M], pitch_rad)
+    return scene_camera(people, [(0.0, image)], CAMERA, [STATURE_M], given)
 
 
 @pytest.mark.parametrize("pitch_deg", [-8.0, 5.0, 25.0])
@@ -127,11 +127,13 @@ def test_edges_decide_where_people_show_little_and_lose_against_who_walks() -> N
 
 
 def test_a_given_pitch_is_kept_and_what_contradicts_it_is_told() -> None:
-    shown = found(12.0, pitch_rad=np.radians(12.0))
+    shown = found(12.0, given=(np.radians(12.0), 0.01))
     assert not shown.remarks and shown.camera.pitch_rad.origin == "given"
-    wrong = found(12.0, pitch_rad=np.radians(30.0))
+    wrong = found(12.0, given=(np.radians(30.0), 0.01))
     assert wrong.camera.pitch_rad.mean == np.radians(30.0)
-    assert any("--camera-pitch-deg 30 is used" in one and "12 deg" in one for one in wrong.remarks)
+    assert any(
+        "a camera pitch of 30 degrees down" in one and "12 deg" in one for one in wrong.remarks
+    )
 
 
 def test_a_camera_that_moves_is_told() -> None:

@@ -153,7 +153,7 @@ def test_a_chair_alone_is_nobody() -> None:
     tracker, chair = Tracker(BODY, CAMERA, default_preset()), box(130, 158, 30)
     grey = np.where(chair > 0, DOOR, WALL).astype(np.uint8)
     estimate = [tracker.track(person() | chair, grey) for _ in range(10)][-1]
-    assert estimate.state == TRACKING
+    assert estimate.state in (TRACKING, UNCERTAIN)
     assert error_m(estimate) < 0.03
     assert [tracker.track(chair, grey).state for _ in range(3)] == [NO_PERSON] * 3
     assert error_m(tracker.track(person() | chair, grey)) < 0.07

@@ -78,6 +78,7 @@ def test_each_fit_is_told_and_a_camera_may_be_silent(node: TrackerNode, hands: A
     assert min(float(both[f"{name} iou"]) for name in ("left", "right")) > 0.6
     # The node waits for the other camera, so the last images are not yet tracked.
     alone = show(10, ("right",))
-    assert int(alone["images tracking"]) > 14
+    # One outline leaves more doubt than two.
+    assert sum(int(alone.get(f"images {state}", 0)) for state in ("tracking", "uncertain")) > 14
     assert alone["left iou"] == "sees nobody"
     assert float(alone["right iou"]) > 0.6
