@@ -15,7 +15,7 @@ from cardbox_tracker.common.files import body_of_person
 if TYPE_CHECKING:
     from cardbox_tracker.camera.camera import Camera
     from cardbox_tracker.commands.request import PersonRequest, RecordingRequest, TrackingRequest
-    from cardbox_tracker.measuring.scene import Scene, SceneCamera, Value
+    from cardbox_tracker.measuring.scene import Scene, SceneCamera
     from cardbox_tracker.measuring.scene_camera import FoundCamera
     from cardbox_tracker.person.model import BodyModel
     from cardbox_tracker.recordings.measured_scene import Watched
@@ -176,6 +176,7 @@ def measured_scene(
         CardboxError: the recording cannot be read, or the detector cannot be loaded.
     """
     from cardbox_tracker.measuring.scene import GIVEN, Scene, SceneCamera, Value
+    from cardbox_tracker.measuring.scene_camera import lens_of
     from cardbox_tracker.person.proportions import USUAL_STATURE_M
     from cardbox_tracker.recordings.measured_scene import seen_people, seen_person, watch
 
@@ -190,7 +191,7 @@ def measured_scene(
         if person.model is not None and not person.body.unknown:
             pitch = Value(tilt.pitch_rad, tilt.pitch_stddev_rad, GIVEN)
             roll_rad = recording.camera.stands_rad
-            camera = SceneCamera(_lens_of(first.camera), pitch, Value(roll_rad, 0.0, GIVEN))
+            camera = SceneCamera(lens_of(first.camera), pitch, Value(roll_rad, 0.0, GIVEN))
             bodies = [body.with_values(camera_roll_rad=roll_rad) for body in bodies]
             yield source, Scene(camera, tuple(bodies))
             return
@@ -241,15 +242,6 @@ def _bodies(
         yield body
 
 
-def _lens_of(camera: Camera) -> Value:
-    from cardbox_tracker.measuring.scene import GIVEN, USUAL, Value
-    from cardbox_tracker.recordings.given_camera import GUESSED_STDDEV
-
-    fov_rad = 2 * math.atan(camera.width / 2 / camera.fx)
-    origin = USUAL if camera.focal_stddev >= GUESSED_STDDEV else GIVEN
-    return Value(fov_rad, math.sin(fov_rad) * camera.focal_stddev, origin)
-
-
 def _corrected(recording: RecordingRequest, found: SceneCamera) -> RecordingRequest:
     """Return the recording with roll and field of view that were found and are not given."""
     from cardbox_tracker.measuring.scene import FOUND
@@ -272,7 +264,7 @@ def found_camera(
     """Return the camera of a recording, and say what was found, or contradicts what is given."""
     from cardbox_tracker.measuring.people_camera import PITCH_PRIOR, USUAL_PITCH
     from cardbox_tracker.measuring.scene import GIVEN, USUAL, SceneCamera, Value
-    from cardbox_tracker.measuring.scene_camera import FoundCamera, scene_camera
+    from cardbox_tracker.measuring.scene_camera import FoundCamera, lens_of, scene_camera
 
     people = watched.people
     statures_m = [*person.statures_m, *[person.stature_m] * len(people)][: len(people)]
@@ -290,7 +282,7 @@ def found_camera(
             )
         else:
             pitch = Value(*given, GIVEN)
-        return FoundCamera(SceneCamera(_lens_of(camera), pitch, Value(0.0, 0.0, USUAL)))
+        return FoundCamera(SceneCamera(lens_of(camera), pitch, Value(0.0, 0.0, USUAL)))
     # Images are turned back by a roll that is given.
     roll_rad = None if recording.camera.roll_rad is None else 0.0
     found = scene_camera(people, watched.pictures, camera, statures_m, given, roll_rad)

@@ -8,6 +8,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from cardbox_tracker.detectors.image_points import POINT_NAMES, ImagePoints
 from cardbox_tracker.person.sizes import FloatArray
 
 Joints = Mapping[str, FloatArray]
@@ -99,3 +100,8 @@ class Figure:
 
 
 _NAMES = tuple(dict.fromkeys(name for limb in (*_WIDTHS, *_LEGS) for name in limb[:2]))
+
+
+def figure_of_points(points: ImagePoints) -> Figure:
+    """Return the figure of a person's points."""
+    return Figure(dict(zip(POINT_NAMES, points.px, strict=True)))

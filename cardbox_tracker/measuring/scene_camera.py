@@ -166,8 +166,7 @@ def scene_camera(
     turned = Value(roll, roll_stddev, FOUND if roll else USUAL)
     if roll_rad is not None:
         turned = Value(roll_rad, GIVEN_STDDEV, GIVEN)
-    is_guessed = camera.focal_stddev > _GUESSED
-    fov = Value(1.0, camera.focal_stddev, USUAL if is_guessed else GIVEN)
+    lens = lens_of(camera)
     height, distances = None, tuple(float("nan") for _ in people)
     if shown is not None:
         # What follows from the pitch and the roll that are known now.
@@ -178,11 +177,12 @@ def scene_camera(
         rest = known.covariance[2:, 2:] + (gain * variances) @ gain.T
         stddevs = np.sqrt(np.diag(rest))
         height = Value(float(known.values[2]), float(stddevs[0]), FOUND)
-        if is_guessed and stddevs[1] < _BETTER * camera.focal_stddev:
-            fov = Value(float(np.exp(known.values[3])), float(stddevs[1]), FOUND)
+        if lens.origin == USUAL and stddevs[1] < _BETTER * camera.focal_stddev:
+            factor = Value(float(np.exp(known.values[3])), float(stddevs[1]), FOUND)
+            lens = lens_of(camera, factor)
         distances = known.distances
     return FoundCamera(
-        SceneCamera(_field_of_view(camera, fov), found, turned, height),
+        SceneCamera(lens, found, turned, height),
         tuple(sources),
         tuple(remarks),
         distances,
@@ -256,8 +256,11 @@ def _peak(values: FloatArray, chances: FloatArray) -> tuple[float, float]:
     return mean, float(np.interp(_WITHIN, within, away[order]))
 
 
-def _field_of_view(camera: Camera, factor: Value) -> Value:
-    """Return the field of view across the image for a factor of the focal length."""
+def lens_of(camera: Camera, factor: Value | None = None) -> Value:
+    """Return the field of view across the image, rad, for a factor of the focal length if found."""
+    if factor is None:
+        is_guessed = camera.focal_stddev > _GUESSED
+        factor = Value(1.0, camera.focal_stddev, USUAL if is_guessed else GIVEN)
     tangent = camera.width / 2 / (camera.fx * factor.mean)
     slope = 2 * tangent / (1 + tangent**2)
     return Value(2 * float(np.arctan(tangent)), slope * factor.stddev, factor.origin)

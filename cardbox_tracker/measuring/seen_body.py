@@ -39,7 +39,6 @@ class SeenBody:
         config: TrackerConfig,
         rng: np.random.Generator,
         pause_s: float = 1.0,
-        growth: float = 2.0,
     ) -> None:
         """Prepare for a person.
 
@@ -48,11 +47,11 @@ class SeenBody:
             camera: working camera.
             config: settings of the tracker.
             rng: random numbers of the fits.
-            pause_s: time between the first two images that are used.
-            growth: by how much longer each further pause is.
+            pause_s: time between the first two images that are used; each further pause is twice
+                as long.
         """
         self._camera, self._config, self._rng = camera, config, rng
-        self._guess, self._pause_s, self._growth = guess, pause_s, growth
+        self._guess, self._pause_s = guess, pause_s
         self.forget()
 
     def forget(self) -> None:
@@ -89,7 +88,7 @@ class SeenBody:
         if not fit.body.unknown:
             self._fits.append(fit)
             self._next_s = time_s + self._wait_s
-            self._wait_s *= self._growth
+            self._wait_s *= 2.0
             self.body = self._median()
         elif not self._fits and fit.iou > self._poor_iou:
             # A body that fits poorly serves until one fits well.
@@ -99,7 +98,7 @@ class SeenBody:
         return True
 
     def _median(self) -> BodyModel:
-        """Return the body with the place and colours of the image that it fits best."""
+        """Return the median sizes, at the first place, with the colours of the best fit."""
         best = max(self._fits, key=lambda fit: fit.iou).body
         sizes = np.median([fit.body.sizes for fit in self._fits], axis=0)
         first = self._fits[0].body

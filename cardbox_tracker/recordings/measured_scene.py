@@ -11,8 +11,8 @@ from typing import Generic, NamedTuple, TypeVar
 import numpy as np
 
 from cardbox_tracker.camera.camera import Camera
-from cardbox_tracker.detectors.figure import Figure
-from cardbox_tracker.detectors.image_points import POINT_NAMES, ImagePoints
+from cardbox_tracker.detectors.figure import figure_of_points
+from cardbox_tracker.detectors.image_points import ImagePoints
 from cardbox_tracker.measuring.first_sight import upper_body
 from cardbox_tracker.measuring.scene_camera import Picture
 from cardbox_tracker.measuring.seen_body import MOST_SIGHTS, SeenBody
@@ -91,20 +91,19 @@ def _track_of(
     people: list[list[tuple[float, ImagePoints]]], points: ImagePoints, time_s: float
 ) -> list[tuple[float, ImagePoints]]:
     """Return the person among ``people`` who is nearest, or a new one."""
-    figure, near = _figure(points), _SAME
+    figure, near = figure_of_points(points), _SAME
     found: list[tuple[float, ImagePoints]] | None = None
     for person in people:
         last_s, last = person[-1]
-        if 0.0 < time_s - last_s <= _FORGOTTEN_S and (away := figure.apart(_figure(last))) < near:
+        if (
+            0.0 < time_s - last_s <= _FORGOTTEN_S
+            and (away := figure.apart(figure_of_points(last))) < near
+        ):
             found, near = person, away
     if found is None:
         found = []
         people.append(found)
     return found
-
-
-def _figure(points: ImagePoints) -> Figure:
-    return Figure(dict(zip(POINT_NAMES, points.px, strict=True)))
 
 
 def seen_person(

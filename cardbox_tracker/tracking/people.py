@@ -18,9 +18,9 @@ import cv2
 import numpy as np
 
 from cardbox_tracker.camera.camera import Camera
-from cardbox_tracker.detectors.figure import Figure
+from cardbox_tracker.detectors.figure import Figure, figure_of_points
 from cardbox_tracker.detectors.identity import ALIKE, GONE_NS, apart, colours_in
-from cardbox_tracker.detectors.image_points import POINT_NAMES, ImagePoints
+from cardbox_tracker.detectors.image_points import ImagePoints
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.sizes import FloatArray
 from cardbox_tracker.person.skeleton import KeypointState
@@ -402,7 +402,7 @@ def _held(last: Estimate, hidden: bool = False) -> Estimate:
 def _figures(points: Sequence[ImagePoints], shape: tuple[int, ...]) -> list[Shown]:
     shown = []
     for one in points:
-        figure = Figure(dict(zip(POINT_NAMES, one.px, strict=True)))
+        figure = figure_of_points(one)
         if np.isfinite(figure.trunk_px):
             shown.append(Shown(one, figure, figure.drawn(shape)))
     return shown

@@ -13,9 +13,8 @@ import numpy as np
 from cardbox_tracker.camera.camera import Camera
 from cardbox_tracker.camera.view import OtherCamera, View
 from cardbox_tracker.common.settings import restarts
-from cardbox_tracker.detectors.figure import Figure
+from cardbox_tracker.detectors.figure import Figure, figure_of_points
 from cardbox_tracker.detectors.identity import Identity, colours_in
-from cardbox_tracker.detectors.image_points import POINT_NAMES
 from cardbox_tracker.measuring.seen_body import SeenBody
 from cardbox_tracker.person.kinematics import clavicles
 from cardbox_tracker.person.model import BodyModel
@@ -358,7 +357,7 @@ class Tracker:
         if points is None or points.is_empty:
             return frame
         seen_ns = self._now_ns if points.stamp_ns is None else points.stamp_ns
-        figure = Figure(dict(zip(POINT_NAMES, points.px, strict=True)))
+        figure = figure_of_points(points)
         if identity.is_same(figure, _colours_of(figure, frame), seen_ns):
             return frame
         self._sees_other |= camera == 0
