@@ -113,9 +113,9 @@ class Models(NamedTuple):
     Attributes:
         uncertain_from: probability of being wrong above which a keypoint is uncertain: the highest
             one with which at most 2 % of the tracked keypoints of left-out sources are wrong.
-        doubtful_from: that of a hand, over time (:func:`remembered`), above which the posture is
-            uncertain: the highest one with which at most 2 % of the images that are ``tracking``
-            have a wrong keypoint.
+        doubtful_from: that of a hand, over time (:func:`remembered`), above which it and the
+            posture are uncertain: the highest one with which at most 2 % of the images that are
+            ``tracking`` have a wrong keypoint.
         by_kind: models by the names of :data:`KINDS`, and ``whole``.
     """
 
@@ -153,7 +153,7 @@ class Doubt:
     def forget(self) -> None:
         """Forget the previous results."""
         self._whole: float | None = None
-        self._hands = 0.0
+        self._hands = np.zeros(len(HANDS))
 
     def judge(
         self, evidence: Values, source: Source, hidden: BoolArray, vetoes: Sequence[bool] = ()
@@ -173,20 +173,24 @@ class Doubt:
         whole = _chance(of["whole"], values, 0)
         self._whole = whole if self._whole is None else _MEMORY * (self._whole + whole)
         is_doubted = any(vetoes) or self._whole > WHOLE_UNCERTAIN_FROM
-        states = tuple(
-            _state_of(chance, is_hidden, is_doubted or chance > uncertain_from)
-            for chance, is_hidden in zip(chances.tolist(), hidden.tolist(), strict=True)
-        )
-        self._hands = remembered(self._hands, float(chances[HANDS].max()))
+        is_unsure = chances > uncertain_from
+        self._hands = remembered(self._hands, chances[HANDS])
+        is_uncertain = is_doubted
         # The paper's filter finds hands so badly that its state only says whether it is lost.
-        needs_hands = source is not Source.PAPER
-        is_uncertain = is_doubted or (needs_hands and self._hands > doubtful_from)
+        if source is not Source.PAPER:
+            is_unsure[HANDS] = self._hands > doubtful_from
+            is_uncertain |= bool(is_unsure[HANDS].any())
+        given = zip(
+            chances.tolist(), hidden.tolist(), (is_unsure | is_doubted).tolist(), strict=True
+        )
+        states = tuple(_state_of(*one) for one in given)
         return Judgement(chances, states, is_uncertain, self._whole > WHOLE_LOST_FROM, evidence)
 
 
-def remembered(before: float, chance: float) -> float:
-    """Return the doubt about hands after one image: it rises at once, and fades slowly."""
-    return max(chance, _DOUBT_STAYS * before + (1.0 - _DOUBT_STAYS) * chance)
+def remembered(before: FloatArray, chances: FloatArray) -> FloatArray:
+    """Return the doubt (2,) about each hand after one image: it rises at once, and fades slowly."""
+    faded: FloatArray = _DOUBT_STAYS * before + (1.0 - _DOUBT_STAYS) * chances
+    return np.maximum(chances, faded)
 
 
 def doubted(states: Sequence[KeypointState]) -> tuple[KeypointState, ...]:

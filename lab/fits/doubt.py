@@ -172,11 +172,11 @@ def names_for(model: str, available: Sequence[str]) -> list[str]:
 
 def doubts(said: FloatArray) -> FloatArray:
     """Return the doubt (n,) about images in turn, with the probabilities (n, 7); 1 if lost."""
-    found, before = np.ones(len(said)), 0.0
-    for number, chance in enumerate(said[:, HANDS].max(axis=1).tolist()):
-        before = remembered(before, chance)
+    found, before = np.ones(len(said)), np.zeros(len(HANDS))
+    for number, chances in enumerate(said[:, HANDS]):
+        before = remembered(before, chances)
         if said[number, 6] <= WHOLE_UNCERTAIN_FROM:
-            found[number] = before
+            found[number] = before.max()
     return found
 
 

@@ -74,9 +74,12 @@ def test_the_doubt_about_a_hand_rises_at_once_and_fades_slowly(by_hand: None) ->
     one = Doubt()
     chances = [0.1, 0.3, *[0.1] * 9]
     judged = [one.judge(evidence(hand=chance), Source.MEASURED, SEEN) for chance in chances]
-    # 0.1 + 0.2 * 0.85 ^ n is 0.154 after eight images, 0.146 after nine; the hand is tracked.
+    # 0.1 + 0.2 * 0.85 ^ n is 0.154 after eight images, 0.146 after nine.
     assert [judgement.is_uncertain for judgement in judged] == [False, *[True] * 9, False]
-    assert judged[2].states[2] is KeypointState.TRACKED
+    # The other keypoints have no memory, and the hand has the state of the posture.
+    for judgement in judged:
+        hand = KeypointState.UNCERTAIN if judgement.is_uncertain else KeypointState.TRACKED
+        assert judgement.states[2] is hand
     one.judge(evidence(hand=0.4), Source.MEASURED, SEEN)
     one.forget()
     assert not one.judge(evidence(hand=0.1), Source.MEASURED, SEEN).is_uncertain
