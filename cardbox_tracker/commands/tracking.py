@@ -297,9 +297,8 @@ def found_camera(
         )
     elif given is None:
         remarks.append(
-            "nothing shows the camera's pitch: nobody is seen upright and no edges of the room "
-            f"are vertical, so it is taken as that of most cameras, {number}; give "
-            "--camera-pitch-deg (0 for a level camera)"
+            "neither people nor edges of the room show the camera's pitch surely, so it is mostly "
+            f"that of most cameras, {number}; give --camera-pitch-deg (0 for a level camera)"
         )
     better = _corrected(recording, found.camera)
     if better.camera.roll_rad != recording.camera.roll_rad:

@@ -135,10 +135,12 @@ def scene_camera(
     if abs(roll) < max(_LEAST_ROLL, _SURE * roll_stddev):
         roll, roll_stddev = 0.0, float(np.hypot(roll, roll_stddev))
     remarks, sources = list[str](), list[str]()
+    # Lines that agree on several pitches show none.
+    has_edges &= by_edges[1] < FOUND_STDDEV
     uses_edges = has_edges and abs(by_edges[0] - pitch) < max(_TOLD, by_edges[1])
     if uses_edges:
         sources.append("the upright edges of the room")
-    if shown is not None and (by_people[1] < FOUND_STDDEV or not uses_edges):
+    if shown is not None and by_people[1] < FOUND_STDDEV:
         sources.append("people who stand or walk" if shown.shows_feet else "people's bodies")
     apart = abs(by_edges[0] - by_people[0])
     if has_edges and shown is not None and apart > max(_TOLD, _SURE * by_people[1]):

@@ -5,8 +5,9 @@ at the distance f L / s. So the relative deviation of the distance is
 
     sqrt(deviation of L ^ 2 + deviation of f ^ 2),
 
-whatever fits the image. Joints relative to each other, and the states of keypoints, do not suffer
-from it, which is why the place has a state of its own.
+whatever fits the image. A trunk that is upright before a camera with pitch p looks shorter by
+cos p, so an error of the pitch is one of the distance, too. Joints relative to each other, and the
+states of keypoints, do not suffer from it, which is why the place has a state of its own.
 
 A detector that estimates its points in space, too, shows the scale at once
 (:func:`distance_of_points`). It is compared with a second source: the given distance, depth images,
@@ -16,7 +17,7 @@ or a further camera.
 from __future__ import annotations
 
 from itertools import pairwise
-from math import erfc, hypot, log, sqrt
+from math import erfc, hypot, log, sqrt, tan
 
 import numpy as np
 
@@ -147,14 +148,15 @@ class PlaceWatch:
         elif is_alone:
             rests_on = self._scale
         self._compare(estimate, body, rests_on, frame)
+        tilt = body.camera_pose
         relative = hypot(SCALE_STDDEVS[rests_on], self._camera.focal_stddev)
         if rests_on == STATURE:
-            relative = hypot(relative, body.stature_stddev)
+            # Deviation of log cos p to the second order. A body is measured with the same error.
+            shorter = hypot(tan(tilt.pitch_rad), tilt.pitch_stddev_rad / sqrt(2.0))
+            relative = hypot(relative, shorter * tilt.pitch_stddev_rad, body.stature_stddev)
         off_m = hypot(relative * distance_m, self._apart_m)
         aside_m = relative * abs(float(estimate.posture[TORSO_Y]))
-        height_m = hypot(
-            relative * (place.hip_height_m + z_m), distance_m * body.camera_pose.pitch_stddev_rad
-        )
+        height_m = hypot(relative * (place.hip_height_m + z_m), distance_m * tilt.pitch_stddev_rad)
         chance = erfc(FAR_M / (sqrt(2.0) * off_m))
         stddev_m = np.array([off_m, aside_m, height_m])
         return Place(stddev_m, chance, rests_on, self.contradiction)

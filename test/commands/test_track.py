@@ -298,7 +298,7 @@ def test_somebody_is_measured_in_a_film(
             ("pitch 12 degrees down (standard deviation 5), found from people", "roll 14.0"),
         ),
         (-6.0, 0.0, ("the edges",), ("pitch 6 degrees up", "found from the edges", "it moves")),
-        (10.0, 0.0, (), ("nobody is seen upright", "taken as that of most cameras")),
+        (10.0, 0.0, (), ("neither people nor edges", "that of most cameras")),
     ],
 )
 def test_the_cameras_pitch_is_found_from_the_recording(

@@ -100,12 +100,23 @@ def frames(points: ImagePoints | None, depth: bool = False, count: int = 10) -> 
 def test_the_deviation_of_the_distance_is_that_of_what_it_rests_on(
     body: BodyModel, depth: bool, alone: bool, rests_on: str, relative: float
 ) -> None:
+    body = body.with_values(pitch_stddev_rad=0.0)
     place = PlaceWatch(body, CAMERA).see(
         estimate_at(4.0, body), body, frames(None, depth)[0], alone
     )
     assert place is not None
     assert place.rests_on == rests_on
     assert place.stddev_m[0] == pytest.approx(4.0 * np.hypot(relative, 0.005))
+
+
+def test_an_unsure_pitch_makes_the_distance_unsure_unless_depth_shows_it() -> None:
+    body = TALL.with_values(camera_pitch_rad=0.2, pitch_stddev_rad=0.15)
+    for depth, relative in ((False, 0.05), (True, 0.02)):
+        place = PlaceWatch(body, CAMERA).see(estimate_at(4.0, body), body, frames(None, depth)[0])
+        # tan 0.2 is 0.2027; to the second order there are 0.15 / sqrt(2), and 0.2290 of both.
+        known, shorter = np.hypot(relative, 0.005), 0.0 if depth else 0.15 * 0.2290
+        assert place is not None
+        assert place.stddev_m[0] == pytest.approx(4.0 * np.hypot(known, shorter), rel=1e-3)
 
 
 def test_a_stated_field_of_view_makes_a_far_place_uncertain() -> None:
