@@ -15,6 +15,7 @@ from cardbox_tracker.camera.view import OtherCamera, View
 from cardbox_tracker.common.settings import restarts
 from cardbox_tracker.detectors.figure import Figure, figure_of_points
 from cardbox_tracker.detectors.identity import Identity, colours_in
+from cardbox_tracker.measuring.people_camera import FOUND_STDDEV
 from cardbox_tracker.measuring.seen_body import SeenBody
 from cardbox_tracker.person.kinematics import clavicles
 from cardbox_tracker.person.model import BodyModel
@@ -66,9 +67,6 @@ FILTERS: MappingProxyType[str, MakeFilter] = MappingProxyType(
     {"hierarchical": Cycles, "whole_body": WholeBodyFilter}
 )
 """Filter classes by the values of ``TrackerConfig.filter``."""
-UNKNOWN_TILT_RAD = np.radians(10.0)
-"""Standard deviation of a pitch that is too unsure for ``tracking``, rad; that of most cameras,
-which nothing tells more of, is above it."""
 
 # Frames without anybody after which another person is expected.
 _ABSENT_FRAMES = 5
@@ -279,7 +277,8 @@ class Tracker:
             observations = self._frozen.without(observations)
         frames = [self._of_person(*one) for one in enumerate(self._frames_of(observations))]
         estimate = self._placed(frames, self._same(frames[0], self._track(frames)))
-        is_tilt_unknown = self.body.camera_pose.pitch_stddev_rad > UNKNOWN_TILT_RAD
+        # The posture of an unsure pitch is unsure, too.
+        is_tilt_unknown = self.body.camera_pose.pitch_stddev_rad > FOUND_STDDEV
         if estimate.state == TRACKING and (self.body.unknown or is_tilt_unknown):
             estimate = replace(estimate, state=UNCERTAIN)
         posture = estimate.posture
