@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from functools import partial
 from itertools import pairwise
 from pathlib import Path
@@ -99,7 +99,7 @@ class ImageFolder(Film):
         self.duration_s = self._places[-1] / (self._given.fps or FPS)
         return self
 
-    def left_out(self, topic: str) -> list[str]:
+    def left_out(self, topic: str, used: Collection[str] = ()) -> list[str]:
         """Return the files that are no images; see ``ImageRecording``."""
         names = sorted(path.name for path in self.path.iterdir() if path.is_file())
         hidden = [name for name in names if name.startswith(".")]

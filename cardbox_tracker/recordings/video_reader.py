@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
@@ -107,7 +107,7 @@ class VideoReader(Film):
             self._end = f"ends after {number} images and {last_s:.1f} of {self._stated_s:.1f} s"
         self.duration_s = max(0, stamp_ns) / 1e9
 
-    def left_out(self, topic: str) -> list[str]:
+    def left_out(self, topic: str, used: Collection[str] = ()) -> list[str]:
         """Return which images could not be read; see ``ImageRecording``."""
         damaged = [f"{self._damaged} that cannot be decoded"] if self._damaged else []
         return damaged + (["the rest of the video, which is missing"] if self._end else [])
