@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import struct
 from collections.abc import Container, Iterator
+from itertools import islice
 from pathlib import Path
 from typing import Any, BinaryIO
 
@@ -16,6 +17,8 @@ from cardbox_tracker.common.errors import CameraError
 
 # More than the longest header of a film or a track.
 _MOST_HEADER_BYTES = 128
+MOST_BOXES = 10_000
+"""Boxes of a film that are read; its header is among the first or last ones of a few."""
 # Pixels that are less oblong count as square, px / px.
 _SQUARE = 0.01
 _MOST_OBLONG = 4.0
@@ -72,7 +75,7 @@ def shown_s(path: Path) -> float | None:
     timescale, times = 0, [0]
     try:
         with path.open("rb") as file:
-            for kind, at, _ in boxes(file, (b"moov", b"trak")):
+            for kind, at, _ in islice(boxes(file, (b"moov", b"trak")), MOST_BOXES):
                 file.seek(at)
                 header = file.read(_MOST_HEADER_BYTES)
                 if kind == b"mvhd":

@@ -422,13 +422,17 @@ def digest_of_inputs(request: TrackingRequest, formats: Sequence[str], program: 
     digest = hashlib.sha256(f"{program} {formats}".encode())
     for value in _values(replace(asked, files=TrackFiles())):
         is_file = isinstance(value, Path) and value.is_file()
-        digest.update(b"\0" + (value.read_bytes() if is_file else repr(value).encode()))
+        if not is_file:
+            digest.update(b"\0" + repr(value).encode())
+            continue
+        with value.open("rb") as file:
+            digest.update(b"\0" + hashlib.file_digest(file, "sha256").digest())
     points = request.recording.points
     folders = [points.path] if isinstance(points, PointTable) and points.path.is_dir() else []
-    for file in [file for folder in (path, *folders) for file in _files_of(folder)]:
-        found = file.stat()
+    for entry in [file for folder in (path, *folders) for file in _files_of(folder)]:
+        found = entry.stat()
         # Names inside of a recording may be no UTF-8.
-        digest.update(b"\0" + os.fsencode(file.name))
+        digest.update(b"\0" + os.fsencode(entry.name))
         digest.update(f" {found.st_size} {found.st_mtime_ns}".encode())
     return digest.hexdigest()[:32]
 

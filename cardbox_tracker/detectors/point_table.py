@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from cardbox_tracker.camera.camera import Calibration
 from cardbox_tracker.common.errors import CardboxError, quoted
-from cardbox_tracker.common.files import UnreadableFileError, regular_file
+from cardbox_tracker.common.files import UnreadableFileError, foreign, regular_file
 from cardbox_tracker.detectors.image_points import POINT_INDEX, ImagePoints
 from cardbox_tracker.detectors.keypoint_json import coco_people, openpose_people
 from cardbox_tracker.detectors.person_choice import LEAST_INSIDE, inside, near_person, person_in
@@ -74,7 +74,9 @@ class PointTable(NamedTuple):
         """
         path = self.path
         if path.suffix == ".json" or path.is_dir():
-            return self._read_json(path if camera is None else path / camera, size)
+            path = path if camera is None else path / camera
+            with foreign(path, CardboxError, "JSON of OpenPose or COCO"):
+                return self._read_json(path, size)
         kind, persons = self._read_table(camera, size)
         return GivenPoints(path, kind, persons)
 

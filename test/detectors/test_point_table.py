@@ -380,8 +380,8 @@ def test_each_camera_has_its_folder_or_file(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("content", "words"),
     [
-        ("{", "is no JSON"),
-        ("[" * 100_000, "is no JSON"),
+        ("{", "expected JSON"),
+        ("[" * 100_000, "expected JSON"),
         ("{}", "has no 'annotations'"),
         ('[{"image_id": 1}]', "entry 0 has no keypoints; expected a file of OpenPose or COCO"),
         ("[5]", "entry 0 has no image_id"),
