@@ -20,7 +20,6 @@ from cardbox_tracker.camera.extrinsics_files import load_extrinsics
 from cardbox_tracker.common.errors import CardboxError
 from cardbox_tracker.detectors.point_table import PointTable
 from cardbox_tracker.measuring.scene import Scene, SceneCamera, Value, dumps_scene, load_scene
-from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.skeleton import KEYPOINT_NAMES
 from cardbox_tracker.recordings.focal_length import equivalent_mm
 from cardbox_tracker.recordings.result_reader import read_results
@@ -116,9 +115,7 @@ TREES: dict[str, tuple[str, Any, Read]] = {
     ),
     "scene": (
         "s.yaml",
-        yaml.safe_load(
-            dumps_scene(Scene(SceneCamera(*[Value(0.9, 0.1, "given")] * 3), (BodyModel(),)))
-        ),
+        yaml.safe_load(dumps_scene(Scene(SceneCamera(*[Value(0.9, 0.1, "given")] * 3), ()))),
         load_scene,
     ),
 }
