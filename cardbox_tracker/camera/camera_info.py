@@ -14,7 +14,8 @@ from cardbox_tracker.common.errors import CameraError
 
 # Farther from the middle, relative to the image, no lens has its principal point.
 _MOST_ASIDE = 0.15
-_SMALLEST_DEG, _LARGEST_DEG = 10.0, 160.0
+LEAST_DEG, MOST_DEG = 10.0, 160.0
+"""Range of fields of view across the image that cameras for people have, degrees."""
 # Pixels that are more oblong belong to a calibration of another size.
 _MOST_OBLONG = 0.1
 # Changes by an autofocus are smaller.
@@ -39,7 +40,7 @@ def unusual(k: NDArray[np.float64], width: int, height: int) -> str:
             f"of {width}x{height}; it seems to be of images of about {middle[0]:.0f}x"
             f"{middle[1]:.0f}"
         )
-    if not _SMALLEST_DEG <= fov_deg <= _LARGEST_DEG:
+    if not LEAST_DEG <= fov_deg <= MOST_DEG:
         found.append(f"its field of view is {fov_deg:.3g} degrees across")
     if abs(focal[0] / focal[1] - 1) > _MOST_OBLONG:
         found.append(f"its focal lengths {focal[0]:g} and {focal[1]:g} px differ")

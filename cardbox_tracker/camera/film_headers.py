@@ -19,6 +19,8 @@ from cardbox_tracker.common.errors import CameraError
 _MOST_HEADER_BYTES = 128
 MOST_BOXES = 10_000
 """Boxes of a film that are read; its header is among the first or last ones of a few."""
+MOST_DAMAGED = 100
+"""Damaged images in a row; a film that has ended fails as often as it is read."""
 # Pixels that are less oblong count as square, px / px.
 _SQUARE = 0.01
 _MOST_OBLONG = 4.0

@@ -374,6 +374,12 @@ def results_in(bag: BagReader, person: int | None = None) -> Results:
         except (AttributeError, TypeError, ValueError) as error:
             # The message type is defined by the recording and may lack fields.
             raise damaged(error) from None
+    if found.repeated > len(found.by_stamp):
+        raise BagError(
+            f"{bag.path} has {len(found.by_stamp) + found.repeated} results with "
+            f"{len(found.by_stamp)} different stamps: the camera's clock stood still; track the "
+            "recording itself, whose times are then those of the recorder"
+        )
     rows = _Rows(bag.path, {name for row in found.by_stamp.values() for name in row}, JOINT_NAMES)
     every = dict.fromkeys(rows.names)
     bodies = []
@@ -395,7 +401,7 @@ class _Messages:
     """Joins the messages of each image, of which joints, deviations and points have its stamp."""
 
     def __init__(self) -> None:
-        self._state = NO_PERSON
+        self._state, self.repeated = NO_PERSON, 0
         self._body: BodyModel | None = None
         self.by_stamp: dict[int, dict[str, Any]] = {}
 
@@ -412,6 +418,7 @@ class _Messages:
             row: dict[str, Any] = {"state": self._state, "body": self._body}
             # A node without the place of the torso keeps it constant.
             row |= dict.fromkeys(PLACE_NAMES, 0.0) | positions_of(joints)
+            self.repeated += stamp_ns_of(message) in self.by_stamp
             self.by_stamp[stamp_ns_of(message)] = row
         elif (found := self.by_stamp.get(stamp_ns_of(message))) is not None:
             if name == _KEYPOINTS:

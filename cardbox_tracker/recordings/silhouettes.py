@@ -28,6 +28,8 @@ from cardbox_tracker.segmentation.silhouettes import SilhouettePipeline
 _PERIOD_IMAGES = 60
 # A stamp that differs from the recording time by more comes from another clock.
 _OTHER_CLOCK_NS = 1_000_000_000
+# Spans are often rounded up by less.
+_SHORT_S = 1.0
 
 
 class TimeSpan(NamedTuple):
@@ -130,6 +132,7 @@ class SilhouetteSource:
     """
 
     depth_topic: str | None = None
+    _background_s = 0.0
     used_beside: Collection[str] = ()
 
     def __init__(
@@ -160,6 +163,7 @@ class SilhouetteSource:
         """
         self._open(bag, size or bag.working_size, camera, config)
         self._find_points(points, camera)
+        self._background_s = background.end_s
         is_readable = False
         for _, time_s, image, *_ in self.images():
             is_readable = True
@@ -329,6 +333,11 @@ class SilhouetteSource:
     def remarks(self) -> list[str]:
         """Warnings about the images read so far."""
         remarks = list(self._bag.remarks)
+        if self._background_s > self._bag.duration_s + _SHORT_S:
+            remarks.append(
+                f"the background span ends at {self._background_s:g} s, after the recording of "
+                f"{self._bag.duration_s:.1f} s; give a span of the empty scene"
+            )
         if self._clock_ns:
             remarks.append(
                 f"the images' stamps are {abs(self._clock_ns) / 1e9:.0f} s "

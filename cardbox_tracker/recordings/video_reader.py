@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from cardbox_tracker.camera.encodings import MOST_PIXELS
 from cardbox_tracker.camera.film_headers import (
+    MOST_DAMAGED,
     check_times,
     oblong,
     shown_s,
@@ -35,8 +36,6 @@ SUFFIXES = (".mp4", ".m4v", ".mov", ".avi", ".mkv", ".webm")
 _USUAL_HZ, _MOST_HZ = 30.0, 1000.0
 # Images that a whole video may lack at its end, since containers count inexactly.
 _LACKING = 2
-# After a damaged image, the next ones can be read; a video that has ended fails each time.
-_MOST_DAMAGED = 100
 
 
 class VideoReader(Film):
@@ -147,7 +146,7 @@ def _opened(path: Path) -> Iterator[cv2.VideoCapture]:
 def _read(capture: cv2.VideoCapture) -> Iterator[NDArray[Any] | None]:
     """Yield the images of an open video to its end, None for one that cannot be decoded."""
     failed = 0
-    while failed < _MOST_DAMAGED:
+    while failed < MOST_DAMAGED:
         found, image = capture.read()
         if not found:
             failed += 1

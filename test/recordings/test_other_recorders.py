@@ -130,6 +130,15 @@ def test_the_first_camera_info_with_a_calibration_counts(tmp_path: Path, empty: 
         assert any(f"first {empty} messages on /camera_info" in text for text in bag.remarks)
 
 
+def test_the_frame_is_that_of_the_images_if_the_camera_info_has_none(tmp_path: Path) -> None:
+    nameless = info(get_typestore(Stores.ROS2_JAZZY))
+    nameless.header.frame_id = ""
+    with open_images(recorded(tmp_path / "bag", infos=[nameless])) as bag:
+        assert SilhouetteSource(bag, EMPTY).frame_id == "left"
+        source = SilhouetteSource(bag, TimeSpan(0.0, 1e300))
+        assert any("ends at 1e+300 s, after the recording of" in text for text in source.remarks)
+
+
 def test_a_zoom_within_the_recording_is_told(tmp_path: Path) -> None:
     store = get_typestore(Stores.ROS2_JAZZY)
     for focal_px, is_told in ((166.0, False), (200.0, True)):

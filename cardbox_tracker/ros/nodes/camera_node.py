@@ -23,7 +23,13 @@ from cardbox_tracker.camera.camera_device import (
     open_device,
     open_video,
 )
-from cardbox_tracker.camera.film_headers import check_times, oblong, with_square_pixels
+from cardbox_tracker.camera.camera_info import LEAST_DEG
+from cardbox_tracker.camera.film_headers import (
+    MOST_DAMAGED,
+    check_times,
+    oblong,
+    with_square_pixels,
+)
 from cardbox_tracker.common.files import user_path
 from cardbox_tracker.ros.messages import conversions
 from cardbox_tracker.ros.runtime import qos
@@ -89,6 +95,11 @@ class CameraParameters(NodeParameters):
 
     def check(self) -> None:
         """Raise ValueError if values contradict each other."""
+        if 0.0 < self.horizontal_fov_deg < LEAST_DEG:
+            raise ValueError(
+                f"horizontal_fov_deg is {self.horizontal_fov_deg:g}; expected degrees, "
+                f"{LEAST_DEG:g} or more"
+            )
         if not self.device and not self.file:
             raise ValueError("device and file are both empty; give one, such as /dev/video0")
 
@@ -147,10 +158,14 @@ class CameraNode(CardboxNode):
         if self.parameters.value.file:
             self._wait_for_listener()
         started_s = due_s = time.monotonic()
+        failed = 0
         while not self._stop.is_set():
             settings = self.parameters.value
             ok, image = self._capture.read()
+            failed = 0 if ok else failed + 1
             if not ok:
+                if settings.file and failed < MOST_DAMAGED:
+                    continue
                 if not settings.file:
                     self.diagnostics.problem(
                         f"{settings.device} delivers no image; is it plugged in, and used by no "
