@@ -114,6 +114,15 @@ def test_a_bag_is_read_with_its_body(tmp_path: Path) -> None:
     assert body.sizes == pytest.approx(BODY.sizes)
 
 
+def test_a_bag_of_one_stamp_is_refused(tmp_path: Path) -> None:
+    tracker, seen = Tracker(BODY, CAMERA), estimates()[0]
+    with result_bag(tmp_path / "bag", "camera") as add:
+        for number in range(6):
+            add(RecordedFrame(START_NS + number // 3, number / 10, GREY, GREY), seen, tracker)
+    with pytest.raises(CardboxError, match="has 6 results with 2 different stamps"):
+        read_results(tmp_path / "bag")
+
+
 STAMP_NS = columns().index("stamp_ns")
 
 

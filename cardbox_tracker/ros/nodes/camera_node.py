@@ -162,8 +162,8 @@ class CameraNode(CardboxNode):
         while not self._stop.is_set():
             settings = self.parameters.value
             ok, image = self._capture.read()
-            failed = 0 if ok else failed + 1
             if not ok:
+                failed += 1
                 if settings.file and failed < MOST_DAMAGED:
                     continue
                 if not settings.file:
@@ -173,6 +173,7 @@ class CameraNode(CardboxNode):
                     )
                     self._stop.wait(_RETRY_S)
                 elif settings.loop and self._capture.set(cv2.CAP_PROP_POS_FRAMES, 0):
+                    failed = 0
                     continue
                 else:
                     self.diagnostics.wait_for(
@@ -183,8 +184,12 @@ class CameraNode(CardboxNode):
             if not self._locked and time.monotonic() - started_s >= settings.settle_s:
                 self._lock_exposure()
             if settings.file:
-                due_s = max(due_s + self._period_s, time.monotonic() - self._period_s)
+                # Damaged images take their time, too.
+                due_s = max(
+                    due_s + (1 + failed) * self._period_s, time.monotonic() - self._period_s
+                )
                 self._stop.wait(max(due_s - time.monotonic(), 0.0))
+            failed = 0
             try:
                 self._publish(np.asarray(image, dtype=np.uint8), settings)
             except Exception as error:
