@@ -227,7 +227,7 @@ class GivenPoints:
 
     def restart(self) -> None:
         """Count anew."""
-        self.images = self.used = self.beside = self._joined = 0
+        self.images = self.used = self.beside = self._joined = self._lying = 0
         self._reasons = Counter[str]()
         self._ends: list[Image] = []
 
@@ -270,6 +270,7 @@ class GivenPoints:
             self.beside += 1
             return None
         self.used += 1
+        self._lying += _lies(person)
         return person
 
     def all_in(self, image: Image) -> list[ImagePoints]:
@@ -279,6 +280,7 @@ class GivenPoints:
         found = self.persons(image, self._tolerance_ns)
         self._joined += bool(found)
         self.used += bool(found)
+        self._lying += bool(found) and all(map(_lies, found))
         return found
 
     @property
@@ -316,10 +318,15 @@ class GivenPoints:
 
     @property
     def remark(self) -> str:
-        """A warning about points beside the silhouettes; empty if there are none."""
-        if not self.beside:
+        """A warning about points beside the silhouettes, or of who lies; empty if all is well."""
+        if self.beside:
+            return f"the points of {self.beside} of {self.images} images are not used: {self._why}"
+        if 2 * self._lying <= self.used:
             return ""
-        return f"the points of {self.beside} of {self.images} images are not used: {self._why}"
+        return (
+            f"the points of {self._lying} of {self.used} images are of people who lie; if they do "
+            "not, columns and rows are exchanged: expected u, v"
+        )
 
     @property
     def _why(self) -> str:

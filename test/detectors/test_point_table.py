@@ -262,6 +262,21 @@ def test_points_beside_the_person_are_not_used_and_the_reason_is_said(
     assert found.at(Image(0, 0), NONE) is not None  # an empty silhouette contradicts nothing
 
 
+@pytest.mark.parametrize("people", [0, 2])
+def test_exchanged_points_are_told_without_a_silhouette(tmp_path: Path, people: int) -> None:
+    numbers = person(500, 240)
+    for is_exchanged in (False, True):
+        if is_exchanged:
+            numbers[0::3], numbers[1::3] = numbers[1::3], numbers[0::3]
+        entries = [{"image_id": i, "keypoints": numbers} for i in range(3)]
+        (tmp_path / "results.json").write_text(json.dumps(entries))
+        found = read(PointTable(tmp_path / "results.json", people))
+        for number in range(3):
+            image = Image(0, number)
+            assert found.all_in(image) if people else found.at(image, NONE)
+        assert ("columns and rows are exchanged" in found.remark) == is_exchanged
+
+
 def test_exchanged_points_in_the_middle_of_the_person_are_told() -> None:
     """The person stands at (240, 240), where columns and rows are alike."""
     shown = np.zeros((480, 640), np.uint8)
