@@ -38,9 +38,9 @@ from cardbox_tracker.commands.tracking import track
 from cardbox_tracker.common import interrupts
 from cardbox_tracker.common.errors import CardboxError, plain
 from cardbox_tracker.common.files import (
-    UnreadableFileError,
     body_beside,
     claimed_name,
+    foreign,
     read_regular,
     write_table,
 )
@@ -355,17 +355,13 @@ def _read_rows(path: Path) -> dict[str, Row]:
     """
     if not path.exists():
         return {}
-    try:
+    expected = "a summary of tracked recordings; remove it, or give another --output"
+    with foreign(path, CardboxError, expected):
         text = read_regular(path, _MOST_BYTES).decode()
         header, *cells = csv.reader(io.StringIO(text, newline=""))
         if tuple(header) != Row._fields:
             raise ValueError("it has other columns")
         rows = [Row(*row) for row in cells]
-    except (UnreadableFileError, csv.Error, ValueError, TypeError) as error:
-        raise CardboxError(
-            f"{path} is no summary of tracked recordings ({error}); remove it, or give another "
-            "--output"
-        ) from None
     return {row.recording: row for row in rows}
 
 

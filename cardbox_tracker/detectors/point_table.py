@@ -77,8 +77,10 @@ class PointTable(NamedTuple):
             path = path if camera is None else path / camera
             with foreign(path, CardboxError, "JSON of OpenPose or COCO"):
                 return self._read_json(path, size)
-        kind, persons = self._read_table(camera, size)
-        return GivenPoints(path, kind, persons)
+        with foreign(
+            path, CardboxError, f"a CSV file in UTF-8 with the columns {', '.join(COLUMNS)}"
+        ):
+            return GivenPoints(path, *self._read_table(camera, size))
 
     def _read_json(self, path: Path, size: Size | None) -> GivenPoints:
         if not path.is_dir() and path.suffix != ".json":
@@ -126,22 +128,13 @@ class PointTable(NamedTuple):
                         )
                     if score > 0.0 and joint in POINT_INDEX:
                         joints[joint] = u, v, score
-        except UnreadableFileError as error:
-            raise CardboxError(f"cannot read {self.path}: {error}; give a CSV file") from None
-        except OSError as error:
-            raise CardboxError(f"cannot read {self.path}: {error.strerror}") from None
-        except (UnicodeDecodeError, csv.Error) as error:
-            raise CardboxError(
-                f"{self.path} is not a table in UTF-8 ({quoted(str(error))}); give a CSV file with "
-                f"the columns {', '.join(COLUMNS)}"
-            ) from None
+        except (UnreadableFileError, UnicodeDecodeError, _TableError):
+            raise
         except (ValueError, TypeError, ArithmeticError) as error:
             raise CardboxError(
                 f"{self.path}, line {rows.line_num}, has a value that is no number "
                 f"({quoted(str(error))}); expected numbers in {column}, u, v and score"
             ) from None
-        except _TableError:
-            raise
         except CardboxError as error:
             raise CardboxError(f"{self.path}, line {rows.line_num}: {error}") from None
         persons: Persons = {}

@@ -348,7 +348,7 @@ def test_what_is_refused(track: Callable, tmp_path: Path, files: Path, cardbox: 
     (tmp_path / "out").mkdir(exist_ok=True)
     (tmp_path / "out" / SUMMARY).write_text("year,income\n")
     assert track(code=1) == []
-    track.done.assert_refused("track", "is no summary of tracked recordings")
+    track.done.assert_refused("track", "expected a summary of tracked recordings")
 
 
 def test_the_person_may_be_in_the_files_alone(

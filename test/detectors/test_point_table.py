@@ -154,7 +154,7 @@ def test_a_file_that_cannot_be_read_is_named(tmp_path: Path) -> None:
         PointTable(tmp_path / "missing.csv").read(None)
     binary = tmp_path / "binary.csv"
     binary.write_bytes(b"\xff\xfe\x00stamp_ns")
-    with pytest.raises(CardboxError, match=r"binary\.csv is not a table in UTF-8"):
+    with pytest.raises(CardboxError, match=r"binary\.csv.*a CSV file in UTF-8"):
         PointTable(binary).read(None)
 
 
