@@ -54,7 +54,7 @@ def unusual(k: NDArray[np.float64], width: int, height: int) -> str:
 
 def is_rectified_only(message: Any) -> bool:
     """Return whether a CameraInfo describes rectified images alone: K is zero, and P is not."""
-    return not info_array(message, "k").any() and info_array(message, "p").any()
+    return bool(not info_array(message, "k").any() and info_array(message, "p").any())
 
 
 def is_other_lens(message: Any, first: Any) -> bool:

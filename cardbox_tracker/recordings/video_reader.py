@@ -88,7 +88,7 @@ class VideoReader(Film):
             shape = oblong(capture)
             for image in _read(capture):
                 if image is None:
-                    damaged += 1
+                    self._damaged = max(self._damaged, damaged := damaged + 1)
                     continue
                 in_file_ms = capture.get(cv2.CAP_PROP_POS_MSEC)
                 first_ms = in_file_ms if number == 0 else first_ms
@@ -100,7 +100,6 @@ class VideoReader(Film):
                 decoded = with_square_pixels(image, shape)
                 number += 1
                 yield RecordedImage(stamp_ns, "", stamp_ns, partial(np.asarray, decoded))
-        self._damaged = damaged
         last_s = max(file_ns / 1e9, 1.0 / self._file_hz)
         if 0.0 < last_s * (number + _LACKING) / max(1, number - 1) < self._stated_s:
             self._end = f"ends after {number} images and {last_s:.1f} of {self._stated_s:.1f} s"
