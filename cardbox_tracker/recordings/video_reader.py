@@ -17,6 +17,7 @@ from cardbox_tracker.camera.encodings import MOST_PIXELS
 from cardbox_tracker.camera.film_headers import (
     MOST_DAMAGED,
     check_times,
+    codecs,
     oblong,
     shown_s,
     with_square_pixels,
@@ -64,7 +65,7 @@ class VideoReader(Film):
             if image is None:
                 raise BagError(
                     f"the video {self.path} has no image that can be decoded"
-                    f"{_codec(capture)}; expected {FORMATS}: film again, or convert it with "
+                    f"{codecs(self.path)}; expected {FORMATS}: film again, or convert it with "
                     "'ffmpeg -i INPUT -c:v libx264 OUTPUT.mp4'"
                 )
             if self._given.fps is None:
@@ -132,9 +133,9 @@ def _opened(path: Path) -> Iterator[cv2.VideoCapture]:
     try:
         if not capture.isOpened():
             raise BagError(
-                f"cannot read the recording {path}: expected a rosbag2, a folder of JPEG or PNG "
-                f"images, or a video ({FORMATS}) that is not empty, cut off or sound alone; "
-                "'ffmpeg -i INPUT OUTPUT.mp4' converts others"
+                f"cannot read the recording {path}{codecs(path)}: expected a rosbag2, a folder of "
+                f"JPEG or PNG images, or a video ({FORMATS}) that is not empty, cut off or sound alone; "
+                "'ffmpeg -i INPUT -c:v libx264 OUTPUT.mp4' converts others"
             )
         capture.set(cv2.CAP_PROP_ORIENTATION_AUTO, 1)
         yield capture
@@ -153,12 +154,6 @@ def _read(capture: cv2.VideoCapture) -> Iterator[NDArray[Any] | None]:
         yield from [None] * failed
         failed = 0
         yield image
-
-
-def _codec(capture: cv2.VideoCapture) -> str:
-    code = int(capture.get(cv2.CAP_PROP_FOURCC)).to_bytes(4, "little", signed=True)
-    name = code.decode("ascii", "replace").strip("\0 ")
-    return f" (its codec is {name})" if name.isprintable() and name else ""
 
 
 def _stated_s(path: Path, capture: cv2.VideoCapture) -> float:

@@ -13,6 +13,7 @@ import pytest
 import yaml
 
 from cardbox_tracker.camera.camera import Camera
+from cardbox_tracker.camera.film_headers import codecs
 from cardbox_tracker.common.errors import BagError, CameraError, CardboxError
 from cardbox_tracker.recordings.bag_writer import BagWriter
 from cardbox_tracker.recordings.given_camera import GivenCamera
@@ -234,6 +235,15 @@ def test_videos_without_images_are_refused(tmp_path: Path, kind: str) -> None:
         at = data.index(b"mdat")
         path.write_bytes(data[: at + 4] + bytes(len(data) - at - 4))
     with pytest.raises(BagError, match=r"expected .*video"), open_images(path, FOV):
+        pass
+
+
+def test_codecs_that_cannot_be_read_are_named(tmp_path: Path) -> None:
+    path = film(tmp_path / "film.mp4", pictures(20, 64, 48), 30.0)
+    path.write_bytes(path.read_bytes().replace(b"mp4v", b"av01"))
+    assert codecs(path) == " (it has the codecs av01)"
+    path.write_bytes(b"\x1aE\xdf\xa3\x86\x85V_AV1\x83\x86A_OPUS" + bytes(99))
+    with pytest.raises(BagError, match="codecs A_OPUS, V_AV1"), open_images(path, FOV):
         pass
 
 
