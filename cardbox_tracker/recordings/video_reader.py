@@ -134,8 +134,8 @@ def _opened(path: Path) -> Iterator[cv2.VideoCapture]:
         if not capture.isOpened():
             raise BagError(
                 f"cannot read the recording {path}{codecs(path)}: expected a rosbag2, a folder of "
-                f"JPEG or PNG images, or a video ({FORMATS}) that is not empty, cut off or sound alone; "
-                "'ffmpeg -i INPUT -c:v libx264 OUTPUT.mp4' converts others"
+                f"JPEG or PNG images, or a video ({FORMATS}) that is not empty, cut off or sound "
+                "alone; 'ffmpeg -i INPUT -c:v libx264 OUTPUT.mp4' converts others"
             )
         capture.set(cv2.CAP_PROP_ORIENTATION_AUTO, 1)
         yield capture
