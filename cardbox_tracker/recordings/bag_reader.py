@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import replace
 from functools import partial
 from itertools import islice
 from pathlib import Path
@@ -360,13 +359,11 @@ class BagReader:
                 f"{self.path} has 0 CameraInfo topics; expected one for {topic}."
                 " Record it with the images, or give --fov DEG or --calibration FILE"
             )
-        info, found = self._info(camera)
+        found = self._info(camera)[1]
         for image in self.images(topic):
             with suppress(EncodingError):
                 height, width = image.as_sent.shape[:2]
                 found.check_shape(width, height, topic, self.camera_info_topic(camera))
-                if not info.header.frame_id:
-                    found = replace(found, frame_id=image.frame_id)
                 break
         return self._given.rolled(found)
 

@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from cardbox_tracker.camera.camera import Rectifier
+from cardbox_tracker.camera.camera import OPTICAL_FRAME, Rectifier
 from cardbox_tracker.camera.depth_image import DepthImage
 from cardbox_tracker.camera.encodings import brightness_of
 from cardbox_tracker.common.errors import BagError, CameraError, CardboxError, EncodingError
@@ -197,6 +197,10 @@ class SilhouetteSource:
         calibration = bag.calibration(camera)
         self._pipeline = SilhouettePipeline(calibration, size, config, learning)
         self.frame_id = calibration.frame_id
+        if self.frame_id == OPTICAL_FRAME:
+            # A CameraInfo without a name is of the images' frame.
+            found = next((image.frame_id for image in bag.images(self.topic)), "")
+            self.frame_id = found.lstrip("/") or OPTICAL_FRAME
         self.camera = self._pipeline.camera
         self._full_size: tuple[int, int] | None = None
         self._full_rectifier: Rectifier | None = None
