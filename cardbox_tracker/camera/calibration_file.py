@@ -13,6 +13,7 @@ import numpy as np
 
 from cardbox_tracker.camera.camera import Calibration
 from cardbox_tracker.common.errors import CameraError, cut, quoted
+from cardbox_tracker.common.files import foreign
 from cardbox_tracker.common.small_yaml import SmallYamlError, parse_small_yaml, read_small_text
 
 _EXPECTED = "a file of camera_calibration, OpenCV's FileStorage or Kalibr"
@@ -42,31 +43,12 @@ def load_calibration(path: str | os.PathLike[str]) -> Calibration:
     Raises:
         CameraError: the file cannot be read or lacks a key; the text names the key.
     """
-    name = os.fspath(path)
-    try:
-        text = read_small_text(path)
-    except SmallYamlError as error:
-        raise CameraError(
-            f"cannot read the calibration {name}: {error}; give {_EXPECTED}"
-        ) from None
-    try:
-        data = _parsed(text)
-    except SmallYamlError as error:
-        raise CameraError(f"calibration {name}: {error}; give {_EXPECTED}") from None
-    if not isinstance(data, Mapping):
-        raise CameraError(f"calibration {name}: expected a mapping; give {_EXPECTED}")
-    try:
+    with foreign(path, CameraError, _EXPECTED):
+        data = _parsed(read_small_text(path))
+        if not isinstance(data, Mapping):
+            raise CameraError("it is no mapping")
         calibration = _of_kalibr(data) if _is_camchain(data) else _of_matrix(data)
-    except KeyError as error:
-        raise CameraError(
-            f"calibration {name}: missing key {error}; expected {_EXPECTED}"
-        ) from None
-    except (TypeError, ValueError, OverflowError, AttributeError) as error:
-        raise CameraError(f"calibration {name}: malformed value: {cut(str(error))}") from None
-    try:
         calibration.camera(calibration.width, calibration.height)
-    except CameraError as error:
-        raise CameraError(f"calibration {name}: {error}") from None
     return calibration
 
 

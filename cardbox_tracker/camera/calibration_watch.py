@@ -10,7 +10,7 @@ from dataclasses import replace
 from typing import Any
 
 from cardbox_tracker.camera.camera import Calibration
-from cardbox_tracker.camera.camera_info import calibration_from_info
+from cardbox_tracker.camera.camera_info import calibration_from_info, info_remark
 from cardbox_tracker.common.errors import CameraError
 
 LASTING = 30
@@ -28,6 +28,7 @@ class CalibrationWatch:
         seen: True once any CameraInfo arrived, valid or not.
         ignored: number of messages that were ignored.
         remark: description of a recently ignored message; empty if there is none.
+        doubt: what is unusual about the calibration in use; empty if nothing is.
     """
 
     def __init__(self, topic: str, image_topic: str, roll_rad: float = 0.0) -> None:
@@ -42,7 +43,7 @@ class CalibrationWatch:
         self.current: Calibration | None = None
         self.seen = False
         self.ignored = 0
-        self.remark = ""
+        self.remark = self.doubt = ""
         self._topic = topic
         self._image_topic = image_topic
         self._other: Calibration | None = None
@@ -81,7 +82,7 @@ class CalibrationWatch:
             )
             return False
         self.current, self._other, self._count = calibration, None, 0
-        self.remark = ""
+        self.remark, self.doubt = "", info_remark(message, self._topic)
         return True
 
     def _check(self, calibration: Calibration) -> None:

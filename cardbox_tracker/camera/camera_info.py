@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import numpy as np
@@ -10,6 +11,68 @@ from numpy.typing import NDArray
 from cardbox_tracker.camera.camera import Calibration
 from cardbox_tracker.camera.camera_checks import matrix_problem
 from cardbox_tracker.common.errors import CameraError
+
+# Farther from the middle, relative to the image, no lens has its principal point.
+_MOST_ASIDE = 0.15
+LEAST_DEG, MOST_DEG = 10.0, 160.0
+"""Range of fields of view across the image that cameras for people have, degrees."""
+# Pixels that are more oblong belong to a calibration of another size.
+_MOST_OBLONG = 0.1
+# Changes by an autofocus are smaller.
+_STEADY = 0.02
+
+
+def unusual(k: NDArray[np.float64], width: int, height: int) -> str:
+    """Return what no usual camera has in a matrix K (3, 3) of full images; empty if all is usual.
+
+    Args:
+        k: intrinsic matrix before regions of interest and binning.
+        width: width of the images, px.
+        height: height of the images, px.
+    """
+    focal, middle = k.diagonal()[:2], 2 * k[:2, 2] + 1
+    size = np.array([width, height])
+    fov_deg = 2 * math.degrees(math.atan(width / 2 / focal[0]))
+    found = []
+    if (np.abs(middle / size - 1) > 2 * _MOST_ASIDE).any():
+        found.append(
+            f"its principal point ({k[0, 2]:g}, {k[1, 2]:g}) px is far from the middle of images "
+            f"of {width}x{height}; it seems to be of images of about {middle[0]:.0f}x"
+            f"{middle[1]:.0f}"
+        )
+    if not LEAST_DEG <= fov_deg <= MOST_DEG:
+        found.append(f"its field of view is {fov_deg:.3g} degrees across")
+    if abs(focal[0] / focal[1] - 1) > _MOST_OBLONG:
+        found.append(f"its focal lengths {focal[0]:g} and {focal[1]:g} px differ")
+    if not found:
+        return ""
+    return (
+        f"the matrix K is unusual: {', and '.join(found)}. Unless the camera is so, results "
+        "are wrong: calibrate at the size that width and height state, before binning"
+    )
+
+
+def is_rectified_only(message: Any) -> bool:
+    """Return whether a CameraInfo describes rectified images alone: K is zero, and P is not."""
+    return bool(not info_array(message, "k").any() and info_array(message, "p").any())
+
+
+def is_other_lens(message: Any, first: Any) -> bool:
+    """Return whether the focal length or the principal point of two CameraInfo differ."""
+    k = info_array(first, "k")
+    return not np.allclose(info_array(message, "k"), k, rtol=_STEADY, atol=_STEADY * k[0])
+
+
+def info_remark(message: Any, info_topic: str) -> str:
+    """Return what a user should know of a valid CameraInfo; empty if all is usual."""
+    if is_rectified_only(message):
+        return (
+            f"K in {info_topic} is all zero, so its P is used: expected rectified images, without "
+            "distortion"
+        )
+    k = info_array(message, "k").reshape(3, 3)
+    found = unusual(k, int(message.width), int(message.height))
+    return f"{info_topic}: {found}" if found else ""
 
 
 def info_array(message: Any, name: str) -> NDArray[np.float64]:
@@ -21,13 +84,16 @@ def info_array(message: Any, name: str) -> NDArray[np.float64]:
 def calibration_from_info(message: Any, image_topic: str, info_topic: str) -> Calibration:
     """Return the calibration of the images that go with a sensor_msgs/CameraInfo.
 
-    The matrix is adapted to the region of interest and to binning. R and P are not used.
+    The matrix is adapted to the region of interest and to binning. R is not used, and P only if K
+    is all zero: the images are rectified then.
 
     Raises:
         CameraError: the camera is not calibrated, or K has impossible values; the text names both
             topics.
     """
-    k = info_array(message, "k").reshape(3, 3)
+    k, distortion = info_array(message, "k").reshape(3, 3), info_array(message, "d")
+    if is_rectified_only(message):
+        k, distortion = info_array(message, "p").reshape(3, 4)[:, :3].copy(), np.zeros(5)
     width, height = int(message.width), int(message.height)
     # Without a size, K cannot be checked; the size itself is refused later.
     problem = matrix_problem(k, width, height) if width > 0 < height else ""
@@ -36,7 +102,8 @@ def calibration_from_info(message: Any, image_topic: str, info_topic: str) -> Ca
             f"the camera that publishes {image_topic} is not calibrated: the matrix K in "
             f"{info_topic} {problem}. Calibrate it with camera_calibration, or give its driver "
             "the calibration file, so that the CameraInfo has its focal length. For a first look, "
-            "this package's camera node assumes an ideal lens with horizontal_fov_deg:=60.0"
+            "give the field of view: --fov DEG for a recording, or horizontal_fov_deg:=60.0 to "
+            "this package's camera node"
         )
     roi = message.roi
     if roi.width and roi.height and (roi.width, roi.height) != (width, height):
@@ -51,7 +118,7 @@ def calibration_from_info(message: Any, image_topic: str, info_topic: str) -> Ca
         width // binning_x,
         height // binning_y,
         k,
-        info_array(message, "d"),
+        distortion,
         message.distortion_model,
         message.header.frame_id,
     )

@@ -13,8 +13,8 @@ import yaml
 from cardbox_tracker.camera.camera import Camera
 from cardbox_tracker.camera.extrinsics import FARTHEST_M, Extrinsics
 from cardbox_tracker.common.errors import CameraError, cut
-from cardbox_tracker.common.files import atomic_path
-from cardbox_tracker.common.small_yaml import SmallYamlError, parse_small_yaml, read_small_text
+from cardbox_tracker.common.files import atomic_path, foreign
+from cardbox_tracker.common.small_yaml import parse_small_yaml, read_small_text
 
 _EXPECTED = "a camchain of Kalibr (YAML with T_cn_cnm1) or a camera group of aniposelib (TOML)"
 
@@ -37,20 +37,12 @@ def load_extrinsics(path: str | os.PathLike[str], cameras: Sequence[str]) -> dic
         CameraError: the file cannot be read, lacks a camera, or has no rigid transforms.
     """
     name = os.fspath(path)
-    try:
+    with foreign(path, CameraError, _EXPECTED):
         text = read_small_text(path)
-    except SmallYamlError as error:
-        raise CameraError(f"cannot read the extrinsics {name}: {error}; give {_EXPECTED}") from None
-    try:
         data = tomllib.loads(text) if name.endswith(".toml") else parse_small_yaml(text)
-    except (ValueError, RecursionError, SmallYamlError) as error:
-        # tomllib also raises these for very long numbers and for deeply nested lists.
-        raise CameraError(
-            f"the extrinsics {name} cannot be parsed: {cut(str(error))}; expected {_EXPECTED}"
-        ) from None
-    entries = data if isinstance(data, Mapping) else {}
-    entries = {str(key): entry for key, entry in entries.items() if isinstance(entry, Mapping)}
-    poses = _aniposelib(entries, name) if name.endswith(".toml") else _camchain(entries, name)
+        entries = data if isinstance(data, Mapping) else {}
+        entries = {str(key): entry for key, entry in entries.items() if isinstance(entry, Mapping)}
+        poses = _aniposelib(entries, name) if name.endswith(".toml") else _camchain(entries, name)
     missing = [camera for camera in cameras if camera.strip("/") not in poses]
     if missing:
         raise CameraError(

@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import os
+import re
 import struct
 from collections.abc import Container, Iterator
+from contextlib import suppress
+from itertools import islice
 from pathlib import Path
 from typing import Any, BinaryIO
 
@@ -16,6 +19,12 @@ from cardbox_tracker.common.errors import CameraError
 
 # More than the longest header of a film or a track.
 _MOST_HEADER_BYTES = 128
+_MOST_START_BYTES = 4096
+_TO_CODEC = b"moov", b"trak", b"mdia", b"minf", b"stbl"
+MOST_BOXES = 10_000
+"""Boxes of a film that are read; its header is among the first or last ones of a few."""
+MOST_DAMAGED = 100
+"""Damaged images in a row; a film that has ended fails as often as it is read."""
 # Pixels that are less oblong count as square, px / px.
 _SQUARE = 0.01
 _MOST_OBLONG = 4.0
@@ -42,6 +51,19 @@ def check_times(path: Path, remedy: str) -> None:
             f"{path} is a raw {'H.264 or H.265' if is_h26x else 'JPEG'} stream, which has neither "
             f"times nor a rate; {remedy}"
         )
+
+
+def codecs(path: Path) -> str:
+    """Return a remark with the codecs that an MP4, MOV, MKV or WebM names; empty if unknown."""
+    with suppress(OSError, struct.error, RecursionError), path.open("rb") as file:
+        names = re.findall(rb"\b[AV]_[A-Z0-9_/]+", file.read(_MOST_START_BYTES))
+        for kind, at, _ in islice(boxes(file, _TO_CODEC), MOST_BOXES):
+            if kind == b"stsd":
+                file.seek(at + 12)
+                names.append(file.read(4))
+        shown = {ascii(name.decode("latin-1"))[1:-1] for name in names}
+        return f" (it has the codecs {', '.join(sorted(shown)[:9])})" if shown else ""
+    return ""
 
 
 def oblong(capture: cv2.VideoCapture) -> float:
@@ -72,7 +94,7 @@ def shown_s(path: Path) -> float | None:
     timescale, times = 0, [0]
     try:
         with path.open("rb") as file:
-            for kind, at, _ in boxes(file, (b"moov", b"trak")):
+            for kind, at, _ in islice(boxes(file, (b"moov", b"trak")), MOST_BOXES):
                 file.seek(at)
                 header = file.read(_MOST_HEADER_BYTES)
                 if kind == b"mvhd":

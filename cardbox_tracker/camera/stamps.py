@@ -15,6 +15,8 @@ WINDOW = 120
 _PAUSE_NS = 2_000_000_000
 # The network does not reorder messages over this time, so the source was restarted.
 _RESTART_NS = 1_000_000_000
+# A clock that is set forward by more, while the recorder's goes on.
+_CLOCK_SET_NS = 10_000_000_000
 # After this many consecutive images of one clock the other clock is forgotten.
 _PATIENCE = 5
 # The period is known from this number of spacings on.
@@ -229,8 +231,8 @@ class StreamStatistics:
 class RecordedStamps:
     """Times of a recorded stream, which always increase.
 
-    Images are left out as in a live stream. Where stamps are missing or go back, the recorder's
-    clock goes on.
+    Images are left out as in a live stream. Where stamps are missing, go back, or jump forward by
+    more than 10 s while the recorder waits for less than 2 s, the recorder's clock goes on.
 
     Attributes:
         statistics: order and losses by the stamps.
@@ -241,6 +243,7 @@ class RecordedStamps:
         self.statistics = StreamStatistics(remembered=None)
         self._last: tuple[int, int] | None = None
         self._ahead_ns = 0
+        self._jumps_ns: list[int] = []
 
     def add(self, stamp_ns: int, recorded_ns: int) -> int | None:
         """Return the time of the next message, ns; None if it is to be left out.
@@ -255,8 +258,12 @@ class RecordedStamps:
         is_unstamped = order is StampOrder.UNSTAMPED
         time_ns = recorded_ns if is_unstamped else stamp_ns + self._ahead_ns
         is_back = is_unstamped or order is StampOrder.RESTART
-        if self._last is not None and (is_back or time_ns <= self._last[0]):
-            before_ns, recorded_before_ns = self._last
+        before_ns, recorded_before_ns = self._last or (time_ns, recorded_ns)
+        ahead_ns, waited_ns = time_ns - before_ns, recorded_ns - recorded_before_ns
+        is_set = not is_unstamped and ahead_ns - waited_ns > _CLOCK_SET_NS and waited_ns < _PAUSE_NS
+        if is_set:
+            self._jumps_ns.append(ahead_ns - waited_ns)
+        if self._last is not None and (is_back or is_set or time_ns <= before_ns):
             time_ns = before_ns + max(recorded_ns - recorded_before_ns, 1)
             if not is_unstamped:
                 self._ahead_ns = time_ns - stamp_ns
@@ -265,4 +272,9 @@ class RecordedStamps:
 
     def remarks(self) -> list[str]:
         """Return texts on all faults, as :meth:`StreamStatistics.remarks`."""
-        return list(self.statistics.remarks().values())
+        jumps = [
+            f"the stamps jump forward by {jump_ns / 1e9:.0f} s while the recorder's clock goes on: "
+            "the clock of the camera's computer was set. Times go on with the recorder's clock"
+            for jump_ns in self._jumps_ns[:1]
+        ]
+        return [*self.statistics.remarks().values(), *jumps]

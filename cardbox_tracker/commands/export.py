@@ -82,6 +82,8 @@ def run(options: argparse.Namespace) -> None:
         f"exported {seen} of {images} images, {motion.state.count(UNCERTAIN)} of them uncertain; "
         f"{images - seen} without a posture are gaps"
     )
+    if images == 1:
+        print("a single image has no rate: 1 Hz is written")
     others = seen - int(motion.is_seen.sum())
     if others:
         print(f"{others} of these images were tracked with another body and are gaps, too")

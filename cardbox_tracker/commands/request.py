@@ -533,6 +533,8 @@ def recording_request(options: argparse.Namespace, problems: Problems) -> Record
     names = problems.caught(lambda: tuple(camera_names(options.cameras)), names)
     for fault in input_faults(path, silhouettes, names, depth, camera):
         problems.add(fault)
+    if options.extrinsics is not None and len(names) < 2:
+        problems.add("--extrinsics has no effect with one camera: name several with --cameras")
     return RecordingRequest(path, silhouettes, points, names, options.extrinsics, depth, camera)
 
 
@@ -723,6 +725,9 @@ def _person(
     others: list[BodyModel] = []
     if options.people is None and options.stature is not None and len(options.stature) > 1:
         problems.add("--stature has several values: give one, or --people")
+    count = len(options.stature or ())
+    if options.people and count > options.people:
+        problems.add(f"--stature has {count} values for --people {options.people}: leave some out")
     if options.people is not None and options.model is not None:
         problems.add("--people takes the stature of each person: give --stature, not --model")
     is_of_scene = scene is not None and bool(scene.people) and options.stature is None

@@ -38,9 +38,9 @@ from cardbox_tracker.commands.tracking import track
 from cardbox_tracker.common import interrupts
 from cardbox_tracker.common.errors import CardboxError, plain
 from cardbox_tracker.common.files import (
-    UnreadableFileError,
     body_beside,
     claimed_name,
+    foreign,
     read_regular,
     write_table,
 )
@@ -355,17 +355,13 @@ def _read_rows(path: Path) -> dict[str, Row]:
     """
     if not path.exists():
         return {}
-    try:
+    expected = "a summary of tracked recordings; remove it, or give another --output"
+    with foreign(path, CardboxError, expected):
         text = read_regular(path, _MOST_BYTES).decode()
         header, *cells = csv.reader(io.StringIO(text, newline=""))
         if tuple(header) != Row._fields:
             raise ValueError("it has other columns")
         rows = [Row(*row) for row in cells]
-    except (UnreadableFileError, csv.Error, ValueError, TypeError) as error:
-        raise CardboxError(
-            f"{path} is no summary of tracked recordings ({error}); remove it, or give another "
-            "--output"
-        ) from None
     return {row.recording: row for row in rows}
 
 
@@ -422,13 +418,17 @@ def digest_of_inputs(request: TrackingRequest, formats: Sequence[str], program: 
     digest = hashlib.sha256(f"{program} {formats}".encode())
     for value in _values(replace(asked, files=TrackFiles())):
         is_file = isinstance(value, Path) and value.is_file()
-        digest.update(b"\0" + (value.read_bytes() if is_file else repr(value).encode()))
+        if not is_file:
+            digest.update(b"\0" + repr(value).encode())
+            continue
+        with value.open("rb") as file:
+            digest.update(b"\0" + hashlib.file_digest(file, "sha256").digest())
     points = request.recording.points
     folders = [points.path] if isinstance(points, PointTable) and points.path.is_dir() else []
-    for file in [file for folder in (path, *folders) for file in _files_of(folder)]:
-        found = file.stat()
+    for entry in [file for folder in (path, *folders) for file in _files_of(folder)]:
+        found = entry.stat()
         # Names inside of a recording may be no UTF-8.
-        digest.update(b"\0" + os.fsencode(file.name))
+        digest.update(b"\0" + os.fsencode(entry.name))
         digest.update(f" {found.st_size} {found.st_mtime_ns}".encode())
     return digest.hexdigest()[:32]
 

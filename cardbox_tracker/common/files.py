@@ -18,7 +18,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import BinaryIO
 
-from cardbox_tracker.common.errors import CardboxError
+from cardbox_tracker.common.errors import CardboxError, cut
 
 # Part of the names of temporary files, which can remain after a crash.
 _MARK = ".unfinished-"
@@ -28,6 +28,36 @@ _FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO)
 
 class UnreadableFileError(CardboxError):
     """A file cannot be opened, is not regular or too large; the text does not name the file."""
+
+
+@contextmanager
+def foreign(
+    path: str | os.PathLike[str], kind: type[CardboxError], expected: str
+) -> Iterator[None]:
+    """Turn any error of a reader of files that others wrote into the package's own.
+
+    Parsers of foreign formats can raise errors of any type.
+
+    Args:
+        path: the file, which the text names.
+        kind: type of the error.
+        expected: what the file should be, for the text.
+
+    Raises:
+        CardboxError: reading failed; one that names the file stays as it is.
+    """
+    name = os.fspath(path)
+    try:
+        yield
+    except Exception as error:
+        if isinstance(error, CardboxError) and name in str(error):
+            raise
+        reason = " ".join(str(getattr(error, "strerror", None) or error).split())
+        if isinstance(error, KeyError):
+            reason = f"missing key {reason}"
+        elif not isinstance(error, CardboxError):
+            reason = cut(reason) or type(error).__name__
+        raise kind(f"cannot read {name}: {reason}; expected {expected}") from None
 
 
 @contextmanager

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import asyncio
 import ctypes
+import logging
 import os
 import signal
 import sys
@@ -16,7 +18,7 @@ from typing import TypeVar
 from warnings import catch_warnings, simplefilter
 
 from cardbox_tracker.common import interrupts
-from cardbox_tracker.common.errors import CardboxError
+from cardbox_tracker.common.errors import CardboxError, cut
 
 A = TypeVar("A")
 R = TypeVar("R")
@@ -90,18 +92,31 @@ def _cluster(scheduler: str) -> Iterator[None]:
     """
     try:
         from distributed import Client
+        from distributed.comm import connect
     except ImportError as error:
         raise CardboxError(
             f"--scheduler needs Dask ({error}); install it with pip install '.[cluster]' in the "
             "checkout"
         ) from None
+
+    async def greet() -> None:
+        # The client waits for longer if a server is silent.
+        comm = await asyncio.wait_for(connect(scheduler, timeout=_CONNECT_S), _CONNECT_S)
+        await comm.close()
+
+    # Dask logs what else a server answers.
+    logging.disable()
     try:
+        asyncio.run(greet())
         client = Client(scheduler, timeout=_CONNECT_S, set_as_default=True)
-    except (OSError, ValueError) as error:
+    except Exception as error:
+        # What other servers answer raises errors of any type.
         raise CardboxError(
-            f"no Dask scheduler answers at {scheduler}: {error}; give an address such as "
-            "tcp://HOST:8786, which 'dask scheduler' prints"
+            f"no Dask scheduler answers at {scheduler}: {cut(str(error)) or type(error).__name__}; "
+            "give an address such as tcp://HOST:8786, which 'dask scheduler' prints"
         ) from None
+    finally:
+        logging.disable(logging.NOTSET)
     with client:
         threads = client.nthreads()
         if not threads or max(threads.values()) > 1:

@@ -14,12 +14,14 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from cardbox_tracker.common.errors import CardboxError, quoted
-from cardbox_tracker.common.files import UnreadableFileError, read_regular
+from cardbox_tracker.common.errors import CardboxError
+from cardbox_tracker.common.files import foreign, read_regular
 from cardbox_tracker.detectors.image_points import COCO_NAMES
 from cardbox_tracker.detectors.point_checks import NamedPoint
 
 _MOST_BYTES, _MOST_OF_IMAGE = 256 * 1024 * 1024, 16 * 1024 * 1024
+# Some ten hours of one person.
+_MOST_PARTS = 4_000_000
 _HAND_POINTS, _INDEX, _LITTLE_FINGER = 21, 5, 17
 # A point that COCO's annotators saw, and one that they guessed.
 _VISIBLE, _GUESSED = 2, 1
@@ -116,7 +118,7 @@ def coco_people(file: Path) -> Iterator[FoundPerson]:
             "file of COCO, or the folder of OpenPose's files"
         )
     names = {}
-    for number, image in enumerate(content.get("images", ()) if is_annotated else ()):
+    for number, image in enumerate((content.get("images") or ()) if is_annotated else ()):
         place = f"{file}, image {number}"
         names[str(_value(image, "id", place))] = Path(str(_value(image, "file_name", place))).name
     seen = set[float]()
@@ -140,12 +142,12 @@ def coco_people(file: Path) -> Iterator[FoundPerson]:
 
 
 def _content(file: Path, most_bytes: int) -> Any:
-    try:
-        return json.loads(read_regular(file, most_bytes))
-    except UnreadableFileError as error:
-        raise CardboxError(f"cannot read {file}: {error}; give a JSON file") from None
-    except (ValueError, RecursionError) as error:
-        raise CardboxError(f"{file} is no JSON: {quoted(str(error))}") from None
+    with foreign(file, CardboxError, "JSON of OpenPose or COCO"):
+        data = read_regular(file, most_bytes)
+        # Empty objects take thirty times their bytes.
+        if data.count(b"{") + data.count(b"[") > _MOST_PARTS:
+            raise CardboxError(f"it has more than {_MOST_PARTS} lists and objects")
+        return json.loads(data)
 
 
 def _value(entry: Any, name: str, place: str) -> Any:

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from cardbox_tracker.camera.camera import Calibration
 from cardbox_tracker.common.errors import CardboxError, quoted
-from cardbox_tracker.common.files import UnreadableFileError, regular_file
+from cardbox_tracker.common.files import UnreadableFileError, foreign, regular_file
 from cardbox_tracker.detectors.image_points import POINT_INDEX, ImagePoints
 from cardbox_tracker.detectors.keypoint_json import coco_people, openpose_people
 from cardbox_tracker.detectors.person_choice import LEAST_INSIDE, inside, near_person, person_in
@@ -74,9 +74,13 @@ class PointTable(NamedTuple):
         """
         path = self.path
         if path.suffix == ".json" or path.is_dir():
-            return self._read_json(path if camera is None else path / camera, size)
-        kind, persons = self._read_table(camera, size)
-        return GivenPoints(path, kind, persons)
+            path = path if camera is None else path / camera
+            with foreign(path, CardboxError, "JSON of OpenPose or COCO"):
+                return self._read_json(path, size)
+        with foreign(
+            path, CardboxError, f"a CSV file in UTF-8 with the columns {', '.join(COLUMNS)}"
+        ):
+            return GivenPoints(path, *self._read_table(camera, size))
 
     def _read_json(self, path: Path, size: Size | None) -> GivenPoints:
         if not path.is_dir() and path.suffix != ".json":
@@ -124,22 +128,13 @@ class PointTable(NamedTuple):
                         )
                     if score > 0.0 and joint in POINT_INDEX:
                         joints[joint] = u, v, score
-        except UnreadableFileError as error:
-            raise CardboxError(f"cannot read {self.path}: {error}; give a CSV file") from None
-        except OSError as error:
-            raise CardboxError(f"cannot read {self.path}: {error.strerror}") from None
-        except (UnicodeDecodeError, csv.Error) as error:
-            raise CardboxError(
-                f"{self.path} is not a table in UTF-8 ({quoted(str(error))}); give a CSV file with "
-                f"the columns {', '.join(COLUMNS)}"
-            ) from None
+        except (UnreadableFileError, UnicodeDecodeError, _TableError):
+            raise
         except (ValueError, TypeError, ArithmeticError) as error:
             raise CardboxError(
                 f"{self.path}, line {rows.line_num}, has a value that is no number "
                 f"({quoted(str(error))}); expected numbers in {column}, u, v and score"
             ) from None
-        except _TableError:
-            raise
         except CardboxError as error:
             raise CardboxError(f"{self.path}, line {rows.line_num}: {error}") from None
         persons: Persons = {}
@@ -225,7 +220,7 @@ class GivenPoints:
 
     def restart(self) -> None:
         """Count anew."""
-        self.images = self.used = self.beside = self._joined = 0
+        self.images = self.used = self.beside = self._joined = self._lying = 0
         self._reasons = Counter[str]()
         self._ends: list[Image] = []
 
@@ -268,6 +263,7 @@ class GivenPoints:
             self.beside += 1
             return None
         self.used += 1
+        self._lying += _lies(person)
         return person
 
     def all_in(self, image: Image) -> list[ImagePoints]:
@@ -277,6 +273,7 @@ class GivenPoints:
         found = self.persons(image, self._tolerance_ns)
         self._joined += bool(found)
         self.used += bool(found)
+        self._lying += bool(found) and all(map(_lies, found))
         return found
 
     @property
@@ -314,10 +311,15 @@ class GivenPoints:
 
     @property
     def remark(self) -> str:
-        """A warning about points beside the silhouettes; empty if there are none."""
-        if not self.beside:
+        """A warning about points beside the silhouettes, or of who lies; empty if all is well."""
+        if self.beside:
+            return f"the points of {self.beside} of {self.images} images are not used: {self._why}"
+        if 2 * self._lying <= self.used:
             return ""
-        return f"the points of {self.beside} of {self.images} images are not used: {self._why}"
+        return (
+            f"the points of {self._lying} of {self.used} images are of people who lie; if they do "
+            "not, columns and rows are exchanged: expected u, v"
+        )
 
     @property
     def _why(self) -> str:

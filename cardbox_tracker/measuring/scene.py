@@ -14,8 +14,8 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 from cardbox_tracker.common.errors import CardboxError, quoted
-from cardbox_tracker.common.files import atomic_path
-from cardbox_tracker.common.small_yaml import SmallYamlError, parse_small_yaml, read_small_text
+from cardbox_tracker.common.files import atomic_path, foreign
+from cardbox_tracker.common.small_yaml import parse_small_yaml, read_small_text
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.model_file import dumps_body_model, loads_body_model
 
@@ -125,14 +125,8 @@ def load_scene(path: str | os.PathLike[str]) -> Scene:
     Raises:
         CardboxError: the file cannot be read or is no scene; the text names what is wrong.
     """
-    try:
-        data = parse_small_yaml(read_small_text(path))
-        return _scene_of(data)
-    except (SmallYamlError, ValueError) as error:
-        raise CardboxError(
-            f"cannot read the scene {os.fspath(path)}: {error}; give a file OUT.scene.yaml that "
-            "'cardbox track' has written"
-        ) from None
+    with foreign(path, CardboxError, "a file OUT.scene.yaml that 'cardbox track' has written"):
+        return _scene_of(parse_small_yaml(read_small_text(path)))
 
 
 def _scene_of(data: Any) -> Scene:

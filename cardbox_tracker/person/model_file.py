@@ -10,7 +10,7 @@ import textwrap
 from typing import Any
 
 from cardbox_tracker.common.errors import BodyModelError, CardboxError, cut, quoted
-from cardbox_tracker.common.files import atomic_path
+from cardbox_tracker.common.files import atomic_path, foreign
 from cardbox_tracker.common.small_yaml import SmallYamlError, parse_small_yaml, read_small_text
 from cardbox_tracker.person.appearance import Appearance
 from cardbox_tracker.person.model import (
@@ -109,13 +109,9 @@ def load_body_model(path: str | os.PathLike[str]) -> BodyModel:
     Raises:
         BodyModelError: the file cannot be read or is no body model.
     """
-    try:
+    expected = "the body model that 'cardbox initialize' or the initializer node wrote"
+    with foreign(path, BodyModelError, expected):
         text = read_small_text(path)
-    except SmallYamlError as error:
-        raise BodyModelError(
-            f"cannot read the body model {os.fspath(path)}: {error}; give the file that "
-            "'cardbox initialize' or the initializer node wrote"
-        ) from None
     return loads_body_model(text, source=os.fspath(path))
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from contextlib import suppress
 from functools import partial
 from itertools import islice
@@ -19,6 +19,7 @@ from rosbags.typesys import Stores, get_typestore
 
 from cardbox_tracker.camera.calibration_watch import CalibrationWatch
 from cardbox_tracker.camera.camera import Calibration
+from cardbox_tracker.camera.camera_info import is_other_lens
 from cardbox_tracker.camera.encodings import (
     SentImage,
     decode_as_sent,
@@ -51,6 +52,13 @@ _MOST_PERIOD_NS = 2_000_000_000
 _REPAIR = "'ros2 bag reindex' remakes lost metadata, 'mcap recover' a file that was cut off"
 
 
+REPAIR_ROS1 = (
+    "'rosbag reindex' of ROS 1 mends what a recorder left open, after the rest of the name behind "
+    "'.bag' is removed"
+)
+"""What to do with a bag of ROS 1 whose recorder was killed, for texts."""
+
+
 class BagMessage(NamedTuple):
     """One message: its topic, recording time, type, and CDR bytes."""
 
@@ -79,6 +87,7 @@ class BagReader:
         self._stamps: dict[str, RecordedStamps] = {}
         self._levels: dict[str, Levels] = {}
         self._skipped: dict[str, str] = {}
+        self._infos: dict[str | None, tuple[Any, Calibration]] = {}
 
     def __enter__(self) -> BagReader:
         """Open the recording."""
@@ -112,9 +121,11 @@ class BagReader:
         except Exception as error:
             # rosbags does not catch the errors of its parsers, which can be of any type.
             self.__exit__()
+            of_ros1 = self.path.suffix == ".bag"
+            kind = "ROS 1 bag" if of_ros1 else "rosbag2 recording (mcap or sqlite3)"
             raise BagError(
-                f"cannot read the recording {self.path}: {_reason(error)}; give a rosbag2 "
-                f"recording (mcap or sqlite3) that was closed properly: {_REPAIR}"
+                f"cannot read the recording {self.path}: {_reason(error)}; give a {kind} that was "
+                f"closed properly: {REPAIR_ROS1 if of_ros1 else _REPAIR}"
             ) from None
         if self._reader.message_count == 0:
             self.__exit__()
@@ -289,15 +300,29 @@ class BagReader:
     def _info(self, camera: str | None) -> tuple[Any, Calibration]:
         """Return the first CameraInfo of a calibrated camera, and its calibration.
 
+        All others are compared with it once, for the remarks.
+
         Raises:
             BagError: the recording has no CameraInfo.
             CameraError: the camera is not calibrated; the text names both topics.
         """
+        if camera in self._infos:
+            return self._infos[camera]
         topic, fault = self.camera_info_topic(camera), None
         watch = CalibrationWatch(topic, self.image_topic(camera))
         for number, message in enumerate(self.messages([topic])):
             info = self.deserialize(message)
             try:
+                if camera in self._infos:
+                    if is_other_lens(info, self._infos[camera][0]):
+                        self._skipped[f"{topic} changes"] = (
+                            f"the calibration on {topic} changes at "
+                            f"{(message.time_ns - self.start_ns) / 1e9:.1f} s, as by a zoom. The "
+                            "first one is used for all images, so results from there on are wrong: "
+                            "track what comes before with --end, and record the rest apart"
+                        )
+                        break
+                    continue
                 watch.see(info)
             except CameraError as error:
                 fault = fault or error
@@ -309,7 +334,11 @@ class BagReader:
                         f"the first {number} messages on {topic} are left out, because they have "
                         f"no calibration: {fault}"
                     )
-                return info, watch.current
+                self._infos[camera] = info, watch.current
+                if watch.doubt:
+                    self._skipped[f"{topic} doubt"] = watch.doubt
+        if camera in self._infos:
+            return self._infos[camera]
         if fault is not None:
             raise fault
         raise BagError(f"{self.path} has no message on {topic}; record it with the images")
@@ -346,7 +375,7 @@ class BagReader:
                 return self._given.calibrated(self.path, width, height, image.frame_id)
         raise BagError(f"{self.path} has no image on {topic} that can be decoded; record it again")
 
-    def left_out(self, topic: str) -> list[str]:
+    def left_out(self, topic: str, used: Collection[str] = ()) -> list[str]:
         """Return the images that were not used, with the reasons, and other image topics."""
         counts = self._stamps[topic].statistics.counts if topic in self._stamps else {}
         found = [
@@ -355,6 +384,7 @@ class BagReader:
             if count and not order.is_usable
         ]
         others = sorted(n for n, kind in self.topics.items() if kind in IMAGE_TYPES and n != topic)
+        others = [name for name in others if name not in used]
         return found + [f"the images on {name}" for name in others]
 
     @property

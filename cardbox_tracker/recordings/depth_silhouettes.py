@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 from collections.abc import Iterator
 from typing import Any, NamedTuple
@@ -16,7 +17,11 @@ from cardbox_tracker.detectors.point_table import PointTable
 from cardbox_tracker.recordings.bag_reader import IMAGE_TYPES, BagReader
 from cardbox_tracker.recordings.image_recording import ImageRecording
 from cardbox_tracker.recordings.silhouettes import RecordedFrame, SilhouetteSource
-from cardbox_tracker.segmentation.depth_silhouette import WITHIN_LIMITS_M, silhouette_within
+from cardbox_tracker.segmentation.depth_silhouette import (
+    WITHIN_LIMITS_M,
+    nearest_m,
+    silhouette_within,
+)
 
 
 def depth_images(
@@ -83,7 +88,7 @@ class DepthSilhouetteSource(SilhouetteSource):
         self._open(bag, bag.working_size, camera)
         self._find_points(points, camera)
         self._within, self.depth_topic = within, within.topic
-        self._without = 0
+        self._without, self._nearest_m, self._is_near = 0, math.inf, False
 
     def frames(self, start_s: float = 0.0, end_s: float = float("inf")) -> Iterator[RecordedFrame]:
         """Yield every image from ``start_s`` to ``end_s`` that has a depth image, in order."""
@@ -103,6 +108,8 @@ class DepthSilhouetteSource(SilhouetteSource):
                 self._without += 1
                 continue
             silhouette = silhouette_within(measured[1], self._within.metres)
+            self._is_near |= bool(silhouette.any())
+            self._nearest_m = min(self._nearest_m, nearest_m(measured[1]))
             found = self._points(seen, silhouette)
             pictures = brightness_of(image), silhouette, image
             yield RecordedFrame(stamp_ns, time_s, *pictures, measured[1], found, recorded)
@@ -111,10 +118,18 @@ class DepthSilhouetteSource(SilhouetteSource):
     @property
     def remarks(self) -> list[str]:
         """Warnings about the images read so far."""
-        if not self._without:
-            return super().remarks
-        without = (
-            f"{self._without} images have no depth image of the same time on "
-            f"{self._within.topic} and are skipped"
-        )
-        return [*super().remarks, without]
+        found, topic = super().remarks, self._within.topic
+        if self._without:
+            found.append(
+                f"{self._without} images have no depth image of the same time on {topic} and are "
+                "skipped"
+            )
+        if self._nearest_m == math.inf and self._used > self._without:
+            found.append(f"{topic} has no depth: all values are 0 or below, or not finite")
+        elif not self._is_near and self._nearest_m < math.inf:
+            found.append(
+                f"nothing on {topic} is nearer than --within {self._within.metres:g} m: the "
+                f"nearest depths are {self._nearest_m:.1f} m, if 16UC1 is in millimetres and 32FC1 "
+                "in metres"
+            )
+        return found

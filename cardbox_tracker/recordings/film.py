@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from pathlib import Path
 
 from cardbox_tracker.camera.camera import Calibration
@@ -55,7 +56,7 @@ class Film:
         self.image_topic(camera)
         return self._given.calibrated(self.path, *self._size, stored=self._stored, file=self._file)
 
-    def left_out(self, topic: str) -> list[str]:
+    def left_out(self, topic: str, used: Collection[str] = ()) -> list[str]:
         """Return what is no image; see ``ImageRecording``."""
         return []
 

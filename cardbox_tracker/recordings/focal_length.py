@@ -7,13 +7,15 @@ Images state it as EXIF ``FocalLengthIn35mmFilm``. Films have it among their Qui
 from __future__ import annotations
 
 import struct
+import warnings
 from collections.abc import Iterator
 from io import BytesIO
+from itertools import islice
 from pathlib import Path
 
 from PIL import Image
 
-from cardbox_tracker.camera.film_headers import boxes
+from cardbox_tracker.camera.film_headers import MOST_BOXES, boxes
 
 FILM_DIAGONAL_MM = 43.27
 """Diagonal of the image on 35 mm film, to which the equivalent focal length belongs."""
@@ -35,28 +37,22 @@ def equivalent_mm(path: Path) -> float | None:
         with path.open("rb") as file:
             is_image = file.read(4).startswith(_IMAGES)
         found = _of_image(path) if is_image else _of_film(path)
-    except (
-        OSError,
-        ValueError,
-        struct.error,
-        SyntaxError,
-        RecursionError,
-        Image.DecompressionBombError,
-    ):
-        # A damaged file says nothing; those who decode it say so.
+    except Exception:
+        # Parsers of foreign formats raise errors of any type. A damaged file says nothing; those
+        # who decode it say so.
         return None
     return found if found is not None and _SHORTEST_MM <= found <= _LONGEST_MM else None
 
 
 def _of_image(path: Path) -> float | None:
-    with Image.open(path) as image:
+    with warnings.catch_warnings(action="ignore"), Image.open(path) as image:
         value = image.getexif().get_ifd(_EXIF_IFD).get(_EXIF_EQUIVALENT)
     return None if value is None else float(value)
 
 
 def _of_film(path: Path) -> float | None:
     with path.open("rb") as film:
-        for kind, begin, end in boxes(film, _CONTAINERS):
+        for kind, begin, end in islice(boxes(film, _CONTAINERS), MOST_BOXES):
             if kind != b"meta":
                 continue
             film.seek(begin)

@@ -8,6 +8,7 @@ from pathlib import Path
 
 from cardbox_tracker.camera.calibration_file import load_calibration
 from cardbox_tracker.camera.camera import Calibration
+from cardbox_tracker.camera.camera_info import LEAST_DEG, MOST_DEG, unusual
 from cardbox_tracker.common.errors import CameraError
 from cardbox_tracker.recordings.focal_length import FILM_DIAGONAL_MM, equivalent_mm
 
@@ -67,8 +68,11 @@ class GivenCamera:
         """
         if self.calibration is not None:
             load_calibration(self.calibration)
-        elif self.fov_deg is not None:
-            Calibration.of_fov(4, 3, self.fov_deg)
+        elif self.fov_deg is not None and not LEAST_DEG <= self.fov_deg <= MOST_DEG:
+            raise CameraError(
+                f"the field of view is {self.fov_deg:g} degrees; expected {LEAST_DEG:g} to "
+                f"{MOST_DEG:g} degrees across the width of the image: {FOV_HINT}"
+            )
 
     def calibrated(
         self,
@@ -117,7 +121,9 @@ class GivenCamera:
     def remarks(self, file: Path, width: int, height: int) -> list[str]:
         """Return what was assumed of the field of view of a film or image, or seems to be wrong."""
         if self.calibration is not None:
-            return []
+            given = load_calibration(self.calibration)
+            found = unusual(given.k, given.width, given.height)
+            return [f"{self.calibration}: {found}"] if found else []
         if self.fov_deg is None:
             fov_deg, is_told = _fov_deg(file, width, height)
             if is_told:

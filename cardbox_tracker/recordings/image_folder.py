@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
+from collections import Counter
+from collections.abc import Collection, Iterator, Sequence
 from functools import partial
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -41,6 +43,25 @@ def _by_number(path: Path) -> list[tuple[int, str]]:
     return [(int(part) if part.isdecimal() else -1, part) for part in parts]
 
 
+def _numbered(files: Sequence[Path]) -> list[int]:
+    """Return the place of each image in an even sequence, counted from 0.
+
+    Images that a recorder dropped are missing if all names have one number that mostly grows by the
+    same step; otherwise the images follow each other.
+    """
+    parts = [_by_number(path) for path in files]
+    if len({len(part) for part in parts}) == 1:
+        varying = [column for column in zip(*parts, strict=True) if len(set(column)) > 1]
+        if len(varying) == 1:
+            numbers = [number for number, _ in varying[0]]
+            (step, times), *_ = Counter(b - a for a, b in pairwise(numbers)).most_common()
+            places = [(number - numbers[0]) / max(1, step) for number in numbers]
+            is_even = all(place.is_integer() for place in places)
+            if is_even and len(set(places)) == len(files) and 2 * times >= len(files) - 1:
+                return [int(place) for place in places]
+    return [*range(len(files))]
+
+
 class ImageFolder(Film):
     """Context of an open folder of images of one camera; its times count from the first one.
 
@@ -52,12 +73,14 @@ class ImageFolder(Film):
         """Store the path and the camera; the folder is read on entry."""
         super().__init__(path, camera)
         self._files: list[Path] = []
+        self._places: list[int] = []
         self._levels = Levels()
         self._first = path
 
     def __enter__(self) -> ImageFolder:
         """Read the names of the images, and the size of the first one that can be decoded."""
         self._files = image_files(self.path)
+        self._places = _numbered(self._files)
         reason = ""
         for file in self._files:
             try:
@@ -73,29 +96,33 @@ class ImageFolder(Film):
                 f"{self.path} has no JPEG or PNG image that can be decoded{reason}; give a folder "
                 "of the images of one camera"
             )
-        self.duration_s = (len(self._files) - 1) / (self._given.fps or FPS)
+        self.duration_s = self._places[-1] / (self._given.fps or FPS)
         return self
 
-    def left_out(self, topic: str) -> list[str]:
+    def left_out(self, topic: str, used: Collection[str] = ()) -> list[str]:
         """Return the files that are no images; see ``ImageRecording``."""
         names = sorted(path.name for path in self.path.iterdir() if path.is_file())
         hidden = [name for name in names if name.startswith(".")]
         others = [name for name in names if name not in {path.name for path in self._files}]
         others = [name for name in others if name not in hidden]
+        gaps = zip(self._files, self._places, self._places[1:], strict=False)
+        before = [file.name for file, place, later in gaps if later > place + 1]
+        lacking = self._places[-1] + 1 - len(self._files)
+        missing = [f"{lacking} that the numbering lacks (after {', '.join(before[:3])})"]
         return [
             f"{len(files)} {kind} ({files[0]})"
             for kind, files in (("hidden files", hidden), ("files of other kinds", others))
             if files
-        ]
+        ] + (missing if lacking else [])
 
     @property
     def _file(self) -> Path:
         return self._first
 
     def images(self, topic: str | None = None) -> Iterator[RecordedImage]:
-        """Yield the images in order, at the given rate."""
-        for number, file in enumerate(self._files):
-            stamp_ns = round(1e9 * number / (self._given.fps or FPS))
+        """Yield the images in order, at the given rate; missing numbers leave gaps."""
+        for place, file in zip(self._places, self._files, strict=True):
+            stamp_ns = round(1e9 * place / (self._given.fps or FPS))
             decode = partial(self._image, file, self._size)
             yield RecordedImage(stamp_ns, "", stamp_ns, decode, file.name)
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterator, Sequence
 from dataclasses import dataclass
 from math import sqrt
 from pathlib import Path
@@ -86,8 +86,13 @@ class ImageRecording(Protocol):
     def remarks(self) -> Sequence[str]:
         """Warnings about what was read so far."""
 
-    def left_out(self, topic: str) -> list[str]:
-        """Return what was read of these images so far but not used, with the reasons."""
+    def left_out(self, topic: str, used: Collection[str] = ()) -> list[str]:
+        """Return what was read of these images so far but not used, with the reasons.
+
+        Args:
+            topic: name of the images.
+            used: topics of other images that are used, too.
+        """
 
     def __enter__(self) -> ImageRecording:
         """Open the recording."""

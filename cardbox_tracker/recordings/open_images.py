@@ -7,13 +7,16 @@ from pathlib import Path
 
 from cardbox_tracker.common.errors import BagError
 from cardbox_tracker.recordings.bag_files import FILE_ENDINGS, is_bag_file
-from cardbox_tracker.recordings.bag_reader import BagReader
+from cardbox_tracker.recordings.bag_reader import REPAIR_ROS1, BagReader
 from cardbox_tracker.recordings.focal_length import equivalent_mm
 from cardbox_tracker.recordings.given_camera import GivenCamera
 from cardbox_tracker.recordings.image_folder import SUFFIXES, ImageFolder, image_files
 from cardbox_tracker.recordings.image_recording import ImageRecording
 from cardbox_tracker.recordings.video_reader import FORMATS, VideoReader
 from cardbox_tracker.recordings.video_reader import SUFFIXES as VIDEO_SUFFIXES
+
+# Endings of compressed files and archives.
+_PACKED = frozenset((".zst", ".zstd", ".gz", ".bz2", ".xz", ".lz4", ".zip", ".tar", ".tgz", ".7z"))
 
 
 def is_bag(path: Path) -> bool:
@@ -48,6 +51,19 @@ def tells_lens(path: Path) -> bool:
     return equivalent_mm(image_files(path)[0] if path.is_dir() else path) is not None
 
 
+def _check_packed(path: Path) -> None:
+    """Raise BagError for a file, or the files of a folder, that another program has to open."""
+    for file in sorted(path.iterdir()) if path.is_dir() else [path]:
+        if file.suffix == ".active":
+            raise BagError(f"{file} was left open by its recorder: {REPAIR_ROS1}")
+        if file.suffix in _PACKED:
+            raise BagError(
+                f"{file} is compressed, without the metadata.yaml that its recorder wrote beside "
+                f"it; unpack it first, such as with 'zstd -d {file.name}' (its ending says which "
+                "program), or give the whole folder"
+            )
+
+
 def open_images(path: str | os.PathLike[str], camera: GivenCamera | None = None) -> ImageRecording:
     """Return the context of the recording at ``path``.
 
@@ -63,14 +79,15 @@ def open_images(path: str | os.PathLike[str], camera: GivenCamera | None = None)
         if camera.fps is not None:
             raise BagError(f"--fps has no effect on {path}: the images of a bag have stamps")
         return BagReader(path, camera)
+    if path.is_dir() and image_files(path):
+        return ImageFolder(path, camera)
+    check_exists(path)
+    _check_packed(path)
     if path.is_dir():
-        if image_files(path):
-            return ImageFolder(path, camera)
         raise BagError(
             f"{path} is not a rosbag2 recording (it has no metadata.yaml), and it has no JPEG or "
             "PNG images; give a bag, a video, or a folder of images"
         )
-    check_exists(path)
     if not path.is_file():
         raise BagError(f"{path} is a pipe or a device; give a recording: a bag, a video or images")
     if path.suffix.lower() in SUFFIXES:

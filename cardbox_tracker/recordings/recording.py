@@ -119,6 +119,9 @@ class Recording:
             for source, there in zip(self.sources[1:], extrinsics, strict=True)
         ]
         self.measures_depth = depth is not None
+        for source in self.sources:
+            topics = {one.topic for one in self.sources} | {depth, source.depth_topic}
+            source.used_beside = {topic for topic in topics if topic is not None}
         # The silhouettes' source already reads these depth images.
         self._cuts_by_depth = depth is not None and depth == self.first.depth_topic
         self._depth = None if self._cuts_by_depth else depth

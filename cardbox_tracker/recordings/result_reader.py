@@ -19,9 +19,9 @@ from numpy.typing import NDArray
 
 from cardbox_tracker.common.errors import BagError, CardboxError, quoted
 from cardbox_tracker.common.files import (
-    UnreadableFileError,
     body_beside,
     body_of_person,
+    foreign,
     regular_file,
 )
 from cardbox_tracker.person.hands import HAND_NAMES, HAND_OPEN_NAMES
@@ -66,6 +66,7 @@ _MOST = 1e6
 _MOST_ROWS, _MOST_BYTES = 3_000_000, 4 * 1024**3
 # Rows that are read at once.
 _BATCH = 10_000
+_EXPECTED = "a table in UTF-8 or Parquet, or a bag, that 'cardbox track' has written"
 _LATEST_NS = np.iinfo(np.int64).max
 
 
@@ -260,49 +261,32 @@ def read_results(path: Path, person: int | None = None) -> Results:
 
 def _csv_cells(path: Path) -> Iterator[tuple[str, Mapping[str, Any]]]:
     """Yield each row of a CSV table, and where it is."""
-    try:
+    with (
+        foreign(path, CardboxError, _EXPECTED),
+        regular_file(path, _MOST_BYTES) as data,
         # Spreadsheets begin a file with a byte order mark.
-        with (
-            regular_file(path, _MOST_BYTES) as data,
-            io.TextIOWrapper(data, newline="", encoding="utf-8-sig") as file,
-        ):
-            rows = csv.DictReader(file)
-            _check(path, rows.fieldnames or ())
-            for row in rows:
-                yield f"line {rows.line_num}", row
-    except UnreadableFileError as error:
-        raise CardboxError(f"cannot read {path}: {error}; give a table or a bag") from None
-    except OSError as error:
-        raise CardboxError(f"cannot read {path}: {error.strerror}") from None
-    except (UnicodeDecodeError, csv.Error) as error:
-        raise CardboxError(
-            f"{path} is not a table in UTF-8 ({quoted(str(error))}); give a table or a bag that "
-            "'cardbox track' has written"
-        ) from None
+        io.TextIOWrapper(data, newline="", encoding="utf-8-sig") as file,
+    ):
+        rows = csv.DictReader(file)
+        _check(path, rows.fieldnames or ())
+        for row in rows:
+            yield f"line {rows.line_num}", row
 
 
 def _parquet_cells(path: Path) -> Iterator[tuple[str, Mapping[str, Any]]]:
     """Yield each row of a Parquet table, and where it is."""
-    arrow, parquet = pyarrow_or_error()
-    try:
-        with parquet.ParquetFile(path) as file:
-            rows, names = file.metadata.num_rows, file.schema_arrow.names
-            # A small file can claim any number of equal rows.
-            if rows > _MOST_ROWS:
-                raise CardboxError(
-                    f"{path} has {rows} images, expected at most {_MOST_ROWS}; give a table that "
-                    "'cardbox track' wrote"
-                )
-            _check(path, names)
-            number = 0
-            for batch in file.iter_batches(_BATCH, columns=list(names)):
-                for row in batch.to_pylist():
-                    number += 1
-                    yield f"row {number}", row
-    except (OSError, arrow.ArrowException) as error:
-        raise CardboxError(
-            f"cannot read {path}: {quoted(str(error))}; give a table that 'cardbox track' wrote"
-        ) from None
+    _, parquet = pyarrow_or_error()
+    with foreign(path, CardboxError, _EXPECTED), parquet.ParquetFile(path) as file:
+        rows, names = file.metadata.num_rows, file.schema_arrow.names
+        # A small file can claim any number of equal rows.
+        if rows > _MOST_ROWS:
+            raise CardboxError(f"it has {rows} images, expected at most {_MOST_ROWS}")
+        _check(path, names)
+        number = 0
+        for batch in file.iter_batches(_BATCH, columns=list(names)):
+            for row in batch.to_pylist():
+                number += 1
+                yield f"row {number}", row
 
 
 def _check(path: Path, names: Sequence[str]) -> None:
@@ -374,6 +358,12 @@ def results_in(bag: BagReader, person: int | None = None) -> Results:
         except (AttributeError, TypeError, ValueError) as error:
             # The message type is defined by the recording and may lack fields.
             raise damaged(error) from None
+    if found.repeated > len(found.by_stamp):
+        raise BagError(
+            f"{bag.path} has {len(found.by_stamp) + found.repeated} results with "
+            f"{len(found.by_stamp)} different stamps: the camera's clock stood still; track the "
+            "recording itself, whose times are then those of the recorder"
+        )
     rows = _Rows(bag.path, {name for row in found.by_stamp.values() for name in row}, JOINT_NAMES)
     every = dict.fromkeys(rows.names)
     bodies = []
@@ -395,7 +385,7 @@ class _Messages:
     """Joins the messages of each image, of which joints, deviations and points have its stamp."""
 
     def __init__(self) -> None:
-        self._state = NO_PERSON
+        self._state, self.repeated = NO_PERSON, 0
         self._body: BodyModel | None = None
         self.by_stamp: dict[int, dict[str, Any]] = {}
 
@@ -412,6 +402,7 @@ class _Messages:
             row: dict[str, Any] = {"state": self._state, "body": self._body}
             # A node without the place of the torso keeps it constant.
             row |= dict.fromkeys(PLACE_NAMES, 0.0) | positions_of(joints)
+            self.repeated += stamp_ns_of(message) in self.by_stamp
             self.by_stamp[stamp_ns_of(message)] = row
         elif (found := self.by_stamp.get(stamp_ns_of(message))) is not None:
             if name == _KEYPOINTS:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Collection, Iterator
 from itertools import islice
 from pathlib import Path
 from typing import NamedTuple
@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from cardbox_tracker.camera.camera import Rectifier
+from cardbox_tracker.camera.camera import OPTICAL_FRAME, Rectifier
 from cardbox_tracker.camera.depth_image import DepthImage
 from cardbox_tracker.camera.encodings import brightness_of
 from cardbox_tracker.common.errors import BagError, CameraError, CardboxError, EncodingError
@@ -28,6 +28,8 @@ from cardbox_tracker.segmentation.silhouettes import SilhouettePipeline
 _PERIOD_IMAGES = 60
 # A stamp that differs from the recording time by more comes from another clock.
 _OTHER_CLOCK_NS = 1_000_000_000
+# Spans are often rounded up by less.
+_SHORT_S = 1.0
 
 
 class TimeSpan(NamedTuple):
@@ -121,13 +123,17 @@ class SilhouetteSource:
     """One camera of a recording: its silhouettes, at the working resolution.
 
     Attributes:
+        topic: name of the images.
         frame_id: name of the camera's optical frame.
         camera: camera of the frames at the working resolution.
         depth_topic: topic of the depth images that cut out the silhouettes; None if a background
             model does.
+        used_beside: topics of other images of the recording that are used, too.
     """
 
     depth_topic: str | None = None
+    _background_s = 0.0
+    used_beside: Collection[str] = ()
 
     def __init__(
         self,
@@ -157,6 +163,7 @@ class SilhouetteSource:
         """
         self._open(bag, size or bag.working_size, camera, config)
         self._find_points(points, camera)
+        self._background_s = background.end_s
         is_readable = False
         for _, time_s, image, *_ in self.images():
             is_readable = True
@@ -186,10 +193,14 @@ class SilhouetteSource:
         self._bag = bag
         self._broken: dict[int, str] = {}
         self._used = self._clock_ns = 0
-        self._topic = bag.image_topic(camera)
+        self.topic = bag.image_topic(camera)
         calibration = bag.calibration(camera)
         self._pipeline = SilhouettePipeline(calibration, size, config, learning)
         self.frame_id = calibration.frame_id
+        if self.frame_id == OPTICAL_FRAME:
+            # A CameraInfo without a name is of the images' frame.
+            found = next((image.frame_id for image in bag.images(self.topic)), "")
+            self.frame_id = found.lstrip("/") or OPTICAL_FRAME
         self.camera = self._pipeline.camera
         self._full_size: tuple[int, int] | None = None
         self._full_rectifier: Rectifier | None = None
@@ -212,7 +223,7 @@ class SilhouetteSource:
             calibration = self._pipeline.calibration
             given = points.read(camera, (calibration.width, calibration.height))
             size = self.camera.width, self.camera.height
-            first_ns = next(self._bag.images(self._topic)).stamp_ns
+            first_ns = next(self._bag.images(self.topic)).stamp_ns
             given.check_span(first_ns, first_ns + int(1e9 * self.duration_s))
             self._given = given = given.placed(calibration, size, self.period_ns() // 2)
             self._points = lambda prepared, silhouette: given.at(
@@ -309,10 +320,10 @@ class SilhouetteSource:
         Raises:
             BagError: there are fewer than two images.
         """
-        images = islice(self._bag.images(self._topic), _PERIOD_IMAGES)
+        images = islice(self._bag.images(self.topic), _PERIOD_IMAGES)
         stamps_ns = [image.stamp_ns for image in images]
         if len(stamps_ns) < 2:
-            raise BagError(f"{self.path} has fewer than two images on {self._topic}")
+            raise BagError(f"{self.path} has fewer than two images on {self.topic}")
         return int(np.median(np.diff(stamps_ns)))
 
     def _brokenness(self) -> str:
@@ -326,6 +337,11 @@ class SilhouetteSource:
     def remarks(self) -> list[str]:
         """Warnings about the images read so far."""
         remarks = list(self._bag.remarks)
+        if self._background_s > self._bag.duration_s + _SHORT_S:
+            remarks.append(
+                f"the background span ends at {self._background_s:g} s, after the recording of "
+                f"{self._bag.duration_s:.1f} s; give a span of the empty scene"
+            )
         if self._clock_ns:
             remarks.append(
                 f"the images' stamps are {abs(self._clock_ns) / 1e9:.0f} s "
@@ -347,11 +363,11 @@ class SilhouetteSource:
     @property
     def account(self) -> str:
         """What was read and used of this camera, and what was left out, with the reasons."""
-        left_out = self._bag.left_out(self._topic)
+        left_out = self._bag.left_out(self.topic, self.used_beside)
         if self._broken:
             left_out.append(f"{len(self._broken)} that cannot be read")
         reasons = f"; left out {', '.join(left_out)}" if left_out else "; nothing left out"
-        return f"used {self._used} images of {self._topic} in {self.path}{reasons}"
+        return f"used {self._used} images of {self.topic} in {self.path}{reasons}"
 
     def full_picture(self, frame: RecordedFrame) -> NDArray[np.uint8]:
         """Return the picture of a frame, undistorted, at the resolution of the recording."""
@@ -370,7 +386,7 @@ class SilhouetteSource:
     def images(self) -> Iterator[PreparedImage]:
         """Yield every image that can be decoded."""
         used = 0
-        for number, image in enumerate(self._bag.images(self._topic), 1):
+        for number, image in enumerate(self._bag.images(self.topic), 1):
             if number == 1:
                 late_ns = image.time_ns - image.stamp_ns
                 self._clock_ns = late_ns if abs(late_ns) > _OTHER_CLOCK_NS else 0
@@ -378,7 +394,7 @@ class SilhouetteSource:
                 sent = image.as_sent
                 height, width = sent.shape[:2]
                 calibration = self._pipeline.calibration
-                calibration.check_shape(width, height, self._topic, "the first image")
+                calibration.check_shape(width, height, self.topic, "the first image")
                 prepared = self._pipeline.prepare(sent)
             except (CameraError, EncodingError) as error:
                 self._broken[number] = str(error)

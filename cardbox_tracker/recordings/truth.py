@@ -13,8 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cardbox_tracker.camera.camera import level_to_optical
-from cardbox_tracker.common.errors import CardboxError, cut
-from cardbox_tracker.common.files import UnreadableFileError, read_regular
+from cardbox_tracker.common.errors import CardboxError
+from cardbox_tracker.common.files import foreign, read_regular
 from cardbox_tracker.person.skeleton import JOINT_NAMES, KEYPOINT_NAMES
 
 FloatArray = NDArray[np.float64]
@@ -96,7 +96,8 @@ def load_ground_truth(path: str | os.PathLike[str], camera: str | None = None) -
     Raises:
         CardboxError: the file cannot be read or is not a ground truth.
     """
-    try:
+    expected = "the ground_truth.json of a session, such as 'cardbox synthesize' writes"
+    with foreign(path, CardboxError, expected):
         data = json.loads(read_regular(path, _MOST_BYTES))
         if camera is not None:
             data = _seen_by(data, camera)
@@ -136,18 +137,6 @@ def load_ground_truth(path: str | os.PathLike[str], camera: str | None = None) -
             data.get("depth_topic"),
             str(data.get("source", "")),
         )
-    except UnreadableFileError as error:
-        raise CardboxError(
-            f"cannot read the ground truth {path}: {error}; expected the "
-            "ground_truth.json of a session, such as 'cardbox synthesize' writes"
-        ) from None
-    except (
-        *(ValueError, LookupError, TypeError, AttributeError, OverflowError, RecursionError),
-    ) as error:
-        raise CardboxError(
-            f"{path} is not a ground truth: {cut(repr(error))}; expected the ground_truth.json of "
-            "a session"
-        ) from None
 
 
 def _seen_by(data: dict[str, Any], camera: str) -> dict[str, Any]:

@@ -3,17 +3,21 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
+from typing import Any
 
 import cv2
 import numpy as np
+from numpy.typing import NDArray
 
 from cardbox_tracker.camera.encodings import MOST_PIXELS
 from cardbox_tracker.camera.film_headers import (
+    MOST_DAMAGED,
     check_times,
+    codecs,
     oblong,
     shown_s,
     with_square_pixels,
@@ -45,7 +49,7 @@ class VideoReader(Film):
     def __init__(self, path: Path, camera: GivenCamera) -> None:
         """Store the path and the camera; the video is opened on entry."""
         super().__init__(path, camera)
-        self._count = self._last = 0
+        self._damaged, self._stated_s, self._end = 0, 0.0, ""
 
     def __enter__(self) -> VideoReader:
         """Open the video and read its first image."""
@@ -57,51 +61,67 @@ class VideoReader(Film):
                 check_pixels(int(size[0]), int(size[1]), MOST_PIXELS)
             except EncodingError as error:
                 raise BagError(f"cannot read the video {self.path}: {error}") from None
-            found, image = capture.read()
-            if not found:
+            image = next((image for image in _read(capture) if image is not None), None)
+            if image is None:
                 raise BagError(
-                    f"the video {self.path} has no image that can be decoded; expected {FORMATS}: "
-                    "film again, or convert it with 'ffmpeg -i INPUT OUTPUT.mp4'"
+                    f"the video {self.path} has no image that can be decoded"
+                    f"{codecs(self.path)}; expected {FORMATS}: film again, or convert it with "
+                    "'ffmpeg -i INPUT -c:v libx264 OUTPUT.mp4'"
                 )
             if self._given.fps is None:
                 check_times(self.path, "give its images a second as --fps HZ")
             self._stored = image.shape[1], image.shape[0]
             self._set_size(*with_square_pixels(image, oblong(capture)).shape[1::-1])
-            self._hz = self._given.fps or _rate(capture)
-            self._count = max(0, _count(self.path, capture))
-        self.duration_s = max(0, self._count - 1) / self._hz
+            self._file_hz = _rate(capture)
+            self._stated_s = _stated_s(self.path, capture)
+        self._hz = self._given.fps or self._file_hz
+        self.duration_s = max(0, round(self._stated_s * self._file_hz) - 1) / self._hz
         return self
 
     def images(self, topic: str | None = None) -> Iterator[RecordedImage]:
-        """Yield the images in order, with the time in the file or at the given rate."""
-        period_ns = 1e9 / self._hz
-        first_ms, stamp_ns = 0.0, -1
+        """Yield the images in order, with the time in the file or at the given rate.
+
+        Images that cannot be decoded are left out; those after them keep their times.
+        """
+        first_ms, file_ns, stamp_ns = 0.0, -1, -1
+        number = damaged = 0
         with _opened(self.path) as capture:
-            number, shape = 0, oblong(capture)
-            while (read := capture.read())[0]:
-                if self._given.fps is None:
-                    in_file_ms = capture.get(cv2.CAP_PROP_POS_MSEC)
-                    first_ms = in_file_ms if number == 0 else first_ms
-                    there_ns = round(1e6 * (in_file_ms - first_ms))
-                    # Damaged files state the same time for several images.
-                    stamp_ns = there_ns if there_ns > stamp_ns else stamp_ns + round(period_ns)
-                else:
-                    stamp_ns = round(number * period_ns)
-                decoded = with_square_pixels(read[1], shape)
+            shape = oblong(capture)
+            for image in _read(capture):
+                if image is None:
+                    self._damaged = max(self._damaged, damaged := damaged + 1)
+                    continue
+                in_file_ms = capture.get(cv2.CAP_PROP_POS_MSEC)
+                first_ms = in_file_ms if number == 0 else first_ms
+                there_ns = round(1e6 * (in_file_ms - first_ms))
+                # Damaged files state the same time for several images.
+                file_ns = there_ns if there_ns > file_ns else file_ns + round(1e9 / self._file_hz)
+                in_order = round(1e9 * (number + damaged) / self._hz)
+                stamp_ns = file_ns if self._given.fps is None else in_order
+                decoded = with_square_pixels(image, shape)
                 number += 1
                 yield RecordedImage(stamp_ns, "", stamp_ns, partial(np.asarray, decoded))
-        self._last = number
+        last_s = max(file_ns / 1e9, 1.0 / self._file_hz)
+        if 0.0 < last_s * (number + _LACKING) / max(1, number - 1) < self._stated_s:
+            self._end = f"ends after {number} images and {last_s:.1f} of {self._stated_s:.1f} s"
         self.duration_s = max(0, stamp_ns) / 1e9
+
+    def left_out(self, topic: str, used: Collection[str] = ()) -> list[str]:
+        """Return which images could not be read; see ``ImageRecording``."""
+        damaged = [f"{self._damaged} that cannot be decoded"] if self._damaged else []
+        return damaged + (["the rest of the video, which is missing"] if self._end else [])
 
     @property
     def remarks(self) -> list[str]:
-        """Warnings about the field of view, and about a video that ends early."""
+        """Warnings about the field of view, and about a video that is damaged or ends early."""
         found = super().remarks
-        if 0 < self._last < self._count - _LACKING:
+        if self._damaged:
             found.append(
-                f"{self.path} ends after {self._last} of {self._count} images; it is damaged or "
-                "was cut off"
+                f"{self._damaged} images of {self.path} are damaged and left out; the others keep "
+                "their times"
             )
+        if self._end:
+            found.append(f"{self.path} {self._end}; it is damaged or was cut off")
         return found
 
 
@@ -113,9 +133,9 @@ def _opened(path: Path) -> Iterator[cv2.VideoCapture]:
     try:
         if not capture.isOpened():
             raise BagError(
-                f"cannot read the recording {path}: expected a rosbag2, a folder of JPEG or PNG "
-                f"images, or a video ({FORMATS}) that is not empty or cut off; 'ffmpeg -i INPUT "
-                "OUTPUT.mp4' converts others"
+                f"cannot read the recording {path}{codecs(path)}: expected a rosbag2, a folder of "
+                f"JPEG or PNG images, or a video ({FORMATS}) that is not empty, cut off or sound "
+                "alone; 'ffmpeg -i INPUT -c:v libx264 OUTPUT.mp4' converts others"
             )
         capture.set(cv2.CAP_PROP_ORIENTATION_AUTO, 1)
         yield capture
@@ -123,13 +143,27 @@ def _opened(path: Path) -> Iterator[cv2.VideoCapture]:
         capture.release()
 
 
-def _count(path: Path, capture: cv2.VideoCapture) -> int:
-    """Return how many images a film should have, from its first one on; negative if unknown."""
-    count, shown = int(capture.get(cv2.CAP_PROP_FRAME_COUNT)), shown_s(path)
+def _read(capture: cv2.VideoCapture) -> Iterator[NDArray[Any] | None]:
+    """Yield the images of an open video to its end, None for one that cannot be decoded."""
+    failed = 0
+    while failed < MOST_DAMAGED:
+        found, image = capture.read()
+        if not found:
+            failed += 1
+            continue
+        yield from [None] * failed
+        failed = 0
+        yield image
+
+
+def _stated_s(path: Path, capture: cv2.VideoCapture) -> float:
+    """Return how long a film should last, from its first image on; not above 0 if unknown."""
+    rate = float(capture.get(cv2.CAP_PROP_FPS)) or _USUAL_HZ
+    lasts_s, shown = capture.get(cv2.CAP_PROP_FRAME_COUNT) / rate, shown_s(path)
     if shown is not None:
-        return min(count, round(shown * _rate(capture)))
+        return float(min(lasts_s, shown))
     # Others count from the time 0, at which their first image need not be.
-    return count - max(0, int(capture.get(cv2.CAP_PROP_PTS)))
+    return float(lasts_s - max(0.0, capture.get(cv2.CAP_PROP_PTS)) / rate)
 
 
 def _rate(capture: cv2.VideoCapture) -> float:

@@ -14,7 +14,8 @@ from __future__ import annotations
 import os
 
 from cardbox_tracker.common.errors import CardboxError
-from cardbox_tracker.common.small_yaml import SmallYamlError, parse_small_yaml, read_small_text
+from cardbox_tracker.common.files import foreign
+from cardbox_tracker.common.small_yaml import parse_small_yaml, read_small_text
 from cardbox_tracker.search.config import TrackerConfig
 
 
@@ -25,15 +26,9 @@ def read_settings(path: str | os.PathLike[str], config: TrackerConfig) -> Tracke
         CardboxError: the file cannot be read; a name is unknown; a value has the wrong type, is out
             of range, or has no effect beside the others.
     """
-    try:
+    expected = "a YAML file with names of docs/parameters.md, such as 'lost_frames: 10'"
+    with foreign(path, CardboxError, expected):
         given = parse_small_yaml(read_small_text(path))
         if not isinstance(given, dict):
             raise ValueError("expected names and values, such as 'lost_frames: 10'")
         return config.changed(given)
-    except SmallYamlError as error:
-        raise CardboxError(
-            f"settings of {path}: {error}; give a YAML file with names of docs/parameters.md, such "
-            "as 'lost_frames: 10'"
-        ) from None
-    except ValueError as error:
-        raise CardboxError(f"settings of {path}: {error}") from None

@@ -14,7 +14,6 @@ import stat
 import struct
 import tempfile
 import zipfile
-import zlib
 from pathlib import Path
 from typing import IO, Any, BinaryIO, Literal, NamedTuple
 
@@ -22,8 +21,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cardbox_tracker.camera.camera import Calibration
-from cardbox_tracker.common.errors import BackgroundFileError, CameraError, CardboxError, quoted
-from cardbox_tracker.common.files import UnreadableFileError, atomic_path, regular_file
+from cardbox_tracker.common.errors import BackgroundFileError, CardboxError, quoted
+from cardbox_tracker.common.files import atomic_path, foreign, regular_file
 from cardbox_tracker.segmentation.chroma import ChromaModel
 from cardbox_tracker.segmentation.empty_scene import BackgroundModel
 
@@ -138,34 +137,14 @@ def load_background(path: str | os.PathLike[str], size: tuple[int, int]) -> Stor
     Raises:
         BackgroundFileError: the file cannot be read, is no background, or is of another size.
     """
-    name = os.fspath(path)
-    try:
+    expected = (
+        "a background that can be used: the file that the background node wrote. Delete it, or "
+        "give another name, and let the node learn with nobody in view"
+    )
+    with foreign(path, BackgroundFileError, expected):
         with regular_file(path, _MOST_BYTES) as file:
             arrays = _read(file, size)
         return _checked(arrays, size)
-    except UnreadableFileError as error:
-        raise BackgroundFileError(
-            f"cannot read the background {name}: {error}; give the file that the background node "
-            "wrote"
-        ) from None
-    # These are the errors of zipfile and numpy for damaged archives.
-    except (
-        ValueError,
-        LookupError,
-        EOFError,
-        OSError,
-        NotImplementedError,
-        RuntimeError,
-        CameraError,
-        struct.error,
-        zipfile.BadZipFile,
-        zlib.error,
-    ) as error:
-        raise BackgroundFileError(
-            f"{name} is no background that can be used: {error}; expected a file that the "
-            "background node wrote. Delete it, or give another name, and let the node learn with "
-            "nobody in view"
-        ) from None
 
 
 def _read(file: BinaryIO, size: tuple[int, int]) -> dict[str, NDArray[Any]]:

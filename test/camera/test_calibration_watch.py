@@ -16,6 +16,7 @@ def info(focal_px: float = 330.0, frame: str = "camera", **changes: Any) -> Any:
         "width": 320,
         "height": 240,
         "k": [focal_px, 0, 159.5, 0, focal_px, 119.5, 0, 0, 1],
+        "p": [0.0] * 12,
         "d": [0.0] * 5,
         "distortion_model": "plumb_bob",
         "roi": SimpleNamespace(x_offset=0, y_offset=0, width=0, height=0),
@@ -52,6 +53,25 @@ def test_one_wrong_message_is_ignored_and_said(watch: CalibrationWatch) -> None:
     for _ in range(200):
         assert not watch.see(info())
     assert watch.remark == "" and watch.ignored == 1
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        ({"width": 640, "height": 480, "binning_x": 2, "binning_y": 2}, "of about 320x240"),
+        ({"k": [330, 0, 319.5, 0, 330, 239.5, 0, 0, 1]}, "of about 640x480"),
+        ({"k": [20, 0, 159.5, 0, 20, 119.5, 0, 0, 1]}, "166 degrees across"),
+        ({"k": [330, 0, 159.5, 0, 247, 119.5, 0, 0, 1]}, "330 and 247 px differ"),
+        ({"k": [0.0] * 9, "p": [330, 0, 159.5, 9, 0, 330, 119.5, 0, 0, 0, 1, 0]}, "P is used"),
+        ({"k": [330, 0, 140.0, 0, 310, 110.0, 0, 0, 1]}, ""),
+    ],
+)
+def test_what_is_unusual_is_told_and_used(changes: dict[str, Any], words: str) -> None:
+    made = CalibrationWatch("/camera_info", "/image_raw")
+    assert made.see(info(**changes))
+    assert words in made.doubt and bool(made.doubt) == bool(words)
+    if "P" in words:
+        assert made.current is not None and made.current.k[0, 0] == 330
 
 
 def test_two_cameras_in_turn_do_not_drive_out_the_first(watch: CalibrationWatch) -> None:

@@ -196,6 +196,21 @@ def test_without_stamps_the_recorders_clock_counts(first: int) -> None:
     assert "no stamp (it is zero)" in remarks[0]
 
 
+@pytest.mark.parametrize("jump_s", [11, 3600, 1_700_000_000])
+def test_a_clock_that_is_set_forward_goes_on_with_the_recorders(jump_s: int) -> None:
+    stamps = even(12)
+    times, remarks = times_of([*stamps[:6], *(stamp + jump_s * S for stamp in stamps[6:])])
+    assert times == stamps
+    assert f"jump forward by {jump_s} s" in remarks[0]
+
+
+def test_a_pause_of_recorder_and_camera_is_one() -> None:
+    stamps = [*even(6), *(stamp + 3600 * S for stamp in even(12)[6:])]
+    recorded = RecordedStamps()
+    assert [recorded.add(stamp, stamp + 5) for stamp in stamps] == stamps
+    assert recorded.remarks() == []
+
+
 def test_two_passes_of_a_long_loop_are_apart() -> None:
     once = even(150)
     times, remarks = times_of([*once, *once])

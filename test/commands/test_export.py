@@ -210,7 +210,7 @@ def test_a_body_beside_the_table_that_is_anothers(
         (("person.csv", "--to", "trc", "--model", "FOLDER/other.yaml"), "not those of the body"),
         (
             ("person.csv", "--to", "trc", "--model", "FOLDER/none.yaml"),
-            "cannot read the body model",
+            "expected the body model",
         ),
         (("person.yaml", "--to", "trc"), "has no column"),
         (("nothing.csv", "--to", "trc"), "there are no results"),

@@ -146,6 +146,9 @@ def test_several_people_have_a_body_each(film: Path, monkeypatch: pytest.MonkeyP
         (("--stature", "1.8", "--people", "2", "--person", "left"), "--person K is the number"),
         (("--stature", "1.8", "--people", "2", "--person", "3"), "--person 3 is none of 2 people"),
         (("--stature", "1.8", "--people", "2", "--preset", "paper"), "needs the preset default"),
+        (("--stature", "1.8,1.7,1.6", "--people", "2"), "--stature has 3 values for --people 2"),
+        (("--stature", "1.8", "--extrinsics", "e.yaml"), "--extrinsics has no effect with one"),
+        (("--stature", "1.8", "--fov", "0.7"), "0.7 degrees; expected 10 to 160 degrees"),
         (("--model", "me.yaml", "--people", "2"), "--people takes the stature of each person"),
     ],
 )

@@ -348,7 +348,7 @@ def test_what_is_refused(track: Callable, tmp_path: Path, files: Path, cardbox: 
     (tmp_path / "out").mkdir(exist_ok=True)
     (tmp_path / "out" / SUMMARY).write_text("year,income\n")
     assert track(code=1) == []
-    track.done.assert_refused("track", "is no summary of tracked recordings")
+    track.done.assert_refused("track", "expected a summary of tracked recordings")
 
 
 def test_the_person_may_be_in_the_files_alone(
@@ -417,7 +417,7 @@ def test_a_path_that_begins_like_a_formula_is_no_cell_of_one() -> None:
 def test_a_huge_summary_is_not_read(tmp_path: Path) -> None:
     with (tmp_path / SUMMARY).open("wb") as file:
         file.truncate(10**12)
-    with pytest.raises(CardboxError, match="no summary"):
+    with pytest.raises(CardboxError, match="a summary of tracked"):
         track_folder._read_rows(tmp_path / SUMMARY)
 
 

@@ -5,18 +5,20 @@ from __future__ import annotations
 import math
 import os
 import signal
+import socket
 import subprocess
 import sys
 import threading
 import time
 from collections.abc import Iterator
+from contextlib import suppress
 from functools import partial
 from itertools import islice
 from pathlib import Path
 
 import pytest
 
-from cardbox_tracker.common import interrupts
+from cardbox_tracker.common import interrupts, processes
 from cardbox_tracker.common.errors import CardboxError
 from cardbox_tracker.common.processes import cores, results_of
 from cardbox_tracker.common.progress import SharedProgress
@@ -136,3 +138,31 @@ def test_the_common_progress_is_the_mean_of_all(tmp_path: Path) -> None:
     assert progress.fraction() == pytest.approx(0.375)
     first(1.0)
     assert progress.fraction() == pytest.approx(0.5)
+
+
+@pytest.mark.timeout(20)
+@pytest.mark.parametrize("scheme", ["tcp", "tls", "ucx"])
+@pytest.mark.parametrize("answer", [b"", b"HTTP/1.1 400 Bad Request\r\n\r\n", bytes(range(256))])
+def test_a_server_that_is_no_scheduler_is_told_in_time(
+    answer: bytes, scheme: str, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    pytest.importorskip("distributed", reason="dask is not installed")
+    monkeypatch.setattr(processes, "_CONNECT_S", 0.3)
+    with socket.create_server(("127.0.0.1", 0)) as server:
+
+        def serve() -> None:
+            with suppress(OSError):
+                kept.append(server.accept()[0])
+                kept[-1].sendall(answer)
+
+        kept: list[socket.socket] = []
+        threading.Thread(target=serve, daemon=True).start()
+        address = f"{scheme}://127.0.0.1:{server.getsockname()[1]}"
+        with (
+            pytest.raises(CardboxError, match=f"no Dask scheduler answers at {address}"),
+            results_of(str, [1], 1, address),
+        ):
+            pass
+    for one in kept:
+        one.close()
+    assert not caplog.records

@@ -154,7 +154,7 @@ def test_a_file_that_cannot_be_read_is_named(tmp_path: Path) -> None:
         PointTable(tmp_path / "missing.csv").read(None)
     binary = tmp_path / "binary.csv"
     binary.write_bytes(b"\xff\xfe\x00stamp_ns")
-    with pytest.raises(CardboxError, match=r"binary\.csv is not a table in UTF-8"):
+    with pytest.raises(CardboxError, match=r"binary\.csv.*a CSV file in UTF-8"):
         PointTable(binary).read(None)
 
 
@@ -260,6 +260,21 @@ def test_points_beside_the_person_are_not_used_and_the_reason_is_said(
     assert "used in 0 of 3 images" in found.fault and reason in found.fault
     assert "the points of 3 of 3 images are not used" in found.remark and reason in found.remark
     assert found.at(Image(0, 0), NONE) is not None  # an empty silhouette contradicts nothing
+
+
+@pytest.mark.parametrize("people", [0, 2])
+def test_exchanged_points_are_told_without_a_silhouette(tmp_path: Path, people: int) -> None:
+    numbers = person(500, 240)
+    for is_exchanged in (False, True):
+        if is_exchanged:
+            numbers[0::3], numbers[1::3] = numbers[1::3], numbers[0::3]
+        entries = [{"image_id": i, "keypoints": numbers} for i in range(3)]
+        (tmp_path / "results.json").write_text(json.dumps(entries))
+        found = read(PointTable(tmp_path / "results.json", people))
+        for number in range(3):
+            image = Image(0, number)
+            assert found.all_in(image) if people else found.at(image, NONE)
+        assert ("columns and rows are exchanged" in found.remark) == is_exchanged
 
 
 def test_exchanged_points_in_the_middle_of_the_person_are_told() -> None:
@@ -380,8 +395,8 @@ def test_each_camera_has_its_folder_or_file(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("content", "words"),
     [
-        ("{", "is no JSON"),
-        ("[" * 100_000, "is no JSON"),
+        ("{", "expected JSON"),
+        ("[" * 100_000, "expected JSON"),
         ("{}", "has no 'annotations'"),
         ('[{"image_id": 1}]', "entry 0 has no keypoints; expected a file of OpenPose or COCO"),
         ("[5]", "entry 0 has no image_id"),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import struct
 from collections.abc import Sequence
 from pathlib import Path
@@ -12,9 +13,11 @@ import pytest
 import yaml
 
 from cardbox_tracker.camera.camera import Camera
+from cardbox_tracker.camera.film_headers import codecs
 from cardbox_tracker.common.errors import BagError, CameraError, CardboxError
 from cardbox_tracker.recordings.bag_writer import BagWriter
 from cardbox_tracker.recordings.given_camera import GivenCamera
+from cardbox_tracker.recordings.image_folder import _numbered
 from cardbox_tracker.recordings.image_recording import working_size
 from cardbox_tracker.recordings.open_images import open_images
 from cardbox_tracker.recordings.person_in_view import PersonInView
@@ -147,9 +150,41 @@ def test_images_are_in_the_order_of_their_numbers(tmp_path: Path) -> None:
     with open_images(tmp_path, FOV) as images:
         levels = [round(float(image.as_sent.mean()) / 20) for image in images.images()]
         assert levels == [0, 1, 2, 9, 10]
-        assert [image.stamp_ns for image in images.images()][3] == 100_000_000
+        assert [image.stamp_ns for image in images.images()][3] == 300_000_000
+        assert "6 that the numbering lacks (after f2.JPG)" in images.left_out("")
     with open_images(tmp_path, GivenCamera(60.0, fps=10.0)) as images:
-        assert images.duration_s == pytest.approx(0.4)
+        assert images.duration_s == pytest.approx(1.0)
+
+
+@pytest.mark.parametrize(
+    ("names", "places"),
+    [
+        (("a_0", "a_2", "a_4", "a_8"), [0, 1, 2, 4]),
+        (("a_1", "a_5", "a_20"), [0, 1, 2]),
+        (("a_1", "a_2", "b_9"), [0, 1, 2]),
+        (("10", "11", "12", "900"), [0, 1, 2, 890]),
+        (("one",), [0]),
+    ],
+)
+def test_a_gap_in_the_numbers_is_one_of_time(names: tuple[str, ...], places: list[int]) -> None:
+    assert _numbered([Path(f"{name}.png") for name in names]) == places
+
+
+def test_a_damaged_image_within_a_video_is_left_out(tmp_path: Path) -> None:
+    """Bytes of three images of 60 are set to zero; OpenCV then fails once, and goes on."""
+    noise = np.random.default_rng(1).integers(0, 256, (60, 96, 128, 3), np.uint8)
+    path = film(tmp_path / "film.avi", list(noise), 30.0)
+    data = bytearray(path.read_bytes())
+    begins = [at.start() for at in re.finditer(b"00dc", data)]
+    for at in begins[20:23]:
+        data[at + 8 : at + 3000] = bytes(2992)
+    path.write_bytes(data)
+    with open_images(path, FOV) as video:
+        stamps = [image.stamp_ns / 1e9 for image in video.images()]
+        assert len(stamps) == 57
+        assert stamps[-1] == pytest.approx(59 / 30, abs=1e-4)
+        assert video.left_out("") == ["3 that cannot be decoded"]
+        assert any("3 images of" in remark for remark in video.remarks)
 
 
 def test_exif_turns_an_image(tmp_path: Path) -> None:
@@ -184,7 +219,8 @@ def test_a_video_that_was_cut_off_is_read_to_its_end_with_a_remark(tmp_path: Pat
         count = len(list(recording.first.frames()))
         assert 10 <= count < 28
         (remark,) = recording.first.remarks
-        assert f"ends after {count} of 30 images" in remark
+        assert f"ends after {count} images and" in remark and "of 1.0 s" in remark
+        assert "left out the rest of the video" in recording.first.account
 
 
 @pytest.mark.parametrize("kind", ["cut", "zero", "no images", "text"])
@@ -199,6 +235,15 @@ def test_videos_without_images_are_refused(tmp_path: Path, kind: str) -> None:
         at = data.index(b"mdat")
         path.write_bytes(data[: at + 4] + bytes(len(data) - at - 4))
     with pytest.raises(BagError, match=r"expected .*video"), open_images(path, FOV):
+        pass
+
+
+def test_codecs_that_cannot_be_read_are_named(tmp_path: Path) -> None:
+    path = film(tmp_path / "film.mp4", pictures(20, 64, 48), 30.0)
+    path.write_bytes(path.read_bytes().replace(b"mp4v", b"av01"))
+    assert codecs(path) == " (it has the codecs av01)"
+    path.write_bytes(b"\x1aE\xdf\xa3\x86\x85V_AV1\x83\x86A_OPUS" + bytes(99))
+    with pytest.raises(BagError, match="codecs A_OPUS, V_AV1"), open_images(path, FOV):
         pass
 
 

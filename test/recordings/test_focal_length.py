@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import struct
+import time
 from pathlib import Path
 
 import cv2
@@ -10,6 +11,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from cardbox_tracker.camera.film_headers import shown_s
 from cardbox_tracker.recordings.focal_length import equivalent_mm
 from cardbox_tracker.recordings.given_camera import GivenCamera
 from cardbox_tracker.recordings.open_images import open_images, tells_lens
@@ -69,6 +71,27 @@ def test_a_phones_film_needs_no_field_of_view(tmp_path: Path) -> None:
             assert "the file tells the field of view" in images.remarks[0]
         with open_images(path, GivenCamera(45.0)) as images:
             assert images.remarks == []
+
+
+@pytest.mark.parametrize(
+    "value",
+    [struct.pack(">II", 21, 0) + b"\xff" * 128, struct.pack(">II", 23, 0), b"", bytes(8)],
+)
+def test_metadata_that_are_no_number_say_nothing(value: bytes, tmp_path: Path) -> None:
+    path = film(tmp_path / "f.mp4", (64, 48), box("moov", metadata(box("data", value))))
+    assert equivalent_mm(path) is None
+    exif = Image.Exif()
+    exif.get_ifd(0x8769)[0xA405] = (28, 29)
+    Image.new("RGB", (40, 30)).save(tmp_path / "1.jpg", exif=exif)
+    assert equivalent_mm(tmp_path / "1.jpg") is None
+
+
+def test_a_film_of_boxes_is_read_to_a_limit(tmp_path: Path) -> None:
+    path = tmp_path / "boxes.mp4"
+    path.write_bytes(box("meta", b"") * 1_000_000)
+    begin_s = time.process_time()
+    assert equivalent_mm(path) is shown_s(path) is None
+    assert time.process_time() - begin_s < 0.3
 
 
 def test_images_of_a_phone_need_no_field_of_view(tmp_path: Path) -> None:

@@ -130,6 +130,56 @@ def test_the_first_camera_info_with_a_calibration_counts(tmp_path: Path, empty: 
         assert any(f"first {empty} messages on /camera_info" in text for text in bag.remarks)
 
 
+def test_the_frame_is_that_of_the_images_if_the_camera_info_has_none(tmp_path: Path) -> None:
+    nameless = info(get_typestore(Stores.ROS2_JAZZY))
+    nameless.header.frame_id = ""
+    with open_images(recorded(tmp_path / "bag", infos=[nameless])) as bag:
+        assert SilhouetteSource(bag, EMPTY).frame_id == "left"
+        source = SilhouetteSource(bag, TimeSpan(0.0, 1e300))
+        assert any("ends at 1e+300 s, after the recording of" in text for text in source.remarks)
+
+
+def test_a_zoom_within_the_recording_is_told(tmp_path: Path) -> None:
+    store = get_typestore(Stores.ROS2_JAZZY)
+    for focal_px, is_told in ((166.0, False), (200.0, True)):
+        zoomed = info(store, k=(focal_px, 0.0, 79.5, 0.0, focal_px, 59.5, 0.0, 0.0, 1.0))
+        infos = [info(store)] * 6 + [zoomed] * 6
+        with open_images(recorded(tmp_path / str(focal_px), infos=infos)) as bag:
+            assert bag.calibration().k[0, 0] == 165.0
+            assert any("changes at 0.4 s" in text for text in bag.remarks) == is_told
+
+
+@pytest.mark.parametrize(
+    ("name", "advice"),
+    [
+        ("s.bag", "rosbag reindex"),
+        ("s.bag.active", "rosbag reindex"),
+        ("s.mcap.zstd", "zstd -d"),
+        ("folder/s.db3.zstd", "zstd -d"),
+    ],
+)
+def test_files_that_another_program_has_to_open_first(
+    tmp_path: Path, name: str, advice: str
+) -> None:
+    path = tmp_path / name
+    path.parent.mkdir(exist_ok=True)
+    # The header of a ROS 1 bag whose recorder did not write the place of the index.
+    fields = (
+        b"op=\x03",
+        b"index_pos=" + bytes(8),
+        b"conn_count=" + bytes(4),
+        b"chunk_count=" + bytes(4),
+    )
+    header = b"".join(len(field).to_bytes(4, "little") + field for field in fields)
+    sized = len(header).to_bytes(4, "little") + header + (4000).to_bytes(4, "little") + bytes(4000)
+    path.write_bytes(b"#ROSBAG V2.0\n" + sized)
+    with (
+        pytest.raises(BagError, match=advice),
+        open_images(path.parent if name.startswith("folder") else path),
+    ):
+        pass
+
+
 def test_without_any_calibration_the_fault_is_told(tmp_path: Path) -> None:
     store = get_typestore(Stores.ROS2_JAZZY)
     path = recorded(tmp_path / "none", infos=[info(store, 160, 120, (0.0,) * 9)] * 3)

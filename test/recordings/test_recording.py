@@ -151,6 +151,14 @@ def test_depth_images_cut_out_the_person_without_a_background(two: Path, tmp_pat
         taken = list(sources.frames(0.25))
         assert len(taken) == len(frames)
         assert all(t.depth_m is t.frames[0].depth_m is not None for t in taken if t.frames[0])
+        assert (
+            "/one/depth" not in sources.first.account and "/two/image_raw" in sources.first.account
+        )
+        assert not any("is nearer than" in remark for remark in sources.first.remarks)
+    with open_recording(folder, Within("/one/depth", 1.2), ["one"]) as source:
+        list(source.first.frames())
+        (_, remark) = source.first.remarks
+        assert "--within 1.2 m: the nearest depths are 1.5 m" in remark
     with (
         pytest.raises(CardboxError, match="one camera"),
         open_recording(folder, within, ["one", "two"]),

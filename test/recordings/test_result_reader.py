@@ -114,6 +114,15 @@ def test_a_bag_is_read_with_its_body(tmp_path: Path) -> None:
     assert body.sizes == pytest.approx(BODY.sizes)
 
 
+def test_a_bag_of_one_stamp_is_refused(tmp_path: Path) -> None:
+    tracker, seen = Tracker(BODY, CAMERA), estimates()[0]
+    with result_bag(tmp_path / "bag", "camera") as add:
+        for number in range(6):
+            add(RecordedFrame(START_NS + number // 3, number / 10, GREY, GREY), seen, tracker)
+    with pytest.raises(CardboxError, match="has 6 results with 2 different stamps"):
+        read_results(tmp_path / "bag")
+
+
 STAMP_NS = columns().index("stamp_ns")
 
 
@@ -185,9 +194,9 @@ def test_mistakes_in_a_table(
     [
         ("missing.csv", None, "there are no results"),
         ("empty.csv", b"", "has no column stamp_ns"),
-        ("binary.csv", bytes(range(256)), "is not a table in UTF-8"),
+        ("binary.csv", bytes(range(256)), "expected a table in UTF-8"),
         ("text.parquet", b"no table", "cannot read .*text.parquet"),
-        ("zeros.csv", bytes(100), "has no column|is not a table"),
+        ("zeros.csv", bytes(100), "has no column|expected a table"),
     ],
 )
 def test_other_files(name: str, content: bytes | None, expected: str, tmp_path: Path) -> None:

@@ -187,6 +187,7 @@ def test_camera_group(text: str, suffix: str) -> None:
         distortion_model=st.sampled_from(["plumb_bob", "rational_polynomial", "equidistant", ""])
         | st.text(max_size=20),
         d=st.lists(st.floats(), max_size=15),
+        p=st.sampled_from([[0.0] * 12, [60.0, 0, 31, 0, 0, 60, 23, 0, 0, 0, 1, 0], [1e308] * 12]),
         k=st.lists(st.floats(), min_size=9, max_size=9)
         | st.just([60.0, 0, 31.5, 0, 60.0, 23.5, 0, 0, 1]),
         roi=st.builds(

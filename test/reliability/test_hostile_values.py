@@ -23,6 +23,7 @@ from cardbox_tracker.camera.camera import Calibration
 from cardbox_tracker.camera.extrinsics_files import load_extrinsics
 from cardbox_tracker.common.errors import CardboxError
 from cardbox_tracker.detectors.point_table import PointTable
+from cardbox_tracker.measuring.scene import Scene, SceneCamera, Value, dumps_scene, load_scene
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.model_file import dumps_body_model, load_body_model
 from cardbox_tracker.recordings.result_reader import read_results
@@ -46,7 +47,7 @@ CAMERA = Calibration.of_fov(*SIZE, 60.0)
 PROMISE = "Any damaged or hostile input is read or refused with a reason"
 HOSTILE: tuple[Any, ...] = (
     *(None, True, "", "x" * 5000, "\x1b[2J", "a\nb", [], {}, -1, 0),
-    *(10**400, float("nan"), float("inf"), 1e308, 2**63),
+    *(10**400, float("nan"), float("inf"), 1e308, 2**63, [320], [[None]], "9" * 4400),
 )
 
 
@@ -88,6 +89,24 @@ CAMCHAIN = {
     "left": {"T_cam_imu": np.eye(4).tolist()},
     "right": {"T_cn_cnm1": np.eye(4).tolist(), "rostopic": "/right/image_raw"},
 }
+KALIBR = {
+    "cam0": {
+        "camera_model": "pinhole",
+        "intrinsics": [60.0, 60.0, 31.5, 23.5],
+        "rostopic": "/i",
+        "resolution": [64, 48],
+        "distortion_model": "radtan",
+        "distortion_coeffs": [0.0] * 4,
+    }
+}
+KNOWN = Value(0.9, 0.1, "given")
+PERSON = {"image_id": 1, "keypoints": [30.0, 20.0, 0.9] * 17, "score": 0.9}
+OPENPOSE = {"pose_keypoints_2d": [3.0, 2.0, 0.9] * 17, "hand_left_keypoints_2d": [1.0] * 63}
+POINTS: dict[str, Any] = {
+    "results.json": [PERSON, {**PERSON, "image_id": "im_2.png"}],
+    "annotations.json": {"images": [{"id": 1, "file_name": "1.png"}], "annotations": [PERSON]},
+    "folder/f_1_keypoints.json": {"people": [OPENPOSE]},
+}
 CAMERA_GROUP = Path(__file__).with_name("camera_group.toml").read_text()
 SETTINGS = {"lost_frames": 10, "whole_body": {"effort": 0.5, "cost": {"yaw_deg": 20.0}}}
 YAML_FILES: dict[str, tuple[Callable[[Path], Any], Any]] = {
@@ -95,6 +114,9 @@ YAML_FILES: dict[str, tuple[Callable[[Path], Any], Any]] = {
     "settings": (lambda path: read_settings(path, TrackerConfig()), SETTINGS),
     "calibration": (load_calibration, CALIBRATION),
     "extrinsics": (lambda path: load_extrinsics(path, ["left", "right"]), CAMCHAIN),
+    "size of FileStorage": (load_calibration, {**CALIBRATION, "image_size": [64, 48]}),
+    "Kalibr": (load_calibration, KALIBR),
+    "scene": (load_scene, yaml.safe_load(dumps_scene(Scene(SceneCamera(*[KNOWN] * 3), ())))),
     "joint map": (
         load_joint_map,
         yaml.safe_load((ROOT / "config" / "example_joint_map.yaml").read_text()),
@@ -133,6 +155,26 @@ def test_json_files(session: Path, tmp_path: Path) -> None:
     for value in HOSTILE:
         path.write_text(json.dumps(value))
         refused_in_words(lambda: read_json(path))
+
+
+@pytest.mark.promise(PROMISE)
+@pytest.mark.parametrize("name", POINTS)
+def test_json_files_of_points(name: str, tmp_path: Path) -> None:
+    path = tmp_path / name
+    path.parent.mkdir(exist_ok=True)
+    given = path if path.parent == tmp_path else path.parent
+    for place in places(POINTS[name]):
+        for value in HOSTILE:
+            path.write_text(json.dumps(replaced(POINTS[name], place, value)))
+            refused_in_words(lambda: PointTable(given).read(None, SIZE))
+
+
+@pytest.mark.promise(PROMISE)
+def test_many_empty_objects_are_refused_before_they_are_built(tmp_path: Path) -> None:
+    path = tmp_path / "results.json"
+    path.write_text(f"[{'{},' * 4_000_000}{{}}]")
+    with pytest.raises(CardboxError, match="more than 4000000 lists and objects"):
+        PointTable(path).read(None, SIZE)
 
 
 @pytest.mark.promise(PROMISE)

@@ -188,7 +188,7 @@ def test_only_a_file_of_some_size_is_opened(path: Path, tmp_path: Path) -> None:
         (".", "directory"),
         ("none", "No such file"),
     ):
-        with pytest.raises(BackgroundFileError, match=f"{words}.*give the file"):
+        with pytest.raises(BackgroundFileError, match=f"{words}.*the file"):
             load_background(tmp_path / name, SIZE)
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 from typing import Any
 
@@ -79,15 +80,20 @@ def test_a_video_has_its_own_rate_unless_another_one_is_given(
 ) -> None:
     path, count, slow_hz = tmp_path / "slow.avi", 8, 5.0
     writer = cv2.VideoWriter(str(path), cv2.VideoWriter.fourcc(*"MJPG"), slow_hz, (64, 48))
-    for _ in range(count):
+    for _ in range(count + 1):
         writer.write(np.zeros((48, 64, 3), np.uint8))
     writer.release()
+    # An image that is damaged takes its time, and does not end the video.
+    data = bytearray(path.read_bytes())
+    at = [found.start() for found in re.finditer(b"00dc", data)][4]
+    data[at + 8 : at + 208] = bytes(200)
+    path.write_bytes(data)
     own_graph.start("camera", file=path)
     images = own_graph.collect(Image, "image_raw", qos.REPLAY)
     own_graph.wait(lambda: len(images) == count, "all images")
     span_s = (stamp_ns(images[-1].header.stamp) - stamp_ns(images[0].header.stamp)) / 1e9
     # Even a slow machine must not exceed the file's rate.
-    assert span_s > 0.8 * (count - 1) / slow_hz
+    assert span_s > 0.9 * count / slow_hz
 
 
 @pytest.mark.parametrize(

@@ -22,8 +22,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cardbox_tracker.common.errors import CardboxError, cut, quoted
-from cardbox_tracker.common.small_yaml import SmallYamlError, parse_small_yaml, read_small_text
+from cardbox_tracker.common.errors import CardboxError, quoted
+from cardbox_tracker.common.files import foreign
+from cardbox_tracker.common.small_yaml import parse_small_yaml, read_small_text
 from cardbox_tracker.person.hands import HAND_OPEN_NAMES
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.posture import (
@@ -122,7 +123,7 @@ def load_joint_map(path: str | os.PathLike[str]) -> JointMap:
     Raises:
         CardboxError: the file cannot be read, or is not a valid joint map.
     """
-    try:
+    with foreign(path, CardboxError, "a joint map, as the example config/example_joint_map.yaml"):
         rows = parse_small_yaml(read_small_text(path))["joints"]
         if not isinstance(rows, list) or not rows:
             raise ValueError("'joints' is an empty list, or not a list")
@@ -140,9 +141,4 @@ def load_joint_map(path: str | os.PathLike[str]) -> JointMap:
         offset = np.array([math.radians(float(row.get("offset_deg", 0.0))) for row in rows])
         if not (np.isfinite(scale).all() and np.isfinite(offset).all()):
             raise ValueError("a scale or an offset is not a finite number")
-    except (SmallYamlError, KeyError, TypeError, ValueError, OverflowError) as error:
-        reason = cut(" ".join(str(error).split()))
-        raise CardboxError(
-            f"{path} is not a joint map: {reason}; see the example config/example_joint_map.yaml"
-        ) from None
     return JointMap(tuple(row.get("from") for row in rows), targets, scale, offset)

@@ -11,7 +11,7 @@ from xml.etree import ElementTree as Xml
 import numpy as np
 
 from cardbox_tracker.common.errors import CardboxError, cut, quoted
-from cardbox_tracker.common.files import UnreadableFileError, read_regular
+from cardbox_tracker.common.files import foreign, read_regular
 from cardbox_tracker.person.sizes import FloatArray
 from cardbox_tracker.person.skeleton import rotation_x, rotation_y, rotation_z
 
@@ -129,10 +129,8 @@ def load_robot(path: str | os.PathLike[str]) -> Robot:
     Raises:
         CardboxError: the file cannot be read, or is not a URDF with movable joints.
     """
-    try:
+    with foreign(path, CardboxError, "a URDF file"):
         content = read_regular(path, _LARGEST_BYTES)
-    except UnreadableFileError as error:
-        raise CardboxError(f"cannot read the robot {path}: {error}; expected a URDF file") from None
     return parse_robot(content, str(path))
 
 

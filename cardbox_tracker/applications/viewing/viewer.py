@@ -193,7 +193,7 @@ class _Page(BaseHTTPRequestHandler):
             connection.request("GET", self.path)
             answer = connection.getresponse()
             content = answer.read()
-        except (OSError, HTTPException) as error:
+        except (OSError, HTTPException, ValueError) as error:  # bytes that are no ASCII
             self.send_error(502, f"the viewer's files cannot be read: {error}")
             return
         finally:

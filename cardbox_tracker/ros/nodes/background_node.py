@@ -271,6 +271,8 @@ class BackgroundNode(CardboxNode):
             "scene brightness drift (grey levels)": f"{self._drift():.1f}",
             "ignored CameraInfo": str(self.camera_images.watch.ignored),
         }
+        if self._cut is not None:
+            values["nearest depth (m)"] = f"{self._cut.nearest_m:.2f}"
         if self._kept.path is not None:
             values["background file"] = self._kept.use
         if self._pipeline is not None:

@@ -104,6 +104,8 @@ class CameraImages:
             self._node.get_logger().warning(
                 f"the CameraInfo on {self.info_topic} has changed for good, to {calibration}"
             )
+        if self.watch.doubt:
+            self._node.get_logger().warning(self.watch.doubt)
         self.info = message
         self._changed(calibration)
         self._node.diagnostics.wait_for(f"images on {self.topic}")
@@ -152,5 +154,5 @@ class CameraImages:
 
     def remarks(self) -> dict[str, str]:
         """Return warnings about the publishers and the calibration, by kind."""
-        remark = self.watch.remark
-        return self._single.remarks() | ({"": remark} if remark else {})
+        found = {"": self.watch.remark, "calibration": self.watch.doubt}
+        return self._single.remarks() | {kind: text for kind, text in found.items() if text}

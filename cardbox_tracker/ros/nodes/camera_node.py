@@ -23,7 +23,13 @@ from cardbox_tracker.camera.camera_device import (
     open_device,
     open_video,
 )
-from cardbox_tracker.camera.film_headers import check_times, oblong, with_square_pixels
+from cardbox_tracker.camera.camera_info import LEAST_DEG
+from cardbox_tracker.camera.film_headers import (
+    MOST_DAMAGED,
+    check_times,
+    oblong,
+    with_square_pixels,
+)
 from cardbox_tracker.common.files import user_path
 from cardbox_tracker.ros.messages import conversions
 from cardbox_tracker.ros.runtime import qos
@@ -89,6 +95,11 @@ class CameraParameters(NodeParameters):
 
     def check(self) -> None:
         """Raise ValueError if values contradict each other."""
+        if 0.0 < self.horizontal_fov_deg < LEAST_DEG:
+            raise ValueError(
+                f"horizontal_fov_deg is {self.horizontal_fov_deg:g}; expected degrees, "
+                f"{LEAST_DEG:g} or more"
+            )
         if not self.device and not self.file:
             raise ValueError("device and file are both empty; give one, such as /dev/video0")
 
@@ -147,10 +158,14 @@ class CameraNode(CardboxNode):
         if self.parameters.value.file:
             self._wait_for_listener()
         started_s = due_s = time.monotonic()
+        failed = 0
         while not self._stop.is_set():
             settings = self.parameters.value
             ok, image = self._capture.read()
             if not ok:
+                failed += 1
+                if settings.file and failed < MOST_DAMAGED:
+                    continue
                 if not settings.file:
                     self.diagnostics.problem(
                         f"{settings.device} delivers no image; is it plugged in, and used by no "
@@ -158,6 +173,7 @@ class CameraNode(CardboxNode):
                     )
                     self._stop.wait(_RETRY_S)
                 elif settings.loop and self._capture.set(cv2.CAP_PROP_POS_FRAMES, 0):
+                    failed = 0
                     continue
                 else:
                     self.diagnostics.wait_for(
@@ -168,8 +184,12 @@ class CameraNode(CardboxNode):
             if not self._locked and time.monotonic() - started_s >= settings.settle_s:
                 self._lock_exposure()
             if settings.file:
-                due_s = max(due_s + self._period_s, time.monotonic() - self._period_s)
+                # Damaged images take their time, too.
+                due_s = max(
+                    due_s + (1 + failed) * self._period_s, time.monotonic() - self._period_s
+                )
                 self._stop.wait(max(due_s - time.monotonic(), 0.0))
+            failed = 0
             try:
                 self._publish(np.asarray(image, dtype=np.uint8), settings)
             except Exception as error:

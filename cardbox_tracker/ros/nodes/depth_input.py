@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
@@ -21,7 +22,7 @@ from cardbox_tracker.ros.messages import conversions
 from cardbox_tracker.ros.messages.conversions import ImageArray
 from cardbox_tracker.ros.runtime import qos
 from cardbox_tracker.ros.runtime.node import CardboxNode
-from cardbox_tracker.segmentation.depth_silhouette import silhouette_within
+from cardbox_tracker.segmentation.depth_silhouette import nearest_m, silhouette_within
 
 _PACKED = "/compressedDepth"
 
@@ -81,12 +82,16 @@ Send = Callable[[Header, ImageArray, Camera, int], None]
 
 
 class DepthCut:
-    """Pairs images with depth images and cuts out the pixels nearer than a limit."""
+    """Pairs images with depth images and cuts out the pixels nearer than a limit.
+
+    Attributes:
+        nearest_m: nearest depths of the last depth image, metres; infinite before it.
+    """
 
     def __init__(self, node: CardboxNode, topic: str, send: Send) -> None:
         """Subscribe with ``node`` to depth images on ``topic``; ``send`` receives silhouettes."""
         self._node, self._topic = node, node.resolve(topic)
-        self._send = send
+        self._send, self.nearest_m = send, math.inf
         self._arrivals: Arrivals[Taken] = Arrivals(2, TOLERANCE_NS)
         self._input = DepthInput(node, topic, self._on_depth)
 
@@ -114,5 +119,6 @@ class DepthCut:
                 # The node would otherwise name the topic of the message that completed the set.
                 raise EncodingError(f"{self._topic}: {error}") from None
             silhouette = silhouette_within(depth_m, seen.within_m)
+            self.nearest_m = nearest_m(depth_m)
             sent_ns = max(seen.sent_ns, measured.sent_ns)
             self._send(seen.message, silhouette, seen.camera, sent_ns)

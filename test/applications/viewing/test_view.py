@@ -362,6 +362,9 @@ def test_files_are_passed_on_with_a_policy() -> None:
             urlopen(f"{address}/other")
         with pytest.raises(HTTPError, match="404"):
             urlopen(f"{address}/end")
+        with socket.create_connection(("127.0.0.1", int(address.rpartition(":")[2]))) as raw:
+            raw.sendall(b"GET /\xc3\xa4 HTTP/1.0\r\nHost: localhost\r\n\r\n")
+            assert b" 502 " in raw.recv(100)
         with pytest.raises(HTTPError, match="502"):
             urlopen(f"{address}/viewer.js")
     hosts = {word for word in allowed.replace(";", "").split() if "//" in word}

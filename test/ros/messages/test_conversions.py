@@ -147,7 +147,9 @@ def test_camera_survives_its_camera_info() -> None:
 
 def test_uncalibrated_camera_names_both_topics() -> None:
     with pytest.raises(CameraError, match=r"(?s)/eye/image_raw.*/eye/camera_info"):
-        calibration_from_info(info(k=np.zeros(9)), "/eye/image_raw", "/eye/camera_info")
+        calibration_from_info(
+            info(k=np.zeros(9), p=np.zeros(12)), "/eye/image_raw", "/eye/camera_info"
+        )
 
 
 def test_binning_and_region_of_interest_are_taken_into_the_camera() -> None:

@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 import gc
+import time
 
 import pytest
 
 rclpy = pytest.importorskip("rclpy", reason="rclpy is not installed")
 
 from rclpy.context import Context  # noqa: E402
+from rclpy.executors import SingleThreadedExecutor  # noqa: E402
+from rclpy.qos import QoSProfile  # noqa: E402
 from std_msgs.msg import String  # noqa: E402
+from std_srvs.srv import Trigger  # noqa: E402
 
 from cardbox_tracker.common.errors import CardboxError  # noqa: E402
 from cardbox_tracker.ros.runtime import qos  # noqa: E402
@@ -56,5 +60,29 @@ def test_a_topic_that_ros_does_not_allow_is_told(topic: str, ros_domain: int) ->
         with pytest.raises(CardboxError, match="topic"):
             node.advertise(String, topic, qos.RESULT)
     finally:
+        node.destroy_node()
+        context.try_shutdown()
+
+
+def test_calls_at_once_wait_for_a_busy_node(ros_domain: int) -> None:
+    context, calls = Context(), 300
+    rclpy.init(context=context, domain_id=ros_domain)
+    node = CardboxNode("tested", context=context, enable_rosout=False)
+    node.offer("do", lambda: "done")
+    caller = rclpy.create_node("caller", context=context, enable_rosout=False)
+    profile = QoSProfile(depth=calls)
+    client = caller.create_client(Trigger, "do", qos_profile=profile)
+    try:
+        assert client.wait_for_service(10.0)
+        answers = [client.call_async(Trigger.Request()) for _ in range(calls)]
+        executor = SingleThreadedExecutor(context=context)
+        for one in (node, caller):
+            executor.add_node(one)
+        until_s = time.monotonic() + 10.0
+        while time.monotonic() < until_s and not all(answer.done() for answer in answers):
+            executor.spin_once(0.1)
+        assert sum(answer.done() for answer in answers) == calls
+    finally:
+        caller.destroy_node()
         node.destroy_node()
         context.try_shutdown()
