@@ -46,6 +46,7 @@ PUBLIC = {
     "Observation",
     "OtherCamera",
     "PRESETS",
+    "Result",
     "RosMissingError",
     "SilhouetteExtractor",
     "Tracker",
@@ -55,7 +56,9 @@ PUBLIC = {
     "load_body_model",
     "load_calibration",
     "load_extrinsics",
+    "read_result",
     "save_body_model",
+    "track",
 }
 
 
