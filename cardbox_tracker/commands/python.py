@@ -47,16 +47,20 @@ def track(recording: str | os.PathLike[str], **options: Any) -> Result:
     from cardbox_tracker.applications.exporting.result import read_result
     from cardbox_tracker.recordings.folder import is_one_recording
 
-    detector = options.pop("detector", None)
-    if isinstance(detector, str | os.PathLike):
-        options["detector"] = detector
+    own = options.get("detector")
+    if own is not None and not isinstance(own, str | os.PathLike):
+        del options["detector"]
+    else:
+        own = None
     parser = _Parser(prog="track", add_help=False, allow_abbrev=False)
     command.add_arguments(parser)
     words = [word for name, value in options.items() for word in _words(name, value)]
     # A recording may begin as an option does.
     parsed = parser.parse_args([*words, "--", os.fspath(recording)])
-    if not isinstance(detector, str | os.PathLike):
-        parsed.detector = detector
+    if own is not None:
+        if parsed.detector is not None:
+            parser.error("detector and detector_class are both given")
+        parsed.detector = own
     if parsed.recording.is_dir() and not is_one_recording(parsed.recording):
         parser.error(f"{recording} is no recording; track its recordings one by one")
     with TemporaryDirectory() as folder:
