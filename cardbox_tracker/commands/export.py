@@ -18,7 +18,7 @@ HELP = "write results as TRC, MOT, BVH or C3D, or as joint angles of the ISB"
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of ``cardbox export``."""
-    from cardbox_tracker.applications.exporting.formats import format_names
+    from cardbox_tracker.applications.exporting.formats import formats
 
     parser.add_argument(
         "results",
@@ -28,7 +28,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         "--to",
-        choices=format_names(),
+        choices=formats(),
         required=True,
         help="trc: markers for OpenSim and Pose2Sim; mot: coordinates for OpenSim; bvh: skeleton "
         "for Blender; c3d: markers, with ezc3d; isb: CSV with joint angles by the recommendations "
@@ -55,11 +55,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> None:
     """Read the results and write the file."""
-    from cardbox_tracker.applications.exporting.formats import export, format_named
+    from cardbox_tracker.applications.exporting.formats import export, formats
     from cardbox_tracker.person.model_file import load_body_model
     from cardbox_tracker.recordings.result_reader import read_results
 
-    chosen = format_named(options.to)
+    chosen = formats()[options.to]
     output = options.output or Path(options.results.resolve().stem + chosen.suffix)
     beside = body_of_person(body_beside(options.results), options.person or 1)
     check_outputs((output,), options.force, inputs=(options.results, options.model, beside))

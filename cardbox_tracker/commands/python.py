@@ -16,10 +16,7 @@ from cardbox_tracker.common.errors import CardboxError
 if TYPE_CHECKING:
     from cardbox_tracker.applications.exporting.result import Result
 
-# Options whose keywords end in their unit.
-_UNITS = ("fov_deg", "stature_m", "distance_m", "within_m", "start_s", "end_s")
-# Options that take several words, and the separator of numbers in one word.
-_SEVERAL, _SEPARATORS = ("cameras",), {"background": ":"}
+_WITH_UNIT = ("fov_deg", "stature_m", "distance_m", "within_m", "start_s", "end_s")
 
 
 class _Parser(argparse.ArgumentParser):
@@ -32,11 +29,8 @@ def track(recording: str | os.PathLike[str], **options: Any) -> Result:
 
     Args:
         recording: bag, video, or folder of images.
-        options: options of ``cardbox track`` with underscores, such as ``camera_pitch_deg=5``;
-            ``fov_deg``, ``stature_m``, ``distance_m``, ``within_m``, ``start_s`` and ``end_s`` have
-            their unit. True is a switch, ``background`` a pair of seconds, ``set`` a dict;
-            ``detector`` may also be a detector of one's own (``docs/extending.md``). Without
-            ``csv`` no table is kept.
+        options: options of ``cardbox track``, see ``docs/python.md``; ``detector`` may also be an
+            object with ``detect(image)``. Without ``csv`` no table is kept.
 
     Returns:
         The results; of several people, those of ``person``, by default the first.
@@ -48,19 +42,14 @@ def track(recording: str | os.PathLike[str], **options: Any) -> Result:
     from cardbox_tracker.recordings.folder import is_one_recording
 
     own = options.get("detector")
-    if own is not None and not isinstance(own, str | os.PathLike):
-        del options["detector"]
-    else:
-        own = None
+    is_own = own is not None and not isinstance(own, str | os.PathLike)
     parser = _Parser(prog="track", add_help=False, allow_abbrev=False)
     command.add_arguments(parser)
-    words = [word for name, value in options.items() for word in _words(name, value)]
-    # A recording may begin as an option does.
-    parsed = parser.parse_args([*words, "--", os.fspath(recording)])
-    if own is not None:
-        if parsed.detector is not None:
-            parser.error("detector and detector_class are both given")
-        parsed.detector = own
+    words = (_words(*one) for one in options.items() if not (is_own and one[0] == "detector"))
+    parsed = parser.parse_args([*(w for some in words for w in some), "--", os.fspath(recording)])
+    if is_own and parsed.detector is not None:
+        parser.error("detector and detector_class are both given")
+    parsed.detector = own if is_own else parsed.detector
     if parsed.recording.is_dir() and not is_one_recording(parsed.recording):
         parser.error(f"{recording} is no recording; track its recordings one by one")
     with TemporaryDirectory() as folder:
@@ -72,17 +61,15 @@ def track(recording: str | os.PathLike[str], **options: Any) -> Result:
 
 def _words(name: str, value: Any) -> Iterator[str]:
     """Yield the words of an option, as they are typed."""
-    option = name.rpartition("_")[0] if name in _UNITS else name
-    flag = f"--{option.replace('_', '-')}"
-    if value is True:
-        yield flag
-    elif isinstance(value, dict):
-        for key, one in value.items():
-            yield f"{flag}={key}={str(one).lower() if isinstance(one, bool) else one}"
-    elif name in _SEVERAL:
-        yield flag
-        yield from [value] if isinstance(value, str) else map(str, value)
+    flag = "--" + (name.rpartition("_")[0] if name in _WITH_UNIT else name).replace("_", "-")
+    if isinstance(value, dict):
+        texts = (
+            (key, str(one).lower() if isinstance(one, bool) else one) for key, one in value.items()
+        )
+        yield from (f"{flag}={key}={text}" for key, text in texts)
+    elif isinstance(value, tuple | list) and name == "cameras":
+        yield from (flag, *value)
     elif isinstance(value, tuple | list):
-        yield f"{flag}={_SEPARATORS.get(name, ',').join(map(str, value))}"
+        yield f"{flag}={(':' if name == 'background' else ',').join(map(str, value))}"
     elif value is not None and value is not False:
-        yield f"{flag}={value}"
+        yield flag if value is True else f"{flag}={value}"

@@ -16,7 +16,7 @@ import sys
 from collections.abc import Callable, Iterable
 from contextlib import AbstractContextManager
 from dataclasses import dataclass
-from importlib import import_module
+from importlib.metadata import EntryPoint
 from pathlib import Path, PurePosixPath
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, NamedTuple, NoReturn, TypeVar
@@ -207,24 +207,6 @@ class TrackingRequest:
 
 class ClassName(str):
     """Module and name of a class, ``MODULE:CLASS``, which only a command line may give."""
-
-    def load(self) -> object:
-        """Return the class.
-
-        Raises:
-            CardboxError: it cannot be imported.
-        """
-        module, _, name = self.partition(":")
-        if os.getcwd() not in sys.path:
-            # Last, so that nothing there takes the place of an installed module.
-            sys.path.append(os.getcwd())
-        try:
-            return getattr(import_module(module), name)
-        except Exception as error:
-            raise CardboxError(
-                f"--detector-class {self} cannot be imported: {type(error).__name__}: {error}; "
-                "expected MODULE:CLASS, such as my_detector:MyDetector"
-            ) from error
 
 
 class OptionsError(CardboxError):
@@ -713,8 +695,7 @@ def points_named(given: object) -> Detector | PointTable:
     """Return the source of 2D points.
 
     Args:
-        given: the name of the installed detector or of one that another package adds, the path of
-            given points, a :class:`ClassName`, or a detector of one's own.
+        given: the name of a detector, the path of points, a class, or a detector of one's own.
 
     Raises:
         CardboxError: the detector is not installed or is none, or there are no such points.
@@ -724,15 +705,19 @@ def points_named(given: object) -> Detector | PointTable:
     from cardbox_tracker.detectors.own_network import OwnModel
     from cardbox_tracker.detectors.point_table import PointTable
 
-    if isinstance(given, ClassName):
-        return Detector(OwnModel.of(given.load(), given))
     if not isinstance(given, str | Path):
         return Detector(OwnModel.of(given, f"the detector {type(given).__name__}"))
     if given == MEDIAPIPE:
         return Detector.installed()
     added = extensions(DETECTORS, (MEDIAPIPE,))
+    if isinstance(given, ClassName):
+        if os.getcwd() not in sys.path:
+            # Last, so that nothing there takes the place of an installed module.
+            sys.path.append(os.getcwd())
+        own = loaded(EntryPoint("--detector-class", given, DETECTORS))
+        return Detector(OwnModel.of(own, given))
     if given in added:
-        return Detector(OwnModel.of(loaded(added[given]), f"the detector {given}"))
+        return Detector(OwnModel.of(loaded(added[str(given)]), f"the detector {given}"))
     path = Path(given)
     if not path.exists():
         raise CardboxError(
@@ -900,10 +885,7 @@ def _read_options(path: Path) -> dict[str, Any]:
     if other is not None:
         parser.error(f"unrecognized arguments: {other}")
     if isinstance(given.get("detector"), ClassName):
-        parser.error(
-            "--detector-class would run code that a file among data names; give it on the command "
-            "line"
-        )
+        parser.error("--detector-class would run code that data name; give it on the command line")
     for name, value in given.items():
         if isinstance(value, Path):
             given[name] = path.parent / value

@@ -95,7 +95,7 @@ def test_command_and_python_track_alike_with_a_detector_of_ones_own(
     assert len(result.state) == 6
     assert result.scene is not None and result.body is not None
     assert result.scene.numbers()["fov_deg"]["mean"] == pytest.approx(60.0, abs=0.5)
-    assert result.scene.camera.roll_rad.origin == "found"
+    assert result.scene.camera.roll_rad.origin == "usual"
     assert (result.path, result.of(["left_hand_x"]).shape) == (film, (6, 1))
     table = cardbox_tracker.read_result(tmp_path / "a.csv")
     assert table.state == result.state and table.scene == result.scene
@@ -164,8 +164,8 @@ def test_pandas_has_the_columns_of_the_table(tmp_path: Path) -> None:
         ({"detector": "nothing", **GIVEN}, "--detector is 'nothing'; expected mediapipe, or"),
         ({"detector": 7, **GIVEN}, r"the detector int has no function detect\(image\)"),
         ({"detector": 7, "detector_class": "a:B", **GIVEN}, "detector_class are both given"),
-        ({"detector_class": "json:nothing", **GIVEN}, "json:nothing cannot be imported: Attrib"),
-        ({"detector_class": "nothing", **GIVEN}, "nothing cannot be imported: ModuleNotFound"),
+        ({"detector_class": "json:nothing", **GIVEN}, "imported from json:nothing: Attrib"),
+        ({"detector_class": "nothing", **GIVEN}, "imported from nothing: ModuleNotFound"),
         ({"stature_m": (1.75, 1.6), "fov_deg": 60}, "--stature has several values"),
         ({"background": (3, 1)}, "argument --background: .*got '3:1'"),
     ],

@@ -73,37 +73,18 @@ FORMATS: dict[str, Format] = {
 }
 
 
-def format_names() -> list[str]:
-    """Return the names of all formats, those of other packages last.
+def formats() -> dict[str, Format]:
+    """Return all formats by name, those of other packages last.
 
     Raises:
-        CardboxError: two have the same name.
+        CardboxError: a package adds what cannot be imported or is none, or a name that is taken.
     """
-    return [*FORMATS, *extensions(EXPORTERS, FORMATS)]
-
-
-def format_named(name: str) -> Format:
-    """Return the format of one of :func:`format_names`.
-
-    Raises:
-        CardboxError: that of another package cannot be imported, or is no :class:`Format`.
-    """
-    found: Format = FORMATS.get(name) or loaded(extensions(EXPORTERS, FORMATS)[name], Format)
+    found = dict(FORMATS)
+    for name, entry in extensions(EXPORTERS, FORMATS).items():
+        found[name] = loaded(entry)
+        if not isinstance(found[name], Format):
+            raise CardboxError(f"{name} of {entry.dist and entry.dist.name} is no {Format}")
     return found
-
-
-def format_of(path: Path) -> Format:
-    """Return the format whose files end as a name does; of several the longest ending counts.
-
-    Raises:
-        CardboxError: there is none.
-    """
-    formats = list(map(format_named, format_names()))
-    fitting = [one for one in formats if path.name.endswith(one.suffix)]
-    if not fitting:
-        endings = ", ".join(one.suffix for one in formats)
-        raise CardboxError(f"no format has the ending of {path}; those are {endings}")
-    return max(fitting, key=lambda one: len(one.suffix))
 
 
 def export(results: Results, path: Path, to: Format, model: BodyModel | None = None) -> list[str]:
@@ -128,17 +109,14 @@ def export(results: Results, path: Path, to: Format, model: BodyModel | None = N
     if body is not None and to.has_places:
         motion = images_of_body(motion, body)
     to.write(path, motion, body)
-    remarks = [
+    lines = [
         f"exported {seen} of {images} images, {motion.state.count(UNCERTAIN)} of them uncertain; "
         f"{images - seen} without a posture are gaps"
     ]
-    others = seen - int(motion.is_seen.sum())
-    if others:
-        remarks.append(f"{others} of these images were tracked with another body and are gaps, too")
+    if others := seen - int(motion.is_seen.sum()):
+        lines.append(f"{others} of these images were tracked with another body and are gaps, too")
     if body is None and to.has_places:
-        remarks.append(
-            "the camera is taken as level, and the floor is not known; --model gives both"
-        )
+        lines.append("the camera is taken as level, and the floor is not known; --model gives both")
     elif to.has_places and body is not None and floor_m(body) is None:
-        remarks.append("the floor is not known, so heights are those above the camera")
-    return remarks
+        lines.append("the floor is not known, so heights are those above the camera")
+    return lines

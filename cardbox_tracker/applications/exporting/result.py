@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from cardbox_tracker.applications.exporting.formats import export, format_named, format_of
+from cardbox_tracker.applications.exporting.formats import export, formats
 from cardbox_tracker.common.errors import CardboxError
 from cardbox_tracker.common.files import scene_beside
 from cardbox_tracker.measuring.scene import Scene, load_scene
@@ -18,11 +18,7 @@ from cardbox_tracker.recordings.result_table import units
 
 @dataclass(frozen=True)
 class Result(Results):
-    """Results of one person, with their scene.
-
-    Attributes:
-        scene: camera and people, as of ``OUT.scene.yaml``; None if it is not known.
-    """
+    """Results of one person, with camera and people as of ``OUT.scene.yaml`` if they are known."""
 
     scene: Scene | None = None
 
@@ -44,29 +40,25 @@ class Result(Results):
         found = {**times, **self.numbers, **self.texts}
         return pandas.DataFrame({name: found[name] for name in units(*[True] * 3) if name in found})
 
-    def save(self, path: str | os.PathLike[str], to: str | None = None) -> list[str]:
-        """Write a file in a format of ``cardbox export``; one that exists is replaced.
-
-        Args:
-            path: the file, such as ``x.trc``.
-            to: name of the format; None for the one whose files end so.
+    def save(self, path: str | os.PathLike[str]) -> list[str]:
+        """Write a file in the format of ``cardbox export`` that its ending says, and replace it.
 
         Returns:
             Lines that say what was written, and what is not known.
 
         Raises:
-            CardboxError: there is no such format, or see :func:`~.formats.export`.
+            CardboxError: no format has this ending, or see :func:`~.formats.export`.
         """
-        path = Path(path)
-        return export(self, path, format_of(path) if to is None else format_named(to))
+        path, known = Path(path), formats().values()
+        fitting = [one for one in known if path.name.endswith(one.suffix)]
+        if not fitting:
+            endings = ", ".join(one.suffix for one in known)
+            raise CardboxError(f"no format has the ending of {path}; those are {endings}")
+        return export(self, path, max(fitting, key=lambda one: len(one.suffix)))
 
 
 def read_result(path: str | os.PathLike[str], person: int | None = None) -> Result:
-    """Return the results in a table or a bag, with body and scene from the files beside a table.
-
-    Args:
-        path: table of ``cardbox track``, or bag of ``cardbox track --bag`` or of nodes.
-        person: number of one of several people; without it, the first one counts.
+    """Return the results in a table or a bag, see :func:`~.result_reader.read_results`, and scene.
 
     Raises:
         CardboxError: a file cannot be read, or contains what no result is; the text names the line.
