@@ -49,16 +49,6 @@ T = TypeVar("T")
 
 OPTIONS_ENDING = ".options"
 """Ending of the files beside the recordings of a folder that have options for them."""
-RETIRED = MappingProxyType(
-    {
-        "--corrector": "results are no longer corrected by a network",
-        "--output-smoothing-s": "it smoothed corrected results, which there are no longer",
-        "--particles": "give --set torso.particles=N --set arm.particles=N",
-        "--refine-sizes": "breadths stay as they were measured",
-        "--strategy": "give --set strategy=NAME",
-    }
-)
-"""Options of former versions, with what to do or expect instead."""
 
 _MOST_ROLL_DEG, _MOST_FPS = 180.0, 1000.0
 _MOST_BYTES = 64 * 1024
@@ -436,8 +426,6 @@ def add_tracking(parser: argparse.ArgumentParser, needs_recording: bool = True) 
         metavar="FILE.yaml",
         help="file of such settings; --set and --effort take precedence over it",
     )
-    for flag in RETIRED:
-        add(flag, action=_Refuse, nargs="?", help=argparse.SUPPRESS)
     add_seed(parser, "the filters")
 
 
@@ -470,14 +458,6 @@ def _person_choice(text: str) -> PersonChoice | int:
         return PersonChoice.parse(text)
     except ValueError as error:
         raise argparse.ArgumentTypeError(str(error)) from None
-
-
-class _Refuse(argparse.Action):
-    """Refuses a retired option."""
-
-    def __call__(self, parser: argparse.ArgumentParser, *given: Any) -> NoReturn:
-        flag = given[-1]
-        parser.error(f"{flag} was removed: {RETIRED[flag]}")
 
 
 class _AddSetting(argparse.Action):

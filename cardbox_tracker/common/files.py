@@ -6,7 +6,6 @@ import contextlib
 import csv
 import errno
 import fcntl
-import io
 import os
 import re
 import secrets
@@ -19,7 +18,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import BinaryIO
 
-from cardbox_tracker.common.errors import CardboxError, quoted
+from cardbox_tracker.common.errors import CardboxError
 
 # Part of the names of temporary files, which can remain after a crash.
 _MARK = ".unfinished-"
@@ -143,32 +142,6 @@ def regular_file(path: str | os.PathLike[str], most_bytes: int) -> Iterator[Bina
     with os.fdopen(descriptor, "rb") as file:
         _check_size(found.st_size, most_bytes)
         yield file
-
-
-@contextmanager
-def csv_table(
-    path: str | os.PathLike[str], most_bytes: int, expected: str
-) -> Iterator[csv.DictReader[str]]:
-    """Open a CSV table of at most ``most_bytes``; errors in it are told with what is ``expected``.
-
-    Raises:
-        CardboxError: the file cannot be read, or a line is no line of a table in UTF-8.
-    """
-    try:
-        # Spreadsheets begin a file with a byte order mark.
-        with (
-            regular_file(path, most_bytes) as data,
-            io.TextIOWrapper(data, newline="", encoding="utf-8-sig") as file,
-        ):
-            yield csv.DictReader(file)
-    except UnreadableFileError as error:
-        raise CardboxError(f"cannot read {path}: {error}; give {expected}") from None
-    except OSError as error:
-        raise CardboxError(f"cannot read {path}: {error.strerror}") from None
-    except (UnicodeDecodeError, csv.Error) as error:
-        raise CardboxError(
-            f"{path} is not a table in UTF-8 ({quoted(str(error))}); give {expected}"
-        ) from None
 
 
 def read_regular(path: str | os.PathLike[str], most_bytes: int) -> bytes:

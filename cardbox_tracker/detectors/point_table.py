@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import csv
+import io
 import re
 from bisect import bisect_left
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from decimal import Decimal
 from pathlib import Path
 from typing import NamedTuple
@@ -15,7 +17,7 @@ from numpy.typing import NDArray
 
 from cardbox_tracker.camera.camera import Calibration
 from cardbox_tracker.common.errors import CardboxError, quoted
-from cardbox_tracker.common.files import csv_table
+from cardbox_tracker.common.files import UnreadableFileError, regular_file
 from cardbox_tracker.detectors.image_points import POINT_INDEX, ImagePoints
 from cardbox_tracker.detectors.keypoint_json import coco_people, openpose_people
 from cardbox_tracker.detectors.person_choice import LEAST_INSIDE, inside, near_person, person_in
@@ -92,33 +94,54 @@ class PointTable(NamedTuple):
     def _read_table(self, camera: str | None, size: Size | None) -> tuple[str, Persons]:
         found: dict[tuple[Key, str], dict[str, tuple[float, float, float]]] = {}
         first_lines: dict[tuple[Key, str], int] = {}
-        expected = f"a CSV file with the columns {', '.join(COLUMNS)}"
-        with csv_table(self.path, _MOST_BYTES, expected) as rows:
-            column = self._check(rows.fieldnames or (), camera)
-            kind = FRAME if column == FRAME else COLUMNS[0]
-            for row in rows:
-                if camera is not None and row["camera"] != camera:
-                    continue
-                try:
-                    image, joint, point = _point_of(row, column)
-                    check_point((joint, *point), size)
-                except CardboxError as error:
-                    raise CardboxError(f"{self.path}, line {rows.line_num}: {error}") from None
-                except (ValueError, TypeError, ArithmeticError) as error:
-                    raise CardboxError(
-                        f"{self.path}, line {rows.line_num}, has a value that is no number "
-                        f"({quoted(str(error))}); expected numbers in {column}, u, v and score"
-                    ) from None
-                key: tuple[Key, str] = image, row.get(_PERSON) or ""
-                joints = found.setdefault(key, {})
-                first_lines.setdefault(key, rows.line_num)
-                if joint in joints:
-                    raise CardboxError(
-                        f"{self.path}, line {rows.line_num}: {kind} {image} has {joint} again; "
-                        f"with several people, give a column {_PERSON}"
+        try:
+            # Spreadsheets begin a file with a byte order mark.
+            with (
+                regular_file(self.path, _MOST_BYTES) as data,
+                io.TextIOWrapper(data, newline="", encoding="utf-8-sig") as file,
+            ):
+                rows = csv.DictReader(file)
+                column = self._check(rows.fieldnames or (), camera)
+                kind = FRAME if column == FRAME else COLUMNS[0]
+                for row in rows:
+                    if camera is not None and row["camera"] != camera:
+                        continue
+                    image, joint = _image_of(row[column], column), row["joint"]
+                    # A cell that is empty is missing, as in tables of pandas.
+                    u, v, score = (
+                        float("nan" if row[name] == "" else row[name]) for name in COLUMNS[2:]
                     )
-                if point[2] > 0.0 and joint in POINT_INDEX:
-                    joints[joint] = point
+                    if row["score"] == row["u"] == row["v"] == "":
+                        score = 0.0
+                    check_point((joint, u, v, score), size)
+                    key: tuple[Key, str] = image, row.get(_PERSON) or ""
+                    joints = found.setdefault(key, {})
+                    first_lines.setdefault(key, rows.line_num)
+                    if joint in joints:
+                        raise CardboxError(
+                            f"{kind} {image} has {joint} again; with several people, give a column "
+                            f"{_PERSON}"
+                        )
+                    if score > 0.0 and joint in POINT_INDEX:
+                        joints[joint] = u, v, score
+        except UnreadableFileError as error:
+            raise CardboxError(f"cannot read {self.path}: {error}; give a CSV file") from None
+        except OSError as error:
+            raise CardboxError(f"cannot read {self.path}: {error.strerror}") from None
+        except (UnicodeDecodeError, csv.Error) as error:
+            raise CardboxError(
+                f"{self.path} is not a table in UTF-8 ({quoted(str(error))}); give a CSV file with "
+                f"the columns {', '.join(COLUMNS)}"
+            ) from None
+        except (ValueError, TypeError, ArithmeticError) as error:
+            raise CardboxError(
+                f"{self.path}, line {rows.line_num}, has a value that is no number "
+                f"({quoted(str(error))}); expected numbers in {column}, u, v and score"
+            ) from None
+        except _TableError:
+            raise
+        except CardboxError as error:
+            raise CardboxError(f"{self.path}, line {rows.line_num}: {error}") from None
         persons: Persons = {}
         for key, joints in found.items():
             try:
@@ -134,25 +157,12 @@ class PointTable(NamedTuple):
         expected = kind, *COLUMNS[1:], *(() if camera is None else ("camera",))
         missing = [name for name in expected if name not in names]
         if missing:
-            raise CardboxError(
+            raise _TableError(
                 f"{self.path} has no column {', '.join(missing)}; a table of points has the "
                 f"columns {', '.join(expected)}, separated by commas; {FRAME}, the image's number "
                 f"from 0 on, or {', '.join(list(_STAMPS)[1:])} may take the place of {COLUMNS[0]}"
             )
         return kind
-
-
-def _point_of(row: Mapping[str, str], column: str) -> tuple[int, str, tuple[float, float, float]]:
-    """Return image, joint, and column, row and score of a line.
-
-    Raises:
-        ValueError, TypeError, ArithmeticError: a value is no number.
-    """
-    # A cell that is empty is missing, as in tables of pandas.
-    u, v, score = (float("nan" if row[name] == "" else row[name]) for name in COLUMNS[2:])
-    if row["score"] == row["u"] == row["v"] == "":
-        score = 0.0
-    return _image_of(row[column], column), row["joint"], (u, v, score)
 
 
 def _image_of(text: str, column: str) -> int:
@@ -169,6 +179,10 @@ def _image_of(text: str, column: str) -> int:
     if not (abs(stamp_ns) < _MOST_NS and is_whole):
         raise ValueError(f"{column} is {text}")
     return round(stamp_ns)
+
+
+class _TableError(CardboxError):
+    """The table lacks a column, which is the fault of no line."""
 
 
 class Image(NamedTuple):

@@ -10,7 +10,7 @@ import math
 import os
 import textwrap
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 from cardbox_tracker.common.errors import CardboxError, quoted
@@ -119,28 +119,20 @@ def save_scene(scene: Scene, path: str | os.PathLike[str]) -> None:
         temporary.write_text(dumps_scene(scene), encoding="utf-8")
 
 
-def load_scene(path: str | os.PathLike[str], is_given: bool = True) -> Scene:
+def load_scene(path: str | os.PathLike[str]) -> Scene:
     """Read a scene.
-
-    Args:
-        path: its file.
-        is_given: whether its numbers are given to another recording; else their origins remain.
 
     Raises:
         CardboxError: the file cannot be read or is no scene; the text names what is wrong.
     """
     try:
-        scene = _scene_of(parse_small_yaml(read_small_text(path)))
+        data = parse_small_yaml(read_small_text(path))
+        return _scene_of(data)
     except (SmallYamlError, ValueError) as error:
         raise CardboxError(
             f"cannot read the scene {os.fspath(path)}: {error}; give a file OUT.scene.yaml that "
             "'cardbox track' has written"
         ) from None
-    if not is_given:
-        return scene
-    numbers = scene.camera._asdict().items()
-    given = {name: value and value._replace(origin=GIVEN) for name, value in numbers}
-    return replace(scene, camera=SceneCamera(**given))
 
 
 def _scene_of(data: Any) -> Scene:

@@ -5,6 +5,8 @@ All that use results read them here, so that the same files are accepted and ref
 
 from __future__ import annotations
 
+import csv
+import io
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -16,7 +18,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cardbox_tracker.common.errors import BagError, CardboxError, quoted
-from cardbox_tracker.common.files import body_beside, body_of_person, csv_table
+from cardbox_tracker.common.files import (
+    UnreadableFileError,
+    body_beside,
+    body_of_person,
+    regular_file,
+)
 from cardbox_tracker.person.hands import HAND_NAMES, HAND_OPEN_NAMES
 from cardbox_tracker.person.legs import LEG_NAMES
 from cardbox_tracker.person.model import BodyModel
@@ -121,13 +128,8 @@ class _Rows:
         texts = set(text_columns())
         self.names = [name for name in known if name not in (*texts, PERSON, "stamp")]
         self._texts = [name for name in known if name in texts]
-        is_chance = [name.endswith("_chance") for name in self.names]
-        self._least = np.where(
-            [one or "_stddev_" in name for one, name in zip(is_chance, self.names, strict=True)],
-            0.0,
-            -_MOST,
-        )
-        self._most = np.where(is_chance, 1.0, _MOST)
+        self._are_chances = np.array([name.endswith("_chance") for name in self.names])
+        self._are_positive = self._are_chances | ["_stddev_" in name for name in self.names]
         self._is_needed = np.array([name in needed for name in self.names])
         self._times: list[tuple[int, float, str]] = []
         self._blocks: list[FloatArray] = []
@@ -174,7 +176,8 @@ class _Rows:
             known = dict(zip(self.names, cells, strict=True))
             values = np.array([_number(known, name) for name in self.names])
         # A comparison with nan is false.
-        is_wrong = ~((self._least <= values) & (values <= self._most))
+        is_wrong = ~(np.abs(values) < _MOST) | (self._are_positive & (values < 0.0))
+        is_wrong |= self._are_chances & (values > 1.0)
         is_wrong |= is_empty & self._is_needed
         if is_wrong.any():
             wrong = int(np.argmax(is_wrong))
@@ -259,16 +262,31 @@ def read_results(path: Path, person: int | None = None) -> Results:
 
 def _csv_cells(path: Path) -> Iterator[tuple[str, Mapping[str, Any]]]:
     """Yield each row of a CSV table, and where it is."""
-    with csv_table(path, _MOST_BYTES, "a table or a bag that 'cardbox track' has written") as rows:
-        _check(path, rows.fieldnames or ())
-        for row in rows:
-            # The reader has None for cells that are missing, and for a name of those beyond.
-            if None in row or None in row.values():
-                raise CardboxError(
-                    f"{path}, line {rows.line_num}: it has not as many cells as the first line; "
-                    "give the table as 'cardbox track' wrote it (docs/results.md)"
-                )
-            yield f"line {rows.line_num}", row
+    try:
+        # Spreadsheets begin a file with a byte order mark.
+        with (
+            regular_file(path, _MOST_BYTES) as data,
+            io.TextIOWrapper(data, newline="", encoding="utf-8-sig") as file,
+        ):
+            rows = csv.DictReader(file)
+            _check(path, rows.fieldnames or ())
+            for row in rows:
+                # The reader has None for cells that are missing, and for a name of those beyond.
+                if None in row or None in row.values():
+                    raise CardboxError(
+                        f"{path}, line {rows.line_num}: it has not as many cells as line 1; "
+                        "give the table as 'cardbox track' wrote it (docs/results.md)"
+                    )
+                yield f"line {rows.line_num}", row
+    except UnreadableFileError as error:
+        raise CardboxError(f"cannot read {path}: {error}; give a table or a bag") from None
+    except OSError as error:
+        raise CardboxError(f"cannot read {path}: {error.strerror}") from None
+    except (UnicodeDecodeError, csv.Error) as error:
+        raise CardboxError(
+            f"{path} is not a table in UTF-8 ({quoted(str(error))}); give a table or a bag that "
+            "'cardbox track' has written"
+        ) from None
 
 
 def _parquet_cells(path: Path) -> Iterator[tuple[str, Mapping[str, Any]]]:
@@ -391,7 +409,8 @@ class _Messages:
     """Joins the messages of each image, of which joints, deviations and points have its stamp."""
 
     def __init__(self) -> None:
-        self._state, self._last_ns = NO_PERSON, 0
+        self._state = NO_PERSON
+        self._last_ns = 0
         self._body: BodyModel | None = None
         self.by_stamp: dict[int, dict[str, Any]] = {}
 
@@ -408,14 +427,10 @@ class _Messages:
             row: dict[str, Any] = {"state": self._state, "body": self._body}
             # A node without the place of the torso keeps it constant.
             row |= dict.fromkeys(PLACE_NAMES, 0.0) | positions_of(joints)
-            stamp_ns = stamp_ns_of(message)
-            if stamp_ns < self._last_ns:
-                raise ValueError(
-                    f"the stamp {stamp_ns} ns is before that of the message before, "
-                    f"{self._last_ns} ns, so the images are not in order of time"
-                )
-            self._last_ns = stamp_ns
-            self.by_stamp[stamp_ns] = row
+            if self._last_ns > stamp_ns_of(message):
+                raise ValueError(f"the stamp {stamp_ns_of(message)} ns is before the one before")
+            self._last_ns = stamp_ns_of(message)
+            self.by_stamp[stamp_ns_of(message)] = row
         elif (found := self.by_stamp.get(stamp_ns_of(message))) is not None:
             if name == _KEYPOINTS:
                 points_m = points_of(message).ravel().tolist()

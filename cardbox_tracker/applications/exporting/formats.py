@@ -113,6 +113,8 @@ def export(results: Results, path: Path, to: Format, model: BodyModel | None = N
         f"exported {seen} of {images} images, {motion.state.count(UNCERTAIN)} of them uncertain; "
         f"{images - seen} without a posture are gaps"
     ]
+    if images == 1:
+        lines.append("a single image has no rate: 1 Hz is written")
     if others := seen - int(motion.is_seen.sum()):
         lines.append(f"{others} of these images were tracked with another body and are gaps, too")
     if body is None and to.has_places:

@@ -65,5 +65,5 @@ def read_result(path: str | os.PathLike[str], person: int | None = None) -> Resu
     """
     path = Path(path)
     results, beside = result_reader.read_results(path, person), scene_beside(path)
-    scene = load_scene(beside, is_given=False) if beside.is_file() else None
+    scene = load_scene(beside) if beside.is_file() else None
     return Result(**vars(results), scene=scene)
