@@ -126,13 +126,12 @@ def _detection(person: Mapping[str, Any], shape: tuple[int, int]) -> Detection:
     check_person(known)
     found = Detection(points_px, scores, np.zeros(shape, np.uint8))
     mask = person.get(_MASK)
-    is_drawn = mask is None
-    return found._replace(
-        mask=figure_of(found).drawn(shape) if is_drawn else silhouette_from(mask, _MASK, shape)
-    )
+    if mask is None:
+        mask = figure_of(found).drawn(shape)
+    return found._replace(mask=silhouette_from(mask, _MASK, shape))
 
 
 def _around(found: Detection) -> Square:
     px = found.points_px[found.scores > 0.0]
     middle, side = (px.min(axis=0) + px.max(axis=0)) / 2, np.ptp(px, axis=0).max()
-    return Square(*middle.tolist(), float(side), 0.0)
+    return Square(float(middle[0]), float(middle[1]), float(side), 0.0)
