@@ -242,6 +242,9 @@ def read_results(path: Path, person: int | None = None) -> Results:
         if person is not None and PERSON not in row:
             raise CardboxError(f"{path} has no column {PERSON}: it is of one person")
         try:
+            # A line of CSV has None for cells that are missing, and as the name of those beyond.
+            if path.suffix != PARQUET and (None in row or None in row.values()):
+                raise ValueError("it has not as many cells as line 1")
             if PERSON in row and _number(row, PERSON, int) != (person or 1):
                 continue
             found = found or _Rows(path, row, _NEEDED)
@@ -271,12 +274,6 @@ def _csv_cells(path: Path) -> Iterator[tuple[str, Mapping[str, Any]]]:
             rows = csv.DictReader(file)
             _check(path, rows.fieldnames or ())
             for row in rows:
-                # The reader has None for cells that are missing, and for a name of those beyond.
-                if None in row or None in row.values():
-                    raise CardboxError(
-                        f"{path}, line {rows.line_num}: it has not as many cells as line 1; "
-                        "give the table as 'cardbox track' wrote it (docs/results.md)"
-                    )
                 yield f"line {rows.line_num}", row
     except UnreadableFileError as error:
         raise CardboxError(f"cannot read {path}: {error}; give a table or a bag") from None
@@ -408,9 +405,10 @@ def _damaged(where: str, error: Exception) -> BagError:
 class _Messages:
     """Joins the messages of each image, of which joints, deviations and points have its stamp."""
 
+    _last_ns = 0
+
     def __init__(self) -> None:
         self._state = NO_PERSON
-        self._last_ns = 0
         self._body: BodyModel | None = None
         self.by_stamp: dict[int, dict[str, Any]] = {}
 
@@ -422,14 +420,14 @@ class _Messages:
             if self._state not in _SEEN:
                 self.by_stamp[time_ns] = {"state": self._state, "body": self._body}
         elif name == _JOINTS:
+            if self._last_ns > stamp_ns_of(message):
+                raise ValueError(f"the stamp {stamp_ns_of(message)} ns is before the one before")
+            self._last_ns = stamp_ns_of(message)
             joints = joints_of(message)
             posture_from(joints)
             row: dict[str, Any] = {"state": self._state, "body": self._body}
             # A node without the place of the torso keeps it constant.
             row |= dict.fromkeys(PLACE_NAMES, 0.0) | positions_of(joints)
-            if self._last_ns > stamp_ns_of(message):
-                raise ValueError(f"the stamp {stamp_ns_of(message)} ns is before the one before")
-            self._last_ns = stamp_ns_of(message)
             self.by_stamp[stamp_ns_of(message)] = row
         elif (found := self.by_stamp.get(stamp_ns_of(message))) is not None:
             if name == _KEYPOINTS:
