@@ -128,8 +128,9 @@ class _Rows:
         texts = set(text_columns())
         self.names = [name for name in known if name not in (*texts, PERSON, "stamp")]
         self._texts = [name for name in known if name in texts]
-        self._are_chances = np.array([name.endswith("_chance") for name in self.names])
-        self._are_positive = self._are_chances | ["_stddev_" in name for name in self.names]
+        self._are_chances = np.array([name.endswith("_chance") for name in self.names], bool)
+        are_deviations = np.array(["_stddev_" in name for name in self.names], bool)
+        self._are_positive = self._are_chances | are_deviations
         self._is_needed = np.array([name in needed for name in self.names])
         self._times: list[tuple[int, float, str]] = []
         self._blocks: list[FloatArray] = []
