@@ -22,6 +22,7 @@ TEST = [
     "mcap>=1.2",
     "mcap-ros2-support>=0.5.4",
     "mypy>=1.11",
+    "pandas>=2,<4",
     "pillow>=10",
     "pytest>=7.4",
     "pytest-timeout>=2.3",

@@ -14,11 +14,13 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from cardbox_tracker.applications.exporting.result import Result, read_result
     from cardbox_tracker.camera.calibration_file import load_calibration
     from cardbox_tracker.camera.camera import Calibration, Camera
     from cardbox_tracker.camera.extrinsics import Extrinsics
     from cardbox_tracker.camera.extrinsics_files import load_extrinsics
     from cardbox_tracker.camera.view import OtherCamera
+    from cardbox_tracker.commands.python import track
     from cardbox_tracker.common.errors import (
         BackgroundFileError,
         BagError,
@@ -77,6 +79,7 @@ __all__ = [
     "NotFiniteError",
     "Observation",
     "OtherCamera",
+    "Result",
     "RosMissingError",
     "SilhouetteExtractor",
     "Tracker",
@@ -86,7 +89,9 @@ __all__ = [
     "load_body_model",
     "load_calibration",
     "load_extrinsics",
+    "read_result",
     "save_body_model",
+    "track",
 ]
 
 _MODULES = {
@@ -121,6 +126,8 @@ _MODULES = {
     "segmentation.empty_scene": ("BackgroundLearner", "BackgroundModel"),
     "camera.extrinsics": ("Extrinsics",),
     "camera.extrinsics_files": ("load_extrinsics",),
+    "applications.exporting.result": ("Result", "read_result"),
+    "commands.python": ("track",),
 }
 _MODULE_OF = {name: module for module, names in _MODULES.items() for name in names}
 

@@ -18,7 +18,7 @@ HELP = "write results as TRC, MOT, BVH or C3D, or as joint angles of the ISB"
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of ``cardbox export``."""
-    from cardbox_tracker.applications.exporting.formats import FORMATS
+    from cardbox_tracker.applications.exporting.formats import formats
 
     parser.add_argument(
         "results",
@@ -28,11 +28,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         "--to",
-        choices=FORMATS,
+        choices=formats(),
         required=True,
         help="trc: markers for OpenSim and Pose2Sim; mot: coordinates for OpenSim; bvh: skeleton "
         "for Blender; c3d: markers, with ezc3d; isb: CSV with joint angles by the recommendations "
-        "of the ISB (docs/export.md)",
+        "of the ISB (docs/export.md); or a format that another package adds",
     )
     parser.add_argument(
         "--output",
@@ -55,40 +55,18 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> None:
     """Read the results and write the file."""
-    from cardbox_tracker.applications.exporting.formats import FORMATS
-    from cardbox_tracker.applications.exporting.motion import Motion
-    from cardbox_tracker.applications.exporting.placed import images_of_body
-    from cardbox_tracker.person.legs import floor_m
+    from cardbox_tracker.applications.exporting.formats import export, formats
     from cardbox_tracker.person.model_file import load_body_model
     from cardbox_tracker.recordings.result_reader import read_results
-    from cardbox_tracker.tracking.estimate import UNCERTAIN
 
-    chosen = FORMATS[options.to]
+    chosen = formats()[options.to]
     output = options.output or Path(options.results.resolve().stem + chosen.suffix)
     beside = body_of_person(body_beside(options.results), options.person or 1)
     check_outputs((output,), options.force, inputs=(options.results, options.model, beside))
     chosen.check()
     given = None if options.model is None else load_body_model(options.model)
     results = read_results(options.results, options.person)
-    motion = Motion.of(results)
-    body = given or results.body
-    images, seen = len(motion.state), int(motion.is_seen.sum())
-    if body is not None and chosen.has_places:
-        motion = images_of_body(motion, body)
-        if given is None and beside.is_file():
-            print(f"took the body of {beside}; --model gives another")
-    chosen.write(output, motion, body)
-    print(
-        f"exported {seen} of {images} images, {motion.state.count(UNCERTAIN)} of them uncertain; "
-        f"{images - seen} without a posture are gaps"
-    )
-    if images == 1:
-        print("a single image has no rate: 1 Hz is written")
-    others = seen - int(motion.is_seen.sum())
-    if others:
-        print(f"{others} of these images were tracked with another body and are gaps, too")
-    if body is None and chosen.has_places:
-        print("the camera is taken as level, and the floor is not known; --model gives both")
-    elif chosen.has_places and body is not None and floor_m(body) is None:
-        print("the floor is not known, so heights are those above the camera")
-    print(f"wrote {output}")
+    remarks = export(results, output, chosen, given)
+    if given is None and chosen.has_places and beside.is_file():
+        print(f"took the body of {beside}; --model gives another")
+    print(*remarks, f"wrote {output}", sep="\n")

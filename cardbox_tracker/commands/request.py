@@ -10,10 +10,13 @@ from __future__ import annotations
 import argparse
 import copy
 import math
+import os
 import shlex
+import sys
 from collections.abc import Callable, Iterable
 from contextlib import AbstractContextManager
 from dataclasses import dataclass
+from importlib.metadata import EntryPoint
 from pathlib import Path, PurePosixPath
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, NamedTuple, NoReturn, TypeVar
@@ -46,16 +49,6 @@ T = TypeVar("T")
 
 OPTIONS_ENDING = ".options"
 """Ending of the files beside the recordings of a folder that have options for them."""
-RETIRED = MappingProxyType(
-    {
-        "--corrector": "results are no longer corrected by a network",
-        "--output-smoothing-s": "it smoothed corrected results, which there are no longer",
-        "--particles": "give --set torso.particles=N --set arm.particles=N",
-        "--refine-sizes": "breadths stay as they were measured",
-        "--strategy": "give --set strategy=NAME",
-    }
-)
-"""Options of former versions, with what to do or expect instead."""
 
 _MOST_ROLL_DEG, _MOST_FPS = 180.0, 1000.0
 _MOST_BYTES = 64 * 1024
@@ -202,6 +195,10 @@ class TrackingRequest:
     force: bool = False
 
 
+class ClassName(str):
+    """Module and name of a class, ``MODULE:CLASS``, which only a command line may give."""
+
+
 class OptionsError(CardboxError):
     """Options are missing, wrong or contradict each other; the text names all of them."""
 
@@ -296,12 +293,22 @@ def add_recording(parser: argparse.ArgumentParser, required: bool = True) -> Non
         "some time. With neither --background nor --within, the mask is the default with "
         "--detector mediapipe, and person_in_view for videos and images",
     )
-    add(
+    detector = parser.add_mutually_exclusive_group()
+    detector.add_argument(
         "--detector",
         metavar="mediapipe|FILE|FOLDER",
         help="also use 2D points of the person's joints: those of MediaPipe's networks ('cardbox "
-        "detector --install'), or those that any detector has written: a table FILE.csv, a file of "
-        "COCO FILE.json, or a folder of OpenPose's files (docs/detectors.md)",
+        "detector --install'), those that any detector has written: a table FILE.csv, a file of "
+        "COCO FILE.json, or a folder of OpenPose's files (docs/detectors.md), or those of a "
+        "detector that another package adds (docs/extending.md)",
+    )
+    detector.add_argument(
+        "--detector-class",
+        dest="detector",
+        type=ClassName,
+        metavar="MODULE:CLASS",
+        help="the same of a class of your own, which has a function detect(image) "
+        "(docs/extending.md); the module may be in the current folder",
     )
     add(
         "--person",
@@ -419,8 +426,6 @@ def add_tracking(parser: argparse.ArgumentParser, needs_recording: bool = True) 
         metavar="FILE.yaml",
         help="file of such settings; --set and --effort take precedence over it",
     )
-    for flag in RETIRED:
-        add(flag, action=_Refuse, nargs="?", help=argparse.SUPPRESS)
     add_seed(parser, "the filters")
 
 
@@ -453,14 +458,6 @@ def _person_choice(text: str) -> PersonChoice | int:
         return PersonChoice.parse(text)
     except ValueError as error:
         raise argparse.ArgumentTypeError(str(error)) from None
-
-
-class _Refuse(argparse.Action):
-    """Refuses a retired option."""
-
-    def __call__(self, parser: argparse.ArgumentParser, *given: Any) -> NoReturn:
-        flag = given[-1]
-        parser.error(f"{flag} was removed: {RETIRED[flag]}")
 
 
 class _AddSetting(argparse.Action):
@@ -507,10 +504,10 @@ def recording_request(options: argparse.Namespace, problems: Problems) -> Record
     path, depth = options.recording, options.depth
     problems.caught(lambda: check_exists(path), None)
     camera = _camera(options, problems)
-    silhouettes = _silhouettes(options, problems)
     points: Detector | PointTable | None = None
     if options.detector is not None:
         points = problems.caught(lambda: points_named(options.detector), None)
+    silhouettes = _silhouettes(options, points, problems)
     people = getattr(options, "people", None)
     if isinstance(options.person, int) != (people is not None) and options.person is not None:
         problems.add(
@@ -542,8 +539,8 @@ def inputs_of(options: argparse.Namespace) -> tuple[Path, ...]:
     """Return the files and folders that the options of a recording or of tracking name."""
     names = "recording", "extrinsics", "calibration", "detector", "model", "scene", "settings"
     given = (getattr(options, name, None) for name in names)
-    # A detector may also be a word, which names no file.
-    return tuple(Path(path) for path in given if path)
+    # A detector may also be a word, which names no file, or an object.
+    return tuple(Path(path) for path in given if path and isinstance(path, str | Path))
 
 
 def tracking_request(options: argparse.Namespace, faults: Iterable[str] = ()) -> TrackingRequest:
@@ -631,7 +628,9 @@ def _is_guessed(options: argparse.Namespace) -> bool:
     return options.detector is not None and is_film(options.recording)
 
 
-def _silhouettes(options: argparse.Namespace, problems: Problems) -> Segmentation:
+def _silhouettes(
+    options: argparse.Namespace, points: Detector | PointTable | None, problems: Problems
+) -> Segmentation:
     """Return the source of the silhouettes that is given, or that fits the recording."""
     from cardbox_tracker.detectors.detector import MEDIAPIPE, Detector
     from cardbox_tracker.recordings.depth_silhouettes import Within
@@ -642,7 +641,8 @@ def _silhouettes(options: argparse.Namespace, problems: Problems) -> Segmentatio
     chosen, within = options.silhouettes, options.within
     background: TimeSpan | None = options.background
     is_given = background is not None or within is not None
-    if chosen is None and not is_given and options.detector == MEDIAPIPE:
+    has_masks = isinstance(points, Detector)
+    if chosen is None and not is_given and (has_masks or options.detector == MEDIAPIPE):
         chosen = "detector"
     elif chosen is None and not is_given and not is_bag(options.recording):
         chosen = "person_in_view"
@@ -653,7 +653,8 @@ def _silhouettes(options: argparse.Namespace, problems: Problems) -> Segmentatio
                 "out"
             )
         if chosen == "detector":
-            return problems.caught(Detector.installed, PersonInView())
+            found = points if isinstance(points, Detector) else None
+            return found or problems.caught(Detector.installed, PersonInView())
     elif not is_given:
         problems.miss(
             "--background T0:T1 or --within M or --silhouettes detector|person_in_view",
@@ -672,22 +673,38 @@ def _silhouettes(options: argparse.Namespace, problems: Problems) -> Segmentatio
     return PersonInView()
 
 
-def points_named(name: str) -> Detector | PointTable:
-    """Return the source of 2D points of a name: the detector's, or the path of given points.
+def points_named(given: object) -> Detector | PointTable:
+    """Return the source of 2D points.
+
+    Args:
+        given: the name of a detector, the path of points, a class, or a detector of one's own.
 
     Raises:
-        CardboxError: the detector is not installed, or there are no such points.
+        CardboxError: the detector is not installed or is none, or there are no such points.
     """
+    from cardbox_tracker.common.extensions import DETECTORS, extensions, loaded
     from cardbox_tracker.detectors.detector import MEDIAPIPE, Detector
+    from cardbox_tracker.detectors.own_network import OwnModel
     from cardbox_tracker.detectors.point_table import PointTable
 
-    if name == MEDIAPIPE:
+    if not isinstance(given, str | Path):
+        return Detector(OwnModel.of(given, f"the detector {type(given).__name__}"))
+    if given == MEDIAPIPE:
         return Detector.installed()
-    path = Path(name)
+    added = extensions(DETECTORS, (MEDIAPIPE,))
+    if isinstance(given, ClassName):
+        if os.getcwd() not in sys.path:
+            # Last, so that nothing there takes the place of an installed module.
+            sys.path.append(os.getcwd())
+        own = loaded(EntryPoint("--detector-class", given, DETECTORS))
+        return Detector(OwnModel.of(own, given))
+    if given in added:
+        return Detector(OwnModel.of(loaded(added[str(given)]), f"the detector {given}"))
+    path = Path(given)
     if not path.exists():
         raise CardboxError(
-            f"--detector is {name!r}; expected {MEDIAPIPE}, or points in a table, in a file of "
-            "COCO, or in a folder of OpenPose (docs/detectors.md)"
+            f"--detector is {str(given)!r}; expected {', '.join((MEDIAPIPE, *added))}, or points "
+            "in a table, in a file of COCO, or in a folder of OpenPose (docs/detectors.md)"
         )
     return PointTable(path)
 
@@ -852,6 +869,8 @@ def _read_options(path: Path) -> dict[str, Any]:
     other = given.pop("recording", None)
     if other is not None:
         parser.error(f"unrecognized arguments: {other}")
+    if isinstance(given.get("detector"), ClassName):
+        parser.error("--detector-class would run code that data name; give it on the command line")
     for name, value in given.items():
         if isinstance(value, Path):
             given[name] = path.parent / value

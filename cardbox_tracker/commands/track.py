@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import json
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -12,7 +13,7 @@ from cardbox_tracker.commands.arguments import add_force, at_least, check_output
 from cardbox_tracker.commands.request import FORMATS, TrackFiles, add_tracking, tracking_request
 from cardbox_tracker.commands.tracking import track
 from cardbox_tracker.common.errors import CardboxError
-from cardbox_tracker.common.files import atomic_path, body_beside, is_written_in_place
+from cardbox_tracker.common.files import atomic_path, body_beside, is_written_in_place, scene_beside
 
 if TYPE_CHECKING:
     from cardbox_tracker.recordings.track import TrackSummary
@@ -99,7 +100,7 @@ def run(options: argparse.Namespace) -> None:
             raise CardboxError("--jobs has no effect with --scheduler: its workers are as many")
         track_folder(options)
     else:
-        _track_one(options)
+        track_one(options)
 
 
 def _without_effect(options: argparse.Namespace, names: tuple[str, ...], what: str) -> list[str]:
@@ -108,7 +109,12 @@ def _without_effect(options: argparse.Namespace, names: tuple[str, ...], what: s
     return [f"--{name} has no effect on {options.recording}, {what}" for name in given]
 
 
-def _track_one(options: argparse.Namespace) -> None:
+def track_one(options: argparse.Namespace, show: Callable[[float], None] | None = None) -> None:
+    """Track one recording and write the requested files; see :func:`~.tracking.track`.
+
+    Raises:
+        CardboxError: options are wrong, or a file cannot be read or written.
+    """
     from cardbox_tracker.recordings.result_table import check_table
 
     faults = _without_effect(options, _OF_MANY, "which is one recording: give --csv")
@@ -122,14 +128,16 @@ def _track_one(options: argparse.Namespace) -> None:
     beside = name if is_piped else table
     has_body = not is_piped or request.person.model is None
     body = body_beside(beside) if has_body else None
-    scene = beside.with_name(f"{beside.stem}.scene.yaml")
+    scene = scene_beside(beside)
     files = TrackFiles(table, options.video, options.bag, body, scene)
     written = (table, body, scene, options.video, options.json)
     check_outputs(written, options.force, request.inputs, results=(options.bag,))
-    summary = track(replace(request, files=files, force=options.force))
+    summary = track(replace(request, files=files, force=options.force), show=show)
     if options.json is not None:
         with atomic_path(options.json) as temporary:
             temporary.write_text(json.dumps(_account(summary), indent=1) + "\n", encoding="utf-8")
+    if show is not None:
+        return
     for path in (*written, options.bag):
         if path is not None:
             print(f"wrote {path}")

@@ -42,6 +42,7 @@ from cardbox_tracker.common.files import (
     claimed_name,
     foreign,
     read_regular,
+    scene_beside,
     write_table,
 )
 from cardbox_tracker.common.processes import cores, results_of
@@ -55,7 +56,7 @@ from cardbox_tracker.tracking.precompile import compile_all
 TRACKED, FAILED = "tracked", "failed"
 
 _BODY = body_beside(Path("NAME.csv")).name.removeprefix("NAME")
-_SCENE = ".scene.yaml"
+_SCENE = scene_beside(Path("NAME.csv")).name.removeprefix("NAME")
 # Most names of recordings in a line; the table has all.
 _MOST_NAMES = 10
 # A summary of 100,000 recordings.

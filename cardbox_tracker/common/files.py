@@ -324,6 +324,11 @@ def body_beside(table: Path) -> Path:
     return table.with_name(f"{table.stem}.body.yaml")
 
 
+def scene_beside(table: Path) -> Path:
+    """Return the file beside a table of results with its scene."""
+    return table.with_name(f"{table.stem}.scene.yaml")
+
+
 def body_of_person(body: Path, number: int) -> Path:
     """Return the file of the body of one of several people; ``body`` is that of the first."""
     if number == 1:

@@ -1,4 +1,4 @@
-"""The installed detector, which finds the person in image after image of one camera."""
+"""The detector, which finds the person in image after image of one camera."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cardbox_tracker.detectors.model_files import ModelFiles, installed_models
+from cardbox_tracker.detectors.own_network import OwnModel, OwnNetwork
 from cardbox_tracker.detectors.people_network import PeopleNetwork
 from cardbox_tracker.detectors.person_choice import PersonChoice
 from cardbox_tracker.detectors.pose_network import Detection, PoseNetwork
@@ -19,16 +20,16 @@ MEDIAPIPE = "mediapipe"
 
 
 class Detector(NamedTuple):
-    """The installed detector.
+    """The installed detector, or one of the user's own.
 
     Attributes:
-        models: its network files.
+        models: its network files, or the class of one's own.
         person: whom to follow, px of the camera's own image; None for the most certain person.
         people: number of people whom it finds at most, see :meth:`PersonDetector.all_in`; 0 for the
             one whom it follows.
     """
 
-    models: ModelFiles
+    models: ModelFiles | OwnModel
     person: PersonChoice | None = None
     people: int = 0
 
@@ -51,7 +52,10 @@ class Detector(NamedTuple):
         Raises:
             CardboxError: the networks cannot be loaded.
         """
-        network = PoseNetwork(*self.models)
+        if isinstance(self.models, OwnModel):
+            network: PoseNetwork = OwnNetwork(self.models.make())
+        else:
+            network = PoseNetwork(*self.models)
         if self.person is not None:
             network.choose = self.person.scaled(across, down)
         return PersonDetector(network, PeopleNetwork(network, self.people))
@@ -85,7 +89,8 @@ class PersonDetector:
     def all_in(self, stamp_ns: int, image: Image) -> list[Detection]:
         """Return all people in an image as above, of a time, ns."""
         assert self._people is not None
-        found = self._people(color(image), stamp_ns)
+        own = self._network if isinstance(self._network, OwnNetwork) else None
+        found = own.people_in(color(image)) if own else self._people(color(image), stamp_ns)
         self.missed += not found
         return found
 

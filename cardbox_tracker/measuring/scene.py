@@ -161,4 +161,6 @@ def _value_of(name: str, given: Any) -> Value:
             f"camera.{name} is {mean:g} +- {stddev:g}; expected {lowest:g} to {highest:g}, and a "
             "deviation from 0 on"
         )
-    return Value(mean / factor, stddev / factor, GIVEN)
+    if given["origin"] not in ORIGINS:
+        raise ValueError(f"camera.{name}.origin is none of {', '.join(ORIGINS)}")
+    return Value(mean / factor, stddev / factor, given["origin"])

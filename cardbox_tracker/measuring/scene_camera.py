@@ -235,9 +235,10 @@ def camera_moves(people: Sequence[Sightings], pictures: Sequence[Picture], camer
 
 def _cover(free: NDArray[np.uint8], points: ImagePoints, camera: Camera) -> None:
     """Set the surroundings of a person to 0."""
-    px = points.px[np.isfinite(points.px[:, 0])]
+    px = points.px
     if points.legs is not None:
         px = np.concatenate([px, points.legs.px])
+    px = px[np.isfinite(px[:, 0])]
     if not len(px):
         return
     around = _AROUND * float(np.ptp(px[:, 1]))

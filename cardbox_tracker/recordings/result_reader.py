@@ -129,7 +129,9 @@ class _Rows:
         texts = set(text_columns())
         self.names = [name for name in known if name not in (*texts, PERSON, "stamp")]
         self._texts = [name for name in known if name in texts]
-        self._is_deviation = np.array(["_stddev_" in name for name in self.names])
+        self._are_chances = np.array([name.endswith("_chance") for name in self.names], bool)
+        are_deviations = np.array(["_stddev_" in name for name in self.names], bool)
+        self._are_positive = self._are_chances | are_deviations
         self._is_needed = np.array([name in needed for name in self.names])
         self._times: list[tuple[int, float, str]] = []
         self._blocks: list[FloatArray] = []
@@ -176,7 +178,8 @@ class _Rows:
             known = dict(zip(self.names, cells, strict=True))
             values = np.array([_number(known, name) for name in self.names])
         # A comparison with nan is false.
-        is_wrong = ~(np.abs(values) < _MOST) | (self._is_deviation & (values < 0.0))
+        is_wrong = ~(np.abs(values) < _MOST) | (self._are_positive & (values < 0.0))
+        is_wrong |= self._are_chances & (values > 1.0)
         is_wrong |= is_empty & self._is_needed
         if is_wrong.any():
             wrong = int(np.argmax(is_wrong))
@@ -241,6 +244,9 @@ def read_results(path: Path, person: int | None = None) -> Results:
         if person is not None and PERSON not in row:
             raise CardboxError(f"{path} has no column {PERSON}: it is of one person")
         try:
+            # A line of CSV has None for cells that are missing, and as the name of those beyond.
+            if path.suffix != PARQUET and (None in row or None in row.values()):
+                raise ValueError("it has not as many cells as line 1")
             if PERSON in row and _number(row, PERSON, int) != (person or 1):
                 continue
             found = found or _Rows(path, row, _NEEDED)
@@ -330,7 +336,13 @@ def namespace_of(bag: BagReader, person: int | None = None) -> str:
 
 
 def joints_of(message: Any) -> JointValues:
-    """Return names and positions of a JointState."""
+    """Return names and positions of a JointState.
+
+    Raises:
+        ValueError: they are not as many.
+    """
+    if len(message.name) != len(message.position):
+        raise ValueError(f"{len(message.name)} joints with {len(message.position)} positions")
     return JointValues(tuple(message.name), np.array(message.position, np.float64))
 
 
@@ -384,6 +396,8 @@ def _damaged(where: str, error: Exception) -> BagError:
 class _Messages:
     """Joins the messages of each image, of which joints, deviations and points have its stamp."""
 
+    _last_ns = 0
+
     def __init__(self) -> None:
         self._state, self.repeated = NO_PERSON, 0
         self._body: BodyModel | None = None
@@ -397,6 +411,9 @@ class _Messages:
             if self._state not in _SEEN:
                 self.by_stamp[time_ns] = {"state": self._state, "body": self._body}
         elif name == _JOINTS:
+            if self._last_ns > stamp_ns_of(message):
+                raise ValueError(f"the stamp {stamp_ns_of(message)} ns is before the one before")
+            self._last_ns = stamp_ns_of(message)
             joints = joints_of(message)
             posture_from(joints)
             row: dict[str, Any] = {"state": self._state, "body": self._body}

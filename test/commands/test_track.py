@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import csv
 import json
-import re
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -13,8 +12,6 @@ import cv2
 import numpy as np
 import pytest
 
-from cardbox_tracker.commands.request import RETIRED
-from cardbox_tracker.common.settings import settings_below
 from cardbox_tracker.detectors import detector as detector_module
 from cardbox_tracker.detectors.model_files import ModelFiles
 from cardbox_tracker.measuring.scene import SceneCamera, Value
@@ -23,7 +20,6 @@ from cardbox_tracker.person.model_file import load_body_model
 from cardbox_tracker.recordings.bag_reader import BagReader
 from cardbox_tracker.recordings.silhouettes import SilhouetteSource, TimeSpan
 from cardbox_tracker.recordings.truth import beside_shoulders
-from cardbox_tracker.search.config import TrackerConfig
 
 FPS = 4.0
 GIVEN = ("--background", "0:3.9", "--start", 16, "--stature", 1.72)
@@ -81,16 +77,6 @@ def test_mistakes_of_track(
     done = cardbox("track", files / "session", *(f"{n}={text}" for n, text in options.items()))
     done.assert_refused("track", expected)
     assert sorted(path.name for path in files.iterdir()) == before
-
-
-@pytest.mark.parametrize("option", RETIRED)
-def test_retired_options_name_what_is_instead(option: str, cardbox: Callable) -> None:
-    for words in ((option, "1"), (f"{option}=1",), (option,)):
-        done = cardbox("track", "session", *words)
-        assert done.code == 2
-        done.assert_refused("track", f"{option} was removed: {RETIRED[option]}")
-    for name in re.findall(r"--set ([\w.]+)=", RETIRED[option]):
-        assert name in {name for name, *_ in settings_below(TrackerConfig())}
 
 
 @pytest.mark.parametrize(

@@ -38,8 +38,7 @@ def test_a_scene_is_read_as_it_was_written(tmp_path: Path) -> None:
         assert one is not None
         assert other is not None
         assert one[:2] == pytest.approx(other[:2], abs=1e-7)
-        # What another film has found is given to this one.
-        assert one.origin == GIVEN
+        assert one.origin == other.origin
 
 
 def test_words_have_deviation_unit_and_origin() -> None:

@@ -6,16 +6,19 @@ import csv
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
 from cardbox_tracker.applications.exporting.motion import Motion
 from cardbox_tracker.camera.camera import Camera
-from cardbox_tracker.common.errors import CardboxError
+from cardbox_tracker.common.errors import BagError, CardboxError
 from cardbox_tracker.person.kinematics import pose
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.recordings import result_reader
+from cardbox_tracker.recordings.bag_reader import BagReader
+from cardbox_tracker.recordings.bag_writer import BagWriter
 from cardbox_tracker.recordings.result_bag import result_bag
 from cardbox_tracker.recordings.result_reader import read_results
 from cardbox_tracker.recordings.result_table import columns, result_table
@@ -143,6 +146,10 @@ def with_negative_deviation(rows: list[list[str]]) -> None:
     rows[3][rows[0].index("torso_roll_stddev_rad")] = "-12.0"
 
 
+def with_large_chance(rows: list[list[str]]) -> None:
+    rows[3][rows[0].index("left_hand_chance")] = "7"
+
+
 def with_state_of_keypoint(rows: list[list[str]]) -> None:
     rows[1][rows[0].index("left_hand_state")] = "sleeping"
 
@@ -173,6 +180,9 @@ def without_postures(rows: list[list[str]]) -> None:
         (lambda rows: rows[3].__setitem__(2, "1e300"), "line 4: torso_y is .1e300."),
         (with_negative_deviation, "line 4: torso_roll_stddev_rad is .-12.0."),
         (with_state_of_keypoint, "line 2: left_hand_state is .sleeping."),
+        (with_large_chance, "line 4: left_hand_chance is .7."),
+        (lambda rows: rows[1].append("7"), "line 2: it has not as many cells as line 1"),
+        (lambda rows: rows[3].pop(), "line 4: it has not as many cells as line 1"),
         (without_postures, "no image with a posture"),
     ],
 )
@@ -187,6 +197,39 @@ def test_mistakes_in_a_table(
         csv.writer(file).writerows(rows)
     with pytest.raises(CardboxError, match=expected):
         read_motion(path)
+
+
+def with_reversed_stamps(messages: list[tuple[str, Any, int]]) -> None:
+    joints = [message for topic, message, _ in messages if topic == "/joint_states"]
+    joints[0].header.stamp, joints[-1].header.stamp = (
+        joints[-1].header.stamp,
+        joints[0].header.stamp,
+    )
+
+
+def with_few_positions(messages: list[tuple[str, Any, int]]) -> None:
+    (first, *_) = (message for topic, message, _ in messages if topic == "/joint_states")
+    first.position = first.position[:5]
+
+
+@pytest.mark.parametrize(
+    ("change", "expected"),
+    [
+        (with_reversed_stamps, r"the stamp \d+ ns is before the one before"),
+        (with_few_positions, "26 joints with 5 positions"),
+    ],
+)
+def test_mistakes_in_a_bag(
+    change: Callable[[list[tuple[str, Any, int]]], None], expected: str, tmp_path: Path
+) -> None:
+    with BagReader(write_bag(tmp_path / "good")) as bag, BagWriter(tmp_path / "bad") as writer:
+        every = bag.messages(list(bag.topics))
+        messages = [(one.topic, bag.deserialize(one), one.time_ns) for one in every]
+        change(messages)
+        for message in messages:
+            writer.write(*message)
+    with pytest.raises(BagError, match=f"/joint_states of .*bad has a damaged message: {expected}"):
+        read_motion(tmp_path / "bad")
 
 
 @pytest.mark.parametrize(

@@ -32,7 +32,13 @@ from cardbox_tracker.tracking.tracker import Tracker
 
 ROOT = Path(__file__).parents[2]
 CODE = re.findall(r"```python\n(.*?)```", (ROOT / "docs" / "extending.md").read_text(), re.DOTALL)
-FILES = {"clicked_points.py": CODE[0], "seated.py": CODE[2]}
+DETECTOR, FORMAT, CLICKED, USE, SEATED, SCHEME = CODE
+FILES = {
+    "my_detector.py": DETECTOR,
+    "my_format.py": FORMAT,
+    "clicked_points.py": CLICKED,
+    "seated.py": SEATED,
+}
 FRONT = reference_posture("front")
 
 
@@ -92,7 +98,7 @@ def seen_by_both(body: BodyModel, camera: Camera, state: np.ndarray) -> list[np.
 def test_clicked_points_cost_nothing_at_the_truth_in_any_camera(
     folder: Path, degrees: float
 ) -> None:
-    tracker, clicked = made_by(CODE[1]), module_of("clicked_points")
+    tracker, clicked = made_by(USE), module_of("clicked_points")
     body, camera = tracker.body, tracker.camera
     state = with_arms(degrees)
     config = replace(tracker.config, terms=(clicked.ClickedPoints(weight=10.0),))
@@ -113,7 +119,7 @@ def test_clicked_points_cost_nothing_at_the_truth_in_any_camera(
 
 
 def test_clicked_points_rate_by_hand(folder: Path) -> None:
-    tracker, clicked = made_by(CODE[1]), module_of("clicked_points")
+    tracker, clicked = made_by(USE), module_of("clicked_points")
     state = with_arms(20.0)
     at = Posed(body_tuple(tracker.body, tracker.camera), state[None])
     points_px = np.full((6, 2), np.nan)
@@ -128,7 +134,7 @@ def test_clicked_points_rate_by_hand(folder: Path) -> None:
 
 def test_two_cameras_follow_clicked_points(folder: Path) -> None:
     """Outlines say little of a forearm before the belly; points say where the hand is."""
-    tracker, clicked = made_by(CODE[1]), module_of("clicked_points")
+    tracker, clicked = made_by(USE), module_of("clicked_points")
     body, camera = tracker.body, tracker.camera
     state = np.append(FRONT, [0.0, 0.0])
     state[4:8] = np.radians((10, 25, -70, 40))
@@ -154,14 +160,14 @@ def test_a_new_channel_is_one_line_and_unknown_ones_are_refused(folder: Path) ->
     module_of("clicked_points")
     with pytest.raises(ValueError, match=r"no channel 'clickt'; expected any of .*clicked"):
         Observation(clickt=np.zeros((6, 2)))
-    tracker = made_by(CODE[1])
+    tracker = made_by(USE)
     silhouette = silhouette_of(tracker)
     with pytest.raises(ValueError, match=r"clicked of the first camera has the shape \(6,\)"):
         tracker.track(Observation(silhouette, clicked=np.zeros(6)))
 
 
 def test_a_corrector_changes_the_result_and_not_the_search(folder: Path) -> None:
-    tracker, seated = made_by(CODE[1]), module_of("seated")
+    tracker, seated = made_by(USE), module_of("seated")
     body, camera, person = tracker.body, tracker.camera, silhouette_of(tracker)
     farthest_m = state_limits(body.placement.distance_m)[TORSO_X, 1]
     for corrector, wanted_m in ((seated.Seated(0.1), 0.1), (seated.Seated(99.0), farthest_m)):
@@ -177,13 +183,21 @@ def test_a_corrector_changes_the_result_and_not_the_search(folder: Path) -> None
 
 
 def test_a_corrector_that_cannot_be_used_is_refused(folder: Path) -> None:
-    tracker, seated = made_by(CODE[1]), module_of("seated")
+    tracker, seated = made_by(USE), module_of("seated")
     body, camera = tracker.body, tracker.camera
     with pytest.raises(ValueError, match=r"a corrector needs .* the preset default"):
         Tracker(body, camera, PRESETS["paper"](), corrector=seated.Seated(0.1))
     of = Tracker(body, camera, tracker.config, corrector=lambda frames, state: state[:12])
     with pytest.raises(ValueError, match=r"shape \(12,\); expected \(14,\)"):
         of.track(silhouette_of(tracker))
+
+
+def test_the_scheme_is_one() -> None:
+    names: dict[str, Any] = {"np": np}
+    exec(SCHEME, names)
+    weights = np.array([0.0, 0.25, 0.75])
+    drawn = names["multinomial"](weights, 4000, np.random.default_rng(0))
+    assert np.bincount(drawn, minlength=3) / 4000 == pytest.approx(weights, abs=0.02)
 
 
 def test_the_examples_pass_ruff(folder: Path) -> None:
@@ -204,8 +218,9 @@ def test_the_examples_pass_strict_mypy_beside_and_in_the_package(
     package = shutil.copytree(
         ROOT / "cardbox_tracker", tmp_path / "cardbox_tracker", ignore=ignored
     )
-    places = "terms/clicked_points.py", "search/seated.py"
+    places = "terms/clicked_points.py", "search/seated.py", "applications/exporting/my_format.py"
     files = [package / place for place in places]
+    (tmp_path / "ultralytics.pyi").write_text("from typing import Any\nYOLO: Any\n")
     for file in files:
         file.write_text(FILES[file.name])
     done = subprocess.run(

@@ -1,4 +1,4 @@
-"""The formats of ``cardbox export`` by name."""
+"""The formats of ``cardbox export`` by name, and those that other packages add."""
 
 from __future__ import annotations
 
@@ -12,10 +12,16 @@ from cardbox_tracker.applications.exporting.bvh import write_bvh
 from cardbox_tracker.applications.exporting.markers import ezc3d_or_error, write_c3d, write_trc
 from cardbox_tracker.applications.exporting.mot import write_mot
 from cardbox_tracker.applications.exporting.motion import Motion
+from cardbox_tracker.applications.exporting.placed import images_of_body
+from cardbox_tracker.common.errors import CardboxError
+from cardbox_tracker.common.extensions import EXPORTERS, extensions, loaded
 from cardbox_tracker.common.files import write_table
 from cardbox_tracker.person.isb_angles import ISB_NAMES, isb_angles
+from cardbox_tracker.person.legs import floor_m
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.skeleton import JOINT_NAMES, NECK_NAMES, PLACE_NAMES, UNITS
+from cardbox_tracker.recordings.result_reader import Results
+from cardbox_tracker.tracking.estimate import UNCERTAIN
 
 
 def write_isb(path: Path, motion: Motion, body: BodyModel | None = None) -> None:
@@ -65,3 +71,54 @@ FORMATS: dict[str, Format] = {
     "mot": Format(".mot", write_mot),
     "isb": Format(".isb.csv", write_isb, has_places=False),
 }
+
+
+def formats() -> dict[str, Format]:
+    """Return all formats by name, those of other packages last.
+
+    Raises:
+        CardboxError: a package adds what cannot be imported or is none, or a name that is taken.
+    """
+    found = dict(FORMATS)
+    for name, entry in extensions(EXPORTERS, FORMATS).items():
+        found[name] = loaded(entry)
+        if not isinstance(found[name], Format):
+            raise CardboxError(f"{name} of {entry.dist and entry.dist.name} is no {Format}")
+    return found
+
+
+def export(results: Results, path: Path, to: Format, model: BodyModel | None = None) -> list[str]:
+    """Write results of one person to a file.
+
+    Args:
+        results: the results.
+        path: file to write.
+        to: its format.
+        model: the person with whom they were tracked; None for the one that the results have.
+
+    Returns:
+        Lines that say what was written, and what is not known.
+
+    Raises:
+        CardboxError: no image has a posture, the results are those of another person, a library is
+            missing, or the file cannot be written.
+    """
+    to.check()
+    motion, body = Motion.of(results), model or results.body
+    images, seen = len(motion.state), int(motion.is_seen.sum())
+    if body is not None and to.has_places:
+        motion = images_of_body(motion, body)
+    to.write(path, motion, body)
+    lines = [
+        f"exported {seen} of {images} images, {motion.state.count(UNCERTAIN)} of them uncertain; "
+        f"{images - seen} without a posture are gaps"
+    ]
+    if images == 1:
+        lines.append("a single image has no rate: 1 Hz is written")
+    if others := seen - int(motion.is_seen.sum()):
+        lines.append(f"{others} of these images were tracked with another body and are gaps, too")
+    if body is None and to.has_places:
+        lines.append("the camera is taken as level, and the floor is not known; --model gives both")
+    elif to.has_places and body is not None and floor_m(body) is None:
+        lines.append("the floor is not known, so heights are those above the camera")
+    return lines

@@ -1,0 +1,48 @@
+"""What other packages add by entry points: detectors, and formats of exports."""
+
+from __future__ import annotations
+
+from collections.abc import Container
+from importlib.metadata import EntryPoint, entry_points
+from typing import Any
+
+from cardbox_tracker.common.errors import CardboxError
+
+DETECTORS, EXPORTERS = "detectors", "exporters"
+
+
+def extensions(kind: str, taken: Container[str]) -> dict[str, EntryPoint]:
+    """Return the entry points of ``DETECTORS`` or ``EXPORTERS`` by name, without importing them.
+
+    Raises:
+        CardboxError: a name comes from two distributions, or is one of those ``taken``.
+    """
+    found: dict[str, EntryPoint] = {}
+    for entry in entry_points(group=f"cardbox_tracker.{kind}"):
+        if entry.name in taken or entry.name in found:
+            other = _place(found[entry.name]) if entry.name in found else "cardbox_tracker"
+            raise CardboxError(
+                f"{entry.name} of {kind} comes from {_place(entry)} and from {other}: uninstall "
+                "one of the two"
+            )
+        found[entry.name] = entry
+    return found
+
+
+def loaded(entry: EntryPoint) -> Any:
+    """Return what an entry point names.
+
+    Raises:
+        CardboxError: it cannot be imported; the text names its distribution.
+    """
+    try:
+        return entry.load()
+    except Exception as error:
+        raise CardboxError(
+            f"{entry.name} of {_place(entry)} cannot be imported from {entry.value}: "
+            f"{type(error).__name__}: {error}"
+        ) from error
+
+
+def _place(entry: EntryPoint) -> str:
+    return entry.dist.name if entry.dist else "the command line"

@@ -1,0 +1,137 @@
+"""A detector of one's own in the place of MediaPipe's networks (``docs/extending.md``)."""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Callable, Iterable, Mapping
+from contextlib import suppress
+from pathlib import Path
+from typing import Any, NamedTuple, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cardbox_tracker.camera.given_arrays import silhouette_from
+from cardbox_tracker.common.errors import CardboxError, quoted
+from cardbox_tracker.detectors.point_checks import check_person, check_point
+from cardbox_tracker.detectors.pose_network import (
+    LANDMARKS,
+    POINTS,
+    ColorImage,
+    Detection,
+    PoseNetwork,
+    Square,
+    figure_of,
+)
+
+_MASK = "mask"
+
+
+class FindsPeople(Protocol):
+    """A detector of one's own."""
+
+    def detect(self, image: ColorImage) -> Iterable[Mapping[str, Any]]:
+        """Return the people in an undistorted image (H, W, 3), bgr, the most certain one first.
+
+        Each has column, row (px) and score (0 to 1) by names of ``LANDMARKS``; points with score 0
+        are missing. ``mask``, (H, W), may be the pixels of the person.
+        """
+
+
+class OwnModel(NamedTuple):
+    """The class of a detector, or a function that returns one, and the file of its code if known.
+
+    By the file, a detector that was changed is told.
+    """
+
+    make: Callable[[], FindsPeople]
+    source: Path | None = None
+
+    @classmethod
+    def of(cls, given: Any, name: str) -> OwnModel:
+        """Return the model of a detector, or of its class.
+
+        Raises:
+            CardboxError: it has no ``detect``.
+        """
+        if not callable(getattr(given, "detect", None)):
+            raise CardboxError(f"{name} has no function detect(image); docs/extending.md has one")
+        if isinstance(given, type):
+            with suppress(OSError, TypeError):
+                return cls(given, Path(inspect.getfile(given)))
+        return cls(given if isinstance(given, type) else lambda: given)
+
+
+class OwnNetwork(PoseNetwork):
+    """Follows one person among those whom a detector of one's own finds."""
+
+    def __init__(self, detector: FindsPeople) -> None:
+        """Use the detector."""
+        self._own, self.choose = detector, None
+        self._found: list[tuple[Detection, Square]] = []
+        self.forget()
+
+    def __call__(self, image: ColorImage, stamp_ns: int | None = None) -> Detection | None:
+        """Return the person in an image (H, W, 3), bgr, of a time, ns; None if not seen."""
+        self._found = [(one, _around(one)) for one in self.people_in(image)]
+        return super().__call__(image, stamp_ns)
+
+    def people_in(self, image: ColorImage) -> list[Detection]:
+        """Return the people in an image (H, W, 3), bgr.
+
+        Raises:
+            CardboxError: what the detector returns are no people.
+        """
+        name, found = f"{type(self._own).__name__}.detect", list[Detection]()
+        people: Any = self._own.detect(np.ascontiguousarray(image))
+        if not isinstance(people, Iterable):
+            raise CardboxError(f"{name} returns {quoted(people)}; expected a list of people")
+        for number, person in enumerate(people):
+            try:
+                found.append(_detection(person, image.shape[:2]))
+            except (CardboxError, ValueError, TypeError, AttributeError) as error:
+                raise CardboxError(
+                    f"{name}, person {number}: {error}; expected column, row and score by names of "
+                    "points"
+                ) from None
+        return [one for one in found if one.scores.any()]
+
+    def detected(self, image: ColorImage, view: Square) -> list[Square]:
+        """Return squares around the people in the image, the most certain one first."""
+        return [square for _, square in self._found]
+
+    def located(
+        self, image: ColorImage, square: Square, others: NDArray[np.uint8] | None = None
+    ) -> tuple[Detection, Square] | None:
+        """Return the person in the image who is nearest to a square; None if there is nobody."""
+
+        def away(found: tuple[Detection, Square]) -> float:
+            return float(np.hypot(found[1].u - square.u, found[1].v - square.v))
+
+        return min(self._found, key=away, default=None)
+
+
+def _detection(person: Mapping[str, Any], shape: tuple[int, int]) -> Detection:
+    points_px, scores, known = np.full((POINTS, 2), np.nan), np.zeros(POINTS), {}
+    for name, values in person.items():
+        if name == _MASK:
+            continue
+        if name not in LANDMARKS:
+            raise ValueError(f"{quoted(name)} is no point; those are {', '.join(LANDMARKS)}")
+        column, row, score = map(float, values)
+        check_point((name, column, row, score), shape[::-1])
+        if score > 0.0:
+            known[name] = column, row, score
+            points_px[LANDMARKS.index(name)], scores[LANDMARKS.index(name)] = (column, row), score
+    check_person(known)
+    found = Detection(points_px, scores, np.zeros(shape, np.uint8))
+    mask = person.get(_MASK)
+    if mask is None:
+        mask = figure_of(found).drawn(shape)
+    return found._replace(mask=silhouette_from(mask, _MASK, shape))
+
+
+def _around(found: Detection) -> Square:
+    px = found.points_px[found.scores > 0.0]
+    middle, side = (px.min(axis=0) + px.max(axis=0)) / 2, np.ptp(px, axis=0).max()
+    return Square(float(middle[0]), float(middle[1]), float(side), 0.0)

@@ -1,0 +1,199 @@
+"""A film in one call from Python, as the documents show it, with a network that is a fake."""
+
+from __future__ import annotations
+
+import re
+import sys
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+import cardbox_tracker
+from cardbox_tracker.applications.drawing.video import video_file
+from cardbox_tracker.applications.simulation.person import person_keypoints_m
+from cardbox_tracker.applications.simulation.renderer import Renderer, Scene
+from cardbox_tracker.camera.camera import Camera
+from cardbox_tracker.common.errors import CardboxError
+from cardbox_tracker.detectors.detector import Detector
+from cardbox_tracker.detectors.image_points import COCO_NAMES
+from cardbox_tracker.detectors.own_network import OwnModel
+from cardbox_tracker.person.model import BodyModel
+from cardbox_tracker.person.posture import reference_posture
+
+ROOT = Path(__file__).resolve().parents[2]
+BODY = BodyModel.of(hip_height_m=-0.51)
+CAMERA = Camera(width=320, height=240, fx=277.1, fy=277.1, cx=159.5, cy=119.5)
+GIVEN = {"fov_deg": 60, "stature_m": 1.75, "camera_pitch_deg": 0}
+JOINTS = [f"{side}_{name}" for side in ("left", "right") for name in ("shoulder", "elbow", "wrist")]
+
+
+def code_in(page: str, number: int) -> str:
+    return re.findall(r"```python\n(.*?)```", (ROOT / "docs" / page).read_text(), re.DOTALL)[number]
+
+
+def coco_points() -> np.ndarray:
+    """The points (1, 17, 3) that a network of COCO finds in each image of the film."""
+    points = np.zeros((1, 17, 3), np.float32)
+    px = CAMERA.project(CAMERA.reference_to_optical(person_keypoints_m(BODY, FRONT)))
+    points[0, [5, 7, 9, 6, 8, 10]] = np.column_stack([px, np.ones(6)])
+    points[0, [11, 12]] = points[0, [5, 6]] + (0.0, 70.0, 0.0)
+    points[0, 0] = *points[0, [5, 6], :2].mean(axis=0) - (0.0, 30.0), 1.0
+    return points
+
+
+FRONT = reference_posture("front")
+
+
+class FakeYolo:
+    """Has the interface of Ultralytics that the example uses."""
+
+    def __init__(self, network: str) -> None:
+        assert network.endswith("-pose.pt")
+
+    def __call__(self, image: np.ndarray, verbose: bool) -> list[Any]:
+        data = SimpleNamespace(cpu=lambda: SimpleNamespace(numpy=coco_points))
+        return [SimpleNamespace(keypoints=SimpleNamespace(data=data))]
+
+
+@pytest.fixture(scope="module")
+def film(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A film of somebody who stands, in a folder with the example's detector."""
+    folder = tmp_path_factory.mktemp("film")
+    renderer = Renderer(CAMERA, Scene(), np.random.default_rng(0))
+    with video_file(folder / "film.mp4", 10.0) as add:
+        for _ in range(6):
+            add(np.repeat(renderer.image(BODY, FRONT)[0][..., None], 3, axis=2))
+    (folder / "my_detector.py").write_text(code_in("extending.md", 0))
+    return folder / "film.mp4"
+
+
+@pytest.fixture
+def network(film: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+    """Be in the folder of the film, with the package that the example needs."""
+    monkeypatch.setitem(sys.modules, "ultralytics", SimpleNamespace(YOLO=FakeYolo))
+    monkeypatch.chdir(film.parent)
+    monkeypatch.setattr(sys, "path", [*sys.path])
+    yield
+    sys.modules.pop("my_detector", None)
+
+
+def test_command_and_python_track_alike_with_a_detector_of_ones_own(
+    network: None, film: Path, tmp_path: Path, cardbox: Callable
+) -> None:
+    words = "--fov=60", "--stature=1.75", "--camera-pitch-deg=0"
+    name = "--detector-class", "my_detector:MyDetector"
+    done = cardbox("track", film, *words, *name, "--csv", tmp_path / "a.csv")
+    assert done.code == 0, done.err
+    detector = sys.modules["my_detector"].MyDetector()
+    result = cardbox_tracker.track(film, detector=detector, csv=tmp_path / "b.csv", **GIVEN)
+    assert (tmp_path / "a.csv").read_bytes() == (tmp_path / "b.csv").read_bytes()
+    assert not done.err.startswith("Traceback")
+    assert len(result.state) == 6
+    assert result.scene is not None and result.body is not None
+    assert result.scene.numbers()["fov_deg"]["mean"] == pytest.approx(60.0, abs=0.5)
+    assert result.scene.camera.roll_rad.origin == "usual"
+    assert (result.path, result.of(["left_hand_x"]).shape) == (film, (6, 1))
+    table = cardbox_tracker.read_result(tmp_path / "a.csv")
+    assert table.state == result.state and table.scene == result.scene
+
+
+def test_the_examples_of_readme_and_python_run(
+    network: None, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    own = Detector(OwnModel.of(Standing, "it"))
+    monkeypatch.setattr(Detector, "installed", classmethod(lambda cls: own))
+    monkeypatch.setitem(sys.modules, "pandas", SimpleNamespace(DataFrame=dict))
+    names: dict[str, Any] = {}
+    exec(code_in("python.md", 0), names)
+    result, frame = names["result"], names["table"]
+    # A head line, a line for each image, and four lines before them.
+    trc = Path("film.trc").read_text()
+    assert len(trc.splitlines()) == 6 + 6
+    assert frame["stamp_ns"].tolist() == result.stamp_ns.tolist()
+    assert list(frame)[:2] == ["state", "torso_y"] and "left_hand_state" in frame
+    with pytest.raises(CardboxError, match=r"no format has the ending of x\.xlsx; those are \.trc"):
+        result.save("x.xlsx")
+    monkeypatch.setitem(sys.modules, "pandas", None)
+    with pytest.raises(CardboxError, match="pip install pandas"):
+        result.to_pandas()
+    Path("film.trc").unlink()
+    (code,) = re.findall(
+        r"(?m)^    from cardbox_tracker.*\n(?:    .*\n)+", (ROOT / "README.md").read_text()
+    )
+    exec("\n".join(line.strip() for line in code.splitlines()))
+    assert Path("film.trc").read_text() == trc
+
+
+class Standing:
+    """Finds the person of the film."""
+
+    def detect(self, image: np.ndarray) -> list[dict[str, Any]]:
+        found = dict(zip(COCO_NAMES, coco_points()[0], strict=True))
+        return [found]
+
+
+def test_pandas_has_the_columns_of_the_table(tmp_path: Path) -> None:
+    pandas = pytest.importorskip("pandas", reason="pandas is not installed")
+    from cardbox_tracker.recordings.result_table import result_table
+    from cardbox_tracker.recordings.silhouettes import RecordedFrame
+    from cardbox_tracker.tracking.estimate import Estimate
+
+    grey = np.zeros((2, 2), np.uint8)
+    seen = Estimate("tracking", np.zeros(12), np.ones(12), np.ones((6, 3)), 10, 0.9)
+    with result_table(tmp_path / "a.csv", has_points=True) as add:
+        for number, estimate in enumerate((seen, Estimate("lost"))):
+            add(RecordedFrame(number, number / 10, grey, grey), estimate)
+    result = cardbox_tracker.read_result(tmp_path / "a.csv")
+    found, written = result.to_pandas(), pandas.read_csv(tmp_path / "a.csv")
+    assert list(found) == [name for name in written if name != "stamp"]
+    numbers = ["stamp_ns", "time_s", *result.numbers]
+    np.testing.assert_array_equal(found[numbers], written[numbers])
+
+
+@pytest.mark.parametrize(
+    ("options", "expected"),
+    [
+        ({"fovv": 60}, "unrecognized arguments: --fovv=60; keywords are options of 'cardbox"),
+        ({"fov_deg": "wide"}, "argument --fov: invalid float value: 'wide'"),
+        ({"fov_deg": 60}, "needs --stature M or --model FILE"),
+        ({"output": "x"}, "--output has no effect on .*film.mp4, which is one recording"),
+        ({"detector": "nothing", **GIVEN}, "--detector is 'nothing'; expected mediapipe, or"),
+        ({"detector": 7, **GIVEN}, r"the detector int has no function detect\(image\)"),
+        ({"detector": 7, "detector_class": "a:B", **GIVEN}, "detector_class are both given"),
+        ({"detector_class": "json:nothing", **GIVEN}, "imported from json:nothing: Attrib"),
+        ({"detector_class": "nothing", **GIVEN}, "imported from nothing: ModuleNotFound"),
+        ({"stature_m": (1.75, 1.6), "fov_deg": 60}, "--stature has several values"),
+        ({"background": (3, 1)}, "argument --background: .*got '3:1'"),
+    ],
+)
+def test_mistakes(network: None, film: Path, options: dict[str, Any], expected: str) -> None:
+    with pytest.raises(CardboxError, match=expected):
+        cardbox_tracker.track(film, **options)
+
+
+def test_a_folder_of_recordings_is_none(network: None, film: Path) -> None:
+    with pytest.raises(CardboxError, match="is no recording; track its recordings one by one"):
+        cardbox_tracker.track(film.parent, **GIVEN)
+
+
+def test_a_file_among_data_runs_no_code(
+    network: None, film: Path, tmp_path: Path, cardbox: Callable
+) -> None:
+    (tmp_path / "data").mkdir()
+    (tmp_path / "data" / "film.mp4").write_bytes(film.read_bytes())
+    options = tmp_path / "data" / "film.options"
+    options.write_text("--detector-class my_detector:MyDetector")
+    words = "track", tmp_path / "data", "--output", tmp_path / "out", "--fov=60", "--stature=1.75"
+    done = cardbox(*words)
+    assert done.code == 1
+    assert "film.options: --detector-class would run code" in done.err
+    assert "my_detector" not in sys.modules
+
+
+def test_one_detector_only(film: Path, cardbox: Callable) -> None:
+    done = cardbox("track", film, "--detector=mediapipe", "--detector-class=a:B")
+    assert "--detector-class: not allowed with argument --detector" in done.err

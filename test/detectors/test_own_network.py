@@ -1,0 +1,116 @@
+"""A detector of one's own: what it returns becomes detections, and one person is followed."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+import pytest
+
+from cardbox_tracker.common.errors import CardboxError
+from cardbox_tracker.detectors.detector import Detector
+from cardbox_tracker.detectors.landmarks import image_points
+from cardbox_tracker.detectors.own_network import OwnModel
+from cardbox_tracker.detectors.person_choice import PersonChoice
+from cardbox_tracker.detectors.pose_network import LANDMARKS
+
+IMAGE = np.random.default_rng(0).integers(0, 255, (120, 160, 3), np.uint8)
+FRAME_NS = 40_000_000
+
+
+def person(column: float) -> dict[str, Any]:
+    """A person whose trunk begins at a column, with one arm."""
+    return {
+        "left_shoulder": (column + 20, 30, 0.9),
+        "right_shoulder": (column, 30, 0.8),
+        "left_hip": (column + 18, 70, 0.7),
+        "right_hip": (column + 2, 70, 0.6),
+        "left_wrist": (column + 25, 65, 0.5),
+        "right_wrist": (0.0, 0.0, 0.0),
+    }
+
+
+class Scripted:
+    """Returns the people of image after image."""
+
+    def __init__(self, *images: Any) -> None:
+        self.images = list(images)
+
+    def detect(self, image: np.ndarray) -> Sequence[Mapping[str, Any]]:
+        assert image.shape == IMAGE.shape and image.flags.c_contiguous
+        return self.images.pop(0)
+
+
+def detector(*images: Any, **asked: Any) -> Detector:
+    return Detector(OwnModel.of(Scripted(*images), "it"), **asked)
+
+
+def test_points_by_name_become_those_of_the_tracker() -> None:
+    found = detector([person(40)]).start()(IMAGE, 0)
+    assert found is not None
+    points = image_points(found)
+    assert found.points_px[LANDMARKS.index("left_wrist")].tolist() == [65.0, 65.0]
+    assert sorted(points.scores.tolist()) == [0.0] * 12 + [0.5, 0.6, 0.7, 0.8, 0.9]
+    # Without a mask the figure of limbs and trunk is drawn.
+    assert found.silhouette()[50, 50] == 255
+    assert found.silhouette()[50, 110] == 0
+
+
+def test_a_mask_is_the_silhouette() -> None:
+    mask = np.zeros((120, 160), bool)
+    mask[3:9, 4] = True
+    found = detector([person(40) | {"mask": mask}]).start()(IMAGE, 0)
+    assert found is not None
+    assert np.array_equal(found.silhouette() > 0, mask)
+
+
+@pytest.mark.parametrize(
+    ("people", "expected"),
+    [
+        (7, r"Scripted.detect returns 7; expected a list of people"),
+        ([{}, {"left_hand": (1, 2, 1)}], "person 1: 'left_hand' is no point; those are nose"),
+        ([{"nose": (1, 2, 3)}], "person 0: nose has the score 3; expected a chance from 0 to 1"),
+        ([{"nose": (1, 2)}], "person 0: .*expected column, row and score"),
+        ([{"nose": (float("nan"), 2, 1)}], r"nose is at \(nan, 2.0\) px; expected a place"),
+        ([dict.fromkeys(LANDMARKS[:4], (0.2, 0.4, 1))], "shares of the image"),
+        ([person(40) | {"mask": np.zeros((9, 9))}], "mask"),
+        ([[1, 2]], "person 0: .*expected column, row and score"),
+    ],
+)
+def test_what_are_no_people_is_told(people: Any, expected: str) -> None:
+    with pytest.raises(CardboxError, match=expected):
+        detector(people).start()(IMAGE, 0)
+
+
+def test_one_person_is_followed_whatever_the_order() -> None:
+    # A person is known after five images.
+    before = [[person(20), person(110)], *[[person(110), person(21)]] * 5]
+    start = detector(*before, [person(110)], [person(110), person(25)]).start()
+    columns = []
+    for number in range(8):
+        found = start(IMAGE, number * FRAME_NS)
+        columns.append(None if found is None else float(np.nanmin(found.points_px[:, 0])))
+    assert columns == [20.0, *[21.0] * 5, None, 25.0]
+    assert start.missed == 1
+    assert "follows the most certain one" in start.remark
+
+
+@pytest.mark.parametrize(("which", "column"), [("left", 20.0), ("right", 110.0)])
+def test_a_person_can_be_chosen(which: str, column: float) -> None:
+    people = [person(60), person(20), person(110)]
+    found = detector(people, person=PersonChoice(which)).start()(IMAGE, 0)
+    assert found is not None
+    assert float(np.nanmin(found.points_px[:, 0])) == column
+
+
+def test_all_people_are_found_if_several_are_wanted() -> None:
+    start = detector([person(20), {}, person(110)], [], people=3).start()
+    assert len(start.all_in(0, IMAGE)) == 2
+    assert start.all_in(FRAME_NS, IMAGE) == []
+    assert start.missed == 1
+
+
+def test_what_does_not_detect_is_refused() -> None:
+    with pytest.raises(CardboxError, match=r"the detector int has no function detect\(image\)"):
+        OwnModel.of(7, "the detector int")
