@@ -13,6 +13,8 @@ HOME = "https://github.com/cardbox-tracker/cardbox_tracker"
 ROS = ["ros-jazzy-rclpy[fastrtps]", "ros-jazzy-common-interfaces"]
 # 'cardbox track FOLDER --scheduler' on a cluster.
 CLUSTER = ["dask>=2024.5", "distributed>=2024.5"]
+# Streams to programs that teleoperate robots.
+TELEOPERATION = ["msgpack>=1,<2", "pyzmq>=25,<28"]
 TEST = [
     "bvh>=0.3,<1",
     "catkin_pkg>=1.0",
@@ -27,6 +29,7 @@ TEST = [
     "pytest-timeout>=2.3",
     "pytest-xdist>=3.5",
     "ruff>=0.6",
+    *TELEOPERATION,
     "types-PyYAML",
     "types-tqdm",
     "yourdfpy>=0.0.56",
@@ -78,6 +81,7 @@ SCRIPTS = [
     f"stereo_depth = {NAME}.start:stereo_depth",
     f"rula = {NAME}.start:rula",
     f"retarget = {NAME}.start:retarget",
+    f"teleoperation = {NAME}.start:teleoperation",
     f"cardbox_nodes = {NAME}.start:cardbox_nodes",
 ]
 
@@ -145,6 +149,7 @@ setup(
         "docs": DOCS,
         "export": EXPORT,
         "cluster": CLUSTER,
+        "teleoperation": TELEOPERATION,
     },
     entry_points={"console_scripts": SCRIPTS},
     cmdclass={"install_data": InstallData},

@@ -192,6 +192,7 @@ class Retargeter:
 
     Attributes:
         joints: names of the robot's joints.
+        limits: those of the joints' motion.
         settles_ns: time in which the robot stops, ns.
     """
 
@@ -203,7 +204,7 @@ class Retargeter:
         """
         self.joints = method.joints
         limits = Limits(*robot.limits_of(method.joints))
-        limits = limits._replace(speed=np.minimum(limits.speed, config.max_speed))
+        self.limits = limits = limits._replace(speed=np.minimum(limits.speed, config.max_speed))
         self._motion = SafeMotion(
             limits,
             _start(config.start, method.joints, limits),
