@@ -92,6 +92,9 @@ class FullBody(NamedTuple):
         share = min(max((stamp_ns - self.stamp_ns) / span_ns, 0.0), 1.0)
         near = np.where((self.turns * later.turns).sum(axis=1, keepdims=True) < 0, -1.0, 1.0)
         turns = (1 - share) * self.turns + share * near * later.turns
+        valid = self.valid & later.valid
+        if share in (0.0, 1.0):
+            valid = later.valid if share else self.valid
         yaw_rad = (later.yaw_rad - self.yaw_rad + np.pi) % (2 * np.pi) - np.pi
         return FullBody(
             stamp_ns,
@@ -99,7 +102,7 @@ class FullBody(NamedTuple):
             turns / np.linalg.norm(turns, axis=1, keepdims=True),
             self.yaw_rad + share * yaw_rad,
             (1 - share) * self.wrists_rad + share * later.wrists_rad,
-            self.valid & later.valid,
+            valid,
         )
 
 

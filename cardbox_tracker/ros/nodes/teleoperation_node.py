@@ -20,6 +20,11 @@ from cardbox_tracker.ros.runtime.node import CardboxNode, run_node
 from cardbox_tracker.ros.runtime.parameter_fields import AT_START, NodeParameters, parameter
 from cardbox_tracker.ros.runtime.parameters import LiveParameters
 
+_TOPICS: dict[str, tuple[Any, str]] = {
+    "isaac": (ByteMultiArray, "xr_teleop/full_body"),
+    "json": (String, "teleoperation/full_body"),
+}
+
 _DOES = "Stream the tracked person as 24 joints to programs that teleoperate robots."
 
 
@@ -60,11 +65,11 @@ class TeleoperationNode(CardboxNode):
         super().__init__("teleoperation", **options)
         self._settings = LiveParameters(self, TeleoperationParameters).value
         to, address = self._settings.to, self._settings.address
-        if to == "sonic" and not address:
-            raise CardboxError("sonic reads ZMQ: give the parameter address, tcp://127.0.0.1:5556")
+        if to not in _TOPICS and not address:
+            raise CardboxError(f"{to} reads ZMQ: give the parameter address, tcp://127.0.0.1:5556")
         self._sender = ZmqSender(address) if address else None
-        self._isaac = self.advertise(ByteMultiArray, "xr_teleop/full_body", qos.RESULT)
-        self._json = self.advertise(String, "teleoperation/full_body", qos.RESULT)
+        if not address:
+            self._publisher = self.advertise(*_TOPICS[to], qos.RESULT)
         self._bodies = FullBodies()
         self._pair: tuple[FullBody, FullBody] | None = None
         self._arrived_s, self._number = 0.0, 0
@@ -102,9 +107,9 @@ class TeleoperationNode(CardboxNode):
         if self._sender is not None:
             self._sender.send(made)
         elif self._settings.to == "json":
-            self._json.publish(String(data=made.decode()))
+            self._publisher.publish(String(data=made.decode()))
         else:
-            self._isaac.publish(ByteMultiArray(data=[bytes([one]) for one in made]))
+            self._publisher.publish(ByteMultiArray(data=[bytes([one]) for one in made]))
 
     def close(self) -> None:
         """Free the address."""
