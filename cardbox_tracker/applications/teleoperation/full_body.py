@@ -139,14 +139,20 @@ class FullBodies:
             if np.isfinite((values.get(name, np.nan), stddev.get(name, np.nan))).all()
         }
         before = self._before
-        if body is None or state not in (TRACKING, UNCERTAIN) or not known.keys() >= set(JOINT_NAMES):
+        if (
+            body is None
+            or state not in (TRACKING, UNCERTAIN)
+            or not known.keys() >= set(JOINT_NAMES)
+        ):
             return before and before.invalid(stamp_ns)
 
         def tracked(*names: str) -> bool:
             found = (keypoints.get(name, (KeypointState.TRACKED, 0.0))[0] for name in names)
             return all(one == KeypointState.TRACKED for one in found)
 
-        trunk = state == TRACKING or (bool(keypoints) and tracked("left_shoulder", "right_shoulder"))
+        trunk = state == TRACKING or (
+            bool(keypoints) and tracked("left_shoulder", "right_shoulder")
+        )
         if trunk:
             self._take(known, _TRUNK)
         head = trunk and self._take(known, NECK_NAMES)
@@ -227,7 +233,6 @@ class FullBodies:
         places = np.array([points[name] for name in NAMES]) - points["pelvis"]
         quaternions = Rotation.from_matrix([turns[name] for name in NAMES]).as_quat()
         return places, quaternions[:, [3, 0, 1, 2]], wrists
-
 
 
 def _roll(palm: FloatArray, upper: FloatArray, fore: FloatArray, sign: float) -> float:

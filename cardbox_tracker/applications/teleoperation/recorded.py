@@ -35,7 +35,11 @@ def bodies_of(results: Results) -> Iterator[FullBody]:
     rows = zip(results.stamp_ns.tolist(), images, chances_in(results), strict=True)
     for stamp_ns, (state, body, row, stddev, palm), keypoints in rows:
         found, known = (dict(zip(_NAMES, one.tolist(), strict=True)) for one in (row, stddev))
-        if body is not None and np.isfinite(palm).any() and np.isfinite(row[: len(JOINT_NAMES)]).all():
+        if (
+            body is not None
+            and np.isfinite(palm).any()
+            and np.isfinite(row[: len(JOINT_NAMES)]).all()
+        ):
             # A table has the palms in place of their turns about the forearms.
             posed = pose(body, row[: len(JOINT_NAMES)])
             arms = zip(turns, (1.0, -1.0), (posed.left, posed.right), palm, strict=True)

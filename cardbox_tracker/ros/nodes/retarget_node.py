@@ -182,9 +182,7 @@ class RetargetNode(CardboxNode):
         if self._sender is not None:
             lower, upper, _ = self._retargeter.limits
             names = self._retargeter.joints
-            self._sender.send(
-                joints_packet(self._stamp_ns, names, moment.positions, lower, upper)
-            )
+            self._sender.send(joints_packet(self._stamp_ns, names, moment.positions, lower, upper))
         positions, velocities = (part.tolist() for part in moment)
         header = Header()
         if self._stamp_ns:

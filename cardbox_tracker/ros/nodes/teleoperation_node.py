@@ -32,9 +32,7 @@ _DOES = "Stream the tracked person as 24 joints to programs that teleoperate rob
 class TeleoperationParameters(NodeParameters):
     """Stream the tracked person to programs that teleoperate robots."""
 
-    to: str = parameter(
-        "isaac", "who reads the stream", choices=tuple(PACKETS), effect=AT_START
-    )
+    to: str = parameter("isaac", "who reads the stream", choices=tuple(PACKETS), effect=AT_START)
     address: str = parameter(
         "",
         "ZMQ address on which the stream is published, as tcp://127.0.0.1:5556; empty: the topic "

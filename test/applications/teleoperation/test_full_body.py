@@ -148,7 +148,9 @@ def test_between_two_images_the_shorter_way_is_taken() -> None:
 
 
 @hypothesis_settings(max_examples=30, deadline=None)
-@given(st.lists(st.tuples(st.sampled_from(["tracking", "uncertain", "lost"]), st.data()), max_size=4))
+@given(
+    st.lists(st.tuples(st.sampled_from(["tracking", "uncertain", "lost"]), st.data()), max_size=4)
+)
 def test_no_input_makes_a_value_that_is_not_finite(images: list[tuple[str, st.DataObject]]) -> None:
     bodies = FullBodies()
     number = st.one_of(st.floats(-4, 4), st.sampled_from([np.nan, np.inf]))

@@ -6,11 +6,12 @@ Where LeRobot is not installed, its two base classes are stand-ins.
 from __future__ import annotations
 
 import sys
+import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import closing
 from dataclasses import dataclass
-from importlib.util import module_from_spec, spec_from_file_location
+from importlib.util import find_spec, module_from_spec, spec_from_file_location
 from pathlib import Path
 from types import ModuleType, SimpleNamespace
 from typing import Any
@@ -49,9 +50,7 @@ class StandInTeleoperator:
 @pytest.fixture(scope="module")
 def plugin() -> Iterator[ModuleType]:
     replaced = {}
-    try:
-        import lerobot.teleoperators.teleoperator
-    except ImportError:
+    if find_spec("lerobot") is None:
         below = "lerobot.teleoperators"
         replaced = {
             f"{below}.config": SimpleNamespace(TeleoperatorConfig=StandInConfig),
@@ -99,8 +98,6 @@ def commanded(sender: ZmqSender, lift: float, jaw: float) -> None:
 
 def connected(teleoperator: Any, sender: ZmqSender) -> Any:
     """Connect while commands come."""
-    import threading
-
     is_done = threading.Event()
 
     def repeat() -> None:

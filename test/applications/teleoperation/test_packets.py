@@ -6,6 +6,7 @@ import json
 import struct
 from collections.abc import Iterator
 from contextlib import closing
+from importlib import import_module
 from typing import Any
 
 import numpy as np
@@ -98,13 +99,11 @@ def test_isaac_gets_the_axes_of_openxr() -> None:
 
 
 def test_the_message_fills_isaac_teleops_full_body() -> None:
-    types = pytest.importorskip(
-        "isaacteleop.retargeting_engine.tensor_types", reason="isaacteleop is not installed"
-    )
-    from isaacteleop.retargeting_engine.interface import TensorGroup
-
+    pytest.importorskip("isaacteleop", reason="isaacteleop is not installed")
+    types = import_module("isaacteleop.retargeting_engine.tensor_types")
+    group_of = import_module("isaacteleop.retargeting_engine.interface").TensorGroup
     found = packets.optional("msgpack").unpackb(packets.isaac_packet(body(), 0))
-    group = TensorGroup(types.FullBodyInput())
+    group = group_of(types.FullBodyInput())
     group[types.FullBodyInputIndex.JOINT_POSITIONS] = np.array(found["joint_positions"], "f4")
     group[types.FullBodyInputIndex.JOINT_ORIENTATIONS] = np.array(found["joint_orientations"], "f4")
     group[types.FullBodyInputIndex.JOINT_VALID] = np.array(found["joint_valid"], "u1")
