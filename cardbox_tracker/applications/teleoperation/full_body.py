@@ -25,7 +25,7 @@ from cardbox_tracker.person.legs import (
 )
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.parts import body_parts
-from cardbox_tracker.person.posture import LEFT_ARM, N_JOINTS, RIGHT_ARM
+from cardbox_tracker.person.posture import LEFT_ARM, RIGHT_ARM
 from cardbox_tracker.person.sizes import FloatArray
 from cardbox_tracker.person.skeleton import (
     JOINT_NAMES,
@@ -139,20 +139,16 @@ class FullBodies:
             if np.isfinite((values.get(name, np.nan), stddev.get(name, np.nan))).all()
         }
         before = self._before
-        if (
-            body is None
-            or state not in (TRACKING, UNCERTAIN)
-            or not known.keys() >= set(JOINT_NAMES)
-        ):
+        is_seen = state in (TRACKING, UNCERTAIN) and known.keys() >= set(JOINT_NAMES)
+        if body is None or not is_seen:
             return before and before.invalid(stamp_ns)
 
         def tracked(*names: str) -> bool:
             found = (keypoints.get(name, (KeypointState.TRACKED, 0.0))[0] for name in names)
             return all(one == KeypointState.TRACKED for one in found)
 
-        trunk = state == TRACKING or (
-            bool(keypoints) and tracked("left_shoulder", "right_shoulder")
-        )
+        shoulders = bool(keypoints) and tracked("left_shoulder", "right_shoulder")
+        trunk = state == TRACKING or shoulders
         if trunk:
             self._take(known, _TRUNK)
         head = trunk and self._take(known, NECK_NAMES)

@@ -179,10 +179,11 @@ class RetargetNode(CardboxNode):
         moment = self._supervisor.moment(now_ns)
         if moment is None:
             return
+        names = list(self._retargeter.joints)
         if self._sender is not None:
             lower, upper, _ = self._retargeter.limits
-            names = self._retargeter.joints
-            self._sender.send(joints_packet(self._stamp_ns, names, moment.positions, lower, upper))
+            found = joints_packet(self._stamp_ns, names, moment.positions, lower, upper)
+            self._sender.send(found)
         positions, velocities = (part.tolist() for part in moment)
         header = Header()
         if self._stamp_ns:
@@ -190,7 +191,6 @@ class RetargetNode(CardboxNode):
             stamp = Time(nanoseconds=self._stamp_ns + now_ns - self._arrived_ns)
             header.stamp = stamp.to_msg()
         self._commands.publish(Float64MultiArray(data=positions))
-        names = list(self._retargeter.joints)
         self._robot_joints.publish(
             JointState(header=header, name=names, position=positions, velocity=velocities)
         )

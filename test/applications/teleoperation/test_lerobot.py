@@ -152,7 +152,7 @@ def test_shares_of_the_range_are_those_of_the_limits(make: Any, sender: ZmqSende
 
 
 def test_mistakes_are_told(make: Any, sender: ZmqSender) -> None:
-    with pytest.raises(ConnectionError, match="no command came on tcp://127.0.0.1:51874"):
+    with pytest.raises(ConnectionError, match="no command came on tcp:"):
         make(wait_s=0.05).connect()
     with pytest.raises(ValueError, match="no joint arm, only lift, jaw, other"):
         connected(make(joints=["arm"]), sender)

@@ -152,7 +152,7 @@ def test_packets_arrive_by_zmq(subscriber: Any) -> None:
                 continue
         else:
             pytest.fail("nothing arrived")
-        with pytest.raises(CardboxError, match="cannot listen on 'tcp://127.0.0.1:51873'"):
+        with pytest.raises(CardboxError, match="cannot listen on 'tcp:"):
             packets.ZmqSender(address)
     with pytest.raises(CardboxError, match="give an address as"):
         packets.ZmqSender("nonsense")
