@@ -44,6 +44,9 @@ class Method(Protocol):
         target may be beyond the joint limits; it is nan if there is no solution.
         """
 
+    def clear(self, positions: FloatArray) -> FloatArray:
+        """Return the positions (n,) near to these at which the hand is not in the way."""
+
 
 class Limits(NamedTuple):
     """Lowest and highest positions (n,), rad or m, and highest speeds (n,), rad/s or m/s."""
@@ -290,6 +293,9 @@ class Retargeter:
         followed_s, soft_s = (now_ns - self._followed_ns) / 1e9, self._config.soft_start_s
         share = min(max(followed_s / soft_s, _SLOWEST), 1.0) if soft_s else 1.0
         goal = np.where(held, point, target + self._offset)
+        # On the way, too, the hand is not in the trunk.
+        most = share * self.limits.speed * duration_ns / 1e9
+        goal = self._method.clear(point + np.clip(goal - point, -most, most))
         self._motion.move(goal, now_ns, duration_ns, share)
         return Command(self.at(now_ns + duration_ns).positions, MOVING, duration_ns / 1e9)
 
@@ -355,6 +361,11 @@ class _Both:
         first = len(self._parts[0].joints)
         parts = zip(self._parts, (now[:first], now[first:]), strict=True)
         return np.concatenate([one.target(body, posture, part) for one, part in parts])
+
+    def clear(self, positions: FloatArray) -> FloatArray:
+        first = len(self._parts[0].joints)
+        parts = zip(self._parts, (positions[:first], positions[first:]), strict=True)
+        return np.concatenate([one.clear(part) for one, part in parts])
 
 
 def make_retargeter(
