@@ -83,7 +83,8 @@ ASIDE = """<robot name="g"><link name="a"/><link name="b"/><link name="c"/><link
 <joint name="pitch" type="continuous"><parent link="b"/><child link="c"/><axis xyz="0 1 0"/></joint>
 <joint name="elbow" type="continuous"><parent link="c"/><child link="d"/>
 <origin xyz="0 0 -0.3"/><axis xyz="1 0 0"/></joint>
-<joint name="end" type="fixed"><parent link="d"/><child link="hand"/><origin xyz="0 0 -0.2"/></joint>
+<joint name="end" type="fixed"><parent link="d"/><child link="hand"/>
+<origin xyz="0 0 -0.2"/></joint>
 </robot>"""
 
 
