@@ -4,7 +4,8 @@ python -m lab.tools.retarget_accuracy --robot URDF [--robot URDF ...] SESSION...
 
 Each session is a folder with ``bag/`` and ``ground_truth.json``. The robots follow the true
 postures without limits of speed and through their trunks, so the figures are those of the transfer,
-not of the tracker. The table replaces that between the marks in ``docs/retargeting.md`` with ``--write``.
+not of the tracker. The table replaces that between the marks in ``docs/retargeting.md`` with
+``--write``.
 """
 
 from __future__ import annotations

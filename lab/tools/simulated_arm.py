@@ -45,13 +45,13 @@ class Run:
     pictures: list[Any] = field(default_factory=list)
 
 
-def commands_of(path: Path, joints: list[str]) -> tuple[FloatArray, FloatArray, FloatArray]:
+def commands_of(path: Path, joints: list[str]) -> tuple[FloatArray, FloatArray, list[int]]:
     """Return times (n,), s, positions (n, joints), rad, and the numbers of rows that move."""
     with path.open(encoding="utf-8") as file:
         rows = list(csv.DictReader(file))
     times = np.array([int(row["stamp_ns"]) for row in rows]) / 1e9
     positions = np.array([[float(row[name]) for name in joints] for row in rows])
-    moving = np.flatnonzero([row["status"] == "moving" for row in rows])
+    moving = [number for number, row in enumerate(rows) if row["status"] == "moving"]
     return times - times[0], positions, moving
 
 
@@ -65,7 +65,7 @@ def follow(scene: Path, table: Path, has_pictures: bool = False) -> Run:
     times, wanted, moving = commands_of(table, joints)
     places = [model.joint(name).qposadr[0] for name in joints]
     data.qpos[places] = data.ctrl[:] = wanted[0]
-    shown = moving[np.linspace(0, len(moving) - 1, _PICTURES).astype(int)]
+    shown = [moving[int(one)] for one in np.linspace(0, len(moving) - 1, _PICTURES)]
     found, run = np.zeros_like(wanted), Run(np.degrees(wanted), np.zeros(0))
     for number, (time_s, row) in enumerate(zip(times, wanted, strict=True)):
         data.ctrl[:] = row
