@@ -292,10 +292,10 @@ class Retargeter:
         duration_ns = max(min(elapsed_ns, waited_ns, longest_ns), 0)
         followed_s, soft_s = (now_ns - self._followed_ns) / 1e9, self._config.soft_start_s
         share = min(max(followed_s / soft_s, _SLOWEST), 1.0) if soft_s else 1.0
-        goal = np.where(held, point, target + self._offset)
         # On the way, too, the hand is not in the trunk.
         most = share * self.limits.speed * duration_ns / 1e9
-        goal = self._method.clear(point + np.clip(goal - point, -most, most))
+        goal = point + np.clip(np.where(held, 0.0, target + self._offset - point), -most, most)
+        goal = np.where(held, point, self._method.clear(goal))
         self._motion.move(goal, now_ns, duration_ns, share)
         return Command(self.at(now_ns + duration_ns).positions, MOVING, duration_ns / 1e9)
 
