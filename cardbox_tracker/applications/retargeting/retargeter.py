@@ -22,6 +22,11 @@ from cardbox_tracker.person.skeleton import JOINT_NAMES
 from cardbox_tracker.tracking.estimate import TRACKING, UNCERTAIN
 
 MOVING = "moving"
+# Settings that a joint map does not need.
+_OF_AN_ARM = (
+    *("base", "hand", "gripper", "gripper_open", "trunk_radius_m", "lowest_m"),
+    *("mount_roll_deg", "mount_pitch_deg", "mount_yaw_deg"),
+)
 # The first of the speeds with which a robot begins to follow, of its highest.
 _SLOWEST = 0.1
 
@@ -386,7 +391,8 @@ def make_retargeter(
     """
     robot = load_robot(robot_file)
     if joint_map:
-        given = [name for name in ("base", "hand", "gripper") if getattr(config, name)]
+        usual = RetargetConfig()
+        given = [name for name in _OF_AN_ARM if getattr(config, name) != getattr(usual, name)]
         if given or config.side == "both":
             raise CardboxError(
                 f"expected either a joint map or {', '.join(given) or 'both sides'}, not both"

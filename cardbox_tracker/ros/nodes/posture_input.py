@@ -29,7 +29,6 @@ class Tracked(NamedTuple):
         stddev: their deviations.
         hands: how open the hands are; None if that is not known.
         keypoints: state and chance to be wrong by keypoint; None if not known.
-        sent_ns: time at which the last message was sent, ns since the epoch.
     """
 
     stamp_ns: int
@@ -39,7 +38,6 @@ class Tracked(NamedTuple):
     stddev: JointState | None = None
     hands: JointState | None = None
     keypoints: dict[str, tuple[str, float]] | None = None
-    sent_ns: int = 0
 
 
 class PostureInput:
@@ -90,7 +88,7 @@ class PostureInput:
         self._stamp_ns = stamp_ns
         hands = self._hands if self._hands.header.stamp == stamp else None
         points = chances_of(self._points) if self._points.header.stamp == stamp else None
-        found = self._joints, message, hands, points, sent_ns
+        found = self._joints, message, hands, points
         self._take(Tracked(stamp_ns, self._state, self._body, *found))
         if self._body is None:
             self._node.diagnostics.wait_for(
