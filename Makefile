@@ -209,7 +209,7 @@ colcon: setup
 		| tar --create --null --files-from=- | tar --extract --directory=$(COLCON)/src/cardbox_tracker
 	cd $(COLCON) && export AMENT_PREFIX_PATH=$(CURDIR)/$(VENV) PATH=$(BIN):$$PATH && \
 		colcon build --event-handlers console_direct+ && \
-		for name in cardbox background initializer tracker camera play_bag stereo_depth rula retarget cardbox_nodes; do \
+		for name in cardbox background initializer tracker camera play_bag stereo_depth rula retarget teleoperation cardbox_nodes; do \
 			test -x install/cardbox_tracker/lib/cardbox_tracker/$$name || \
 				{ echo "colcon installed no $$name" >&2; exit 1; }; \
 		done && \

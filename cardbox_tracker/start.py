@@ -43,6 +43,7 @@ NODES: dict[str, str] = {
     "stereo_depth": "cardbox_tracker.ros.nodes.stereo_depth_node",
     "rula": "cardbox_tracker.ros.nodes.rula_node",
     "retarget": "cardbox_tracker.ros.nodes.retarget_node",
+    "teleoperation": "cardbox_tracker.ros.nodes.teleoperation_node",
     "cardbox_nodes": "cardbox_tracker.ros.nodes.single_process",
 }
 """Module of each executable of ``ros2 run cardbox_tracker`` except ``cardbox``."""
@@ -138,6 +139,7 @@ detector = partial(_run, "detector")
 stereo_depth = partial(_run, "stereo_depth")
 rula = partial(_run, "rula")
 retarget = partial(_run, "retarget")
+teleoperation = partial(_run, "teleoperation")
 cardbox_nodes = partial(_run, "cardbox_nodes")
 
 

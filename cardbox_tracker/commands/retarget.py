@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 from collections import Counter
+from contextlib import closing
 from pathlib import Path
 
 from cardbox_tracker.commands.arguments import (
@@ -13,6 +14,7 @@ from cardbox_tracker.commands.arguments import (
     check_outputs,
     settings_from,
 )
+from cardbox_tracker.common.errors import CardboxError
 
 NAME = "retarget"
 HELP = "move a robot arm, given by its URDF, as the measured person moves theirs"
@@ -23,7 +25,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     from cardbox_tracker.applications.retargeting.config import RetargetConfig
 
     parser.add_argument(
-        "results", type=Path, metavar="RESULTS", help="bag of results, of 'cardbox track --bag'"
+        "results",
+        type=Path,
+        metavar="RESULTS",
+        help="table of 'cardbox track' (CSV or Parquet), or its bag",
     )
     parser.add_argument("--robot", type=Path, required=True, metavar="ROBOT.urdf", help="the robot")
     parser.add_argument(
@@ -43,7 +48,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--bag",
         type=Path,
         metavar="OUT",
-        help="the results with the robot beside the person, for 'cardbox view'",
+        help="a bag of results with the robot beside the person, for 'cardbox view'",
+    )
+    parser.add_argument(
+        "--stream",
+        metavar="ADDRESS",
+        help="send the robot's joints in real time by ZMQ, as tcp://127.0.0.1:5557, for LeRobot",
     )
     add_person(parser)
     add_force(parser)
@@ -54,12 +64,16 @@ def run(options: argparse.Namespace) -> None:
     """Retarget a recording to the robot and write the results."""
     from cardbox_tracker.applications.retargeting.config import RetargetConfig
     from cardbox_tracker.applications.retargeting.recording import (
-        retarget_bag,
+        retarget_results,
         write_bag,
         write_csv,
     )
     from cardbox_tracker.applications.retargeting.retargeter import make_retargeter
+    from cardbox_tracker.applications.teleoperation.packets import ZmqSender, joints_packet
+    from cardbox_tracker.applications.teleoperation.recorded import in_real_time
     from cardbox_tracker.recordings.bag_reader import BagReader
+    from cardbox_tracker.recordings.open_images import is_bag
+    from cardbox_tracker.recordings.result_reader import read_results
 
     check_outputs(
         (options.csv,),
@@ -67,19 +81,27 @@ def run(options: argparse.Namespace) -> None:
         inputs=(options.results, options.robot, options.map),
         results=() if options.bag is None else (options.bag,),
     )
+    if options.bag is not None and not is_bag(options.results):
+        raise CardboxError(f"--bag adds the robot to a bag; {options.results} is a table")
     config = settings_from(options, RetargetConfig)
     robot, retargeter, table = make_retargeter(options.robot, options.map, config)
-    with BagReader(options.results) as bag:
-        motion = retarget_bag(bag, retargeter, config.rate_hz, options.person)
-        if table:
-            print(table)
-        if options.csv is not None:
-            write_csv(motion.way, retargeter.joints, options.csv)
-        if options.bag is not None:
-            joints = retargeter.joints
+    results = read_results(options.results, options.person)
+    motion = retarget_results(results, retargeter, config.rate_hz)
+    joints = retargeter.joints
+    if table:
+        print(table)
+    if options.csv is not None:
+        write_csv(motion.way, joints, options.csv)
+    if options.bag is not None:
+        with BagReader(options.results) as bag:
             write_bag(bag, motion, joints, robot.urdf, options.bag, options.force)
     for status, count in Counter(step.command.status for step in motion.commands).most_common():
         print(f"{status}: {count} of {len(motion.commands)} images")
     for path in (options.csv, options.bag):
         if path is not None:
             print(f"wrote {path}")
+    if options.stream is not None:
+        lower, upper, _ = retargeter.limits
+        with closing(ZmqSender(options.stream)) as sender:
+            for stamp_ns, _, moment in in_real_time(motion.way, config.rate_hz):
+                sender.send(joints_packet(stamp_ns, joints, moment.positions, lower, upper))

@@ -135,10 +135,15 @@ def leg_directions(angles_rad: FloatArray, side: float) -> tuple[FloatArray, Flo
         angles_rad: the four angles of a leg, (..., 4).
         side: +1 for the left leg, -1 for the right.
     """
+    thigh, shank = leg_rotations(angles_rad, side)
+    return -thigh[..., 2], -shank[..., 2]
+
+
+def leg_rotations(angles_rad: FloatArray, side: float) -> tuple[FloatArray, FloatArray]:
+    """Return rotations (..., 3, 3) from thigh and shank to hips, see :func:`leg_directions`."""
     a = np.asarray(angles_rad, dtype=np.float64)
     thigh = rotation_y(-a[..., 0]) @ rotation_x(side * a[..., 1]) @ rotation_z(-side * a[..., 2])
-    shank = thigh @ rotation_y(a[..., 3])
-    return -thigh[..., 2], -shank[..., 2]
+    return thigh, thigh @ rotation_y(a[..., 3])
 
 
 def leg_angles(thigh: FloatArray, shank: FloatArray, side: float) -> FloatArray:

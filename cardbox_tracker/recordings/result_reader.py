@@ -160,7 +160,7 @@ class _Rows:
         is_seen = state in _SEEN
         self._rows.append(self._numbers(row) if is_seen else np.full(len(self.names), np.nan))
         for name in self._texts:
-            text = str(row[name] or "") if is_seen else ""
+            text = str(row.get(name) or "") if is_seen else ""
             if text and name.endswith("_state") and text not in _KEYPOINT_STATES:
                 raise ValueError(f"{name} is {quoted(text)}")
             self._found_texts[name].append(text)
@@ -401,6 +401,7 @@ class _Messages:
     def __init__(self) -> None:
         self._state, self.repeated = NO_PERSON, 0
         self._body: BodyModel | None = None
+        self._keypoints: tuple[int, dict[str, Any]] = 0, {}
         self.by_stamp: dict[int, dict[str, Any]] = {}
 
     def take(self, name: str, time_ns: int, message: Any) -> None:
@@ -420,16 +421,21 @@ class _Messages:
             # A node without the place of the torso keeps it constant.
             row |= dict.fromkeys(PLACE_NAMES, 0.0) | positions_of(joints)
             self.repeated += stamp_ns_of(message) in self.by_stamp
+            stamp_ns, keypoints = self._keypoints
+            row |= keypoints if stamp_ns == stamp_ns_of(message) else {}
             self.by_stamp[stamp_ns_of(message)] = row
+        elif name == _STATES:
+            # They come before the joints of their image.
+            states: dict[str, Any] = {}
+            for keypoint, (state, chance) in chances_of(message).items():
+                states |= {f"{keypoint}_state": state, f"{keypoint}_chance": chance}
+            self._keypoints = stamp_ns_of(message), states
         elif (found := self.by_stamp.get(stamp_ns_of(message))) is not None:
             if name == _KEYPOINTS:
                 points_m = points_of(message).ravel().tolist()
                 if len(points_m) != len(POINT_COLUMNS):
                     raise ValueError(f"{len(points_m) // 3} keypoints")
                 found |= zip(POINT_COLUMNS, points_m, strict=True)
-            elif name == _STATES:
-                for keypoint, (state, chance) in chances_of(message).items():
-                    found |= {f"{keypoint}_state": state, f"{keypoint}_chance": chance}
             elif name == _HANDS:
                 values = positions_of(joints_of(message))
                 found |= {name: values[name] for name in HAND_OPEN_NAMES if name in values}

@@ -20,6 +20,7 @@ from cardbox_tracker.ros.nodes.play_bag_node import PlayBagParameters
 from cardbox_tracker.ros.nodes.retarget_node import RetargetParameters
 from cardbox_tracker.ros.nodes.rula_node import RulaParameters
 from cardbox_tracker.ros.nodes.stereo_depth_node import StereoDepthParameters
+from cardbox_tracker.ros.nodes.teleoperation_node import TeleoperationParameters
 from cardbox_tracker.ros.nodes.tracker_parameters import TrackerParameters
 from cardbox_tracker.ros.runtime.parameter_fields import (
     NodeParameters,
@@ -45,9 +46,10 @@ NODES: dict[str, type[NodeParameters]] = {
     "detector": DetectorParameters,
     "rula": RulaParameters,
     "retarget": RetargetParameters,
+    "teleoperation": TeleoperationParameters,
 }
 """Node name to its parameters."""
-APART = ("detector", "rula", "retarget")
+APART = ("detector", "rula", "retarget", "teleoperation")
 """Nodes that are no part of ``cardbox_nodes``."""
 
 

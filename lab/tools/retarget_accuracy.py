@@ -3,8 +3,9 @@
 python -m lab.tools.retarget_accuracy --robot URDF [--robot URDF ...] SESSION...
 
 Each session is a folder with ``bag/`` and ``ground_truth.json``. The robots follow the true
-postures without limits of speed, so the figures are those of the transfer, not of the tracker.
-The table replaces that between the marks in ``docs/retargeting.md`` with ``--write``.
+postures without limits of speed and through their trunks, so the figures are those of the transfer,
+not of the tracker. The table replaces that between the marks in ``docs/retargeting.md`` with
+``--write``.
 """
 
 from __future__ import annotations
@@ -37,7 +38,7 @@ def row(robot: Robot, name: str, side: str, body: BodyModel, postures: FloatArra
 
     ``postures`` (n, 12) are followed one after the other, as those of a recording.
     """
-    follower = ArmFollower(robot, RetargetConfig(side=side))
+    follower = ArmFollower(robot, RetargetConfig(side=side, trunk_radius_m=0.0))
     lower, upper, _ = robot.limits_of(follower.arm.joints)
     hidden = np.full((len(postures), 4), np.nan)
     now, cosines, limited = np.zeros(len(follower.joints)), [], []

@@ -35,6 +35,7 @@ from cardbox_tracker.ros.nodes.play_bag_node import PlayBagNode
 from cardbox_tracker.ros.nodes.retarget_node import RetargetNode
 from cardbox_tracker.ros.nodes.rula_node import RulaNode
 from cardbox_tracker.ros.nodes.stereo_depth_node import StereoDepthNode
+from cardbox_tracker.ros.nodes.teleoperation_node import TeleoperationNode
 from cardbox_tracker.ros.nodes.tracker_node import TrackerNode
 
 _CONFIG = Path(__file__).resolve().parents[2] / "config"
@@ -129,7 +130,7 @@ def policy(nodes: dict[str, Access]) -> str:
     operator = Access(publish={"/rosout", "/parameter_events"}, subscribe={"/diagnostics"})
     for path, access in nodes.items():
         operator.request |= {f"{_place(path)}/{name}".lstrip("/") for name in access.triggers}
-        if path in ("initializer", "tracker", "rula", "retarget"):
+        if path in ("initializer", "tracker", "rula", "retarget", "teleoperation"):
             operator.subscribe |= access.publish - set(_GLOBAL)
     root = ElementTree.Element("policy", version="0.2.0")
     root.append(ElementTree.Comment(_COMMENT))
@@ -194,6 +195,7 @@ def running(
         *([(StereoDepthNode, "/", {})] if layout.depth or not layout.cameras else []),
         (RulaNode, "/", {}),
         (RetargetNode, "/", robot),
+        (TeleoperationNode, "/", {}),
     ]
     make: Any = Parameter
     made = []

@@ -3,18 +3,23 @@
 from __future__ import annotations
 
 import csv
+import json
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
+from cardbox_tracker.applications.teleoperation import packets
 from cardbox_tracker.camera.camera import Camera
 from cardbox_tracker.person.model import BodyModel
+from cardbox_tracker.person.model_file import save_body_model
 from cardbox_tracker.person.posture import reference_posture
 from cardbox_tracker.recordings.bag_reader import BagReader
 from cardbox_tracker.recordings.result_bag import result_bag
+from cardbox_tracker.recordings.result_table import result_table
 from cardbox_tracker.recordings.silhouettes import RecordedFrame
 from cardbox_tracker.tracking.estimate import LOST, TRACKING, Estimate
 from cardbox_tracker.tracking.tracker import Tracker
@@ -71,6 +76,34 @@ def test_the_robot_follows_and_stands_still(
         assert read.count(list(before.topics)) == before.count()
 
 
+def test_a_table_is_read_and_its_joints_are_streamed(
+    results: Path, tmp_path: Path, cardbox: Callable, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    sent: list[dict] = []
+    sender = SimpleNamespace(send=lambda one: sent.append(json.loads(one)), close=lambda: None)
+    monkeypatch.setattr(packets, "ZmqSender", lambda _: sender)
+    table, arm = tmp_path / "person.csv", tmp_path / "arm.csv"
+    posture = reference_posture("arms")
+    seen = Estimate(TRACKING, posture, np.full(12, 0.1), np.zeros((6, 3)), 10, 0.9)
+    grey = np.zeros((48, 64), np.uint8)
+    with result_table(table, has_points=True) as add:
+        for i in range(3):
+            add(RecordedFrame(i * 10**8, i / 10, grey, grey), seen)
+    body = BodyModel.of(hip_height_m=-0.51)
+    save_body_model(body, tmp_path / "person.body.yaml")
+    options = ("--robot", ROBOT, "--csv", arm, "--stream", "tcp://127.0.0.1:5557")
+    done = cardbox("retarget", table, *options)
+    assert done.code == 0, done.err
+    with arm.open(encoding="utf-8") as file:
+        rows = list(csv.DictReader(file))
+    names = sent[0]["names"]
+    assert [one["stamp_ns"] for one in sent] == [int(row["stamp_ns"]) for row in rows]
+    assert sent[-1]["positions"] == [float(rows[-1][name]) for name in names]
+    assert sent[0]["lower"] < sent[0]["upper"]
+    done = cardbox("retarget", table, "--robot", ROBOT, "--bag", tmp_path / "out")
+    assert done.code == 1 and "is a table" in done.err
+
+
 HEAD = """<robot name="head"><link name="neck"/><link name="face"/>
 <joint name="head_yaw" type="revolute"><parent link="neck"/><child link="face"/>
 <limit lower="-1" upper="1" velocity="0" effort="1"/></joint></robot>"""
@@ -110,6 +143,7 @@ def test_a_head_in_a_bag_is_followed_while_the_face_is_known(
         (("--robot", str(MAP)), "expected the URDF"),
         (("--map", str(ROBOT)), "config/example_joint_map.yaml"),
         (("--map", str(MAP), "--hand", "hand_link"), "either a joint map or hand, not both"),
+        (("--map", str(MAP), "--lowest-m", "0"), "either a joint map or lowest_m, not both"),
         (("--max-speed", "100"), "--max-speed is 100; expected 0.01 to 20"),
         (("--map", str(MAP), "--side", "both"), "either a joint map or both sides"),
         (("--side", "none"), "--side: invalid choice: 'none'"),

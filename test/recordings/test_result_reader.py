@@ -16,6 +16,7 @@ from cardbox_tracker.camera.camera import Camera
 from cardbox_tracker.common.errors import BagError, CardboxError
 from cardbox_tracker.person.kinematics import pose
 from cardbox_tracker.person.model import BodyModel
+from cardbox_tracker.person.skeleton import KeypointState
 from cardbox_tracker.recordings import result_reader
 from cardbox_tracker.recordings.bag_reader import BagReader
 from cardbox_tracker.recordings.bag_writer import BagWriter
@@ -52,6 +53,8 @@ def estimates() -> list[Estimate]:
         offset_stddev_m=np.full(2, 0.1),
         neck=np.array([0.0, 0.2]),
         neck_stddev=np.full(2, 0.3),
+        keypoint_states=(KeypointState.TRACKED,) * 5 + (KeypointState.LOST,),
+        keypoint_chances=np.array([0.0, 0.1, 0.2, 0.3, 0.4, 0.9]),
     )
     return [seen, Estimate("lost"), moved, Estimate("no_person"), seen]
 
@@ -115,6 +118,9 @@ def test_a_bag_is_read_with_its_body(tmp_path: Path) -> None:
     assert motion.time_s == pytest.approx([0.0, 0.1, 0.2, 0.3, 0.4])
     assert body is not None
     assert body.sizes == pytest.approx(BODY.sizes)
+    results = read_results(tmp_path / "results")
+    assert results.texts_of("right_hand_state") == ("", "", "lost", "", "")
+    assert results.numbers["left_hand_chance"][2] == pytest.approx(0.2)
 
 
 def test_a_bag_of_one_stamp_is_refused(tmp_path: Path) -> None:

@@ -34,6 +34,8 @@ _BAD, _MUCH_BETTER = 0.07, 0.5
 _STARTS = 8
 # Where a robot cannot have all three directions, its hand is where the person's is.
 _WEIGHTS = (1.0, 1.0, 2.0)
+# A point that is too near counts so much for each metre that it comes nearer by millimetres only.
+_KEEPS_OUT = 100.0
 _IDENTITY = np.eye(3)
 _SHORTEST_M, _LONGEST_M = 0.01, 100.0
 _LEAST_PART, _LEAST_SINE = 0.2, 0.5
@@ -85,12 +87,13 @@ class Kinematics:
         reach_m: length of the stretched arm from the shoulder to the tip.
     """
 
-    def __init__(self, arm: Arm) -> None:
-        """Prepare.
+    def __init__(self, arm: Arm, trunk_radius_m: float = 0.0, lowest_m: float = -math.inf) -> None:
+        """Prepare; for the settings see :class:`~.config.RetargetConfig`.
 
         Raises:
             CardboxError: the arm has an impossible length, or no elbow and hand.
         """
+        self._lowest_m = lowest_m
         self._steps, self._tip_m = _steps(arm)
         self._slides = np.array([step.slides for step in self._steps if step.is_own])
         first = next(i for i, one in enumerate(arm.path) if one.name == arm.joints[0])
@@ -105,11 +108,13 @@ class Kinematics:
                 f"expected {_SHORTEST_M:g} to {_LONGEST_M:g} m: a URDF has metres, and a hand that "
                 "is not its last joint"
             )
-        self.elbow = self._find_elbow(lengths)
-
-    def _find_elbow(self, lengths: list[float]) -> int:
-        """Return the first joint after the shoulder that bends the arm, not one that twists it."""
         places = self.at(np.zeros(len(lengths)))
+        self.elbow = self._find_elbow(lengths, places)
+        aside_m = float(np.linalg.norm(places.origins_m[self.shoulder][:2]))
+        self._trunk_radius_m = min(trunk_radius_m, aside_m)
+
+    def _find_elbow(self, lengths: list[float], places: _Places) -> int:
+        """Return the first joint after the shoulder that bends the arm, not one that twists it."""
         for number in range(2, len(lengths)):
             share = lengths[number] / self.reach_m
             upper = places.origins_m[number] - places.origins_m[self.shoulder]
@@ -150,18 +155,12 @@ class Kinematics:
         shoulder, elbow = ends[self.shoulder], ends[min(self.elbow, len(ends) - 1)]
         if self.elbow == len(ends) - 1:
             shoulder, elbow = ends[self.shoulder], 0.5 * (ends[self.shoulder] + places.tip_m)
-        numbers = np.arange(len(places.axes))
-
-        def moved(point: FloatArray, before: int) -> FloatArray:
-            turned = _cross(places.axes, point - places.origins_m)
-            found = np.where(self._slides[:, None], places.axes, turned)
-            return np.where((numbers < before)[:, None], found, 0.0).T
-
-        at_shoulder, at_tip = moved(shoulder, self.shoulder), moved(places.tip_m, len(numbers))
+        at_shoulder = self._moved(places, shoulder, self.shoulder)
+        at_tip = self._moved(places, places.tip_m, len(places.axes))
         if self.elbow == len(ends) - 1:
             at_elbow = 0.5 * (at_shoulder + at_tip)
         else:
-            at_elbow = moved(elbow, self.elbow)
+            at_elbow = self._moved(places, elbow, self.elbow)
         upper, fore = elbow - shoulder, places.tip_m - elbow
         lengths = np.linalg.norm(np.stack([upper, fore, upper + fore]), axis=1)
         return (
@@ -170,16 +169,52 @@ class Kinematics:
             np.stack([at_elbow - at_shoulder, at_tip - at_elbow]),
         )
 
+    def _moved(self, places: _Places, point: FloatArray, before: int) -> FloatArray:
+        """Return the derivatives (3, n) of a point that the joints ``before`` a number move."""
+        turned = _cross(places.axes, point - places.origins_m)
+        found = np.where(self._slides[:, None], places.axes, turned)
+        return np.where((np.arange(len(found)) < before)[:, None], found, 0.0).T
+
+    def too_near(self, positions: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return how far points of forearm and hand are in the trunk or too low, and derivatives.
+
+        The trunk is a capsule about the Z axis of the root. Shapes (k,), m, and (k, n).
+        """
+        return self._too_near(self.at(positions))
+
+    def _too_near(self, places: _Places) -> tuple[FloatArray, FloatArray]:
+        count = len(places.axes)
+        after = [*places.origins_m[self.elbow + 1 :], places.tip_m]
+        start = places.origins_m[self.elbow] if self.elbow < count else places.origins_m[1]
+        points = [0.5 * (start + places.tip_m), *after]
+        numbers = [count, *range(self.elbow + 1, count), count]
+        gaps, slopes = [], []
+        for point, number in zip(points, numbers, strict=True):
+            x, y, z = point.tolist()
+            above = max(z - float(places.origins_m[self.shoulder, 2]), 0.0)
+            far_m = max(math.hypot(x, y, above), 1e-6)
+            for gap_m, normal in (
+                (far_m - self._trunk_radius_m, (x / far_m, y / far_m, above / far_m)),
+                (z - self._lowest_m, (0.0, 0.0, 1.0)),
+            ):
+                if gap_m < 0.0:
+                    gaps.append(gap_m)
+                    slopes.append(normal @ self._moved(places, point, number))
+        return np.array(gaps), np.array(slopes).reshape(-1, count)
+
     def residual(self, positions: FloatArray, wanted: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return how far the directions are off, (9,), and the derivatives (9, n)."""
-        found, lengths, parts = self._directions(self.at(positions))
+        """Return how far the directions are off, and what is too near, (9 + k,); derivatives."""
+        places = self.at(positions)
+        found, lengths, parts = self._directions(places)
         changes = [parts[0], parts[1], parts[0] + parts[1]]
         rows = [
             weight / length * (change - np.outer(unit, unit @ change))
             for weight, change, unit, length in zip(_WEIGHTS, changes, found, lengths, strict=True)
         ]
         weights = np.array(_WEIGHTS)[:, None]
-        return (weights * (found - wanted)).ravel(), np.concatenate(rows)
+        gaps, slopes = self._too_near(places)
+        off = np.concatenate([(weights * (found - wanted)).ravel(), _KEEPS_OUT * gaps])
+        return off, np.concatenate([*rows, _KEEPS_OUT * slopes])
 
 
 def _cross(left: FloatArray, right: FloatArray) -> FloatArray:
@@ -231,7 +266,7 @@ class ArmFollower:
         """
         self._side = side or config.side
         self.arm = find_arm(robot, self._side, config.base, config.hand, config.gripper)
-        self.kinematics = Kinematics(self.arm)
+        self.kinematics = Kinematics(self.arm, config.trunk_radius_m, config.lowest_m)
         gripper = (self.arm.gripper,) if self.arm.gripper else ()
         self.joints = (*self.arm.joints, *gripper)
         behind = tuple(f"{self._side}_{name}" for name in ARM_JOINTS)
@@ -272,6 +307,18 @@ class ArmFollower:
             found[-1] = self._closed + float(posture[self._hand]) * (self._open - self._closed)
         return found
 
+    def clear(self, positions: FloatArray) -> FloatArray:
+        """See :class:`~.retargeter.Method`."""
+        found = positions.copy()
+        arm = found[: len(self.arm.joints)]
+        for _ in range(3):
+            gaps, slopes = self.kinematics.too_near(arm)
+            if len(gaps) == 0:
+                break
+            normal = slopes @ slopes.T + 1e-4 * np.eye(len(gaps))
+            arm[:] = np.clip(arm - slopes.T @ np.linalg.solve(normal, gaps), self._low, self._high)
+        return found
+
     def _solved(self, start: FloatArray, wanted: FloatArray) -> tuple[FloatArray, float]:
         """Return joint positions (n,) within the limits and the squared error of directions."""
         positions = np.clip(start, self._low, self._high)
@@ -305,7 +352,3 @@ class ArmFollower:
             if is_close:
                 break
         return positions, float(off @ off)
-
-    def hand_m(self, positions: FloatArray) -> FloatArray:
-        """Return the robot's hand (3,), metres in its root frame, at positions of ``joints``."""
-        return self.kinematics.at(positions[: len(self.arm.joints)]).tip_m

@@ -87,10 +87,18 @@ class RetargetConfig(Settings):
         unit="s",
         limits=(0.01, 1.0),
     )
-    reach: float = setting(
-        0.95,
-        "the stretched arm of the person is this much of the robot's stretched arm",
-        limits=(0.1, 1.0),
+    trunk_radius_m: float = setting(
+        0.1,
+        "forearm and hand stay so far from the Z axis of the robot's root, up to its shoulder, "
+        "or as far as the shoulder is",
+        unit="m",
+        limits=(0.0, 2.0),
+    )
+    lowest_m: float = setting(
+        -10.0,
+        "forearm and hand stay above this height in the robot's root, as above a table",
+        unit="m",
+        limits=(-10.0, 10.0),
     )
     mount_roll_deg: float = setting(
         0.0, "how the robot's root is turned in the person's torso", unit="deg", limits=(-180, 180)

@@ -116,6 +116,10 @@ class JointMap:
         chosen = np.array([known[angle] if angle else 0.0 for angle in self.angles])
         return np.where(np.isnan(chosen), now, self.scale * chosen + self.offset_rad)
 
+    def clear(self, positions: FloatArray) -> FloatArray:
+        """See :class:`~.retargeter.Method`; nothing is known of the robot's shape."""
+        return positions
+
 
 def load_joint_map(path: str | os.PathLike[str]) -> JointMap:
     """Read a joint map from a YAML file.

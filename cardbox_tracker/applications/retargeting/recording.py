@@ -15,7 +15,7 @@ from cardbox_tracker.person.hands import HAND_OPEN_NAMES
 from cardbox_tracker.person.skeleton import JOINT_NAMES, KEYPOINT_NAMES, NECK_NAMES
 from cardbox_tracker.recordings.bag_reader import BagReader
 from cardbox_tracker.recordings.bag_writer import BagWriter
-from cardbox_tracker.recordings.result_reader import Results, results_in
+from cardbox_tracker.recordings.result_reader import Results
 from cardbox_tracker.tracking.estimate import TRACKING, UNCERTAIN
 
 SPACE = "/retarget"
@@ -46,20 +46,13 @@ class Motion(NamedTuple):
     way: list[StampedMoment]
 
 
-def retarget_bag(
-    bag: BagReader, retargeter: Retargeter, rate_hz: float, person: int | None = None
-) -> Motion:
-    """Return the robot's motion for a bag of results, of a ``person`` if it has several.
-
-    Raises:
-        BagError: the bag has no results of the tracker, or is damaged.
-    """
+def retarget_results(results: Results, retargeter: Retargeter, rate_hz: float) -> Motion:
+    """Return the robot's motion for the results of a person."""
     motion = Motion([], [])
-    results = results_in(bag, person)
     joints = (*JOINT_NAMES, *NECK_NAMES)
     each = results.of(joints), results.deviations_of(joints), results.of(HAND_OPEN_NAMES)
     of_image = results.stamp_ns.tolist(), results.state, results.bodies
-    images = zip(*of_image, *each, _chances(results), strict=True)
+    images = zip(*of_image, *each, chances_in(results), strict=True)
     for stamp_ns, state, body, values, deviations, hands, keypoints in images:
         posture = stddev = None
         if state in (TRACKING, UNCERTAIN):
@@ -81,7 +74,7 @@ def retarget_bag(
     return motion
 
 
-def _chances(results: Results) -> Iterator[dict[str, tuple[str, float]]]:
+def chances_in(results: Results) -> Iterator[dict[str, tuple[str, float]]]:
     """Yield state and probability of an error of each image's keypoints, where they are known."""
     chances = results.of([f"{name}_chance" for name in KEYPOINT_NAMES]).tolist()
     states = zip(*(results.texts_of(f"{name}_state") for name in KEYPOINT_NAMES), strict=True)

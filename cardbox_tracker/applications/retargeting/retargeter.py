@@ -22,6 +22,11 @@ from cardbox_tracker.person.skeleton import JOINT_NAMES
 from cardbox_tracker.tracking.estimate import TRACKING, UNCERTAIN
 
 MOVING = "moving"
+# Settings that a joint map does not need.
+_OF_AN_ARM = (
+    *("base", "hand", "gripper", "gripper_open", "trunk_radius_m", "lowest_m"),
+    *("mount_roll_deg", "mount_pitch_deg", "mount_yaw_deg"),
+)
 # The first of the speeds with which a robot begins to follow, of its highest.
 _SLOWEST = 0.1
 
@@ -43,6 +48,9 @@ class Method(Protocol):
         ``now`` (n,) are the current positions. What is not known of head and hands is nan. The
         target may be beyond the joint limits; it is nan if there is no solution.
         """
+
+    def clear(self, positions: FloatArray) -> FloatArray:
+        """Return the positions (n,) near to these at which the hand is not in the way."""
 
 
 class Limits(NamedTuple):
@@ -192,6 +200,7 @@ class Retargeter:
 
     Attributes:
         joints: names of the robot's joints.
+        limits: those of the joints' motion.
         settles_ns: time in which the robot stops, ns.
     """
 
@@ -203,7 +212,7 @@ class Retargeter:
         """
         self.joints = method.joints
         limits = Limits(*robot.limits_of(method.joints))
-        limits = limits._replace(speed=np.minimum(limits.speed, config.max_speed))
+        self.limits = limits = limits._replace(speed=np.minimum(limits.speed, config.max_speed))
         self._motion = SafeMotion(
             limits,
             _start(config.start, method.joints, limits),
@@ -288,7 +297,10 @@ class Retargeter:
         duration_ns = max(min(elapsed_ns, waited_ns, longest_ns), 0)
         followed_s, soft_s = (now_ns - self._followed_ns) / 1e9, self._config.soft_start_s
         share = min(max(followed_s / soft_s, _SLOWEST), 1.0) if soft_s else 1.0
-        goal = np.where(held, point, target + self._offset)
+        # On the way, too, the hand is not in the trunk.
+        most = share * self.limits.speed * duration_ns / 1e9
+        goal = point + np.clip(np.where(held, 0.0, target + self._offset - point), -most, most)
+        goal = np.where(held, point, self._method.clear(goal))
         self._motion.move(goal, now_ns, duration_ns, share)
         return Command(self.at(now_ns + duration_ns).positions, MOVING, duration_ns / 1e9)
 
@@ -355,6 +367,11 @@ class _Both:
         parts = zip(self._parts, (now[:first], now[first:]), strict=True)
         return np.concatenate([one.target(body, posture, part) for one, part in parts])
 
+    def clear(self, positions: FloatArray) -> FloatArray:
+        first = len(self._parts[0].joints)
+        parts = zip(self._parts, (positions[:first], positions[first:]), strict=True)
+        return np.concatenate([one.clear(part) for one, part in parts])
+
 
 def make_retargeter(
     robot_file: str | os.PathLike[str],
@@ -374,7 +391,8 @@ def make_retargeter(
     """
     robot = load_robot(robot_file)
     if joint_map:
-        given = [name for name in ("base", "hand", "gripper") if getattr(config, name)]
+        usual = RetargetConfig()
+        given = [name for name in _OF_AN_ARM if getattr(config, name) != getattr(usual, name)]
         if given or config.side == "both":
             raise CardboxError(
                 f"expected either a joint map or {', '.join(given) or 'both sides'}, not both"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections import deque
 from dataclasses import dataclass
 from functools import partial
 from types import MappingProxyType
@@ -10,7 +11,6 @@ from typing import Any
 
 import numpy as np
 from builtin_interfaces.msg import Duration
-from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.time import Time
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Bool, Float64MultiArray, Header, String
@@ -20,20 +20,22 @@ from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 from cardbox_tracker.applications.retargeting.config import RetargetConfig
 from cardbox_tracker.applications.retargeting.retargeter import Command, make_retargeter
 from cardbox_tracker.applications.retargeting.supervisor import Supervisor
+from cardbox_tracker.applications.teleoperation.packets import ZmqSender, joints_packet
+from cardbox_tracker.camera.stamps import WINDOW
 from cardbox_tracker.common.errors import CardboxError
 from cardbox_tracker.common.files import user_path
 from cardbox_tracker.common.settings import settings_of
-from cardbox_tracker.person.model import BodyModel
-from cardbox_tracker.person.model_file import loads_body_model
-from cardbox_tracker.recordings.outputs import chances_of, open_hands_from
-from cardbox_tracker.ros.messages import conversions
+from cardbox_tracker.recordings.outputs import open_hands_from
 from cardbox_tracker.ros.messages.results import joint_values_of, posture_and_neck_of
+from cardbox_tracker.ros.nodes.posture_input import PostureInput, Tracked
 from cardbox_tracker.ros.runtime import qos
 from cardbox_tracker.ros.runtime.command_line import plain_command_line
 from cardbox_tracker.ros.runtime.node import CardboxNode, run_node
 from cardbox_tracker.ros.runtime.parameter_fields import AT_START, NodeParameters, parameter
 from cardbox_tracker.ros.runtime.parameters import LiveParameters
-from cardbox_tracker.tracking.estimate import TRACKING, UNCERTAIN
+
+# A longer time is that of a recording, whose stamps are of another clock.
+_MOST_MS = 60_000.0
 
 _DOES = "Move a robot arm as the tracked person moves theirs, within its limits."
 
@@ -50,6 +52,12 @@ class RetargetParameters(NodeParameters, RetargetConfig):
         "",
         "map of joints, as in config/example_joint_map.yaml; empty: the robot's arm is found and "
         "points as the person's",
+        effect=AT_START,
+    )
+    stream_address: str = parameter(
+        "",
+        "ZMQ address on which the commands are published, too, as tcp://127.0.0.1:5557, for "
+        "LeRobot; empty: none",
         effect=AT_START,
     )
     timeout_s: float = parameter(
@@ -81,44 +89,24 @@ class RetargetNode(CardboxNode):
         if table:
             self.get_logger().info(f"the robot's joints\n{table}")
         self._supervisor = Supervisor(self._retargeter, settings, settings.timeout_s)
-        self._body: BodyModel | None = None
-        self._state, self._status = "", ""
-        self._joints, self._open, self._points = JointState(), JointState(), DiagnosticArray()
+        self._status = ""
         self._arrived_ns, self._stamp_ns = _now_ns(), 0
+        self._latencies_ms: deque[float] = deque(maxlen=WINDOW)
+        address = settings.stream_address
+        self._sender = ZmqSender(address) if address else None
         self._trajectory = self.advertise(JointTrajectory, "retarget/joint_trajectory", qos.RESULT)
         self._commands = self.advertise(Float64MultiArray, "retarget/commands", qos.RESULT)
         self._robot_joints = self.advertise(JointState, "retarget/joint_states", qos.RESULT)
         self._says = self.advertise(String, "retarget/status", qos.LATCHED)
         description = self.advertise(String, "retarget/robot_description", qos.LATCHED)
         description.publish(String(data=robot.urdf))
-        self._joints_topic = self.resolve("joint_states")
-        self.subscribe(String, "body_model", self._on_model, qos.LATCHED)
-        self.subscribe(String, "tracking_state", self._on_state, qos.RESULT)
-        self.subscribe(DiagnosticArray, "keypoint_states", self._on_points, qos.RESULT)
-        self.subscribe(JointState, "joint_states", self._on_joints, qos.RESULT)
-        self.subscribe(JointState, "hands", self._on_hands, qos.RESULT)
-        self.subscribe(JointState, "joint_states_stddev", self._on_stddev, qos.RESULT)
+        self._input = PostureInput(self, self._follow)
         self.subscribe(JointState, "retarget/robot_joint_states", self._on_robot, qos.RESULT)
         self.subscribe(Bool, "retarget/grip", self._on_grip, qos.RESULT)
         self.create_service(SetBool, "retarget/enable", self._on_enable, qos_profile=qos.SERVICE)
         self.create_timer(1.0 / settings.rate_hz, self._stream)
-        self.diagnostics.source = f"postures on {self._joints_topic}"
-        self.diagnostics.wait_for(f"postures on {self._joints_topic} (is the tracker running?)")
+        self.diagnostics.extra = self._latency
         self._say()
-
-    def _on_model(self, message: String, _: int) -> None:
-        self._body = loads_body_model(message.data, source=self.resolve("body_model"))
-
-    def _on_state(self, message: String, _: int) -> None:
-        # The state comes before the joints of its image, or without joints.
-        self._state = message.data
-        if message.data not in (TRACKING, UNCERTAIN):
-            now_ns, state = _now_ns(), message.data
-            hold = partial(self._retargeter.update, self._stamp_ns, state, now_ns=now_ns)
-            self._send(self._supervisor.follow(hold, state, now_ns))
-
-    def _on_points(self, message: DiagnosticArray, _: int) -> None:
-        self._points = message
 
     def _on_robot(self, message: JointState, _: int) -> None:
         """Take where the robot is, if the message has all of its joints."""
@@ -137,41 +125,33 @@ class RetargetNode(CardboxNode):
         response.success, response.message = True, self._supervisor.status
         return response
 
-    def _on_joints(self, message: JointState, _: int) -> None:
-        self._joints = message
-
-    def _on_hands(self, message: JointState, _: int) -> None:
-        self._open = message
-
-    def _on_stddev(self, message: JointState, sent_ns: int) -> None:
-        """Command the robot; the deviations come after the joints, with the same stamp."""
-        if self._joints.header.stamp != message.header.stamp:
-            return
-        stamp_ns = conversions.stamp_ns(message.header.stamp)
-        if not self.diagnostics.input.add(stamp_ns).is_usable:
-            return
+    def _follow(self, image: Tracked) -> None:
+        """Command the robot after an image."""
         # Stamps may run faster than the robot's own time, which its speed is about.
-        self._arrived_ns, self._stamp_ns = _now_ns(), stamp_ns
-        posture, stddev = posture_and_neck_of(self._joints), posture_and_neck_of(message)
-        hands = None
-        if self._open.header.stamp == message.header.stamp:
-            hands = open_hands_from(joint_values_of(self._open))
-        keypoints = None
-        if self._points.header.stamp == message.header.stamp:
-            keypoints = chances_of(self._points)
+        now_ns = _now_ns()
+        posture = stddev = hands = None
+        if image.joints is not None:
+            self._arrived_ns, self._stamp_ns = now_ns, image.stamp_ns
+            posture, stddev = posture_and_neck_of(image.joints), posture_and_neck_of(image.stddev)
+        if image.hands is not None:
+            hands = open_hands_from(joint_values_of(image.hands))
         update = partial(
             self._retargeter.update,
-            *(stamp_ns, self._state, self._body, posture, stddev, self._arrived_ns, hands),
-            keypoints,
+            *(image.stamp_ns, image.state, image.body, posture, stddev, now_ns, hands),
+            image.keypoints,
         )
-        self._send(self._supervisor.follow(update, self._state, self._arrived_ns))
-        if self._body is None:
-            self.diagnostics.wait_for(
-                f"the body model on {self.resolve('body_model')}; the node initializer sends it "
-                "when it starts with its parameter model_file, or after it has measured the person"
-            )
-            return
-        self.diagnostics.working(sent_ns)
+        command = self._supervisor.follow(update, image.state, now_ns)
+        self._send(command)
+        if command is not None and image.joints is not None:
+            now = self.get_clock().now().nanoseconds
+            self._latencies_ms.append((now - image.stamp_ns) / 1e6)
+
+    def _latency(self) -> dict[str, str]:
+        """Return the time from the stamp of an image to its command, of the last images."""
+        if not self._latencies_ms:
+            return {}
+        p95_ms = float(np.percentile(self._latencies_ms, 95))
+        return {"image to command p95 (ms)": f"{p95_ms:.1f}"} if 0 <= p95_ms < _MOST_MS else {}
 
     def _send(self, command: Command | None) -> None:
         """Send the goal of an image, if it may be sent, and what the robot does."""
@@ -199,6 +179,11 @@ class RetargetNode(CardboxNode):
         moment = self._supervisor.moment(now_ns)
         if moment is None:
             return
+        names = list(self._retargeter.joints)
+        if self._sender is not None:
+            lower, upper, _ = self._retargeter.limits
+            found = joints_packet(self._stamp_ns, names, moment.positions, lower, upper)
+            self._sender.send(found)
         positions, velocities = (part.tolist() for part in moment)
         header = Header()
         if self._stamp_ns:
@@ -206,10 +191,14 @@ class RetargetNode(CardboxNode):
             stamp = Time(nanoseconds=self._stamp_ns + now_ns - self._arrived_ns)
             header.stamp = stamp.to_msg()
         self._commands.publish(Float64MultiArray(data=positions))
-        names = list(self._retargeter.joints)
         self._robot_joints.publish(
             JointState(header=header, name=names, position=positions, velocity=velocities)
         )
+
+    def close(self) -> None:
+        """Free the address of the stream."""
+        if self._sender is not None:
+            self._sender.close()
 
 
 def _now_ns() -> int:

@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 
 from cardbox_tracker.applications.retargeting.arm import ArmFollower, directions_of
 from cardbox_tracker.applications.retargeting.config import RetargetConfig
+from cardbox_tracker.applications.retargeting.retargeter import Retargeter
 from cardbox_tracker.applications.retargeting.robot import load_robot, parse_robot
 from cardbox_tracker.common.errors import CardboxError
 from cardbox_tracker.person.posture import JOINT_LIMITS
@@ -67,13 +68,60 @@ def test_the_robots_segments_point_as_the_persons(turn_deg: float) -> None:
 @hypothesis_settings(max_examples=15, deadline=None)
 @given(st.lists(st.floats(-1, 1), min_size=7, max_size=7))
 def test_the_derivatives_are_those_of_the_directions(positions: list[float]) -> None:
-    kinematics = ArmFollower(ROBOT, RetargetConfig()).kinematics
+    kinematics = ArmFollower(ROBOT, RetargetConfig(trunk_radius_m=0.0)).kinematics
     q, zero = np.array(positions), np.zeros((3, 3))
     off, slope = kinematics.residual(q, zero)
     for number in range(7):
         step = 1e-6 * np.eye(7)[number]
         there, _ = kinematics.residual(q + step, zero)
         np.testing.assert_allclose((there - off) / 1e-6, slope[:, number], atol=1e-4)
+
+
+ASIDE = """<robot name="g"><link name="a"/><link name="b"/><link name="c"/><link name="d"/>
+<link name="hand"/><joint name="roll" type="continuous"><parent link="a"/><child link="b"/>
+<origin xyz="0 -0.2 0.3"/><axis xyz="1 0 0"/></joint>
+<joint name="pitch" type="continuous"><parent link="b"/><child link="c"/><axis xyz="0 1 0"/></joint>
+<joint name="elbow" type="continuous"><parent link="c"/><child link="d"/>
+<origin xyz="0 0 -0.3"/><axis xyz="1 0 0"/></joint>
+<joint name="end" type="fixed"><parent link="d"/><child link="hand"/>
+<origin xyz="0 0 -0.2"/></joint>
+</robot>"""
+
+
+def test_a_hand_in_the_trunk_or_in_the_table_is_moved_out() -> None:
+    config = RetargetConfig(trunk_radius_m=0.1, lowest_m=0.1)
+    follower = ArmFollower(parse_robot(ASIDE), config)
+    # The hand is at the axis below the shoulder, the middle of the forearm at the radius.
+    gaps, slopes = follower.kinematics.too_near(np.array([0.0, 0.0, np.pi / 2]))
+    assert gaps == pytest.approx([-0.1, -0.1, -0.1], abs=1e-5)
+    hanging = np.zeros(3)
+    gaps, slopes = follower.kinematics.too_near(hanging)
+    assert gaps == pytest.approx([-0.2, -0.3])  # middle and hand are at -0.1 and -0.2 m
+    bent = np.array([0.1, 0.2, 0.3])
+    gaps, slopes = follower.kinematics.too_near(bent)
+    for number in range(3):
+        there, _ = follower.kinematics.too_near(bent + 1e-6 * np.eye(3)[number])
+        np.testing.assert_allclose((there - gaps) / 1e-6, slopes[:, number], atol=1e-4)
+
+
+@hypothesis_settings(max_examples=8, deadline=None)
+@given(st.lists(st.lists(st.floats(0, 1), min_size=4, max_size=4), min_size=2, max_size=4))
+def test_no_way_leads_through_the_trunk_or_the_table(shares: list[list[float]]) -> None:
+    config = RetargetConfig(trunk_radius_m=0.15, lowest_m=-0.1, soft_start_s=0.0)
+    robot = parse_robot(ASIDE)
+    follower = ArmFollower(robot, config)
+    retargeter = Retargeter(robot, follower, config)
+    retargeter.begin(np.array([-0.5, -1.2, 0.0]))
+    least = 0.0
+    for number, share in enumerate(np.repeat(shares, 20, axis=0)):
+        wanted = np.zeros(12)
+        wanted[8:] = JOINT_LIMITS[8:, 0] + share * np.ptp(JOINT_LIMITS[8:], axis=1)
+        retargeter.update(number * 50_000_000, "tracking", BODY, wanted, np.full(12, 0.1))
+        for part in (0, 25_000_000):
+            moment = retargeter.at(number * 50_000_000 + part)
+            gaps, _ = follower.kinematics.too_near(moment.positions)
+            least = min(least, *gaps, 0.0)
+    assert least > -0.02
 
 
 @hypothesis_settings(max_examples=15, deadline=None)
@@ -126,7 +174,7 @@ def test_a_mimic_moves_with_its_joint() -> None:
         '<origin xyz="0 0 0.1"/></joint></robot>',
     )
     follower = ArmFollower(parse_robot(ahead), RetargetConfig(hand="end"))
-    hand = follower.hand_m(np.array([0, 0, np.pi / 2, 0.0]))
+    hand = follower.kinematics.at(np.array([0, 0, np.pi / 2])).tip_m
     turned = 0.75 * np.pi
     expected = [0.3 + 0.1 * np.sin(turned), 0.0, 0.4 + 0.1 * np.cos(turned)]
     assert hand == pytest.approx(expected)

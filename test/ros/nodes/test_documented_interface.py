@@ -40,6 +40,7 @@ from cardbox_tracker.ros.nodes.play_bag_node import PlayBagNode  # noqa: E402
 from cardbox_tracker.ros.nodes.retarget_node import RetargetNode  # noqa: E402
 from cardbox_tracker.ros.nodes.rula_node import RulaNode  # noqa: E402
 from cardbox_tracker.ros.nodes.stereo_depth_node import StereoDepthNode  # noqa: E402
+from cardbox_tracker.ros.nodes.teleoperation_node import TeleoperationNode  # noqa: E402
 from cardbox_tracker.ros.nodes.tracker_node import TrackerNode  # noqa: E402
 from cardbox_tracker.ros.runtime.command_line import SERVICE, entries  # noqa: E402
 
@@ -54,6 +55,7 @@ NODES = (
     "tracker",
     "rula",
     "retarget",
+    "teleoperation",
 )
 ARM = {
     "robot_file": str(ROOT / "config" / "example_arm.urdf"),
@@ -171,6 +173,8 @@ def nodes_called(name: str, make: Callable[..., Any], folder: Path) -> list[Any]
         ]
     if name == "retarget":
         return [make(RetargetNode, **ARM)]
+    if name == "teleoperation":
+        return [make(TeleoperationNode, to=to) for to in ("isaac", "json")]
     if name == "rula":
         return [make(RulaNode)]
     return [

@@ -1,0 +1,1 @@
+"""Tracked postures as the streams that teleoperated robots read; no ROS."""

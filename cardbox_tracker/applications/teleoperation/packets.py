@@ -1,0 +1,161 @@
+"""The bytes in which peers read a full body: JSON, SONIC's protocol v3, Isaac's msgpack."""
+
+from __future__ import annotations
+
+import importlib
+import json
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from cardbox_tracker.applications.teleoperation.full_body import NAMES, FullBody
+from cardbox_tracker.common.errors import CardboxError, quoted
+from cardbox_tracker.person.sizes import FloatArray
+from cardbox_tracker.person.skeleton import rotation_z
+
+_HEADER_BYTES, _ROBOT_JOINTS = 1280, 29
+# The first of the six wrist joints of SONIC's robot: roll, pitch, yaw, each left before right.
+_WRISTS = 23
+_FEET = [NAMES.index(f"{side}_foot") for side in ("left", "right")]
+# OpenXR has X to the right, Y up and Z backwards.
+_TO_OPENXR = np.array([[0.0, -1.0, 0.0], [0.0, 0.0, 1.0], [-1.0, 0.0, 0.0]])
+
+
+def json_packet(body: FullBody, _: int) -> bytes:
+    """Return a line of JSON: places (m), quaternions (w first) and validity of the joints."""
+    content = {
+        "stamp_ns": body.stamp_ns,
+        "yaw_rad": round(body.yaw_rad, 6),
+        "names": NAMES,
+        "positions": body.points_m.round(5).tolist(),
+        "orientations": body.turns.round(6).tolist(),
+        "valid": body.valid.tolist(),
+    }
+    return line(content)
+
+
+def joints_packet(
+    stamp_ns: int,
+    names: Sequence[str],
+    positions: FloatArray,
+    lower: FloatArray,
+    upper: FloatArray,
+) -> bytes:
+    """Return a line of JSON: positions and limits (n,) of a robot's joints, rad or m."""
+    values = {"positions": positions, "lower": lower, "upper": upper}
+    rounded = {name: one.round(6).tolist() for name, one in values.items()}
+    return line({"stamp_ns": stamp_ns, "names": names, **rounded})
+
+
+def line(content: dict[str, Any]) -> bytes:
+    """Return a line of JSON; it has no value that is not finite."""
+    return json.dumps(content, separators=(",", ":"), allow_nan=False).encode() + b"\n"
+
+
+def sonic_packet(body: FullBody, number: int) -> bytes:
+    """Return a frame of SONIC's protocol v3; ``number`` has to rise from frame to frame."""
+    joints = np.zeros((1, _ROBOT_JOINTS), "<f4")
+    joints[0, _WRISTS : _WRISTS + 6] = body.wrists_rad.T.ravel()
+    half = body.yaw_rad / 2
+    fields = {
+        "smpl_joints": body.points_m[None].astype("<f4"),
+        "smpl_pose": np.zeros((1, 21, 3), "<f4"),
+        "joint_pos": joints,
+        "joint_vel": np.zeros_like(joints),
+        "body_quat": np.array([[np.cos(half), 0.0, 0.0, np.sin(half)]], "<f4"),
+        "frame_index": np.array([number], "<i8"),
+    }
+    table = [
+        {"name": name, "dtype": f"{one.dtype.kind}{8 * one.itemsize}", "shape": list(one.shape)}
+        for name, one in fields.items()
+    ]
+    header = line({"v": 3, "endian": "le", "count": 1, "fields": table}).rstrip()
+    data = b"".join(one.tobytes() for one in fields.values())
+    return b"pose" + header.ljust(_HEADER_BYTES, b"\0") + data
+
+
+def isaac_packet(body: FullBody, _: int) -> bytes:
+    """Return the msgpack of Isaac Teleop's full body, in OpenXR's axes, the feet on the floor.
+
+    Raises:
+        CardboxError: msgpack is not installed.
+    """
+    points_m = body.points_m @ rotation_z(np.array(body.yaw_rad)).T @ _TO_OPENXR.T
+    points_m[:, 1] -= points_m[_FEET, 1].min()
+    turned = Rotation.from_rotvec([0.0, 0.0, body.yaw_rad]) * Rotation.from_quat(
+        body.turns[:, [1, 2, 3, 0]]
+    )
+    x, y, z, w = turned.as_quat().T
+    content = {
+        "timestamp": body.stamp_ns,
+        "joint_names": NAMES,
+        "joint_positions": points_m.tolist(),
+        "joint_orientations": np.stack([-y, z, -x, w], axis=1).tolist(),
+        "joint_valid": body.valid.tolist(),
+    }
+    packed: bytes = optional("msgpack").packb(content)
+    return packed
+
+
+PACKETS: dict[str, Callable[[FullBody, int], bytes]] = {
+    "sonic": sonic_packet,
+    "isaac": isaac_packet,
+    "json": json_packet,
+}
+"""Makers of packets by the name of the peer."""
+
+
+def packet(to: str, body: FullBody | None, number: int) -> bytes | None:
+    """Return the packet of a body; None where the peer has to stay, as it cannot read validity."""
+    if body is None or (to != "json" and not body.valid.any()):
+        return None
+    return PACKETS[to](body, number)
+
+
+def optional(name: str) -> Any:
+    """Return a module of the extra ``teleoperation``.
+
+    Raises:
+        CardboxError: it is not installed.
+    """
+    try:
+        return importlib.import_module(name)
+    except ImportError as error:
+        raise CardboxError(
+            f"this stream needs the Python packages pyzmq and msgpack ({error}); install them with "
+            "pip install '.[teleoperation]' in the checkout"
+        ) from None
+
+
+class ZmqSender:
+    """Publishes packets by ZMQ; who subscribes later misses the first ones."""
+
+    def __init__(self, address: str) -> None:
+        """Listen on ``address``, such as ``tcp://127.0.0.1:5556``.
+
+        Raises:
+            CardboxError: pyzmq is not installed, or the address cannot be used.
+        """
+        zmq = optional("zmq")
+        self._context = zmq.Context()
+        self._socket = self._context.socket(zmq.PUB)
+        self._socket.linger = 0
+        try:
+            self._socket.bind(address)
+        except zmq.ZMQError as error:
+            self.close()
+            raise CardboxError(
+                f"cannot listen on {quoted(address)}: {error}; give an address as "
+                "tcp://127.0.0.1:5556, whose port is free"
+            ) from None
+
+    def send(self, packet: bytes) -> None:
+        """Publish a packet; this never waits."""
+        self._socket.send(packet)
+
+    def close(self) -> None:
+        """Free the address."""
+        self._socket.close()
+        self._context.term()

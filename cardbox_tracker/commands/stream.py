@@ -1,0 +1,79 @@
+"""``cardbox stream``: results in real time, as programs that teleoperate robots read people."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from contextlib import ExitStack
+from pathlib import Path
+
+from cardbox_tracker.commands.arguments import add_person, between
+
+NAME = "stream"
+HELP = "stream results as 24 joints in real time, to programs that teleoperate robots"
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the arguments of ``cardbox stream``."""
+    from cardbox_tracker.applications.teleoperation.packets import PACKETS
+
+    parser.add_argument(
+        "results",
+        type=Path,
+        metavar="RESULTS",
+        help="table of 'cardbox track' (CSV or Parquet), or its bag",
+    )
+    parser.add_argument(
+        "--to",
+        choices=PACKETS,
+        required=True,
+        help="sonic: frames of its protocol v3; isaac: msgpack of Isaac Teleop's full body; json: "
+        "a line for each time (docs/retargeting.md)",
+    )
+    parser.add_argument(
+        "--rate", type=between(1, 1000), default=50.0, metavar="HZ", help="packets a second"
+    )
+    parser.add_argument(
+        "--address",
+        metavar="ADDRESS",
+        help="publish by ZMQ, as tcp://127.0.0.1:5556 (default: the standard output)",
+    )
+    parser.add_argument("--fast", action="store_true", help="do not wait for the time of a packet")
+    add_person(parser)
+
+
+def run(options: argparse.Namespace) -> None:
+    """Read the results and send them."""
+    from cardbox_tracker.applications.teleoperation.packets import ZmqSender, packet
+    from cardbox_tracker.applications.teleoperation.recorded import (
+        at_rate,
+        bodies_of,
+        in_real_time,
+    )
+    from cardbox_tracker.common.errors import CardboxError
+    from cardbox_tracker.recordings.result_reader import read_results
+
+    results = read_results(options.results, options.person)
+    if results.body is None:
+        raise CardboxError(
+            f"{options.results} has no posture of a known person: keep OUT.body.yaml, which "
+            "'cardbox track' writes, beside the table OUT.csv"
+        )
+    bodies = at_rate(bodies_of(results), options.rate)
+    sent = number = 0
+    with ExitStack() as stack:
+        sender = ZmqSender(options.address) if options.address else None
+        if sender is not None:
+            stack.callback(sender.close)
+        for body in bodies if options.fast else in_real_time(bodies, options.rate):
+            made = packet(options.to, body, number)
+            number += 1
+            if made is None:
+                continue
+            sent += 1
+            if sender is not None:
+                sender.send(made)
+            else:
+                sys.stdout.buffer.write(made)
+                sys.stdout.buffer.flush()
+    print(f"cardbox: sent {sent} packets of {number} times", file=sys.stderr)

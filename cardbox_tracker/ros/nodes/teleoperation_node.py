@@ -1,0 +1,121 @@
+"""The node ``teleoperation`` streams the tracked person to programs that teleoperate robots."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass
+from typing import Any
+
+from std_msgs.msg import ByteMultiArray, String
+
+from cardbox_tracker.applications.teleoperation.full_body import FullBodies, FullBody
+from cardbox_tracker.applications.teleoperation.packets import PACKETS, ZmqSender, packet
+from cardbox_tracker.common.errors import CardboxError
+from cardbox_tracker.recordings.outputs import positions_of
+from cardbox_tracker.ros.messages.results import joint_values_of
+from cardbox_tracker.ros.nodes.posture_input import PostureInput, Tracked
+from cardbox_tracker.ros.runtime import qos
+from cardbox_tracker.ros.runtime.command_line import plain_command_line
+from cardbox_tracker.ros.runtime.node import CardboxNode, run_node
+from cardbox_tracker.ros.runtime.parameter_fields import AT_START, NodeParameters, parameter
+from cardbox_tracker.ros.runtime.parameters import LiveParameters
+
+_TOPICS: dict[str, tuple[Any, str]] = {
+    "isaac": (ByteMultiArray, "xr_teleop/full_body"),
+    "json": (String, "teleoperation/full_body"),
+}
+
+_DOES = "Stream the tracked person as 24 joints to programs that teleoperate robots."
+
+
+@dataclass(frozen=True)
+class TeleoperationParameters(NodeParameters):
+    """Stream the tracked person to programs that teleoperate robots."""
+
+    to: str = parameter("isaac", "who reads the stream", choices=tuple(PACKETS), effect=AT_START)
+    address: str = parameter(
+        "",
+        "ZMQ address on which the stream is published, as tcp://127.0.0.1:5556; empty: the topic "
+        "of the reader",
+        effect=AT_START,
+    )
+    rate_hz: float = parameter(
+        50.0, "packets a second", unit="Hz", limits=(1.0, 1000.0), effect=AT_START
+    )
+    timeout_s: float = parameter(
+        0.5,
+        "no joint is valid after this time without a posture",
+        unit="s",
+        limits=(0.05, 10.0),
+        effect=AT_START,
+    )
+
+
+class TeleoperationNode(CardboxNode):
+    """Streams the full body at a constant rate, one image late: between it and the one before."""
+
+    def __init__(self, **options: Any) -> None:
+        """Subscribe to what the tracker publishes.
+
+        Raises:
+            CardboxError: the peer needs an address, or the address cannot be used.
+        """
+        super().__init__("teleoperation", **options)
+        self._settings = LiveParameters(self, TeleoperationParameters).value
+        to, address = self._settings.to, self._settings.address
+        if to not in _TOPICS and not address:
+            raise CardboxError(f"{to} reads ZMQ: give the parameter address, tcp://127.0.0.1:5556")
+        self._sender = ZmqSender(address) if address else None
+        if not address:
+            self._publisher = self.advertise(*_TOPICS[to], qos.RESULT)
+        self._bodies = FullBodies()
+        self._pair: tuple[FullBody, FullBody] | None = None
+        self._arrived_s, self._number = 0.0, 0
+        self._input = PostureInput(self, self._take)
+        self.create_timer(1.0 / self._settings.rate_hz, self._stream)
+
+    def _take(self, image: Tracked) -> None:
+        values, stddev = (
+            {} if one is None else positions_of(joint_values_of(one))
+            for one in (image.joints, image.stddev)
+        )
+        body = self._bodies.update(
+            *(image.stamp_ns, image.state, image.body, values, stddev, image.keypoints or {})
+        )
+        if body is not None:
+            before = self._pair[1] if self._pair else body
+            # After a gap nothing lies between.
+            is_near = 0 < body.stamp_ns - before.stamp_ns < self._settings.timeout_s * 1e9
+            self._pair = (before if is_near else body), body
+            self._arrived_s = time.monotonic()
+
+    def _stream(self) -> None:
+        if self._pair is None:
+            return
+        before, after = self._pair
+        passed_s = time.monotonic() - self._arrived_s
+        now_ns = before.stamp_ns + round(passed_s * 1e9)
+        body = before.until(after, now_ns)
+        if passed_s > self._settings.timeout_s:
+            body = after.invalid(now_ns)
+        made = packet(self._settings.to, body, self._number)
+        if made is None:
+            return
+        self._number += 1
+        if self._sender is not None:
+            self._sender.send(made)
+        elif self._settings.to == "json":
+            self._publisher.publish(String(data=made.decode()))
+        else:
+            self._publisher.publish(ByteMultiArray(data=[bytes([one]) for one in made]))
+
+    def close(self) -> None:
+        """Free the address."""
+        if self._sender is not None:
+            self._sender.close()
+
+
+def main(args: list[str] | None = None) -> int:
+    """Run the node; the exit code is 0 unless it could not start."""
+    command_line = plain_command_line("teleoperation", _DOES, TeleoperationParameters, args)
+    return run_node(TeleoperationNode, command_line)

@@ -1,0 +1,164 @@
+"""Packets are those of the pages of their readers, byte for byte."""
+
+from __future__ import annotations
+
+import json
+import struct
+from collections.abc import Iterator
+from contextlib import closing
+from importlib import import_module
+from typing import Any
+
+import numpy as np
+import pytest
+
+from cardbox_tracker.applications.teleoperation import packets
+from cardbox_tracker.applications.teleoperation.full_body import NAMES, FullBody
+from cardbox_tracker.common.errors import CardboxError
+
+REST = np.tile([1.0, 0.0, 0.0, 0.0], (24, 1))
+
+
+def body(yaw_rad: float = 0.0) -> FullBody:
+    """Return a body whose numbers tell their places."""
+    points = np.arange(72.0).reshape(24, 3) / 64
+    wrists = np.array([[0.25, 0.5, 0.75], [1.25, 1.5, 1.75]])
+    valid = np.array([name != "left_foot" for name in NAMES])
+    return FullBody(7, points, REST, yaw_rad, wrists, valid)
+
+
+def test_a_frame_of_sonic_has_the_bytes_computed_by_hand() -> None:
+    header = (
+        b'{"v":3,"endian":"le","count":1,"fields":['
+        b'{"name":"smpl_joints","dtype":"f32","shape":[1,24,3]},'
+        b'{"name":"smpl_pose","dtype":"f32","shape":[1,21,3]},'
+        b'{"name":"joint_pos","dtype":"f32","shape":[1,29]},'
+        b'{"name":"joint_vel","dtype":"f32","shape":[1,29]},'
+        b'{"name":"body_quat","dtype":"f32","shape":[1,4]},'
+        b'{"name":"frame_index","dtype":"i64","shape":[1]}]}'
+    )
+    expected = b"pose" + header + bytes(1280 - len(header))
+    expected += b"".join(struct.pack("<f", number / 64) for number in range(72))
+    expected += bytes(21 * 3 * 4) + bytes(23 * 4)
+    expected += struct.pack("<6f", 0.25, 1.25, 0.5, 1.5, 0.75, 1.75)
+    expected += bytes(29 * 4) + bytes.fromhex("0000803f 00000000 00000000 00000000")
+    expected += bytes.fromhex("2a00000000000000")
+    assert packets.sonic_packet(body(), 42) == expected
+    assert len(expected) == 2080
+
+
+def decoded(frame: bytes) -> dict[str, Any]:
+    """Decode a frame as the page of SONIC's protocol describes it."""
+    assert frame[:4] == b"pose"
+    header = json.loads(frame[4:1284].rstrip(b"\0"))
+    assert (header["v"], header["endian"]) == (3, "le")
+    found, offset = {}, 1284
+    for entry in header["fields"]:
+        kind, size = {"f32": ("f", 4), "i64": ("q", 8)}[entry["dtype"]]
+        count = int(np.prod(entry["shape"]))
+        numbers = struct.unpack_from(f"<{count}{kind}", frame, offset)
+        found[entry["name"]] = np.reshape(numbers, entry["shape"])
+        offset += size * count
+    assert offset == len(frame)
+    return found
+
+
+def test_a_decoder_of_the_page_reads_a_frame_of_sonic() -> None:
+    turned = decoded(packets.sonic_packet(body(np.pi / 2), 5))
+    half = np.sqrt(0.5)
+    assert turned["body_quat"][0] == pytest.approx([half, 0.0, 0.0, half])
+    assert turned["frame_index"].tolist() == [5]
+    # The joints are in the person's frame, whatever the yaw.
+    assert turned["smpl_joints"][0] == pytest.approx(body().points_m)
+    assert set(turned) == {
+        *("smpl_joints", "smpl_pose", "joint_pos", "joint_vel", "body_quat", "frame_index")
+    }
+
+
+def test_isaac_gets_the_axes_of_openxr() -> None:
+    msgpack = pytest.importorskip("msgpack")
+    points = np.zeros((24, 3))
+    points[NAMES.index("head")] = 0.25, 0.5, 1.0
+    points[[NAMES.index("left_foot"), NAMES.index("right_foot")], 2] = -0.75, -1.0
+    half = np.sqrt(0.5)
+    turns = REST.copy()
+    turns[NAMES.index("neck")] = half, half, 0.0, 0.0
+    found = msgpack.unpackb(packets.isaac_packet(body()._replace(points_m=points, turns=turns), 0))
+    assert found["timestamp"] == 7 and found["joint_names"] == list(NAMES)
+    # X to the right, Y up, Z backwards; the lower foot stands on the floor.
+    assert found["joint_positions"][NAMES.index("head")] == [-0.5, 2.0, -0.25]
+    assert found["joint_positions"][0] == [0.0, 1.0, 0.0]
+    # A lean to the right is a turn about the direction ahead, which is -Z; w is last.
+    assert found["joint_orientations"][NAMES.index("neck")] == pytest.approx([0, 0, -half, half])
+    assert found["joint_orientations"][0] == pytest.approx([0, 0, 0, 1])
+    assert [NAMES[i] for i, one in enumerate(found["joint_valid"]) if not one] == ["left_foot"]
+    turned = body(np.pi / 2)._replace(points_m=points, turns=turns)
+    found = msgpack.unpackb(packets.isaac_packet(turned, 0))
+    assert found["joint_positions"][NAMES.index("head")] == pytest.approx([-0.25, 2.0, 0.5])
+    assert found["joint_orientations"][0] == pytest.approx([0, half, 0, half])
+
+
+def test_the_message_fills_isaac_teleops_full_body() -> None:
+    pytest.importorskip("isaacteleop", reason="isaacteleop is not installed")
+    types = import_module("isaacteleop.retargeting_engine.tensor_types")
+    group_of = import_module("isaacteleop.retargeting_engine.interface").TensorGroup
+    found = packets.optional("msgpack").unpackb(packets.isaac_packet(body(), 0))
+    group = group_of(types.FullBodyInput())
+    group[types.FullBodyInputIndex.JOINT_POSITIONS] = np.array(found["joint_positions"], "f4")
+    group[types.FullBodyInputIndex.JOINT_ORIENTATIONS] = np.array(found["joint_orientations"], "f4")
+    group[types.FullBodyInputIndex.JOINT_VALID] = np.array(found["joint_valid"], "u1")
+    with pytest.raises((TypeError, ValueError)):
+        group[types.FullBodyInputIndex.JOINT_VALID] = np.ones(23, "u1")
+
+
+def test_a_line_of_json_has_the_validity_of_each_joint() -> None:
+    found = json.loads(packets.json_packet(body(), 0))
+    assert found["names"] == list(NAMES) and found["stamp_ns"] == 7
+    assert found["positions"][1] == [round(value / 64, 5) for value in (3, 4, 5)]
+    assert found["valid"].count(False) == 1
+    with pytest.raises(ValueError):
+        packets.line({"value": float("nan")})
+
+
+def test_readers_without_validity_get_nothing_while_nothing_is_valid() -> None:
+    nothing = body().invalid(8)
+    assert packets.packet("sonic", nothing, 1) is None
+    assert packets.packet("isaac", nothing, 1) is None
+    assert b'"valid":[false' in (packets.packet("json", nothing, 1) or b"")
+    assert packets.packet("json", None, 1) is None
+
+
+@pytest.fixture
+def subscriber() -> Iterator[Any]:
+    zmq = pytest.importorskip("zmq", reason="pyzmq is not installed")
+    with zmq.Context() as context, context.socket(zmq.SUB) as socket:
+        socket.subscribe(b"")
+        socket.linger, socket.rcvtimeo = 0, 200
+        yield socket
+
+
+def test_packets_arrive_by_zmq(subscriber: Any) -> None:
+    import zmq
+
+    address = "tcp://127.0.0.1:51873"
+    with closing(packets.ZmqSender(address)) as sender:
+        subscriber.connect(address)
+        for _ in range(50):
+            sender.send(b"pose1")
+            try:
+                assert subscriber.recv() == b"pose1"
+                break
+            except zmq.Again:
+                continue
+        else:
+            pytest.fail("nothing arrived")
+        with pytest.raises(CardboxError, match="cannot listen on 'tcp:"):
+            packets.ZmqSender(address)
+    with pytest.raises(CardboxError, match="give an address as"):
+        packets.ZmqSender("nonsense")
+
+
+def test_a_missing_package_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(__import__("sys").modules, "msgpack", None)
+    with pytest.raises(CardboxError, match=r"pip install '\.\[teleoperation\]'"):
+        packets.isaac_packet(body(), 0)
