@@ -76,8 +76,6 @@ COMMANDS: tuple[Command, ...] = (
     call,
     evaluate,
 )
-# Replacements of the subcommands of former versions.
-RETIRED = {"screenshots": "python -m lab.tools.screenshots --output docs/images"}
 
 _EVERY_COMMAND = tuple(command.NAME for command in COMMANDS)
 # A folder of recordings has many reasons.
@@ -114,8 +112,6 @@ def main(arguments: Sequence[str] | None = None) -> int:
     try:
         with interrupts.raised():
             parser = build_parser(words)
-            if name in RETIRED:
-                parser.error(f"{name!r} is no longer a subcommand; use {RETIRED[name]!r}")
             options = parser.parse_args(words)
             options.run(options)
             sys.stdout.flush()

@@ -16,7 +16,7 @@ from cardbox_tracker.commands import call as command
 from cardbox_tracker.commands import checkout
 from cardbox_tracker.commands import main as main_module
 from cardbox_tracker.commands.checkout import from_checkout
-from cardbox_tracker.commands.main import COMMANDS, RETIRED, build_parser
+from cardbox_tracker.commands.main import COMMANDS, build_parser
 from cardbox_tracker.common.errors import CardboxError
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -84,24 +84,6 @@ def test_what_is_missing_is_listed(
     assert done.code == 2
     assert done.err.startswith("usage: cardbox")
     assert expected in done.err.splitlines()[-1]
-
-
-@pytest.mark.parametrize("name", RETIRED)
-def test_a_retired_subcommand_is_refused_with_what_replaces_it(
-    name: str, cardbox: Callable
-) -> None:
-    assert name not in NAMES
-    for words in ((name,), (name, "--help"), (name, "--output", "images")):
-        done = cardbox(*words)
-        assert done.code == 2
-        assert f"'{name}'" in done.err and f"use '{RETIRED[name]}'" in done.err
-
-
-@pytest.mark.parametrize("name", RETIRED)
-def test_what_replaces_a_retired_subcommand_is_there(name: str) -> None:
-    module = re.fullmatch(r"python -m ([\w.]+)( .*)?", RETIRED[name])
-    assert module
-    assert (ROOT / (module[1].replace(".", "/") + ".py")).is_file()
 
 
 def test_help_loads_no_large_library() -> None:
