@@ -30,6 +30,10 @@ from pickle import UnpicklingError  # noqa: E402
 
 from cardbox_tracker.common import garbage, interrupts  # noqa: E402
 
+# The matrices are small: threads of OpenBLAS wait for each other far longer than they compute,
+# most of all where several nodes share the cores. It reads this when numpy is imported.
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+
 COMMAND = "cardbox_tracker.commands.main"
 """Module of the executable ``cardbox``."""
 

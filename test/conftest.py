@@ -49,6 +49,9 @@ settings.load_profile("long" if "RELIABILITY_EXAMPLES" in os.environ else "untim
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
     signal.signal(signal.SIGINT, signal.default_int_handler)
 
+# As in the programs; the processes of the tests, and what they start, inherit it.
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+
 PROCESSES = 2
 WORKER = int(os.environ.get("PYTEST_XDIST_WORKER", "gw0")[2:])
 # Above 101, domains collide with ephemeral ports.

@@ -7,6 +7,7 @@ import ast
 import re
 import shlex
 from collections.abc import Iterator
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -204,6 +205,7 @@ def key_words(text: str) -> set[str]:
     return {word[:5] for word in re.findall(r"[a-z_]{3,}", text.lower())}
 
 
+@cache
 def spoken() -> list[set[str]]:
     """Return the key words of each text in the code but docstrings."""
     texts = []

@@ -42,6 +42,21 @@ def test_a_missing_package_is_told_in_words(name: str, missing: str) -> None:
     assert "Traceback" not in done.stderr
 
 
+def test_a_program_has_one_thread_of_openblas_unless_told() -> None:
+    program = """
+import os, sys
+from cardbox_tracker import start
+print(os.environ["OPENBLAS_NUM_THREADS"], "numpy" in sys.modules)
+"""
+    without = {k: v for k, v in os.environ.items() if k != "OPENBLAS_NUM_THREADS"}
+    for given, expected in (({}, "1 False\n"), ({"OPENBLAS_NUM_THREADS": "3"}, "3 False\n")):
+        command = [sys.executable, "-c", program]
+        done = subprocess.run(
+            command, capture_output=True, text=True, cwd=ROOT, env=without | given, check=True
+        )
+        assert done.stdout == expected
+
+
 def test_another_fault_keeps_its_traceback() -> None:
     with pytest.raises(ModuleNotFoundError):
         start("tracker", lambda: import_module("cardbox_tracker.nothing").main())

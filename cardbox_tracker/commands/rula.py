@@ -34,25 +34,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     from cardbox_tracker.applications.ergonomics.config import RulaConfig
 
     add_tracking(parser)
-    parser.add_argument(
-        "--csv",
-        type=Path,
-        metavar="OUT.csv",
-        help="table to write, one row per image: the expected score and the chance of each",
-    )
-    parser.add_argument("--plot", type=Path, metavar="OUT.png", help="draw the scores over time")
-    parser.add_argument(
-        "--shares",
-        type=Path,
-        metavar="SHARES.csv",
-        help="write the time at each score of each part",
-    )
-    parser.add_argument(
-        "--html",
-        type=Path,
-        metavar="OUT.html",
-        help="write one page that prints: scores, shares of time, and the worst moments",
-    )
+    add_score_outputs(parser)
     parser.add_argument(
         "--images",
         choices=IMAGES,
@@ -60,7 +42,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="images of the worst moments in --html: with the head of the tracked person made "
         "unrecognizable, as they are, or none",
     )
-    parser.add_argument("--title", metavar="TEXT", help="heading of --html, such as the task")
     parser.add_argument(
         "--hands",
         action="store_true",
@@ -73,40 +54,59 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(options: argparse.Namespace) -> None:
     """Track the person, score every image, and print times, part scores and declared inputs."""
     from cardbox_tracker.applications.ergonomics.config import RulaConfig
-    from cardbox_tracker.applications.ergonomics.recording import (
-        MomentImages,
-        RulaObserver,
-        score_shares,
-        summarize,
-        write_csv,
-        write_shares,
-    )
-    from cardbox_tracker.applications.ergonomics.report import plot_scores, report_lines, write_page
+    from cardbox_tracker.applications.ergonomics.recording import MomentImages, RulaObserver
 
     if options.html is None and (options.title is not None or options.images != IMAGES[0]):
         raise CardboxError("--images and --title change the page of --html; give --html OUT.html")
-    outputs = (options.csv, options.plot, options.shares, options.html)
     request = tracking_request(options)
-    check_outputs(outputs, options.force, inputs=request.inputs)
+    check_outputs(outputs_of(options), options.force, inputs=request.inputs)
     config = settings_from(options, RulaConfig)
     images = None
     if options.html is not None and options.images != NO_IMAGES:
         images = MomentImages(is_head_hidden=options.images == HIDDEN_HEAD)
     observer = RulaObserver(config, options.seed, images)
     summary = track(request, observers=(observer,))
-    rows = observer.rows
-    shares = score_shares(rows, config)
-    if options.csv is not None:
-        write_csv(rows, options.csv)
-    for line in report_lines(summarize(rows), shares, config):
+    write_scores(options, _content(options, config, observer.rows, summary, images))
+
+
+def add_score_outputs(parser: argparse.ArgumentParser) -> None:
+    """Add the options of the files that both methods write."""
+    for flag, name, text in (
+        ("--csv", "OUT.csv", "table to write, one row per image: its score, the chance of each"),
+        ("--plot", "OUT.png", "draw the scores over time"),
+        ("--shares", "SHARES.csv", "write the time at each score of each part"),
+        ("--html", "OUT.html", "write a page that prints: scores, shares of time, worst moments"),
+    ):
+        parser.add_argument(flag, type=Path, metavar=name, help=text)
+    parser.add_argument("--title", metavar="TEXT", help="heading of --html, such as the task")
+
+
+def outputs_of(options: argparse.Namespace) -> tuple[Path | None, ...]:
+    """Return the files of :func:`add_score_outputs`; None for each that is not wanted."""
+    return options.csv, options.plot, options.shares, options.html
+
+
+def write_scores(options: argparse.Namespace, content: PageContent) -> None:
+    """Print times, part scores and declared inputs, and write the files.
+
+    Raises:
+        CardboxError: a file cannot be written.
+    """
+    from cardbox_tracker.applications.ergonomics import recording, report
+
+    rows, config, method = content.rows, content.config, content.method
+    shares = recording.score_shares(rows, config, method)
+    for line in report.report_lines(recording.summarize(rows, method), shares, config, method):
         print(line)
+    if options.csv is not None:
+        recording.write_csv(rows, options.csv, method)
     if options.plot is not None:
-        plot_scores(rows, options.plot)
+        report.plot_scores(rows, options.plot, method)
     if options.shares is not None:
-        write_shares(shares, options.shares)
+        recording.write_shares(shares, options.shares)
     if options.html is not None:
-        write_page(_content(options, config, rows, summary, images), options.html)
-    for path in outputs:
+        report.write_page(content, options.html)
+    for path in outputs_of(options):
         if path is not None:
             print(f"wrote {path}")
 

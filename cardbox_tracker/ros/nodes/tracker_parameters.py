@@ -45,11 +45,6 @@ _PARAMETERS = MappingProxyType(
         "arm.particles": "particles",
         "cycles": "cycles",
         "average": "average",
-        "torso.survival_rate": "torso_survival_rate",
-        "arm.survival_rate": "arm_survival_rate",
-        "torso.rotation_noise_rad": "torso_rotation_noise_rad",
-        "torso.translation_noise_m": "torso_translation_noise_m",
-        "arm.rotation_noise_rad": "arm_rotation_noise_rad",
         "whole_body.effort": "effort",
         "relocalize": "relocalize",
         "select_person": "select_person",
@@ -67,7 +62,6 @@ or signal, so an image must not take much longer than 0.2 s. ``cardbox track`` h
 def _of_preset(
     kind: type[FilterConfig] | type[TrackerConfig],
     name: str,
-    part: str = "",
     most: float | None = None,
     more: str = "",
 ) -> Any:
@@ -76,8 +70,8 @@ def _of_preset(
     return shared(
         kind,
         name,
-        default=type(getattr(kind, name))(0),
-        description=f"{part}{core.description}{more}; 0: preset",
+        default=0,
+        description=f"{core.description}{more}; 0: preset",
         limits=(0, core.maximum if most is None else most),
     )
 
@@ -87,7 +81,15 @@ class TrackerParameters(NodeParameters):
     """Follow the person's posture; 0 or ``preset`` leaves a setting to the preset."""
 
     retired = MappingProxyType(
-        {"refine_sizes": "measured breadths are not refined; measure the person again"}
+        {
+            "torso_survival_rate": "give torso.survival_rate in a settings_file",
+            "arm_survival_rate": "give arm.survival_rate in a settings_file",
+            "torso_rotation_noise_rad": "give torso.rotation_noise_rad in a settings_file",
+            "torso_translation_noise_m": "give torso.translation_noise_m in a settings_file",
+            "arm_rotation_noise_rad": "give arm.rotation_noise_rad in a settings_file",
+            "recover": "it is called relocalize",
+            "refine_sizes": "measured breadths are not refined; measure the person again",
+        }
     )
 
     preset: str = parameter(
@@ -108,11 +110,6 @@ class TrackerParameters(NodeParameters):
     )
     cycles: int = _of_preset(TrackerConfig, "cycles")
     average: int = _of_preset(TrackerConfig, "average", most=MOST_MOVES)
-    torso_survival_rate: float = _of_preset(FilterConfig, "survival_rate", "torso: ")
-    arm_survival_rate: float = _of_preset(FilterConfig, "survival_rate", "arms: ")
-    torso_rotation_noise_rad: float = _of_preset(FilterConfig, "rotation_noise_rad", "torso: ")
-    torso_translation_noise_m: float = _of_preset(FilterConfig, "translation_noise_m", "torso: ")
-    arm_rotation_noise_rad: float = _of_preset(FilterConfig, "rotation_noise_rad", "arms: ")
     effort: float = shared(WholeBodyConfig, "effort")
     settings_file: str = parameter(
         "",
@@ -121,11 +118,7 @@ class TrackerParameters(NodeParameters):
         effect=AT_START,
     )
     relocalize: str = shared(
-        TrackerConfig,
-        "relocalize",
-        default="preset",
-        choices=("preset", "always", "never"),
-        was="recover",
+        TrackerConfig, "relocalize", default="preset", choices=("preset", "always", "never")
     )
     select_person: str = shared(
         TrackerConfig, "select_person", default="preset", choices=("preset", "always", "never")

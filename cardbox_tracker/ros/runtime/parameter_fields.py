@@ -27,11 +27,9 @@ class ParameterSpec(Setting):
 
     Attributes:
         effect: when a change takes effect.
-        was: former name, which still works; empty if it was not renamed.
     """
 
     effect: str = NEXT_IMAGE
-    was: str = ""
 
     @property
     def read_only(self) -> bool:
@@ -47,12 +45,11 @@ def parameter(
     limits: tuple[float, float] | None = None,
     choices: tuple[str, ...] = (),
     effect: str = NEXT_IMAGE,
-    was: str = "",
 ) -> Any:
     """Return a dataclass field that :class:`LiveParameters` can declare; lists default to empty."""
     lowest, highest = limits or (None, None)
     spec = ParameterSpec(
-        *(description, unit, lowest, highest, choices, effect == RESTARTS), effect=effect, was=was
+        *(description, unit, lowest, highest, choices, effect == RESTARTS), effect=effect
     )
     if isinstance(default, list):
         return field(default_factory=list, metadata={"setting": spec})

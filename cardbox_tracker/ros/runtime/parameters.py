@@ -66,7 +66,6 @@ class LiveParameters(Generic[T]):
         self._on_change = on_change
         self._specs = kind.specs()
         self._types = kind.types()
-        self._new_names = {spec.was: name for name, spec in self._specs.items() if spec.was}
         values = {name: self._declare(name) for name in self._specs}
         self.value: T = kind(**values)
         problem = self._problem({})
@@ -79,10 +78,7 @@ class LiveParameters(Generic[T]):
 
     def _declare(self, name: str) -> Any:
         spec, type_ = self._specs[name], self._types[name]
-        given = self._given(name)
-        if spec.was:
-            given = self._given_before(name, spec.was, given)
-        given = _as_type(type_, given)
+        given = _as_type(type_, self._given(name))
         if given is not None and not _is_of(type_, given):
             raise self._refusal(
                 f"{name} is '{given}'; expected {_TYPE_TEXTS[type_]}. {name} is {spec.description}"
@@ -128,26 +124,6 @@ class LiveParameters(Generic[T]):
         self._node.undeclare_parameter(name)
         return value
 
-    def _given_before(self, name: str, was: str, given: Any) -> Any:
-        """Return the value given under the old or the new name.
-
-        The old name is not declared: it would have no value, and 'ros2 param dump' would write it.
-        """
-        old = self._given(was)
-        # Files that 'ros2 param dump' wrote for a former version have the name without a value.
-        if old is None or old == "null":
-            return given
-        if given is not None:
-            raise self._refusal(_both_names(was, name))
-        self._warn_of(was, name)
-        return old
-
-    def _warn_of(self, was: str, name: str) -> None:
-        self._node.get_logger().warning(
-            f"the parameter '{was}' is now called '{name}'; use the new name, because the next "
-            "version drops the old one"
-        )
-
     def _warn_of_unknown(self) -> None:
         """Warn of unknown names given at the start, which ROS ignores silently.
 
@@ -159,8 +135,7 @@ class LiveParameters(Generic[T]):
         for name in given:
             if name in self._kind.retired:
                 raise self._refusal(self._unknown(name))
-            known = self._node.has_parameter(name) or name in self._new_names
-            if known or name.startswith(_OF_QOS):
+            if self._node.has_parameter(name) or name.startswith(_OF_QOS):
                 continue
             self._node.get_logger().warning(
                 f"'{cut(name)}' is not a parameter of node '{self._node.get_name()}' and has no "
@@ -182,25 +157,19 @@ class LiveParameters(Generic[T]):
         return CardboxError(f"parameters of node '{self._node.get_name()}': {problem}")
 
     def _translate(self, parameters: list[Parameter]) -> list[Parameter]:
-        """Replace old names by new ones, and integers by floats where these are expected.
+        """Replace integers by floats where these are expected.
 
         Raises:
-            NotDeclared: a name is unknown, or old and new name of a parameter are given together.
+            NotDeclared: a name is unknown.
         """
-        names = {p.name for p in parameters}
         translated = []
         for given in parameters:
-            name = self._new_names.get(given.name, given.name)
-            if name != given.name:
-                if name in names:
-                    raise NotDeclared(_both_names(given.name, name))
-                self._warn_of(given.name, name)
-            elif not self._node.has_parameter(name):
-                raise NotDeclared(self._unknown(name))
-            value = _as_type(self._types.get(name), given.value)
+            if not self._node.has_parameter(given.name):
+                raise NotDeclared(self._unknown(given.name))
+            value = _as_type(self._types.get(given.name), given.value)
             # Only the original parameter has the type of an empty list.
-            same = name == given.name and value is given.value
-            translated.append(given if same else Parameter(name, value=value))
+            same = value is given.value
+            translated.append(given if same else Parameter(given.name, value=value))
         return translated
 
     def _changed(self, parameters: list[Parameter]) -> dict[str, Any]:
@@ -229,10 +198,6 @@ class LiveParameters(Generic[T]):
         except (ValueError, CardboxError) as error:
             return str(error)
         return ""
-
-
-def _both_names(was: str, name: str) -> str:
-    return f"'{was}' and '{name}' are the old and the new name of one parameter; give '{name}' only"
 
 
 def _as_type(type_: Any, value: Any) -> Any:

@@ -51,7 +51,6 @@ class Sample(NodeParameters):
     fixed: bool = parameter(False, "only at the start", effect=AT_START)
     names: list[str] = parameter([], "some names")
     times: list[float] = parameter([], "some times")
-    fresh: float = parameter(0.5, "a renamed one", limits=(0.0, 1.0), was="stale")
 
     def check(self) -> None:
         """Check that ``low`` is at most ``high``."""
@@ -67,13 +66,12 @@ def set_values(node: Any, **values: Any) -> tuple[bool, str]:
 def test_a_name_that_is_no_parameter_is_said_with_the_nearest(
     make_node: Callable, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    given = ("lo:=1.5", "stale:=0.7", "nothing_like_it:=1", "use_sim_time:=false")
+    given = ("lo:=1.5", "nothing_like_it:=1", "use_sim_time:=false")
     of_qos = "qos_overrides./image_raw.publisher.depth:=3"
     node = make_node(*(word for one in (*given, of_qos) for word in ("-p", one)))
     said: list[str] = []
     monkeypatch.setattr(node, "get_logger", lambda: SimpleNamespace(warning=said.append))
-    assert LiveParameters(node, Sample).value == Sample(fresh=0.7)
-    said = [line for line in said if "not a parameter" in line]
+    assert LiveParameters(node, Sample).value == Sample()
     assert len(said) == 2
     assert all(name in said[0] for name in ("'lo'", "'tested'", "'low'"))
     assert "'nothing_like_it'" in said[1] and "did you mean" not in said[1]
@@ -115,7 +113,6 @@ def test_live_change_is_seen_and_announced(make_node: Callable) -> None:
         ({"kind": "c"}, "kind is 'c'; expected one of a, b"),
         ({"fixed": True}, "read-only"),
         ({"low": 3.0}, "low is 3, above high 2; lower it"),
-        ({"stale": 2.0}, "out of range"),
     ],
 )
 def test_wrong_value_is_refused_with_the_reason_and_the_old_one_stays(
@@ -156,8 +153,6 @@ def test_values_of_the_start_are_taken(make_node: Callable) -> None:
         ("kind:=c", ("kind is 'c'", "a, b")),
         ("count:=many", ("count", "a count")),
         ("count:=2.0", ("count", "a count")),
-        ("stale:=much", ("fresh", "a renamed one")),
-        ("stale:=2.0", ("fresh is 2; expected 0 to 1",)),
     ],
 )
 def test_wrong_value_at_the_start_says_which_and_why(
@@ -191,44 +186,12 @@ def test_a_whole_number_is_taken_for_a_text_where_a_text_may_be_one(make_node: C
     assert LiveParameters(make_node("-p", "device:=0"), Device).value.device == "0"
 
 
-def test_the_old_name_works_at_the_start_and_live_with_a_hint(
-    make_node: Callable, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    node = make_node("-p", "stale:=1")
-    hints: list[str] = []
-    monkeypatch.setattr(node.get_logger(), "warning", hints.append)
-    live = LiveParameters(node, Sample)
-    assert live.value == Sample(fresh=1.0)
-    assert node.get_parameter("fresh").value == 1.0
-    assert set_values(node, stale=0.25, low=0.5) == (True, "")
-    assert live.value == Sample(low=0.5, fresh=0.25)
-    assert node.get_parameter("fresh").value == 0.25
-    assert len(hints) == 2
-    assert all("'stale'" in hint and "'fresh'" in hint for hint in hints)
-    assert set_values(node, fresh=0.75) == (True, "")
-    assert len(hints) == 2
-
-
-def test_the_old_name_beside_the_new_one_is_refused_at_the_start(make_node: Callable) -> None:
-    node = make_node("-p", "stale:=0.1", "-p", "fresh:=0.2")
-    with pytest.raises(CardboxError, match=r"tested.*'stale' and 'fresh'.*'fresh'"):
-        LiveParameters(node, Sample)
-
-
-def test_a_dumped_file_has_an_old_name_without_value(make_node: Callable, tmp_path: Path) -> None:
-    dump = tmp_path / "dump.yaml"
-    dump.write_text("/**:\n  ros__parameters:\n    fresh: 0.2\n    stale: null\n")
-    node = make_node("--params-file", str(dump))
-    assert LiveParameters(node, Sample).value == Sample(fresh=0.2)
-
-
 @pytest.mark.parametrize(
     ("values", "words"),
     [
         ({"lo": 1.5}, ("'lo' is not a parameter of node 'tested'", "did you mean 'low'")),
         ({"nothing_like_it": 1}, ("'nothing_like_it'", "ros2 param list")),
         ({"middle": 1.0}, ("'middle' was removed", "give low and high")),
-        ({"stale": 0.1, "fresh": 0.2}, ("'stale' and 'fresh' are the old and the new name",)),
     ],
 )
 def test_a_request_to_set_what_is_no_parameter_is_answered_with_the_name_and_the_nearest(
@@ -249,23 +212,6 @@ def test_a_request_to_set_what_is_no_parameter_is_answered_with_the_name_and_the
     assert live.value == Sample()
 
 
-def test_a_dump_of_a_former_version_has_the_old_name_without_a_value(
-    make_node: Callable, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    node = make_node("-p", "stale:=null", "-p", "fresh:=0.75")
-    said: list[str] = []
-    monkeypatch.setattr(node, "get_logger", lambda: SimpleNamespace(warning=said.append))
-    assert LiveParameters(node, Sample).value == Sample(fresh=0.75)
-    assert not node.has_parameter("stale")
-    assert said == []
-
-
-def test_the_tracker_still_knows_recover(make_node: Callable) -> None:
-    live = LiveParameters(make_node("-p", "recover:=always"), TrackerParameters)
-    assert live.value == TrackerParameters(relocalize="always")
-    assert live.value.config().relocalize
-
-
 @pytest.mark.parametrize(
     ("kind", "core"),
     [(BackgroundParameters, BackgroundConfig), (InitializerParameters, InitializationConfig)],
@@ -283,7 +229,7 @@ def test_a_setting_of_the_core_keeps_its_text_range_and_type(kind: Any, core: An
 
 def test_what_a_live_change_does_is_that_of_the_core() -> None:
     effects = {name: spec.effect for name, spec in TrackerParameters.specs().items()}
-    for name in ("preset", "strategy", "particles", "average", "arm_survival_rate"):
+    for name in ("preset", "strategy", "particles", "average"):
         assert effects[name] == RESTARTS
     for name in ("cycles", "relocalize", "lost_iou", "lost_frames"):
         assert effects[name] == NEXT_IMAGE
@@ -406,7 +352,6 @@ def test_tracker_settings_override_the_preset() -> None:
         preset="paper",
         strategy="srs",
         particles=50,
-        torso_translation_noise_m=0.05,
         relocalize="always",
         select_person="always",
     ).config()
@@ -414,7 +359,6 @@ def test_tracker_settings_override_the_preset() -> None:
     assert config.strategy == "srs" and config.relocalize and config.select_person
     assert config.torso.particles == config.arm.particles == 50
     assert config.torso.survival_rate == TrackerConfig().torso.survival_rate
-    assert config.torso.translation_noise_m == 0.05
 
 
 def test_settings_that_do_not_go_together_are_refused(make_node: Callable) -> None:
@@ -431,11 +375,6 @@ OTHERS: dict[str, dict[str, Any]] = {
         "particles": 150,
         "cycles": 3,
         "average": 20,
-        "torso_survival_rate": 0.3,
-        "arm_survival_rate": 0.3,
-        "torso_rotation_noise_rad": 0.2,
-        "torso_translation_noise_m": 0.05,
-        "arm_rotation_noise_rad": 0.1,
         "relocalize": "always",
         "select_person": "always",
         "lost_iou": 0.3,
