@@ -32,7 +32,7 @@ from cardbox_tracker.segmentation.color_reader import ColorReader
 from cardbox_tracker.segmentation.empty_scene import BackgroundLearner, BackgroundModel
 from cardbox_tracker.segmentation.light import LightFollower
 from cardbox_tracker.segmentation.partial_scene import merged
-from cardbox_tracker.segmentation.regions import clean_in_window
+from cardbox_tracker.segmentation.regions import LEAST_AREA, MOST_HOLE, clean_in_window
 from cardbox_tracker.segmentation.shadows import decide_shadows
 from cardbox_tracker.segmentation.window import Window, find_edges, window_of
 
@@ -98,6 +98,21 @@ def _foreground(
     return find_edges(foreground)
 
 
+# Least standard deviation of a pixel, grey levels.
+_LEAST_STDDEV = 1.5
+# Standard deviation of the Gaussian that smooths differences against noise, px. The kernel covers
+# three of them; OpenCV's default is wider and slower.
+_SMOOTHING_PX, _KERNEL_SIZE = 0.6, (5, 5)
+# A pixel is dropped if its difference is less than this share of the largest among its neighbours,
+# because smoothing spreads a strong contrast beyond the outline.
+_EDGE = 0.35
+# Least difference of colours (Cr, Cb), grey levels, and the share of the largest within 6 px below
+# which it is dropped, because JPEG smears colours over an outline.
+_LEAST_COLOR_CONTRAST, _COLOR_EDGE = 7.0, 0.45
+# Largest darkening by a soft shadow, as a share of the background's brightness.
+_DARKEST_SHADOW = 0.4
+# Largest change of the brightness of the whole scene that is compensated if light is not followed.
+_FLICKER = 0.1
 # Number of pixels whose median estimates the brightness of the scene.
 _BRIGHTNESS_SAMPLES = 1000
 # Margins around the foreground, and around the part that is compared by colour.
@@ -118,9 +133,6 @@ class SilhouetteExtractor:
         self.gain = 1.0
         step = max(1, math.isqrt(model.mean.size // _BRIGHTNESS_SAMPLES))
         self._grid = (slice(None, None, step), slice(None, None, step))
-        # The kernel covers three standard deviations; OpenCV's default is wider and slower.
-        size = 2 * math.ceil(3 * config.smoothing_px) + 1
-        self._kernel_size = (size, size)
         self._light: LightFollower | None = None
         self._chroma: ChromaScore | None = None
         self._learned = model
@@ -140,7 +152,7 @@ class SilhouetteExtractor:
         """Compare the next images with ``model``."""
         config = self.config
         self.model = model
-        self._limit = config.threshold * np.maximum(model.stddev, config.min_stddev)
+        self._limit = config.threshold * np.maximum(model.stddev, _LEAST_STDDEV)
         # Factors that turn a difference of either sign into a score, 1 at its limit.
         brighter = np.maximum(self._limit, config.min_contrast)
         darker = np.maximum(brighter, config.shadow * model.mean)
@@ -153,8 +165,8 @@ class SilhouetteExtractor:
             self._chroma = ChromaScore(
                 model.chroma,
                 config.threshold,
-                config.min_color_contrast,
-                config.color_edge,
+                _LEAST_COLOR_CONTRAST,
+                _COLOR_EDGE,
                 config.follow,
                 before,
             )
@@ -215,19 +227,14 @@ class SilhouetteExtractor:
         cv2.addWeighted(
             brightness, shares[0], expected, shares[1], 0.0, dst=signed, dtype=cv2.CV_32F
         )
-        if config.smoothing_px > 0:
-            cv2.GaussianBlur(signed, self._kernel_size, config.smoothing_px, dst=signed)
-        foreground, window = segment_foreground(
-            signed, self._brighter, self._darker, config.edge, score
-        )
+        cv2.GaussianBlur(signed, _KERNEL_SIZE, _SMOOTHING_PX, dst=signed)
+        foreground, window = segment_foreground(signed, self._brighter, self._darker, _EDGE, score)
         near: Window | None = window.grown(_MARGIN_PX, foreground.shape)
         if has_color:
             near = self._near(window, foreground.shape)
         self._decide(foreground, near, has_color)
         window = near or window_of(foreground).grown(_MARGIN_PX, foreground.shape)
-        silhouette, self._last = clean_in_window(
-            foreground, config.min_area, config.max_hole, window
-        )
+        silhouette, self._last = clean_in_window(foreground, LEAST_AREA, MOST_HOLE, window)
         if self._light is not None:
             self._light.exclude(silhouette, self._last)
         self._absorb(image, brightness, silhouette, stamp_ns)
@@ -250,7 +257,7 @@ class SilhouetteExtractor:
     def _decide(self, foreground: ImageArray, window: Window | None, has_color: bool) -> None:
         """Add coloured pixels in a window (None: everywhere), and remove soft shadows."""
         signed, config, colored = self._scratch[0], self.config, None
-        shadow = config.darkest_shadow, config.soft_shadow
+        shadow = _DARKEST_SHADOW, config.soft_shadow
         if has_color and self._chroma is not None:
             colors = self._colors.colors
             if self._is_even and config.soft_shadow > 0:
@@ -280,12 +287,10 @@ class SilhouetteExtractor:
 
     def _scene_gain(self, brightness: ImageArray) -> float:
         """Return the brightness relative to the background: a median, since the person is small."""
-        if self.config.flicker <= 0:
-            return 1.0
         ratios = (brightness[self._grid] / self._grid_mean).ravel()
         middle = len(ratios) // 2
         ratio = float(np.partition(ratios, middle)[middle])  # the median, without its checks
-        if abs(ratio - 1.0) > self.config.flicker:
+        if abs(ratio - 1.0) > _FLICKER:
             return 1.0
         return ratio
 

@@ -11,8 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cardbox_tracker.camera.depth_image import DepthImage
-from cardbox_tracker.segmentation.background_config import BackgroundConfig
-from cardbox_tracker.segmentation.regions import clean_silhouette
+from cardbox_tracker.segmentation.regions import LEAST_AREA, MOST_HOLE, clean_silhouette
 
 WITHIN_LIMITS_M = 0.3, 20.0
 """Range of the limit, metres."""
@@ -20,7 +19,6 @@ WITHIN_LIMITS_M = 0.3, 20.0
 # Unknown pixels between near ones belong to the person: a depth camera measures nothing at edges
 # and where only one of its eyes sees.
 _GAP = 1 / 64
-_SPECKS = BackgroundConfig()
 
 # A share of the pixels below which they are specks.
 _NEAREST = 0.01
@@ -44,4 +42,4 @@ def silhouette_within(depth_m: DepthImage, within_m: float) -> NDArray[np.uint8]
     width = max(3, round(_GAP * depth_m.shape[1]) | 1)
     closed = cv2.morphologyEx(near, cv2.MORPH_CLOSE, np.ones((width, width), np.uint8))
     near[~is_known & (np.asarray(closed) > 0)] = 255
-    return clean_silhouette(near, _SPECKS.min_area, _SPECKS.max_hole)
+    return clean_silhouette(near, LEAST_AREA, MOST_HOLE)

@@ -25,6 +25,10 @@ _EIGHT = np.uint64(0x0101010101010101)
 # Smallest kernel that closes a gap of one pixel in all eight directions.
 _CLOSING_KERNEL = np.ones((3, 3), np.uint8)
 
+LEAST_AREA, MOST_HOLE = 0.004, 0.0008
+"""Least area of a region of the foreground, and area below which a hole is filled, as shares of the
+image."""
+
 
 def remove_small_regions(image: ImageArray, colour: int, area_px: float) -> None:
     """Invert regions of ``colour`` with fewer than ``area_px`` pixels, in place.

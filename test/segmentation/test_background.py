@@ -9,6 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
+from cardbox_tracker.segmentation import background
 from cardbox_tracker.segmentation.background import SilhouetteExtractor
 from cardbox_tracker.segmentation.background_config import BackgroundConfig
 from cardbox_tracker.segmentation.empty_scene import BackgroundLearner, BackgroundModel
@@ -150,13 +151,16 @@ def test_a_shadow_is_not_the_person() -> None:
 
 
 @pytest.mark.parametrize("gain", [0.94, 1.06])
-def test_a_scene_that_flickers_stays_background(gain: float) -> None:
+def test_a_scene_that_flickers_stays_background(
+    gain: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
     model = flat(200, 2)
     extractor = SilhouetteExtractor(model, BackgroundConfig(follow=False))
     got = extractor(image(200 * gain, 100 * gain))
     assert extractor.gain == pytest.approx(gain, abs=1e-6)
     assert np.count_nonzero(got != person_mask()) <= 8
-    rigid = SilhouetteExtractor(model, BackgroundConfig(follow=False, flicker=0.0, shadow=0.0))
+    monkeypatch.setattr(background, "_FLICKER", 0.0)
+    rigid = SilhouetteExtractor(model, BackgroundConfig(follow=False, shadow=0.0))
     assert np.all(rigid(image(200 * gain)) == 255)
 
 

@@ -8,6 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from cardbox_tracker.segmentation import background
 from cardbox_tracker.segmentation.background import SilhouetteExtractor
 from cardbox_tracker.segmentation.background_config import BackgroundConfig
 from cardbox_tracker.segmentation.empty_scene import BackgroundModel
@@ -65,12 +66,16 @@ def test_dark_clothes_in_noise_stay() -> None:
     assert np.count_nonzero(extractor()(picture)) > 0.97 * PERSON.sum()
 
 
-def test_what_is_darker_than_a_shadow_can_be_is_the_person() -> None:
+def test_what_is_darker_than_a_shadow_can_be_is_the_person(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     # Across the whole image from bright to half as bright, without any edge.
     picture = np.tile(np.linspace(LEVEL, LEVEL / 2, W), (H, 1)).round().astype(np.uint8)
-    found = extractor(darkest_shadow=0.4, follow=False, flicker=0.0)(picture)
+    monkeypatch.setattr(background, "_FLICKER", 0.0)
+    found = extractor(follow=False)(picture)
     assert not found[:, : int(0.75 * W)].any() and found[:, int(0.85 * W) :].all()
-    assert not extractor(darkest_shadow=0.6, follow=False, flicker=0.0)(picture).any()
+    monkeypatch.setattr(background, "_DARKEST_SHADOW", 0.6)
+    assert not extractor(follow=False)(picture).any()
 
 
 def plain(
