@@ -15,6 +15,8 @@ ROS = ["ros-jazzy-rclpy[fastrtps]", "ros-jazzy-common-interfaces"]
 CLUSTER = ["dask>=2024.5", "distributed>=2024.5"]
 # Streams to programs that teleoperate robots.
 TELEOPERATION = ["msgpack>=1,<2", "pyzmq>=25,<28"]
+# Gives results in memory as a table.
+PANDAS = ["pandas>=2,<4"]
 TEST = [
     "bvh>=0.3,<1",
     "catkin_pkg>=1.0",
@@ -24,7 +26,7 @@ TEST = [
     "mcap>=1.2",
     "mcap-ros2-support>=0.5.4",
     "mypy>=1.11",
-    "pandas>=2,<4",
+    *PANDAS,
     "pytest>=7.4",
     "pytest-timeout>=2.3",
     "pytest-xdist>=3.5",
@@ -148,6 +150,7 @@ setup(
         "colcon": COLCON,
         "view": VIEW,
         "detector": DETECTOR,
+        "pandas": PANDAS,
         "parquet": PARQUET,
         "docs": DOCS,
         "export": EXPORT,

@@ -34,7 +34,8 @@ class Result(Results):
             import pandas
         except ImportError as error:
             raise CardboxError(
-                f"to_pandas needs the library pandas ({error}); install it with pip install pandas"
+                f"to_pandas needs the library pandas ({error}); install it with "
+                "pip install 'cardbox_tracker[pandas]'"
             ) from None
         times = {"stamp_ns": self.stamp_ns, "time_s": self.time_s, "state": self.state}
         found = {**times, **self.numbers, **self.texts}
