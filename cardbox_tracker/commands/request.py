@@ -385,7 +385,7 @@ def add_tracking(parser: argparse.ArgumentParser, needs_recording: bool = True) 
         "--people",
         type=_count,
         metavar="N|auto",
-        help="track N people, or all who come (up to 6), with one camera; they are numbered as "
+        help="track N people, or all who come (up to 6); they are numbered as "
         "they come, and from left to right if they come together",
     )
     add(
@@ -439,7 +439,7 @@ def _statures(text: str) -> tuple[float, ...]:
 
 
 def _count(text: str) -> int:
-    from cardbox_tracker.tracking.people import MOST_PEOPLE
+    from cardbox_tracker.tracking.session import MOST_PEOPLE
 
     count = 0 if text == "auto" else int(text) if text.isdecimal() else -1
     if not (text == "auto" or 1 <= count <= MOST_PEOPLE):
@@ -499,7 +499,7 @@ def recording_request(options: argparse.Namespace, problems: Problems) -> Record
     from cardbox_tracker.detectors.detector import Detector
     from cardbox_tracker.recordings.open_images import check_exists
     from cardbox_tracker.recordings.recording import input_faults
-    from cardbox_tracker.tracking.people import MOST_PEOPLE
+    from cardbox_tracker.tracking.session import MOST_PEOPLE
 
     path, depth = options.recording, options.depth
     problems.caught(lambda: check_exists(path), None)
@@ -569,8 +569,8 @@ def tracking_request(options: argparse.Namespace, faults: Iterable[str] = ()) ->
             f"--preset {options.preset} uses the silhouette of one camera; give --preset default "
             "with several cameras or with --depth"
         )
-    if options.people is not None and is_more:
-        problems.add("--people tracks with one camera and without --depth: leave the others out")
+    if options.people is not None and options.depth is not None:
+        problems.add("--people tracks without --depth: leave it out")
     if options.people is not None and options.preset != "default":
         problems.add(f"--people needs the preset default, not {options.preset}")
     config = problems.caught(lambda: _config(options, preset), preset)

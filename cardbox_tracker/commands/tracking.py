@@ -48,7 +48,7 @@ def track(
     from cardbox_tracker.measuring.scene import save_scene
     from cardbox_tracker.person.model_file import save_body_model
     from cardbox_tracker.recordings.quality import Quality
-    from cardbox_tracker.recordings.track import Crowd, track_recording
+    from cardbox_tracker.recordings.track import track_recording
 
     qualities: dict[int, Quality] = {}
     recording, person = request.recording, request.person
@@ -64,9 +64,6 @@ def track(
     with measured_scene(recording, person, request.config, request.seed) as (source, scene):
         early = source.first.remarks
         print_remarks(early)
-        bodies, crowd = scene.people, None
-        if person.people is not None:
-            crowd = Crowd(bodies, person.people or None)
         total_s = max(1e-9, min(source.first.duration_s, person.end_s) - start_s)
         with ExitStack() as stack:
             observers = (*_writers(request, source, stack), *observers)
@@ -75,14 +72,14 @@ def track(
             advance = show or stack.enter_context(progress_bar("track"))
             summary = track_recording(
                 source,
-                bodies[0],
+                scene.people,
                 request.config,
                 request.seed,
                 start_s,
                 request.files.table,
                 (*observers, lambda frame, *_: advance((frame.time_s - start_s) / total_s)),
                 person.end_s,
-                crowd,
+                person.people,
                 None if request.hands is None else HandNetwork(request.hands),
             )
         remarks = [remark for remark in source.first.remarks if remark not in early]
@@ -214,7 +211,7 @@ def measured_scene(
         if person.people is None:
             bodies = [seen_person(watched, bodies[0], first.camera, config, seed)]
         else:
-            bodies = seen_people(source, bodies, config, person.people or None, seed, *span)
+            bodies = seen_people(source, bodies, config, person.people, seed, *span)
         yield source, Scene(found.camera, tuple(bodies))
 
 

@@ -17,10 +17,10 @@ from cardbox_tracker.measuring.first_sight import upper_body
 from cardbox_tracker.measuring.scene_camera import Picture
 from cardbox_tracker.measuring.seen_body import MOST_SIGHTS, SeenBody
 from cardbox_tracker.person.model import BodyModel
-from cardbox_tracker.recordings.recording import Recording
+from cardbox_tracker.recordings.recording import FrameSet, Recording
 from cardbox_tracker.recordings.silhouettes import RecordedFrame
 from cardbox_tracker.search.config import TrackerConfig
-from cardbox_tracker.tracking.people import People
+from cardbox_tracker.tracking.session import Session
 
 T = TypeVar("T")
 
@@ -75,7 +75,7 @@ def watch(recording: Recording, start_s: float = 0.0, end_s: float = math.inf) -
         frame = taken.first
         if upper_body(frame.silhouette, _is_detected(frame)) is not None:
             frames.add(partial(frame._replace, recorded=None))
-        pictures.add(partial(_picture, recording, frame))
+        pictures.add(partial(_picture, taken))
         seen = frame.people if frame.people is not None else (frame.points,)
         for points in seen:
             if points is not None:
@@ -83,8 +83,9 @@ def watch(recording: Recording, start_s: float = 0.0, end_s: float = math.inf) -
     return Watched(frames.items, pictures.items, people)
 
 
-def _picture(recording: Recording, frame: RecordedFrame) -> Picture:
-    return frame.time_s, recording.first.full_picture(frame)
+def _picture(taken: FrameSet) -> Picture:
+    assert taken.picture is not None
+    return taken.time_s, taken.picture()
 
 
 def _track_of(
@@ -135,7 +136,7 @@ def seen_people(
     recording: Recording,
     guesses: Sequence[BodyModel],
     config: TrackerConfig,
-    most: int | None,
+    most: int,
     seed: int,
     start_s: float = 0.0,
     end_s: float = math.inf,
@@ -144,16 +145,16 @@ def seen_people(
 
     Args:
         recording: an open recording.
-        guesses: see :class:`~cardbox_tracker.tracking.people.People`.
+        guesses: see :class:`~cardbox_tracker.tracking.session.Session`.
         config: settings of the trackers.
-        most: number of people; None for all who come.
+        most: number of people; 0 for all who come.
         seed: random seed.
         start_s: seconds from the start of the recording from which on they are tracked.
         end_s: the same until when.
     """
     rng = np.random.default_rng(seed)
-    people = People(guesses, recording.first.camera, config, rng, most)
+    session = Session(guesses, recording.first.camera, config, rng, recording.others, most)
     for taken in recording.frames(start_s, end_s):
-        people.track(taken.observations[0], taken.people)
-    bodies = [replace(tracker.body, version=0, stamp_ns=0) for tracker in people.trackers]
+        session.track(taken.observations)
+    bodies = [replace(tracker.body, version=0, stamp_ns=0) for tracker in session.trackers]
     return bodies or list(guesses)

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
+from functools import partial
 from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from cardbox_tracker.camera.camera import Camera
 from cardbox_tracker.camera.depth_image import DepthImage
@@ -25,7 +27,6 @@ from cardbox_tracker.camera.stereo import StereoDepth, stereo_of_pair
 from cardbox_tracker.camera.view import OtherCamera
 from cardbox_tracker.common.errors import BagError, CameraError, CardboxError
 from cardbox_tracker.detectors.detector import Detector
-from cardbox_tracker.detectors.image_points import ImagePoints
 from cardbox_tracker.detectors.point_table import PointTable
 from cardbox_tracker.recordings.bag_reader import BagReader
 from cardbox_tracker.recordings.depth_silhouettes import DepthSilhouetteSource, Within, depth_images
@@ -54,6 +55,7 @@ class FrameSet(NamedTuple):
         frames: one frame for each camera, the first camera's first; None if it has no image.
         first: frame of the first camera, black without an image.
         depth_m: depth (H, W) in the first camera, metres; None without a depth image.
+        picture: returns the first camera's image at the resolution of the recording.
     """
 
     stamp_ns: int
@@ -61,24 +63,25 @@ class FrameSet(NamedTuple):
     frames: tuple[RecordedFrame | None, ...]
     first: RecordedFrame
     depth_m: DepthImage | None = None
-
-    @property
-    def people(self) -> tuple[ImagePoints, ...] | None:
-        """Joints of each person in the first camera; None without a detector of several."""
-        return self.first.people
+    picture: Callable[[], NDArray[np.uint8]] | None = None
 
     @property
     def observations(self) -> list[Observation]:
-        """Observations for a tracker; that of a camera without an image is empty."""
+        """Observations for a session; that of a camera without an image is empty."""
         seen = [
             Observation()
             if frame is None
             else Observation(
-                frame.silhouette, frame.image, stamp_ns=frame.stamp_ns, points=frame.points
+                frame.silhouette,
+                frame.image,
+                stamp_ns=frame.stamp_ns,
+                points=frame.points,
+                people=frame.people,
             )
             for frame in self.frames
         ]
-        seen[0] = seen[0].having(depth_m=self.depth_m, stamp_ns=self.stamp_ns)
+        more = {"depth_m": self.depth_m, "stamp_ns": self.stamp_ns, "picture": self.picture}
+        seen[0] = seen[0].having(**more)
         return seen
 
 
@@ -166,7 +169,8 @@ class Recording:
                 there = self._stereo(*(f.image for f in frames[:2] if f and f.image is not None))
             stamp_ns, time_s, *_ = lead
             first = frames[0] or RecordedFrame(stamp_ns, time_s, black, black)
-            yield FrameSet(stamp_ns, time_s, frames, first, there)
+            picture = partial(self.first.full_picture, first)
+            yield FrameSet(stamp_ns, time_s, frames, first, there, picture)
 
     def _depths(self) -> Iterator[tuple[int, DepthImage]]:
         """Yield stamp and depth of each depth image, at the size of the first camera."""

@@ -43,11 +43,3 @@ class AgreementWatch:
             for how, found in errors.items()
             for name, degrees in zip(self._names, found, strict=True)
         }
-
-    def warnings(self) -> dict[str, str]:
-        """Return a text for each camera whose extrinsics are doubtful, by kind."""
-        if self._agreement is None:
-            return {}
-        return {
-            f"extrinsics {i}": text for i, text in enumerate(self._agreement.remarks(self._names))
-        }

@@ -112,7 +112,7 @@ class HandReader:
 
     def see(
         self,
-        picture: Callable[[], ColorImage],
+        picture: Callable[[], ColorImage] | None,
         points: ImagePoints | None,
         estimate: Estimate,
         body: BodyModel,
@@ -122,7 +122,8 @@ class HandReader:
         """Return ``estimate`` with the hands that are known.
 
         Args:
-            picture: returns the image (H, W, 3), bgr, or (H, W) at any resolution.
+            picture: returns the image (H, W, 3), bgr, or (H, W) at any resolution; None without
+                one.
             points: of the person in the image of ``camera``; None if nobody is found.
             estimate: of the same image.
             body: the person.
@@ -130,7 +131,7 @@ class HandReader:
             time_s: time of the image.
         """
         tracked = [side for side in _SIDES if is_tracked(estimate, side)]
-        if tracked and points is not None:
+        if tracked and points is not None and picture is not None:
             image = color(picture())
             view = camera.scaled(image.shape[1], image.shape[0])
             scale = np.array([view.width / camera.width, view.height / camera.height])

@@ -57,13 +57,27 @@ def pixels_from(given: Any, name: str, size: tuple[int, int]) -> FloatArray:
     return pixels.astype(np.float64)
 
 
+def people_from(given: Any, name: str, size: tuple[int, int]) -> tuple[ImagePoints, ...]:
+    """Return a detector's points of several people.
+
+    Raises:
+        ValueError: one of them is no ImagePoints.
+    """
+    return tuple(points_from(one, name, size) for one in given)
+
+
+def _upright_points(view: View, found: ImagePoints) -> ImagePoints:
+    return replace(found, px=view.upright_px(found.px))
+
+
 CHANNELS: dict[str, Channel] = {
     "silhouette": Channel(silhouette_from, lambda view, mask: view.upright(mask, is_mask=True)),
     "covered": Channel(silhouette_from, lambda view, mask: view.upright(mask, is_mask=True)),
     "image": Channel(image_from, View.upright),
     "depth_m": Channel(depth_from, View.upright),
-    "points": Channel(
-        points_from, lambda view, found: replace(found, px=view.upright_px(found.px))
+    "points": Channel(points_from, _upright_points),
+    "people": Channel(
+        people_from, lambda view, found: tuple(_upright_points(view, one) for one in found)
     ),
 }
 """The channels by name. A line ``CHANNELS["name"] = Channel(pixels_from, View.upright_px)`` adds
@@ -80,9 +94,11 @@ class Observation:
     Attributes:
         channels: data by the names of :data:`CHANNELS`; missing ones have no data.
         stamp_ns: time of the data, ns; None if it is unknown.
+        picture: returns the image at its full resolution, which hands need; that of the channel
+            ``image`` without another one.
     """
 
-    __slots__ = ("channels", "stamp_ns")
+    __slots__ = ("channels", "picture", "stamp_ns")
 
     def __init__(
         self,
@@ -91,6 +107,7 @@ class Observation:
         depth_m: DepthImage | None = None,
         stamp_ns: int | None = None,
         points: ImagePoints | None = None,
+        picture: Callable[[], Image] | None = None,
         **more: Any,
     ) -> None:
         """Take the data.
@@ -103,7 +120,9 @@ class Observation:
                 are not above 0 or not finite.
             stamp_ns: time of the data, ns; None if it is unknown.
             points: the person's joints in the image, from a detector; None without one.
-            more: further channels, such as ``covered``: the pixels (H, W), 0 or 255, of other
+            picture: see the attribute.
+            more: further channels: ``people``, the joints of each of several people for a
+                :class:`~.session.Session`; ``covered``, the pixels (H, W), 0 or 255, of other
                 people, which may hide this one.
 
         Raises:
@@ -123,10 +142,12 @@ class Observation:
             )
         self.channels = {name: data for name, data in given.items() if data is not None}
         self.stamp_ns = stamp_ns
+        self.picture = (lambda: image) if picture is None and image is not None else picture
 
     def having(self, **given: Any) -> Observation:
         """Return the observation with other channels, or another ``stamp_ns``."""
-        return Observation(**{"stamp_ns": self.stamp_ns, **self.channels, **given})
+        kept = {"stamp_ns": self.stamp_ns, "picture": self.picture}
+        return Observation(**{**kept, **self.channels, **given})
 
     @property
     def silhouette(self) -> Silhouette | None:

@@ -14,9 +14,10 @@ from cardbox_tracker.person.sizes import FloatArray
 from cardbox_tracker.search.config import TrackerConfig
 from cardbox_tracker.terms.drawn_body import body_tuple
 from cardbox_tracker.terms.silhouette import rows_above_hips
-from cardbox_tracker.terms.term import USUAL_INTERVAL_S, Frame, Posed, Term
+from cardbox_tracker.terms.term import USUAL_INTERVAL_S, Frame, Posed, Silhouette, Term
 from cardbox_tracker.tracking.depth_agreement import DepthAgreement
 from cardbox_tracker.tracking.observation import CHANNELS, Observation
+from cardbox_tracker.tracking.person_masks import PersonDrawer
 from cardbox_tracker.tracking.person_region import PersonRegion
 
 
@@ -61,6 +62,7 @@ class TrackedCamera:
         self.posable = body_tuple(self._body, self._camera)
         self.configure(config)
         self._region: PersonRegion | None = None
+        self._drawer: PersonDrawer | None = None
         self.depth = DepthAgreement()
 
     def configure(self, config: TrackerConfig) -> None:
@@ -71,6 +73,19 @@ class TrackedCamera:
     def reset(self, config: TrackerConfig) -> None:
         """Forget the region of the person in the images."""
         self._region = PersonRegion(self._body, self._camera) if config.select_person else None
+
+    def drawn(self, state: FloatArray) -> Silhouette:
+        """Return the pixels (H, W), 0 or 255, of a state (14,) for the first camera, coarsely."""
+        if self._drawer is None:
+            self._drawer = PersonDrawer(self._body, self._camera)
+        if self.view is not None:
+            state = self.view.states(state)
+        cells, side = self._drawer.masks(state, 0.0).core, self._drawer.cell_px
+        pixels = np.repeat(np.repeat(cells, side, axis=0), side, axis=1)
+        drawn: Silhouette = 255 * pixels[: self._camera.height, : self._camera.width]
+        if self.view is not None and self.view.turn is not None:
+            drawn = np.asarray(cv2.warpAffine(drawn, self.view.raw_px, self._size[::-1]), np.uint8)
+        return drawn
 
     def frame(
         self,

@@ -56,6 +56,7 @@ from cardbox_tracker.tracking.estimate import (
 )
 from cardbox_tracker.tracking.facing import Facing
 from cardbox_tracker.tracking.frozen import FrozenCameras
+from cardbox_tracker.tracking.hands import HandReader, Look
 from cardbox_tracker.tracking.head import HeadTracker
 from cardbox_tracker.tracking.legs import LegReader
 from cardbox_tracker.tracking.observation import Observation, Observations, stamp_of
@@ -80,6 +81,7 @@ class Tracker:
     """Tracks one measured person (paper, algorithm "Online Motion Tracking").
 
     Attributes:
+        cameras: the body before each camera, the first one first.
         agreement: check of the extrinsics of several cameras; None with one camera.
         images: number of times that were tracked.
         used: in how many of them each optional input told of the posture, by its name.
@@ -95,6 +97,7 @@ class Tracker:
         make_filter: MakeFilter | None = None,
         others: Sequence[OtherCamera] = (),
         corrector: Corrector | None = None,
+        look: Look | None = None,
     ) -> None:
         """Set up for ``body``; the camera gets the pitch of the body model.
 
@@ -111,6 +114,8 @@ class Tracker:
             others: further cameras; they need the filter ``whole_body``.
             corrector: changes the fitted state of each frame before it becomes the result; joints
                 are kept within their limits. It needs the filter ``whole_body``.
+            look: finds the points of hands in images of the first camera, which are then part of
+                all estimates.
 
         Raises:
             CameraError: the person was not measured in front of one of ``others``.
@@ -120,7 +125,7 @@ class Tracker:
         self.camera = camera.with_pitch(body.camera_pose.pitch_rad)
         self.config = config or TrackerConfig()
         self._rng = rng or np.random.default_rng(0)
-        self._make_filter, self._corrector = make_filter, corrector
+        self._make_filter, self._corrector, self._look = make_filter, corrector, look
         self._others = tuple(others)
         if (others or corrector) and (make_filter or not self.config.has_several_views):
             what = "several cameras need" if others else "a corrector needs"
@@ -142,7 +147,7 @@ class Tracker:
         """Track ``body`` from the next frame on, else with the states that were found so far."""
         self.body = self.config.with_shoulders(body)
         self._silhouette = silhouette
-        self._cameras = [
+        self.cameras = [
             TrackedCamera(self.body, self.camera, self.config, other)
             for other in (None, *self._others)
         ]
@@ -153,7 +158,7 @@ class Tracker:
         if is_new_start or not isinstance(self._filter, WholeBodyFilter):
             self.reset()
             return
-        for camera in self._cameras:
+        for camera in self.cameras:
             camera.reset(self.config)
         self._filter.use(silhouette, views)
         self._head = HeadTracker(self.body, self.camera)
@@ -163,14 +168,15 @@ class Tracker:
         make_filter = self._make_filter or FILTERS[self.config.filter]
         if self._corrector is not None:
             make_filter = partial(WholeBodyFilter, corrector=self._corrector)
-        for camera in self._cameras:
+        for camera in self.cameras:
             camera.reset(self.config)
-        self._identities = [Identity() for _ in self._cameras]
+        self._identities = [Identity() for _ in self.cameras]
         self._now_ns, self._sees_other = 0, False
         rng = self._rng.spawn(1)[0]
         self._filter = make_filter(self.config, self._silhouette, rng, self.views)
         self._head = HeadTracker(self.body, self.camera)
         self._legs.forget()
+        self._hands = None if self._look is None else HandReader(self._look)
         # The outlines of several cameras determine the direction; the paper has no such doubt.
         is_alone = self.config.has_several_views and not self._others
         self._facing = Facing(self.body) if is_alone else None
@@ -190,7 +196,7 @@ class Tracker:
         """
         is_new_start = restarts(self.config, config)
         if config.terms != self.config.terms:
-            for camera in self._cameras:
+            for camera in self.cameras:
                 camera.configure(config)
         self.config = config
         if is_new_start:
@@ -207,12 +213,12 @@ class Tracker:
     @property
     def views(self) -> tuple[View, ...]:
         """Views of the body from the further cameras."""
-        return tuple(camera.view for camera in self._cameras if camera.view is not None)
+        return tuple(camera.view for camera in self.cameras if camera.view is not None)
 
     @property
     def remarks(self) -> list[str]:
         """Warnings about images that contradict each other, for diagnostics and logs."""
-        depths = (camera.depth.remark for camera in self._cameras)
+        depths = (camera.depth.remark for camera in self.cameras)
         found = *self._frozen.remarks(), *depths, self._place.contradiction
         return [text for text in found if text]
 
@@ -262,10 +268,10 @@ class Tracker:
                 f"the observations are of the type {type(observations).__name__}; expected a "
                 "silhouette as a numpy array, an Observation, or a list with one for each camera"
             )
-        if not 1 <= len(observations) <= len(self._cameras):
+        if not 1 <= len(observations) <= len(self.cameras):
             raise ValueError(
                 f"there are {len(observations)} observations; expected one for each of "
-                f"{len(self._cameras)} cameras"
+                f"{len(self.cameras)} cameras"
             )
         for one in observations:
             if one is not None and not isinstance(one, Observation):
@@ -285,7 +291,15 @@ class Tracker:
         if self.config.has_several_views and posture is not None and is_at_two_limits(posture):
             estimate = _unsure(estimate)
         self._count(observations, frames, estimate)
-        return self._legs.see(frames[0], self._head.see(frames[0], estimate))
+        estimate = self._legs.see(frames[0], self._head.see(frames[0], estimate))
+        if self._hands is None:
+            return estimate
+        seen, person = observations[0], (self.body, self.camera)
+        picture = None if seen is None else seen.picture
+        given = picture, frames[0].points, estimate, *person, self._now_ns / 1e9
+        estimate = self._hands.see(*given)
+        self.used["hands"] = self.used.get("hands", 0) + any(estimate.hands or ())
+        return estimate
 
     def _placed(self, frames: Sequence[Frame], estimate: Estimate) -> Estimate:
         """Return the estimate with its place, which no deviation of it is surer than."""
@@ -323,7 +337,7 @@ class Tracker:
                 any(one.depth_m is not None for one in frames),
             ),
             "colours": (
-                any(isinstance(term, InnerCueTerm) for term in self._cameras[0].terms),
+                any(isinstance(term, InnerCueTerm) for term in self.cameras[0].terms),
                 frames[0].image is not None and frames[0].before is not None,
             ),
         }
@@ -343,7 +357,7 @@ class Tracker:
         is_sure = self._poor_frames == 0
         return [
             camera.frame(observation, self._before, is_sure, interval_s)
-            for camera, observation in zip_longest(self._cameras, observations)
+            for camera, observation in zip_longest(self.cameras, observations)
         ]
 
     def _of_person(self, camera: int, frame: Frame) -> Frame:
@@ -375,7 +389,7 @@ class Tracker:
             return Estimate(LOST) if self._sees_other else estimate
         if points is None or points.is_empty:
             assert self._before is not None
-            there = projected(Posed(self._cameras[0].posable, self._before[None]))[:, :2]
+            there = projected(Posed(self.cameras[0].posable, self._before[None]))[:, :2]
             joints = {"left_shoulder": there[SHOULDER], "left_hip": there[HIPS]}
             joints |= {"right_shoulder": there[POINTS_OF_ARM + SHOULDER], "right_hip": there[HIPS]}
             figure, silhouette = Figure(joints), frame.silhouette
@@ -435,9 +449,11 @@ class Tracker:
         if presence is Presence.TOO_MUCH:
             # After a short change of the light, the person is still at the same place.
             return Estimate(LOST)
-        if self.agreement is not None:
+        # What others hide is missing in the outline.
+        is_whole = not any(frame["covered"] is not None for frame in frames)
+        if self.agreement is not None and is_whole:
             self.agreement.look(*_silhouettes(frames))
-        fit = self._filter.follow(frames, [camera.terms for camera in self._cameras])
+        fit = self._filter.follow(frames, [camera.terms for camera in self.cameras])
         self._particles = fit.particles
         if not fit.is_finite:
             # Without a reset, values that are not finite would stay in the particles.
@@ -457,7 +473,7 @@ class Tracker:
             if self.config.relocalize:
                 self._filter.recover()
             return Estimate(LOST)
-        if self.agreement is not None and fit.offset_m is not None:
+        if self.agreement is not None and is_whole and fit.offset_m is not None:
             self.agreement.see(self._before, *_silhouettes(frames))
         judged, is_doubtful = fit.judged, self._is_doubtful(frames[0])
         states = None if judged is None else judged.states
@@ -484,7 +500,7 @@ class Tracker:
     def _is_doubtful(self, frame: Frame) -> bool:
         """Return whether poses of cameras, or a person's back, make the whole result doubtful."""
         if self._facing is not None and self._before is not None:
-            self._facing.see(frame, Posed(self._cameras[0].posable, self._before[None]))
+            self._facing.see(frame, Posed(self.cameras[0].posable, self._before[None]))
             return self._facing.shows_back
         return self.agreement is not None and self.agreement.is_contradicted
 

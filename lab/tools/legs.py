@@ -35,7 +35,7 @@ from cardbox_tracker.recordings.recording import Segmentation, open_recording
 from cardbox_tracker.recordings.silhouettes import TimeSpan
 from cardbox_tracker.search.config import default_preset
 from cardbox_tracker.tracking.estimate import Estimate
-from cardbox_tracker.tracking.people import People
+from cardbox_tracker.tracking.session import Session
 from lab.tools.people import joints_of, matched
 
 _HIPS, _REST = [0, 3], [1, 2, 4, 5]
@@ -73,12 +73,11 @@ def _lines(folder: Path, truth: Any, camera: Any, given: list[float] | None) -> 
     names = [name] if len(truth.get("cameras", ())) > 1 else []
     found: dict[int, list[tuple[Estimate, ImagePoints | None]]] = {}
     with open_recording(folder / "bag", scene, names, points=finder) as recording:
-        tracked = People(bodies, recording.first.camera, default_preset(), count=len(people))
+        tracked = Session(bodies, recording.first.camera, default_preset(), people=len(people))
         for taken in recording.frames():
             there = found.setdefault(taken.stamp_ns, [])
-            for estimate, _ in tracked.track(taken.observations[0], taken.people):
-                assert estimate.person is not None
-                there.append((estimate, tracked.points_of(estimate.person)))
+            for number, estimate in enumerate(tracked.track(taken.observations), 1):
+                there.append((estimate, tracked.points_of(number)))
     rows: list[list[FloatArray]] = [[] for _ in people]
     for i, frame in enumerate(truth["frames"]):
         seen_people = [joints_of(person["frames"][i], name) for person in people]

@@ -3,8 +3,9 @@
     python -m lab.tools.people SESSION... [--detector mediapipe]
 
 A session has ``bag/`` and a ``ground_truth.json`` of format 2, whose ``people`` are a list. Each of
-its cameras is tracked alone. Statures and the camera's pitch are given. In an image, each estimate
-belongs to the person whose shoulders it is nearest to, if they are within 0.35 m sideways.
+its cameras is tracked alone, and then all together, in the first one's frame. Statures and the
+camera's pitch are given. In an image, each estimate belongs to the person whose shoulders it is
+nearest to, if they are within 0.35 m sideways.
 *Aligned*: the mean error of shoulders, elbows, and hands beside the middle of the shoulders. *Seen*
 counts only joints that nobody covers. *More* is the processor time that each further person adds to
 an image of one, network included.
@@ -32,7 +33,7 @@ from cardbox_tracker.recordings.silhouettes import TimeSpan
 from cardbox_tracker.recordings.truth import SHOULDERS
 from cardbox_tracker.search.config import default_preset
 from cardbox_tracker.tracking.estimate import TRACKING, Estimate
-from cardbox_tracker.tracking.people import People
+from cardbox_tracker.tracking.session import Session
 from lab.evaluation.metrics import distances_m
 
 _WITHIN_M = 0.35
@@ -56,22 +57,25 @@ def main() -> None:
     print("uncertain %, hidden said, ms of one, ms more")
     for folder in options.sessions:
         truth = json.loads((folder / "ground_truth.json").read_text())
-        for camera in truth.get("cameras", [truth["camera"]]):
-            for line in _lines(folder, truth, camera, detector, given):
+        cameras = truth.get("cameras", [truth["camera"]])
+        for chosen in [[one] for one in cameras] + ([cameras] if len(cameras) > 1 else []):
+            for line in _lines(folder, truth, chosen, detector, given):
                 print(f"{folder.name} {line}", flush=True)
 
 
 def _lines(
-    folder: Path, truth: Any, camera: Any, detector: Any, given: list[float] | None
+    folder: Path, truth: Any, cameras: list[Any], detector: Any, given: list[float] | None
 ) -> Iterator[str]:
-    name, people = camera.get("name", "camera"), truth["people"]
+    camera, people = cameras[0], truth["people"]
+    name = camera.get("name", "camera")
     pitch_rad = float(np.radians(camera["pitch_down_deg"]))
     # The tracker numbers people as they come, and from left to right if they come together.
     as_numbered = sorted(people, key=lambda person: _comes(person, name))
     statures = given or [person["height"] for person in as_numbered]
     bodies = [body_from_proportions(one, None, camera_pitch_rad=pitch_rad) for one in statures]
     empty = next((one for one in truth["segments"] if one["name"] == "empty"), None)
-    names = [name] if len(truth.get("cameras", ())) > 1 else []
+    names = [one["name"] for one in cameras if len(truth.get("cameras", ())) > 1]
+    poses = folder / "extrinsics.yaml" if len(names) > 1 else None
 
     def tracked(count: int) -> tuple[dict[int, list[Estimate]], float]:
         """Return the estimates by stamp, and the time of an image, ms."""
@@ -80,11 +84,13 @@ def _lines(
             finder if empty is None else TimeSpan(empty["start_s"], empty["end_s"])
         )
         spent_s, found = time.process_time(), {}
-        with open_recording(folder / "bag", scene, names, points=finder) as recording:
-            people = People(bodies, recording.first.camera, default_preset(), count=count)
+        with open_recording(folder / "bag", scene, names, poses, points=finder) as recording:
+            others = recording.others
+            session = Session(
+                bodies, recording.first.camera, default_preset(), others=others, people=count
+            )
             for taken in recording.frames():
-                results = people.track(taken.observations[0], taken.people)
-                found[taken.stamp_ns] = [estimate for estimate, _ in results]
+                found[taken.stamp_ns] = session.track(taken.observations)
         return found, 1e3 * (time.process_time() - spent_s) / len(found)
 
     (_, one_ms), (found, ms) = tracked(1), tracked(len(people))
@@ -128,7 +134,7 @@ def _lines(
         exchanged = sum(a[0] != b[0] for a, b in pairwise(row))
         cm = [f"{100 * float(np.nanmean([one[j] for one in row])):.1f}" for j in (1, 2, 3)]
         yield (
-            f"{name}, {person['name']}, {counts[k]}, {len(row)}, "
+            f"{'+'.join(names) or name}, {person['name']}, {counts[k]}, {len(row)}, "
             f"{100 * all_found / max(all_seen, 1):.0f}, {exchanged}, {', '.join(cm)}, "
             f"{100 * np.mean([one[4] for one in row]):.0f}, {hidden[k][1]} of {hidden[k][0]}, "
             f"{one_ms:.0f}, {more_ms:.0f}"

@@ -30,7 +30,7 @@ from cardbox_tracker.person.proportions import body_from_proportions
 from cardbox_tracker.recordings.given_camera import GivenCamera
 from cardbox_tracker.recordings.person_in_view import PersonInView
 from cardbox_tracker.recordings.silhouettes import TimeSpan
-from cardbox_tracker.tracking.people import MOST_PEOPLE
+from cardbox_tracker.tracking.session import MOST_PEOPLE
 
 
 @pytest.fixture

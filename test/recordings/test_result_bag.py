@@ -48,7 +48,7 @@ def results(
     with result_bag(folder / "bag", source.frame_id, draw=draw_sharp_overlay) as bag:
         summary = track_recording(
             Recording([""], [source]),
-            recording.body,
+            [recording.body],
             default_preset(),
             0,
             0.0,

@@ -6,7 +6,6 @@ import csv
 import os
 from dataclasses import replace
 from pathlib import Path
-from types import SimpleNamespace
 from typing import Any
 
 import cv2
@@ -32,7 +31,7 @@ from cardbox_tracker.recordings.recording import Recording
 from cardbox_tracker.recordings.result_bag import result_bag
 from cardbox_tracker.recordings.result_table import columns
 from cardbox_tracker.recordings.silhouettes import SilhouetteSource, TimeSpan
-from cardbox_tracker.recordings.track import Crowd, TrackSummary, track_recording
+from cardbox_tracker.recordings.track import TrackSummary, track_recording
 from cardbox_tracker.search.config import default_preset
 from cardbox_tracker.tracking.estimate import Estimate
 from cardbox_tracker.tracking.tracker import Tracker
@@ -45,7 +44,7 @@ def track(
 ) -> TrackSummary:
     start_s = rest.pop("start_s", recording.start_s())
     return track_recording(
-        Recording([""], [source]), recording.body, CONFIG, seed, start_s, path, **rest
+        Recording([""], [source]), [recording.body], CONFIG, seed, start_s, path, **rest
     )
 
 
@@ -87,19 +86,14 @@ def test_the_tracker_gets_the_images(
 
     monkeypatch.setattr(Tracker, "track", spy)
     config = default_preset().changed({"whole_body": {"effort": 0.25}})
-    track_recording(Recording([""], [source]), recording.body, config, 0, recording.start_s())
+    track_recording(Recording([""], [source]), [recording.body], config, 0, recording.start_s())
     assert seen
     assert all(image.shape == (240, 320) for image in seen)
 
 
-def test_of_several_people_there_may_be_nobody(
-    recording: Any, source: SilhouetteSource, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    nobody = SimpleNamespace(track=lambda *_: [])
-    monkeypatch.setattr("cardbox_tracker.recordings.track.People", lambda *_: nobody)
-    given = recording.body, default_preset(), 0, recording.start_s()
-    crowd = Crowd((recording.body,), None)
-    summary = track_recording(Recording([""], [source]), *given, crowd=crowd)
+def test_of_several_people_there_may_be_nobody(recording: Any, source: SilhouetteSource) -> None:
+    given = [recording.body], default_preset(), 0
+    summary = track_recording(Recording([""], [source]), *given, 0.0, end_s=1.0, people=0)
     assert (summary.frames_tracked, summary.people) == (0, {})
 
 

@@ -22,25 +22,20 @@ class Agreement:
         assert self.go_on.wait(60)
         self.turned_deg = [2.0]
 
-    def remarks(self, names: list[str]) -> list[str]:
-        return [f"{name}: {deg}" for name, deg in zip(names, self.turned_deg, strict=True) if deg]
-
 
 def test_a_check_runs_beside_the_tracking_and_is_said() -> None:
     watch, agreement = AgreementWatch(["left", "right"]), Agreement()
-    assert watch.values() == watch.warnings() == {}
+    assert watch.values() == {}
     for _ in range(3):
         watch.see(agreement)  # type: ignore[arg-type]
     unknown = {"right turned (deg)": "not yet known", "right rolled (deg)": "not yet known"}
     assert watch.values() == unknown
-    assert watch.warnings() == {}
     # Python waits for those that are no daemons; others in compiled code abort it at its end.
     assert [one.daemon for one in threading.enumerate() if one.name == "agreement"] == [False]
     agreement.go_on.set()
     watch.wait()
     assert agreement.checks == 1
     assert watch.values() == unknown | {"right turned (deg)": "2.0"}
-    assert list(watch.warnings().values()) == ["right: 2.0"]
 
 
 def test_nothing_is_checked_before_it_is_due() -> None:

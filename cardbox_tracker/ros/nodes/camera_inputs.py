@@ -16,7 +16,6 @@ from cardbox_tracker.camera.depth_image import DepthImage
 from cardbox_tracker.camera.pairing import TOLERANCE_NS, Arrivals
 from cardbox_tracker.camera.view import OtherCamera
 from cardbox_tracker.common.errors import CameraError, CardboxError
-from cardbox_tracker.detectors.image_points import ImagePoints
 from cardbox_tracker.ros.messages import conversions
 from cardbox_tracker.ros.messages.conversions import ImageArray, stamp_ns
 from cardbox_tracker.ros.nodes.camera_poses import CameraPoses, silhouettes_of
@@ -118,8 +117,6 @@ class ObservationSet:
         observations: observation of each camera, as a tracker takes them.
         sent_ns: send time of the last silhouette, ns since the epoch.
         nothing: black image (H, W) of the first camera.
-        people: points of each of several people in the first camera's image; None if none have
-            come, or only one person is tracked.
     """
 
     header: Header
@@ -127,7 +124,6 @@ class ObservationSet:
     observations: list[Observation]
     sent_ns: int
     nothing: ImageArray
-    people: list[ImagePoints] | None = None
 
     def picture(self, number: int = 0) -> ImageArray:
         """Return a camera's image, or its silhouette, or a black image."""
@@ -281,16 +277,17 @@ class CameraInputs:
             observations,
             max(one.sent_ns for one in messages if one is not None),
             np.zeros((first.height, first.width), np.uint8),
-            self._keypoints.people(header, first) if self._tracks_people else None,
         )
 
     def _with_points(
         self, number: int, received: Received | None, seen: Observation, camera: Camera
     ) -> Observation:
         """Return an observation with the points that have arrived; it does not wait for points."""
-        if received is None or seen.silhouette is None or self._tracks_people:
+        if received is None or seen.silhouette is None:
             return seen
         header = received.message.header
+        if self._tracks_people:
+            return seen.having(people=self._keypoints.people(number, header, camera))
         period_ns = self._streams[number].statistics.period_ns
         half_ns = period_ns // 2 or TOLERANCE_NS
         points = self._keypoints.points(number, header, camera, seen.silhouette, half_ns)

@@ -42,7 +42,7 @@ from cardbox_tracker.ros.runtime.parameter_fields import AT_START, NodeParameter
 from cardbox_tracker.ros.runtime.parameters import LiveParameters
 from cardbox_tracker.ros.runtime.publishers import SinglePublisher
 from cardbox_tracker.segmentation.silhouettes import SilhouettePipeline
-from cardbox_tracker.tracking.people import MOST_PEOPLE
+from cardbox_tracker.tracking.session import MOST_PEOPLE
 
 # People stand still for some time, and move about between.
 _IMAGES = 10

@@ -248,9 +248,9 @@ class KeypointInputs:
             return None
         return self._cameras[number].points(header, camera, silhouette, tolerance_ns)
 
-    def people(self, header: Header, camera: Camera) -> list[ImagePoints] | None:
-        """Return the points of all people in the image of a silhouette; None without a detector."""
-        return self._cameras[0].people(header, camera) if self._cameras else None
+    def people(self, number: int, header: Header, camera: Camera) -> list[ImagePoints] | None:
+        """Return the points of all people in a camera's image; None without a detector."""
+        return self._cameras[number].people(header, camera) if self._cameras else None
 
     def values(self) -> dict[str, str]:
         """Return rate, age and use of each camera's points for the diagnostics."""

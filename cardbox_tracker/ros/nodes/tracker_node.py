@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import replace
 from functools import partial
 from typing import Any
 
@@ -27,7 +26,7 @@ from cardbox_tracker.person.skeleton import PLACE_NAMES
 from cardbox_tracker.person.urdf import urdf_from_body
 from cardbox_tracker.recordings.outputs import METRICS, place_of
 from cardbox_tracker.ros.messages import conversions
-from cardbox_tracker.ros.nodes.camera_inputs import CameraInputs, ObservationSet, Received
+from cardbox_tracker.ros.nodes.camera_inputs import CameraInputs, Received
 from cardbox_tracker.ros.nodes.rep155_outputs import TrackedBodies
 from cardbox_tracker.ros.nodes.tracker_outputs import TrackerOutputs
 from cardbox_tracker.ros.nodes.tracker_parameters import TrackerParameters
@@ -37,10 +36,8 @@ from cardbox_tracker.ros.runtime.node import CardboxNode, run_node
 from cardbox_tracker.ros.runtime.parameters import LiveParameters
 from cardbox_tracker.tracking.agreement_watch import AgreementWatch
 from cardbox_tracker.tracking.estimate import LOST, NO_PERSON, UNCERTAIN, Estimate
-from cardbox_tracker.tracking.hands import HandReader
-from cardbox_tracker.tracking.people import People
 from cardbox_tracker.tracking.precompile import compile_all
-from cardbox_tracker.tracking.tracker import Tracker
+from cardbox_tracker.tracking.session import Session
 
 _REASONS = {
     NO_PERSON: "nobody is in the image",
@@ -183,7 +180,7 @@ _PREPARING = "preparing (the very first start compiles for one to two minutes)"
 
 
 class TrackerNode(CardboxNode):
-    """Tracks one measured person with one or several cameras."""
+    """Tracks people with one or several cameras."""
 
     def __init__(self, **options: Any) -> None:
         """Subscribe to silhouettes and wait for a body model."""
@@ -193,15 +190,12 @@ class TrackerNode(CardboxNode):
         self.offer("~/reset", self._reset)
         settings = self.parameters.value
         self._look = HandNetwork(installed_hands()) if settings.hands else None
-        self._hands: list[HandReader] = []
         self._prepared: set[str] = set()
         self._prepare(settings)
         self._body: BodyModel | None = None
         self._camera: Camera | None = None
         self._others: Sequence[OtherCamera] = ()
-        # Of several people, the first one's.
-        self._tracker: Tracker | None = None
-        self._people: People | None = None
+        self._session: Session | None = None
         numbers = [None, *range(1, settings.people + 1)][settings.people > 0 :]
         self._reports = [TrackingReport() for _ in numbers]
         bodies = TrackedBodies(self, len(numbers)) if settings.rep155_id else None
@@ -211,7 +205,8 @@ class TrackerNode(CardboxNode):
         self._model_topic = self.resolve("body_model")
         self.subscribe(String, "body_model", self._on_model, qos.LATCHED)
         self._inputs = CameraInputs(self, settings, self._on_cameras, self._on_input)
-        self._agreement = AgreementWatch([name.strip("/") for name in settings.cameras])
+        self._names = [name.strip("/") for name in settings.cameras or [""]]
+        self._agreement = AgreementWatch(self._names)
         self.diagnostics.source = f"silhouettes on {self._inputs.source}"
         self.diagnostics.extra = self._values
         self.diagnostics.remedy = (
@@ -270,19 +265,19 @@ class TrackerNode(CardboxNode):
         if not (others or self._others) and first == self._camera:
             return
         self._camera, self._others = first, others
-        self._tracker = None
+        self._session = None
         self._build("new cameras" if others else "new camera")
 
     def _changed(self, settings: TrackerParameters) -> None:
         """Apply changed parameters."""
         self._prepare(settings)
-        if self._tracker is None:
+        if self._session is None:
             return
         config = settings.config()
-        if self._people is not None or restarts(self._tracker.config, config):
+        if restarts(self._session.config, config):
             self._build("other settings of the particles")
         else:
-            self._tracker.configure(config)
+            self._session.configure(config)
 
     def _build(self, reason: str) -> None:
         """Set up a tracker for the current body, cameras and parameters.
@@ -293,24 +288,16 @@ class TrackerNode(CardboxNode):
             return
         settings = self.parameters.value
         rng = np.random.default_rng(settings.seed)
-        if settings.people:
-            self._people = People(
-                [self._body], self._camera, settings.config(), rng, settings.people
-            )
-            trackers = self._people.trackers
-        else:
-            trackers = [
-                Tracker(self._body, self._camera, settings.config(), rng, others=self._others)
-            ]
-        self._tracker = trackers[0]
-        self._hands = [HandReader(self._look) for _ in trackers if self._look is not None]
-        for report, tracker in zip(self._reports, trackers, strict=True):
+        people = settings.people or None
+        given = settings.config(), rng, self._others, people, self._look
+        self._session = Session([self._body], self._camera, *given)
+        for report, tracker in zip(self._reports, self._session.trackers, strict=True):
             report.start(tracker.body)
         self.diagnostics.say(reason, f"{reason}: tracking starts from the front reference posture")
 
     def _reset(self) -> str:
         """Answer the service ``reset``."""
-        if self._tracker is None:
+        if self._session is None:
             missing = self._model_topic if self._body is None else self._inputs.missing
             raise CameraError(
                 f"nothing to reset: the tracker has not started, it waits for {missing}"
@@ -320,9 +307,9 @@ class TrackerNode(CardboxNode):
 
     def _reset_person(self, number: int) -> str:
         """Answer the service ``person_N/reset``."""
-        if self._people is None:
+        if self._session is None:
             return self._reset()
-        self._people.reset(number)
+        self._session.reset(number)
         return f"person {number} is sought again"
 
     def _wait(self) -> None:
@@ -345,62 +332,42 @@ class TrackerNode(CardboxNode):
             self._build("an image is older than the one before (a bag that loops?)")
         if not step.is_usable:
             return
-        if self._tracker is None:
+        if self._session is None:
             self._inputs.check()
             self._wait()
             text = "no body model yet: call initializer/initialize"
             self._outputs[0].waiting(lead.message, lead.image, text)
             return
         seen = self._inputs.observed(received)
-        if self._people is None:
-            found = [(self._tracker.track(seen.observations), self._tracker)]
-        else:
-            found = self._people.track(seen.observations[0], seen.people)
-        found = [(self._with_hands(seen, *one), one[1]) for one in found]
-        for outputs, report, (estimate, tracker) in zip(
-            self._outputs, self._reports, found, strict=True
+        estimates, trackers = self._session.track(seen.observations), self._session.trackers
+        for outputs, report, estimate, tracker in zip(
+            self._outputs, self._reports, estimates, trackers, strict=True
         ):
             news, named = report.add(estimate, tracker.body), _named(estimate.person)
             for kind, text in news.items():
                 self.diagnostics.say(named + kind, named + text)
             # Joint states of a new version of the body follow the version.
-            if self._found is not None and "body" in news and tracker is self._tracker:
+            if self._found is not None and "body" in news and tracker is trackers[0]:
                 self._found.publish(tracker.body, seen.header.frame_id)
             outputs.publish(seen, estimate, tracker)
-        self._agreement.see(self._tracker.agreement)
+        self._agreement.see(self._session.agreement)
         self.diagnostics.advice = self._warnings
         self.diagnostics.working(seen.sent_ns)
 
-    def _with_hands(self, seen: ObservationSet, estimate: Estimate, tracker: Tracker) -> Estimate:
-        """Return the estimate of an image with the hands, if they are looked at."""
-        first = seen.observations[0]
-        if not self._hands:
-            return estimate
-        if first.image is None:
-            # The joints of the hands stay among the others.
-            return replace(estimate, hands=(None, None))
-        time_s = conversions.stamp_ns(seen.header.stamp) / 1e9
-        number, points = estimate.person or 1, first.points
-        if self._people is not None:
-            points = self._people.points_of(number)
-        person, reader = (tracker.body, tracker.camera), self._hands[number - 1]
-        found = reader.see(seen.picture, points, estimate, *person, time_s)
-        tracker.used["hands"] = tracker.used.get("hands", 0) + any(found.hands or ())
-        return found
-
     def _warnings(self) -> dict[str, str]:
         """Return warnings for the diagnostics."""
-        remarks = [] if self._tracker is None else self._tracker.remarks
+        remarks = [] if self._session is None else self._session.remarks(self._names)
         images = {f"images {number}": text for number, text in enumerate(remarks)}
-        told = self._inputs.warnings() | self._agreement.warnings()
+        told = self._inputs.warnings()
         for name, report in self._named_reports():
             told |= {name + kind: name + text for kind, text in report.warnings().items()}
         return told | images
 
     def _values(self) -> dict[str, str]:
         """Return the values of the diagnostics."""
-        ious = [] if self._tracker is None else self._tracker.camera_ious()
-        used = {} if self._tracker is None else self._tracker.used_texts()
+        first = None if self._session is None else self._session.trackers[0]
+        ious = [] if first is None else first.camera_ious()
+        used = {} if first is None else first.used_texts()
         common = self._inputs.values(ious) | self._agreement.values() | used
         values: dict[str, str] = {}
         for name, report in self._named_reports():

@@ -34,7 +34,7 @@ from cardbox_tracker.search.config import PRESETS, FilterConfig, TrackerConfig
 from cardbox_tracker.search.resampling import STRATEGIES
 from cardbox_tracker.search.settings_file import read_settings
 from cardbox_tracker.search.whole_body_config import WholeBodyConfig
-from cardbox_tracker.tracking.people import MOST_PEOPLE
+from cardbox_tracker.tracking.session import MOST_PEOPLE
 
 _NEXT_START = "next start of tracking"
 
@@ -179,7 +179,7 @@ class TrackerParameters(NodeParameters):
     )
     people: int = parameter(
         0,
-        "number of people to track with one camera, each with topics below person_1, person_2 ...; "
+        "number of people to track, each with topics below person_1, person_2 ...; "
         "body_model is the body of each; 0: one person without a number",
         limits=(0, MOST_PEOPLE),
         effect=AT_START,
@@ -244,10 +244,10 @@ class TrackerParameters(NodeParameters):
                 f"the preset {self.preset} uses the silhouette of one camera; set preset to "
                 "default with several cameras or depth"
             )
-        if self.people and (len(self.cameras) > 1 or self.depth or self.preset != "default"):
+        if self.people and (self.depth or self.preset != "default"):
             raise ValueError(
-                f"people is {self.people}; several people are tracked with one camera, without "
-                "depth, and with the preset default"
+                f"people is {self.people}; several people are tracked without depth, and with the "
+                "preset default"
             )
         if self.hands and not (self.keypoints and self.use_image):
             raise ValueError(

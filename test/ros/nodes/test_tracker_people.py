@@ -68,11 +68,11 @@ def test_one_person_is_reset_alone(bus: Any, node: Any) -> None:
     for tenth in range(5):
         show(bus, tenth, -0.6, 0.6)
     assert node._reset_person(2) == "person 2 is sought again"
-    assert [one.estimate.posture is None for one in node._people._people] == [False, True]
+    assert [one.estimate.posture is None for one in node._session._people] == [False, True]
     show(bus, 6, -0.6, 0.6)
     assert bus.texts("/person_2/tracking_state")[-1] != "no_person"
 
 
-def test_several_people_need_one_camera(bus: Any) -> None:
-    with pytest.raises(CardboxError, match="several people are tracked with one camera"):
-        bus.start(TrackerNode, people=2, cameras=["a", "b"])
+def test_several_people_are_tracked_without_depth(bus: Any) -> None:
+    with pytest.raises(CardboxError, match="several people are tracked without depth"):
+        bus.start(TrackerNode, people=2, cameras=["a"], depth="depth")

@@ -22,10 +22,10 @@ from cardbox_tracker.terms.outline import Outline
 from cardbox_tracker.terms.term import Posed
 from cardbox_tracker.terms.whole_body import WholeBodyCost
 from cardbox_tracker.terms.whole_body_config import WholeBodyCostConfig
-from cardbox_tracker.tracking import people
+from cardbox_tracker.tracking import session
 from cardbox_tracker.tracking.estimate import NO_PERSON, UNCERTAIN, Estimate
 from cardbox_tracker.tracking.observation import Observation
-from cardbox_tracker.tracking.people import People
+from cardbox_tracker.tracking.session import Session
 
 CAMERA = Camera(320, 240, 260.0, 260.0, 159.5, 119.5)
 BODY = BodyModel.of(distance_m=2.6, hip_height_m=-0.25)
@@ -48,7 +48,7 @@ def pixels(aside_m: float) -> np.ndarray:
 class Scene:
     """People in clothes of one colour at places; the first ones stand in front."""
 
-    def __init__(self, people: People, detected: Detect | None) -> None:
+    def __init__(self, people: Session, detected: Detect | None) -> None:
         self.people, self.detected, self.images = people, detected, 0
 
     def __call__(
@@ -64,12 +64,12 @@ class Scene:
             numbers = range(len(people)) if found is None else found
             points = [self.detected(BODY, CAMERA, place(people[i][0])) for i in numbers]
         self.images += 1
-        seen = Observation(silhouette, image, stamp_ns=self.images * STEP_NS)
-        return [estimate for estimate, _ in self.people.track(seen, points)]
+        stamp_ns = self.images * STEP_NS
+        return self.people.track(Observation(silhouette, image, stamp_ns=stamp_ns, people=points))
 
 
-def scene(detected: Detect | None, count: int | None = 2) -> Scene:
-    return Scene(People([BODY], CAMERA, default_preset(), count=count), detected)
+def scene(detected: Detect | None, count: int = 2) -> Scene:
+    return Scene(Session([BODY], CAMERA, default_preset(), people=count), detected)
 
 
 def places(found: list[Estimate]) -> list[float | None]:
@@ -90,11 +90,11 @@ def test_people_are_numbered_from_left_to_right_and_keep_their_numbers(
 def test_before_anybody_comes_each_of_a_given_number_is_nobody(detected: Detect) -> None:
     found = scene(detected)()
     assert [(one.person, one.state) for one in found] == [(1, NO_PERSON), (2, NO_PERSON)]
-    assert scene(detected, None)() == []
+    assert scene(detected, 0)() == []
 
 
 def test_without_a_number_all_who_come_are_tracked(detected: Detect) -> None:
-    show = scene(detected, None)
+    show = scene(detected, 0)
     assert len(show((0.0, RED))) == 1
     counts = [len(show((0.0, RED), (0.9, BLUE))) for _ in range(4)]
     # Somebody new is seen in three images first.
@@ -135,13 +135,15 @@ def test_the_chance_of_the_same_person_by_hand() -> None:
     one, other = np.array([1.0, 0.0]), np.array([0.36, 0.64])
     # Their distance is sqrt(1 - 0.6) = 0.632.
     expected = 1.0 / (1.0 + np.exp((0.6325 - 0.6) / 0.07))
-    assert people._chance_of_same(one, other) == pytest.approx(expected, abs=1e-3)
-    assert people._chance_of_same(one, one) > 0.999 > 0.01 > people._chance_of_same(one, one[::-1])
-    assert people._chance_of_same(one, None) == 0.5
+    assert session._chance_of_same(one, other) == pytest.approx(expected, abs=1e-3)
+    assert (
+        session._chance_of_same(one, one) > 0.999 > 0.01 > session._chance_of_same(one, one[::-1])
+    )
+    assert session._chance_of_same(one, None) == 0.5
 
 
 def test_somebody_else_in_the_place_of_one_who_left_is_not_that_person(detected: Detect) -> None:
-    show = scene(detected, None)
+    show = scene(detected, 0)
     for _ in range(4):
         show((0.0, RED))
     for _ in range(60):
@@ -194,11 +196,11 @@ def test_the_outline_of_others_does_not_pull() -> None:
 )
 def test_figures_are_assigned_with_the_least_sum(costs: list[list[float]]) -> None:
     table = np.array(costs)
-    found = people._cheapest(table)
+    found = session._cheapest(table)
     assert len(set(found.values())) == len(found)
-    assert all(table[row, column] < people._OTHER for row, column in found.items())
+    assert all(table[row, column] < session._OTHER for row, column in found.items())
     rows = np.arange(len(table))
-    clipped = np.minimum(table, people._OTHER)
+    clipped = np.minimum(table, session._OTHER)
     least = min(clipped[rows, list(chosen)].sum() for chosen in permutations(range(4), len(rows)))
-    unassigned = people._OTHER * (len(table) - len(found))
+    unassigned = session._OTHER * (len(table) - len(found))
     assert sum(table[pair] for pair in found.items()) + unassigned == pytest.approx(least)

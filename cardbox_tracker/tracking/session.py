@@ -1,0 +1,632 @@
+"""One call for people, cameras and channels: one person before one camera is a list of one.
+
+A session of one person gives all that the cameras show to one tracker. Otherwise each image shows a
+few *figures*: people whose joints a detector has found, or regions of the silhouette that are
+apart. In each camera they are assigned to the known people by place and by the colours of the
+trunk; in a further camera also by where the lines of sight meet, and whom the camera has missed by
+the last posture. Somebody who has left keeps the identity and is known by the colours alone. Each
+tracker gets the pixels that are nearest to its person's figure. Pixels of others do not count for
+it, because they may hide the person. Somebody whom others hide in all cameras stays where they
+were, and is ``uncertain``, with ``hidden`` keypoints.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Container, Iterator, Mapping, Sequence
+from dataclasses import replace
+from typing import NamedTuple
+
+import cv2
+import numpy as np
+
+from cardbox_tracker.camera.camera import Camera
+from cardbox_tracker.camera.view import OtherCamera
+from cardbox_tracker.detectors.figure import Figure, figure_of_points
+from cardbox_tracker.detectors.identity import ALIKE, GONE_NS, apart, colours_in
+from cardbox_tracker.detectors.image_points import ImagePoints
+from cardbox_tracker.person.model import BodyModel
+from cardbox_tracker.person.sizes import FloatArray
+from cardbox_tracker.person.skeleton import KeypointState
+from cardbox_tracker.search.config import TrackerConfig
+from cardbox_tracker.search.doubt import doubted
+from cardbox_tracker.terms.joint_points import projected
+from cardbox_tracker.terms.joint_points_kernels import ELBOW, HIPS, POINTS_OF_ARM, SHOULDER, WRIST
+from cardbox_tracker.terms.term import Image, Posed, Silhouette
+from cardbox_tracker.tracking.camera_agreement import CameraAgreement
+from cardbox_tracker.tracking.estimate import LOST, NO_PERSON, UNCERTAIN, Estimate
+from cardbox_tracker.tracking.hands import Look
+from cardbox_tracker.tracking.observation import Observation, Observations, stamp_of
+from cardbox_tracker.tracking.tracker import Tracker
+
+MOST_PEOPLE = 6
+"""People that are tracked if their number is not given."""
+
+# Deviation of a figure's place, in lengths of the trunk, and its growth a second.
+_PLACE, _PLACE_PER_S = 0.5, 2.0
+# Deviation of the colours of one person: Bhattacharyya distance of the trunk's histograms.
+_COLOURS = 0.3
+# Change of that distance that changes the odds of being the same person by a factor of e.
+_ALIKE_SPREAD = 0.07
+# Squared deviations above which a figure is somebody else.
+_OTHER = 16.0
+# Images in a row with the colours of somebody else after which a person is given up.
+_OTHERS_IMAGES = 3
+# Share of a figure that others may cover when its colours are learned, and its weight.
+_LEARNS, _LEARN_RATE = 0.1, 0.1
+# Share of a figure in those of others from which it is hidden, and from which it is a mere mixture.
+_HIDDEN, _MIXED = 0.15, 0.5
+# Least share of a figure in the silhouette by which somebody is tracked whom the detector misses.
+_SEEN = 0.4
+# Time for which somebody whom the detector misses stays where they were if nobody hides them, ns.
+_DROPPED_NS = 300_000_000
+# Time for which a hidden person stays where they were, ns.
+_HELD_NS = 3_000_000_000
+# Images in a row in which somebody new is seen before they are tracked, after the first images.
+_PROVED = 3
+# Least area and height of the region of a new person, as shares of the image.
+_LEAST_AREA, _LEAST_HEIGHT = 0.01, 0.25
+_USUAL_NS = 66_666_667
+# Deviation of the gap between lines of sight to the middle of a trunk, m; length of a trunk, m, and
+# relative deviation of that which the place where they meet gives.
+_GAP_M, _TRUNK_M, _TRUNK = 0.15, 0.5, 0.4
+# Points of a figure by their rows in :func:`projected`.
+_PROJECTED = {
+    f"{side}_{name}": first + row
+    for side, first in (("left", 0), ("right", POINTS_OF_ARM))
+    for name, row in (("shoulder", SHOULDER), ("elbow", ELBOW), ("wrist", WRIST))
+} | {"left_hip": HIPS, "right_hip": HIPS}
+
+
+class Shown(NamedTuple):
+    """A figure in one image.
+
+    Attributes:
+        points: joints from a detector; None for a region of the silhouette.
+        figure: place and size; None for a region.
+        pixels: (H, W), 255 at the person's pixels as far as they are known, else 0.
+    """
+
+    points: ImagePoints | None
+    figure: Figure | None
+    pixels: Silhouette
+
+
+class _Share(NamedTuple):
+    """What a camera shows of a person.
+
+    Attributes:
+        seen: the observation with the person's part of the silhouette.
+        is_found: whether one of the figures is the person.
+        is_missed: whether the person is where the silhouette shows nothing of them.
+        is_hidden: whether others hide the person there.
+        is_detected: whether a detector finds the figures.
+    """
+
+    seen: Observation
+    is_found: bool
+    is_missed: bool
+    is_hidden: bool
+    is_detected: bool
+
+
+class _Sight:
+    """What is known of a person in the images of one camera."""
+
+    def __init__(self) -> None:
+        self.figure: Figure | None = None
+        self.points: ImagePoints | None = None
+        self.pixels: Silhouette | None = None
+        self.colours: FloatArray | None = None
+        self.seen_ns: int | None = None
+
+
+class _Person:
+    """One identity."""
+
+    def __init__(self, number: int | None, tracker: Tracker) -> None:
+        self.number, self.tracker = number or 1, tracker
+        self.estimate = Estimate(NO_PERSON, person=number)
+        self.sights = [_Sight() for _ in tracker.cameras]
+        self.fitted_ns = self.others_images = 0
+        self.chance = 1.0
+
+    @property
+    def seen_ns(self) -> int | None:
+        """Time at which a camera last showed the person; None before."""
+        return max((one.seen_ns for one in self.sights if one.seen_ns is not None), default=None)
+
+    def state(self) -> FloatArray | None:
+        """Return the last state (14,); None without one."""
+        found = self.estimate
+        if found.posture is None:
+            return None
+        return np.append(found.posture, np.zeros(2) if found.offset_m is None else found.offset_m)
+
+    def drawn(self, camera: int) -> Silhouette | None:
+        """Return the pixels (H, W) of the last posture in a camera; None without one."""
+        state = self.state()
+        return None if state is None else self.tracker.cameras[camera].drawn(state)
+
+    def expected(self, camera: int) -> Figure | None:
+        """Return the figure of the last posture in a camera; None without one."""
+        state, there = self.state(), self.tracker.cameras[camera]
+        if state is None:
+            return None
+        if there.view is not None:
+            state = there.view.states(state)
+        px = projected(Posed(there.posable, state[None]))[:, :2]
+        if there.view is not None:
+            px = px @ there.view.raw_px[:, :2].T + there.view.raw_px[:, 2]
+        return Figure({name: px[row] for name, row in _PROJECTED.items()})
+
+
+class Session:
+    """Tracks up to six people before up to four cameras.
+
+    Attributes:
+        config: settings of all trackers.
+    """
+
+    def __init__(
+        self,
+        bodies: Sequence[BodyModel],
+        camera: Camera,
+        config: TrackerConfig | None = None,
+        rng: np.random.Generator | None = None,
+        others: Sequence[OtherCamera] = (),
+        people: int | None = None,
+        look: Look | None = None,
+    ) -> None:
+        """Set up for people who may come.
+
+        Args:
+            bodies: the body of each person in the order of their numbers; the last one is also that
+                of further people. People are numbered as they come, and from left to right if
+                they come together.
+            camera: working camera.
+            config: settings of each tracker.
+            rng: source of all noise; seeded with 0 by default.
+            others: further cameras, see :class:`~.tracker.Tracker`.
+            people: number of people, 0 for up to ``MOST_PEOPLE`` who come; None for one without a
+                number, to whom everything belongs that the cameras show.
+            look: finds the points of hands, which are then part of the estimates.
+        """
+        self._bodies, self._camera = tuple(bodies), camera
+        self.config = config or TrackerConfig()
+        self._rng, self._others = rng or np.random.default_rng(0), tuple(others)
+        self._look, self._is_alone = look, people is None
+        self._most = people or MOST_PEOPLE
+        self._people: list[_Person] = []
+        # Images in a row with somebody new, by camera.
+        self._new = [0] * (1 + len(self._others))
+        self._last_ns: int | None = None
+        if self._is_alone:
+            tracker = Tracker(bodies[0], camera, config, rng, others=self._others, look=look)
+            self._people.append(_Person(None, tracker))
+        for _ in range(people or 0):
+            self._add()
+
+    def _add(self) -> _Person:
+        number = len(self._people) + 1
+        body = self._bodies[min(number, len(self._bodies)) - 1]
+        given = body, self._camera, self.config, self._rng.spawn(1)[0]
+        tracker = Tracker(*given, others=self._others, look=self._look)
+        self._people.append(_Person(number, tracker))
+        return self._people[-1]
+
+    @property
+    def trackers(self) -> list[Tracker]:
+        """The tracker of each person, in the order of the estimates."""
+        return [person.tracker for person in self._people]
+
+    @property
+    def agreement(self) -> CameraAgreement | None:
+        """Check of the extrinsics, by the first person; None with one camera."""
+        return self._people[0].tracker.agreement if self._people else None
+
+    def check_cameras(self, is_last: bool = False) -> None:
+        """Estimate the rotation of further cameras if it is due, see :class:`.CameraAgreement`."""
+        agreement = self.agreement
+        if agreement is not None and (agreement.is_due or is_last):
+            agreement.check(is_last)
+
+    def remarks(self, names: Sequence[str]) -> list[str]:
+        """Return warnings about images that contradict each other.
+
+        Args:
+            names: names of all cameras.
+        """
+        told = [text for one in self.trackers for text in one.remarks]
+        if self.agreement is not None:
+            told += self.agreement.remarks(names[1:])
+        return list(dict.fromkeys(told))
+
+    def points_of(self, number: int) -> ImagePoints | None:
+        """Return the points of one of several people in the first camera's last image."""
+        return self._people[number - 1].sights[0].points
+
+    def reset(self, number: int = 1) -> None:
+        """Forget the posture of a person, who keeps the number."""
+        person = self._people[number - 1]
+        person.tracker.reset()
+        person.estimate = Estimate(NO_PERSON, person=person.estimate.person)
+
+    def configure(self, config: TrackerConfig) -> bool:
+        """Use other settings from the next image on.
+
+        Returns:
+            True if tracking starts again, see :meth:`.Tracker.configure`.
+        """
+        self.config = config
+        restarted = [tracker.configure(config) for tracker in self.trackers]
+        return any(restarted)
+
+    def track(self, observations: Observations | Observation) -> list[Estimate]:
+        """Estimate the postures of all people at one time.
+
+        Args:
+            observations: of each camera, the first camera first, as :meth:`.Tracker.track` takes
+                them. Of several people, silhouettes show all of them, and the channel ``people``
+                has the joints of each whom a detector finds; without it there is no detector.
+
+        Returns:
+            The estimate of each person, in the order of the numbers.
+
+        Raises:
+            ValueError: see :meth:`.Tracker.track`.
+        """
+        if self._is_alone:
+            (person,) = self._people
+            person.estimate = person.tracker.track(observations)
+            return [person.estimate]
+        if isinstance(observations, Observation):
+            observations = (observations,)
+        stamp_ns = stamp_of(observations)
+        if stamp_ns is None:
+            stamp_ns = 0 if self._last_ns is None else self._last_ns + _USUAL_NS
+        self._last_ns = stamp_ns
+        seen = [self._shared(*one) for one in enumerate(observations)]
+        for person in self._people:
+            person.estimate = self._tracked(person, [one.get(person.number) for one in seen])
+        return [person.estimate for person in self._people]
+
+    def _shared(self, camera: int, seen: Observation | None) -> dict[int, _Share]:
+        """Return what a camera shows of each person, by number."""
+        assert self._last_ns is not None
+        if seen is None or seen.silhouette is None:
+            return {}
+        silhouette, stamp_ns, given = seen.silhouette, self._last_ns, seen.channels.get("people")
+        is_detected = given is not None
+        if given is not None:
+            shown = _figures(given, silhouette.shape)
+        else:
+            shown = self._regions(camera, silhouette)
+        colours = [_colours_of(one, seen.image, silhouette) for one in shown]
+        found = self._assigned(camera, shown, colours)
+        found |= self._new_people(camera, shown, colours, found)
+        for person in self._people:
+            sight = person.sights[camera]
+            if person.number in found:
+                number = found[person.number]
+                self._see(person, camera, shown[number], colours[number])
+                continue
+            sight.points = None
+            elsewhere = person.seen_ns == stamp_ns
+            if not is_detected or elsewhere:
+                sight.pixels = person.drawn(camera)
+            last_ns = sight.seen_ns
+            if not elsewhere and last_ns is not None and not 0 <= stamp_ns - last_ns <= _HELD_NS:
+                sight.pixels = None
+        for person, number in ((p, found[p.number]) for p in self._people if p.number in found):
+            self._learn(person, camera, colours[number])
+        parts = dict(self._shares(camera, silhouette, found.keys()))
+        return {
+            person.number: self._share_of(person, camera, seen, parts, person.number in found)
+            for person in self._people
+        }
+
+    def _regions(self, camera: int, silhouette: Silhouette) -> list[Shown]:
+        """Return the regions of a silhouette that nobody who is known occupies."""
+        drawn = [pixels for p in self._people if (pixels := p.drawn(camera)) is not None]
+        taken = np.bitwise_or.reduce(drawn) if drawn else np.zeros_like(silhouette)
+        count, labels, stats, _ = cv2.connectedComponentsWithStats(silhouette)
+        shown = []
+        for label in range(1, count):
+            height, area = stats[label, cv2.CC_STAT_HEIGHT], stats[label, cv2.CC_STAT_AREA]
+            is_small = area < _LEAST_AREA * silhouette.size or height < _LEAST_HEIGHT * len(labels)
+            region = labels == label
+            if not is_small and not (taken[region] > 0).any():
+                shown.append(Shown(None, None, np.where(region, np.uint8(255), np.uint8(0))))
+        return shown
+
+    def _assigned(
+        self, camera: int, shown: Sequence[Shown], colours: Sequence[FloatArray | None]
+    ) -> dict[int, int]:
+        """Return which figure each known person is, by number."""
+        known = [person for person in self._people if person.seen_ns is not None]
+        costs = np.full((len(known), len(shown)), _OTHER)
+        for row, person in enumerate(known):
+            for column, one in enumerate(shown):
+                costs[row, column] = self._cost(person, camera, one, colours[column])
+        return {known[row].number: column for row, column in _cheapest(costs).items()}
+
+    def _cost(self, person: _Person, camera: int, one: Shown, colours: FloatArray | None) -> float:
+        """Return how far a figure is from a person: sum of squared deviations."""
+        assert person.seen_ns is not None and self._last_ns is not None
+        if one.figure is None and person.estimate.posture is not None:
+            # Free regions are not those of people who are tracked.
+            return _OTHER
+        sight = person.sights[camera]
+        before, seen_ns = sight.figure, sight.seen_ns
+        if seen_ns != person.seen_ns and (seen_ns is None or self._last_ns - seen_ns > _DROPPED_NS):
+            # Another camera has seen the person since.
+            before, seen_ns = person.expected(camera), person.fitted_ns
+        # Unknown colours, such as those of a person in a grey image, agree with all.
+        other, gap = ALIKE / 2, self._gap(person, camera, one)
+        if colours is not None and sight.colours is not None:
+            other = apart(sight.colours, colours)
+        away_ns = abs(self._last_ns - (seen_ns or 0))
+        if away_ns > GONE_NS or one.figure is None or before is None:
+            return _OTHER * (other / ALIKE) ** 2 + gap
+        deviation = _PLACE + _PLACE_PER_S * away_ns / 1e9
+        return (other / _COLOURS) ** 2 + (before.apart(one.figure) / deviation) ** 2 + gap
+
+    def _gap(self, person: _Person, camera: int, one: Shown) -> float:
+        """Return how far a figure is from those in other cameras: sum of squared deviations."""
+        total = 0.0
+        for number, sight in enumerate(person.sights):
+            if sight.seen_ns != self._last_ns or number == camera:
+                continue
+            if sight.figure is None or one.figure is None:
+                continue
+            here, there = (
+                self._sight_line(camera, one.figure),
+                self._sight_line(number, sight.figure),
+            )
+            ahead = np.column_stack([here[1], -there[1]])
+            between = there[0] - here[0]
+            depths_m = np.linalg.lstsq(ahead, between, rcond=None)[0]
+            trunks_m = np.maximum(depths_m, 1e-3) * [here[2], there[2]]
+            sizes = np.log(trunks_m / _TRUNK_M) / _TRUNK
+            total += float(np.sum(((ahead @ depths_m - between) / _GAP_M) ** 2) + sizes @ sizes)
+        return total
+
+    def _sight_line(self, camera: int, figure: Figure) -> tuple[FloatArray, FloatArray, float]:
+        """Return place and direction of a line of sight, and the trunk's angle.
+
+        Both are in the first optical frame; the direction has the length of a metre of depth.
+        """
+        one = self._others[camera - 1].camera if camera else self._camera
+        (column, row), trunk = figure.middle_px, figure.trunk_px / one.fx
+        ahead = np.array([(column - one.cx) / one.fx, (row - one.cy) / one.fy, 1.0])
+        if not camera:
+            return np.zeros(3), ahead, trunk
+        pose = self._others[camera - 1].extrinsics
+        return -pose.translation_m @ pose.rotation, ahead @ pose.rotation, trunk
+
+    def _new_people(
+        self,
+        camera: int,
+        shown: Sequence[Shown],
+        colours: Sequence[FloatArray | None],
+        found: dict[int, int],
+    ) -> dict[int, int]:
+        """Return the figures of people who are new, by number, and know them from now on."""
+        sights = [p.sights[camera] for p in self._people if p.number not in found]
+        others = [shown[number].pixels for number in found.values()]
+        others += [sight.pixels for sight in sights if sight.pixels is not None]
+        taken = np.bitwise_or.reduce(others) if others else None
+        free = []
+        for number, one in enumerate(shown):
+            is_clear = taken is None or _share(one.pixels, taken) < _MIXED
+            is_certain = one.points is None or one.points.are_certain
+            if number not in found.values() and is_clear and is_certain:
+                free.append(number)
+        waiting = [person for person in self._people if person.seen_ns is None]
+        room = self._most - (len(self._people) - len(waiting))
+        is_known = len(waiting) < len(self._people)
+        self._new[camera] = self._new[camera] + 1 if free and room else 0
+        if not free or room <= 0 or (is_known and self._new[camera] < _PROVED):
+            return {}
+        sizes = [np.count_nonzero(shown[number].pixels) for number in free]
+        largest = sorted(free, key=lambda number: -sizes[free.index(number)])[:room]
+        added = {}
+        for number in sorted(largest, key=lambda number: _middle(shown[number].pixels)):
+            person = waiting.pop(0) if waiting else self._add()
+            person.sights[camera].colours = colours[number]
+            added[person.number] = number
+        self._new[camera] = 0
+        return added
+
+    def _see(self, person: _Person, camera: int, one: Shown, colours: FloatArray | None) -> None:
+        assert self._last_ns is not None
+        sight = person.sights[camera]
+        if person.seen_ns is not None and self._last_ns - person.seen_ns > GONE_NS:
+            person.tracker.reset()
+            person.chance = _chance_of_same(sight.colours, colours)
+        sight.points, sight.figure, sight.pixels = one.points, one.figure, one.pixels
+        sight.seen_ns = self._last_ns
+
+    def _learn(self, person: _Person, camera: int, colours: FloatArray | None) -> None:
+        """Learn the colours of somebody whom nobody covers."""
+        sight = person.sights[camera]
+        assert sight.pixels is not None
+        if colours is None or self._share_of_others(person, camera, sight.pixels) > _LEARNS:
+            return
+        if sight.colours is None or len(sight.colours) != len(colours):
+            sight.colours = colours
+        sight.colours = (1 - _LEARN_RATE) * sight.colours + _LEARN_RATE * colours
+
+    def _share_of_others(self, person: _Person, camera: int, pixels: Silhouette) -> float:
+        """Return the share of a person's pixels that are also those of others."""
+        sights = [one.sights[camera] for one in self._people if one is not person]
+        others = [sight.pixels for sight in sights if sight.pixels is not None]
+        return _share(pixels, np.bitwise_or.reduce(others)) if others else 0.0
+
+    def _is_somebody_else(self, person: _Person, seen: Observation) -> bool:
+        """Return whether a tracker follows the region of another person, by the colours."""
+        own, colours, known = seen.silhouette, None, person.sights[0].colours
+        if own is not None and own.any():
+            colours = _colours_of(Shown(None, None, own), seen.image, own)
+        if colours is None or known is None:
+            return False
+        is_other = apart(known, colours) > ALIKE
+        person.others_images = person.others_images + 1 if is_other else 0
+        return person.others_images >= _OTHERS_IMAGES
+
+    def _shares(
+        self, camera: int, silhouette: Silhouette, seen: Container[int]
+    ) -> Iterator[tuple[int, tuple[Silhouette, Silhouette]]]:
+        """Yield each person's part of the silhouette, and the parts of others, by number.
+
+        A pixel belongs to the nearest figure; in the figures of several, nobody knows whose it is.
+        """
+        there = [
+            (person.number, pixels)
+            for person in self._people
+            if (pixels := person.sights[camera].pixels) is not None
+        ]
+        if len(there) == 1:
+            yield there[0][0], (silhouette, np.zeros_like(silhouette))
+        if len(there) < 2:
+            return
+        away = []
+        for number, pixels in there:
+            # Who is not seen is behind the others.
+            behind_px = 0.0 if number in seen else 0.5
+            away.append(cv2.distanceTransform(255 - pixels, cv2.DIST_L2, 3) + behind_px)
+        for row, (number, _) in enumerate(there):
+            others = np.delete(away, row, axis=0).min(axis=0)
+            own = np.where(away[row] < others, silhouette, np.uint8(0))
+            yield number, (own, silhouette & ~own)
+
+    def _share_of(
+        self,
+        person: _Person,
+        camera: int,
+        seen: Observation,
+        parts: Mapping[int, tuple[Silhouette, Silhouette]],
+        is_found: bool,
+    ) -> _Share:
+        """Return what a camera shows of a person with these :meth:`_shares`."""
+        assert seen.silhouette is not None
+        pixels, nothing = person.sights[camera].pixels, np.zeros(seen.silhouette.shape, np.uint8)
+        own, covered = parts.get(person.number, (nothing, nothing))
+        more = {"covered": covered} if covered.any() else {}
+        points = person.sights[camera].points
+        one = seen.having(silhouette=own, points=points, people=None, **more)
+        is_missed = is_hidden = False
+        if not is_found and pixels is not None and _share(pixels, own) < _SEEN:
+            is_missed = True
+            is_hidden = self._share_of_others(person, camera, pixels) >= _HIDDEN
+        is_detected = "people" in seen.channels
+        return _Share(one, is_found, is_missed, is_hidden, is_detected)
+
+    def _tracked(self, person: _Person, shares: Sequence[_Share | None]) -> Estimate:
+        """Return the estimate of a person of whom each camera shows this."""
+        seen_ns, now_ns, last = person.seen_ns, self._last_ns, person.estimate
+        there = [one for one in shares if one is not None]
+        if seen_ns is None or not there:
+            return _held(last)
+        assert now_ns is not None
+        if all(one.is_missed for one in there):
+            if any(one.is_hidden for one in there):
+                return _held(last, hidden=True)
+            if now_ns - seen_ns <= _DROPPED_NS:
+                return _held(last)
+        is_detected = any(one.is_detected for one in there)
+        if is_detected and now_ns - seen_ns > GONE_NS:
+            # The rest of the silhouette is that of others: only an image of them brings them back.
+            gone = Estimate(NO_PERSON if last.state == NO_PERSON else LOST)
+            return replace(gone, person=person.number, person_chance=person.chance)
+        # A camera that misses the person, whom another one shows, tells nothing.
+        least = min(one.is_missed for one in there)
+        used = [one is not None and one.is_missed == least for one in shares]
+        found = person.tracker.track(
+            [
+                one.seen if one is not None and is_used else Observation(stamp_ns=now_ns)
+                for one, is_used in zip(shares, used, strict=True)
+            ]
+        )
+        found = replace(found, person=person.number, person_chance=person.chance)
+        if found.posture is not None:
+            person.fitted_ns = now_ns
+            if not is_detected:
+                for sight, is_used in zip(person.sights, used, strict=False):
+                    sight.seen_ns = now_ns if is_used else sight.seen_ns
+                if self._is_somebody_else(person, there[0].seen):
+                    person.tracker.reset()
+                    return Estimate(NO_PERSON, person=person.number)
+        elif any(one.is_found for one in there) and now_ns - person.fitted_ns <= _DROPPED_NS:
+            return _held(last)
+        return found
+
+
+def _held(last: Estimate, hidden: bool = False) -> Estimate:
+    """Return the last estimate for an image that does not show the person, or not well."""
+    if last.posture is None:
+        return last
+    hands = None if last.hands is None else (None, None)
+    states: tuple[KeypointState, ...] = (KeypointState.HIDDEN,) * 6
+    if not hidden and last.keypoint_states is not None:
+        states = doubted(last.keypoint_states)
+    legs = None if last.legs is None else last.legs.hidden()
+    return replace(last, state=UNCERTAIN, keypoint_states=states, legs=legs, hands=hands)
+
+
+def _figures(points: Sequence[ImagePoints], shape: tuple[int, ...]) -> list[Shown]:
+    shown = []
+    for one in points:
+        figure = figure_of_points(one)
+        if np.isfinite(figure.trunk_px):
+            shown.append(Shown(one, figure, figure.drawn(shape)))
+    return shown
+
+
+def _share(pixels: Silhouette, of: Silhouette) -> float:
+    """Return the share of the pixels (H, W) that are not 0 in ``of``."""
+    return cv2.countNonZero(pixels & of) / max(cv2.countNonZero(pixels), 1)
+
+
+def _middle(pixels: Silhouette) -> float:
+    """Return the mean column of pixels that are not 0."""
+    return float(np.nonzero(pixels)[1].mean())
+
+
+def _colours_of(one: Shown, image: Image | None, silhouette: Silhouette) -> FloatArray | None:
+    """Return the histogram of the trunk's colours, or brightness; None if it is not seen."""
+    if image is None:
+        return None
+    if one.figure is None:
+        rows = np.nonzero(one.pixels.any(axis=1))[0]
+        trunk = one.pixels.copy()
+        top, height = int(rows[0]), int(rows[-1] - rows[0])
+        trunk[: top + height // 5] = trunk[top + height // 2 :] = 0
+    else:
+        trunk = one.figure.trunk(silhouette.shape)
+    trunk &= silhouette
+    return colours_in(image, trunk)
+
+
+def _chance_of_same(before: FloatArray | None, now: FloatArray | None) -> float:
+    """Return the probability that colours are those of one person; without them, it is even."""
+    away = ALIKE if before is None or now is None else apart(before, now)
+    return float(1.0 / (1.0 + np.exp((away - ALIKE) / _ALIKE_SPREAD)))
+
+
+def _cheapest(costs: FloatArray) -> dict[int, int]:
+    """Return the column of each row that has one below ``_OTHER``, with the least sum.
+
+    A row without a column counts ``_OTHER``. The time grows with 2 to the number of rows.
+
+    Args:
+        costs: (N, M), of few rows.
+    """
+    best: dict[int, tuple[float, dict[int, int]]] = {0: (0.0, {})}
+    for column in range(costs.shape[1]):
+        for taken, (total, pairs) in list(best.items()):
+            for row in np.flatnonzero(costs[:, column] < _OTHER).tolist():
+                key, now = taken | 1 << row, total + float(costs[row, column]) - _OTHER
+                if not taken >> row & 1 and (key not in best or now < best[key][0]):
+                    best[key] = now, {**pairs, row: column}
+    return min(best.values(), key=lambda one: one[0])[1]
