@@ -53,10 +53,12 @@ ARGUMENTS = {
         choices=("raw", "compressed"),
     ),
     "person_distance_m": Argument(
-        *("2.0", "level distance from the camera to the person", float), limits=(0.3, 20.0)
+        *("", "level distance from the camera to the person; empty: 2 m, or found", float),
+        limits=(0.3, 20.0),
     ),
     "camera_pitch_deg": Argument(
-        "0.0", "how far the camera looks down", float, limits=(-80.0, 80.0)
+        *("", "how far the camera looks down; empty: it is level, or found", float),
+        limits=(-80.0, 80.0),
     ),
     "side_turn": Argument(
         *("left", "direction in which the person turns for the side reference: left or right"),
@@ -70,6 +72,11 @@ ARGUMENTS = {
         *("0.0", "height of a person who is not measured, who is tracked at once", float),
         limits=(0.0, 2.2),
     ),
+    "statures": Argument(
+        *("", "heights of several people who are not measured, such as [1.75, 1.62]", list),
+        limits=(1.1, 2.2),
+    ),
+    "people": Argument("0", "number of people; 0: one", int, limits=(0, 6)),
     "preset": Argument(
         "default", "tracker settings: paper or default", choices=("paper", "default")
     ),
@@ -123,7 +130,7 @@ GIVEN = {
     ),
     "tracker": (
         "preset",
-        "stature",
+        *("stature", "statures", "people", "person_distance_m", "camera_pitch_deg"),
         "rep155_id",
         "cameras",
         "extrinsics_file",
@@ -131,7 +138,7 @@ GIVEN = {
         "keypoints",
         "hands",
     ),
-    "detector": ("image_transport",),
+    "detector": ("image_transport", "people"),
 }
 # Nodes of cardbox_nodes; the detector always has a process of its own.
 TOGETHER = ("background", "initializer", "tracker")
@@ -290,8 +297,13 @@ def _typed(given: dict[str, str], node: str, camera: str = "") -> dict[str, obje
         # Each camera has its own background.
         path = Path(kept)
         typed["background_file"] = str(path.with_name(f"{path.stem}_{camera}{path.suffix}"))
+    if node == "tracker" and not (typed["stature"] or typed["statures"] or typed["keypoints"]):
+        # The body that the initializer measures has them.
+        typed["person_distance_m"] = typed["camera_pitch_deg"] = None
     # An empty list has no type in ROS, so it is left out.
-    found: dict[str, object] = {name: typed[name] for name in GIVEN[node] if typed[name] != []}
+    found: dict[str, object] = {
+        name: typed[name] for name in GIVEN[node] if typed[name] not in (None, [])
+    }
     if node == "detector":
         found["publish_silhouette"] = typed["silhouettes"] == "detector"
     return found | _queue(given, node, camera)

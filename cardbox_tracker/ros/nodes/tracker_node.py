@@ -29,7 +29,7 @@ from cardbox_tracker.ros.messages import conversions
 from cardbox_tracker.ros.nodes.camera_inputs import CameraInputs, Received
 from cardbox_tracker.ros.nodes.rep155_outputs import TrackedBodies
 from cardbox_tracker.ros.nodes.tracker_outputs import TrackerOutputs
-from cardbox_tracker.ros.nodes.tracker_parameters import TrackerParameters
+from cardbox_tracker.ros.nodes.tracker_parameters import NOT_GIVEN_DEG, TrackerParameters
 from cardbox_tracker.ros.runtime import qos
 from cardbox_tracker.ros.runtime.command_line import plain_command_line
 from cardbox_tracker.ros.runtime.node import CardboxNode, run_node
@@ -126,34 +126,35 @@ class FoundBody:
         self,
         node: CardboxNode,
         settings: TrackerParameters,
-        guess: BodyModel,
-        use: Callable[[BodyModel], None],
+        use: Callable[[Sequence[BodyModel]], None],
     ) -> None:
-        """Use ``guess`` now, and again with the camera's pitch when the detector finds it."""
+        """Use the settings' guesses now, and with the camera's pitch when the detector finds it."""
         self.text = ""
-        self._node, self._settings, self._guess, self._use = node, settings, guess, use
+        self._node, self._settings, self._use = node, settings, use
         self._is_measured = False
         self._model = node.advertise(String, "body_model", qos.LATCHED)
         self._description = node.advertise(String, "robot_description", qos.LATCHED)
-        node.subscribe(Float64, "detector/camera_pitch", self._on_pitch, qos.LATCHED)
+        if settings.camera_pitch_deg == NOT_GIVEN_DEG:
+            node.subscribe(Float64, "detector/camera_pitch", self._on_pitch, qos.LATCHED)
+        given = settings.statures or [settings.stature]
         stature = (
-            f"a stature of {settings.stature:g} m"
-            if settings.stature
+            f"a stature of {' and '.join(f'{one:g}' for one in given)} m"
+            if given[0]
             else "the mean stature of people, so sizes and distances may be wrong by a tenth"
         )
         node.get_logger().info(
             f"nobody is measured: the person in the image is tracked with {stature}"
         )
-        use(guess)
+        use(settings.guesses)
 
     def _on_pitch(self, message: Float64, _: int) -> None:
         if not self._is_measured:
             # The message has no deviation; this is the largest one of a pitch that is found.
             tilt = {"camera_pitch_rad": message.data, "pitch_stddev_rad": FOUND_STDDEV}
-            body = self._guess.with_values(**tilt)
+            bodies = [body.with_values(**tilt) for body in self._settings.guesses]
             degrees = math.degrees(message.data)
             self._node.diagnostics.say("pitch", f"the detector found a pitch of {degrees:.0f} deg")
-            self._use(body)
+            self._use(bodies)
 
     def replace(self, text: str) -> None:
         """Latch the text of a measured body, too, so that late subscribers get one body."""
@@ -192,7 +193,7 @@ class TrackerNode(CardboxNode):
         self._look = HandNetwork(installed_hands()) if settings.hands else None
         self._prepared: set[str] = set()
         self._prepare(settings)
-        self._body: BodyModel | None = None
+        self._bodies: Sequence[BodyModel] = ()
         self._camera: Camera | None = None
         self._others: Sequence[OtherCamera] = ()
         self._session: Session | None = None
@@ -214,9 +215,9 @@ class TrackerNode(CardboxNode):
         )
         self._found: FoundBody | None = None
         if settings.model_file:
-            self._use(load_body_model(user_path(settings.model_file)))
-        elif settings.guess is not None:
-            self._found = FoundBody(self, settings, settings.guess, self._use)
+            self._use([load_body_model(user_path(settings.model_file))])
+        elif settings.guesses:
+            self._found = FoundBody(self, settings, self._use)
         self._wait()
 
     def _prepare(self, settings: TrackerParameters) -> None:
@@ -235,8 +236,8 @@ class TrackerNode(CardboxNode):
         if self._found is not None and message.data == self._found.text:
             return
         body = self._rolled(loads_body_model(message.data, source=self._model_topic))
-        if body != self._body:
-            self._use(body)
+        if self._bodies != [body]:
+            self._use([body])
         if self._found is not None:
             self._found.replace(message.data)
 
@@ -251,12 +252,13 @@ class TrackerNode(CardboxNode):
             )
         return body.with_values(camera_roll_rad=roll_rad)
 
-    def _use(self, body: BodyModel) -> None:
-        self._body = body = self._rolled(body)
-        needs_images = body.appearance is not None or bool(body.unknown) or bool(self._look)
-        self._inputs.wait_for_images(needs_images)
-        if body.doubt:
-            self.get_logger().warning(body.doubt)
+    def _use(self, bodies: Sequence[BodyModel]) -> None:
+        self._bodies = [self._rolled(body) for body in bodies]
+        needs_images = any(body.appearance is not None or body.unknown for body in self._bodies)
+        self._inputs.wait_for_images(needs_images or bool(self._look))
+        for body in self._bodies:
+            if body.doubt:
+                self.get_logger().warning(body.doubt)
         self._build("new body model")
         self._wait()
 
@@ -284,13 +286,13 @@ class TrackerNode(CardboxNode):
 
         The same seed and images give the same results, also after a reset.
         """
-        if self._body is None or self._camera is None:
+        if not self._bodies or self._camera is None:
             return
         settings = self.parameters.value
         rng = np.random.default_rng(settings.seed)
         people = settings.people or None
         given = settings.config(), rng, self._others, people, self._look
-        self._session = Session([self._body], self._camera, *given)
+        self._session = Session(self._bodies, self._camera, *given)
         for report, tracker in zip(self._reports, self._session.trackers, strict=True):
             report.start(tracker.body)
         self.diagnostics.say(reason, f"{reason}: tracking starts from the front reference posture")
@@ -298,7 +300,7 @@ class TrackerNode(CardboxNode):
     def _reset(self) -> str:
         """Answer the service ``reset``."""
         if self._session is None:
-            missing = self._model_topic if self._body is None else self._inputs.missing
+            missing = self._model_topic if not self._bodies else self._inputs.missing
             raise CameraError(
                 f"nothing to reset: the tracker has not started, it waits for {missing}"
             )
@@ -314,7 +316,7 @@ class TrackerNode(CardboxNode):
 
     def _wait(self) -> None:
         """Report missing inputs."""
-        if self._body is None:
+        if not self._bodies:
             self.diagnostics.wait_for(
                 f"a body model on {self._model_topic} (call initializer/initialize, or give "
                 "model_file or stature)"

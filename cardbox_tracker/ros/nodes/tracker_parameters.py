@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from dataclasses import dataclass
 from types import MappingProxyType
@@ -9,6 +10,7 @@ from typing import Any
 
 from cardbox_tracker.camera.pairing import camera_names
 from cardbox_tracker.common.settings import NoEffectError, nested, settings_of
+from cardbox_tracker.measuring.scene_camera import GIVEN_STDDEV
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.proportions import (
     STATURE_LIMITS_M,
@@ -37,6 +39,8 @@ from cardbox_tracker.search.whole_body_config import WholeBodyConfig
 from cardbox_tracker.tracking.session import MOST_PEOPLE
 
 _NEXT_START = "next start of tracking"
+NOT_GIVEN_DEG = 90.0
+"""Pitch of a camera that is not given, deg."""
 
 _PARAMETERS = MappingProxyType(
     {
@@ -140,6 +144,28 @@ class TrackerParameters(NodeParameters):
         limits=(0.0, STATURE_LIMITS_M[1]),
         effect=AT_START,
     )
+    statures: list[float] = parameter(
+        [],
+        "heights of several people who are not measured, instead of stature: from left to right if "
+        "they come together, else as they come; the last one is also that of further people",
+        unit="m",
+        effect=AT_START,
+    )
+    person_distance_m: float = parameter(
+        0.0,
+        "with people who are not measured: level distance from the camera at first; 0: it is found",
+        unit="m",
+        limits=(0.0, 20.0),
+        effect=AT_START,
+    )
+    camera_pitch_deg: float = parameter(
+        NOT_GIVEN_DEG,
+        "with people who are not measured: pitch of the camera, positive downwards; 90: the "
+        "detector finds it, or the camera is taken as level",
+        unit="deg",
+        limits=(-80.0, NOT_GIVEN_DEG),
+        effect=AT_START,
+    )
     torso_place: bool = parameter(
         True,
         "joint_states also has the joints of place, neck and clavicles; "
@@ -196,14 +222,18 @@ class TrackerParameters(NodeParameters):
         return self.keypoints.endswith(".csv")
 
     @property
-    def guess(self) -> BodyModel | None:
-        """Body of a person who is not measured; None if a measured one is waited for."""
-        if not (self.stature or self.keypoints) or self.model_file or len(self.cameras) > 1:
-            return None
-        if self.stature:
-            return body_from_proportions(self.stature)
-        unsure = USUAL_STDDEV_M / USUAL_STATURE_M
-        return body_from_proportions(USUAL_STATURE_M).with_values(stature_stddev=unsure)
+    def guesses(self) -> tuple[BodyModel, ...]:
+        """Bodies of people who are not measured; empty if a measured one is waited for."""
+        given = self.statures or [self.stature] * (self.stature > 0.0)
+        if not (given or self.keypoints) or self.model_file or len(self.cameras) > 1:
+            return ()
+        place, pitch_deg = self.person_distance_m or None, self.camera_pitch_deg
+        bodies = [body_from_proportions(one, place) for one in given or [USUAL_STATURE_M]]
+        changes = {} if given else {"stature_stddev": USUAL_STDDEV_M / USUAL_STATURE_M}
+        if pitch_deg != NOT_GIVEN_DEG:
+            changes["camera_pitch_rad"] = math.radians(pitch_deg)
+            changes["pitch_stddev_rad"] = GIVEN_STDDEV
+        return tuple(body.with_values(**changes) for body in bodies)
 
     def config(self) -> TrackerConfig:
         """Return the settings of the core.
@@ -255,15 +285,30 @@ class TrackerParameters(NodeParameters):
                 "keypoints, such as detector/keypoints"
             )
         camera_names(self.cameras)
-        if self.stature and len(self.cameras) > 1:
+        if self.statures and (self.stature or len(self.statures) > self.people):
+            raise ValueError(
+                f"statures has {len(self.statures)} heights; expected them instead of stature, and "
+                f"people as their number or more, which is {self.people}"
+            )
+        is_placed = bool(self.person_distance_m) or self.camera_pitch_deg != NOT_GIVEN_DEG
+        if is_placed and not self.guesses:
+            raise ValueError(
+                "person_distance_m and camera_pitch_deg are of people who are not measured: give "
+                "stature, statures or keypoints, too, or leave them out, because a body model has "
+                "its own"
+            )
+        if (self.stature or self.statures) and len(self.cameras) > 1:
             raise ValueError(
                 "stature is for one camera; with several, have the person measured instead: "
                 "call initializer/initialize, or give model_file"
             )
-        if 0.0 < self.stature < STATURE_LIMITS_M[0]:
+        lowest_m, highest_m = STATURE_LIMITS_M
+        given = self.stature or lowest_m, *self.statures
+        wrong = [one for one in given if not lowest_m <= one <= highest_m]
+        if wrong:
             raise ValueError(
-                f"stature is {self.stature:g} m; expected {STATURE_LIMITS_M[0]:g} to "
-                f"{STATURE_LIMITS_M[1]:g} m, or 0 if it is not known"
+                f"stature is {wrong[0]:g} m; expected {lowest_m:g} to "
+                f"{highest_m:g} m, or 0 if it is not known"
             )
         if len(self.cameras) > 1 and self.keypoints.startswith("/") and not self.has_point_table:
             raise ValueError(

@@ -36,7 +36,8 @@ class Argument:
     """One argument of a launch file.
 
     Attributes:
-        default: default as text; None if the argument is required.
+        default: default as text; None if the argument is required. A number whose default is
+            empty may be left out.
         meaning: one line for ``--show-args``.
         kind: type of its value; ``list`` is a list of numbers, ``Path`` the name of a file to read.
         choices: allowed texts; empty if any text is allowed.
@@ -52,8 +53,8 @@ class Argument:
     limits: tuple[float, float] | None = None
     name: bool = False
 
-    def value(self, text: str) -> Value:
-        """Return the value of ``text``.
+    def value(self, text: str) -> Value | None:
+        """Return the value of ``text``; None for a number that is left out.
 
         Raises:
             ValueError: ``text`` is not valid; the error's text is the expectation.
@@ -66,24 +67,30 @@ class Argument:
             return _names(text)
         if self.name:
             expected = "a letter, then letters, digits and underscores, or nothing"
+        if self.kind is float and self.default == text.strip() == "":
+            return None
         found = _parsed(self.kind, text.strip())
         if (
             found is None
             or (self.choices and found not in self.choices)
             or (self.name and not re.fullmatch(r"([A-Za-z]\w*)?", text, re.ASCII))
-            or (isinstance(found, int | float) and not lowest <= found <= highest)
+            or any(
+                not lowest <= one <= highest
+                for one in (found if isinstance(found, list) else [found])
+                if isinstance(one, int | float)
+            )
         ):
             raise ValueError(expected)
         return found
 
 
-def values(arguments: Mapping[str, Argument], given: Mapping[str, str]) -> dict[str, Value]:
+def values(arguments: Mapping[str, Argument], given: Mapping[str, str]) -> dict[str, Value | None]:
     """Return the value of each of ``arguments`` from the texts ``given`` by name.
 
     Raises:
         CardboxError: values are wrong; the text has each of them and the expectation.
     """
-    found: dict[str, Value] = {}
+    found: dict[str, Value | None] = {}
     wrong = []
     for name, argument in arguments.items():
         try:

@@ -70,21 +70,50 @@ def test_a_measured_body_replaces_it(bus: Any, start: Any) -> None:
     bus.send("/body_model", String(data=measured))
     bus.send("/detector/camera_pitch", Float64(data=0.2))
     show(bus, 2)
-    assert node._body == loads_body_model(measured)
+    assert node._bodies == [loads_body_model(measured)]
     assert bus.texts("/body_model")[-1] == measured
 
 
 def test_the_detectors_pitch_is_used(bus: Any, start: Any) -> None:
     node = start(keypoints="detector/keypoints")
-    assert node._body is not None
-    assert node._body.sizes.tolist() == body_from_proportions(USUAL_STATURE_M).sizes.tolist()
-    assert node._body.stature_stddev == pytest.approx(0.09 / 1.69)
+    [body] = node._bodies
+    assert body.sizes.tolist() == body_from_proportions(USUAL_STATURE_M).sizes.tolist()
+    assert body.stature_stddev == pytest.approx(0.09 / 1.69)
     bus.send("/detector/camera_pitch", Float64(data=0.2))
-    assert node._body.camera_pose.pitch_rad == 0.2
+    assert node._bodies[0].camera_pose.pitch_rad == 0.2
     # What a standing person shows is not as sure as a measured pitch.
-    assert node._body.camera_pose.pitch_stddev_rad == FOUND_STDDEV
+    assert node._bodies[0].camera_pose.pitch_stddev_rad == FOUND_STDDEV
     bus.send("/detector/camera_pitch", Float64(data=float("nan")))
-    assert node._body.camera_pose.pitch_rad == 0.2
+    assert node._bodies[0].camera_pose.pitch_rad == 0.2
+
+
+def test_what_is_given_of_people_and_camera_is_used(bus: Any, start: Any) -> None:
+    given = {"statures": [1.75, 1.62], "people": 2}
+    node = start(**given, person_distance_m=2.5, camera_pitch_deg=10.0)
+    with pytest.raises(KeyError):
+        bus.send("/detector/camera_pitch", Float64(data=0.2))
+    lengths_m = [body.size("upper_arm_length") for body in node._bodies]
+    assert lengths_m == [
+        body_from_proportions(stature_m).size("upper_arm_length") for stature_m in (1.75, 1.62)
+    ]
+    for body in node._bodies:
+        assert body.placement.distance_m == 2.5 and "distance_m" not in body.unknown
+        assert body.camera_pose.pitch_rad == pytest.approx(np.radians(10.0))
+
+
+@pytest.mark.parametrize(
+    ("given", "expected"),
+    [
+        ({"statures": [1.75, 1.62], "people": 1}, "statures has 2 heights"),
+        ({"statures": [1.75], "people": 1, "stature": 1.7}, "instead of stature"),
+        ({"statures": [0.3], "people": 1}, "stature is 0.3 m"),
+        ({"person_distance_m": 2.0}, "give stature, statures or keypoints"),
+        ({"camera_pitch_deg": 0.0, "model_file": "me.yaml"}, "a body model has its own"),
+    ],
+)
+def test_what_would_have_no_effect_is_refused(given: dict[str, Any], expected: str) -> None:
+    with pytest.raises(ValueError, match=expected):
+        TrackerParameters(**given).check()
 
 
 @pytest.mark.parametrize(
