@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from cardbox_tracker.commands.arguments import (
     add_force,
@@ -11,6 +12,10 @@ from cardbox_tracker.commands.arguments import (
     check_outputs,
 )
 from cardbox_tracker.common.files import body_beside, body_of_person
+
+if TYPE_CHECKING:
+    from cardbox_tracker.applications.exporting.formats import Format
+    from cardbox_tracker.person.model import BodyModel
 
 NAME = "export"
 HELP = "write results as TRC, MOT, BVH or C3D, or as joint angles of the ISB"
@@ -56,12 +61,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(options: argparse.Namespace) -> None:
     """Read the results and write the file."""
     from cardbox_tracker.applications.exporting.formats import FORMATS
-    from cardbox_tracker.applications.exporting.motion import Motion
-    from cardbox_tracker.applications.exporting.placed import images_of_body
-    from cardbox_tracker.person.legs import floor_m
     from cardbox_tracker.person.model_file import load_body_model
-    from cardbox_tracker.recordings.result_reader import read_results
-    from cardbox_tracker.tracking.estimate import UNCERTAIN
 
     chosen = FORMATS[options.to]
     output = options.output or Path(options.results.resolve().stem + chosen.suffix)
@@ -69,14 +69,39 @@ def run(options: argparse.Namespace) -> None:
     check_outputs((output,), options.force, inputs=(options.results, options.model, beside))
     chosen.check()
     given = None if options.model is None else load_body_model(options.model)
-    results = read_results(options.results, options.person)
+    export(options.results, options.person, chosen, output, given)
+    if given is None and chosen.has_places and beside.is_file():
+        print(f"took the body of {beside}; --model gives another")
+
+
+def export(
+    path: Path, person: int | None, chosen: Format, output: Path, given: BodyModel | None = None
+) -> None:
+    """Write results in a format, and print what is exported.
+
+    Args:
+        path: table or bag.
+        person: number of one of several people.
+        chosen: the format.
+        output: file to write.
+        given: the person that was tracked; None for the one of the results.
+
+    Raises:
+        CardboxError: the results cannot be read, have no posture or are those of another body, or
+            the file cannot be written.
+    """
+    from cardbox_tracker.applications.exporting.motion import Motion
+    from cardbox_tracker.applications.exporting.placed import images_of_body
+    from cardbox_tracker.person.legs import floor_m
+    from cardbox_tracker.recordings.result_reader import read_results
+    from cardbox_tracker.tracking.estimate import UNCERTAIN
+
+    results = read_results(path, person)
     motion = Motion.of(results)
     body = given or results.body
     images, seen = len(motion.state), int(motion.is_seen.sum())
     if body is not None and chosen.has_places:
         motion = images_of_body(motion, body)
-        if given is None and beside.is_file():
-            print(f"took the body of {beside}; --model gives another")
     chosen.write(output, motion, body)
     print(
         f"exported {seen} of {images} images, {motion.state.count(UNCERTAIN)} of them uncertain; "
