@@ -61,7 +61,9 @@ def angles_plot(results: Results) -> bytes:
         row.margins(x=0.0)
         row.grid(alpha=0.3)
         row.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0), fontsize=8, frameon=False)
-    row.set_xlabel("time [s]; orange: may be wrong, grey: no posture")
+    row.set_xlabel(
+        "time [s]; bands: one standard deviation; orange: may be wrong, grey: no posture"
+    )
     return png_of(figure)
 
 
