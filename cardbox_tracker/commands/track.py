@@ -207,7 +207,8 @@ def _write_derived(
     from cardbox_tracker.commands.export import export
     from cardbox_tracker.recordings.result_reader import read_results
 
-    numbers = [number for number, one in summary.people.items() if one.frames_tracked] or [None]
+    tracked = (number for number, one in summary.people.items() if one.frames_tracked)
+    numbers: list[int | None] = [*tracked] or [None]
     people = {number: read_results(table, number) for number in numbers}
     if options.plot is not None:
         for number, results in people.items():

@@ -81,7 +81,7 @@ def main(arguments: list[str] | None = None) -> int:
         np.savez_compressed(
             file,
             fov_deg=film.fov_deg,
-            stature_m=film.session.truth.stature_m,
+            stature_m=np.array(film.session.truth.stature_m, float),
             true_m=true_m,
             points_px=np.array([one.points_px for one in found], np.float32),
             scores=np.array([one.scores for one in found], np.float16),

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import re
+import shutil
+import subprocess
 from collections.abc import Callable
 from html.parser import HTMLParser
 from pathlib import Path
@@ -75,6 +77,29 @@ def test_one_command_writes_exports_plot_and_page(
     for word in ("--stature M", "--fov DEG", "angles"):
         assert word in line
     assert not re.search("taken as that|nothing tells", done.err)
+
+
+BROWSER = next(filter(None, map(shutil.which, ("chromium", "google-chrome", "chrome"))), None)
+
+
+@pytest.mark.skipif(BROWSER is None, reason="no Chromium on the PATH")
+def test_a_browser_runs_the_page_and_finds_its_film(
+    tmp_path: Path, film: Path, cardbox: Callable
+) -> None:
+    page, table = tmp_path / "her.html", tmp_path / "her.csv"
+    words = ("track", film, "--detector", "mediapipe", "--end", 0.2, "--csv", table)
+    assert cardbox(*words, "--report", page).code == 0
+    assert 'id="missing" hidden=""' in in_browser(page)
+    (tmp_path / "her.mp4").unlink()
+    assert 'id="missing">' in in_browser(page)
+
+
+def in_browser(page: Path) -> str:
+    """Return the page after its script ran."""
+    flags = "--headless", "--no-sandbox", "--virtual-time-budget=3000", "--dump-dom"
+    profile = f"--user-data-dir={page.parent / 'profile'}"
+    words = [str(BROWSER), *flags, profile, page.as_uri()]
+    return subprocess.run(words, capture_output=True, text=True, check=True, timeout=60).stdout
 
 
 @pytest.mark.parametrize(

@@ -158,7 +158,7 @@ def _bones() -> list[tuple[str, str, str]]:
 
 def _upright(points_m: FloatArray) -> FloatArray:
     """Return points (..., 3) of the laboratory with x to the image's right, y away, z up."""
-    return points_m[..., [2, 0, 1]] * np.array([-1.0, -1.0, 1.0])
+    return np.asarray(points_m[..., [2, 0, 1]] * np.array([-1.0, -1.0, 1.0]))
 
 
 def png_of(figure: Figure) -> bytes:
