@@ -94,10 +94,14 @@ class DemoFilm(NamedTuple):
         detector.found = self.found
         return detector
 
-    def mediapipe_m(self) -> FloatArray:
+    def mediapipe_m(self, pitch_rad: float = 0.0) -> FloatArray:
         """Return the detector's own points in space, (n, 6, 3), m relative to the hips.
 
-        A hand is where the reference has it: from the wrist towards the knuckles.
+        A hand is where the reference has it: from the wrist towards the knuckles. The detector
+        takes the camera for level.
+
+        Args:
+            pitch_rad: downward pitch of the camera, by which the points are turned.
         """
         points = np.array([one.spatial_m for one in self.found])
         at = {name: points[:, number] for number, name in enumerate(LANDMARKS)}
@@ -107,7 +111,9 @@ class DemoFilm(NamedTuple):
             out = (at[f"{side}_index"] + at[f"{side}_little_finger"]) / 2 - wrist
             out *= _HAND_SHARE * self.stature_m / np.linalg.norm(out, axis=-1, keepdims=True)
             joints += [at[f"{side}_shoulder"], at[f"{side}_elbow"], wrist + out]
-        return np.stack(joints, axis=1)
+        c, s = np.cos(pitch_rad), np.sin(pitch_rad)
+        turn = np.array([[1.0, 0.0, 0.0], [0.0, c, -s], [0.0, s, c]])
+        return np.asarray(np.stack(joints, axis=1) @ turn.T)
 
     def errors_m(self, keypoints_m: FloatArray, *, is_placed: bool = False) -> FloatArray:
         """Return the mean distance of keypoints (n, 6, 3) to the reference in each image, (n,).
