@@ -1,5 +1,6 @@
 # make setup   everything in .venv: the cardbox command, the nodes, the tools of the tests
-# make demo    the whole chain on a synthetic recording; results in demo_output/
+# make demo    the whole chain on a synthetic recording, through the nodes; results in demo_output/
+# make dist    wheel and sdist in dist/
 # make example   a small recording, its measured person and their posture, in example/
 # make test    set-up, lint, types, all tests
 # make benchmark   measure the speed on this machine; writes docs/benchmarks.md
@@ -114,7 +115,13 @@ links: $(VENV)/extras
 
 .PHONY: demo
 demo: setup
-	$(BIN)/cardbox demo --output demo_output
+	$(BIN)/cardbox demo --live --output demo_output
+
+.PHONY: dist
+dist: $(VENV)/dependencies
+	rm -rf build/lib build/bdist.* *.egg-info
+	$(BIN)/python setup.py --quiet sdist bdist_wheel
+	rm -rf build/lib build/bdist.* *.egg-info
 
 # These are the commands of the tutorial, with the times of the synthetic session.
 .PHONY: example

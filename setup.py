@@ -113,7 +113,9 @@ setup(
     ],
     packages=find_packages(include=[NAME, f"{NAME}.*"]),
     package_data={
+        f"{NAME}.applications.demo": ["film.mp4", "film.npz", "film.txt"],
         f"{NAME}.applications.ergonomics": ["*.html"],
+        f"{NAME}.applications.reporting": ["*.html"],
         NAME: ["py.typed"],
         f"{NAME}.ros": ["*.csv"],
         f"{NAME}.search": ["*.json"],

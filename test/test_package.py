@@ -6,9 +6,12 @@ import ast
 import importlib
 import re
 import runpy
+import shutil
 import subprocess
 import sys
+import tarfile
 import xml.etree.ElementTree as ElementTree
+import zipfile
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -226,6 +229,36 @@ def test_data_inside_the_package_are_installed_with_it() -> None:
     }
     assert {path for path in files if path.suffix != ".py"} == installed
     assert all(patterns.values())
+
+
+@pytest.mark.slow
+def test_a_wheel_made_of_the_sdist_has_all_files_of_the_package(tmp_path: Path) -> None:
+    tree = tmp_path / "tree"
+    ignored = shutil.ignore_patterns("__pycache__", "*.egg-info")
+    for name in ("cardbox_tracker", "config", "launch", "resource"):
+        shutil.copytree(ROOT / name, tree / name, ignore=ignored)
+    for name in ("setup.py", "setup.cfg", "pyproject.toml", "package.xml", "README.md", "LICENSE"):
+        shutil.copy(ROOT / name, tree)
+    build_in(tree, "sdist")
+    (sdist,) = (tree / "dist").glob("*.tar.gz")
+    with tarfile.open(sdist) as archive:
+        archive.extractall(tmp_path, filter="data")
+    unpacked = tmp_path / sdist.name.removesuffix(".tar.gz")
+    build_in(unpacked, "bdist_wheel")
+    (wheel,) = (unpacked / "dist").glob("*-py3-none-any.whl")
+    with zipfile.ZipFile(wheel) as archive:
+        names = {name for name in archive.namelist() if name.startswith("cardbox_tracker/")}
+    expected = {
+        path.relative_to(tree).as_posix()
+        for path in (tree / "cardbox_tracker").rglob("*")
+        if path.is_file()
+    }
+    assert names == expected
+
+
+def build_in(folder: Path, command: str) -> None:
+    words = [sys.executable, "setup.py", "--quiet", command]
+    subprocess.run(words, cwd=folder, check=True, capture_output=True)
 
 
 def test_every_folder_is_a_package() -> None:

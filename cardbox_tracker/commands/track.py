@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 import json
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -16,12 +16,13 @@ from cardbox_tracker.common.errors import CardboxError
 from cardbox_tracker.common.files import atomic_path, body_beside, is_written_in_place, scene_beside
 
 if TYPE_CHECKING:
+    from cardbox_tracker.applications.exporting.formats import Format
     from cardbox_tracker.recordings.track import TrackSummary
 
 NAME = "track"
 HELP = "follow the posture through a recording, or through all recordings of a folder"
 
-_OF_ONE = ("csv", "bag", "video", "json")
+_OF_ONE = ("csv", "bag", "video", "json", "export", "plot", "report")
 _OF_MANY = ("output", "formats", "jobs", "scheduler")
 
 
@@ -57,6 +58,25 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         type=Path,
         metavar="OUT.json",
         help="also write what is printed at the end: what was tracked, used, left out and assumed",
+    )
+    parser.add_argument(
+        "--export",
+        type=_formats,
+        metavar="FORMAT[,...]",
+        help="also write the table in formats of 'cardbox export' beside it, such as trc,bvh",
+    )
+    parser.add_argument(
+        "--plot",
+        type=Path,
+        metavar="OUT.png",
+        help="also plot the angles, with bands of one standard deviation",
+    )
+    parser.add_argument(
+        "--report",
+        type=Path,
+        metavar="OUT.html",
+        help="also write a page with the overlay video (OUT.mp4 without --video), the skeleton "
+        "from aside, the angles and the times to look at",
     )
     many = parser.add_argument_group("a folder of recordings (docs/many-recordings.md)")
     many.add_argument(
@@ -103,6 +123,17 @@ def run(options: argparse.Namespace) -> None:
         track_one(options)
 
 
+def _formats(text: str) -> dict[str, Format]:
+    from cardbox_tracker.applications.exporting.formats import formats
+
+    known, names = formats(), dict.fromkeys(text.split(","))
+    if not known.keys() >= names.keys():
+        raise argparse.ArgumentTypeError(
+            f"expected formats of {', '.join(known)}, such as trc,bvh: {text!r}"
+        )
+    return {name: known[name] for name in names}
+
+
 def _without_effect(options: argparse.Namespace, names: tuple[str, ...], what: str) -> list[str]:
     """Return a fault for each given option that has no effect, since the recording is ``what``."""
     given = [name for name in names if getattr(options, name) is not None]
@@ -129,9 +160,19 @@ def track_one(options: argparse.Namespace, show: Callable[[float], None] | None 
     has_body = not is_piped or request.person.model is None
     body = body_beside(beside) if has_body else None
     scene = scene_beside(beside)
-    files = TrackFiles(table, options.video, options.bag, body, scene)
-    written = (table, body, scene, options.video, options.json)
-    check_outputs(written, options.force, request.inputs, results=(options.bag,))
+    video = options.video
+    if options.report is not None and video is None:
+        video = options.report.with_suffix(".mp4")
+    exports = {
+        form: beside.with_name(beside.stem + form.suffix)
+        for form in (options.export or {}).values()
+    }
+    derived = (*exports.values(), options.plot, options.report)
+    _check_derived(options, is_piped)
+    files = TrackFiles(table, video, options.bag, body, scene)
+    written = (table, body, scene, video, options.json)
+    every = (*written, *derived)
+    check_outputs(every, options.force, request.inputs, results=(options.bag,))
     summary = track(replace(request, files=files, force=options.force), show=show)
     if options.json is not None:
         with atomic_path(options.json) as temporary:
@@ -142,6 +183,63 @@ def track_one(options: argparse.Namespace, show: Callable[[float], None] | None 
         if path is not None:
             print(f"wrote {path}")
     print(*summary.accounts, sep="\n")
+    if exports or options.plot is not None or options.report is not None:
+        _write_derived(options, summary, table, video, exports)
+
+
+def _check_derived(options: argparse.Namespace, is_piped: bool) -> None:
+    """Check what is made of the finished table, before it is."""
+    for form in (options.export or {}).values():
+        form.check()
+    for flag, suffix in (("plot", ".png"), ("report", ".html")):
+        path = getattr(options, flag)
+        if path is not None and path.suffix != suffix:
+            raise CardboxError(f"--{flag} {path}: its name must end in {suffix}")
+    given = [flag for flag in _OF_ONE[-3:] if getattr(options, flag) is not None]
+    if given and is_piped:
+        raise CardboxError(f"--{given[0]} reads the table, so --csv must name a file")
+    if options.report is not None and options.video is not None and options.video.suffix != ".mp4":
+        raise CardboxError("--report shows the video, which browsers play as .mp4: change --video")
+
+
+def _write_derived(
+    options: argparse.Namespace,
+    summary: TrackSummary,
+    table: Path,
+    video: Path | None,
+    exports: Mapping[Format, Path],
+) -> None:
+    """Write what is made of the finished table; of several people, files of each."""
+    from cardbox_tracker.applications.exporting.formats import export
+    from cardbox_tracker.applications.reporting.page import write_page
+    from cardbox_tracker.applications.reporting.plots import angles_plot
+    from cardbox_tracker.recordings.result_reader import read_results
+
+    tracked = (number for number, one in summary.people.items() if one.frames_tracked)
+    numbers: list[int | None] = [*tracked] or [None]
+    people = {number: read_results(table, number) for number in numbers}
+    if options.plot is not None:
+        for number, results in people.items():
+            path = _of_person(options.plot, number, options.plot.suffix)
+            with atomic_path(path) as temporary:
+                temporary.write_bytes(angles_plot(results))
+            print(f"wrote {path}")
+    if options.report is not None and video is not None:
+        named = {"Person" if k is None else f"Person {k}": one for k, one in people.items()}
+        lines = (*summary.assumptions, *summary.remarks, *summary.accounts)
+        write_page(options.report, video, f"Posture in {options.recording.name}", named, lines)
+        print(f"wrote {options.report}")
+    for form, path in exports.items():
+        for number, results in people.items():
+            output = _of_person(path, number, form.suffix)
+            print(*export(results, output, form), f"wrote {output}", sep="\n")
+
+
+def _of_person(path: Path, number: int | None, suffix: str) -> Path:
+    """Return the file of one of several people; ``path`` is that of the first."""
+    if number in (None, 1):
+        return path
+    return path.with_name(f"{path.name.removesuffix(suffix)}.person_{number}{suffix}")
 
 
 def _account(summary: TrackSummary) -> dict[str, Any]:

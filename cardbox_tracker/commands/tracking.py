@@ -63,7 +63,7 @@ def track(
 
     with measured_scene(recording, person, request.config, request.seed) as (source, scene):
         early = source.first.remarks
-        print_remarks(early)
+        print_remarks(_with_unknown(early, person))
         total_s = max(1e-9, min(source.first.duration_s, person.end_s) - start_s)
         with ExitStack() as stack:
             observers = (*_writers(request, source, stack), *observers)
@@ -113,6 +113,28 @@ def track(
         return summary
     one = summary.people.get(person.number, summary)
     return replace(one, accounts=accounts, assumptions=assumptions, scene=summary.scene)
+
+
+def _with_unknown(remarks: Sequence[str], person: PersonRequest) -> list[str]:
+    """Return remarks with one on an unknown stature, which also tells of an unknown lens."""
+    from cardbox_tracker.person.proportions import USUAL_STATURE_M
+    from cardbox_tracker.recordings.given_camera import FOV_HINT, UNKNOWN_LENS
+
+    if person.stature_m is not None or person.model is not None:
+        return [*remarks]
+    others = [remark for remark in remarks if not remark.startswith(UNKNOWN_LENS)]
+    if len(others) == len(remarks):
+        return [
+            f"the stature is taken as that of most adults, {USUAL_STATURE_M:g} m, so sizes and "
+            "distances may be wrong by a tenth; give --stature M",
+            *others,
+        ]
+    return [
+        f"stature and field of view are unknown ({USUAL_STATURE_M:g} m and those of most cameras "
+        "are assumed), so distances may be wrong by half, and sizes by a tenth; give --stature M "
+        f"and --fov DEG ({FOV_HINT}); times, and mostly angles, are right all the same",
+        *others,
+    ]
 
 
 def _of_person(
@@ -174,7 +196,6 @@ def measured_scene(
     """
     from cardbox_tracker.measuring.scene import GIVEN, Scene, SceneCamera, Value
     from cardbox_tracker.measuring.scene_camera import lens_of
-    from cardbox_tracker.person.proportions import USUAL_STATURE_M
     from cardbox_tracker.recordings.measured_scene import seen_people, seen_person, watch
 
     if person.model is not None and not person.body.unknown:
@@ -199,13 +220,6 @@ def measured_scene(
             stack.close()
             source = stack.enter_context(better.open())
             watched, first = watch(source, *span), source.first
-        if person.stature_m is None and person.model is None:
-            print_remarks(
-                [
-                    f"the stature is taken as that of most adults, {USUAL_STATURE_M:g} m, so sizes "
-                    "and distances may be wrong by a tenth; give --stature M"
-                ]
-            )
         stands = {"camera_roll_rad": better.camera.stands_rad}
         bodies = [body.with_values(**stands) for body in _bodies(bodies, person, found)]
         if person.people is None:

@@ -12,6 +12,8 @@ from cardbox_tracker.camera.camera_info import LEAST_DEG, MOST_DEG, unusual
 from cardbox_tracker.common.errors import CameraError
 from cardbox_tracker.recordings.focal_length import FILM_DIAGONAL_MM, equivalent_mm
 
+UNKNOWN_LENS = "nothing tells the camera's field of view"
+"""How a remark on an unknown field of view begins."""
 # No usual phone held upright has so large a field of view across its image, degrees.
 _UPRIGHT_DEG = 55.0
 FOV_HINT = "webcams 60 to 78, phones 60 to 75 held sideways, 36 to 46 upright"
@@ -129,7 +131,7 @@ class GivenCamera:
             if is_told:
                 return [f"the file tells the field of view: {fov_deg:.0f} degrees across"]
             return [
-                f"nothing tells the camera's field of view: {fov_deg:.0f} degrees across are "
+                f"{UNKNOWN_LENS}: {fov_deg:.0f} degrees across are "
                 "assumed, so distances and sizes may be wrong by a sixth; give --fov DEG "
                 f"({FOV_HINT})"
             ]

@@ -142,7 +142,7 @@ def test_a_full_disk_is_told_in_words(
         (("demo", "--output", "FOLDER/text.txt"), "cannot make the folder"),
         (("demo", "--output", "FOLDER/new", "--preset", "fast"), "invalid choice: 'fast'"),
         (
-            ("demo", "--output", "FOLDER/new", "--preset", "paper", "--cameras", "2"),
+            ("demo", "--live", "--output", "FOLDER/new", "--preset", "paper", "--cameras", "2"),
             "--preset paper is for one camera; leave it out with --cameras",
         ),
         (("urdf", "FOLDER/missing.yaml"), "missing.yaml: No such file or directory"),

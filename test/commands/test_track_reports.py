@@ -1,0 +1,124 @@
+"""'cardbox track' with --export, --plot and --report, and what it says where nothing is given."""
+
+from __future__ import annotations
+
+import re
+import shutil
+import subprocess
+from collections.abc import Callable
+from html.parser import HTMLParser
+from pathlib import Path
+from urllib.parse import unquote
+
+import cv2
+import pytest
+
+from cardbox_tracker.applications.demo.film import DemoFilm
+from cardbox_tracker.detectors.detector import Detector
+
+VOID = {"meta", "img", "br"}
+
+
+class Page(HTMLParser):
+    """Attributes of a page by element; it fails on elements that are not closed in order."""
+
+    def __init__(self, text: str) -> None:
+        super().__init__()
+        self.found: list[tuple[str, dict[str, str | None]]] = []
+        self.open: list[str] = []
+        self.feed(text)
+        self.close()
+        assert self.open == []
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self.found.append((tag, dict(attrs)))
+        if tag not in VOID:
+            self.open.append(tag)
+
+    def handle_endtag(self, tag: str) -> None:
+        assert self.open.pop() == tag
+
+
+@pytest.fixture
+def film(monkeypatch: pytest.MonkeyPatch) -> Path:
+    """Return the demo's film, and install what was found in it as the detector."""
+    demo = DemoFilm.load()
+    monkeypatch.setattr(Detector, "installed", lambda: demo.detector)
+    return demo.path
+
+
+def test_one_command_writes_exports_plot_and_page(
+    tmp_path: Path, film: Path, cardbox: Callable, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    words = ("track", film, "--detector", "mediapipe", "--end", 1, "--csv", "her #1.csv")
+    more = ("--export", "trc,bvh", "--plot", "her.png", "--report", "page/her #1.html")
+    Path("page").mkdir()
+    done = cardbox(*words, *more)
+    assert done.code == 0, done.err
+    assert Path("her #1.trc").read_text().startswith("PathFileType\t4")
+    assert Path("her #1.bvh").read_text().startswith("HIERARCHY")
+    assert cv2.imread("her.png").std() > 10.0
+    for name in ("her #1.trc", "her #1.bvh", "her.png", "page/her #1.html", "page/her #1.mp4"):
+        assert f"wrote {name}" in done.out
+
+    text = Path("page/her #1.html").read_text(encoding="utf-8")
+    elements = Page(text).found
+    (shown,) = (values["src"] for tag, values in elements if tag == "video")
+    assert shown is not None
+    assert cv2.VideoCapture(str(Path("page") / unquote(shown))).read()[0]
+    pictures = [values["src"] for tag, values in elements if tag == "img"]
+    assert len(pictures) == 2
+    assert all(str(source).startswith("data:image/png;base64,iVBOR") for source in pictures)
+    assert "field of view across the image" in text
+
+    # Lens and stature are in one line, which says what is right all the same.
+    (line,) = (line for line in done.err.splitlines() if "unknown" in line)
+    for word in ("--stature M", "--fov DEG", "angles"):
+        assert word in line
+    assert not re.search("taken as that|nothing tells", done.err)
+
+
+BROWSER = next(filter(None, map(shutil.which, ("chromium", "google-chrome", "chrome"))), None)
+
+
+@pytest.mark.skipif(BROWSER is None, reason="no Chromium on the PATH")
+def test_a_browser_runs_the_page_and_finds_its_film(
+    tmp_path: Path, film: Path, cardbox: Callable
+) -> None:
+    page, table = tmp_path / "her.html", tmp_path / "her.csv"
+    words = ("track", film, "--detector", "mediapipe", "--end", 0.2, "--csv", table)
+    assert cardbox(*words, "--report", page).code == 0
+    assert 'id="missing" hidden=""' in in_browser(page)
+    (tmp_path / "her.mp4").unlink()
+    assert 'id="missing">' in in_browser(page)
+
+
+def in_browser(page: Path) -> str:
+    """Return the page after its script ran."""
+    flags = "--headless", "--no-sandbox", "--virtual-time-budget=3000", "--dump-dom"
+    profile = f"--user-data-dir={page.parent / 'profile'}"
+    words = [str(BROWSER), *flags, profile, page.as_uri()]
+    return subprocess.run(words, capture_output=True, text=True, check=True, timeout=60).stdout
+
+
+@pytest.mark.parametrize(
+    ("words", "expected"),
+    [
+        (("--export", "trc,fbx"), "expected formats of trc, bvh, c3d, mot, isb"),
+        (("--plot", "FOLDER/angles.jpg"), "its name must end in .png"),
+        (("--report", "FOLDER/page"), "its name must end in .html"),
+        (("--report", "FOLDER/a.html", "--video", "FOLDER/a.avi"), "--report shows the video"),
+        (("--export", "trc", "--csv", "/dev/null"), "--export reads the table"),
+        (("--plot", "FOLDER/there.png"), "there.png exists"),
+    ],
+)
+def test_mistakes(
+    tmp_path: Path, film: Path, words: tuple[str, ...], expected: str, cardbox: Callable
+) -> None:
+    (tmp_path / "there.png").touch()
+    given = (word.replace("FOLDER", str(tmp_path)) for word in words)
+    table = () if "--csv" in words else ("--csv", tmp_path / "out.csv")
+    done = cardbox("track", film, "--detector", "mediapipe", *table, *given)
+    done.assert_refused("track", expected)
+    assert [path.name for path in tmp_path.iterdir()] == ["there.png"]
