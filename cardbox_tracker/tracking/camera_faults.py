@@ -97,7 +97,7 @@ class CameraFaults:
             self._last[number], self._repeated[number] = np.array(shown), 0
             self._then[number] = kept
         frozen = [self._is_frozen(number, kept) for number in range(count)]
-        for number in np.flatnonzero(frozen):
+        for number in np.flatnonzero(frozen).tolist():
             self.leave_out(number, FROZEN)
             seen[number] = None
         return seen
