@@ -152,9 +152,10 @@ def _assumptions(request: TrackingRequest, scene: Scene) -> Iterator[str]:
     person = request.person
     yield from scene.words()
     source = "given" if person.model is None else f"from {person.model.name}"
-    if person.people is None:
-        distance = "found" if "distance_m" in person.body.unknown else source
-        yield f"distance {scene.people[0].placement.distance_m:.2f} m ({distance})"
+    distance = "found" if "distance_m" in person.body.unknown else source
+    for number, body in enumerate(scene.people, 1):
+        whose = "" if person.people is None else f" of person {number}"
+        yield f"distance{whose} {body.placement.distance_m:.2f} m ({distance})"
     if person.stature_m is not None:
         yield f"stature {person.stature_m:.2f} m (given), sizes from proportions"
     elif person.model is None:

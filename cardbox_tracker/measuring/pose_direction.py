@@ -66,7 +66,9 @@ class PoseDirection:
     def see(self, first: Silhouette, other: Silhouette) -> None:
         """Add a frame with silhouettes (H, W), 0 or 255, whether a posture fits them or not."""
         self._frames += 1
-        if self._frames % (_EVERY if self._frames > _FIRST else _EVERY_AT_FIRST):
+        # An error that is over is forgotten as soon as it was found.
+        is_often = self._frames <= _FIRST or self.fault is not None
+        if self._frames % (_EVERY_AT_FIRST if is_often else _EVERY):
             return
         if not self._tangents.add(first, other):
             return

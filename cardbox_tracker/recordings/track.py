@@ -159,5 +159,7 @@ def track_recording(
     else:
         each = {n: tally.summary(bodies[n - 1]) for n, tally in enumerate(tallies, 1)}
     # Of several people, there may be nobody.
-    summary = whole.summary(bodies[0] if bodies else None, session.remarks(recording.names))
+    summary = whole.summary(
+        bodies[0] if bodies else None, session.remarks(recording.names, is_all=True)
+    )
     return replace(summary, used=used, people=each)

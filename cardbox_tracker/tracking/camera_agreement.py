@@ -95,9 +95,9 @@ class CameraAgreement:
                 direction.see(first, other)
 
     @property
-    def is_contradicted(self) -> bool:
-        """Whether the silhouettes show a gross error of a pose, so that no result is reliable."""
-        return any(direction.fault is not None for direction in self._directions)
+    def are_contradicted(self) -> list[bool]:
+        """Whether the silhouettes show a gross error of the pose of each further camera."""
+        return [direction.fault is not None for direction in self._directions]
 
     def see(
         self, state: FloatArray, first: Silhouette, others: Sequence[Silhouette | None]

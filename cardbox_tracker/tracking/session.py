@@ -230,13 +230,14 @@ class Session:
         if agreement is not None and (agreement.is_due or is_last):
             agreement.check(is_last)
 
-    def remarks(self, names: Sequence[str]) -> list[str]:
+    def remarks(self, names: Sequence[str], is_all: bool = False) -> list[str]:
         """Return warnings about images that contradict each other.
 
         Args:
             names: names of all cameras.
+            is_all: whether what is over is told, too.
         """
-        told = [text for one in self.trackers for text in one.remarks]
+        told = [text for one in self.trackers for text in one.remarks(names, is_all)]
         if self.agreement is not None:
             told += self.agreement.remarks(names[1:])
         return list(dict.fromkeys(told))

@@ -47,6 +47,7 @@ from cardbox_tracker.terms.joint_points_kernels import HIPS, POINTS_OF_ARM, SHOU
 from cardbox_tracker.terms.silhouette import SilhouetteTerm
 from cardbox_tracker.terms.term import USUAL_INTERVAL_S, Frame, Image, Posed, Silhouette
 from cardbox_tracker.tracking.camera_agreement import CameraAgreement
+from cardbox_tracker.tracking.camera_faults import POSE, TURNED, CameraFaults, facing_rad
 from cardbox_tracker.tracking.estimate import (
     LOST,
     NO_PERSON,
@@ -55,7 +56,6 @@ from cardbox_tracker.tracking.estimate import (
     Estimate,
 )
 from cardbox_tracker.tracking.facing import Facing
-from cardbox_tracker.tracking.frozen import FrozenCameras
 from cardbox_tracker.tracking.hands import HandReader, Look
 from cardbox_tracker.tracking.head import HeadTracker
 from cardbox_tracker.tracking.legs import LegReader
@@ -83,6 +83,7 @@ class Tracker:
     Attributes:
         cameras: the body before each camera, the first one first.
         agreement: check of the extrinsics of several cameras; None with one camera.
+        faults: cameras that are left out for a while.
         images: number of times that were tracked.
         used: in how many of them each optional input told of the posture, by its name.
     """
@@ -132,7 +133,9 @@ class Tracker:
             raise ValueError(f"{what} the filter whole_body: the preset default")
         self._place = PlaceWatch(body, self.camera)
         self.agreement: CameraAgreement | None = None
-        self._frozen = FrozenCameras(1 + len(self._others))
+        self.faults = CameraFaults(1 + len(self._others))
+        # Whether two cameras contradict each other, so that nobody knows which one is wrong.
+        self._is_contradicted = False
         self.images, self.used = 0, dict[str, int]()
         self._measuring: SeenBody | None = None
         self._absent, self._seconds, self._is_first = 0, 0.0, True
@@ -215,11 +218,10 @@ class Tracker:
         """Views of the body from the further cameras."""
         return tuple(camera.view for camera in self.cameras if camera.view is not None)
 
-    @property
-    def remarks(self) -> list[str]:
-        """Warnings about images that contradict each other, for diagnostics and logs."""
+    def remarks(self, names: Sequence[str] = (), is_all: bool = False) -> list[str]:
+        """Return warnings about images that contradict each other, see :class:`.CameraFaults`."""
         depths = (camera.depth.remark for camera in self.cameras)
-        found = *self._frozen.remarks(), *depths, self._place.contradiction
+        found = *self.faults.remarks(names, is_all), *depths, self._place.contradiction
         return [text for text in found if text]
 
     def used_texts(self) -> dict[str, str]:
@@ -280,8 +282,10 @@ class Tracker:
                     "such as Observation(silhouette), or None"
                 )
         if self._others:
-            observations = self._frozen.without(observations)
+            observations = self.faults.without(observations, stamp_of(observations))
         frames = [self._of_person(*one) for one in enumerate(self._frames_of(observations))]
+        if self.agreement is not None:
+            frames = self._agreeing(self.agreement, frames)
         estimate = self._placed(frames, self._same(frames[0], self._track(frames)))
         # The posture of an unsure pitch is unsure, too.
         is_tilt_unknown = self.body.camera_pose.pitch_stddev_rad > FOUND_STDDEV
@@ -300,6 +304,33 @@ class Tracker:
         estimate = self._hands.see(*given)
         self.used["hands"] = self.used.get("hands", 0) + any(estimate.hands or ())
         return estimate
+
+    def _agreeing(self, agreement: CameraAgreement, frames: Sequence[Frame]) -> list[Frame]:
+        """Return the frames, empty ones of cameras that contradict the others.
+
+        If all of several further cameras contradict the first one, that is left out.
+        """
+        if not any(frame["covered"] is not None for frame in frames):
+            # What others hide is missing in the outline.
+            agreement.look(*_silhouettes(frames))
+        before_rad = facing_rad(frames[0].points, frames[0].camera)
+        reasons = [POSE if fault else "" for fault in agreement.are_contradicted]
+        for number, (frame, view) in enumerate(zip(frames[1:], self.views, strict=True)):
+            turned_rad = facing_rad(frame.points, frame.camera) + view.yaw_rad - before_rad
+            if self.faults.is_turned(number + 1, turned_rad):
+                reasons[number] = reasons[number] or TURNED
+        self._is_contradicted = len(reasons) == 1 and bool(reasons[0])
+        wrong = ["", *reasons]
+        if len(reasons) > 1 and all(reasons):
+            wrong = [reasons[0], *[""] * len(reasons)]
+        kept = []
+        for number, (frame, reason) in enumerate(zip(frames, wrong, strict=True)):
+            if reason and frame.foreground_px:
+                self.faults.leave_out(number, reason)
+                channels = {"silhouette": np.zeros_like(frame.silhouette)}
+                frame = frame.changed(channels=channels, foreground_px=0)
+            kept.append(frame)
+        return kept
 
     def _placed(self, frames: Sequence[Frame], estimate: Estimate) -> Estimate:
         """Return the estimate with its place, which no deviation of it is surer than."""
@@ -449,10 +480,6 @@ class Tracker:
         if presence is Presence.TOO_MUCH:
             # After a short change of the light, the person is still at the same place.
             return Estimate(LOST)
-        # What others hide is missing in the outline.
-        is_whole = not any(frame["covered"] is not None for frame in frames)
-        if self.agreement is not None and is_whole:
-            self.agreement.look(*_silhouettes(frames))
         fit = self._filter.follow(frames, [camera.terms for camera in self.cameras])
         self._particles = fit.particles
         if not fit.is_finite:
@@ -473,6 +500,7 @@ class Tracker:
             if self.config.relocalize:
                 self._filter.recover()
             return Estimate(LOST)
+        is_whole = not any(frame["covered"] is not None for frame in frames)
         if self.agreement is not None and is_whole and fit.offset_m is not None:
             self.agreement.see(self._before, *_silhouettes(frames))
         judged, is_doubtful = fit.judged, self._is_doubtful(frames[0])
@@ -502,7 +530,7 @@ class Tracker:
         if self._facing is not None and self._before is not None:
             self._facing.see(frame, Posed(self.cameras[0].posable, self._before[None]))
             return self._facing.shows_back
-        return self.agreement is not None and self.agreement.is_contradicted
+        return self._is_contradicted
 
 
 def _unsure(estimate: Estimate) -> Estimate:

@@ -87,10 +87,10 @@ def test_a_tracker_tells_depth_of_another_view_and_does_not_use_it() -> None:
     depth_m = np.linspace(1.0, 3.0, mask.size, dtype=np.float32).reshape(mask.shape)
     for _ in range(20):
         wrong.track(Observation(mask, depth_m=depth_m))
-    (text,) = wrong.remarks
+    (text,) = wrong.remarks()
     assert "another view" in text
     frame = wrong._frames_of([Observation(mask, depth_m=depth_m)])[0]
     assert frame.depth_m is None
     for _ in range(20):
         without.track(Observation(mask))
-    assert without.remarks == []
+    assert without.remarks() == []

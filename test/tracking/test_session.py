@@ -11,7 +11,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from cardbox_tracker.camera.camera import Camera
+from cardbox_tracker.camera.extrinsics import Extrinsics
 from cardbox_tracker.camera.rasterisation import render
+from cardbox_tracker.camera.view import OtherCamera, View
 from cardbox_tracker.detectors.image_points import ImagePoints
 from cardbox_tracker.person.cardbox import cardbox_patches
 from cardbox_tracker.person.model import BodyModel
@@ -159,6 +161,34 @@ def test_a_reset_forgets_one_person(detected: Detect) -> None:
     show.people.reset(1)
     assert places([person.estimate for person in show.people._people])[0] is None
     assert places(show((-0.6, RED), (0.6, BLUE))) == pytest.approx([-0.6, 0.6], abs=0.1)
+
+
+def test_a_camera_that_misses_a_person_takes_their_place_from_the_other(detected: Detect) -> None:
+    turn = np.array([(0.5, 0.0, 0.75**0.5), (0.0, 1.0, 0.0), (-(0.75**0.5), 0.0, 0.5)])
+    # The second camera looks at the point 2.6 m in front of the first one.
+    middle_m = np.array([0.0, 0.0, 2.6])
+    other = OtherCamera(CAMERA, Extrinsics(turn, middle_m - turn @ middle_m))
+    view = View.of(BODY, CAMERA, other)
+    people = Session([BODY], CAMERA, default_preset(), others=[other], people=2)
+    for image in range(12):
+        seen = []
+        for body, states_of in ((BODY, np.copy), (view.body, view.states)):
+            masks, points = [], []
+            for aside_m in (-0.6, 0.6):
+                state = states_of(place(aside_m))
+                there = Estimate("", offset_m=state[12:]).placed(body)
+                masks.append(render(cardbox_patches(there, state[:12]), CAMERA) > 0)
+                points.append(detected(body, CAMERA, state))
+            if body is BODY and image >= 6:
+                # The first camera loses the second person.
+                masks, points = masks[:1], points[:1]
+            mask = np.where(np.any(masks, axis=0), np.uint8(255), np.uint8(0))
+            # Nothing follows from the order of the figures.
+            figures = tuple(points[:: -1 if body is BODY else 1])
+            seen.append(Observation(mask, stamp_ns=image * STEP_NS, people=figures))
+        found = people.track(seen)
+        assert [one.person for one in found] == [1, 2]
+        assert places(found) == pytest.approx([-0.6, 0.6], abs=0.15)
 
 
 def test_pixels_of_others_do_not_count() -> None:

@@ -241,7 +241,7 @@ def test_a_second_camera_that_froze_is_not_used() -> None:
             assert tracker.camera_ious()[1] is None
             errors.append(error_cm(estimate, state))
     assert max(errors) < 20.0
-    assert any("camera 2 of 2 shows the same image" in text for text in tracker.remarks)
+    assert any("camera 2 of 2 shows the same image" in text for text in tracker.remarks())
     assert tracker.images == 20 and 6 <= tracker.used["camera 2"] <= 10
     assert tracker.used_texts()["camera 2 used"] == f"{tracker.used['camera 2']} of 20"
 

@@ -6,7 +6,9 @@ import cv2
 import numpy as np
 import pytest
 
-from cardbox_tracker.tracking.frozen import FrozenCameras
+from cardbox_tracker.camera.camera import Camera
+from cardbox_tracker.detectors.image_points import POINT_NAMES, ImagePoints
+from cardbox_tracker.tracking.camera_faults import CameraFaults, facing_rad
 from cardbox_tracker.tracking.observation import Observation
 
 
@@ -19,9 +21,9 @@ def seen(at: int, noise: int | None = None) -> Observation:
     return Observation(mask, np.random.default_rng(noise).integers(0, 255, mask.shape, np.uint8))
 
 
-def used(first: list[Observation], second: list[Observation | None]) -> tuple[str, FrozenCameras]:
+def used(first: list[Observation], second: list[Observation | None]) -> tuple[str, CameraFaults]:
     """Return for each time which of two cameras was used: 1, 2 or b for both."""
-    cameras = FrozenCameras(2)
+    cameras = CameraFaults(2)
     found = ""
     for both in zip(first, second, strict=True):
         kept = [number for number, one in enumerate(cameras.without(both), 1) if one is not None]
@@ -38,7 +40,7 @@ def test_a_frozen_camera_is_left_out_until_it_goes_on(has_image: bool) -> None:
     ]
     found, cameras = used(first, second)
     assert found == "bbbbb111bb"
-    assert cameras.left_out == [0, 3]
+    assert [sum(one.values()) for one in cameras.left_out] == [0, 3]
     (remark,) = cameras.remarks()
     assert "camera 2 of 2 shows the same image again and again" in remark
     assert "3 of its images are not used" in remark
@@ -73,8 +75,44 @@ def test_a_camera_that_sees_nobody_is_not_frozen() -> None:
 
 
 def test_cameras_without_data_are_no_frozen_ones() -> None:
-    cameras = FrozenCameras(3)
+    cameras = CameraFaults(3)
     for i in range(5):
         kept = cameras.without([seen(10 + 3 * i, i), None])
         assert [one is not None for one in kept] == [True, False, False]
     assert cameras.remarks() == []
+
+
+def test_a_silhouette_that_fills_the_image_needs_points_and_is_forgotten_after_a_second() -> None:
+    cameras, white = CameraFaults(2), np.full((60, 80), 255, np.uint8)
+    points = ImagePoints.of({"nose": (40.0, 20.0, 0.9)})
+    kept = cameras.without([seen(10), Observation(white)], 0)
+    assert [one is not None for one in kept] == [True, False]
+    kept = cameras.without([seen(12), Observation(white, points=points)], 10)
+    assert [one is not None for one in kept] == [True, True]
+    assert "silhouette of right fills 2 of its images" in cameras.remarks(["left", "right"])[0]
+    for stamp_ns, count in ((900_000_000, 1), (1_100_000_000, 0)):
+        cameras.without([seen(14), seen(16)], stamp_ns)
+        assert len(cameras.remarks()) == count
+    assert len(cameras.remarks(is_all=True)) == 1
+
+
+def test_the_direction_of_the_shoulders_by_hand() -> None:
+    camera = Camera(80, 60, 40.0, 40.0, 40.0, 30.0)
+    px, spatial_m = np.full((17, 2), 40.0), np.zeros((17, 3))
+    left, right = (POINT_NAMES.index(f"{side}_shoulder") for side in ("left", "right"))
+    # The left shoulder is on the right in the image, and 45 degrees farther away.
+    spatial_m[left], spatial_m[right] = (0.2, 0.0, 0.2), (-0.2, 0.0, -0.2)
+    ahead = ImagePoints(px, np.ones(17), spatial_m=spatial_m)
+    assert facing_rad(ahead, camera) == pytest.approx(np.radians(-45.0))
+    # The line of sight is 45 degrees to the right.
+    aside = ImagePoints(px + np.array([40.0, 0.0]), np.ones(17), spatial_m=spatial_m)
+    assert facing_rad(aside, camera) == pytest.approx(np.radians(-90.0))
+    assert np.isnan(facing_rad(None, camera))
+
+
+def test_a_camera_in_which_somebody_faces_another_way_is_told_and_recovers() -> None:
+    cameras = CameraFaults(2)
+    given = [1.2] * 10 + [float("nan")] + [2 * np.pi - 0.4] * 12
+    found = [cameras.is_turned(1, one) for one in given]
+    assert found[:6] == [False] * 5 + [True] and found[10] and not found[-1]
+    assert found.index(False, 6) <= 20
