@@ -143,7 +143,8 @@ def scene_camera(
     if shown is not None and by_people[1] < FOUND_STDDEV:
         sources.append("people who stand or walk" if shown.shows_feet else "people's bodies")
     apart = abs(by_edges[0] - by_people[0])
-    if has_edges and shown is not None and apart > max(_TOLD, _SURE * by_people[1]):
+    is_asked = given is None and has_edges and shown is not None
+    if is_asked and apart > max(_TOLD, _SURE * by_people[1]):
         remarks.append(
             f"the upright edges of the room show a camera pitch of {_degrees(by_edges)}, and "
             f"people show {_degrees(by_people)}; {_degrees((pitch, pitch_stddev))} is used, so "

@@ -20,7 +20,7 @@ from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.posture import YAW, reference_posture
 from cardbox_tracker.person.skeleton import KeypointState
 from cardbox_tracker.search.config import default_preset
-from cardbox_tracker.search.doubt import HANDS, Source, models
+from cardbox_tracker.search.doubt import HANDS
 from cardbox_tracker.search.whole_body import WholeBodyFilter
 from cardbox_tracker.terms.inner_cue import InnerCue
 from cardbox_tracker.terms.joint_points import EVIDENCE
@@ -32,7 +32,6 @@ from cardbox_tracker.tracking.tracker import Tracker
 
 Detect = Callable[..., ImagePoints]
 
-UNCERTAIN_ABOVE = models()[Source.POINTS].uncertain_from
 CAMERA = Camera(160, 120, 165.0, 165.0, 79.5, 59.5)
 MEASURED = BodyModel.of(hip_height_m=-0.51)
 GUESSED = MEASURED.with_values(source="proportions")
@@ -137,7 +136,7 @@ def is_tracked(found: tuple[np.ndarray, list[Estimate]], body: BodyModel) -> boo
     estimates = found[1]
     sure = [
         estimate.state == TRACKING
-        or bool((estimate.keypoint_chances[HANDS] > UNCERTAIN_ABOVE).any())
+        or any(estimate.keypoint_states[hand] is not KeypointState.TRACKED for hand in HANDS)
         for estimate in estimates
     ]
     least = 0.8 * len(sure) if body is MEASURED else 0
