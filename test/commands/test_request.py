@@ -341,7 +341,6 @@ def test_a_measured_person_takes_the_place_of_a_stature(tmp_path: Path) -> None:
         ("film.mp4", "unrecognized arguments: film.mp4"),
         ("--start soon", "got 'soon'"),
         ("--model 'a.yaml", "No closing quotation"),
-        ("--particles 3", "was removed: give --set"),
     ],
 )
 def test_mistakes_name_the_file(tmp_path: Path, text: str, expected: str) -> None:

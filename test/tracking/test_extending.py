@@ -9,7 +9,7 @@ import sys
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
-from types import ModuleType
+from types import ModuleType, SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -190,6 +190,12 @@ def test_a_corrector_that_cannot_be_used_is_refused(folder: Path) -> None:
     of = Tracker(body, camera, tracker.config, corrector=lambda frames, state: state[:12])
     with pytest.raises(ValueError, match=r"shape \(12,\); expected \(14,\)"):
         of.track(silhouette_of(tracker))
+
+
+def test_the_format_writes_a_line_for_each_image(folder: Path) -> None:
+    motion = SimpleNamespace(stamp_ns=np.array([7, 9]), state=("tracking", "lost"))
+    module_of("my_format").STATES.write(folder / "a.states", motion, None)
+    assert (folder / "a.states").read_text() == "7 tracking\n9 lost\n"
 
 
 def test_the_scheme_is_one() -> None:
