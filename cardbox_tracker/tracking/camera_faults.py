@@ -44,8 +44,8 @@ _MOVED = 0.08
 # Share of the image that no person fills.
 _FULL = 0.8
 # Images over which the direction that somebody faces is compared, and from which on; least
-# difference, rad: right cameras differ by up to 30 degrees, mirrored ones by 60 and more.
-_WINDOW, _JUDGED, _OTHER_WAY = 15, 6, np.radians(45.0)
+# difference, rad: right cameras differ by up to 34 degrees, mirrored ones by 60 and more.
+_WINDOW, _JUDGED, _OTHER_WAY = 15, 6, np.radians(50.0)
 # Time for which a fault that is over is told, ns, and the usual time between images.
 _TOLD_NS, _USUAL_NS = 1_000_000_000, 66_666_667
 _SHOULDERS = [POINT_INDEX["left_shoulder"], POINT_INDEX["right_shoulder"]]

@@ -310,10 +310,11 @@ class Tracker:
 
         If all of several further cameras contradict the first one, that is left out.
         """
-        if not any(frame["covered"] is not None for frame in frames):
-            # What others hide is missing in the outline.
+        # What others hide is missing in the outline, and networks mix people.
+        is_whole = not any(frame["covered"] is not None for frame in frames)
+        if is_whole:
             agreement.look(*_silhouettes(frames))
-        before_rad = facing_rad(frames[0].points, frames[0].camera)
+        before_rad = facing_rad(frames[0].points, frames[0].camera) if is_whole else np.nan
         reasons = [POSE if fault else "" for fault in agreement.are_contradicted]
         for number, (frame, view) in enumerate(zip(frames[1:], self.views, strict=True)):
             turned_rad = facing_rad(frame.points, frame.camera) + view.yaw_rad - before_rad
