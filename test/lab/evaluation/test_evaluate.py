@@ -111,7 +111,7 @@ def test_the_same_seed_gives_the_same_figures(session: Path) -> None:
 
 
 def test_a_folder_that_is_no_session_is_refused(session: Path, tmp_path: Path) -> None:
-    with pytest.raises(CardboxError, match="ground truth"):
+    with pytest.raises(CardboxError, match="json of a session"):
         load_session(tmp_path)
     truth = json.loads((session / "ground_truth.json").read_text())
     truth["segments"] = [s for s in truth["segments"] if s["name"] != "side"]

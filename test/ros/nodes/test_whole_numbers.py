@@ -15,7 +15,7 @@ pytest.importorskip("rclpy", reason="rclpy is not installed")
 from cardbox_tracker.ros.runtime.parameters import LiveParameters
 from lab.tools.parameter_docs import NODES
 
-GIVEN = {"play_bag": {"bag": "bag"}}
+GIVEN = {"play_bag": {"bag": "bag"}, "tracker": {"people": 2}}
 
 
 def whole(default: float, lowest: float | None, highest: float | None) -> int | None:
@@ -37,7 +37,7 @@ def test_whole_numbers_of_a_file_are_accepted(
             if number is not None:
                 numbers[key] = number
         elif kind.types()[key] == list[float]:
-            numbers[key] = [1, 2]
+            numbers[key] = [2, 2]
     path = tmp_path / "numbers.yaml"
     section = {"ros__parameters": numbers | GIVEN.get(name, {})}
     path.write_text(yaml.safe_dump({place.format(name=name): section}))
