@@ -118,7 +118,7 @@ def test_the_examples_of_readme_and_python_run(
     with pytest.raises(CardboxError, match=r"no format has the ending of x\.xlsx; those are \.trc"):
         result.save("x.xlsx")
     monkeypatch.setitem(sys.modules, "pandas", None)
-    with pytest.raises(CardboxError, match="pip install pandas"):
+    with pytest.raises(CardboxError, match="pip install 'cardbox_tracker"):
         result.to_pandas()
     Path("film.trc").unlink()
     (code,) = re.findall(
