@@ -69,14 +69,12 @@ class FoundCamera(NamedTuple):
         sources: what the pitch is found from, in words.
         remarks: sources that contradict each other, and a camera that moves, in words.
         distances: level distance of each person at first, statures; nan where it is not known.
-        moves: whether the camera moves.
     """
 
     camera: SceneCamera
     sources: tuple[str, ...] = ()
     remarks: tuple[str, ...] = ()
     distances: tuple[float, ...] = ()
-    moves: bool = False
 
 
 def scene_camera(
@@ -151,8 +149,7 @@ def scene_camera(
             "give --camera-pitch-deg if it is known"
         )
     # Without points, nothing tells the people from the background.
-    moves = bool(people) and camera_moves(people, pictures, camera)
-    if moves:
+    if people and camera_moves(people, pictures, camera):
         pitch_stddev = float(np.hypot(pitch_stddev, _MOVING))
         remarks.append(
             "the background moves, so the camera does not stand still; postures are those of one "
@@ -184,13 +181,8 @@ def scene_camera(
             factor = Value(float(np.exp(known.values[3])), float(stddevs[1]), FOUND)
             lens = lens_of(camera, factor)
         distances = known.distances
-    return FoundCamera(
-        SceneCamera(lens, found, turned, height),
-        tuple(sources),
-        tuple(remarks),
-        distances,
-        moves,
-    )
+    camera_found = SceneCamera(lens, found, turned, height)
+    return FoundCamera(camera_found, tuple(sources), tuple(remarks), distances)
 
 
 def camera_moves(people: Sequence[Sightings], pictures: Sequence[Picture], camera: Camera) -> bool:

@@ -307,7 +307,7 @@ def test_the_cameras_pitch_is_found_from_the_recording(
     pitch, roll = (Value(float(np.radians(d)), 0.0873) for d in (pitch_deg, roll_deg))
     tilt = SceneCamera(Value(1.0, 0.01), pitch, roll)
     remarks = ("it moves",) if pitch_deg < 0.0 else ()
-    found = FoundCamera(tilt, sources, remarks, (2.0 / 1.72,), moves=False)
+    found = FoundCamera(tilt, sources, remarks, (2.0 / 1.72,))
     monkeypatch.setattr("cardbox_tracker.measuring.scene_camera.scene_camera", found_in)
 
     def opened(bag: Any, detector: Any, camera: Any, points: Any) -> SilhouetteSource:

@@ -143,5 +143,4 @@ def test_a_camera_that_moves_is_told() -> None:
     for shift_px, moves in ((0, False), (15, True)):
         pictures = [(10.0 * k, np.roll(room, shift_px * k, axis=1)) for k in range(4)]
         shown = scene_camera(people, pictures, CAMERA, [STATURE_M])
-        assert shown.moves is moves
         assert any("camera does not stand still" in one for one in shown.remarks) is moves
