@@ -113,9 +113,9 @@ class Models(NamedTuple):
     Attributes:
         uncertain_from: probability of being wrong above which a keypoint is uncertain: the highest
             one with which at most 2 % of the tracked keypoints of left-out sources are wrong.
-        doubtful_from: that of a hand, over time (:func:`remembered`), above which it and the
-            posture are uncertain: the highest one with which at most 2 % of the images that are
-            ``tracking`` have a wrong keypoint.
+        doubtful_from: that of a hand, over time (:func:`remembered`), above which the posture is
+            uncertain, and without points the hand: the highest one with which at most 2 % of the
+            images that are ``tracking`` have a wrong keypoint.
         by_kind: models by the names of :data:`KINDS`, and ``whole``.
     """
 
@@ -178,8 +178,10 @@ class Doubt:
         is_uncertain = is_doubted
         # The paper's filter finds hands so badly that its state only says whether it is lost.
         if source is not Source.PAPER:
-            is_unsure[HANDS] = self._hands > doubtful_from
-            is_uncertain |= bool(is_unsure[HANDS].any())
+            is_uncertain |= bool(self._hands.max() > doubtful_from)
+            # An outline shows hands so badly that they make the images uncertain.
+            if source is not Source.POINTS:
+                is_unsure[HANDS] = self._hands > doubtful_from
         given = zip(
             chances.tolist(), hidden.tolist(), (is_unsure | is_doubted).tolist(), strict=True
         )
