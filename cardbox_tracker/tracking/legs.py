@@ -12,9 +12,9 @@ units of its deviation:
 
 Lengths of thigh and shank, and the height of the floor, are the same in all images. They are
 unknowns of each fit whose prior is what the images before have shown, and the floor that is given.
-So is the distance of the hips, with the tracker's as prior: feet on a floor that is known show it
-better than the trunk's size. The whole person is moved along the line of sight to it, unless depth
-images or a further camera show the distance.
+So is the share by which the tracker's distance is wrong, which changes little: else, who squats
+could stand on straight legs nearer to the camera. The whole person is moved along the line of sight
+to that distance, unless depth images or a further camera show it.
 
 A leg that the detector does not see keeps its angles, with growing deviations, and is ``hidden``.
 """
@@ -22,7 +22,7 @@ A leg that the detector does not see keeps its angles, with growing deviations, 
 from __future__ import annotations
 
 from dataclasses import replace
-from math import exp
+from itertools import product
 from typing import NamedTuple
 
 import numpy as np
@@ -59,7 +59,7 @@ from cardbox_tracker.tracking.place import DEPTH, SECOND_CAMERA
 _SIDES = 1.0, -1.0
 _N = len(LEG_NAMES)
 # Values of a fit: the angles, the logarithms of the lengths' factors, the floor, the distance.
-_LENGTHS, _SHARED, _DISTANCE = slice(_N, _N + 2), slice(_N, _N + 3), _N + 3
+_LENGTHS, _SHARED, _DISTANCE = slice(_N, _N + 2), slice(_N, _N + 4), _N + 3
 # Knee and ankle, left and right, among the points.
 _ENDS = [
     [LEG_POINT_NAMES.index(f"{side}_{name}") for name in ("knee", "ankle")]
@@ -85,13 +85,9 @@ _REST = np.tile(np.radians([60.0, 15.0, 15.0, 60.0]), 2)
 _CHANGE, _CHANGE_PER_S = np.radians(8.0), np.radians(200.0)
 # Logarithms of the lengths' factors, the largest one of people, and the floor before it is seen, m.
 _LENGTH, _MOST_LENGTH, _FLOOR_M = 0.04, 0.12, 0.12
-# Relative deviation of the tracker's distance of the hips.
-_DISTANCE_SHARE = 0.05
+# Relative deviations of the tracker's distance of the hips, in all images and in each.
+_DISTANCE_SHARE, _DISTANCE_CHANGE = 0.03, 0.02
 _FIXED = 1e-6
-# Time in which what the feet have shown of the distance is forgotten, s.
-_FORGOTTEN_S = 2.0
-# Its change from image to image and the growth of that a second.
-_DISTANCE_CHANGE, _DISTANCE_PER_S = 0.01, 0.1
 # Images whose information counts for what they share, because their errors are alike, and time over
 # which it is averaged, s.
 _IMAGES, _AVERAGED_S = 2.0, 3.0
@@ -138,12 +134,12 @@ class LegReader:
         self.forget()
         stature_m = stature_of(body_parts(body.sizes))
         lengths_m = (THIGH_SHARE + SHANK_SHARE + _ANKLE_SHARE) * stature_m
-        self._usual = np.array([0.0, 0.0, body.placement.hip_height_m - lengths_m])
-        self._usual_stddev = np.array([_LENGTH, _LENGTH, _FLOOR_M])
+        self._usual = np.array([0.0, 0.0, body.placement.hip_height_m - lengths_m, 0.0])
+        self._usual_stddev = np.array([_LENGTH, _LENGTH, _FLOOR_M, _DISTANCE_SHARE])
         stands = body.camera_pose
         if stands.height_m is not None:
             self._usual[2], self._usual_stddev[2] = -stands.height_m, stands.height_stddev_m
-        self._mean_information, self._mean_vector = np.zeros((3, 3)), np.zeros(3)
+        self._mean_information, self._mean_vector = np.zeros((4, 4)), np.zeros(4)
         self._seen_s = self._time_s = 0.0
         self._is_known = False
 
@@ -151,7 +147,7 @@ class LegReader:
         """Forget the posture; lengths and floor stay."""
         self._last: FloatArray | None = None
         self._last_stddev = _REST
-        self._last_s, self._last_share = 0.0, 0.0
+        self._last_s = 0.0
 
     def see(self, frame: Frame, estimate: Estimate) -> Estimate:
         """Return ``estimate`` with the legs, as soon as points have shown them.
@@ -169,10 +165,9 @@ class LegReader:
         fit = _Fit(estimate, self._body, camera)
         time_s = self._time_s
         elapsed_s = abs(time_s - self._last_s)
-        change, steady = np.full(_N, np.inf), np.inf
+        change = np.full(_N, np.inf)
         if self._last is not None and elapsed_s <= _KEPT_S:
             change = np.hypot(self._last_stddev, _CHANGE + _CHANGE_PER_S * elapsed_s)
-            steady = _DISTANCE_CHANGE + _DISTANCE_PER_S * elapsed_s
         else:
             self._last = np.zeros(_N)
         usual = np.diag(self._usual_stddev**-2.0)
@@ -180,14 +175,17 @@ class LegReader:
         vector = usual @ self._usual + _IMAGES * self._mean_vector
         shared: FloatArray = np.asarray(np.linalg.solve(information, vector), np.float64)
         seen = fit.seen(points)
-        if seen is None or seen.scores[:, 2].min() < LEAST_SCORE:
-            # Without both feet, nothing shows the distance.
-            self._last_share *= exp(-min(elapsed_s, _KEPT_S) / _FORGOTTEN_S)
-            steady = _FIXED
-        fit.prior(self._last, change, shared, information, (self._last_share, steady))
+        changes = np.diag([0.0, 0.0, 0.0, _DISTANCE_CHANGE**2])
+        information = np.linalg.inv(np.linalg.inv(information) + changes)
+        if fit.is_distance_fixed:
+            shared[3] = 0.0
+        if fit.is_distance_fixed or seen is None or seen.scores[:, 2].min() < LEAST_SCORE:
+            # Without both feet, nothing new shows the distance.
+            information[3, 3] += _FIXED**-2.0
+        vector = information @ shared
+        fit.prior(self._last, change, shared, information)
         found = fit.solve(seen, self._last)
         self._last, self._last_s = found.values[:_N], time_s
-        self._last_share = float(found.values[_DISTANCE])
         covariance: FloatArray = np.asarray(np.linalg.inv(found.information), np.float64)
         covariance = covariance * max(1.0, found.rms) ** 2
         self._last_stddev = np.minimum(np.sqrt(np.diag(covariance)[:_N]), _REST)
@@ -243,8 +241,7 @@ class _Fit:
         self._sight = camera.optical_to_reference(np.array([0.0, 0.0, 1.0]))
         place = estimate.place
         # A filter that keeps the distance constant has no values for another one.
-        is_fixed = place is None or place.rests_on in (DEPTH, SECOND_CAMERA)
-        self._distance_share = _FIXED if is_fixed else _DISTANCE_SHARE
+        self.is_distance_fixed = place is None or place.rests_on in (DEPTH, SECOND_CAMERA)
 
     def seen(self, points: ImagePoints | None) -> _Seen | None:
         """Return what the points show; None if they do not show the legs."""
@@ -288,67 +285,69 @@ class _Fit:
         change: FloatArray,
         shared: FloatArray,
         information: FloatArray,
-        distance: tuple[float, float],
     ) -> None:
         """Set the priors.
 
         Args:
             before: angles (8,) in the image before.
             change: deviations of their change; inf for none.
-            shared: what images share, (3,).
-            information: its information (3, 3).
-            distance: share of the distance in the image before, and deviation of its change.
+            shared: what images share, (4,).
+            information: its information (4, 4).
         """
-        self._before, self._change, self._distance = before, change, distance
+        self._before, self._change = before, change
         self._expected, self._root = shared, np.linalg.cholesky(information).T
 
     def solve(self, seen: _Seen | None, before: FloatArray) -> _Solution:
         """Return the best of the fits that start at the angles before and at what is seen."""
-        starts = [before]
-        if seen is not None and np.isfinite(seen.slopes).all():
-            starts.append(self._by_bones(seen))
+        starts = [np.concatenate([before, self._expected])]
+        if seen is not None:
+            others = self._folded(seen)
+            costs = np.sum(self._residuals(others, seen) ** 2, axis=1)
+            starts.append(others[np.argmin(costs)])
         best: _Solution | None = None
-        for start in starts:
-            values = np.concatenate([start, self._expected, [0.0]])
-            for number in range(_STEPS + 1):
+        for values in starts:
+            for _ in range(_STEPS + 1):
                 moved = np.concatenate([values[None], values + _DIFFERENCE * np.eye(len(values))])
                 residuals = self._residuals(moved, seen)
                 jacobian = (residuals[1:] - residuals[0]).T / _DIFFERENCE
                 information = jacobian.T @ jacobian
-                if number == _STEPS:
-                    break
+                count = 1 if seen is None else 4 + 8
+                rms = float(np.sqrt(np.sum(residuals[0] ** 2) / count))
+                if best is None or rms < best.rms:
+                    best = _Solution(values, information, rms)
                 step = np.linalg.solve(information, jacobian.T @ residuals[0])
                 values = values - np.clip(step, -_LARGEST_STEP, _LARGEST_STEP)
                 values[:_N] = np.clip(values[:_N], *LEG_LIMITS.T)
                 values[_LENGTHS] = np.clip(values[_LENGTHS], -_MOST_LENGTH, _MOST_LENGTH)
-            count = 1 if seen is None else 4 + 8
-            rms = float(np.sqrt(np.sum(residuals[0] ** 2) / count))
-            if best is None or rms < best.rms:
-                best = _Solution(values, information, rms)
         assert best is not None
         return best
 
-    def _by_bones(self, seen: _Seen) -> FloatArray:
-        """Return the angles (8,) of legs in the image whose bones slope as their lengths tell.
+    def _folded(self, seen: _Seen) -> FloatArray:
+        """Return values (16, 12) of legs whose knees and ankles are where they are seen.
 
-        The detector tells whether a bone that looks short points to the camera or away.
+        A bone of a known length ends in front of or behind its beginning, so there are four legs
+        on each side. A bone that looks too long is across the line of sight.
         """
-        hips_m = self._hip_m + np.outer(_SIDES, self._aside)
-        optical_m = self._camera.reference_to_optical(hips_m)
-        metres = optical_m[:, 2].mean() / np.array([self._camera.fx, self._camera.fy])
-        ends = np.concatenate([self._camera.project(optical_m)[:, None], seen.px], axis=1)
-        across = np.diff(ends, axis=1) * metres / self._lengths_m[:, None]
-        short = np.sqrt(np.maximum(1.0 - (across**2).sum(axis=-1), 0.0))
-        slopes = np.sign(seen.slopes) * np.maximum(np.abs(seen.slopes), short)
-        slopes = np.clip(slopes, -0.98, 0.98)
-        flat = across / np.maximum(np.linalg.norm(across, axis=-1, keepdims=True), 1e-6)
-        bones = np.concatenate([flat * np.sqrt(1.0 - slopes**2)[..., None], slopes[..., None]], -1)
-        bones = self._camera.optical_to_reference(bones) @ self._turn
-        angles = [
-            leg_angles(thigh, shank, side)
-            for (thigh, shank), side in zip(bones, _SIDES, strict=True)
-        ]
-        return np.asarray(np.clip(np.concatenate(angles), *LEG_LIMITS.T))
+        lengths_m = self._lengths_m * np.exp(self._expected[:2])
+        hips_m = self._hip_m * np.exp(self._expected[3]) + np.outer(_SIDES, self._aside)
+        both: list[list[FloatArray]] = [[], []]
+        for number, side in enumerate(_SIDES):
+            hip_m = self._camera.reference_to_optical(hips_m[number])
+            rays = self._camera.rays(seen.px[number])
+            rays /= np.linalg.norm(rays, axis=-1, keepdims=True)
+            for signs in product((-1.0, 1.0), repeat=2):
+                joints_m = [hip_m]
+                for ray, length_m, sign in zip(rays, lengths_m, signs, strict=True):
+                    along_m = float(ray @ joints_m[-1])
+                    across_m2 = joints_m[-1] @ joints_m[-1] - along_m**2
+                    root_m = np.sqrt(max(length_m**2 - across_m2, 0.0))
+                    joints_m.append((along_m + sign * root_m) * ray)
+                bones = self._camera.optical_to_reference(np.diff(joints_m, axis=0)) @ self._turn
+                bones /= np.linalg.norm(bones, axis=-1, keepdims=True)
+                both[number].append(leg_angles(bones[0], bones[1], side))
+        folded = np.array([np.concatenate([*pair, self._expected]) for pair in product(*both)])
+        folded[:, :_N] = np.clip(folded[:, :_N], *LEG_LIMITS.T)
+        return folded
 
     def hips_moved_m(self, values: FloatArray) -> FloatArray:
         """Return how far from the tracker's place the hips are, (3,), reference frame."""
@@ -376,8 +375,6 @@ class _Fit:
             angles / _REST,
             (angles - self._before) / self._change,
             (values[:, _SHARED] - self._expected) @ self._root.T,
-            values[:, _DISTANCE, None] / self._distance_share,
-            (values[:, _DISTANCE, None] - self._distance[0]) / self._distance[1],
         ]
         # A foot may not be below the floor; from some height on, it is lifted.
         height_m = points_m[:, :, 2, 2] - values[:, _N + 2, None] - self._ankle_m

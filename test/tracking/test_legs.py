@@ -232,6 +232,21 @@ def test_a_given_floor_shows_the_distance_in_the_first_image(rests_on: str, left
     assert abs(float(result.offset_m[0])) == pytest.approx(left_m, abs=0.04)
 
 
+def test_a_distance_that_feet_have_shown_stays_while_they_are_hidden() -> None:
+    there, body = estimate(), BODY.with_values(camera_height_m=1.33, height_stddev_m=0.01)
+    moved = 0.12 * pose(BODY, np.zeros(12)).hip / 3.0
+    wrong = estimate((float(moved[0]), float(moved[2])))
+    reader, joints = LegReader(body, CAMERA), joints_m(np.zeros(8), there)
+    found = []
+    for score, images in ((1.0, 30), (0.1, 90)):
+        for _ in range(images):
+            result = reader.see(frame(seen(joints, there, score)), wrong)
+        assert result.offset_m is not None
+        found.append(float(result.offset_m[0] - moved[0]))
+    assert abs(found[0]) > 0.04
+    assert found[1] == pytest.approx(found[0], rel=0.3)
+
+
 def test_bones_are_not_longer_than_those_of_people() -> None:
     """A knee and an ankle that are another person's do not stretch the leg to them."""
     found = estimate()
