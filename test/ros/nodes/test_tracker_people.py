@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from typing import Any
 
 import numpy as np
@@ -42,8 +43,8 @@ def node(bus: Any) -> Any:
     return node
 
 
-def show(bus: Any, tenth: int, *aside_m: float) -> None:
-    header = Header(frame_id="eye", stamp=Time(sec=1, nanosec=tenth * 10**8))
+def show(bus: Any, tenth: int, *aside_m: float, second: int = 1) -> None:
+    header = Header(frame_id="eye", stamp=Time(sec=second, nanosec=tenth * 10**8))
     bus.send("/silhouette/camera_info", camera_info_message(header, CAMERA))
     bus.send("/silhouette", image_message(header, silhouette(*aside_m), "mono8"))
 
@@ -62,6 +63,22 @@ def test_each_person_has_the_topics(bus: Any, node: Any) -> None:
     assert "/joint_states" not in bus.sent
     keys = {value.key for value in bus.tick().values}
     assert {"person 1 state", "person 2 state"} <= keys and "state" not in keys
+
+
+def test_who_is_absent_is_a_value_and_an_image_has_an_age(bus: Any, node: Any) -> None:
+    second = int(time.time()) - 2
+    for tenth in range(8):
+        show(bus, tenth, -0.6, second=second)
+    status = bus.tick()
+    values = {value.key: value.value for value in status.values}
+    assert values["absent people"] == "2" and "person 2" not in status.message
+    ages_ms = [float(values[f"image to joint states p{share} (ms)"]) for share in (50, 95)]
+    assert 1000.0 < ages_ms[0] <= ages_ms[1]
+    for tenth in range(8, 10):
+        show(bus, tenth, second=second)
+    status = bus.tick()
+    assert "nobody is in the image" in status.message and "person" not in status.message
+    assert {value.value for value in status.values if value.key == "absent people"} == {"1, 2"}
 
 
 def test_one_person_is_reset_alone(bus: Any, node: Any) -> None:
