@@ -396,6 +396,26 @@ def test_silhouettes_of_the_detector_take_the_place_of_the_background(
             launch("nodes", silhouettes="detector", **wrong)
 
 
+@pytest.mark.parametrize(
+    ("more", "is_told"),
+    [
+        ({}, False),
+        ({"stature": "1.75"}, True),
+        ({"statures": "[1.75, 1.62]", "people": "2"}, True),
+        ({"silhouettes": "detector"}, True),
+        ({"silhouettes": "detector", "cameras": "[left, right]"}, False),
+    ],
+)
+def test_the_tracker_is_told_of_distance_and_pitch_if_nobody_is_measured(
+    more: dict[str, str], is_told: bool, launch: Callable[..., Any]
+) -> None:
+    given = {"person_distance_m": "2.5", "camera_pitch_deg": "5.0"}
+    nodes = launch("nodes", **more, **given, single_process="false", publish_tf="false")
+    by_name = {node.options["name"]: parameters_of(node) for node in nodes}
+    for node, expected in (("initializer", True), ("tracker", is_told)):
+        assert ({"person_distance_m", "camera_pitch_deg"} <= by_name[node].keys()) is expected
+
+
 def test_points_of_another_detector_can_be_given(launch: Callable[..., Any]) -> None:
     nodes = launch("nodes", keypoints="/yolo/detections", publish_tf="false")
     assert executables(nodes) == NODES
