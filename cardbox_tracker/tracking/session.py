@@ -318,8 +318,9 @@ class Session:
             last_ns = sight.seen_ns
             if not elsewhere and last_ns is not None and not 0 <= stamp_ns - last_ns <= _HELD_NS:
                 sight.pixels = None
-        for person, number in ((p, found[p.number]) for p in self._people if p.number in found):
-            self._learn(person, camera, colours[number])
+        for person in self._people:
+            if person.number in found:
+                self._learn(person, camera, colours[found[person.number]])
         parts = dict(self._shares(camera, silhouette, found.keys()))
         return {
             person.number: self._share_of(person, camera, seen, parts, person.number in found)

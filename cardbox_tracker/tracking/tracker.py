@@ -310,8 +310,7 @@ class Tracker:
 
         If all of several further cameras contradict the first one, that is left out.
         """
-        # What others hide is missing in the outline, and networks mix people.
-        is_whole = not any(frame["covered"] is not None for frame in frames)
+        is_whole = _are_whole(frames)
         if is_whole:
             agreement.look(*_silhouettes(frames))
         before_rad = facing_rad(frames[0].points, frames[0].camera) if is_whole else np.nan
@@ -501,8 +500,7 @@ class Tracker:
             if self.config.relocalize:
                 self._filter.recover()
             return Estimate(LOST)
-        is_whole = not any(frame["covered"] is not None for frame in frames)
-        if self.agreement is not None and is_whole and fit.offset_m is not None:
+        if self.agreement is not None and _are_whole(frames) and fit.offset_m is not None:
             self.agreement.see(self._before, *_silhouettes(frames))
         judged, is_doubtful = fit.judged, self._is_doubtful(frames[0])
         states = None if judged is None else judged.states
@@ -532,6 +530,11 @@ class Tracker:
             self._facing.see(frame, Posed(self.cameras[0].posable, self._before[None]))
             return self._facing.shows_back
         return self._is_contradicted
+
+
+def _are_whole(frames: Sequence[Frame]) -> bool:
+    """Return whether nobody hides a part of the person, whom networks then mix with others, too."""
+    return all(frame["covered"] is None for frame in frames)
 
 
 def _unsure(estimate: Estimate) -> Estimate:
