@@ -56,10 +56,11 @@ class OwnModel(NamedTuple):
         """
         if not callable(getattr(given, "detect", None)):
             raise CardboxError(f"{name} has no function detect(image); docs/extending.md has one")
-        if isinstance(given, type):
-            with suppress(OSError, TypeError):
-                return cls(given, Path(inspect.getfile(given)))
-        return cls(given if isinstance(given, type) else lambda: given)
+        if not isinstance(given, type):
+            return cls(lambda: given)
+        with suppress(OSError, TypeError):
+            return cls(given, Path(inspect.getfile(given)))
+        return cls(given)
 
 
 class OwnNetwork(PoseNetwork):
