@@ -52,10 +52,7 @@ _MOST_PERIOD_NS = 2_000_000_000
 _REPAIR = "'ros2 bag reindex' remakes lost metadata, 'mcap recover' a file that was cut off"
 
 
-REPAIR_ROS1 = (
-    "'rosbag reindex' of ROS 1 mends what a recorder left open, after the rest of the name behind "
-    "'.bag' is removed"
-)
+REPAIR_ROS1 = "let its name end in '.bag', and close it with 'rosbag reindex' of ROS 1"
 """What to do with a bag of ROS 1 whose recorder was killed, for texts."""
 
 
