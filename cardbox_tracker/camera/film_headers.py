@@ -24,7 +24,7 @@ _TO_CODEC = b"moov", b"trak", b"mdia", b"minf", b"stbl"
 # Boxes of a film that are read; its header is among the first or last ones of a few.
 _MOST_BOXES = 10_000
 MOST_DAMAGED = 100
-"""Damaged images in a row; a film that has ended fails as often as it is read."""
+"""Images in a row that cannot be decoded, after which a film counts as ended."""
 # Pixels that are less oblong count as square, px / px.
 _SQUARE = 0.01
 _MOST_OBLONG = 4.0

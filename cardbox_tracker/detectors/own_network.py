@@ -41,7 +41,7 @@ class FindsPeople(Protocol):
 class OwnModel(NamedTuple):
     """The class of a detector, or a function that returns one, and the file of its code if known.
 
-    By the file, a detector that was changed is told.
+    A folder of recordings is tracked again if this file has changed.
     """
 
     make: Callable[[], FindsPeople]

@@ -23,7 +23,7 @@ from cardbox_tracker.camera.camera_device import (
     open_device,
     open_video,
 )
-from cardbox_tracker.camera.camera_info import LEAST_DEG
+from cardbox_tracker.camera.camera_info import LEAST_FOV_DEG
 from cardbox_tracker.camera.film_headers import (
     MOST_DAMAGED,
     check_times,
@@ -95,10 +95,10 @@ class CameraParameters(NodeParameters):
 
     def check(self) -> None:
         """Raise ValueError if values contradict each other."""
-        if 0.0 < self.horizontal_fov_deg < LEAST_DEG:
+        if 0.0 < self.horizontal_fov_deg < LEAST_FOV_DEG:
             raise ValueError(
                 f"horizontal_fov_deg is {self.horizontal_fov_deg:g}; expected degrees, "
-                f"{LEAST_DEG:g} or more"
+                f"{LEAST_FOV_DEG:g} or more"
             )
         if not self.device and not self.file:
             raise ValueError("device and file are both empty; give one, such as /dev/video0")
