@@ -164,22 +164,19 @@ class CameraNode(CardboxNode):
             ok, image = self._capture.read()
             if not ok:
                 failed += 1
-                if settings.file and failed < MOST_DAMAGED:
-                    continue
                 if not settings.file:
                     self.diagnostics.problem(
                         f"{settings.device} delivers no image; is it plugged in, and used by no "
                         "other program? ('fuser -v' tells)"
                     )
                     self._stop.wait(_RETRY_S)
-                elif settings.loop and self._capture.set(cv2.CAP_PROP_POS_FRAMES, 0):
+                elif failed >= MOST_DAMAGED:
+                    if not (settings.loop and self._capture.set(cv2.CAP_PROP_POS_FRAMES, 0)):
+                        self.diagnostics.wait_for(
+                            f"a restart: {settings.file} has been played to its end"
+                        )
+                        return
                     failed = 0
-                    continue
-                else:
-                    self.diagnostics.wait_for(
-                        f"a restart: {settings.file} has been played to its end"
-                    )
-                    return
                 continue
             if not self._locked and time.monotonic() - started_s >= settings.settle_s:
                 self._lock_exposure()
