@@ -14,7 +14,7 @@ from cardbox_tracker.common.errors import CameraError
 
 # Farther from the middle, relative to the image, no lens has its principal point.
 _MOST_ASIDE = 0.15
-LEAST_DEG, MOST_DEG = 10.0, 160.0
+LEAST_FOV_DEG, MOST_FOV_DEG = 10.0, 160.0
 """Range of fields of view across the image that cameras for people have, degrees."""
 # Pixels that are more oblong belong to a calibration of another size.
 _MOST_OBLONG = 0.1
@@ -40,7 +40,7 @@ def unusual(k: NDArray[np.float64], width: int, height: int) -> str:
             f"of {width}x{height}; it seems to be of images of about {middle[0]:.0f}x"
             f"{middle[1]:.0f}"
         )
-    if not LEAST_DEG <= fov_deg <= MOST_DEG:
+    if not LEAST_FOV_DEG <= fov_deg <= MOST_FOV_DEG:
         found.append(f"its field of view is {fov_deg:.3g} degrees across")
     if abs(focal[0] / focal[1] - 1) > _MOST_OBLONG:
         found.append(f"its focal lengths {focal[0]:g} and {focal[1]:g} px differ")
@@ -58,7 +58,7 @@ def is_rectified_only(message: Any) -> bool:
 
 
 def is_other_lens(message: Any, first: Any) -> bool:
-    """Return whether the focal length or the principal point of two CameraInfo differ."""
+    """Return whether the focal length or the principal point of two CameraInfo differs."""
     k = info_array(first, "k")
     return not np.allclose(info_array(message, "k"), k, rtol=_STEADY, atol=_STEADY * k[0])
 

@@ -21,10 +21,10 @@ from cardbox_tracker.common.errors import CameraError
 _MOST_HEADER_BYTES = 128
 _MOST_START_BYTES = 4096
 _TO_CODEC = b"moov", b"trak", b"mdia", b"minf", b"stbl"
-MOST_BOXES = 10_000
-"""Boxes of a film that are read; its header is among the first or last ones of a few."""
+# Boxes of a film that are read; its header is among the first or last ones of a few.
+_MOST_BOXES = 10_000
 MOST_DAMAGED = 100
-"""Damaged images in a row; a film that has ended fails as often as it is read."""
+"""Images in a row that cannot be decoded, after which a film counts as ended."""
 # Pixels that are less oblong count as square, px / px.
 _SQUARE = 0.01
 _MOST_OBLONG = 4.0
@@ -57,7 +57,7 @@ def codecs(path: Path) -> str:
     """Return a remark with the codecs that an MP4, MOV, MKV or WebM names; empty if unknown."""
     with suppress(OSError, struct.error, RecursionError), path.open("rb") as file:
         names = re.findall(rb"\b[AV]_[A-Z0-9_/]+", file.read(_MOST_START_BYTES))
-        for kind, at, _ in islice(boxes(file, _TO_CODEC), MOST_BOXES):
+        for kind, at, _ in boxes(file, _TO_CODEC):
             if kind == b"stsd":
                 file.seek(at + 12)
                 names.append(file.read(4))
@@ -94,7 +94,7 @@ def shown_s(path: Path) -> float | None:
     timescale, times = 0, [0]
     try:
         with path.open("rb") as file:
-            for kind, at, _ in islice(boxes(file, (b"moov", b"trak")), MOST_BOXES):
+            for kind, at, _ in boxes(file, (b"moov", b"trak")):
                 file.seek(at)
                 header = file.read(_MOST_HEADER_BYTES)
                 if kind == b"mvhd":
@@ -109,18 +109,19 @@ def shown_s(path: Path) -> float | None:
     return max(times) / timescale if timescale and max(times) > 0 else None
 
 
-def boxes(
-    file: BinaryIO, inside: Container[bytes] = (), start: int = 0, end: int | None = None
-) -> Iterator[tuple[bytes, int, int]]:
-    """Yield kind, and begin and end of the content, of the boxes of an MP4 or MOV.
+def boxes(file: BinaryIO, inside: Container[bytes] = ()) -> Iterator[tuple[bytes, int, int]]:
+    """Return kind, and begin and end of the content, of the first boxes of an MP4 or MOV.
 
     Args:
         file: the film, or the content of a box.
         inside: kinds of boxes in which the boxes follow, too.
-        start: place of the first box.
-        end: place behind the last one; None for the end of the file.
     """
-    end = file.seek(0, os.SEEK_END) if end is None else end
+    return islice(_boxes(file, inside, 0, file.seek(0, os.SEEK_END)), _MOST_BOXES)
+
+
+def _boxes(
+    file: BinaryIO, inside: Container[bytes], start: int, end: int
+) -> Iterator[tuple[bytes, int, int]]:
     while start + 8 <= end:
         file.seek(start)
         size, kind = struct.unpack(">I4s", file.read(8))
@@ -132,5 +133,5 @@ def boxes(
             return
         yield kind, start + header, min(start + size, end)
         if kind in inside:
-            yield from boxes(file, inside, start + header, min(start + size, end))
+            yield from _boxes(file, inside, start + header, min(start + size, end))
         start += size

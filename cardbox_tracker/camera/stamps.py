@@ -243,7 +243,7 @@ class RecordedStamps:
         self.statistics = StreamStatistics(remembered=None)
         self._last: tuple[int, int] | None = None
         self._ahead_ns = 0
-        self._jumps_ns: list[int] = []
+        self._jump_ns = 0
 
     def add(self, stamp_ns: int, recorded_ns: int) -> int | None:
         """Return the time of the next message, ns; None if it is to be left out.
@@ -262,9 +262,9 @@ class RecordedStamps:
         ahead_ns, waited_ns = time_ns - before_ns, recorded_ns - recorded_before_ns
         is_set = not is_unstamped and ahead_ns - waited_ns > _CLOCK_SET_NS and waited_ns < _PAUSE_NS
         if is_set:
-            self._jumps_ns.append(ahead_ns - waited_ns)
+            self._jump_ns = self._jump_ns or ahead_ns - waited_ns
         if self._last is not None and (is_back or is_set or time_ns <= before_ns):
-            time_ns = before_ns + max(recorded_ns - recorded_before_ns, 1)
+            time_ns = before_ns + max(waited_ns, 1)
             if not is_unstamped:
                 self._ahead_ns = time_ns - stamp_ns
         self._last = time_ns, recorded_ns
@@ -272,9 +272,11 @@ class RecordedStamps:
 
     def remarks(self) -> list[str]:
         """Return texts on all faults, as :meth:`StreamStatistics.remarks`."""
-        jumps = [
-            f"the stamps jump forward by {jump_ns / 1e9:.0f} s while the recorder's clock goes on: "
-            "the clock of the camera's computer was set. Times go on with the recorder's clock"
-            for jump_ns in self._jumps_ns[:1]
-        ]
-        return [*self.statistics.remarks().values(), *jumps]
+        found = [*self.statistics.remarks().values()]
+        if self._jump_ns:
+            found.append(
+                f"the stamps jump forward by {self._jump_ns / 1e9:.0f} s while the recorder's "
+                "clock goes on: the clock of the camera's computer was set. Times go on with the "
+                "recorder's clock"
+            )
+        return found

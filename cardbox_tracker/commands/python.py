@@ -51,7 +51,7 @@ def track(recording: str | os.PathLike[str], **options: Any) -> Result:
         parser.error("detector and detector_class are both given")
     parsed.detector = own if is_own else parsed.detector
     if parsed.recording.is_dir() and not is_one_recording(parsed.recording):
-        parser.error(f"{recording} is no recording; track its recordings one by one")
+        raise CardboxError(f"{recording} is no recording; track its recordings one by one")
     with TemporaryDirectory() as folder:
         parsed.csv = parsed.csv or Path(folder, "results.csv")
         command.track_one(parsed, show=lambda _: None)

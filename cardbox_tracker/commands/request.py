@@ -30,7 +30,7 @@ from cardbox_tracker.commands.arguments import (
     time,
 )
 from cardbox_tracker.common.errors import CardboxError
-from cardbox_tracker.common.files import UnreadableFileError, read_regular
+from cardbox_tracker.common.files import foreign, read_regular
 from cardbox_tracker.common.settings import NoEffectError, nested, settings_of
 
 if TYPE_CHECKING:
@@ -847,15 +847,9 @@ def with_own_options(options: argparse.Namespace, folder: Path, name: str) -> ar
 
 def _read_options(path: Path) -> dict[str, Any]:
     """Return the values of the options in a file, by their names in a namespace."""
-    try:
+    expected = "options of 'cardbox track' in UTF-8 as they are typed, such as --stature 1.75"
+    with foreign(path, CardboxError, expected):
         words = shlex.split(read_regular(path, _MOST_BYTES).decode(), comments=True)
-    except UnreadableFileError as error:
-        raise CardboxError(f"cannot read {path}: {error}") from None
-    except ValueError as error:  # no UTF-8, or a quotation mark without its second
-        raise CardboxError(
-            f"{path} has no options as they are typed: {error}; give options of 'cardbox track' in "
-            "UTF-8, such as --stature 1.75"
-        ) from None
 
     class Parser(argparse.ArgumentParser):
         def error(self, message: str) -> NoReturn:

@@ -418,12 +418,11 @@ def digest_of_inputs(request: TrackingRequest, formats: Sequence[str], program: 
     asked = replace(request, recording=replace(request.recording, path=Path()), inputs=())
     digest = hashlib.sha256(f"{program} {formats}".encode())
     for value in _values(replace(asked, files=TrackFiles())):
-        is_file = isinstance(value, Path) and value.is_file()
-        if not is_file:
+        if isinstance(value, Path) and value.is_file():
+            with value.open("rb") as file:
+                digest.update(b"\0" + hashlib.file_digest(file, "sha256").digest())
+        else:
             digest.update(b"\0" + repr(value).encode())
-            continue
-        with value.open("rb") as file:
-            digest.update(b"\0" + hashlib.file_digest(file, "sha256").digest())
     points = request.recording.points
     folders = [points.path] if isinstance(points, PointTable) and points.path.is_dir() else []
     for entry in [file for folder in (path, *folders) for file in _files_of(folder)]:

@@ -41,7 +41,7 @@ class FindsPeople(Protocol):
 class OwnModel(NamedTuple):
     """The class of a detector, or a function that returns one, and the file of its code if known.
 
-    By the file, a detector that was changed is told.
+    A folder of recordings is tracked again if this file has changed.
     """
 
     make: Callable[[], FindsPeople]
@@ -56,10 +56,11 @@ class OwnModel(NamedTuple):
         """
         if not callable(getattr(given, "detect", None)):
             raise CardboxError(f"{name} has no function detect(image); docs/extending.md has one")
-        if isinstance(given, type):
-            with suppress(OSError, TypeError):
-                return cls(given, Path(inspect.getfile(given)))
-        return cls(given if isinstance(given, type) else lambda: given)
+        if not isinstance(given, type):
+            return cls(lambda: given)
+        with suppress(OSError, TypeError):
+            return cls(given, Path(inspect.getfile(given)))
+        return cls(given)
 
 
 class OwnNetwork(PoseNetwork):

@@ -52,10 +52,7 @@ _MOST_PERIOD_NS = 2_000_000_000
 _REPAIR = "'ros2 bag reindex' remakes lost metadata, 'mcap recover' a file that was cut off"
 
 
-REPAIR_ROS1 = (
-    "'rosbag reindex' of ROS 1 mends what a recorder left open, after the rest of the name behind "
-    "'.bag' is removed"
-)
+REPAIR_ROS1 = "let its name end in '.bag', and close it with 'rosbag reindex' of ROS 1"
 """What to do with a bag of ROS 1 whose recorder was killed, for texts."""
 
 
@@ -300,7 +297,7 @@ class BagReader:
     def _info(self, camera: str | None) -> tuple[Any, Calibration]:
         """Return the first CameraInfo of a calibrated camera, and its calibration.
 
-        All others are compared with it once, for the remarks.
+        All after it are compared with it once, for the remarks.
 
         Raises:
             BagError: the recording has no CameraInfo.
@@ -310,34 +307,34 @@ class BagReader:
             return self._infos[camera]
         topic, fault = self.camera_info_topic(camera), None
         watch = CalibrationWatch(topic, self.image_topic(camera))
-        for number, message in enumerate(self.messages([topic])):
+        messages = self.messages([topic])
+        for number, message in enumerate(messages):
             info = self.deserialize(message)
             try:
-                if camera in self._infos:
-                    if is_other_lens(info, self._infos[camera][0]):
-                        self._skipped[f"{topic} changes"] = (
-                            f"the calibration on {topic} changes at "
-                            f"{(message.time_ns - self.start_ns) / 1e9:.1f} s, as by a zoom. The "
-                            "first one is used for all images, so results from there on are wrong: "
-                            "track what comes before with --end, and record the rest apart"
-                        )
-                        break
-                    continue
                 watch.see(info)
+                changed = (m for m in messages if is_other_lens(self.deserialize(m), info))
+                other = next(changed, None)
             except CameraError as error:
                 fault = fault or error
+                continue
             except (AttributeError, ArithmeticError, TypeError, ValueError) as error:
                 raise self._damaged(error) from None
-            if watch.current is not None:
-                if number:
-                    self._skipped[topic] = (
-                        f"the first {number} messages on {topic} are left out, because they have "
-                        f"no calibration: {fault}"
-                    )
-                self._infos[camera] = info, watch.current
-                if watch.doubt:
-                    self._skipped[f"{topic} doubt"] = watch.doubt
-        if camera in self._infos:
+            assert watch.current is not None
+            if number:
+                self._skipped[topic] = (
+                    f"the first {number} messages on {topic} are left out, because they have no "
+                    f"calibration: {fault}"
+                )
+            if watch.doubt:
+                self._skipped[f"{topic} doubt"] = watch.doubt
+            if other is not None:
+                self._skipped[f"{topic} changes"] = (
+                    f"the calibration on {topic} changes at "
+                    f"{(other.time_ns - self.start_ns) / 1e9:.1f} s, as by a zoom. The first one "
+                    "is used for all images, so results from there on are wrong: track what comes "
+                    "before with --end, and record the rest apart"
+                )
+            self._infos[camera] = info, watch.current
             return self._infos[camera]
         if fault is not None:
             raise fault

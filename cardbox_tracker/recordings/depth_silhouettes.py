@@ -108,8 +108,9 @@ class DepthSilhouetteSource(SilhouetteSource):
                 self._without += 1
                 continue
             silhouette = silhouette_within(measured[1], self._within.metres)
-            self._is_near |= bool(silhouette.any())
-            self._nearest_m = min(self._nearest_m, nearest_m(measured[1]))
+            self._is_near = self._is_near or bool(silhouette.any())
+            if not self._is_near:
+                self._nearest_m = min(self._nearest_m, nearest_m(measured[1]))
             found = self._points(seen, silhouette)
             pictures = brightness_of(image), silhouette, image
             yield RecordedFrame(stamp_ns, time_s, *pictures, measured[1], found, recorded)
@@ -124,12 +125,14 @@ class DepthSilhouetteSource(SilhouetteSource):
                 f"{self._without} images have no depth image of the same time on {topic} and are "
                 "skipped"
             )
-        if self._nearest_m == math.inf and self._used > self._without:
-            found.append(f"{topic} has no depth: all values are 0 or below, or not finite")
-        elif not self._is_near and self._nearest_m < math.inf:
+        if self._is_near:
+            return found
+        if self._nearest_m < math.inf:
             found.append(
                 f"nothing on {topic} is nearer than --within {self._within.metres:g} m: the "
                 f"nearest depths are {self._nearest_m:.1f} m, if 16UC1 is in millimetres and 32FC1 "
                 "in metres"
             )
+        elif self._used > self._without:
+            found.append(f"{topic} has no depth: all values are 0 or below, or not finite")
         return found

@@ -10,12 +10,11 @@ import struct
 import warnings
 from collections.abc import Iterator
 from io import BytesIO
-from itertools import islice
 from pathlib import Path
 
 from PIL import Image
 
-from cardbox_tracker.camera.film_headers import MOST_BOXES, boxes
+from cardbox_tracker.camera.film_headers import boxes
 
 FILM_DIAGONAL_MM = 43.27
 """Diagonal of the image on 35 mm film, to which the equivalent focal length belongs."""
@@ -52,7 +51,7 @@ def _of_image(path: Path) -> float | None:
 
 def _of_film(path: Path) -> float | None:
     with path.open("rb") as film:
-        for kind, begin, end in islice(boxes(film, _CONTAINERS), MOST_BOXES):
+        for kind, begin, end in boxes(film, _CONTAINERS):
             if kind != b"meta":
                 continue
             film.seek(begin)

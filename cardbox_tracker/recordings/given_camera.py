@@ -8,7 +8,7 @@ from pathlib import Path
 
 from cardbox_tracker.camera.calibration_file import load_calibration
 from cardbox_tracker.camera.camera import Calibration
-from cardbox_tracker.camera.camera_info import LEAST_DEG, MOST_DEG, unusual
+from cardbox_tracker.camera.camera_info import LEAST_FOV_DEG, MOST_FOV_DEG, unusual
 from cardbox_tracker.common.errors import CameraError
 from cardbox_tracker.recordings.focal_length import FILM_DIAGONAL_MM, equivalent_mm
 
@@ -70,10 +70,10 @@ class GivenCamera:
         """
         if self.calibration is not None:
             load_calibration(self.calibration)
-        elif self.fov_deg is not None and not LEAST_DEG <= self.fov_deg <= MOST_DEG:
+        elif self.fov_deg is not None and not LEAST_FOV_DEG <= self.fov_deg <= MOST_FOV_DEG:
             raise CameraError(
-                f"the field of view is {self.fov_deg:g} degrees; expected {LEAST_DEG:g} to "
-                f"{MOST_DEG:g} degrees across the width of the image: {FOV_HINT}"
+                f"the field of view is {self.fov_deg:g} degrees; expected {LEAST_FOV_DEG:g} to "
+                f"{MOST_FOV_DEG:g} degrees across the width of the image: {FOV_HINT}"
             )
 
     def calibrated(

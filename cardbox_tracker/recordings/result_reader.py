@@ -396,12 +396,10 @@ def _damaged(where: str, error: Exception) -> BagError:
 class _Messages:
     """Joins the messages of each image, of which joints, deviations and points have its stamp."""
 
-    _last_ns = 0
-
     def __init__(self) -> None:
-        self._state, self.repeated = NO_PERSON, 0
+        self._state, self._last_ns, self.repeated = NO_PERSON, 0, 0
         self._body: BodyModel | None = None
-        self._keypoints: tuple[int, dict[str, Any]] = 0, {}
+        self._keypoints: dict[int, dict[str, Any]] = {}
         self.by_stamp: dict[int, dict[str, Any]] = {}
 
     def take(self, name: str, time_ns: int, message: Any) -> None:
@@ -412,24 +410,24 @@ class _Messages:
             if self._state not in _SEEN:
                 self.by_stamp[time_ns] = {"state": self._state, "body": self._body}
         elif name == _JOINTS:
-            if self._last_ns > stamp_ns_of(message):
-                raise ValueError(f"the stamp {stamp_ns_of(message)} ns is before the one before")
-            self._last_ns = stamp_ns_of(message)
+            stamp_ns = stamp_ns_of(message)
+            if self._last_ns > stamp_ns:
+                raise ValueError(f"the stamp {stamp_ns} ns is before the one before")
+            self._last_ns = stamp_ns
             joints = joints_of(message)
             posture_from(joints)
             row: dict[str, Any] = {"state": self._state, "body": self._body}
             # A node without the place of the torso keeps it constant.
             row |= dict.fromkeys(PLACE_NAMES, 0.0) | positions_of(joints)
-            self.repeated += stamp_ns_of(message) in self.by_stamp
-            stamp_ns, keypoints = self._keypoints
-            row |= keypoints if stamp_ns == stamp_ns_of(message) else {}
-            self.by_stamp[stamp_ns_of(message)] = row
+            self.repeated += stamp_ns in self.by_stamp
+            row |= self._keypoints.get(stamp_ns, {})
+            self.by_stamp[stamp_ns] = row
         elif name == _STATES:
             # They come before the joints of their image.
             states: dict[str, Any] = {}
             for keypoint, (state, chance) in chances_of(message).items():
                 states |= {f"{keypoint}_state": state, f"{keypoint}_chance": chance}
-            self._keypoints = stamp_ns_of(message), states
+            self._keypoints = {stamp_ns_of(message): states}
         elif (found := self.by_stamp.get(stamp_ns_of(message))) is not None:
             if name == _KEYPOINTS:
                 points_m = points_of(message).ravel().tolist()

@@ -77,7 +77,7 @@ def formats() -> dict[str, Format]:
     """Return all formats by name, those of other packages last.
 
     Raises:
-        CardboxError: a package adds what cannot be imported or is none, or a name that is taken.
+        CardboxError: a package adds what is no format or cannot be imported, or a taken name.
     """
     found = dict(FORMATS)
     for name, entry in extensions(EXPORTERS, FORMATS).items():

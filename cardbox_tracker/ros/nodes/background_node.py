@@ -31,7 +31,7 @@ from cardbox_tracker.ros.runtime.parameters import LiveParameters
 from cardbox_tracker.segmentation.background import warm_up
 from cardbox_tracker.segmentation.background_config import BackgroundConfig
 from cardbox_tracker.segmentation.background_file import background_path
-from cardbox_tracker.segmentation.depth_silhouette import WITHIN_LIMITS_M
+from cardbox_tracker.segmentation.depth_silhouette import WITHIN_LIMITS_M, nearest_m
 from cardbox_tracker.segmentation.kept_background import KeptBackground
 from cardbox_tracker.segmentation.learning import WAYS
 from cardbox_tracker.segmentation.silhouettes import SilhouettePipeline
@@ -281,7 +281,7 @@ class BackgroundNode(CardboxNode):
             "ignored CameraInfo": str(self.camera_images.watch.ignored),
         }
         if self._cut is not None:
-            values["nearest depth (m)"] = f"{self._cut.nearest_m:.2f}"
+            values["nearest depth (m)"] = f"{nearest_m(self._cut.depth_m):.2f}"
         if self._kept.path is not None:
             values["background file"] = self._kept.use
         if self._pipeline is not None:

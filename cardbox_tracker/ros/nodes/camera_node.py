@@ -23,7 +23,7 @@ from cardbox_tracker.camera.camera_device import (
     open_device,
     open_video,
 )
-from cardbox_tracker.camera.camera_info import LEAST_DEG
+from cardbox_tracker.camera.camera_info import LEAST_FOV_DEG
 from cardbox_tracker.camera.film_headers import (
     MOST_DAMAGED,
     check_times,
@@ -95,10 +95,10 @@ class CameraParameters(NodeParameters):
 
     def check(self) -> None:
         """Raise ValueError if values contradict each other."""
-        if 0.0 < self.horizontal_fov_deg < LEAST_DEG:
+        if 0.0 < self.horizontal_fov_deg < LEAST_FOV_DEG:
             raise ValueError(
                 f"horizontal_fov_deg is {self.horizontal_fov_deg:g}; expected degrees, "
-                f"{LEAST_DEG:g} or more"
+                f"{LEAST_FOV_DEG:g} or more"
             )
         if not self.device and not self.file:
             raise ValueError("device and file are both empty; give one, such as /dev/video0")
@@ -164,22 +164,19 @@ class CameraNode(CardboxNode):
             ok, image = self._capture.read()
             if not ok:
                 failed += 1
-                if settings.file and failed < MOST_DAMAGED:
-                    continue
                 if not settings.file:
                     self.diagnostics.problem(
                         f"{settings.device} delivers no image; is it plugged in, and used by no "
                         "other program? ('fuser -v' tells)"
                     )
                     self._stop.wait(_RETRY_S)
-                elif settings.loop and self._capture.set(cv2.CAP_PROP_POS_FRAMES, 0):
+                elif failed >= MOST_DAMAGED:
+                    if not (settings.loop and self._capture.set(cv2.CAP_PROP_POS_FRAMES, 0)):
+                        self.diagnostics.wait_for(
+                            f"a restart: {settings.file} has been played to its end"
+                        )
+                        return
                     failed = 0
-                    continue
-                else:
-                    self.diagnostics.wait_for(
-                        f"a restart: {settings.file} has been played to its end"
-                    )
-                    return
                 continue
             if not self._locked and time.monotonic() - started_s >= settings.settle_s:
                 self._lock_exposure()

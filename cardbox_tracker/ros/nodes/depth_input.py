@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
+import numpy as np
 from sensor_msgs.msg import CameraInfo, CompressedImage, Image
 from std_msgs.msg import Header
 
@@ -22,7 +22,7 @@ from cardbox_tracker.ros.messages import conversions
 from cardbox_tracker.ros.messages.conversions import ImageArray
 from cardbox_tracker.ros.runtime import qos
 from cardbox_tracker.ros.runtime.node import CardboxNode
-from cardbox_tracker.segmentation.depth_silhouette import nearest_m, silhouette_within
+from cardbox_tracker.segmentation.depth_silhouette import silhouette_within
 
 _PACKED = "/compressedDepth"
 
@@ -85,13 +85,14 @@ class DepthCut:
     """Pairs images with depth images and cuts out the pixels nearer than a limit.
 
     Attributes:
-        nearest_m: nearest depths of the last depth image, metres; infinite before it.
+        depth_m: last depth image, metres, as the camera sees it; empty before it.
     """
 
     def __init__(self, node: CardboxNode, topic: str, send: Send) -> None:
         """Subscribe with ``node`` to depth images on ``topic``; ``send`` receives silhouettes."""
         self._node, self._topic = node, node.resolve(topic)
-        self._send, self.nearest_m = send, math.inf
+        self._send = send
+        self.depth_m: DepthImage = np.empty((0, 0), np.float32)
         self._arrivals: Arrivals[Taken] = Arrivals(2, TOLERANCE_NS)
         self._input = DepthInput(node, topic, self._on_depth)
 
@@ -114,11 +115,10 @@ class DepthCut:
                 continue
             assert seen.camera is not None
             try:
-                depth_m = self._input.seen_by(seen.camera, measured.message)
+                self.depth_m = self._input.seen_by(seen.camera, measured.message)
             except EncodingError as error:
                 # The node would otherwise name the topic of the message that completed the set.
                 raise EncodingError(f"{self._topic}: {error}") from None
-            silhouette = silhouette_within(depth_m, seen.within_m)
-            self.nearest_m = nearest_m(depth_m)
+            silhouette = silhouette_within(self.depth_m, seen.within_m)
             sent_ns = max(seen.sent_ns, measured.sent_ns)
             self._send(seen.message, silhouette, seen.camera, sent_ns)

@@ -33,7 +33,7 @@ RESULT = QoSProfile(depth=10, reliability=ReliabilityPolicy.RELIABLE)
 TF = QoSProfile(depth=100, reliability=ReliabilityPolicy.RELIABLE)
 # A player can wait for a slow subscriber, and the queue holds 100 images.
 PLAYED = QoSProfile(depth=100, reliability=ReliabilityPolicy.RELIABLE)
-# Calls wait while a node is busy, and ROS's default queue of ten loses those that are more.
+# Calls wait while a node is busy, and a queue of ten, ROS's default, loses the others.
 SERVICE = QoSProfile(depth=10_000, reliability=ReliabilityPolicy.RELIABLE)
 # A subscriber that records a replay must not lose a message.
 REPLAY = QoSProfile(depth=1000, reliability=ReliabilityPolicy.RELIABLE)
