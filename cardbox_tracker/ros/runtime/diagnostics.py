@@ -73,8 +73,6 @@ PERIOD_S = 1.0
 # The input has ceased after this time and this number of periods without a message.
 _SILENT_S = 3.0
 _SILENT_PERIODS = 5.0
-# An image that is older at its result has a stamp of another clock, such as that of a recording.
-_OLDEST_MS = 60_000.0
 # The median latency needs at least this many results.
 _ENOUGH = 30
 
@@ -126,7 +124,6 @@ class NodeDiagnostics:
         self._warnings: list[str] = []
         self._published = self._late = 0
         self._latencies_ms: deque[float] = deque(maxlen=WINDOW)
-        self._result, self._ages_ms = "", deque[float](maxlen=WINDOW)
         self._before = (time.monotonic(), 0, 0)
         self._publisher = node.create_publisher(
             DiagnosticArray,
@@ -171,28 +168,6 @@ class NodeDiagnostics:
             self._latencies_ms.append(latency_ns / 1e6)
             # The next image was due before this one was done.
             self._late += 0 < self.input.period_ns < latency_ns
-
-    def age(self, result: str, stamp_ns: int) -> None:
-        """Remember how old an image is at its ``result``, such as "command".
-
-        Args:
-            result: name of what the node has made of it, always the same.
-            stamp_ns: stamp of the image.
-        """
-        now_ns = self._node.get_clock().now().nanoseconds
-        self._result = result
-        self._ages_ms.append((now_ns - stamp_ns) / 1e6)
-
-    def _ages(self) -> dict[str, str]:
-        if not self._ages_ms:
-            return {}
-        ages_ms = np.percentile(self._ages_ms, (50, 95))
-        if not 0.0 <= ages_ms[0] <= ages_ms[1] < _OLDEST_MS:
-            return {}
-        return {
-            f"image to {self._result} p{share} (ms)": f"{age_ms:.1f}"
-            for share, age_ms in zip((50, 95), ages_ms, strict=True)
-        }
 
     def warn(self, text: str) -> None:
         """Add a permanent warning, such as an incompatible QoS."""
@@ -293,7 +268,7 @@ class NodeDiagnostics:
         }
         if self._latencies_ms:
             values["latency p95 (ms)"] = f"{np.percentile(self._latencies_ms, 95):.2f}"
-        values |= self._ages() | self.extra()
+        values |= self.extra()
         values |= {f"warning {i}": warning for i, warning in enumerate(warnings, 1)}
         name = self._node.get_fully_qualified_name().lstrip("/")
         return DiagnosticStatus(
