@@ -29,7 +29,13 @@ from cardbox_tracker.person.legs import LEG_NAMES
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.model_file import load_body_model, loads_body_model
 from cardbox_tracker.person.sizes import FloatArray
-from cardbox_tracker.person.skeleton import JOINT_NAMES, NECK_NAMES, PLACE_NAMES, KeypointState
+from cardbox_tracker.person.skeleton import (
+    JOINT_NAMES,
+    KEYPOINT_NAMES,
+    NECK_NAMES,
+    PLACE_NAMES,
+    KeypointState,
+)
 from cardbox_tracker.recordings.bag_reader import BagReader, stamp_ns_of
 from cardbox_tracker.recordings.open_images import is_bag
 from cardbox_tracker.recordings.outputs import (
@@ -117,6 +123,14 @@ class Results:
     def texts_of(self, name: str) -> tuple[str, ...]:
         """Return the texts (n) of a column; empty ones if it is missing."""
         return self.texts.get(name, ("",) * len(self.state))
+
+    def keypoints(self) -> Iterator[dict[str, tuple[str, float]]]:
+        """Yield state and chance to be wrong of each image's keypoints, where they are known."""
+        chances = self.of([f"{name}_chance" for name in KEYPOINT_NAMES]).tolist()
+        states = zip(*(self.texts_of(f"{name}_state") for name in KEYPOINT_NAMES), strict=True)
+        for texts, values in zip(states, chances, strict=True):
+            pairs = zip(KEYPOINT_NAMES, texts, values, strict=True)
+            yield {name: (text, chance) for name, text, chance in pairs if text}
 
 
 class _Rows:
