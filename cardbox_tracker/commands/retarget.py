@@ -80,6 +80,7 @@ def run(options: argparse.Namespace) -> None:
     config = settings_from(options, RetargetConfig)
     robot, retargeter, table = make_retargeter(options.robot, options.map, config)
     results = read_results(options.results, options.person)
+    results.check_body()
     motion = retarget_results(results, retargeter, config.rate_hz)
     joints = retargeter.joints
     if table:

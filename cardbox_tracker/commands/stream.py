@@ -43,15 +43,10 @@ def run(options: argparse.Namespace) -> None:
         bodies_of,
         in_real_time,
     )
-    from cardbox_tracker.common.errors import CardboxError
     from cardbox_tracker.recordings.result_reader import read_results
 
     results = read_results(options.results, options.person)
-    if results.body is None:
-        raise CardboxError(
-            f"{options.results} has no posture of a known person: keep OUT.body.yaml, which "
-            "'cardbox track' writes, beside the table OUT.csv"
-        )
+    results.check_body()
     bodies = at_rate(bodies_of(results), options.rate)
     sent = number = 0
     with closing(ZmqSender(options.address)) if options.address else nullcontext() as sender:

@@ -110,6 +110,18 @@ class Results:
         counts = Counter(id(body) for body, state in pairs if body and state in _SEEN)
         return known[counts.most_common(1)[0][0]] if counts else None
 
+    def check_body(self) -> None:
+        """Check that the person is known.
+
+        Raises:
+            CardboxError: it is not.
+        """
+        if not any(self.bodies):
+            raise CardboxError(
+                f"{self.path} has no posture of a known person: keep OUT.body.yaml, which "
+                "'cardbox track' writes, beside the table OUT.csv"
+            )
+
     def of(self, names: Sequence[str]) -> FloatArray:
         """Return the values (n, number of names) of columns; nan for those that are missing."""
         nothing = np.full(len(self.state), np.nan)

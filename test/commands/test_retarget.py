@@ -102,6 +102,9 @@ def test_a_table_is_read_and_its_joints_are_streamed(
     assert sent[0]["lower"] < sent[0]["upper"]
     done = cardbox("retarget", table, "--robot", ROBOT, "--bag", tmp_path / "out")
     assert done.code == 1 and "is a table" in done.err
+    (tmp_path / "person.body.yaml").unlink()
+    done = cardbox("retarget", table, "--robot", ROBOT)
+    assert done.code == 1 and "keep OUT.body.yaml" in done.err
 
 
 HEAD = """<robot name="head"><link name="neck"/><link name="face"/>
