@@ -63,8 +63,11 @@ def run(options: argparse.Namespace) -> None:
         write_csv,
     )
     from cardbox_tracker.applications.retargeting.retargeter import make_retargeter
-    from cardbox_tracker.applications.teleoperation.packets import ZmqSender, joints_packet
-    from cardbox_tracker.applications.teleoperation.recorded import in_real_time
+    from cardbox_tracker.applications.teleoperation.sending import (
+        ZmqSender,
+        in_real_time,
+        joints_packet,
+    )
     from cardbox_tracker.recordings.bag_reader import BagReader
     from cardbox_tracker.recordings.open_images import is_bag
     from cardbox_tracker.recordings.result_reader import read_results

@@ -37,12 +37,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> None:
     """Read the results and send them."""
-    from cardbox_tracker.applications.teleoperation.packets import ZmqSender, packet
-    from cardbox_tracker.applications.teleoperation.recorded import (
-        at_rate,
-        bodies_of,
-        in_real_time,
-    )
+    from cardbox_tracker.applications.teleoperation.packets import packet
+    from cardbox_tracker.applications.teleoperation.recorded import at_rate, bodies_of
+    from cardbox_tracker.applications.teleoperation.sending import ZmqSender, in_real_time
     from cardbox_tracker.recordings.result_reader import read_results
 
     results = read_results(options.results, options.person)

@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import math
-import time
 from collections.abc import Iterable, Iterator
-from typing import TypeVar
 
 import numpy as np
 
@@ -17,8 +15,6 @@ from cardbox_tracker.person.legs import LEG_NAMES
 from cardbox_tracker.person.skeleton import JOINT_NAMES, NECK_NAMES
 from cardbox_tracker.recordings.result_reader import Results
 from cardbox_tracker.recordings.result_table import PALM_COLUMNS
-
-T = TypeVar("T")
 
 _NAMES = (*JOINT_NAMES, *NECK_NAMES, *LEG_NAMES, *HAND_NAMES)
 # Between images farther apart nothing is known; a longer gap is shortened.
@@ -64,11 +60,3 @@ def at_rate(bodies: Iterable[FullBody], rate_hz: float) -> Iterator[FullBody]:
         before = after
     if before is not None:
         yield before
-
-
-def in_real_time(items: Iterable[T], rate_hz: float) -> Iterator[T]:
-    """Yield ``items`` at a rate by the clock; one that is late does not delay the others."""
-    begun_s = time.monotonic()
-    for number, item in enumerate(items):
-        time.sleep(max(begun_s + number / rate_hz - time.monotonic(), 0.0))
-        yield item

@@ -19,7 +19,7 @@ from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 from cardbox_tracker.applications.retargeting.config import RetargetConfig
 from cardbox_tracker.applications.retargeting.retargeter import Command, make_retargeter
 from cardbox_tracker.applications.retargeting.supervisor import Supervisor
-from cardbox_tracker.applications.teleoperation.packets import ZmqSender, joints_packet
+from cardbox_tracker.applications.teleoperation.sending import ZmqSender, joints_packet
 from cardbox_tracker.common.errors import CardboxError
 from cardbox_tracker.common.files import user_path
 from cardbox_tracker.common.settings import settings_of
