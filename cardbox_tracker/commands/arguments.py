@@ -263,8 +263,14 @@ def _is_same(path: Path, other: Path) -> bool:
         return False
 
 
-def add_person(parser: argparse.ArgumentParser) -> None:
-    """Add ``--person``, the number of one of several people in results."""
+def add_results(parser: argparse.ArgumentParser) -> None:
+    """Add ``RESULTS``, and ``--person``, the number of one of several people in them."""
+    parser.add_argument(
+        "results",
+        type=Path,
+        metavar="RESULTS",
+        help="table of 'cardbox track' (CSV or Parquet), or its bag",
+    )
     parser.add_argument(
         "--person",
         type=at_least(1),

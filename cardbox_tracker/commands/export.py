@@ -5,11 +5,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from cardbox_tracker.commands.arguments import (
-    add_force,
-    add_person,
-    check_outputs,
-)
+from cardbox_tracker.commands.arguments import add_force, add_results, check_outputs
 from cardbox_tracker.common.files import body_beside, body_of_person
 
 NAME = "export"
@@ -20,12 +16,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of ``cardbox export``."""
     from cardbox_tracker.applications.exporting.formats import formats
 
-    parser.add_argument(
-        "results",
-        type=Path,
-        metavar="RESULTS",
-        help="table of 'cardbox track' (CSV or Parquet), or its bag",
-    )
+    add_results(parser)
     parser.add_argument(
         "--to",
         choices=formats(),
@@ -49,7 +40,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "and c3d take the pitch of the camera and the floor from it, and the places of hips and "
         "neck. A bag contains it, and OUT.body.yaml beside the table OUT.csv is found",
     )
-    add_person(parser)
     add_force(parser)
 
 

@@ -9,7 +9,7 @@ from pathlib import Path
 
 from cardbox_tracker.commands.arguments import (
     add_force,
-    add_person,
+    add_results,
     add_settings,
     check_outputs,
     settings_from,
@@ -24,12 +24,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of ``cardbox retarget``."""
     from cardbox_tracker.applications.retargeting.config import RetargetConfig
 
-    parser.add_argument(
-        "results",
-        type=Path,
-        metavar="RESULTS",
-        help="table of 'cardbox track' (CSV or Parquet), or its bag",
-    )
+    add_results(parser)
     parser.add_argument("--robot", type=Path, required=True, metavar="ROBOT.urdf", help="the robot")
     parser.add_argument(
         "--map",
@@ -55,7 +50,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="ADDRESS",
         help="send the robot's joints in real time by ZMQ, as tcp://127.0.0.1:5557, for LeRobot",
     )
-    add_person(parser)
     add_force(parser)
     add_settings(parser, RetargetConfig, "limits and mounting")
 
@@ -69,8 +63,11 @@ def run(options: argparse.Namespace) -> None:
         write_csv,
     )
     from cardbox_tracker.applications.retargeting.retargeter import make_retargeter
-    from cardbox_tracker.applications.teleoperation.packets import ZmqSender, joints_packet
-    from cardbox_tracker.applications.teleoperation.recorded import in_real_time
+    from cardbox_tracker.applications.teleoperation.sending import (
+        ZmqSender,
+        in_real_time,
+        joints_packet,
+    )
     from cardbox_tracker.recordings.bag_reader import BagReader
     from cardbox_tracker.recordings.open_images import is_bag
     from cardbox_tracker.recordings.result_reader import read_results
@@ -86,6 +83,7 @@ def run(options: argparse.Namespace) -> None:
     config = settings_from(options, RetargetConfig)
     robot, retargeter, table = make_retargeter(options.robot, options.map, config)
     results = read_results(options.results, options.person)
+    results.check_body()
     motion = retarget_results(results, retargeter, config.rate_hz)
     joints = retargeter.joints
     if table:

@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import argparse
 import sys
-from contextlib import ExitStack
-from pathlib import Path
+from contextlib import closing, nullcontext
 
-from cardbox_tracker.commands.arguments import add_person, between
+from cardbox_tracker.commands.arguments import add_results, between
 
 NAME = "stream"
 HELP = "stream results as 24 joints in real time, to programs that teleoperate robots"
@@ -17,12 +16,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of ``cardbox stream``."""
     from cardbox_tracker.applications.teleoperation.packets import PACKETS
 
-    parser.add_argument(
-        "results",
-        type=Path,
-        metavar="RESULTS",
-        help="table of 'cardbox track' (CSV or Parquet), or its bag",
-    )
+    add_results(parser)
     parser.add_argument(
         "--to",
         choices=PACKETS,
@@ -39,32 +33,20 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="publish by ZMQ, as tcp://127.0.0.1:5556 (default: the standard output)",
     )
     parser.add_argument("--fast", action="store_true", help="do not wait for the time of a packet")
-    add_person(parser)
 
 
 def run(options: argparse.Namespace) -> None:
     """Read the results and send them."""
-    from cardbox_tracker.applications.teleoperation.packets import ZmqSender, packet
-    from cardbox_tracker.applications.teleoperation.recorded import (
-        at_rate,
-        bodies_of,
-        in_real_time,
-    )
-    from cardbox_tracker.common.errors import CardboxError
+    from cardbox_tracker.applications.teleoperation.packets import packet
+    from cardbox_tracker.applications.teleoperation.recorded import at_rate, bodies_of
+    from cardbox_tracker.applications.teleoperation.sending import ZmqSender, in_real_time
     from cardbox_tracker.recordings.result_reader import read_results
 
     results = read_results(options.results, options.person)
-    if results.body is None:
-        raise CardboxError(
-            f"{options.results} has no posture of a known person: keep OUT.body.yaml, which "
-            "'cardbox track' writes, beside the table OUT.csv"
-        )
+    results.check_body()
     bodies = at_rate(bodies_of(results), options.rate)
     sent = number = 0
-    with ExitStack() as stack:
-        sender = ZmqSender(options.address) if options.address else None
-        if sender is not None:
-            stack.callback(sender.close)
+    with closing(ZmqSender(options.address)) if options.address else nullcontext() as sender:
         for body in bodies if options.fast else in_real_time(bodies, options.rate):
             made = packet(options.to, body, number)
             number += 1

@@ -29,7 +29,13 @@ from cardbox_tracker.person.legs import LEG_NAMES
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.model_file import load_body_model, loads_body_model
 from cardbox_tracker.person.sizes import FloatArray
-from cardbox_tracker.person.skeleton import JOINT_NAMES, NECK_NAMES, PLACE_NAMES, KeypointState
+from cardbox_tracker.person.skeleton import (
+    JOINT_NAMES,
+    KEYPOINT_NAMES,
+    NECK_NAMES,
+    PLACE_NAMES,
+    KeypointState,
+)
 from cardbox_tracker.recordings.bag_reader import BagReader, stamp_ns_of
 from cardbox_tracker.recordings.open_images import is_bag
 from cardbox_tracker.recordings.outputs import (
@@ -104,6 +110,18 @@ class Results:
         counts = Counter(id(body) for body, state in pairs if body and state in _SEEN)
         return known[counts.most_common(1)[0][0]] if counts else None
 
+    def check_body(self) -> None:
+        """Check that the person is known.
+
+        Raises:
+            CardboxError: it is not.
+        """
+        if not any(self.bodies):
+            raise CardboxError(
+                f"{self.path} has no posture of a known person: keep OUT.body.yaml, which "
+                "'cardbox track' writes, beside the table OUT.csv"
+            )
+
     def of(self, names: Sequence[str]) -> FloatArray:
         """Return the values (n, number of names) of columns; nan for those that are missing."""
         nothing = np.full(len(self.state), np.nan)
@@ -117,6 +135,14 @@ class Results:
     def texts_of(self, name: str) -> tuple[str, ...]:
         """Return the texts (n) of a column; empty ones if it is missing."""
         return self.texts.get(name, ("",) * len(self.state))
+
+    def keypoints(self) -> Iterator[dict[str, tuple[str, float]]]:
+        """Yield state and chance to be wrong of each image's keypoints, where they are known."""
+        chances = self.of([f"{name}_chance" for name in KEYPOINT_NAMES]).tolist()
+        states = zip(*(self.texts_of(f"{name}_state") for name in KEYPOINT_NAMES), strict=True)
+        for texts, values in zip(states, chances, strict=True):
+            pairs = zip(KEYPOINT_NAMES, texts, values, strict=True)
+            yield {name: (text, chance) for name, text, chance in pairs if text}
 
 
 class _Rows:

@@ -11,9 +11,8 @@ import argparse
 import csv
 import sys
 from collections import Counter
-from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import cv2
 import numpy as np
@@ -28,8 +27,7 @@ _PIXELS_A_M, _MIDDLE_M = 480.0, (0.18, 0.0, 0.13)
 _VISUAL = 2
 
 
-@dataclass
-class Run:
+class Run(NamedTuple):
     """What a robot did.
 
     Attributes:
@@ -41,8 +39,8 @@ class Run:
 
     wanted_deg: FloatArray
     errors_deg: FloatArray
-    contacts: Counter[tuple[str, str]] = field(default_factory=Counter)
-    pictures: list[Any] = field(default_factory=list)
+    contacts: Counter[tuple[str, str]]
+    pictures: list[Any]
 
 
 def commands_of(path: Path, joints: list[str]) -> tuple[FloatArray, FloatArray, list[int]]:
@@ -66,7 +64,7 @@ def follow(scene: Path, table: Path, has_pictures: bool = False) -> Run:
     places = [model.joint(name).qposadr[0] for name in joints]
     data.qpos[places] = data.ctrl[:] = wanted[0]
     shown = [moving[int(one)] for one in np.linspace(0, len(moving) - 1, _PICTURES)]
-    found, run = np.zeros_like(wanted), Run(np.degrees(wanted), np.zeros(0))
+    found, contacts, pictures = np.zeros_like(wanted), Counter[tuple[str, str]](), []
     for number, (time_s, row) in enumerate(zip(times, wanted, strict=True)):
         data.ctrl[:] = row
         while data.time < time_s:
@@ -76,11 +74,10 @@ def follow(scene: Path, table: Path, has_pictures: bool = False) -> Run:
             tuple(sorted(model.body(model.geom_bodyid[one]).name for one in contact.geom))
             for contact in data.contact
         }
-        run.contacts.update(pairs)
+        contacts.update(pairs)
         if has_pictures and number in shown:
-            run.pictures.append(_drawn(model, data))
-    run.errors_deg = np.degrees(np.abs(found - wanted))
-    return run
+            pictures.append(_drawn(model, data))
+    return Run(np.degrees(wanted), np.degrees(np.abs(found - wanted)), contacts, pictures)
 
 
 def _drawn(model: Any, data: Any) -> Any:

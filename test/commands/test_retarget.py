@@ -12,7 +12,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from cardbox_tracker.applications.teleoperation import packets
+from cardbox_tracker.applications.teleoperation import sending
 from cardbox_tracker.camera.camera import Camera
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.model_file import save_body_model
@@ -81,7 +81,7 @@ def test_a_table_is_read_and_its_joints_are_streamed(
 ) -> None:
     sent: list[dict] = []
     sender = SimpleNamespace(send=lambda one: sent.append(json.loads(one)), close=lambda: None)
-    monkeypatch.setattr(packets, "ZmqSender", lambda _: sender)
+    monkeypatch.setattr(sending, "ZmqSender", lambda _: sender)
     table, arm = tmp_path / "person.csv", tmp_path / "arm.csv"
     posture = reference_posture("arms")
     seen = Estimate(TRACKING, posture, np.full(12, 0.1), np.zeros((6, 3)), 10, 0.9)
@@ -102,6 +102,9 @@ def test_a_table_is_read_and_its_joints_are_streamed(
     assert sent[0]["lower"] < sent[0]["upper"]
     done = cardbox("retarget", table, "--robot", ROBOT, "--bag", tmp_path / "out")
     assert done.code == 1 and "is a table" in done.err
+    (tmp_path / "person.body.yaml").unlink()
+    done = cardbox("retarget", table, "--robot", ROBOT)
+    assert done.code == 1 and "keep OUT.body.yaml" in done.err
 
 
 HEAD = """<robot name="head"><link name="neck"/><link name="face"/>

@@ -152,13 +152,11 @@ class Kinematics:
     def _directions(self, places: _Places) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Return the directions, their lengths (3,), and derivatives of the parts (2, 3, n)."""
         ends = np.vstack([places.origins_m, places.tip_m])
-        shoulder, elbow = ends[self.shoulder], ends[min(self.elbow, len(ends) - 1)]
-        if self.elbow == len(ends) - 1:
-            shoulder, elbow = ends[self.shoulder], 0.5 * (ends[self.shoulder] + places.tip_m)
+        shoulder, elbow = ends[self.shoulder], ends[self.elbow]
         at_shoulder = self._moved(places, shoulder, self.shoulder)
         at_tip = self._moved(places, places.tip_m, len(places.axes))
-        if self.elbow == len(ends) - 1:
-            at_elbow = 0.5 * (at_shoulder + at_tip)
+        if self.elbow == len(places.axes):
+            elbow, at_elbow = 0.5 * (shoulder + places.tip_m), 0.5 * (at_shoulder + at_tip)
         else:
             at_elbow = self._moved(places, elbow, self.elbow)
         upper, fore = elbow - shoulder, places.tip_m - elbow
@@ -183,14 +181,13 @@ class Kinematics:
         return self._too_near(self.at(positions))
 
     def _too_near(self, places: _Places) -> tuple[FloatArray, FloatArray]:
-        count = len(places.axes)
-        after = [*places.origins_m[self.elbow + 1 :], places.tip_m]
-        start = places.origins_m[self.elbow] if self.elbow < count else places.origins_m[1]
-        points = [0.5 * (start + places.tip_m), *after]
-        numbers = [count, *range(self.elbow + 1, count), count]
+        ends, count = np.vstack([places.origins_m, places.tip_m]), len(places.axes)
+        start = self.elbow if self.elbow < count else self.shoulder
+        # The middle of the forearm, the joints after the elbow, and the tip.
+        pairs = [(start, count), *((one, one) for one in (*range(self.elbow + 1, count), count))]
         gaps, slopes = [], []
-        for point, number in zip(points, numbers, strict=True):
-            x, y, z = point.tolist()
+        for pair in pairs:
+            x, y, z = (0.5 * (ends[pair[0]] + ends[pair[1]])).tolist()
             above = max(z - float(places.origins_m[self.shoulder, 2]), 0.0)
             far_m = max(math.hypot(x, y, above), 1e-6)
             for gap_m, normal in (
@@ -199,7 +196,8 @@ class Kinematics:
             ):
                 if gap_m < 0.0:
                     gaps.append(gap_m)
-                    slopes.append(normal @ self._moved(places, point, number))
+                    moved = sum(self._moved(places, ends[one], one) for one in pair)
+                    slopes.append(0.5 * np.array(normal) @ moved)
         return np.array(gaps), np.array(slopes).reshape(-1, count)
 
     def residual(self, positions: FloatArray, wanted: FloatArray) -> tuple[FloatArray, FloatArray]:

@@ -12,7 +12,7 @@ import numpy as np
 from cardbox_tracker.applications.retargeting.retargeter import Command, Moment, Retargeter
 from cardbox_tracker.common.files import write_table
 from cardbox_tracker.person.hands import HAND_OPEN_NAMES
-from cardbox_tracker.person.skeleton import JOINT_NAMES, KEYPOINT_NAMES, NECK_NAMES
+from cardbox_tracker.person.skeleton import JOINT_NAMES, NECK_NAMES
 from cardbox_tracker.recordings.bag_reader import BagReader
 from cardbox_tracker.recordings.bag_writer import BagWriter
 from cardbox_tracker.recordings.result_reader import Results
@@ -52,7 +52,7 @@ def retarget_results(results: Results, retargeter: Retargeter, rate_hz: float) -
     joints = (*JOINT_NAMES, *NECK_NAMES)
     each = results.of(joints), results.deviations_of(joints), results.of(HAND_OPEN_NAMES)
     of_image = results.stamp_ns.tolist(), results.state, results.bodies
-    images = zip(*of_image, *each, chances_in(results), strict=True)
+    images = zip(*of_image, *each, results.keypoints(), strict=True)
     for stamp_ns, state, body, values, deviations, hands, keypoints in images:
         posture = stddev = None
         if state in (TRACKING, UNCERTAIN):
@@ -72,15 +72,6 @@ def retarget_results(results: Results, retargeter: Retargeter, rate_hz: float) -
         end_ns = last.stamp_ns + round(last.command.duration_s * 1e9)
         motion.way.extend(_until(end_ns + 1, motion.commands, retargeter, rate_hz))
     return motion
-
-
-def chances_in(results: Results) -> Iterator[dict[str, tuple[str, float]]]:
-    """Yield state and probability of an error of each image's keypoints, where they are known."""
-    chances = results.of([f"{name}_chance" for name in KEYPOINT_NAMES]).tolist()
-    states = zip(*(results.texts_of(f"{name}_state") for name in KEYPOINT_NAMES), strict=True)
-    for texts, values in zip(states, chances, strict=True):
-        pairs = zip(KEYPOINT_NAMES, texts, values, strict=True)
-        yield {name: (text, chance) for name, text, chance in pairs if text}
 
 
 def _until(

@@ -3,23 +3,18 @@
 from __future__ import annotations
 
 import math
-import time
 from collections.abc import Iterable, Iterator
-from typing import TypeVar
 
 import numpy as np
 
 from cardbox_tracker.applications.exporting.placed import in_reference
-from cardbox_tracker.applications.retargeting.recording import chances_in
 from cardbox_tracker.applications.teleoperation.full_body import FullBodies, FullBody
 from cardbox_tracker.person.hands import HAND_NAMES, turn_of
 from cardbox_tracker.person.kinematics import pose
 from cardbox_tracker.person.legs import LEG_NAMES
 from cardbox_tracker.person.skeleton import JOINT_NAMES, NECK_NAMES
 from cardbox_tracker.recordings.result_reader import Results
-from cardbox_tracker.recordings.result_table import PALM_COLUMNS, deviation_columns
-
-T = TypeVar("T")
+from cardbox_tracker.recordings.result_table import PALM_COLUMNS
 
 _NAMES = (*JOINT_NAMES, *NECK_NAMES, *LEG_NAMES, *HAND_NAMES)
 # Between images farther apart nothing is known; a longer gap is shortened.
@@ -29,19 +24,16 @@ _LONGEST_S, _LONGEST_GAP_S = 0.5, 1.0
 def bodies_of(results: Results) -> Iterator[FullBody]:
     """Yield the full body of each image, from the first one with a person on."""
     make = FullBodies()
-    values, deviations = results.of(_NAMES), results.of(deviation_columns(_NAMES))
+    values, deviations = results.of(_NAMES), results.deviations_of(_NAMES)
     palms, turns = results.of(PALM_COLUMNS).reshape(-1, 2, 3), [HAND_NAMES[0], HAND_NAMES[3]]
     images = zip(results.state, results.bodies, values, deviations, palms, strict=True)
-    rows = zip(results.stamp_ns.tolist(), images, chances_in(results), strict=True)
+    rows = zip(results.stamp_ns.tolist(), images, results.keypoints(), strict=True)
     for stamp_ns, (state, body, row, stddev, palm), keypoints in rows:
         found, known = (dict(zip(_NAMES, one.tolist(), strict=True)) for one in (row, stddev))
-        if (
-            body is not None
-            and np.isfinite(palm).any()
-            and np.isfinite(row[: len(JOINT_NAMES)]).all()
-        ):
+        posture = row[: len(JOINT_NAMES)]
+        if body is not None and np.isfinite(palm).any() and np.isfinite(posture).all():
             # A table has the palms in place of their turns about the forearms.
-            posed = pose(body, row[: len(JOINT_NAMES)])
+            posed = pose(body, posture)
             arms = zip(turns, (1.0, -1.0), (posed.left, posed.right), palm, strict=True)
             for name, sign, arm, normal in arms:
                 found[name] = turn_of(in_reference(normal, body), arm.forearm_rotation, sign)
@@ -68,11 +60,3 @@ def at_rate(bodies: Iterable[FullBody], rate_hz: float) -> Iterator[FullBody]:
         before = after
     if before is not None:
         yield before
-
-
-def in_real_time(items: Iterable[T], rate_hz: float) -> Iterator[T]:
-    """Yield ``items`` at a rate by the clock; one that is late does not delay the others."""
-    begun_s = time.monotonic()
-    for number, item in enumerate(items):
-        time.sleep(max(begun_s + number / rate_hz - time.monotonic(), 0.0))
-        yield item

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import time
-from collections import deque
 from dataclasses import dataclass
 from functools import partial
 from types import MappingProxyType
@@ -20,8 +19,7 @@ from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 from cardbox_tracker.applications.retargeting.config import RetargetConfig
 from cardbox_tracker.applications.retargeting.retargeter import Command, make_retargeter
 from cardbox_tracker.applications.retargeting.supervisor import Supervisor
-from cardbox_tracker.applications.teleoperation.packets import ZmqSender, joints_packet
-from cardbox_tracker.camera.stamps import WINDOW
+from cardbox_tracker.applications.teleoperation.sending import ZmqSender, joints_packet
 from cardbox_tracker.common.errors import CardboxError
 from cardbox_tracker.common.files import user_path
 from cardbox_tracker.common.settings import settings_of
@@ -33,9 +31,6 @@ from cardbox_tracker.ros.runtime.command_line import plain_command_line
 from cardbox_tracker.ros.runtime.node import CardboxNode, run_node
 from cardbox_tracker.ros.runtime.parameter_fields import AT_START, NodeParameters, parameter
 from cardbox_tracker.ros.runtime.parameters import LiveParameters
-
-# A longer time is that of a recording, whose stamps are of another clock.
-_MOST_MS = 60_000.0
 
 _DOES = "Move a robot arm as the tracked person moves theirs, within its limits."
 
@@ -91,7 +86,6 @@ class RetargetNode(CardboxNode):
         self._supervisor = Supervisor(self._retargeter, settings, settings.timeout_s)
         self._status = ""
         self._arrived_ns, self._stamp_ns = _now_ns(), 0
-        self._latencies_ms: deque[float] = deque(maxlen=WINDOW)
         address = settings.stream_address
         self._sender = ZmqSender(address) if address else None
         self._trajectory = self.advertise(JointTrajectory, "retarget/joint_trajectory", qos.RESULT)
@@ -105,7 +99,6 @@ class RetargetNode(CardboxNode):
         self.subscribe(Bool, "retarget/grip", self._on_grip, qos.RESULT)
         self.create_service(SetBool, "retarget/enable", self._on_enable, qos_profile=qos.SERVICE)
         self.create_timer(1.0 / settings.rate_hz, self._stream)
-        self.diagnostics.extra = self._latency
         self._say()
 
     def _on_robot(self, message: JointState, _: int) -> None:
@@ -143,15 +136,7 @@ class RetargetNode(CardboxNode):
         command = self._supervisor.follow(update, image.state, now_ns)
         self._send(command)
         if command is not None and image.joints is not None:
-            now = self.get_clock().now().nanoseconds
-            self._latencies_ms.append((now - image.stamp_ns) / 1e6)
-
-    def _latency(self) -> dict[str, str]:
-        """Return the time from the stamp of an image to its command, of the last images."""
-        if not self._latencies_ms:
-            return {}
-        p95_ms = float(np.percentile(self._latencies_ms, 95))
-        return {"image to command p95 (ms)": f"{p95_ms:.1f}"} if 0 <= p95_ms < _MOST_MS else {}
+            self.diagnostics.made("command", image.stamp_ns)
 
     def _send(self, command: Command | None) -> None:
         """Send the goal of an image, if it may be sent, and what the robot does."""

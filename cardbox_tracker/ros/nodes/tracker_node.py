@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections import deque
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import partial
 from typing import Any
@@ -12,7 +11,7 @@ import numpy as np
 from std_msgs.msg import Float64, String
 
 from cardbox_tracker.camera.camera import Camera
-from cardbox_tracker.camera.stamps import WINDOW, StampOrder
+from cardbox_tracker.camera.stamps import StampOrder
 from cardbox_tracker.camera.view import OtherCamera
 from cardbox_tracker.common.errors import CameraError
 from cardbox_tracker.common.files import user_path
@@ -181,8 +180,6 @@ class FoundBody:
         self._description.publish(String(data=urdf))
 
 
-# An image that is older at its joint states has a stamp of another clock.
-_MOST_MS = 10_000.0
 _SAME_ROLL_RAD = math.radians(0.1)
 _DOES = "Follow the measured person: silhouettes in, joint states out."
 _PREPARING = "preparing (the very first start compiles for one to two minutes)"
@@ -205,7 +202,6 @@ class TrackerNode(CardboxNode):
         self._camera: Camera | None = None
         self._others: Sequence[OtherCamera] = ()
         self._session: Session | None = None
-        self._ages_ms: deque[float] = deque(maxlen=WINDOW)
         numbers = [None, *range(1, settings.people + 1)][settings.people > 0 :]
         self._reports = [TrackingReport() for _ in numbers]
         bodies = TrackedBodies(self, len(numbers)) if settings.rep155_id else None
@@ -364,8 +360,7 @@ class TrackerNode(CardboxNode):
         self._agreement.see(self._session.agreement)
         self.diagnostics.advice = self._warnings
         self.diagnostics.working(seen.sent_ns)
-        now_ns = self.get_clock().now().nanoseconds
-        self._ages_ms.append((now_ns - conversions.stamp_ns(seen.header.stamp)) / 1e6)
+        self.diagnostics.made("joint states", conversions.stamp_ns(seen.header.stamp))
 
     def _warnings(self) -> dict[str, str]:
         """Return warnings for the diagnostics."""
@@ -384,7 +379,7 @@ class TrackerNode(CardboxNode):
         ious = [] if first is None else first.camera_ious()
         used = {} if first is None else first.used_texts()
         common = self._inputs.values(ious) | self._agreement.values() | used
-        values = self._ages()
+        values: dict[str, str] = {}
         if self.parameters.value.people:
             absent = [str(k) for k, report in enumerate(self._reports, 1) if report.is_absent]
             values["absent people"] = ", ".join(absent) or "none"
@@ -392,19 +387,6 @@ class TrackerNode(CardboxNode):
             values |= {name + key: text for key, text in report.values(common).items()}
             common = {}
         return values
-
-    def _ages(self) -> dict[str, str]:
-        """Return the time from the stamp of an image to its joint states, of the last images."""
-        if not self._ages_ms:
-            return {}
-        ages_ms = np.percentile(self._ages_ms, (50, 95))
-        # A recording that is played has stamps of another day.
-        if not 0.0 <= ages_ms[0] <= ages_ms[1] < _MOST_MS:
-            return {}
-        return {
-            f"image to joint states p{share} (ms)": f"{age_ms:.1f}"
-            for share, age_ms in zip((50, 95), ages_ms, strict=True)
-        }
 
     def _named_reports(self) -> Iterator[tuple[str, TrackingReport]]:
         for number, report in enumerate(self._reports, 1):

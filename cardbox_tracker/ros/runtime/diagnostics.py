@@ -75,6 +75,8 @@ _SILENT_S = 3.0
 _SILENT_PERIODS = 5.0
 # The median latency needs at least this many results.
 _ENOUGH = 30
+# An image that is older has a stamp of another clock, as those of a recording.
+_OLDEST_MS = 10_000.0
 
 _CEASED = "is the camera running and connected, and every node between it and this one?"
 _PLAYED = (
@@ -124,6 +126,8 @@ class NodeDiagnostics:
         self._warnings: list[str] = []
         self._published = self._late = 0
         self._latencies_ms: deque[float] = deque(maxlen=WINDOW)
+        self._made = ""
+        self._ages_ms: deque[float] = deque(maxlen=WINDOW)
         self._before = (time.monotonic(), 0, 0)
         self._publisher = node.create_publisher(
             DiagnosticArray,
@@ -168,6 +172,20 @@ class NodeDiagnostics:
             self._latencies_ms.append(latency_ns / 1e6)
             # The next image was due before this one was done.
             self._late += 0 < self.input.period_ns < latency_ns
+
+    def made(self, what: str, stamp_ns: int) -> None:
+        """Take the age of an image, by its stamp, at ``what`` was made of it."""
+        age_ns = self._node.get_clock().now().nanoseconds - stamp_ns
+        self._made = what
+        self._ages_ms.append(age_ns / 1e6)
+
+    def _ages(self) -> dict[str, str]:
+        """Return the median and 95 % of the ages of the last images."""
+        ages_ms = np.percentile(self._ages_ms or [-1.0], (50, 95)).tolist()
+        if not 0.0 <= ages_ms[0] <= ages_ms[1] < _OLDEST_MS:
+            return {}
+        names = (f"image to {self._made} p{share} (ms)" for share in (50, 95))
+        return {name: f"{age_ms:.1f}" for name, age_ms in zip(names, ages_ms, strict=True)}
 
     def warn(self, text: str) -> None:
         """Add a permanent warning, such as an incompatible QoS."""
@@ -268,7 +286,7 @@ class NodeDiagnostics:
         }
         if self._latencies_ms:
             values["latency p95 (ms)"] = f"{np.percentile(self._latencies_ms, 95):.2f}"
-        values |= self.extra()
+        values |= self._ages() | self.extra()
         values |= {f"warning {i}": warning for i, warning in enumerate(warnings, 1)}
         name = self._node.get_fully_qualified_name().lstrip("/")
         return DiagnosticStatus(

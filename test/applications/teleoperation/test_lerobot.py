@@ -21,7 +21,7 @@ import pytest
 
 zmq = pytest.importorskip("zmq", reason="pyzmq is not installed")
 
-from cardbox_tracker.applications.teleoperation.packets import (  # noqa: E402
+from cardbox_tracker.applications.teleoperation.sending import (  # noqa: E402
     ZmqSender,
     joints_packet,
 )

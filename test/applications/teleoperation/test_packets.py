@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from cardbox_tracker.applications.teleoperation import packets
+from cardbox_tracker.applications.teleoperation import packets, sending
 from cardbox_tracker.applications.teleoperation.full_body import NAMES, FullBody
 from cardbox_tracker.common.errors import CardboxError
 
@@ -102,7 +102,7 @@ def test_the_message_fills_isaac_teleops_full_body() -> None:
     pytest.importorskip("isaacteleop", reason="isaacteleop is not installed")
     types = import_module("isaacteleop.retargeting_engine.tensor_types")
     group_of = import_module("isaacteleop.retargeting_engine.interface").TensorGroup
-    found = packets.optional("msgpack").unpackb(packets.isaac_packet(body(), 0))
+    found = sending.optional("msgpack").unpackb(packets.isaac_packet(body(), 0))
     group = group_of(types.FullBodyInput())
     group[types.FullBodyInputIndex.JOINT_POSITIONS] = np.array(found["joint_positions"], "f4")
     group[types.FullBodyInputIndex.JOINT_ORIENTATIONS] = np.array(found["joint_orientations"], "f4")
@@ -117,7 +117,7 @@ def test_a_line_of_json_has_the_validity_of_each_joint() -> None:
     assert found["positions"][1] == [round(value / 64, 5) for value in (3, 4, 5)]
     assert found["valid"].count(False) == 1
     with pytest.raises(ValueError):
-        packets.line({"value": float("nan")})
+        sending.line({"value": float("nan")})
 
 
 def test_readers_without_validity_get_nothing_while_nothing_is_valid() -> None:
@@ -141,7 +141,7 @@ def test_packets_arrive_by_zmq(subscriber: Any) -> None:
     import zmq
 
     address = "tcp://127.0.0.1:51873"
-    with closing(packets.ZmqSender(address)) as sender:
+    with closing(sending.ZmqSender(address)) as sender:
         subscriber.connect(address)
         for _ in range(50):
             sender.send(b"pose1")
@@ -153,9 +153,9 @@ def test_packets_arrive_by_zmq(subscriber: Any) -> None:
         else:
             pytest.fail("nothing arrived")
         with pytest.raises(CardboxError, match="cannot listen on 'tcp:"):
-            packets.ZmqSender(address)
+            sending.ZmqSender(address)
     with pytest.raises(CardboxError, match="give an address as"):
-        packets.ZmqSender("nonsense")
+        sending.ZmqSender("nonsense")
 
 
 def test_a_missing_package_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
