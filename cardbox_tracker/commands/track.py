@@ -81,8 +81,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--report",
         type=Path,
         metavar="OUT.html",
-        help="also write a page with the overlay video (OUT.mp4 without --video), the skeleton "
-        "from aside, the angles and the times to look at",
+        help="also write a page with the overlay video (OUT.overlay.mp4 without --video), the "
+        "skeleton from aside, the angles and the times to look at",
     )
     many = parser.add_argument_group("a folder of recordings (docs/many-recordings.md)")
     many.add_argument(
@@ -168,7 +168,7 @@ def track_one(options: argparse.Namespace, show: Callable[[float], None] | None 
     scene = scene_beside(beside)
     video = options.video
     if options.report is not None and video is None:
-        video = options.report.with_suffix(".mp4")
+        video = options.report.with_suffix(".overlay.mp4")
     exports = {
         form: beside.with_name(beside.stem + form.suffix)
         for form in (options.export or {}).values()
