@@ -49,6 +49,8 @@ def track(recording: str | os.PathLike[str], **options: Any) -> Result:
     parsed = parser.parse_args([*(w for some in words for w in some), "--", os.fspath(recording)])
     if is_own and parsed.detector is not None:
         parser.error("detector and detector_class are both given")
+    if parsed.export and parsed.csv is None:
+        parser.error("export writes beside the table: give csv, or save the result")
     parsed.detector = own if is_own else parsed.detector
     if parsed.recording.is_dir() and not is_one_recording(parsed.recording):
         raise CardboxError(f"{recording} is no recording; track its recordings one by one")

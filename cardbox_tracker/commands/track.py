@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 import json
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -13,7 +13,13 @@ from cardbox_tracker.commands.arguments import add_force, at_least, check_output
 from cardbox_tracker.commands.request import FORMATS, TrackFiles, add_tracking, tracking_request
 from cardbox_tracker.commands.tracking import track
 from cardbox_tracker.common.errors import CardboxError
-from cardbox_tracker.common.files import atomic_path, body_beside, is_written_in_place, scene_beside
+from cardbox_tracker.common.files import (
+    atomic_path,
+    body_beside,
+    is_written_in_place,
+    of_person,
+    scene_beside,
+)
 
 if TYPE_CHECKING:
     from cardbox_tracker.applications.exporting.formats import Format
@@ -75,8 +81,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--report",
         type=Path,
         metavar="OUT.html",
-        help="also write a page with the overlay video (OUT.mp4 without --video), the skeleton "
-        "from aside, the angles and the times to look at",
+        help="also write a page with the overlay video (OUT.overlay.mp4 without --video), the "
+        "skeleton from aside, the angles and the times to look at",
     )
     many = parser.add_argument_group("a folder of recordings (docs/many-recordings.md)")
     many.add_argument(
@@ -162,7 +168,7 @@ def track_one(options: argparse.Namespace, show: Callable[[float], None] | None 
     scene = scene_beside(beside)
     video = options.video
     if options.report is not None and video is None:
-        video = options.report.with_suffix(".mp4")
+        video = options.report.with_suffix(".overlay.mp4")
     exports = {
         form: beside.with_name(beside.stem + form.suffix)
         for form in (options.export or {}).values()
@@ -177,14 +183,12 @@ def track_one(options: argparse.Namespace, show: Callable[[float], None] | None 
     if options.json is not None:
         with atomic_path(options.json) as temporary:
             temporary.write_text(json.dumps(_account(summary), indent=1) + "\n", encoding="utf-8")
-    if show is not None:
-        return
-    for path in (*written, options.bag):
-        if path is not None:
-            print(f"wrote {path}")
-    print(*summary.accounts, sep="\n")
-    if exports or options.plot is not None or options.report is not None:
-        _write_derived(options, summary, table, video, exports)
+    lines = [f"wrote {path}" for path in (*written, options.bag) if path is not None]
+    lines += summary.accounts
+    if any(derived):
+        lines += _derived(options, summary, table, video, exports)
+    if show is None:
+        print(*lines, sep="\n")
 
 
 def _check_derived(options: argparse.Namespace, is_piped: bool) -> None:
@@ -202,44 +206,36 @@ def _check_derived(options: argparse.Namespace, is_piped: bool) -> None:
         raise CardboxError("--report shows the video, which browsers play as .mp4: change --video")
 
 
-def _write_derived(
+def _derived(
     options: argparse.Namespace,
     summary: TrackSummary,
     table: Path,
     video: Path | None,
     exports: Mapping[Format, Path],
-) -> None:
-    """Write what is made of the finished table; of several people, files of each."""
+) -> Iterator[str]:
+    """Write what is made of the finished table, of several people files of each, and say it."""
     from cardbox_tracker.applications.exporting.formats import export
     from cardbox_tracker.applications.reporting.page import write_page
     from cardbox_tracker.applications.reporting.plots import angles_plot
     from cardbox_tracker.recordings.result_reader import read_results
 
     tracked = (number for number, one in summary.people.items() if one.frames_tracked)
-    numbers: list[int | None] = [*tracked] or [None]
-    people = {number: read_results(table, number) for number in numbers}
+    people = {number: read_results(table, number) for number in tracked} or {1: read_results(table)}
     if options.plot is not None:
         for number, results in people.items():
-            path = _of_person(options.plot, number, options.plot.suffix)
+            path = of_person(options.plot, number, options.plot.suffix)
             with atomic_path(path) as temporary:
                 temporary.write_bytes(angles_plot(results))
-            print(f"wrote {path}")
+            yield f"wrote {path}"
     if options.report is not None and video is not None:
-        named = {"Person" if k is None else f"Person {k}": one for k, one in people.items()}
+        named = {f"Person {k}" if summary.people else "Person": one for k, one in people.items()}
         lines = (*summary.assumptions, *summary.remarks, *summary.accounts)
         write_page(options.report, video, f"Posture in {options.recording.name}", named, lines)
-        print(f"wrote {options.report}")
+        yield f"wrote {options.report}"
     for form, path in exports.items():
         for number, results in people.items():
-            output = _of_person(path, number, form.suffix)
-            print(*export(results, output, form), f"wrote {output}", sep="\n")
-
-
-def _of_person(path: Path, number: int | None, suffix: str) -> Path:
-    """Return the file of one of several people; ``path`` is that of the first."""
-    if number in (None, 1):
-        return path
-    return path.with_name(f"{path.name.removesuffix(suffix)}.person_{number}{suffix}")
+            output = of_person(path, number, form.suffix)
+            yield from (*export(results, output, form), f"wrote {output}")
 
 
 def _account(summary: TrackSummary) -> dict[str, Any]:

@@ -109,10 +109,9 @@ def track(
             save_body_model(one.body, body_of_person(request.files.body, number))
     if request.files.scene is not None:
         save_scene(scene, request.files.scene)
-    if person.people is None:
-        return summary
     one = summary.people.get(person.number, summary)
-    return replace(one, accounts=accounts, assumptions=assumptions, scene=summary.scene)
+    names = "remarks", "accounts", "assumptions", "scene", "people"
+    return replace(one, **{name: getattr(summary, name) for name in names})
 
 
 def _with_unknown(remarks: Sequence[str], person: PersonRequest) -> list[str]:

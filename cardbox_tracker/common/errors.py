@@ -61,7 +61,7 @@ class RosMissingError(CardboxError):
     def __init__(self, error: ImportError) -> None:
         """Name the module that cannot be imported and the remedy."""
         super().__init__(
-            f"ROS 2 is not installed ({error}); use pip install '.[ros]' in the checkout or source "
+            f"ROS 2 is not installed ({error}); use pip install 'cardbox_tracker[ros]' or source "
             "a ROS 2 Jazzy installation"
         )
 

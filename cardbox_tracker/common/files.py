@@ -331,6 +331,11 @@ def scene_beside(table: Path) -> Path:
 
 def body_of_person(body: Path, number: int) -> Path:
     """Return the file of the body of one of several people; ``body`` is that of the first."""
+    return of_person(body, number, ".body.yaml")
+
+
+def of_person(path: Path, number: int, suffix: str) -> Path:
+    """Return the file of one of several people; ``path`` with this suffix is that of the first."""
     if number == 1:
-        return body
-    return body.with_name(body.name.replace(".body.yaml", f".person_{number}.body.yaml"))
+        return path
+    return path.with_name(f"{path.name.removesuffix(suffix)}.person_{number}{suffix}")

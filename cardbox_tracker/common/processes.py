@@ -95,8 +95,8 @@ def _cluster(scheduler: str) -> Iterator[None]:
         from distributed.comm import connect
     except ImportError as error:
         raise CardboxError(
-            f"--scheduler needs Dask ({error}); install it with pip install '.[cluster]' in the "
-            "checkout"
+            f"--scheduler needs Dask ({error}); install it with "
+            "pip install 'cardbox_tracker[cluster]'"
         ) from None
 
     async def greet() -> None:

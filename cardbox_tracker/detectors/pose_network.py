@@ -288,7 +288,7 @@ class Network:
         except ImportError as error:
             raise CardboxError(
                 f"the detector needs ai-edge-litert ({error}); install it with "
-                "pip install '.[detector]' in the checkout"
+                "pip install 'cardbox_tracker[detector]'"
             ) from None
         try:
             with _silent():

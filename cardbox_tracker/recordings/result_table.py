@@ -292,6 +292,6 @@ def pyarrow_or_error() -> tuple[Any, Any]:
     except ImportError as error:
         raise CardboxError(
             f"a table in Parquet needs the library pyarrow ({error}); install it with "
-            "pip install '.[parquet]' in the checkout, or give a name that ends in .csv"
+            "pip install 'cardbox_tracker[parquet]', or give a name that ends in .csv"
         ) from None
     return pyarrow, pyarrow.parquet

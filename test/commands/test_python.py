@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import re
 import sys
 from collections.abc import Callable, Iterator
@@ -136,6 +137,23 @@ class Standing:
         return [found]
 
 
+class TwoStanding:
+    """Finds two people side by side."""
+
+    def detect(self, image: np.ndarray) -> list[dict[str, Any]]:
+        (left,) = Standing().detect(image)
+        return [left, {name: np.add(point, (90.0, 0.0, 0.0)) for name, point in left.items()}]
+
+
+def test_each_of_several_people_has_files(network: None, film: Path, tmp_path: Path) -> None:
+    files = {"csv": tmp_path / "a.csv", "json": tmp_path / "a.json", "plot": tmp_path / "a.png"}
+    cardbox_tracker.track(film, detector=TwoStanding(), people=2, export="trc", **files, **GIVEN)
+    for name in ("a.png", "a.person_2.png", "a.trc", "a.person_2.trc"):
+        assert (tmp_path / name).stat().st_size > 1000
+    told = json.loads(files["json"].read_text())
+    assert [one["tracked"] for one in told["people"].values()] == [6, 6]
+
+
 def test_pandas_has_the_columns_of_the_table(tmp_path: Path) -> None:
     pandas = pytest.importorskip("pandas", reason="pandas is not installed")
     from cardbox_tracker.recordings.result_table import result_table
@@ -167,6 +185,10 @@ def test_pandas_has_the_columns_of_the_table(tmp_path: Path) -> None:
         ({"detector_class": "json:nothing", **GIVEN}, "imported from json:nothing: Attrib"),
         ({"detector_class": "nothing", **GIVEN}, "imported from nothing: ModuleNotFound"),
         ({"stature_m": (1.75, 1.6), "fov_deg": 60}, "--stature has several values"),
+        (
+            {"export": "trc", **GIVEN},
+            "export writes beside the table: give csv, or save the result",
+        ),
         ({"background": (3, 1)}, "argument --background: .*got '3:1'"),
     ],
 )

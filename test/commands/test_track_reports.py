@@ -59,7 +59,13 @@ def test_one_command_writes_exports_plot_and_page(
     assert Path("her #1.trc").read_text().startswith("PathFileType\t4")
     assert Path("her #1.bvh").read_text().startswith("HIERARCHY")
     assert cv2.imread("her.png").std() > 10.0
-    for name in ("her #1.trc", "her #1.bvh", "her.png", "page/her #1.html", "page/her #1.mp4"):
+    for name in (
+        "her #1.trc",
+        "her #1.bvh",
+        "her.png",
+        "page/her #1.html",
+        "page/her #1.overlay.mp4",
+    ):
         assert f"wrote {name}" in done.out
 
     text = Path("page/her #1.html").read_text(encoding="utf-8")
@@ -90,7 +96,7 @@ def test_a_browser_runs_the_page_and_finds_its_film(
     words = ("track", film, "--detector", "mediapipe", "--end", 0.2, "--csv", table)
     assert cardbox(*words, "--report", page).code == 0
     assert 'id="missing" hidden=""' in in_browser(page)
-    (tmp_path / "her.mp4").unlink()
+    (tmp_path / "her.overlay.mp4").unlink()
     assert 'id="missing">' in in_browser(page)
 
 

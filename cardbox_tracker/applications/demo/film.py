@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from cardbox_tracker.applications.reporting.plots import png_of
+from cardbox_tracker.applications.drawing.page import png_of
 from cardbox_tracker.detectors.detector import Detector, PersonDetector
 from cardbox_tracker.detectors.model_files import ModelFiles
 from cardbox_tracker.detectors.pose_network import LANDMARKS, Detection

@@ -1,1 +1,1 @@
-"""Draws results for people: overlay, guidance, video."""
+"""Draws results for people: overlay, guidance, video, pages."""

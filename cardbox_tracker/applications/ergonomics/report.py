@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import base64
-import io
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
+from cardbox_tracker.applications.drawing.page import png_of, render_page
 from cardbox_tracker.applications.ergonomics.config import (
     NOT_SEEN,
     ErgonomicConfig,
@@ -98,20 +97,14 @@ def write_page(content: PageContent, path: Path) -> None:
     Raises:
         CardboxError: the file cannot be written.
     """
-    import jinja2
-
     rows, config, method = content.rows, content.config, content.method
     summary = summarize(rows, method)
     shares, moments = score_shares(rows, config, method), worst_moments(rows)
-    environment = jinja2.Environment(
-        autoescape=True, trim_blocks=True, lstrip_blocks=True, undefined=jinja2.StrictUndefined
-    )
-    environment.filters |= {"data": _data, "bar": _bar, "words": _share_words}
     colours = _ACTION_COLOURS[: len(method.levels)]
     levels = zip(method.levels, colours, summary.by_level_s, strict=True)
-    text = environment.from_string(
-        Path(__file__).with_name("page.html").read_text(encoding="utf-8")
-    ).render(
+    render_page(
+        path,
+        Path(__file__).with_name("page.html"),
         content=content,
         summary=summary,
         above=method.above,
@@ -124,10 +117,9 @@ def write_page(content: PageContent, path: Path) -> None:
         measured=[*_measured_words(summary)],
         moments=[(row, _moment_words(row, method)) for row in moments],
         limits=limits(config),
+        bar=_bar,
+        words=_share_words,
     )
-    with atomic_path(path) as temporary:
-        # Letters of broken file names become "?".
-        temporary.write_bytes(text.encode("utf-8", "replace"))
 
 
 def plot_scores(rows: Sequence[RulaRow], path: Path, method: Method = RULA) -> None:
@@ -181,9 +173,7 @@ def score_plot(
     limits_ = (0.5, method.highest + 0.5)
     axes.set(xlabel="time [s]", ylabel=f"{method.name} score", yticks=scores, ylim=limits_)
     axes.margins(x=0.01)
-    png = io.BytesIO()
-    figure.savefig(png, format="png", metadata={"Software": None})
-    return png.getvalue()
+    return png_of(figure)
 
 
 def _span(low: int, high: int) -> str:
@@ -215,10 +205,6 @@ def _moment_words(row: RulaRow, method: Method) -> str:
     words = (f"{part.words} {expected(parts[part.name]):.1f}" for part in method.parts)
     doubt = ", but the posture may be wrong" if row.state == UNCERTAIN else ""
     return f"score {row.worst:.1f}{doubt} ({'; '.join(words)})"
-
-
-def _data(content: bytes) -> str:
-    return base64.b64encode(content).decode("ascii")
 
 
 def _bar(shares: FloatArray) -> Iterator[tuple[str, float, str, str]]:

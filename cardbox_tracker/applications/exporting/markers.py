@@ -155,6 +155,6 @@ def ezc3d_or_error() -> Any:
     except ImportError as error:
         raise CardboxError(
             f"C3D needs the library ezc3d ({error}); install it with "
-            "pip install '.[export]' in the checkout, or export --to trc"
+            "pip install 'cardbox_tracker[export]', or export --to trc"
         ) from None
     return ezc3d

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import base64
 import os
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -10,9 +9,9 @@ from urllib.parse import quote
 
 import numpy as np
 
+from cardbox_tracker.applications.drawing.page import render_page
 from cardbox_tracker.applications.exporting.motion import Motion
 from cardbox_tracker.applications.reporting.plots import angles_plot, doubtful_spans, space_view
-from cardbox_tracker.common.files import atomic_path
 from cardbox_tracker.recordings.result_reader import Results
 from cardbox_tracker.tracking.estimate import TRACKING
 
@@ -34,13 +33,9 @@ def write_page(
     Raises:
         CardboxError: the file cannot be written.
     """
-    import jinja2
-
-    environment = jinja2.Environment(
-        autoescape=True, trim_blocks=True, lstrip_blocks=True, undefined=jinja2.StrictUndefined
-    )
-    page = Path(__file__).with_name("page.html").read_text(encoding="utf-8")
-    text = environment.from_string(page).render(
+    render_page(
+        path,
+        Path(__file__).with_name("page.html"),
         title=title,
         film=quote(os.path.relpath(film, path.parent)),
         film_name=film.name,
@@ -48,9 +43,6 @@ def write_page(
         people=[_person(name, results) for name, results in people.items()],
         lines=lines,
     )
-    with atomic_path(path) as temporary:
-        # Letters of broken file names become "?".
-        temporary.write_bytes(text.encode("utf-8", "replace"))
 
 
 def _person(name: str, results: Results) -> dict[str, object]:
@@ -68,5 +60,5 @@ def _person(name: str, results: Results) -> dict[str, object]:
             for begin_s, end_s, what in sorted(spans[:_MOST_SPANS])
         ],
         "more": max(0, len(spans) - _MOST_SPANS),
-        "pictures": {what: base64.b64encode(png).decode("ascii") for what, png in pictures.items()},
+        "pictures": pictures,
     }

@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import io
-from typing import TYPE_CHECKING
-
 import numpy as np
 
+from cardbox_tracker.applications.drawing.page import png_of
 from cardbox_tracker.applications.exporting.markers import markers_of
 from cardbox_tracker.applications.exporting.motion import Motion
 from cardbox_tracker.applications.exporting.placed import floor_below, in_reference
@@ -17,9 +15,6 @@ from cardbox_tracker.person.sizes import FloatArray
 from cardbox_tracker.person.skeleton import JOINT_NAMES, NECK_NAMES, UNITS
 from cardbox_tracker.recordings.result_reader import Results
 from cardbox_tracker.tracking.estimate import TRACKING, UNCERTAIN
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 STATE_COLOURS = {UNCERTAIN: "#e69f00", "": "#9a9a9a"}
 """Colours of times whose posture may be wrong, and of those without one."""
@@ -159,10 +154,3 @@ def _bones() -> list[tuple[str, str, str]]:
 def _upright(points_m: FloatArray) -> FloatArray:
     """Return points (..., 3) of the laboratory with x to the image's right, y away, z up."""
     return np.asarray(points_m[..., [2, 0, 1]] * np.array([-1.0, -1.0, 1.0]))
-
-
-def png_of(figure: Figure) -> bytes:
-    """Return a figure as PNG, the same bytes for the same figure."""
-    png = io.BytesIO()
-    figure.savefig(png, format="png", metadata={"Software": None})
-    return png.getvalue()

@@ -43,7 +43,7 @@ def optional(name: str) -> Any:
     except ImportError as error:
         raise CardboxError(
             f"this stream needs the Python packages pyzmq and msgpack ({error}); install them with "
-            "pip install '.[teleoperation]' in the checkout"
+            "pip install 'cardbox_tracker[teleoperation]'"
         ) from None
 
 

@@ -48,7 +48,7 @@ def rerun() -> Any:
     except ImportError as error:
         raise CardboxError(
             f"the viewer needs the library rerun-sdk ({error}); install it with "
-            "pip install '.[view]' in the checkout (170 MB)"
+            "pip install 'cardbox_tracker[view]' (170 MB)"
         ) from None
     return module
 

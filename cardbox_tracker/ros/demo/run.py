@@ -30,8 +30,13 @@ def run_demo(output: Path, preset: str, seed: int, cameras: int = 1) -> None:
     """Run the demo and write its results to the folder ``output``.
 
     Raises:
-        CardboxError: a step failed; the text names it.
+        CardboxError: ROS is not installed, or a step failed; the text names it.
     """
+    isolate()
+    try:
+        import cardbox_tracker.ros.demo.client  # noqa: F401
+    except ImportError as error:
+        raise RosMissingError(error) from None
     if cameras > 1 and not PRESETS[preset]().has_several_views:
         raise CardboxError(f"--preset {preset} is for one camera; leave it out with --cameras")
     try:
@@ -57,13 +62,10 @@ def track_through_nodes(session: Path, output: Path, preset: str, seed: int) -> 
     """Play ``session`` to the nodes, which measure and track the person; record ``output``/bag.
 
     Raises:
-        CardboxError: ROS is not installed, a node failed, or a service refused.
+        CardboxError: a node failed, or a service refused.
     """
-    isolate()
-    try:
-        from cardbox_tracker.ros.demo.client import Client
-    except ImportError as error:
-        raise RosMissingError(error) from None
+    from cardbox_tracker.ros.demo.client import Client
+
     truth = load_ground_truth(session / "ground_truth.json")
     pauses = {name: round(float(np.mean(truth.spans[name])), 3) for name in REFERENCE_NAMES}
     start_s = round(truth.spans["neutral"][0] + _NEUTRAL_S, 3)

@@ -328,7 +328,7 @@ def test_without_the_library_its_extra_is_named(
 ) -> None:
     monkeypatch.setitem(sys.modules, "rerun", None)
     assert view(results, "--save", results.parent / "v.rrd") == 1
-    assert "pip install '.[view]'" in capsys.readouterr().err
+    assert "pip install 'cardbox_tracker[view]'" in capsys.readouterr().err
     assert not (results.parent / "v.rrd").exists()
 
 
