@@ -55,7 +55,7 @@ class Person:
 
 @pytest.fixture(scope="module")
 def person(graph: Any, scene: Any) -> Person:
-    graph.start("initializer", count_down_s=1, attempts=2, capture_frames=3, person_distance_m=2.3)
+    graph.start("initializer", count_down_s=1, attempts=2, person_distance_m=2.3)
     person = Person(graph, scene)
     graph.wait(lambda: graph.node.count_subscribers("silhouette") == 1, "the initializer")
     return person
@@ -148,7 +148,7 @@ def test_an_initialization_can_be_cancelled(person: Person) -> None:
 
 
 def test_a_call_before_the_first_silhouette_waits_for_it(own_graph: Any, scene: Any) -> None:
-    own_graph.start("initializer", count_down_s=1, capture_frames=3, person_distance_m=2.3)
+    own_graph.start("initializer", count_down_s=1, person_distance_m=2.3)
     client = own_graph.node.create_client(Trigger, "initializer/initialize")
     own_graph.wait(client.service_is_ready, "service")
     statuses = own_graph.collect(String, "initializer/status", qos.LATCHED)

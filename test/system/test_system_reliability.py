@@ -315,7 +315,7 @@ def test_all_at_once(live: Live) -> None:
         live.graph.wait(client.service_is_ready, client.srv_name)
     changes = (
         ("tracker", "preset", ("paper", "default")),
-        ("tracker", "particles", (0, 50, 3000, 10**9)),
+        ("tracker", "lost_frames", (5, 50, -1, 10**9)),
         ("tracker", "lost_iou", (0.1, 0.4, float("nan"))),
         ("background", "threshold", (2.0, 5.0, -1.0)),
         ("background", "follow", (True, False)),
@@ -348,7 +348,7 @@ def test_all_at_once(live: Live) -> None:
     # The original settings are restored.
     models.publish(String(data=bodies[1]))
     settings = {
-        "tracker": {"particles": 0, "preset": "default", "lost_iou": 0.4},
+        "tracker": {"lost_frames": 5, "preset": "default", "lost_iou": 0.4},
         "background": {"threshold": 3.0, "follow": True},
     }
     for name, values in settings.items():

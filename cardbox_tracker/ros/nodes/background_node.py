@@ -104,16 +104,6 @@ class BackgroundParameters(NodeParameters, BackgroundConfig):
     """Cut the person out of the camera's images."""
 
     effects = MappingProxyType({"learn_images": _NEXT_LEARNING})
-    retired = MappingProxyType(
-        dict.fromkeys(
-            (
-                *("min_stddev", "smoothing_px", "darkest_shadow", "min_color_contrast"),
-                *("color_edge", "edge", "flicker", "min_area", "max_hole"),
-            ),
-            "it is constant; leave it out, or try threshold, min_contrast, shadow or soft_shadow",
-        )
-    )
-
     image_transport: str = image_transport_parameter()
     width: int = parameter(
         320, "working resolution, width", unit="px", limits=(32, 4096), effect=AT_START

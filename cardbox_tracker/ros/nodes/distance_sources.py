@@ -48,7 +48,7 @@ Progress = Callable[[float], None]
 """Callback that receives the finished fraction of a measurement."""
 
 # A few depth images of a posture are enough, and each takes much memory.
-_KEPT_DEPTHS = 10
+_KEPT_DEPTHS = 5
 
 
 class DepthDistance:
@@ -89,12 +89,11 @@ class DepthDistance:
                 "measure_distance to false"
             )
 
-    def capture(self, name: str, frames: int, now_ns: int | None) -> None:
+    def capture(self, name: str, now_ns: int | None) -> None:
         """Keep the depth of the reference ``name``, if it is needed.
 
         Args:
             name: name of the reference.
-            frames: largest number of depth images to combine.
             now_ns: stamp of the camera's latest silhouette.
 
         Raises:
@@ -104,7 +103,7 @@ class DepthDistance:
             return
         alike = [
             depth_m
-            for at_ns, depth_m in list(self._recent)[-frames:]
+            for at_ns, depth_m in self._recent
             if abs(at_ns - now_ns) <= ONE_POSTURE_NS and depth_m.shape == self._recent[-1][1].shape
         ]
         if not alike:
@@ -178,12 +177,11 @@ class SecondCamera:
                 "node, or give person_distance_m and set measure_distance to false"
             )
 
-    def capture(self, name: str, frames: int, now_ns: int | None) -> None:
+    def capture(self, name: str, now_ns: int | None) -> None:
         """Keep this camera's silhouettes of the reference ``name``, if it is needed.
 
         Args:
             name: name of the reference.
-            frames: largest number of silhouettes to combine.
             now_ns: stamp of the first camera's latest silhouette.
 
         Raises:
@@ -191,7 +189,7 @@ class SecondCamera:
         """
         if name not in SCALE_REFERENCES or now_ns is None:
             return
-        alike = alike_of(self._recent, frames) if self._recent else []
+        alike = alike_of(self._recent) if self._recent else []
         if not alike or abs(stamp_ns(alike[-1].header.stamp) - now_ns) > ONE_POSTURE_NS:
             raise InitializationError(
                 f"reference '{name}': nothing has come on {self._topic} at the time of the first "

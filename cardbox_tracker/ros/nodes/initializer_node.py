@@ -120,8 +120,8 @@ class InitializerNode(CardboxNode):
     def _capture(self, name: str) -> str:
         given = self.parameters.value
         if self._distance is not None and given.measure_distance:
-            self._distance.capture(name, given.capture_frames, self._references.latest_ns)
-        return self._references.capture(name, given.capture_frames, self._camera, given.config())
+            self._distance.capture(name, self._references.latest_ns)
+        return self._references.capture(name, self._camera, given.config())
 
     async def _initialize(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
         """Measure in another thread, so that the node still handles silhouettes and captures."""

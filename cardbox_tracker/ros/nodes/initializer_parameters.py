@@ -19,8 +19,7 @@ from cardbox_tracker.ros.nodes.shared_parameters import (
 from cardbox_tracker.ros.runtime.parameter_fields import AT_START, NodeParameters, parameter, shared
 
 _MAX_PITCH_DEG = round(math.degrees(MAX_PITCH_RAD), 6)
-_NEXT_GUIDANCE, _NEXT_CAPTURE = "next guidance", "next capture"
-_NEXT_MEASUREMENT = "next measurement"
+_NEXT_GUIDANCE, _NEXT_MEASUREMENT = "next guidance", "next measurement"
 
 
 @dataclass(frozen=True)
@@ -38,18 +37,9 @@ class InitializerParameters(NodeParameters):
     )
     camera_roll_deg: float = camera_roll_parameter()
     side_turn: str = shared(InitializationConfig, "side_turn", effect=_NEXT_GUIDANCE)
-    hypotheses: int = shared(InitializationConfig, "hypotheses", effect=_NEXT_MEASUREMENT)
-    max_rounds: int = shared(InitializationConfig, "max_rounds", effect=_NEXT_MEASUREMENT)
     seed: int = shared(InitializationConfig, "seed", effect=_NEXT_MEASUREMENT)
     check_postures: bool = shared(InitializationConfig, "check_postures", effect=_NEXT_MEASUREMENT)
     least_iou: float = shared(InitializationConfig, "least_iou", effect=_NEXT_MEASUREMENT)
-    capture_frames: int = parameter(
-        5,
-        "number of silhouettes that a capture combines, each pixel by majority; more silhouettes "
-        "have less noise, but the person must stand still for longer",
-        limits=(1, 30),
-        effect=_NEXT_CAPTURE,
-    )
     count_down_s: int = parameter(
         5,
         "time the guidance gives the person for each posture",
@@ -114,8 +104,6 @@ class InitializerParameters(NodeParameters):
             distance_m=self.person_distance_m,
             camera_pitch_rad=math.radians(self.camera_pitch_deg),
             side_turn=self.side_turn,
-            hypotheses=self.hypotheses,
-            max_rounds=self.max_rounds,
             seed=self.seed,
             check_postures=self.check_postures,
             least_iou=self.least_iou,

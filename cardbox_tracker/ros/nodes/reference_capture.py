@@ -24,19 +24,16 @@ from cardbox_tracker.ros.messages.conversions import (
 )
 from cardbox_tracker.ros.runtime.recent import RecentImages
 
-KEPT = 30
-"""Number of silhouettes to keep, the maximum of the parameter capture_frames."""
+KEPT = 5
+"""Silhouettes that a capture combines: more have less noise, but need longer standing still."""
 ONE_POSTURE_NS = 1_000_000_000
 """Older silhouettes may show the posture before."""
 _OLD_S = 2.0
 
 
-def alike_of(recent: RecentImages, frames: int) -> list[Image]:
-    """Return the latest images, ``frames`` at most, with the posture and size of the last one.
-
-    The last image is always among them.
-    """
-    messages = list(recent)[-frames:]
+def alike_of(recent: RecentImages) -> list[Image]:
+    """Return the images with the posture and size of the last one, which is among them."""
+    messages = list(recent)
     latest = messages[-1]
     now_ns = stamp_ns(latest.header.stamp)
     return [
@@ -108,10 +105,8 @@ class ReferenceCapture:
                 "it learn the empty scene, then step in front of the camera"
             )
 
-    def capture(
-        self, name: str, frames: int, camera: Camera | None, config: InitializationConfig
-    ) -> str:
-        """Keep the majority of the latest ``frames`` silhouettes as the reference ``name``.
+    def capture(self, name: str, camera: Camera | None, config: InitializationConfig) -> str:
+        """Keep the majority of the latest silhouettes as the reference ``name``.
 
         If the working camera is known, the posture is compared with the requested one.
 
@@ -123,7 +118,7 @@ class ReferenceCapture:
                 off, or another posture.
         """
         self.check_running()
-        alike = alike_of(self._recent, frames)
+        alike = alike_of(self._recent)
         silhouettes = [silhouette_of(message) for message in alike]
         silhouette = average_silhouette(silhouettes)
         check_reference(name, silhouette)

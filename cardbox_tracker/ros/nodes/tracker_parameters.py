@@ -1,15 +1,13 @@
-"""The parameters of the tracker; 0 or ``preset`` selects the value of the preset."""
+"""The parameters of the tracker."""
 
 from __future__ import annotations
 
 import math
 import re
 from dataclasses import dataclass
-from types import MappingProxyType
-from typing import Any
 
 from cardbox_tracker.camera.pairing import camera_names
-from cardbox_tracker.common.settings import NoEffectError, nested, settings_of
+from cardbox_tracker.common.settings import NoEffectError, nested
 from cardbox_tracker.measuring.scene_camera import GIVEN_STDDEV
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.proportions import (
@@ -32,8 +30,7 @@ from cardbox_tracker.ros.runtime.parameter_fields import (
     parameter,
     shared,
 )
-from cardbox_tracker.search.config import PRESETS, FilterConfig, TrackerConfig
-from cardbox_tracker.search.resampling import STRATEGIES
+from cardbox_tracker.search.config import PRESETS, TrackerConfig
 from cardbox_tracker.search.settings_file import read_settings
 from cardbox_tracker.search.whole_body_config import WholeBodyConfig
 from cardbox_tracker.tracking.session import MOST_PEOPLE
@@ -42,59 +39,16 @@ _NEXT_START = "next start of tracking"
 NOT_GIVEN_DEG = 90.0
 """Pitch of a camera that is not given, deg."""
 
-_PARAMETERS = MappingProxyType(
-    {
-        "strategy": "strategy",
-        "torso.particles": "particles",
-        "arm.particles": "particles",
-        "cycles": "cycles",
-        "average": "average",
-        "whole_body.effort": "effort",
-        "relocalize": "relocalize",
-        "select_person": "select_person",
-        "lost_iou": "lost_iou",
-        "lost_frames": "lost_frames",
-    }
-)
-"""Parameters that are settings of the core, and the names of these settings."""
+_CHANGEABLE = {"effort": "whole_body.effort", "lost_iou": "lost_iou", "lost_frames": "lost_frames"}
 
 MOST_MOVES = 20_000
-"""Largest product of particles and cycles. During an image the node handles no other image, service
-or signal, so an image must not take much longer than 0.2 s. ``cardbox track`` has no such limit."""
-
-
-def _of_preset(
-    kind: type[FilterConfig] | type[TrackerConfig],
-    name: str,
-    most: float | None = None,
-    more: str = "",
-) -> Any:
-    """Return a parameter for a setting; 0 selects the value of the preset."""
-    core = settings_of(kind)[name]
-    return shared(
-        kind,
-        name,
-        default=0,
-        description=f"{core.description}{more}; 0: preset",
-        limits=(0, core.maximum if most is None else most),
-    )
+"""Largest product of particles and cycles in a settings file. During an image the node handles no
+other image, service or signal, so an image must not take much longer than 0.2 s."""
 
 
 @dataclass(frozen=True)
 class TrackerParameters(NodeParameters):
-    """Follow the person's posture; 0 or ``preset`` leaves a setting to the preset."""
-
-    retired = MappingProxyType(
-        {
-            "torso_survival_rate": "give torso.survival_rate in a settings_file",
-            "arm_survival_rate": "give arm.survival_rate in a settings_file",
-            "torso_rotation_noise_rad": "give torso.rotation_noise_rad in a settings_file",
-            "torso_translation_noise_m": "give torso.translation_noise_m in a settings_file",
-            "arm_rotation_noise_rad": "give arm.rotation_noise_rad in a settings_file",
-            "recover": "it is called relocalize",
-            "refine_sizes": "measured breadths are not refined; measure the person again",
-        }
-    )
+    """Follow the person's posture."""
 
     preset: str = parameter(
         "default",
@@ -102,30 +56,12 @@ class TrackerParameters(NodeParameters):
         choices=tuple(PRESETS),
         effect=RESTARTS,
     )
-    strategy: str = shared(
-        TrackerConfig, "strategy", default="preset", choices=("preset", *STRATEGIES)
-    )
-    particles: int = _of_preset(
-        FilterConfig,
-        "particles",
-        most=MOST_MOVES,
-        more="; a cycle of the three filters takes about N x 4 us, and particles x cycles is at "
-        f"most {MOST_MOVES}",
-    )
-    cycles: int = _of_preset(TrackerConfig, "cycles")
-    average: int = _of_preset(TrackerConfig, "average", most=MOST_MOVES)
     effort: float = shared(WholeBodyConfig, "effort")
     settings_file: str = parameter(
         "",
         "YAML file with further settings, by the names at the end of docs/parameters.md; "
         "parameters that differ from their default take precedence; empty: none",
         effect=AT_START,
-    )
-    relocalize: str = shared(
-        TrackerConfig, "relocalize", default="preset", choices=("preset", "always", "never")
-    )
-    select_person: str = shared(
-        TrackerConfig, "select_person", default="preset", choices=("preset", "always", "never")
     )
     lost_iou: float = shared(TrackerConfig, "lost_iou")
     lost_frames: int = shared(TrackerConfig, "lost_frames")
@@ -247,24 +183,19 @@ class TrackerParameters(NodeParameters):
             base = base.with_depth()
         if self.settings_file:
             base = read_settings(self.settings_file, base)
+        values = {name: getattr(self, name) for name in _CHANGEABLE}
+        given = {
+            _CHANGEABLE[name]: value
+            for name, value in values.items()
+            if value != getattr(type(self), name)
+        }
         try:
-            return base.changed(nested(self._given()))
+            return base.changed(nested(given))
         except NoEffectError as error:
-            name = _PARAMETERS[error.name]
             raise ValueError(
-                f"{error.renamed(_PARAMETERS)}; to change the preset, first set {name} back to its "
-                f"default, {getattr(type(self), name)}"
+                f"effort has no effect {error.where}: set it back to {type(self).effort:g}, or "
+                f"give {error.instead} in a settings_file"
             ) from None
-
-    def _given(self) -> dict[str, Any]:
-        """Return the values that differ from the defaults, by the names of the core's settings."""
-        given = {}
-        for setting, name in _PARAMETERS.items():
-            value = getattr(self, name)
-            if value != getattr(type(self), name):
-                is_switch = name in ("relocalize", "select_person")
-                given[setting] = value == "always" if is_switch else value
-        return given
 
     def check(self) -> None:
         """Raise ValueError or CardboxError if values contradict each other."""

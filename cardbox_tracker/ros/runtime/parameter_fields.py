@@ -85,11 +85,9 @@ class NodeParameters:
     A class may also inherit settings of the core, all of which are parameters then.
 
     Attributes:
-        retired: removed names, and the instruction for each.
         effects: effect of a change of inherited settings that is not that of the core, by name.
     """
 
-    retired: ClassVar[Mapping[str, str]] = MappingProxyType({})
     effects: ClassVar[Mapping[str, str]] = MappingProxyType({})
 
     def check(self) -> None:

@@ -127,31 +127,22 @@ class LiveParameters(Generic[T]):
     def _warn_of_unknown(self) -> None:
         """Warn of unknown names given at the start, which ROS ignores silently.
 
-        They are not errors, because a file may serve several nodes. Only a removed parameter is
-        refused.
+        They are not errors, because a file may serve several nodes.
         """
         # rclpy has no public interface to the given values.
         given = getattr(self._node, "_parameter_overrides", {})
         for name in given:
-            if name in self._kind.retired:
-                raise self._refusal(self._unknown(name))
             if self._node.has_parameter(name) or name.startswith(_OF_QOS):
                 continue
-            self._node.get_logger().warning(
-                f"'{cut(name)}' is not a parameter of node '{self._node.get_name()}' and has no "
-                f"effect; {self._names_like(name)}"
-            )
-
-    def _names_like(self, name: str) -> str:
-        near = suggestion(name, self._specs)
-        return f"{near}see 'ros2 param list' or docs/parameters.md for all names"
+            self._node.get_logger().warning(self._unknown(name))
 
     def _unknown(self, name: str) -> str:
         """Return the answer to a change of a parameter that does not exist."""
-        if name in self._kind.retired:
-            return f"'{name}' was removed: {self._kind.retired[name]}"
-        node = self._node.get_name()
-        return f"'{cut(name)}' is not a parameter of node '{node}'; {self._names_like(name)}"
+        return (
+            f"'{cut(name)}' is not a parameter of node '{self._node.get_name()}' and has no "
+            f"effect; {suggestion(name, self._specs)}see 'ros2 param list' or docs/parameters.md "
+            "for all names"
+        )
 
     def _refusal(self, problem: str) -> CardboxError:
         return CardboxError(f"parameters of node '{self._node.get_name()}': {problem}")

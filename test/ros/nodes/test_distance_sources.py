@@ -86,7 +86,7 @@ def test_the_distance_is_that_of_the_depth_images(node: Node, distance: DepthDis
     for second, name in ((1, "front"), (5, "side"), (9, "arms")):
         node.see(second, BODY.placement.distance_m - 0.1)
         distance.check()
-        distance.capture(name, 5, second * SECOND)
+        distance.capture(name, second * SECOND)
     found = distance.measure(measure, InitializationConfig(distance_m=1.6)).body
     assert found.placement.distance_m == pytest.approx(BODY.placement.distance_m, abs=0.06)
 
@@ -94,10 +94,10 @@ def test_the_distance_is_that_of_the_depth_images(node: Node, distance: DepthDis
 def test_what_is_missing_is_said(node: Node, distance: DepthDistance) -> None:
     with pytest.raises(InitializationError, match=r"no depth image .*/depth"):
         distance.check()
-    distance.capture("side", 5, SECOND)
+    distance.capture("side", SECOND)
     node.see(1, 1.9)
     with pytest.raises(InitializationError, match=r"'front': no depth image .*/depth"):
-        distance.capture("front", 5, 9 * SECOND)
-    distance.capture("front", 5, SECOND)
+        distance.capture("front", 9 * SECOND)
+    distance.capture("front", SECOND)
     with pytest.raises(InitializationError, match=r"no depth image.* front and"):
         distance.measure(measure, InitializationConfig())

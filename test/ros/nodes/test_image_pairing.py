@@ -153,8 +153,8 @@ def test_captures_keep_the_images_of_their_silhouettes() -> None:
             image = np.full((240, 320, 3), number, np.uint8)
             references.add_image(conversions.image_message(header, image), 0)
         references.add(conversions.image_message(header, silhouette))
-    references.capture("front", 3, None, InitializationConfig())
-    assert [int(image[0, 0, 0]) for image in references.images["front"]] == [3, 5]
+    references.capture("front", None, InitializationConfig())
+    assert [int(image[0, 0, 0]) for image in references.images["front"]] == [1, 2, 3, 5]
 
 
 @pytest.fixture

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Callable
-from dataclasses import dataclass, fields
+from contextlib import nullcontext
+from dataclasses import dataclass, fields, replace
 from pathlib import Path
-from types import MappingProxyType, SimpleNamespace
+from types import SimpleNamespace
 from typing import Any, get_type_hints
 
 import pytest
@@ -16,7 +16,7 @@ from rclpy.parameter import Parameter, parameter_value_to_python
 from rclpy.parameter_client import AsyncParameterClient
 
 from cardbox_tracker.common.errors import CardboxError
-from cardbox_tracker.common.settings import check, settings_of
+from cardbox_tracker.common.settings import settings_of
 from cardbox_tracker.measuring.config import InitializationConfig
 from cardbox_tracker.ros.nodes.background_node import BackgroundParameters
 from cardbox_tracker.ros.nodes.initializer_parameters import InitializerParameters
@@ -41,8 +41,6 @@ ROOT = Path(__file__).resolve().parents[3]
 @dataclass(frozen=True)
 class Sample(NodeParameters):
     """Parameters of a test."""
-
-    retired = MappingProxyType({"middle": "give low and high"})
 
     low: float = parameter(1.0, "lower end", unit="m", limits=(0.0, 10.0))
     high: float = parameter(2.0, "upper end", unit="m", limits=(0.0, 10.0))
@@ -75,11 +73,6 @@ def test_a_name_that_is_no_parameter_is_said_with_the_nearest(
     assert len(said) == 2
     assert all(name in said[0] for name in ("'lo'", "'tested'", "'low'"))
     assert "'nothing_like_it'" in said[1] and "did you mean" not in said[1]
-
-
-def test_a_name_of_a_former_version_is_refused_with_what_to_do(make_node: Callable) -> None:
-    with pytest.raises(CardboxError, match=r"middle.*removed.*give low and high"):
-        LiveParameters(make_node("-p", "middle:=1.5"), Sample)
 
 
 def test_defaults_are_declared_with_description_unit_and_range(make_node: Callable) -> None:
@@ -191,7 +184,6 @@ def test_a_whole_number_is_taken_for_a_text_where_a_text_may_be_one(make_node: C
     [
         ({"lo": 1.5}, ("'lo' is not a parameter of node 'tested'", "did you mean 'low'")),
         ({"nothing_like_it": 1}, ("'nothing_like_it'", "ros2 param list")),
-        ({"middle": 1.0}, ("'middle' was removed", "give low and high")),
     ],
 )
 def test_a_request_to_set_what_is_no_parameter_is_answered_with_the_name_and_the_nearest(
@@ -229,10 +221,8 @@ def test_a_setting_of_the_core_keeps_its_text_range_and_type(kind: Any, core: An
 
 def test_what_a_live_change_does_is_that_of_the_core() -> None:
     effects = {name: spec.effect for name, spec in TrackerParameters.specs().items()}
-    for name in ("preset", "strategy", "particles", "average"):
-        assert effects[name] == RESTARTS
-    for name in ("cycles", "relocalize", "lost_iou", "lost_frames"):
-        assert effects[name] == NEXT_IMAGE
+    assert effects["preset"] == RESTARTS
+    assert effects["lost_iou"] == effects["lost_frames"] == NEXT_IMAGE
 
 
 @pytest.mark.parametrize("kind", NODES.values(), ids=NODES.keys())
@@ -348,92 +338,19 @@ def test_every_background_setting_is_a_parameter() -> None:
 
 
 def test_tracker_settings_override_the_preset() -> None:
-    config = TrackerParameters(
-        preset="paper",
-        strategy="srs",
-        particles=50,
-        relocalize="always",
-        select_person="always",
-    ).config()
-    assert isinstance(config, TrackerConfig)
-    assert config.strategy == "srs" and config.relocalize and config.select_person
-    assert config.torso.particles == config.arm.particles == 50
-    assert config.torso.survival_rate == TrackerConfig().torso.survival_rate
-
-
-def test_settings_that_do_not_go_together_are_refused(make_node: Callable) -> None:
-    node = make_node()
-    live = LiveParameters(node, TrackerParameters)
-    accepted, reason = set_values(node, preset="paper", particles=10, average=50)
-    assert not accepted and "average is 50" in reason
-    assert live.value == TrackerParameters()
-
-
-OTHERS: dict[str, dict[str, Any]] = {
-    "paper": {
-        "strategy": "srs",
-        "particles": 150,
-        "cycles": 3,
-        "average": 20,
-        "relocalize": "always",
-        "select_person": "always",
-        "lost_iou": 0.3,
-        "lost_frames": 9,
-    },
-    "default": {
-        "effort": 0.5,
-        "lost_iou": 0.3,
-        "relocalize": "never",
-        "select_person": "never",
-        "lost_frames": 9,
-    },
-}
-INSTEAD = {"effort": "particles"}
-
-
-@pytest.mark.parametrize("preset", PRESETS)
-@pytest.mark.parametrize("name", sorted(OTHERS["paper"].keys() | OTHERS["default"].keys()))
-def test_a_parameter_of_the_tracker_acts_or_is_refused_with_the_one_that_does(
-    preset: str, name: str
-) -> None:
-    """The effect of the core's settings is tested in test/tracking/test_settings_act.py."""
-    values = {**OTHERS["paper"], **OTHERS["default"]}
-    if name in OTHERS[preset]:
-        changed = TrackerParameters(preset=preset, **{name: OTHERS[preset][name]})
-        changed.check()
-        assert changed.config() != TrackerParameters(preset=preset).config()
-        return
-    refused = TrackerParameters(preset=preset, **{name: values[name]})
-    instead = INSTEAD.get(name, r"(whole_body\.|effort)")
-    with pytest.raises(ValueError, match=rf"^{name} has no effect .*{preset}.*; use .*{instead}"):
-        refused.check()
-
-
-def test_a_parameter_without_effect_is_refused_at_the_start(make_node: Callable) -> None:
-    with pytest.raises(CardboxError, match=r"particles has no effect.*use effort"):
-        LiveParameters(make_node("-p", "particles:=300"), TrackerParameters)
-
-
-def test_a_preset_is_refused_with_the_parameter_to_reset_first(make_node: Callable) -> None:
-    """'ros2 param set' sets one parameter after another, so the order matters."""
-    node = make_node("-p", "preset:=paper", "-p", "particles:=100")
-    live = LiveParameters(node, TrackerParameters)
-    accepted, reason = set_values(node, preset="default")
-    assert not accepted and re.search(r"set particles back to its default, 0", reason)
-    assert set_values(node, particles=0) == set_values(node, preset="default") == (True, "")
-    assert live.value == TrackerParameters()
+    config = TrackerParameters(preset="paper", lost_iou=0.3, lost_frames=9).config()
+    assert config == replace(TrackerConfig(), lost_iou=0.3, lost_frames=9)
 
 
 def test_a_parameter_without_effect_is_refused_live(make_node: Callable) -> None:
     node = make_node()
     live = LiveParameters(node, TrackerParameters)
-    accepted, reason = set_values(node, particles=300)
-    assert not accepted and "use effort" in reason
     assert set_values(node, effort=0.5) == (True, "")
     assert live.value.config().whole_body.effort == 0.5
     accepted, reason = set_values(node, preset="paper")
-    assert not accepted and "effort has no effect" in reason and "use particles" in reason
-    assert set_values(node, preset="paper", effort=1.0, particles=300) == (True, "")
+    assert not accepted and "effort has no effect" in reason
+    assert "back to 1, or give torso.particles" in reason
+    assert set_values(node, preset="paper", effort=1.0) == (True, "")
 
 
 def test_a_settings_file_gives_what_has_no_parameter(tmp_path: Path, make_node: Callable) -> None:
@@ -456,22 +373,12 @@ def test_yaml_floats_stay_floats(value: float) -> None:
 
 
 @pytest.mark.promise("Any damaged or hostile input is read or refused with a reason")
-@pytest.mark.parametrize(
-    ("values", "words"),
-    [
-        ({"preset": "paper", "particles": 200_000}, "particles is 200000; .*20000"),
-        ({"preset": "paper", "particles": 20_000, "cycles": 2}, "40000; .*20000"),
-        ({"preset": "paper", "particles": 1000, "cycles": 100}, "cardbox track"),
-    ],
-)
-def test_what_would_make_the_tracker_deaf_is_refused(values: dict[str, Any], words: str) -> None:
-    with pytest.raises(ValueError, match=words):
-        check(TrackerParameters(**values))
-        TrackerParameters(**values).check()
-
-
-@pytest.mark.parametrize("values", [{"particles": 20_000}, {"particles": 200, "cycles": 100}])
-def test_all_that_the_frame_rate_bears_is_allowed(values: dict[str, Any]) -> None:
-    parameters = TrackerParameters(preset="paper", **values)
-    check(parameters)
-    parameters.check()
+@pytest.mark.parametrize(("particles", "cycles", "fits"), [(20_000, 1, True), (20_000, 2, False)])
+def test_what_would_make_the_tracker_deaf_is_refused(
+    tmp_path: Path, particles: int, cycles: int, fits: bool
+) -> None:
+    path = tmp_path / "settings.yaml"
+    path.write_text(f"torso: {{particles: {particles}}}\ncycles: {cycles}\n")
+    words = "40000; .*20000.*cardbox track"
+    with nullcontext() if fits else pytest.raises(ValueError, match=words):
+        TrackerParameters(preset="paper", settings_file=f"{path}").check()
