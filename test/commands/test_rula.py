@@ -55,7 +55,7 @@ def test_a_recording_is_scored(files: Path, tmp_path: Path, cardbox: Callable) -
     ("words", "expected"),
     [
         (("--neck", "7"), "--neck is 7; expected 1 to 6"),
-        (("--side-bent-deg", "90"), "--side-bent-deg is 90; expected 1 to 45"),
+        (("--wrist", "9"), "--wrist is 9; expected 1 to 4"),
         (("--legs", "both"), "argument --legs: invalid int value: 'both'"),
         (("--images", "none"), "give --html OUT.html"),
         (("--title", "Packing"), "give --html OUT.html"),

@@ -1,4 +1,4 @@
-"""Settings of RULA and REBA: inputs that no image shows, and limits that the papers leave open."""
+"""Inputs of RULA and REBA that no image shows, and limits that the papers leave open."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ _DECLARED = "declared, since it is not measured"
 
 @dataclass(frozen=True)
 class ErgonomicConfig(Settings):
-    """Settings that both methods have: what no image shows, then limits of angles.
+    """What no image shows, of both methods.
 
     Raises:
         ValueError: a value is out of its range; the text names it.
@@ -33,45 +33,6 @@ class ErgonomicConfig(Settings):
         False,
         "the trunk is twisted against the hips; declared, since torso_yaw is where the whole "
         "person faces",
-    )
-    abducted_deg: float = setting(
-        30.0,
-        "an upper arm this far to the side counts as abducted; the paper names no angle",
-        unit="deg",
-        limits=(5.0, 90.0),
-    )
-    side_bent_deg: float = setting(
-        10.0,
-        "a trunk this far to a side counts as bent; the paper names no angle",
-        unit="deg",
-        limits=(1.0, 45.0),
-    )
-    neck_extended_deg: float = setting(
-        10.0,
-        "a neck bent backwards by more than this is in extension; the paper has 0, which is within "
-        "the error of the measurement",
-        unit="deg",
-        limits=(0.0, 45.0),
-    )
-    neck_twisted_deg: float = setting(
-        20.0,
-        "a head turned this far against the trunk twists the neck; the paper names no angle",
-        unit="deg",
-        limits=(5.0, 80.0),
-    )
-    wrist_aside_deg: float = setting(
-        15.0,
-        "a hand bent this far to the thumb or to the little finger is bent aside; the paper names "
-        "no angle",
-        unit="deg",
-        limits=(5.0, 40.0),
-    )
-    upright_deg: float = setting(
-        10.0,
-        "a trunk bowed less than this is upright, score 1; the paper has 0, which nobody keeps and "
-        "no outline shows",
-        unit="deg",
-        limits=(0.0, 20.0),
     )
 
 
@@ -112,19 +73,6 @@ class RulaConfig(ErgonomicConfig):
     )
     body_muscle_use: int = setting(0, "as arm_muscle_use, of neck, trunk and legs", limits=(0, 1))
     body_load: int = setting(0, "as arm_load, of neck, trunk and legs", limits=(0, 3))
-    wrist_neutral_deg: float = setting(
-        5.0,
-        "a wrist bent less than this is neutral; the paper has 0, which no wrist keeps",
-        unit="deg",
-        limits=(0.0, 15.0),
-    )
-    outwards_deg: float = setting(
-        30.0,
-        "a forearm that points this far to the outside works out to the side of the body; the "
-        "paper names no angle",
-        unit="deg",
-        limits=(5.0, 90.0),
-    )
 
 
 @dataclass(frozen=True)
@@ -228,10 +176,3 @@ def declared(
         text = str(value) if type(value) is int else ("no", "yes")[value]
         found.append(Declared(name, text, value == defaults[name], known[name].description))
     return tuple(found)
-
-
-def limits(config: ErgonomicConfig) -> dict[str, str]:
-    """Return the limits of angles by name, degrees."""
-    kind = _kind_of(config)
-    names = [name for name in settings_of(kind) if name not in _INPUTS[kind]]
-    return {name.removesuffix("_deg"): f"{getattr(config, name):g}" for name in names}

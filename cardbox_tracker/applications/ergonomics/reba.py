@@ -30,6 +30,8 @@ from cardbox_tracker.applications.ergonomics.config import WRISTS, RebaConfig
 from cardbox_tracker.applications.ergonomics.recording import RulaRow
 from cardbox_tracker.applications.ergonomics.rula import (
     INDEPENDENT,
+    NECK_EXTENDED_DEG,
+    NECK_TWISTED_DEG,
     SAMPLES,
     Method,
     Part,
@@ -47,19 +49,10 @@ from cardbox_tracker.applications.ergonomics.rula import (
 )
 from cardbox_tracker.common.errors import CardboxError
 from cardbox_tracker.person.hands import WRIST_NAMES
-from cardbox_tracker.person.legs import (
-    LEG_KEYPOINT_NAMES,
-    LEG_NAMES,
-    leg_directions,
-)
+from cardbox_tracker.person.legs import LEG_KEYPOINT_NAMES, LEG_NAMES, leg_directions
 from cardbox_tracker.person.posture import LEFT_ARM, PITCH, RIGHT_ARM
 from cardbox_tracker.person.sizes import FloatArray
-from cardbox_tracker.person.skeleton import (
-    JOINT_NAMES,
-    NECK_NAMES,
-    KeypointState,
-    arm_directions,
-)
+from cardbox_tracker.person.skeleton import JOINT_NAMES, NECK_NAMES, KeypointState, arm_directions
 from cardbox_tracker.recordings.result_reader import Results, read_results
 from cardbox_tracker.recordings.result_table import LEG_POINT_COLUMNS, POINT_COLUMNS
 from cardbox_tracker.tracking.sampling import normal_postures
@@ -327,7 +320,7 @@ def reba_scores(
         wrists = np.full((*d.shape[:-1], 2, 2), np.nan)
     is_far_back = np.degrees(d[..., PITCH]) < -60.0
     trunk = trunk_scores(d, config) - is_far_back
-    neck = np.full(trunk.shape, config.neck) if necks is None else _neck(necks, config)
+    neck = np.full(trunk.shape, config.neck) if necks is None else _neck(necks)
     leg = np.full(trunk.shape, config.legs)
     if legs is not None and lengths_m is not None:
         leg = _legs(legs, lengths_m, is_seated)
@@ -338,10 +331,10 @@ def reba_scores(
     return RebaScores(left, right, trunk, neck, leg, table_a, np.maximum(left.grand, right.grand))
 
 
-def _neck(necks: FloatArray, config: RebaConfig) -> ScoreArray:
+def _neck(necks: FloatArray) -> ScoreArray:
     yaw_deg, pitch_deg = (np.degrees(necks[..., joint]) for joint in (0, 1))
-    score = np.where((pitch_deg > 20.0) | (pitch_deg < -config.neck_extended_deg), 2, 1)
-    return np.asarray(score + (np.abs(yaw_deg) > config.neck_twisted_deg))
+    score = np.where((pitch_deg > 20.0) | (pitch_deg < -NECK_EXTENDED_DEG), 2, 1)
+    return np.asarray(score + (np.abs(yaw_deg) > NECK_TWISTED_DEG))
 
 
 def _legs(angles: FloatArray, lengths_m: FloatArray, is_seated: bool) -> ScoreArray:
@@ -395,7 +388,7 @@ def _arm(
     """Return the scores of arms (..., 4) with wrists (..., 2); ``side`` is +1 for left ones."""
     upper, fore = arm_directions(angles, side)
     upper_arm, lower_arm = upper_arm_scores(upper, side, config), elbow_scores(upper, fore)
-    wrist = wrist_scores(wrists, (15.0,), config, config.wrist)
+    wrist = wrist_scores(wrists, (15.0,), config.wrist)
     table_b = TABLE_B[upper_arm - 1, lower_arm - 1, wrist - 1]
     arm = np.minimum(table_b + config.coupling, 12)
     grand = TABLE_C[body - 1, arm - 1] + config.activity

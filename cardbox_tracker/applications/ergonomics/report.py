@@ -9,12 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from cardbox_tracker.applications.drawing.page import png_of, render_page
-from cardbox_tracker.applications.ergonomics.config import (
-    NOT_SEEN,
-    ErgonomicConfig,
-    declared,
-    limits,
-)
+from cardbox_tracker.applications.ergonomics.config import NOT_SEEN, ErgonomicConfig, declared
 from cardbox_tracker.applications.ergonomics.recording import (
     GAP_S,
     LONGEST_STEP,
@@ -116,7 +111,6 @@ def write_page(content: PageContent, path: Path) -> None:
         inputs=declared(config, summary.always_measured),
         measured=[*_measured_words(summary)],
         moments=[(row, _moment_words(row, method)) for row in moments],
-        limits=limits(config),
         bar=_bar,
         words=_share_words,
     )

@@ -45,6 +45,11 @@ from cardbox_tracker.person.skeleton import NECK_LIMITS, arm_directions
 
 ScoreArray = NDArray[np.int64]
 
+# The papers name no angle for these words.
+ABDUCTED_DEG, OUTWARDS_DEG, NECK_TWISTED_DEG, WRIST_ASIDE_DEG, SIDE_BENT_DEG = 30, 30, 20, 15, 10
+# The papers have 0, which nobody keeps, and which is within the error of the measurement.
+NECK_EXTENDED_DEG, UPRIGHT_DEG, WRIST_NEUTRAL_DEG = 10, 10, 5
+
 SAMPLES = 500
 """Samples of a distribution; the standard error of a probability of 0.5 is then 0.02."""
 
@@ -192,10 +197,7 @@ class Method(NamedTuple):
     measurable: tuple[str, ...]
 
 
-RULA = Method(
-    *("RULA", HIGHEST, ABOVE, ACTION_LEVELS, PARTS, DECLARED_PARTS),
-    ("neck", *WRISTS),
-)
+RULA = Method(*("RULA", HIGHEST, ABOVE, ACTION_LEVELS, PARTS, DECLARED_PARTS), ("neck", *WRISTS))
 
 
 class ScoreDistribution(NamedTuple):
@@ -354,7 +356,7 @@ def rula_scores(
     if wrists is None:
         wrists = np.full((*d.shape[:-1], 2, 2), np.nan)
     trunk = trunk_scores(d, config)
-    neck = np.full(trunk.shape, config.neck) if necks is None else _neck(necks, config)
+    neck = np.full(trunk.shape, config.neck) if necks is None else _neck(necks)
     table_b = TABLE_B[neck - 1, trunk - 1, config.legs - 1]
     rest = table_b + config.body_muscle_use + config.body_load
     left = _arm(body, d[..., LEFT_ARM], 1.0, wrists[..., 0, :], rest, config)
@@ -365,15 +367,15 @@ def rula_scores(
 def trunk_scores(postures: FloatArray, config: ErgonomicConfig) -> ScoreArray:
     """Return the scores of the trunk in postures (..., 12)."""
     bow_deg, bend_deg = (np.abs(np.degrees(postures[..., joint])) for joint in (PITCH, ROLL))
-    trunk = _steps(bow_deg, config.upright_deg, 20.0, 60.0) + (bend_deg > config.side_bent_deg)
+    trunk = _steps(bow_deg, UPRIGHT_DEG, 20.0, 60.0) + (bend_deg > SIDE_BENT_DEG)
     return np.asarray(trunk + config.trunk_twisted)
 
 
-def _neck(necks: FloatArray, config: RulaConfig) -> ScoreArray:
+def _neck(necks: FloatArray) -> ScoreArray:
     yaw_deg, pitch_deg = (np.degrees(necks[..., joint]) for joint in (0, 1))
     flexed = _steps(pitch_deg, 10.0, 20.0)
-    score = np.where(pitch_deg < -config.neck_extended_deg, 4, flexed)
-    return np.asarray(score + (np.abs(yaw_deg) > config.neck_twisted_deg))
+    score = np.where(pitch_deg < -NECK_EXTENDED_DEG, 4, flexed)
+    return np.asarray(score + (np.abs(yaw_deg) > NECK_TWISTED_DEG))
 
 
 def _arm(
@@ -392,25 +394,23 @@ def _arm(
     hand_m = parts.shoulder_aside_m + side * (
         parts.upper_arm.height_m * upper[..., 1] + parts.forearm.height_m * fore[..., 1]
     )
-    is_away = (hand_m < 0.0) | (fore_aside_deg > config.outwards_deg)
+    is_away = (hand_m < 0.0) | (fore_aside_deg > OUTWARDS_DEG)
     lower_arm = elbow_scores(upper, fore) + is_away
 
-    wrist = wrist_scores(wrists, (config.wrist_neutral_deg, 15.0), config, config.wrist)
+    wrist = wrist_scores(wrists, (WRIST_NEUTRAL_DEG, 15.0), config.wrist)
     table_a = TABLE_A[upper_arm - 1, lower_arm - 1, wrist - 1, config.wrist_twist - 1]
     arm = table_a + config.arm_muscle_use + config.arm_load
     return ArmScores(upper_arm, lower_arm, wrist, table_a, grand_score(arm, rest))
 
 
-def wrist_scores(
-    wrists: FloatArray, limits_deg: Sequence[float], config: ErgonomicConfig, declared: int
-) -> ScoreArray:
+def wrist_scores(wrists: FloatArray, limits_deg: Sequence[float], declared: int) -> ScoreArray:
     """Return the scores of wrists (..., 2), rad: flexion and deviation.
 
     The score is 1 up to the first of the limits of the flexion, and 1 more beyond each of them; a
     hand that is bent aside adds 1. Wrists with nan have the ``declared`` score.
     """
     bent_deg, aside_deg = np.moveaxis(np.abs(np.degrees(wrists)), -1, 0)
-    score = _steps(bent_deg, *limits_deg) + (aside_deg > config.wrist_aside_deg)
+    score = _steps(bent_deg, *limits_deg) + (aside_deg > WRIST_ASIDE_DEG)
     return np.asarray(np.where(np.isnan(bent_deg), declared, score))
 
 
@@ -420,7 +420,7 @@ def upper_arm_scores(upper: FloatArray, side: float, config: ErgonomicConfig) ->
     raised_deg = np.degrees(np.arccos(np.clip(-upper[..., 2], -1.0, 1.0)))
     is_backwards = (-upper[..., 0] > np.abs(upper[..., 1])) & (raised_deg > 20.0)
     score = np.where(is_backwards, 2, _steps(raised_deg, 20.0, 45.0, 90.0))
-    score = score + (_aside_deg(upper, side) > config.abducted_deg)
+    score = score + (_aside_deg(upper, side) > ABDUCTED_DEG)
     return np.asarray(np.clip(score + config.shoulders_raised - config.arms_supported, 1, 6))
 
 

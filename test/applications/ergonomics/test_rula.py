@@ -186,11 +186,6 @@ def test_a_known_neck_replaces_the_declared_one(
     assert int(rula_scores(BODY, posture(), RulaConfig(neck=6)).neck) == 6
 
 
-def test_the_limits_of_the_neck_are_settings() -> None:
-    bent = RulaConfig(neck_extended_deg=20.0, neck_twisted_deg=40.0)
-    assert int(rula_scores(BODY, posture(), bent, np.radians([30.0, -15.0])).neck) == 1
-
-
 def test_an_uncertain_neck_spreads_the_score() -> None:
     postures = np.tile(posture(), (SAMPLES, 1))
     rng = np.random.default_rng(0)
