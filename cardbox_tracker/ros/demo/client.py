@@ -6,10 +6,8 @@ import time
 from collections.abc import Callable, Sequence
 from typing import Any
 
-import numpy as np
 import rclpy
 from diagnostic_msgs.msg import DiagnosticStatus
-from numpy.typing import NDArray
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.qos import QoSProfile, ReliabilityPolicy
 from rclpy.serialization import deserialize_message
@@ -20,7 +18,7 @@ from std_srvs.srv import Trigger
 
 from cardbox_tracker.common.errors import CardboxError
 from cardbox_tracker.recordings.bag_writer import BagWriter
-from cardbox_tracker.recordings.outputs import OUTPUTS, place_from, positions_of, posture_from
+from cardbox_tracker.recordings.outputs import OUTPUTS, positions_of
 from cardbox_tracker.recordings.result_bag import BagTransforms
 from cardbox_tracker.ros.messages import results
 from cardbox_tracker.ros.messages.measurement import mean_iou_of
@@ -53,32 +51,23 @@ def topics_of(cameras: Sequence[str] = ()) -> dict[str, tuple[Any, QoSProfile]]:
 
 
 class Client:
-    """Records the results in a bag and keeps the data of the report.
+    """Records the results in a bag, and knows how far the nodes are.
 
     Attributes:
-        body_model: YAML text of the measured person; empty before it is published.
+        has_body: whether a measured person was published.
         initialization_iou: mean fit of the references; None before it is published.
-        postures: joint positions (12,) by stamp, ns.
-        places_m: ``torso_x`` and ``torso_z`` (2,) by stamp, ns.
-        states: tracking state of each posture by stamp, ns.
-        keypoints_m: keypoints (6, 3) by stamp, ns, metres in the optical frame.
-        silhouettes: silhouettes (H, W) of the first camera by stamp, ns.
+        latest_ns: stamp of the last joint state; 0 before it.
         arrivals_s: arrival time of each joint state, monotonic seconds.
     """
 
     def __init__(self, nodes: Nodes, bag: BagWriter, cameras: Sequence[str] = ()) -> None:
         """Subscribe to the topics of nodes for one camera, or for several camera namespaces."""
         self._silhouettes = silhouettes_of(cameras or [""])
-        self.body_model = ""
+        self.has_body = False
         self.initialization_iou: float | None = None
-        self.postures: dict[int, NDArray[np.float64]] = {}
-        self.places_m: dict[int, NDArray[np.float64]] = {}
-        self.states: dict[int, str] = {}
-        self.keypoints_m: dict[int, NDArray[np.float64]] = {}
-        self.silhouettes: dict[int, NDArray[np.uint8]] = {}
+        self.latest_ns = 0
         self.arrivals_s: list[float] = []
         self._player_status = ""
-        self._state = ""
         self._nodes = nodes
         self._bag = bag
         self._transforms = BagTransforms(bag)
@@ -112,28 +101,14 @@ class Client:
         return record
 
     def _keep(self, topic: str, message: Any) -> None:
-        stamp = self._stamp_ns
         if topic == "body_model":
-            self.body_model = message.data
+            self.has_body = True
         elif topic == "robot_description":
             self._transforms.describe(message.data)
-        elif topic == "tracking_state":
-            # The state has no stamp; the tracker sends it just before the joint state.
-            self._state = message.data
         elif topic == "joint_states":
-            joints = results.joint_values_of(message)
-            self._transforms.write(stamp, positions_of(joints))
-            self.postures[stamp] = posture_from(joints)
-            place_m = place_from(joints)
-            if place_m is not None:
-                self.places_m[stamp] = place_m
-            self.states[stamp] = self._state
+            self._transforms.write(self._stamp_ns, positions_of(results.joint_values_of(message)))
+            self.latest_ns = self._stamp_ns
             self.arrivals_s.append(time.monotonic())
-        elif topic == "keypoints":
-            self.keypoints_m[stamp] = results.points_of(message).points_m
-        elif topic == self._silhouettes[0]:
-            pixels = np.frombuffer(message.data, np.uint8)
-            self.silhouettes[stamp] = pixels.reshape(message.height, message.width)
 
     def _note_status(self, message: String) -> None:
         self._player_status = message.data

@@ -9,11 +9,10 @@ import numpy as np
 from cardbox_tracker.applications.simulation.session import SessionFormat, synthesize_session
 from cardbox_tracker.common.errors import CardboxError, RosMissingError
 from cardbox_tracker.common.progress import progress_bar
-from cardbox_tracker.person.model_file import loads_body_model
 from cardbox_tracker.person.posture import REFERENCE_NAMES
 from cardbox_tracker.recordings.result_bag import result_writer
 from cardbox_tracker.recordings.truth import GroundTruth, load_ground_truth
-from cardbox_tracker.ros.demo.report import DemoResult, write_report
+from cardbox_tracker.ros.demo.report import write_report
 from cardbox_tracker.ros.runtime.processes import (
     Nodes,
     compile_kernels,
@@ -49,8 +48,11 @@ def run_demo(output: Path, preset: str, seed: int, cameras: int = 1) -> None:
         synthesize_session(session, "all", seed, form, overwrite=True, progress=show)
     print("compile (one to two minutes, the first time only)", flush=True)
     compile_kernels()
-    result = track_through_nodes(session, output, preset, seed)
-    write_report(result, session, output, preset, seed)
+    truth = load_ground_truth(session / "ground_truth.json")
+    start_s = round(truth.spans["neutral"][0] + _NEUTRAL_S, 3)
+    fps, iou = track_through_nodes(session, truth, start_s, output, preset, seed)
+    run = {"preset": preset, "seed": seed, "fps": fps, "initialization_iou": iou}
+    write_report(output, truth, truth.start_ns + round(start_s * 1e9), run)
 
 
 def _last_before(truth: GroundTruth, time_s: float) -> int:
@@ -58,17 +60,20 @@ def _last_before(truth: GroundTruth, time_s: float) -> int:
     return max(stamp for stamp in truth.frames if stamp < truth.start_ns + round(time_s * 1e9))
 
 
-def track_through_nodes(session: Path, output: Path, preset: str, seed: int) -> DemoResult:
+def track_through_nodes(
+    session: Path, truth: GroundTruth, start_s: float, output: Path, preset: str, seed: int
+) -> tuple[float, float]:
     """Play ``session`` to the nodes, which measure and track the person; record ``output``/bag.
+
+    Returns:
+        Joint states a second, and the mean fit of the references.
 
     Raises:
         CardboxError: a node failed, or a service refused.
     """
     from cardbox_tracker.ros.demo.client import Client
 
-    truth = load_ground_truth(session / "ground_truth.json")
     pauses = {name: round(float(np.mean(truth.spans[name])), 3) for name in REFERENCE_NAMES}
-    start_s = round(truth.spans["neutral"][0] + _NEUTRAL_S, 3)
     with running_nodes(output) as nodes, result_writer(output / "bag", overwrite=True) as bag:
         client = Client(nodes, bag, truth.cameras)
         try:
@@ -89,7 +94,7 @@ def track_through_nodes(session: Path, output: Path, preset: str, seed: int) -> 
             print("initializer/initialize", flush=True)
             client.call("initializer/initialize")
             client.wait(
-                lambda: bool(client.body_model) and client.initialization_iou is not None,
+                lambda: client.has_body and client.initialization_iou is not None,
                 "the body model and its fit",
             )
             client.rest(1.0)
@@ -101,26 +106,15 @@ def track_through_nodes(session: Path, output: Path, preset: str, seed: int) -> 
                 while nodes.is_running("play_bag"):
                     client.rest(0.5)
                     nodes.check()
-                    if client.postures:
-                        time_s = (max(client.postures) - truth.start_ns) / 1e9
+                    if client.latest_ns:
+                        time_s = (client.latest_ns - truth.start_ns) / 1e9
                         show((time_s - start_s) / (end_s - start_s))
             client.rest_until_quiet()
         finally:
             client.close()
     arrivals = client.arrivals_s[first:]
     lasted_s = arrivals[-1] - arrivals[0] if len(arrivals) > 1 else float("nan")
-    return DemoResult(
-        loads_body_model(client.body_model, "body_model"),
-        truth,
-        truth.start_ns + round(start_s * 1e9),
-        client.postures,
-        client.keypoints_m,
-        client.silhouettes,
-        (len(arrivals) - 1) / lasted_s,
-        client.initialization_iou or 0.0,
-        client.places_m,
-        client.states,
-    )
+    return (len(arrivals) - 1) / lasted_s, client.initialization_iou or 0.0
 
 
 def _start_nodes(
