@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import argparse
 import time
-from collections.abc import Mapping, Sequence
-from contextlib import ExitStack, suppress
+from collections.abc import Mapping
+from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -42,13 +42,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="FILE",
         help=f"{_TRUTH} of the recording, to plot the error; not needed if it lies beside BAG",
     )
-    parser.add_argument(
-        "--beside",
-        type=Path,
-        metavar="RESULTS",
-        help="second bag of results of the same recording, such as with other settings, to show "
-        "beside the first",
-    )
     add_tracking(parser, needs_recording=False)
     add_force(parser)
 
@@ -59,38 +52,32 @@ def run(options: argparse.Namespace) -> None:
         raise CardboxError("expected either BAG or --live")
     if options.person is not None and options.live:
         raise CardboxError("--person chooses in a recording or in results: leave out --live")
-    inputs = *inputs_of(options), options.truth, options.beside
+    inputs = *inputs_of(options), options.truth
     check_outputs((options.save,), options.force, inputs=inputs)
     # A wrong input is reported before a missing library or display.
-    results = [] if options.live else _results_of(options)
-    request = None if options.live or results else _request_of(options)
-    if options.beside is not None and not results:
-        raise CardboxError(
-            "--beside needs a bag of results as BAG; 'cardbox track --bag' writes one"
-        )
-    from cardbox_tracker.applications.viewing.scene import Scene, columns, layout
-    from cardbox_tracker.applications.viewing.sources import check_same_images
+    is_result = not options.live and _has_results(options)
+    request = None if options.live or is_result else _request_of(options)
+    from cardbox_tracker.applications.viewing.scene import Scene, layout
+    from cardbox_tracker.applications.viewing.sources import ShownTracking, show_results
     from cardbox_tracker.applications.viewing.viewer import recording
+    from cardbox_tracker.common.progress import progress_bar
 
-    first_ns = (
-        check_same_images(results[0], results[1], options.person) if len(results) > 1 else None
-    )
-    truth = None if options.live else _truth_of(options, results)
-    shown = columns(_names_of(results))
-    blueprint = layout(shown, has_truth=truth is not None, is_live=options.live)
+    truth = None if options.live else _truth_of(options, is_result)
+    blueprint = layout(has_truth=truth is not None, is_live=options.live)
     with recording(blueprint, options.save, options.web) as (stream, address):
         if address:
             print(f"open {address} in a browser; Ctrl-C ends", flush=True)
+        scene = Scene(stream, truth)
         if options.live:
-            _show_nodes(Scene(stream))
+            _show_nodes(scene)
         elif request is not None:
-            count = _track(request, Scene(stream, truth=truth))
+            shown = ShownTracking(scene)
+            track(request, observers=(shown,))
+            print(f"shown: {shown.count} images with a posture", flush=True)
+        else:
+            with progress_bar("view") as show:
+                count = show_results(options.recording, scene, show, options.person)
             print(f"shown: {count} images with a posture", flush=True)
-        scenes = [Scene(stream, column, first_ns, truth) for column in shown[: len(results)]]
-        for column, count in zip(
-            shown, _show_results(results, scenes, options.person), strict=False
-        ):
-            print(column.named(f"shown: {count} images with a posture"), flush=True)
         if options.web and not options.live:
             stream.flush()
             with suppress(KeyboardInterrupt):
@@ -108,24 +95,19 @@ def _show_nodes(scene: Scene) -> None:
     show_nodes(scene)
 
 
-def _results_of(options: argparse.Namespace) -> list[Path]:
-    """Return the bags of results to show; none if the recording is to be tracked.
-
-    Raises:
-        CardboxError: the recording cannot be read.
-    """
+def _has_results(options: argparse.Namespace) -> bool:
+    """Return whether there are results to show; else the recording is to be tracked."""
     from cardbox_tracker.recordings.bag_reader import BagReader
     from cardbox_tracker.recordings.open_images import is_bag
-    from cardbox_tracker.recordings.result_reader import has_results, read_results
+    from cardbox_tracker.recordings.result_reader import has_results, results_in
 
-    if is_bag(options.recording) or not options.recording.exists():
-        with BagReader(options.recording) as bag:
-            if has_results(bag):
-                for path in (options.recording, options.beside):
-                    if path is not None:
-                        read_results(path, options.person)
-                return [path for path in (options.recording, options.beside) if path is not None]
-    return []
+    if not is_bag(options.recording) and options.recording.exists():
+        return False
+    with BagReader(options.recording) as bag:
+        if not has_results(bag):
+            return False
+        results_in(bag, options.person)
+    return True
 
 
 def _request_of(options: argparse.Namespace) -> TrackingRequest:
@@ -143,23 +125,8 @@ def _request_of(options: argparse.Namespace) -> TrackingRequest:
         ) from None
 
 
-def _names_of(results: Sequence[Path]) -> list[str]:
-    """Return a name for each bag: that of its folder, or as much of the path as differs."""
-    parts = [path.resolve().parts for path in results]
-    longest = max(map(len, parts), default=0)
-    lengths = (n for n in range(1, longest) if len({p[-n:] for p in parts}) == len(parts))
-    length = next(lengths, longest)
-    return ["/".join(part[-length:]) for part in parts]
-
-
-def _truth_of(
-    options: argparse.Namespace, results: Sequence[Path]
-) -> Mapping[int, TrueFrame] | None:
-    """Return the true frames by stamp, of which results must have one; None if there are none.
-
-    Raises:
-        CardboxError: the ground truth cannot be read, or is given for other images.
-    """
+def _truth_of(options: argparse.Namespace, is_result: bool) -> Mapping[int, TrueFrame] | None:
+    """Return the true frames by stamp, of which results must have one; None if there are none."""
     from cardbox_tracker.applications.viewing.sources import image_stamps
     from cardbox_tracker.recordings.truth import load_ground_truth
 
@@ -167,37 +134,15 @@ def _truth_of(
     if path is None:
         return None
     frames = load_ground_truth(path).frames
-    if not results or not frames.keys().isdisjoint(image_stamps(results[0], options.person)):
+    stamps = image_stamps(options.recording, options.person) if is_result else [*frames]
+    if not frames.keys().isdisjoint(stamps):
         return frames
     if options.truth is not None:
         raise CardboxError(
-            f"{path} has no true frame for an image of {results[0]}; give the ground truth of its "
-            "recording"
+            f"{path} has no true frame for an image of {options.recording}; give the ground truth "
+            "of its recording"
         )
     return None
-
-
-def _show_results(paths: Sequence[Path], scenes: Sequence[Scene], person: int | None) -> list[int]:
-    """Show the results in bags; return the number of images with a posture of each."""
-    from cardbox_tracker.applications.viewing.sources import show_together
-    from cardbox_tracker.common.progress import progress_bar
-    from cardbox_tracker.recordings.bag_reader import BagReader
-
-    if not paths:
-        return []
-    with ExitStack() as stack:
-        bags = [stack.enter_context(BagReader(path)) for path in paths]
-        show = stack.enter_context(progress_bar("view"))
-        return show_together(list(zip(bags, scenes, strict=False)), show, person)
-
-
-def _track(request: TrackingRequest, scene: Scene) -> int:
-    """Track a recording and show it; return the number of images with a posture."""
-    from cardbox_tracker.applications.viewing.sources import ShownTracking
-
-    shown = ShownTracking(scene)
-    track(request, observers=(shown,))
-    return shown.count
 
 
 def _truth_beside(bag: Path) -> Path | None:

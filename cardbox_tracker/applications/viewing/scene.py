@@ -5,7 +5,7 @@ from __future__ import annotations
 import tempfile
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -73,47 +73,10 @@ _RADIUS_M = 0.018
 _JPEG_QUALITY = 92
 
 
-class Column(NamedTuple):
-    """One of the results that are shown beside each other.
-
-    Attributes:
-        prefix: before its entities and frames: a word and a slash, or empty.
-        name: of the result, in titles and legends; empty if it is shown alone.
-        is_pale: whether its plots are pale, to distinguish them from those of another result.
-    """
-
-    prefix: str = ""
-    name: str = ""
-    is_pale: bool = False
-
-    def named(self, text: str) -> str:
-        """Return ``text`` with the name of the result before it."""
-        return f"{self.name} {text}".strip()
-
-    def geometry(self, robot: str) -> str:
-        """Return the entity of the shapes of ``person`` or a robot, which must be a single word."""
-        return f"{self.prefix}{robot}".replace("/", "_")
-
-
-ALONE = Column()
-"""A result that is shown alone."""
-
-
-def columns(names: Sequence[str]) -> tuple[Column, ...]:
-    """Return the columns of two named results, or that of a single one."""
-    if len(names) < 2:
-        return (ALONE,)
-    first, second = names
-    return Column("first/", first), Column("second/", second, is_pale=True)
-
-
-def layout(
-    shown: Sequence[Column] = (ALONE,), has_truth: bool = False, is_live: bool = False
-) -> Any:
+def layout(has_truth: bool = False, is_live: bool = False) -> Any:
     """Return the blueprint of the views.
 
     Args:
-        shown: one or two results. Two have their joints in the same plots, without uncertainty.
         has_truth: whether there is a view of the errors.
         is_live: whether the viewer follows the newest result; otherwise it plays from the start.
 
@@ -122,14 +85,12 @@ def layout(
     """
     views = rerun().blueprint
     # The heights of plots with joints, errors and states.
-    error, shares = ([_plot(shown, _ERROR, "error [cm]")], [2]) if has_truth else ([], [])
+    error, shares = ([_plot(_ERROR, "error [cm]")], [2]) if has_truth else ([], [])
     plots = [
-        _plot(shown, f"{_JOINTS}/{name}", f"{name.replace('_', ' ')} [{_unit_of(name)}]")
+        _plot(f"{_JOINTS}/{name}", f"{name.replace('_', ' ')} [{_unit_of(name)}]")
         for name in _GROUPS
     ]
-    states = views.TextLogView(
-        origin="/", contents=[f"+ /{one.prefix}{_STATE}" for one in shown], name="state"
-    )
+    states = views.TextLogView(origin="/", contents=[f"+ /{_STATE}"], name="state")
     right = views.Vertical(
         *plots[:2],
         views.Tabs(*plots[2:]),
@@ -139,9 +100,19 @@ def layout(
     )
     return views.Blueprint(
         views.Horizontal(
-            *(_image_and_body(column) for column in shown),
+            views.Vertical(
+                views.Spatial2DView(origin=_IMAGE, name="image"),
+                views.Spatial3DView(
+                    origin="/",
+                    contents=["+ /**", *(f"- /{name}/**" for name in _FLAT)],
+                    name="measured body",
+                    spatial_information=views.SpatialInformation(target_frame=_ROOT_FRAME),
+                    eye_controls=views.EyeControls3D(
+                        position=_EYE_M, look_target=_TARGET_M, eye_up=(0.0, 0.0, 1.0)
+                    ),
+                ),
+            ),
             right,
-            column_shares=[1.0] * len(shown) + [1.0 if len(shown) == 1 else 1.3],
         ),
         views.TimePanel(
             timeline="time",
@@ -152,58 +123,19 @@ def layout(
     )
 
 
-def _image_and_body(column: Column) -> Any:
-    """Return the image and the body of a result."""
+def _plot(entity: str, title: str) -> Any:
     views = rerun().blueprint
-    prefix = column.prefix
-    title = f"{column.name}: " if column.name else ""
-    return views.Vertical(
-        views.Spatial2DView(origin=f"{prefix}{_IMAGE}", name=f"{title}image"),
-        views.Spatial3DView(
-            origin="/",
-            contents=[
-                *(f"+ /{prefix}**", f"+ /{column.geometry('person')}/**"),
-                *(f"- /{prefix}{name}/**" for name in _FLAT),
-            ],
-            name=f"{title}measured body",
-            spatial_information=views.SpatialInformation(target_frame=f"{prefix}{_ROOT_FRAME}"),
-            eye_controls=views.EyeControls3D(
-                position=_EYE_M, look_target=_TARGET_M, eye_up=(0.0, 0.0, 1.0)
-            ),
-        ),
-    )
-
-
-def _plot(shown: Sequence[Column], entity: str, title: str) -> Any:
-    """Return the plot of an entity of all results; that of two has no room for uncertainty."""
-    views = rerun().blueprint
-    contents = [f"+ /{column.prefix}{entity}/**" for column in shown]
-    if len(shown) > 1:
-        contents += [f"- /{column.prefix}{entity}/{_SPREAD}/**" for column in shown]
     legend = views.PlotLegend(corner=views.Corner2D.RightTop)
-    return views.TimeSeriesView(origin="/", contents=contents, name=title, plot_legend=legend)
+    return views.TimeSeriesView(origin=entity, name=title, plot_legend=legend)
 
 
 class Scene:
     """Logs results to a Rerun stream, each with the stamp of its image, ns."""
 
-    def __init__(
-        self,
-        stream: Any,
-        column: Column = ALONE,
-        first_ns: int | None = None,
-        truth: Mapping[int, TrueFrame] | None = None,
-    ) -> None:
-        """Start an empty scene.
-
-        Args:
-            stream: a rerun.RecordingStream.
-            column: place of the result among those of the layout.
-            first_ns: stamp from which the time line counts, ns; None for that of the first image.
-            truth: true frames by stamp, to plot the error; None if they are not known.
-        """
+    def __init__(self, stream: Any, truth: Mapping[int, TrueFrame] | None = None) -> None:
+        """Start an empty scene in a rerun.RecordingStream; ``truth`` has true frames by stamp."""
         self._rr = rerun()
-        self._stream, self._column, self._first_ns = stream, column, first_ns
+        self._stream, self._first_ns = stream, None
         self._truth = truth or {}
         self._state = ""
         self._styled: set[str] = set()
@@ -239,8 +171,8 @@ class Scene:
         put = self._rr.Transform3D(
             translation=_ROBOT_PLACE_M,
             quaternion=self._rr.Quaternion(xyzw=_HALF_TURN),
-            parent_frame=self._column.prefix + _ROOT_FRAME,
-            child_frame=f"{self._column.prefix}{name}/{root}",
+            parent_frame=_ROOT_FRAME,
+            child_frame=f"{name}/{root}",
         )
         self._log(f"{name}/place", put, static=True)
 
@@ -254,7 +186,7 @@ class Scene:
         """Log the tracking state if it has changed."""
         self._at(stamp_ns)
         if text != self._state:
-            self._log(_STATE, self._rr.TextLog(self._column.named(text)))
+            self._log(_STATE, self._rr.TextLog(text))
         self._state = text
 
     def joints(self, stamp_ns: int, joints: JointValues) -> None:
@@ -334,9 +266,9 @@ class Scene:
             try:
                 tree = self._rr.urdf.UrdfTree.from_file_path(
                     path,
-                    entity_path_prefix=self._column.geometry(name),
-                    frame_prefix=f"{self._column.prefix}{name}/",
-                    static_transform_entity_path=f"{self._column.prefix}{name}/links",
+                    entity_path_prefix=name,
+                    frame_prefix=f"{name}/",
+                    static_transform_entity_path=f"{name}/links",
                 )
                 tree.log_urdf_to_recording(self._stream)
             except Exception as error:
@@ -358,17 +290,13 @@ class Scene:
         strips = [points[list(arm)] for arm in _ARMS]
         bones = self._rr.LineStrips3D(strips, colors=[rgb] * len(strips), radii=_RADIUS_M / 3)
         joints = self._rr.Points3D(points, colors=list(joint_rgb) or rgb, radii=_RADIUS_M)
-        frame = self._column.prefix + _ROOT_FRAME
         for name, shown in (("arms", bones), ("joints", joints)):
-            self._once(f"{entity}/{name}", self._rr.CoordinateFrame(frame))
+            self._once(f"{entity}/{name}", self._rr.CoordinateFrame(_ROOT_FRAME))
             self._log(f"{entity}/{name}", shown)
 
     def _plot(self, entity: str, name: str, value: float, colour: int, width: float) -> None:
         rgb = _COLOURS[colour % len(_COLOURS)]
-        if self._column.is_pale:
-            rgb = tuple((level + 255) // 2 for level in rgb)
-        named = self._column.named(name)
-        self._once(entity, self._rr.SeriesLines(colors=rgb, names=named, widths=width))
+        self._once(entity, self._rr.SeriesLines(colors=rgb, names=name, widths=width))
         self._log(entity, self._rr.Scalars(value))
 
     def _once(self, entity: str, what: Any) -> None:
@@ -378,7 +306,7 @@ class Scene:
         self._styled.add(entity)
 
     def _log(self, entity: str, what: Any, static: bool = False) -> None:
-        self._stream.log(self._column.prefix + entity, what, static=static)
+        self._stream.log(entity, what, static=static)
 
 
 def _shown(joints: JointValues) -> Mapping[str, float]:

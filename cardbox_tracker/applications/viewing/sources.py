@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -11,7 +11,7 @@ import numpy as np
 from cardbox_tracker.applications.drawing.overlay import draw_camera_overlay
 from cardbox_tracker.applications.viewing.scene import Scene
 from cardbox_tracker.camera.encodings import SentImage, decode_bgr
-from cardbox_tracker.common.errors import BagError, CardboxError
+from cardbox_tracker.common.errors import BagError
 from cardbox_tracker.person.model_file import dumps_body_model
 from cardbox_tracker.recordings.bag_reader import BagMessage, BagReader, stamp_ns_of
 from cardbox_tracker.recordings.outputs import joint_deviations, joint_values
@@ -56,56 +56,38 @@ class ShownTracking:
             scene.keypoints(stamp_ns, np.asarray(standing.keypoints_m))
 
 
-def show_together(
-    results: Sequence[tuple[BagReader, Scene]],
-    progress: Callable[[float], None] = lambda _: None,
-    person: int | None = None,
-) -> list[int]:
-    """Show bags of results of one recording at the same time, each in its scene.
-
-    A viewer that plays while it is sent the data has an image of each from the beginning on.
+def show_results(
+    path: Path, scene: Scene, progress: Callable[[float], None], person: int | None = None
+) -> int:
+    """Show a bag of results; return the number of images with joints.
 
     Args:
-        results: open recordings and their scenes.
+        path: the bag.
+        scene: where it is shown.
         progress: called with the finished fraction, 0 to 1.
         person: number of one of several people.
 
-    Returns:
-        The number of images with joints of each.
-
     Raises:
-        BagError: a bag has no results of the tracker, or is damaged.
+        BagError: the bag has no results of the tracker, or is damaged.
     """
-    counts = [0] * len(results)
-    running = {number: _shown(*one, person) for number, one in enumerate(results)}
-    finished = dict.fromkeys(running, 0.0)
-    while running:
-        number = min(running, key=finished.__getitem__)
-        try:
-            finished[number], has_joints = next(running[number])
-        except StopIteration:
-            del running[number]
-            continue
-        counts[number] += has_joints
-        progress(min(finished[one] for one in running))
-    return counts
-
-
-def _shown(bag: BagReader, scene: Scene, person: int | None) -> Iterator[tuple[float, bool]]:
-    """Show the messages; yield the finished fraction after each, and whether it had joints."""
-    space = namespace_of(bag, person)
-    handlers = _handlers(bag, scene, space)
-    total_s = max(bag.duration_s, 1e-9)
-    for message in bag.messages([topic for topic in bag.topics if topic in handlers]):
-        content = bag.deserialize(message)
-        try:
-            handlers[message.topic](message, content)
-        except (AttributeError, TypeError, ValueError) as error:
-            # A recording contains the definitions of its types.
-            raise BagError(
-                f"{message.topic} of {bag.path} has a malformed message: {error}; record it again"
-            ) from None
-        yield (message.time_ns - bag.start_ns) / 1e9 / total_s, message.topic == space + _JOINTS
+    count = 0
+    with BagReader(path) as bag:
+        space = namespace_of(bag, person)
+        handlers = _handlers(bag, scene, space)
+        total_s = max(bag.duration_s, 1e-9)
+        for message in bag.messages([topic for topic in bag.topics if topic in handlers]):
+            content = bag.deserialize(message)
+            try:
+                handlers[message.topic](message, content)
+            except (AttributeError, TypeError, ValueError) as error:
+                # A recording contains the definitions of its types.
+                raise BagError(
+                    f"{message.topic} of {bag.path} has a malformed message: {error}; record it "
+                    "again"
+                ) from None
+            count += message.topic == space + _JOINTS
+            progress((message.time_ns - bag.start_ns) / 1e9 / total_s)
+    return count
 
 
 def _handlers(
@@ -135,8 +117,8 @@ def _handlers(
     return handlers
 
 
-def image_stamps(path: Path, person: int | None = None) -> list[int]:
-    """Return the stamps of the images in a bag of results, ns, ascending.
+def image_stamps(path: Path, person: int | None = None) -> set[int]:
+    """Return the stamps of the images in a bag of results, ns.
 
     Without overlays these are the images with joints.
 
@@ -148,27 +130,4 @@ def image_stamps(path: Path, person: int | None = None) -> list[int]:
         named = (space + _OVERLAY, space + _JOINTS)
         topic = next((topic for topic in named if topic in bag.topics), None)
         messages = [] if topic is None else bag.messages([topic])
-        return sorted({stamp_ns_of(bag.deserialize(message)) for message in messages})
-
-
-def check_same_images(first: Path, second: Path, person: int | None = None) -> int:
-    """Check by their stamps that the images of one bag of results are among those of the other.
-
-    Returns:
-        Stamp of the earliest image of both, ns.
-
-    Raises:
-        CardboxError: they have other stamps, or a bag cannot be read.
-    """
-    stamps = {path: set(image_stamps(path, person)) for path in (first, second)}
-    few, many = sorted(stamps, key=lambda path: len(stamps[path]))
-    others = len(stamps[few] - stamps[many])
-    remedy = "; give two results of the same recording"
-    if others == len(stamps[few]):
-        raise CardboxError(f"{first} and {second} have no image in common{remedy}")
-    if others:
-        raise CardboxError(
-            f"{others} of the {len(stamps[few])} images of {few} are not among those of {many}"
-            + remedy
-        )
-    return min(stamps[many])
+        return {stamp_ns_of(bag.deserialize(message)) for message in messages}

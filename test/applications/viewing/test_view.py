@@ -18,7 +18,6 @@ from cardbox_tracker.applications.drawing.overlay import draw_sharp_overlay
 from cardbox_tracker.applications.simulation.motions import wave
 from cardbox_tracker.applications.simulation.session import SessionFormat, synthesize_session
 from cardbox_tracker.applications.viewing import viewer
-from cardbox_tracker.applications.viewing.sources import show_together
 from cardbox_tracker.applications.viewing.viewer import web_page
 from cardbox_tracker.camera.camera import Camera
 from cardbox_tracker.commands.main import main
@@ -27,7 +26,6 @@ from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.model_file import save_body_model
 from cardbox_tracker.person.posture import reference_posture
 from cardbox_tracker.person.urdf import urdf_from_body
-from cardbox_tracker.recordings.bag_reader import BagReader
 from cardbox_tracker.recordings.bag_writer import BagWriter
 from cardbox_tracker.recordings.result_bag import result_bag
 from cardbox_tracker.recordings.silhouettes import RecordedFrame
@@ -39,27 +37,19 @@ CAMERA = Camera(64, 48, 66.0, 66.0, 31.5, 23.5)
 IMAGES = 5
 
 
-def write_results(path: Path, first: int = 0, seed: int = 0, later_ns: int = 0) -> Path:
-    """Write a bag as 'cardbox track --bag' does: images from ``first`` on, of the noise ``seed``.
-
-    The person of another seed is seen by a camera whose pictures have other noise.
-    """
-    tracker = Tracker(BODY, CAMERA)
-    noise = np.random.default_rng(seed).integers(0, 256, (IMAGES + 1, 48, 64), np.uint8)
+@pytest.fixture
+def results(tmp_path: Path) -> Path:
+    """A bag as of 'cardbox track --bag'; the person is lost in the last image."""
+    path, tracker = tmp_path / "results", Tracker(BODY, CAMERA)
+    noise = np.random.default_rng(0).integers(0, 256, (IMAGES + 1, 48, 64), np.uint8)
     with result_bag(path, "camera", draw=draw_sharp_overlay) as bag:
-        for i in range(first, IMAGES + 1):
+        for i in range(IMAGES + 1):
             posture = wave(i / 5.0)
             points = CAMERA.reference_to_optical(pose(BODY.rigid, posture).keypoints_m)
             estimate = Estimate(TRACKING, posture, np.full(12, 0.1), points, 10, 0.9)
-            frame = RecordedFrame(i * 10**8 + later_ns, i / 10, noise[i], noise[i])
+            frame = RecordedFrame(i * 10**8, i / 10, noise[i], noise[i])
             bag(frame, estimate if i < IMAGES else Estimate(LOST), tracker)
     return path
-
-
-@pytest.fixture
-def results(tmp_path: Path) -> Path:
-    """Results for all images; the person is lost in the last one."""
-    return write_results(tmp_path / "results")
 
 
 def view(*words: object) -> int:
@@ -136,92 +126,6 @@ def test_recordings_play_from_the_start_and_nodes_are_followed() -> None:
     assert layout(is_live=True).time_panel.play_state == "following"
 
 
-def test_two_results_have_a_column_each_and_one_time_line(tmp_path: Path) -> None:
-    chunk = pytest.importorskip("rerun.chunk", reason="rerun-sdk is not installed")
-    from cardbox_tracker.applications.viewing.scene import columns, layout
-
-    # The second one was tracked from a later image on.
-    first, second = write_results(tmp_path / "a"), write_results(tmp_path / "b", first=2)
-    out = tmp_path / "v.rrd"
-    assert view(second, "--beside", first, "--save", out) == 0
-    rows = rows_of(out)
-    assert rows["first/image"] == IMAGES - 1
-    assert rows["second/image"] == IMAGES + 1
-    for entity in ("keypoints/joints", "person/joints/left_elbow_flexion"):
-        assert (rows[f"first/{entity}"], rows[f"second/{entity}"]) == (IMAGES - 2, IMAGES)
-    assert {"first_person", "second_person"} <= {entity.split("/")[0] for entity in rows}
-    starts_s: dict[str, float] = {}
-    for one in chunk.RrdReader(out).stream():
-        if (entity := str(one.entity_path)).endswith("/image"):
-            start_s = min(one.to_record_batch()["time"].to_pylist()).total_seconds()
-            starts_s[entity] = min(start_s, starts_s.get(entity, start_s))
-    assert starts_s == pytest.approx({"/first/image": 0.2, "/second/image": 0.0})
-    found = titles(layout(columns(("b", "a"))).root_container)
-    assert [title for title in found if ":" in title] == [
-        *("b: image", "b: measured body", "a: image", "a: measured body"),
-    ]
-
-
-def test_two_results_are_sent_at_the_same_time(tmp_path: Path) -> None:
-    """A browser plays what has arrived, so the second result must not wait for the first."""
-    paths = write_results(tmp_path / "a"), write_results(tmp_path / "b")
-    sent: list[int] = []
-    fractions: list[float] = []
-
-    class Receiver:
-        def __init__(self, number: int) -> None:
-            self.number = number
-
-        def __getattr__(self, name: str) -> Any:
-            def receive(*_: Any) -> None:
-                if name == "image":
-                    sent.append(self.number)
-
-            return receive
-
-    with BagReader(paths[0]) as first, BagReader(paths[1]) as second:
-        results: Any = [(first, Receiver(0)), (second, Receiver(1))]
-        assert show_together(results, fractions.append) == [IMAGES, IMAGES]
-    assert sorted(sent) == [0] * (IMAGES + 1) + [1] * (IMAGES + 1)
-    ahead = np.cumsum([1 if number else -1 for number in sent])
-    assert np.abs(ahead).max() <= 2
-    assert fractions == sorted(fractions)
-
-
-@pytest.mark.parametrize(
-    ("other", "expected"),
-    [
-        ({"later_ns": 1}, "have no image in common"),
-        ({"later_ns": 10**8}, r"1 of the 6 images of \S+ are not among those of"),
-    ],
-)
-def test_results_of_other_images_are_not_compared(
-    results: Path,
-    tmp_path: Path,
-    other: dict[str, int],
-    expected: str,
-    capsys: pytest.CaptureFixture[str],
-) -> None:
-    pytest.importorskip("rerun", reason="rerun-sdk is not installed")
-    beside = write_results(tmp_path / "other", **other)
-    assert view(results, "--beside", beside, "--save", tmp_path / "v.rrd") == 1
-    said = capsys.readouterr().err
-    assert re.search(expected, said)
-    assert "give two results of the same recording" in said
-    assert not (tmp_path / "v.rrd").exists()
-
-
-def test_names_of_results_differ() -> None:
-    from cardbox_tracker.commands.view import _names_of
-
-    assert _names_of([]) == []
-    assert _names_of([Path("/x/one"), Path("/x/two")]) == ["one", "two"]
-    assert _names_of([Path("/x/one/results"), Path("/x/two/results")]) == [
-        "one/results",
-        "two/results",
-    ]
-
-
 def test_a_robot_of_its_own_namespace_is_shown(tmp_path: Path) -> None:
     pytest.importorskip("rerun", reason="rerun-sdk is not installed")
     names = ("torso_yaw", "elbow")
@@ -262,8 +166,6 @@ REFUSALS: list[Refusal] = [
     ((), "expected either BAG or --live"),
     (("BAG", "--live"), "expected either BAG or --live"),
     (("BAG", "--save", "FOLDER/missing/v.rrd"), "No such file or directory"),
-    (("BAG", "--beside", "FOLDER/missing"), "there are no results"),
-    (("--live", "--beside", "BAG"), "--beside needs a bag of results"),
 ]
 
 
