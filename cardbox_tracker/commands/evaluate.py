@@ -89,10 +89,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     add_preset(parser)
     parser.add_argument(
-        "--jobs",
-        type=at_least(1),
-        metavar="N",
-        help="number of processes; one per core by default",
+        "--jobs", type=at_least(1), metavar="N", help="number of processes; one per core by default"
     )
     add_seed(parser, "recordings and filters")
     add_force(parser)

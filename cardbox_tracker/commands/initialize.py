@@ -16,12 +16,7 @@ from cardbox_tracker.commands.arguments import (
     check_outputs,
     print_remarks,
 )
-from cardbox_tracker.commands.request import (
-    Problems,
-    add_recording,
-    inputs_of,
-    recording_request,
-)
+from cardbox_tracker.commands.request import Problems, add_recording, inputs_of, recording_request
 from cardbox_tracker.commands.tracking import tilt_in
 
 NAME = "initialize"

@@ -580,13 +580,7 @@ def tracking_request(options: argparse.Namespace, faults: Iterable[str] = ()) ->
         problems.add("--legs needs the detector's knees and ankles: give --detector mediapipe")
     problems.check()
     return TrackingRequest(
-        recording,
-        person,
-        options.preset,
-        config,
-        options.seed,
-        inputs_of(options),
-        hands,
+        recording, person, options.preset, config, options.seed, inputs_of(options), hands
     )
 
 

@@ -19,11 +19,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="motion after the reference postures: wave, bend, bow or all",
     )
     parser.add_argument(
-        "--output",
-        type=Path,
-        required=True,
-        metavar="BAG",
-        help="recording to write",
+        "--output", type=Path, required=True, metavar="BAG", help="recording to write"
     )
     add_seed(parser, "noise and sway")
     parser.add_argument(

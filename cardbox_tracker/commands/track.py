@@ -93,10 +93,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "that is finished there with the same inputs and settings is not tracked again",
     )
     many.add_argument(
-        "--formats",
-        nargs="+",
-        choices=FORMATS,
-        help="results of each recording; csv by default",
+        "--formats", nargs="+", choices=FORMATS, help="results of each recording; csv by default"
     )
     many.add_argument(
         "--jobs",

@@ -13,11 +13,7 @@ from cardbox_tracker.camera.camera import Camera
 from cardbox_tracker.camera.rasterisation import clip_near, in_front
 from cardbox_tracker.detectors.image_points import POINT_INDEX, ImagePoints
 from cardbox_tracker.person.cardbox import PATCH_NAMES, cardbox_patches, patches_at
-from cardbox_tracker.person.kinematics import (
-    PosedBodies,
-    gaze_m,
-    pose,
-)
+from cardbox_tracker.person.kinematics import PosedBodies, gaze_m, pose
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.parts import body_parts
 from cardbox_tracker.person.posture import PLACE, POSTURE
@@ -39,11 +35,7 @@ _PART_BGR = {"left": (102, 179, 51), "right": (51, 115, 217)}
 _TORSO_BGR = (191, 115, 64)
 _FILL = 0.4
 UNCERTAIN_BGR = (40, 170, 255)
-_STATE_BGR = {
-    "tracking": (120, 255, 120),
-    "uncertain": UNCERTAIN_BGR,
-    "lost": (90, 110, 255),
-}
+_STATE_BGR = {"tracking": (120, 255, 120), "uncertain": UNCERTAIN_BGR, "lost": (90, 110, 255)}
 _BONE_BGR = {
     KeypointState.UNCERTAIN: (0, 230, 255),
     KeypointState.LOST: (60, 60, 255),

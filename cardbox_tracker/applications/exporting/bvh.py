@@ -19,13 +19,7 @@ from cardbox_tracker.applications.exporting.motion import Motion, held
 from cardbox_tracker.applications.exporting.placed import floor_below, frames_of
 from cardbox_tracker.common.errors import CardboxError
 from cardbox_tracker.common.files import atomic_path
-from cardbox_tracker.person.legs import (
-    ANKLE_SHARE,
-    HIP_SHARE,
-    SHANK_SHARE,
-    THIGH_SHARE,
-    stature_of,
-)
+from cardbox_tracker.person.legs import ANKLE_SHARE, HIP_SHARE, SHANK_SHARE, THIGH_SHARE, stature_of
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.parts import body_parts
 from cardbox_tracker.person.posture import (

@@ -7,10 +7,7 @@ import numpy as np
 from cardbox_tracker.applications.exporting.motion import Motion
 from cardbox_tracker.camera.camera import level_to_optical
 from cardbox_tracker.common.errors import CardboxError
-from cardbox_tracker.person.kinematics import (
-    PosedBodies,
-    pose,
-)
+from cardbox_tracker.person.kinematics import PosedBodies, pose
 from cardbox_tracker.person.legs import floor_m
 from cardbox_tracker.person.model import BodyModel, CameraPose
 from cardbox_tracker.person.sizes import FloatArray

@@ -51,8 +51,7 @@ class RetargetConfig(Settings):
         limits=(0.0, 60.0),
     )
     clutch: bool = setting(
-        False,
-        "the robot begins where it is and follows movements from there, not postures",
+        False, "the robot begins where it is and follows movements from there, not postures"
     )
     enable_after_lost: bool = setting(
         False, "after lost or no_person the robot has to be enabled again"

@@ -310,10 +310,7 @@ class Retargeter:
         return Command(end, f"frozen: {reason.replace('_', ' ')}", self.settles_ns / 1e9)
 
     def _held(
-        self,
-        posture: FloatArray,
-        stddev: FloatArray,
-        keypoints: Mapping[str, tuple[str, float]],
+        self, posture: FloatArray, stddev: FloatArray, keypoints: Mapping[str, tuple[str, float]]
     ) -> NDArray[np.bool_]:
         """Return which joints (n,) of the robot stay because theirs are not sure."""
         sure = (stddev[:N_JOINTS] <= self._config.max_stddev_rad) & np.isfinite(posture[:N_JOINTS])

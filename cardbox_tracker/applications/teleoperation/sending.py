@@ -15,11 +15,7 @@ T = TypeVar("T")
 
 
 def joints_packet(
-    stamp_ns: int,
-    names: Sequence[str],
-    positions: FloatArray,
-    lower: FloatArray,
-    upper: FloatArray,
+    stamp_ns: int, names: Sequence[str], positions: FloatArray, lower: FloatArray, upper: FloatArray
 ) -> bytes:
     """Return a line of JSON: positions and limits (n,) of a robot's joints, rad or m."""
     values = {"positions": positions, "lower": lower, "upper": upper}

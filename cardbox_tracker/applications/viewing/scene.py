@@ -92,11 +92,7 @@ def layout(has_truth: bool = False, is_live: bool = False) -> Any:
     ]
     states = views.TextLogView(origin="/", contents=[f"+ /{_STATE}"], name="state")
     right = views.Vertical(
-        *plots[:2],
-        views.Tabs(*plots[2:]),
-        *error,
-        states,
-        row_shares=[3, 3, 3, *shares, 2],
+        *plots[:2], views.Tabs(*plots[2:]), *error, states, row_shares=[3, 3, 3, *shares, 2]
     )
     return views.Blueprint(
         views.Horizontal(
@@ -115,9 +111,7 @@ def layout(has_truth: bool = False, is_live: bool = False) -> Any:
             right,
         ),
         views.TimePanel(
-            timeline="time",
-            state="collapsed",
-            play_state="following" if is_live else "playing",
+            timeline="time", state="collapsed", play_state="following" if is_live else "playing"
         ),
         collapse_panels=True,
     )

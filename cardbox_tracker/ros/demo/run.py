@@ -13,12 +13,7 @@ from cardbox_tracker.person.posture import REFERENCE_NAMES
 from cardbox_tracker.recordings.result_bag import result_writer
 from cardbox_tracker.recordings.truth import GroundTruth, load_ground_truth
 from cardbox_tracker.ros.demo.report import write_report
-from cardbox_tracker.ros.runtime.processes import (
-    Nodes,
-    compile_kernels,
-    isolate,
-    running_nodes,
-)
+from cardbox_tracker.ros.runtime.processes import Nodes, compile_kernels, isolate, running_nodes
 from cardbox_tracker.search.config import PRESETS
 
 _RATE = 2.0

@@ -46,9 +46,7 @@ def stamp_ns(stamp: Time) -> int:
 
 
 def image_of(
-    message: Image | CompressedImage,
-    most_pixels: float = MOST_PIXELS,
-    levels: Levels | None = None,
+    message: Image | CompressedImage, most_pixels: float = MOST_PIXELS, levels: Levels | None = None
 ) -> ImageArray:
     """Return an image message as (H, W, 3) bgr, or as (H, W) if it has no colours.
 

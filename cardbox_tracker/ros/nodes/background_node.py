@@ -206,10 +206,7 @@ class BackgroundNode(CardboxNode):
             self._kept.carry_over(self._pipeline.model)
         self._image = None
         self._pipeline = SilhouettePipeline(
-            calibration,
-            (settings.width, settings.height),
-            settings,
-            WAYS[settings.learning],
+            calibration, (settings.width, settings.height), settings, WAYS[settings.learning]
         )
 
     def _on_image(self, header: Header, full: conversions.ImageArray, sent_ns: int) -> None:

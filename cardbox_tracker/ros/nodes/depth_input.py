@@ -10,12 +10,7 @@ from sensor_msgs.msg import CameraInfo, CompressedImage, Image
 from std_msgs.msg import Header
 
 from cardbox_tracker.camera.camera import Camera
-from cardbox_tracker.camera.depth_image import (
-    DepthImage,
-    as_seen_by,
-    at_size,
-    depth_from_image,
-)
+from cardbox_tracker.camera.depth_image import DepthImage, as_seen_by, at_size, depth_from_image
 from cardbox_tracker.camera.pairing import TOLERANCE_NS, Arrivals
 from cardbox_tracker.common.errors import EncodingError
 from cardbox_tracker.ros.messages import conversions

@@ -16,10 +16,7 @@ from sensor_msgs.msg import Image
 from cardbox_tracker.camera.camera import Camera
 from cardbox_tracker.camera.depth_image import DepthImage, median_depth
 from cardbox_tracker.common.errors import InitializationError
-from cardbox_tracker.measuring.config import (
-    InitializationConfig,
-    InitializationResult,
-)
+from cardbox_tracker.measuring.config import InitializationConfig, InitializationResult
 from cardbox_tracker.measuring.measure import initialize_body
 from cardbox_tracker.measuring.references import Silhouette, average_silhouette
 from cardbox_tracker.measuring.scale import (

@@ -35,11 +35,7 @@ from cardbox_tracker.person.model_file import dumps_body_model
 from cardbox_tracker.person.posture import REFERENCE_NAMES
 from cardbox_tracker.person.urdf import urdf_from_body
 from cardbox_tracker.ros.messages import conversions
-from cardbox_tracker.ros.messages.measurement import (
-    answer_text,
-    measured_message,
-    refused_message,
-)
+from cardbox_tracker.ros.messages.measurement import answer_text, measured_message, refused_message
 from cardbox_tracker.ros.nodes.camera_poses import silhouettes_of
 from cardbox_tracker.ros.nodes.distance_sources import distance_source, measured
 from cardbox_tracker.ros.nodes.initializer_parameters import InitializerParameters
@@ -208,10 +204,7 @@ class InitializerNode(CardboxNode):
         settings = self.parameters.value
         frame_id = self._frame_id if settings.optical_frame_in_urdf else None
         urdf = urdf_from_body(
-            body,
-            frame_id or None,
-            torso_place=settings.torso_place_in_urdf,
-            hands=settings.hands,
+            body, frame_id or None, torso_place=settings.torso_place_in_urdf, hands=settings.hands
         )
         self._description.publish(String(data=urdf))
 

@@ -6,10 +6,7 @@ import math
 from dataclasses import dataclass
 
 from cardbox_tracker.camera.pairing import camera_names
-from cardbox_tracker.measuring.config import (
-    MAX_PITCH_RAD,
-    InitializationConfig,
-)
+from cardbox_tracker.measuring.config import MAX_PITCH_RAD, InitializationConfig
 from cardbox_tracker.ros.nodes.shared_parameters import (
     camera_roll_parameter,
     cameras_parameter,
@@ -48,18 +45,13 @@ class InitializerParameters(NodeParameters):
         effect=_NEXT_GUIDANCE,
     )
     attempts: int = parameter(
-        3,
-        "number of tries of the guidance for each posture",
-        limits=(1, 20),
-        effect=_NEXT_GUIDANCE,
+        3, "number of tries of the guidance for each posture", limits=(1, 20), effect=_NEXT_GUIDANCE
     )
     mirror: bool = parameter(
-        True,
-        "the guidance shows the person as in a mirror; false: as in the image",
+        True, "the guidance shows the person as in a mirror; false: as in the image"
     )
     bell: bool = parameter(
-        False,
-        "ring the terminal's bell after each success or failure of the guidance",
+        False, "ring the terminal's bell after each success or failure of the guidance"
     )
     model_file: str = parameter(
         "",

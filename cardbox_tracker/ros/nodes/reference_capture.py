@@ -10,18 +10,9 @@ from cardbox_tracker.camera.camera import Camera
 from cardbox_tracker.common.errors import InitializationError
 from cardbox_tracker.measuring.asked_outline import check_asked
 from cardbox_tracker.measuring.config import InitializationConfig
-from cardbox_tracker.measuring.references import (
-    Silhouette,
-    average_silhouette,
-    check_reference,
-)
+from cardbox_tracker.measuring.references import Silhouette, average_silhouette, check_reference
 from cardbox_tracker.person.posture import REFERENCE_NAMES
-from cardbox_tracker.ros.messages.conversions import (
-    ImageArray,
-    image_of,
-    silhouette_of,
-    stamp_ns,
-)
+from cardbox_tracker.ros.messages.conversions import ImageArray, image_of, silhouette_of, stamp_ns
 from cardbox_tracker.ros.runtime.recent import RecentImages
 
 KEPT = 5

@@ -11,12 +11,7 @@ from std_msgs.msg import Bool, Header
 from cardbox_tracker.applications.drawing.overlay import draw_camera_overlay, draw_message
 from cardbox_tracker.camera.camera import OPTICAL_FRAME
 from cardbox_tracker.common.errors import CardboxError
-from cardbox_tracker.person.urdf import (
-    LinkTransform,
-    LinkTransforms,
-    rep155_urdf,
-    urdf_from_body,
-)
+from cardbox_tracker.person.urdf import LinkTransform, LinkTransforms, rep155_urdf, urdf_from_body
 from cardbox_tracker.recordings.outputs import (
     Output,
     OutputStream,

@@ -158,9 +158,5 @@ def type_name(type_: Any) -> str:
 
 def details(spec: ParameterSpec) -> str:
     """Return unit, allowed values and effect of a parameter, as far as it has them."""
-    parts = [
-        spec.unit,
-        spec.range_text,
-        spec.effect if spec.read_only else f"live: {spec.effect}",
-    ]
+    parts = [spec.unit, spec.range_text, spec.effect if spec.read_only else f"live: {spec.effect}"]
     return "; ".join(part for part in parts if part)

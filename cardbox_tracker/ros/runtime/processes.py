@@ -78,9 +78,7 @@ class Nodes:
         called = called or name
         with (self._logs / f"{called}.log").open("wb") as log:
             self._processes[called] = subprocess.Popen(
-                [*self._program(called), name, *arguments],
-                stdout=log,
-                stderr=subprocess.STDOUT,
+                [*self._program(called), name, *arguments], stdout=log, stderr=subprocess.STDOUT
             )
 
     def _program(self, called: str) -> list[str]:

@@ -38,21 +38,15 @@ SERVICE = QoSProfile(depth=10_000, reliability=ReliabilityPolicy.RELIABLE)
 # A subscriber that records a replay must not lose a message.
 REPLAY = QoSProfile(depth=1000, reliability=ReliabilityPolicy.RELIABLE)
 LATCHED = QoSProfile(
-    depth=1,
-    reliability=ReliabilityPolicy.RELIABLE,
-    durability=DurabilityPolicy.TRANSIENT_LOCAL,
+    depth=1, reliability=ReliabilityPolicy.RELIABLE, durability=DurabilityPolicy.TRANSIENT_LOCAL
 )
 # Lines that follow each other at once must not replace each other before they are sent.
 LATCHED_LINES = QoSProfile(
-    depth=10,
-    reliability=ReliabilityPolicy.RELIABLE,
-    durability=DurabilityPolicy.TRANSIENT_LOCAL,
+    depth=10, reliability=ReliabilityPolicy.RELIABLE, durability=DurabilityPolicy.TRANSIENT_LOCAL
 )
 # tf2's listener uses the same profile, because several programs publish latched messages.
 STATIC_TRANSFORMS = QoSProfile(
-    depth=100,
-    reliability=ReliabilityPolicy.RELIABLE,
-    durability=DurabilityPolicy.TRANSIENT_LOCAL,
+    depth=100, reliability=ReliabilityPolicy.RELIABLE, durability=DurabilityPolicy.TRANSIENT_LOCAL
 )
 
 _MEANING = {
@@ -113,8 +107,7 @@ def subscription_events(topic: str, report: Callable[[str], None]) -> Subscripti
     """Return callbacks that pass a mismatch of QoS on ``topic`` to ``report``."""
     # The default callbacks wait for other events, which lengthens every wait of the executor.
     return SubscriptionEventCallbacks(
-        incompatible_qos=partial(_report_mismatch, topic, report, True),
-        use_default_callbacks=False,
+        incompatible_qos=partial(_report_mismatch, topic, report, True), use_default_callbacks=False
     )
 
 
