@@ -1,8 +1,10 @@
-"""Modules of ``lab/``, which only a checkout has."""
+"""``cardbox benchmark`` and ``evaluate``, whose modules only a checkout has, in ``lab/``."""
 
 from __future__ import annotations
 
+import argparse
 import sys
+from dataclasses import dataclass
 from importlib import import_module
 from pathlib import Path
 from typing import Any
@@ -12,14 +14,51 @@ from cardbox_tracker.common.errors import CardboxError
 _PACKAGE = Path(__file__).parents[1]
 
 
-def from_checkout(module: str, target: str) -> Any:
+@dataclass
+class LabCommand:
+    """A subcommand whose arguments and work are in a module of ``lab/``.
+
+    Attributes:
+        module: full name of the module.
+        targets: words of ``make`` that do the same.
+    """
+
+    NAME: str
+    HELP: str
+    module: str
+    targets: str
+
+    def add_arguments(self, parser: argparse.ArgumentParser) -> None:
+        """Add the arguments."""
+        from_checkout(self.module, self.targets).add_arguments(parser)
+
+    def run(self, options: argparse.Namespace) -> None:
+        """Do the work."""
+        from_checkout(self.module, self.targets).run(options)
+
+
+BENCHMARK = LabCommand(
+    "benchmark",
+    "measure how fast the tracker is on this machine (in a checkout)",
+    "lab.benchmarks.command",
+    "make benchmark",
+)
+EVALUATE = LabCommand(
+    "evaluate",
+    "in a checkout: compare recorded sessions with their truth, or repeat the paper's experiments",
+    "lab.evaluation.command",
+    "make experiments, make sessions, make people",
+)
+
+
+def from_checkout(module: str, targets: str) -> Any:
     """Import a module of a folder at the top of a checkout.
 
     The checkout is the current directory, one above it, or the parent of this package.
 
     Args:
         module: full name of the module, such as ``lab.benchmarks.run``.
-        target: the ``make`` target that runs it.
+        targets: words of ``make`` that run it.
 
     Raises:
         CardboxError: there is no checkout, or a library that the module needs is not installed.
@@ -33,7 +72,7 @@ def from_checkout(module: str, target: str) -> Any:
     else:
         raise CardboxError(
             f"{folder}/ is not installed; run this in a checkout of {_PACKAGE.name}, or there "
-            f"'make {target}'"
+            f"{targets}"
         )
     try:
         return import_module(module)

@@ -12,13 +12,12 @@ from typing import Protocol
 
 from cardbox_tracker import __version__
 from cardbox_tracker.commands import (
-    benchmark,
     body,
     calibrate_extrinsics,
     call,
+    checkout,
     demo,
     detector,
-    evaluate,
     export,
     initialize,
     reba,
@@ -35,7 +34,7 @@ from cardbox_tracker.common.errors import CardboxError, plain
 
 
 class Command(Protocol):
-    """A subcommand; each is a module of this folder with these four names.
+    """A subcommand: a module of this folder, or an object, with these four names.
 
     Slow imports are inside ``add_arguments`` and ``run``, so that ``cardbox --help`` is fast.
 
@@ -73,10 +72,10 @@ COMMANDS: tuple[Command, ...] = (
     reba,
     retarget,
     stream,
-    benchmark,
+    checkout.BENCHMARK,
     urdf,
     call,
-    evaluate,
+    checkout.EVALUATE,
 )
 
 _EVERY_COMMAND = tuple(command.NAME for command in COMMANDS)

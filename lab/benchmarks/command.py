@@ -1,14 +1,11 @@
-"""``cardbox benchmark``: the speed of this machine, measured by ``lab/`` of a checkout."""
+"""The arguments of ``cardbox benchmark``."""
 
 from __future__ import annotations
 
 import argparse
 from pathlib import Path
 
-from cardbox_tracker.commands.checkout import from_checkout
-
-NAME = "benchmark"
-HELP = "measure how fast the tracker is on this machine (in a checkout)"
+from lab.benchmarks import run as benchmark
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -26,7 +23,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> None:
     """Measure, write the results and print a short table."""
-    benchmark = from_checkout("lab.benchmarks.run", "benchmark")
     results = benchmark.run_benchmark(options.json, options.report, session=options.session)
     print(benchmark.short_table(results))
     print(f"wrote {options.json}" + (f" and {options.report}" if options.report else ""))

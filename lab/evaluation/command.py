@@ -1,7 +1,4 @@
-"""``cardbox evaluate``: recorded sessions with ground truth, or the paper's experiments.
-
-``lab/`` of a checkout has what it runs.
-"""
+"""The arguments of ``cardbox evaluate``: recorded sessions, or the paper's experiments."""
 
 from __future__ import annotations
 
@@ -16,13 +13,7 @@ from cardbox_tracker.commands.arguments import (
     at_least,
     check_outputs,
 )
-from cardbox_tracker.commands.checkout import from_checkout
 from cardbox_tracker.commands.request import points_named
-
-NAME = "evaluate"
-HELP = (
-    "in a checkout: compare recorded sessions with their truth, or repeat the paper's experiments"
-)
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -106,8 +97,9 @@ def run(options: argparse.Namespace) -> None:
         return
     inputs = [options.session] if options.session else []
     check_outputs((), options.force, inputs=inputs, results=(options.output / "report.md",))
-    experiments = from_checkout("lab.experiments.evaluate", "experiments")
-    plans = from_checkout("lab.experiments.plan", "experiments")
+    from lab.experiments import evaluate as experiments
+    from lab.experiments import plan as plans
+
     plan = (plans.quick_plan if options.quick else plans.full_plan)(options.runs)
     experiments.evaluate(options.output, plan, options.seed, options.session, jobs)
     print(f"wrote {options.output}/report.md, and all numbers to {options.output}/results.json")
@@ -115,9 +107,9 @@ def run(options: argparse.Namespace) -> None:
 
 def _sessions(options: argparse.Namespace, jobs: int) -> None:
     from cardbox_tracker.common.progress import progress_bar
+    from lab.evaluation import evaluate as sessions
+    from lab.evaluation import plan as plans
 
-    sessions = from_checkout("lab.evaluation.evaluate", "sessions")
-    plans = from_checkout("lab.evaluation.plan", "sessions")
     names = dict.fromkeys(sessions.result_name(folder) for folder in options.sessions)
     results = [options.output / f"{name}.md" for name in names]
     check_outputs((), options.force, inputs=options.sessions, results=results)
@@ -138,9 +130,10 @@ def _sessions(options: argparse.Namespace, jobs: int) -> None:
 
 
 def _films(options: argparse.Namespace, jobs: int) -> None:
+    from lab.evaluation import films
+
     report = options.output / "films.md"
     check_outputs((), options.force, inputs=options.films, results=[report])
-    films = from_checkout("lab.evaluation.films", "people")
     seeds = range(options.seed, options.seed + options.seeds)
     films.evaluate_films(options.films, report, options.preset, seeds, jobs)
     print(f"wrote {report} and {report.with_suffix('.json')}")
