@@ -49,7 +49,7 @@ def _track_film(output: Path, seed: int) -> None:
     from cardbox_tracker.applications.demo.film import SOURCE, DemoFilm
     from cardbox_tracker.applications.exporting.markers import write_trc
     from cardbox_tracker.applications.exporting.motion import Motion
-    from cardbox_tracker.applications.reporting.plots import space_view
+    from cardbox_tracker.applications.reporting.page import space_view
     from cardbox_tracker.commands.request import (
         PersonRequest,
         RecordingRequest,

@@ -22,7 +22,7 @@ HELP = "score the strain on the whole body in a table of 'cardbox track --legs' 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of ``cardbox reba``."""
-    from cardbox_tracker.applications.ergonomics.config import RebaConfig
+    from cardbox_tracker.applications.ergonomics.rula import RebaConfig
 
     add = parser.add_argument
     add("table", type=Path, metavar="TABLE.csv", help="table of 'cardbox track --legs --csv'")
@@ -35,9 +35,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> None:
     """Score every image, and print times, part scores and declared inputs."""
-    from cardbox_tracker.applications.ergonomics.config import RebaConfig
     from cardbox_tracker.applications.ergonomics.reba import REBA, read_table, score_table
     from cardbox_tracker.applications.ergonomics.report import PageContent
+    from cardbox_tracker.applications.ergonomics.rula import RebaConfig
 
     check_outputs(outputs_of(options), options.force, inputs=(options.table,))
     config = settings_from(options, RebaConfig)

@@ -15,9 +15,9 @@ from cardbox_tracker.commands.tracking import track
 from cardbox_tracker.common.errors import CardboxError
 
 if TYPE_CHECKING:
-    from cardbox_tracker.applications.ergonomics.config import RulaConfig
     from cardbox_tracker.applications.ergonomics.recording import MomentImages, RulaRow
     from cardbox_tracker.applications.ergonomics.report import PageContent
+    from cardbox_tracker.applications.ergonomics.rula import RulaConfig
     from cardbox_tracker.recordings.track import TrackSummary
 
 NAME = "rula"
@@ -31,7 +31,7 @@ _LEAST_CLOCK_S = 1e9
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of ``cardbox rula``."""
-    from cardbox_tracker.applications.ergonomics.config import RulaConfig
+    from cardbox_tracker.applications.ergonomics.rula import RulaConfig
 
     add_tracking(parser)
     add_score_outputs(parser)
@@ -53,8 +53,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> None:
     """Track the person, score every image, and print times, part scores and declared inputs."""
-    from cardbox_tracker.applications.ergonomics.config import RulaConfig
     from cardbox_tracker.applications.ergonomics.recording import MomentImages, RulaObserver
+    from cardbox_tracker.applications.ergonomics.rula import RulaConfig
 
     if options.html is None and (options.title is not None or options.images != IMAGES[0]):
         raise CardboxError("--images and --title change the page of --html; give --html OUT.html")

@@ -14,7 +14,7 @@ HELP = "stream results as 24 joints in real time, to programs that teleoperate r
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of ``cardbox stream``."""
-    from cardbox_tracker.applications.teleoperation.packets import PACKETS
+    from cardbox_tracker.applications.teleoperation.sending import PACKETS
 
     add_results(parser)
     parser.add_argument(
@@ -37,9 +37,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> None:
     """Read the results and send them."""
-    from cardbox_tracker.applications.teleoperation.packets import packet
     from cardbox_tracker.applications.teleoperation.recorded import at_rate, bodies_of
-    from cardbox_tracker.applications.teleoperation.sending import ZmqSender, in_real_time
+    from cardbox_tracker.applications.teleoperation.sending import ZmqSender, in_real_time, packet
     from cardbox_tracker.recordings.result_reader import read_results
 
     results = read_results(options.results, options.person)

@@ -212,8 +212,7 @@ def _derived(
 ) -> Iterator[str]:
     """Write what is made of the finished table, of several people files of each, and say it."""
     from cardbox_tracker.applications.exporting.formats import export
-    from cardbox_tracker.applications.reporting.page import write_page
-    from cardbox_tracker.applications.reporting.plots import angles_plot
+    from cardbox_tracker.applications.reporting.page import angles_plot, write_page
     from cardbox_tracker.recordings.result_reader import read_results
 
     tracked = (number for number, one in summary.people.items() if one.frames_tracked)

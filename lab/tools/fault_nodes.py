@@ -22,7 +22,7 @@ from cardbox_tracker.ros.messages.conversions import (
 from cardbox_tracker.ros.nodes.background_node import BackgroundNode
 from cardbox_tracker.ros.nodes.camera_inputs import ObservationSet
 from cardbox_tracker.ros.nodes.tracker_node import TrackerNode
-from cardbox_tracker.ros.runtime.intra_process import IntraProcess
+from cardbox_tracker.ros.runtime.node import IntraProcess
 from cardbox_tracker.tracking.estimate import Estimate
 from lab.tools.fault_scene import EMPTY, START_NS, Found, Person, S, Sent
 

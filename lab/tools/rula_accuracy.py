@@ -18,11 +18,11 @@ from pathlib import Path
 
 import numpy as np
 
-from cardbox_tracker.applications.ergonomics.config import RulaConfig
 from cardbox_tracker.applications.ergonomics.rula import (
     ABOVE,
     HIGHEST,
     SAMPLES,
+    RulaConfig,
     ScoreArray,
     ScoreDistribution,
     neck_samples,

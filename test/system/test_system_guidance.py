@@ -16,7 +16,7 @@ from std_srvs.srv import Trigger  # noqa: E402
 
 from cardbox_tracker.applications.drawing.guidance import FIT_BGR  # noqa: E402
 from cardbox_tracker.ros.messages.conversions import camera_info_message, image_message  # noqa: E402
-from cardbox_tracker.ros.messages.measurement import mean_iou_of  # noqa: E402
+from cardbox_tracker.ros.messages.results import mean_iou_of  # noqa: E402
 from cardbox_tracker.ros.runtime import qos  # noqa: E402
 
 

@@ -19,7 +19,7 @@ from std_msgs.msg import String  # noqa: E402
 
 from cardbox_tracker.applications.simulation.session import synthesize_session  # noqa: E402
 from cardbox_tracker.ros.messages.conversions import stamp_ns  # noqa: E402
-from cardbox_tracker.ros.messages.measurement import mean_iou_of  # noqa: E402
+from cardbox_tracker.ros.messages.results import mean_iou_of  # noqa: E402
 from cardbox_tracker.ros.runtime import qos  # noqa: E402
 
 DATA = Path(__file__).resolve().parents[3] / "shared" / "data"

@@ -26,15 +26,16 @@ from typing import NamedTuple
 
 import numpy as np
 
-from cardbox_tracker.applications.ergonomics.config import WRISTS, RebaConfig
 from cardbox_tracker.applications.ergonomics.recording import RulaRow
 from cardbox_tracker.applications.ergonomics.rula import (
     INDEPENDENT,
     NECK_EXTENDED_DEG,
     NECK_TWISTED_DEG,
     SAMPLES,
+    WRISTS,
     Method,
     Part,
+    RebaConfig,
     ScoreArray,
     ScoreDistribution,
     distribution_of,

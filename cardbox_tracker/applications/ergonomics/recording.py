@@ -12,17 +12,15 @@ import cv2
 import numpy as np
 
 from cardbox_tracker.applications.drawing.overlay import draw_overlay, with_hidden_head
-from cardbox_tracker.applications.ergonomics.config import (
+from cardbox_tracker.applications.ergonomics.rula import (
     DECLARED,
     MEASURED,
     MIXED,
-    ErgonomicConfig,
-    RulaConfig,
-)
-from cardbox_tracker.applications.ergonomics.rula import (
     RULA,
     SAMPLES,
+    ErgonomicConfig,
     Method,
+    RulaConfig,
     ScoreDistribution,
     expected,
     sampled_scores,

@@ -9,7 +9,6 @@ from pathlib import Path
 import numpy as np
 
 from cardbox_tracker.applications.drawing.page import png_of, render_page
-from cardbox_tracker.applications.ergonomics.config import NOT_SEEN, ErgonomicConfig, declared
 from cardbox_tracker.applications.ergonomics.recording import (
     GAP_S,
     LONGEST_STEP,
@@ -21,7 +20,14 @@ from cardbox_tracker.applications.ergonomics.recording import (
     summarize,
     worst_moments,
 )
-from cardbox_tracker.applications.ergonomics.rula import RULA, Method, expected
+from cardbox_tracker.applications.ergonomics.rula import (
+    NOT_SEEN,
+    RULA,
+    ErgonomicConfig,
+    Method,
+    declared,
+    expected,
+)
 from cardbox_tracker.common.files import atomic_path
 from cardbox_tracker.person.sizes import FloatArray
 from cardbox_tracker.tracking.estimate import UNCERTAIN

@@ -9,11 +9,157 @@ from urllib.parse import quote
 
 import numpy as np
 
-from cardbox_tracker.applications.drawing.page import render_page
+from cardbox_tracker.applications.drawing.page import png_of, render_page
+from cardbox_tracker.applications.exporting.markers import markers_of
 from cardbox_tracker.applications.exporting.motion import Motion
-from cardbox_tracker.applications.reporting.plots import angles_plot, doubtful_spans, space_view
+from cardbox_tracker.applications.exporting.placed import floor_below, in_reference
+from cardbox_tracker.person.isb_angles import LABORATORY
+from cardbox_tracker.person.legs import LEG_NAMES
+from cardbox_tracker.person.model import BodyModel
+from cardbox_tracker.person.sizes import FloatArray
+from cardbox_tracker.person.skeleton import JOINT_NAMES, NECK_NAMES, UNITS
 from cardbox_tracker.recordings.result_reader import Results
-from cardbox_tracker.tracking.estimate import TRACKING
+from cardbox_tracker.tracking.estimate import TRACKING, UNCERTAIN
+
+STATE_COLOURS = {UNCERTAIN: "#e69f00", "": "#9a9a9a"}
+"""Colours of times whose posture may be wrong, and of those without one."""
+_ANGLES = [name for name in (*JOINT_NAMES, *NECK_NAMES) if UNITS[name] == "rad"] + [*LEG_NAMES]
+_GROUPS = ("torso", "neck", "left arm", "right arm", "left leg", "right leg")
+_DPI = 100
+
+_TRUNK, _LEFT, _RIGHT, _TRUE = "#4073bf", "#33b366", "#d97333", "#00b4d8"
+_ARMS = (("Neck", "Shoulder"), ("Shoulder", "Elbow"), ("Elbow", "Hand"))
+_LEGS = (("Hip", "Hip"), ("Hip", "Knee"), ("Knee", "Ankle"))
+_ALONG_ARMS = [2, 1, 0, 3, 4, 5]
+_MOMENTS = 4
+
+
+def angles_plot(results: Results) -> bytes:
+    """Return the joint angles over time as PNG, each with a band of one standard deviation."""
+    from matplotlib.figure import Figure
+
+    groups = {name: _joints_of(name, results) for name in _GROUPS}
+    shown = {name: joints for name, joints in groups.items() if joints} or {"torso": []}
+    figure = Figure(figsize=(10.0, 2.2 * len(shown)), dpi=_DPI, layout="constrained")
+    time_s = results.time_s
+    for row, (name, joints) in zip(
+        figure.subplots(len(shown), sharex=True, squeeze=False)[:, 0], shown.items(), strict=True
+    ):
+        angles, deviations = (
+            np.degrees(values) for values in (results.of(joints), results.deviations_of(joints))
+        )
+        for joint, angle, deviation in zip(joints, angles.T, deviations.T, strict=True):
+            line = row.plot(time_s, angle, linewidth=1.2, label=_words(joint, name))[0]
+            low, high = angle - deviation, angle + deviation
+            row.fill_between(time_s, low, high, color=line.get_color(), alpha=0.15, linewidth=0)
+        # Deviations of what is hardly seen would leave no room for the curves.
+        if np.isfinite(angles).any():
+            row.set_ylim(np.nanmin(angles) - 30.0, np.nanmax(angles) + 30.0)
+        for begin_s, end_s, state in doubtful_spans(results):
+            row.axvspan(begin_s, end_s, 0.0, 0.04, color=STATE_COLOURS[state], linewidth=0)
+        row.set(ylabel=f"{name} [deg]")
+        row.margins(x=0.0)
+        row.grid(alpha=0.3)
+        row.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0), fontsize=8, frameon=False)
+    row.set_xlabel(
+        "time [s]; bands: one standard deviation; orange: may be wrong, grey: no posture"
+    )
+    return png_of(figure)
+
+
+def _joints_of(group: str, results: Results) -> list[str]:
+    """Return the joints of a group, such as ``left arm``, that have a value in the results."""
+    side, _, limb = group.partition(" ")
+    found = []
+    for name in _ANGLES:
+        is_of_group = name.startswith(side) and (not limb or (name in LEG_NAMES) == (limb == "leg"))
+        if is_of_group and np.isfinite(results.of([name])).any():
+            found.append(name)
+    return found
+
+
+def _words(joint: str, group: str) -> str:
+    return joint.removeprefix(f"{group.split()[0]}_").replace("_", " ")
+
+
+def doubtful_spans(results: Results) -> list[tuple[float, float, str]]:
+    """Return start and end, s, of each time whose posture may be wrong or is missing.
+
+    The third value is ``uncertain``, or "" without a posture.
+    """
+    step_s = float(np.median(np.diff(results.time_s))) if len(results.time_s) > 1 else 0.0
+    spans: list[tuple[float, float, str]] = []
+    before = None
+    for time_s, state in zip(results.time_s.tolist(), results.state, strict=True):
+        kind = state if state in (TRACKING, UNCERTAIN) else ""
+        if kind != TRACKING:
+            begin_s = spans.pop()[0] if kind == before else time_s
+            spans.append((begin_s, time_s + step_s, kind))
+        before = kind
+    return spans
+
+
+def space_view(motion: Motion, body: BodyModel | None, true_m: FloatArray | None = None) -> bytes:
+    """Return the skeleton from aside at some moments as PNG.
+
+    Args:
+        motion: results of n images, with a posture in some.
+        body: the person that was tracked; None if it is not known.
+        true_m: keypoints of a reference, (n, 6, 3), metres in the optical frame; nan where there
+            are none.
+    """
+    from matplotlib.figure import Figure
+
+    seen = motion.is_seen if true_m is None else motion.is_seen & np.isfinite(true_m).all((1, 2))
+    numbers = np.flatnonzero(seen if seen.any() else motion.is_seen)
+    chosen = numbers[np.linspace(0, len(numbers) - 1, 2 * _MOMENTS + 1).astype(int)[1::2]]
+    markers = markers_of(motion, body)
+    points_m = _upright(markers.points_m[chosen])
+    reference_m = None
+    if true_m is not None:
+        level_m = (in_reference(true_m[chosen], body) - floor_below(body)) @ LABORATORY.T
+        reference_m = _upright(level_m)
+    figure = Figure(figsize=(3.0 * _MOMENTS, 3.4), dpi=_DPI, layout="constrained")
+    low, high = (f(points_m, axis=(0, 1)) for f in (np.nanmin, np.nanmax))
+    middle, half = (low + high) / 2, float(np.max(high - low)) / 2 + 0.1
+    for column, number in enumerate(chosen.tolist()):
+        axes = figure.add_subplot(1, _MOMENTS, column + 1, projection="3d")
+        joints = dict(zip(markers.names, points_m[column], strict=True))
+        for begin, end, colour in _bones():
+            if begin in joints and end in joints:
+                axes.plot(*np.transpose([joints[begin], joints[end]]), color=colour, linewidth=3)
+        if reference_m is not None:
+            axes.plot(
+                *reference_m[column][_ALONG_ARMS].T, color=_TRUE, linewidth=1.5, marker="o", ms=3
+            )
+        axes.set(
+            title=f"{motion.time_s[number]:.1f} s",
+            xlim=(middle[0] - half, middle[0] + half),
+            ylim=(middle[1] - half, middle[1] + half),
+            zlim=(middle[2] - half, middle[2] + half),
+        )
+        axes.set_box_aspect((1, 1, 1), zoom=1.25)
+        axes.view_init(elev=10.0, azim=-35.0)
+        axes.tick_params(labelsize=6)
+    what = "; light blue: reference" if reference_m is not None else ""
+    figure.suptitle(f"green: left, orange: right{what}; metres", fontsize=10)
+    return png_of(figure)
+
+
+def _bones() -> list[tuple[str, str, str]]:
+    """Return the markers at both ends of each bone, and its colour."""
+    bones = [("Hip", "Neck", _TRUNK)]
+    for side, colour in (("L", _LEFT), ("R", _RIGHT)):
+        for begin, end in (*_ARMS, *_LEGS):
+            is_middle = begin in ("Neck", "Hip") and end in ("Shoulder", "Hip")
+            bones.append((begin if is_middle else f"{side}{begin}", f"{side}{end}", colour))
+    return bones
+
+
+def _upright(points_m: FloatArray) -> FloatArray:
+    """Return points (..., 3) of the laboratory with x to the image's right, y away, z up."""
+    return np.asarray(points_m[..., [2, 0, 1]] * np.array([-1.0, -1.0, 1.0]))
+
 
 _MOST_SPANS = 20
 

@@ -21,7 +21,7 @@ from cardbox_tracker.recordings.bag_writer import BagWriter
 from cardbox_tracker.recordings.outputs import OUTPUTS, positions_of
 from cardbox_tracker.recordings.result_bag import BagTransforms
 from cardbox_tracker.ros.messages import results
-from cardbox_tracker.ros.messages.measurement import mean_iou_of
+from cardbox_tracker.ros.messages.results import mean_iou_of
 from cardbox_tracker.ros.nodes.camera_poses import silhouettes_of
 from cardbox_tracker.ros.runtime import qos
 from cardbox_tracker.ros.runtime.processes import Nodes

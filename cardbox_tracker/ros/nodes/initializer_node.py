@@ -35,11 +35,10 @@ from cardbox_tracker.person.model_file import dumps_body_model
 from cardbox_tracker.person.posture import REFERENCE_NAMES
 from cardbox_tracker.person.urdf import urdf_from_body
 from cardbox_tracker.ros.messages import conversions
-from cardbox_tracker.ros.messages.measurement import answer_text, measured_message, refused_message
+from cardbox_tracker.ros.messages.results import answer_text, measured_message, refused_message
 from cardbox_tracker.ros.nodes.camera_poses import silhouettes_of
-from cardbox_tracker.ros.nodes.distance_sources import distance_source, measured
 from cardbox_tracker.ros.nodes.initializer_parameters import InitializerParameters
-from cardbox_tracker.ros.nodes.reference_capture import ReferenceCapture
+from cardbox_tracker.ros.nodes.reference_capture import ReferenceCapture, distance_source, measured
 from cardbox_tracker.ros.runtime import qos
 from cardbox_tracker.ros.runtime.command_line import plain_command_line
 from cardbox_tracker.ros.runtime.node import CardboxNode, run_node

@@ -3,16 +3,35 @@
 from __future__ import annotations
 
 import time
+from collections import deque
+from collections.abc import Callable
+from functools import partial
+from typing import Any
 
 from sensor_msgs.msg import Image
 
 from cardbox_tracker.camera.camera import Camera
+from cardbox_tracker.camera.depth_image import DepthImage, median_depth
 from cardbox_tracker.common.errors import InitializationError
 from cardbox_tracker.measuring.asked_outline import check_asked
-from cardbox_tracker.measuring.config import InitializationConfig
+from cardbox_tracker.measuring.config import InitializationConfig, InitializationResult
+from cardbox_tracker.measuring.measure import initialize_body
 from cardbox_tracker.measuring.references import Silhouette, average_silhouette, check_reference
+from cardbox_tracker.measuring.scale import (
+    SCALE_REFERENCES,
+    DepthReference,
+    Measure,
+    depth_scale,
+    measured_at_scale,
+    measured_scale,
+)
 from cardbox_tracker.person.posture import REFERENCE_NAMES
 from cardbox_tracker.ros.messages.conversions import ImageArray, image_of, silhouette_of, stamp_ns
+from cardbox_tracker.ros.nodes.camera_poses import CameraPoses, silhouettes_of
+from cardbox_tracker.ros.nodes.depth_input import DepthInput
+from cardbox_tracker.ros.nodes.initializer_parameters import InitializerParameters
+from cardbox_tracker.ros.runtime import qos
+from cardbox_tracker.ros.runtime.node import CardboxNode
 from cardbox_tracker.ros.runtime.recent import RecentImages
 
 KEPT = 5
@@ -131,3 +150,224 @@ class ReferenceCapture:
         if self.missing:
             return f"{text}; missing: {', '.join(self.missing)}"
         return f"{text}; all three are there"
+
+
+Progress = Callable[[float], None]
+"""Callback that receives the finished fraction of a measurement."""
+
+# A few depth images of a posture are enough, and each takes much memory.
+_KEPT_DEPTHS = 5
+
+
+class DepthDistance:
+    """Keeps the depth of the reference postures in the view of the measuring camera."""
+
+    def __init__(
+        self,
+        node: CardboxNode,
+        topic: str,
+        references: ReferenceCapture,
+        camera: Callable[[], Camera | None],
+    ) -> None:
+        """Subscribe with ``node``, the initializer, to depth images on ``topic``.
+
+        ``camera`` returns the camera of the silhouettes in ``references``, or None until it is
+        known.
+        """
+        self._topic, self._references, self._camera = node.resolve(topic), references, camera
+        self._recent: deque[tuple[int, DepthImage]] = deque(maxlen=_KEPT_DEPTHS)
+        self._captured: dict[str, DepthImage] = {}
+        self._input = DepthInput(node, topic, self._add)
+
+    def _add(self, message: Any, _: int) -> None:
+        if (camera := self._camera()) is not None:
+            depth_m = self._input.seen_by(camera, message)
+            self._recent.append((stamp_ns(message.header.stamp), depth_m))
+
+    def check(self) -> None:
+        """Check before the reference postures that a measurement will be possible.
+
+        Raises:
+            InitializationError: no depth image was received.
+        """
+        if not self._recent:
+            raise InitializationError(
+                f"no depth image was received yet on {self._topic}, so the person's distance "
+                "cannot be measured; start its publisher, or give person_distance_m and set "
+                "measure_distance to false"
+            )
+
+    def capture(self, name: str, now_ns: int | None) -> None:
+        """Keep the depth of the reference ``name``, if it is needed.
+
+        Args:
+            name: name of the reference.
+            now_ns: stamp of the camera's latest silhouette.
+
+        Raises:
+            InitializationError: no depth image has the time of the silhouettes.
+        """
+        if name not in SCALE_REFERENCES or now_ns is None:
+            return
+        alike = [
+            depth_m
+            for at_ns, depth_m in self._recent
+            if abs(at_ns - now_ns) <= ONE_POSTURE_NS and depth_m.shape == self._recent[-1][1].shape
+        ]
+        if not alike:
+            raise InitializationError(
+                f"reference '{name}': no depth image has come on {self._topic} at the time of the "
+                "silhouettes; is the depth camera running, with stamps of the same clock?"
+            )
+        self._captured[name] = median_depth(alike)
+
+    def measure(self, measure: Measure, config: InitializationConfig) -> InitializationResult:
+        """Measure a person, and the distance with the depth images.
+
+        Args:
+            measure: measurement with the camera at a given distance.
+            config: settings; the search begins at their distance.
+
+        Raises:
+            InitializationError: ``measure`` failed, or the depth images do not fit the person.
+        """
+        camera, silhouettes = self._camera(), self._references.captured
+        if camera is None or any(name not in self._captured for name in SCALE_REFERENCES):
+            raise InitializationError(
+                f"there are no depth images of the references {' and '.join(SCALE_REFERENCES)}: "
+                "they were captured while measure_distance was false; capture them again"
+            )
+        seen = {
+            name: DepthReference(silhouettes[name], self._captured[name])
+            for name in SCALE_REFERENCES
+        }
+        if any(one.silhouette.shape != one.depth_m.shape for one in seen.values()):
+            raise InitializationError(
+                "the working resolution has changed since the references were captured; capture "
+                "them again"
+            )
+        return measured_at_scale(measure, config, camera, partial(depth_scale, references=seen))
+
+
+class SecondCamera:
+    """Captures the reference postures in the view of the second of several cameras."""
+
+    def __init__(self, node: CardboxNode, settings: InitializerParameters) -> None:
+        """Subscribe with ``node``, the initializer, to the first two of its ``cameras``.
+
+        Raises:
+            CardboxError: the file of the extrinsics cannot be read, or a name is not allowed.
+        """
+        cameras = settings.cameras[:2]
+        self._poses = CameraPoses(node, cameras, settings.extrinsics_file, lambda: None)
+        self._recent = RecentImages(KEPT)
+        self._captured: dict[str, Silhouette] = {}
+        topic = silhouettes_of(cameras)[1]
+        self._topic = node.resolve(topic)
+        node.subscribe(Image, topic, self._add, qos.SILHOUETTE_INPUT)
+
+    def _add(self, message: Image, _: int) -> None:
+        silhouette_of(message)
+        self._recent.append(message)
+
+    def check(self) -> None:
+        """Check before the reference postures that a measurement will be possible.
+
+        Raises:
+            CameraError: the poses of the cameras are unknown, or two sources disagree.
+            InitializationError: nothing was received from a camera.
+        """
+        self._poses.check()
+        if self._poses.first is None or not self._recent:
+            raise InitializationError(
+                f"no silhouette was received yet on {self._topic}, or no CameraInfo of a camera, "
+                "so the second camera cannot measure the person's distance; start its background "
+                "node, or give person_distance_m and set measure_distance to false"
+            )
+
+    def capture(self, name: str, now_ns: int | None) -> None:
+        """Keep this camera's silhouettes of the reference ``name``, if it is needed.
+
+        Args:
+            name: name of the reference.
+            now_ns: stamp of the first camera's latest silhouette.
+
+        Raises:
+            InitializationError: this camera has no silhouette of that time.
+        """
+        if name not in SCALE_REFERENCES or now_ns is None:
+            return
+        alike = alike_of(self._recent) if self._recent else []
+        if not alike or abs(stamp_ns(alike[-1].header.stamp) - now_ns) > ONE_POSTURE_NS:
+            raise InitializationError(
+                f"reference '{name}': nothing has come on {self._topic} at the time of the first "
+                "camera's silhouettes; is the second camera running, and its background node?"
+            )
+        self._captured[name] = average_silhouette([silhouette_of(message) for message in alike])
+
+    def measure(self, measure: Measure, config: InitializationConfig) -> InitializationResult:
+        """Measure a person with the first camera, and the distance with this one.
+
+        Args:
+            measure: measurement with the first camera at a given distance.
+            config: settings; the search begins at their distance.
+
+        Raises:
+            InitializationError: ``measure`` failed, or this camera's silhouettes do not fit.
+        """
+        self.check()
+        first = self._poses.first
+        assert first is not None
+        missing = [name for name in SCALE_REFERENCES if name not in self._captured]
+        if missing:
+            raise InitializationError(
+                f"the second camera has no reference {', '.join(missing)}: it was captured while "
+                "measure_distance was false; capture it again"
+            )
+        other = self._poses.others[0]
+        scale = partial(measured_scale, other=other, references=self._captured)
+        return measured_at_scale(measure, config, first, scale)
+
+
+def distance_source(
+    node: CardboxNode,
+    settings: InitializerParameters,
+    references: ReferenceCapture,
+    camera: Callable[[], Camera | None],
+) -> DepthDistance | SecondCamera | None:
+    """Return the source of the person's distance, or None.
+
+    Args:
+        node: the initializer.
+        settings: parameters of the initializer.
+        references: silhouettes of the first camera.
+        camera: returns the first camera at the working resolution, or None until it is known.
+
+    Raises:
+        CardboxError: the file of the extrinsics cannot be read, or a name is not allowed.
+    """
+    if settings.depth:
+        return DepthDistance(node, settings.depth, references, camera)
+    return SecondCamera(node, settings) if len(settings.cameras) > 1 else None
+
+
+def measured(
+    references: ReferenceCapture,
+    distance: DepthDistance | SecondCamera | None,
+    camera: Camera,
+    config: InitializationConfig,
+    progress: Progress,
+) -> InitializationResult:
+    """Measure the person of ``references`` with ``camera``, and the distance with ``distance``.
+
+    Raises:
+        InitializationError: the references are unusable, or the model does not fit them.
+    """
+
+    def measure(at: InitializationConfig, done: Progress) -> InitializationResult:
+        return initialize_body(references.captured, camera, at, done, references.images)
+
+    def half(at: InitializationConfig, is_last: bool) -> InitializationResult:
+        return measure(at, lambda fraction: progress(0.5 * (fraction + is_last)))
+
+    return measure(config, progress) if distance is None else distance.measure(half, config)

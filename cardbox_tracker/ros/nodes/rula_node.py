@@ -11,11 +11,11 @@ from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float32, Float32MultiArray, MultiArrayDimension, MultiArrayLayout, String
 
-from cardbox_tracker.applications.ergonomics.config import RulaConfig
 from cardbox_tracker.applications.ergonomics.rula import (
     ABOVE,
     ACTION_LEVELS,
     SAMPLES,
+    RulaConfig,
     ScoreDistribution,
     expected,
     part_values,

@@ -25,8 +25,7 @@ from cardbox_tracker.common.errors import CardboxError
 from cardbox_tracker.ros.nodes.background_node import BackgroundNode
 from cardbox_tracker.ros.nodes.initializer_node import InitializerNode
 from cardbox_tracker.ros.nodes.tracker_node import TrackerNode
-from cardbox_tracker.ros.runtime.intra_process import IntraProcess
-from cardbox_tracker.ros.runtime.node import CardboxNode, own_arguments, run
+from cardbox_tracker.ros.runtime.node import CardboxNode, IntraProcess, own_arguments, run
 
 if TYPE_CHECKING:
     from cardbox_tracker.ros.nodes.play_bag_node import PlayBagNode

@@ -9,8 +9,7 @@ from typing import Any
 from std_msgs.msg import ByteMultiArray, String
 
 from cardbox_tracker.applications.teleoperation.full_body import FullBodies, FullBody
-from cardbox_tracker.applications.teleoperation.packets import PACKETS, packet
-from cardbox_tracker.applications.teleoperation.sending import ZmqSender
+from cardbox_tracker.applications.teleoperation.sending import PACKETS, ZmqSender, packet
 from cardbox_tracker.common.errors import CardboxError
 from cardbox_tracker.recordings.outputs import positions_of
 from cardbox_tracker.ros.messages.results import joint_values_of

@@ -9,7 +9,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from cardbox_tracker.applications.ergonomics.config import RebaConfig, declared
 from cardbox_tracker.applications.ergonomics.reba import (
     REBA,
     TABLE_A,
@@ -21,6 +20,7 @@ from cardbox_tracker.applications.ergonomics.reba import (
 )
 from cardbox_tracker.applications.ergonomics.recording import score_shares, summarize, write_csv
 from cardbox_tracker.applications.ergonomics.report import PageContent, report_lines, write_page
+from cardbox_tracker.applications.ergonomics.rula import RebaConfig, declared
 from cardbox_tracker.common.errors import CardboxError
 from cardbox_tracker.person.posture import PITCH, ROLL
 from cardbox_tracker.person.sizes import FloatArray

@@ -14,7 +14,6 @@ import cv2
 import numpy as np
 import pytest
 
-from cardbox_tracker.applications.ergonomics.config import RulaConfig, declared
 from cardbox_tracker.applications.ergonomics.recording import (
     CSV_HEADER,
     SHARES_HEADER,
@@ -34,7 +33,12 @@ from cardbox_tracker.applications.ergonomics.report import (
     score_plot,
     write_page,
 )
-from cardbox_tracker.applications.ergonomics.rula import PARTS, ScoreDistribution
+from cardbox_tracker.applications.ergonomics.rula import (
+    PARTS,
+    RulaConfig,
+    ScoreDistribution,
+    declared,
+)
 from cardbox_tracker.camera.camera import Camera
 from cardbox_tracker.person.proportions import body_from_proportions
 from cardbox_tracker.recordings.silhouettes import RecordedFrame

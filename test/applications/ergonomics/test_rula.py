@@ -8,13 +8,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from cardbox_tracker.applications.ergonomics.config import RulaConfig, declared
 from cardbox_tracker.applications.ergonomics.rula import (
     PARTS,
     SAMPLES,
     TABLE_A,
     TABLE_B,
     TABLE_C,
+    RulaConfig,
+    declared,
     grand_score,
     neck_samples,
     part_values,

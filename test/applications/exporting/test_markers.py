@@ -159,6 +159,6 @@ def test_without_ezc3d_the_extra_is_named_and_nothing_is_left(
     motion_of: Callable, body: BodyModel, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setitem(sys.modules, "ezc3d", None)
-    with pytest.raises(CardboxError, match=r"pip install '\.\[export\]'.*--to trc"):
+    with pytest.raises(CardboxError, match=r"pip install 'cardbox_tracker\[export\]'.*--to trc"):
         write_c3d(tmp_path / "a.c3d", motion_of(np.zeros(14), body), body)
     assert list(tmp_path.iterdir()) == []

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from cardbox_tracker.applications.teleoperation import packets, sending
+from cardbox_tracker.applications.teleoperation import sending
 from cardbox_tracker.applications.teleoperation.full_body import NAMES, FullBody
 from cardbox_tracker.common.errors import CardboxError
 
@@ -43,7 +43,7 @@ def test_a_frame_of_sonic_has_the_bytes_computed_by_hand() -> None:
     expected += struct.pack("<6f", 0.25, 1.25, 0.5, 1.5, 0.75, 1.75)
     expected += bytes(29 * 4) + bytes.fromhex("0000803f 00000000 00000000 00000000")
     expected += bytes.fromhex("2a00000000000000")
-    assert packets.sonic_packet(body(), 42) == expected
+    assert sending.sonic_packet(body(), 42) == expected
     assert len(expected) == 2080
 
 
@@ -64,7 +64,7 @@ def decoded(frame: bytes) -> dict[str, Any]:
 
 
 def test_a_decoder_of_the_page_reads_a_frame_of_sonic() -> None:
-    turned = decoded(packets.sonic_packet(body(np.pi / 2), 5))
+    turned = decoded(sending.sonic_packet(body(np.pi / 2), 5))
     half = np.sqrt(0.5)
     assert turned["body_quat"][0] == pytest.approx([half, 0.0, 0.0, half])
     assert turned["frame_index"].tolist() == [5]
@@ -83,7 +83,7 @@ def test_isaac_gets_the_axes_of_openxr() -> None:
     half = np.sqrt(0.5)
     turns = REST.copy()
     turns[NAMES.index("neck")] = half, half, 0.0, 0.0
-    found = msgpack.unpackb(packets.isaac_packet(body()._replace(points_m=points, turns=turns), 0))
+    found = msgpack.unpackb(sending.isaac_packet(body()._replace(points_m=points, turns=turns), 0))
     assert found["timestamp"] == 7 and found["joint_names"] == list(NAMES)
     # X to the right, Y up, Z backwards; the lower foot stands on the floor.
     assert found["joint_positions"][NAMES.index("head")] == [-0.5, 2.0, -0.25]
@@ -93,7 +93,7 @@ def test_isaac_gets_the_axes_of_openxr() -> None:
     assert found["joint_orientations"][0] == pytest.approx([0, 0, 0, 1])
     assert [NAMES[i] for i, one in enumerate(found["joint_valid"]) if not one] == ["left_foot"]
     turned = body(np.pi / 2)._replace(points_m=points, turns=turns)
-    found = msgpack.unpackb(packets.isaac_packet(turned, 0))
+    found = msgpack.unpackb(sending.isaac_packet(turned, 0))
     assert found["joint_positions"][NAMES.index("head")] == pytest.approx([-0.25, 2.0, 0.5])
     assert found["joint_orientations"][0] == pytest.approx([0, half, 0, half])
 
@@ -102,7 +102,7 @@ def test_the_message_fills_isaac_teleops_full_body() -> None:
     pytest.importorskip("isaacteleop", reason="isaacteleop is not installed")
     types = import_module("isaacteleop.retargeting_engine.tensor_types")
     group_of = import_module("isaacteleop.retargeting_engine.interface").TensorGroup
-    found = sending.optional("msgpack").unpackb(packets.isaac_packet(body(), 0))
+    found = sending.optional("msgpack").unpackb(sending.isaac_packet(body(), 0))
     group = group_of(types.FullBodyInput())
     group[types.FullBodyInputIndex.JOINT_POSITIONS] = np.array(found["joint_positions"], "f4")
     group[types.FullBodyInputIndex.JOINT_ORIENTATIONS] = np.array(found["joint_orientations"], "f4")
@@ -112,7 +112,7 @@ def test_the_message_fills_isaac_teleops_full_body() -> None:
 
 
 def test_a_line_of_json_has_the_validity_of_each_joint() -> None:
-    found = json.loads(packets.json_packet(body(), 0))
+    found = json.loads(sending.json_packet(body(), 0))
     assert found["names"] == list(NAMES) and found["stamp_ns"] == 7
     assert found["positions"][1] == [round(value / 64, 5) for value in (3, 4, 5)]
     assert found["valid"].count(False) == 1
@@ -122,10 +122,10 @@ def test_a_line_of_json_has_the_validity_of_each_joint() -> None:
 
 def test_readers_without_validity_get_nothing_while_nothing_is_valid() -> None:
     nothing = body().invalid(8)
-    assert packets.packet("sonic", nothing, 1) is None
-    assert packets.packet("isaac", nothing, 1) is None
-    assert b'"valid":[false' in (packets.packet("json", nothing, 1) or b"")
-    assert packets.packet("json", None, 1) is None
+    assert sending.packet("sonic", nothing, 1) is None
+    assert sending.packet("isaac", nothing, 1) is None
+    assert b'"valid":[false' in (sending.packet("json", nothing, 1) or b"")
+    assert sending.packet("json", None, 1) is None
 
 
 @pytest.fixture
@@ -160,5 +160,5 @@ def test_packets_arrive_by_zmq(subscriber: Any) -> None:
 
 def test_a_missing_package_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(__import__("sys").modules, "msgpack", None)
-    with pytest.raises(CardboxError, match=r"pip install '\.\[teleoperation\]'"):
-        packets.isaac_packet(body(), 0)
+    with pytest.raises(CardboxError, match=r"pip install 'cardbox_tracker\[teleoperation\]'"):
+        sending.isaac_packet(body(), 0)

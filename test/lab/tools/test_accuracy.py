@@ -10,8 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from cardbox_tracker.applications.ergonomics.config import RulaConfig
-from cardbox_tracker.applications.ergonomics.rula import ScoreDistribution
+from cardbox_tracker.applications.ergonomics.rula import RulaConfig, ScoreDistribution
 from cardbox_tracker.applications.retargeting.robot import load_robot
 from cardbox_tracker.applications.simulation.session import session_camera
 from cardbox_tracker.person.kinematics import pose

@@ -12,7 +12,7 @@ from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.recordings.result_reader import Results
 from cardbox_tracker.recordings.result_table import POINT_COLUMNS
 from cardbox_tracker.recordings.truth import load_ground_truth
-from cardbox_tracker.ros.demo.report import figures
+from cardbox_tracker.ros.demo.run import figures
 
 LAST = 24
 """So many images of the session's end are expected."""

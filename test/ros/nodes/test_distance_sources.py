@@ -24,8 +24,10 @@ from cardbox_tracker.measuring.scale import scaled  # noqa: E402
 from cardbox_tracker.person.model import BodyModel  # noqa: E402
 from cardbox_tracker.person.posture import reference_posture  # noqa: E402
 from cardbox_tracker.ros.messages.conversions import image_message  # noqa: E402
-from cardbox_tracker.ros.nodes.distance_sources import DepthDistance  # noqa: E402
-from cardbox_tracker.ros.nodes.reference_capture import ReferenceCapture  # noqa: E402
+from cardbox_tracker.ros.nodes.reference_capture import (  # noqa: E402
+    DepthDistance,
+    ReferenceCapture,
+)
 from cardbox_tracker.terms.whole_body import WholeBodyCost  # noqa: E402
 from cardbox_tracker.terms.whole_body_config import WholeBodyCostConfig  # noqa: E402
 

@@ -35,7 +35,7 @@ from cardbox_tracker.ros.nodes.camera_inputs import ImagePairing  # noqa: E402
 from cardbox_tracker.ros.nodes.reference_capture import ReferenceCapture  # noqa: E402
 from cardbox_tracker.ros.nodes.tracker_node import TrackerNode  # noqa: E402
 from cardbox_tracker.ros.runtime import qos  # noqa: E402
-from cardbox_tracker.ros.runtime.intra_process import IntraProcess  # noqa: E402
+from cardbox_tracker.ros.runtime.node import IntraProcess  # noqa: E402
 from cardbox_tracker.tracking.estimate import Estimate  # noqa: E402
 from cardbox_tracker.tracking.observation import Observation  # noqa: E402
 from cardbox_tracker.tracking.tracker import Tracker  # noqa: E402

@@ -22,7 +22,7 @@ from cardbox_tracker.measuring.config import InitializationResult  # noqa: E402
 from cardbox_tracker.person.model import BodyModel  # noqa: E402
 from cardbox_tracker.person.model_file import load_body_model  # noqa: E402
 from cardbox_tracker.person.posture import REFERENCE_NAMES  # noqa: E402
-from cardbox_tracker.ros.nodes import distance_sources, initializer_node  # noqa: E402
+from cardbox_tracker.ros.nodes import initializer_node, reference_capture  # noqa: E402
 from cardbox_tracker.ros.nodes.camera_node import CameraNode  # noqa: E402
 from cardbox_tracker.ros.nodes.tracker_node import TrackerNode  # noqa: E402
 
@@ -62,7 +62,7 @@ def test_a_folder_that_is_gone_costs_no_second_posing(
     folder.mkdir()
     path = folder / "model.yaml"
     result = InitializationResult(BODY, dict.fromkeys(REFERENCE_NAMES, 0.9), {}, {})
-    monkeypatch.setattr(distance_sources, "initialize_body", lambda *_: result)
+    monkeypatch.setattr(reference_capture, "initialize_body", lambda *_: result)
     node = initializer_node.InitializerNode(
         context=context,
         parameter_overrides=[Parameter("model_file", value=str(path))],

@@ -15,8 +15,7 @@ from std_msgs.msg import String  # noqa: E402
 
 from cardbox_tracker.common.errors import CardboxError  # noqa: E402
 from cardbox_tracker.ros.runtime import qos  # noqa: E402
-from cardbox_tracker.ros.runtime.intra_process import IntraProcess  # noqa: E402
-from cardbox_tracker.ros.runtime.node import CardboxNode  # noqa: E402
+from cardbox_tracker.ros.runtime.node import CardboxNode, IntraProcess  # noqa: E402
 
 
 @pytest.fixture
