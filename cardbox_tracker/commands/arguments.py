@@ -30,11 +30,7 @@ REFERENCES = {
 
 
 def span(text: str) -> TimeSpan:
-    """Parse a span ``T0:T1``, seconds from the start of the recording.
-
-    Raises:
-        argparse.ArgumentTypeError: the text is not two times, the first before the second.
-    """
+    """Parse a span ``T0:T1``, seconds from the start of the recording."""
     from cardbox_tracker.recordings.silhouettes import TimeSpan
 
     try:
@@ -47,11 +43,7 @@ def span(text: str) -> TimeSpan:
 
 
 def time(text: str) -> float:
-    """Parse a time in seconds from the start of the recording.
-
-    Raises:
-        argparse.ArgumentTypeError: the text is no finite number, or it is negative.
-    """
+    """Parse a time in seconds from the start of the recording."""
     value = _number(text)
     if not 0.0 <= value < math.inf:
         raise argparse.ArgumentTypeError(
@@ -184,11 +176,7 @@ def add_settings(parser: argparse.ArgumentParser, kind: Any, title: str) -> None
 
 
 def settings_from(options: argparse.Namespace, kind: type[T]) -> T:
-    """Return the settings of the dataclass ``kind`` from the options of :func:`add_settings`.
-
-    Raises:
-        CardboxError: a value is out of its range.
-    """
+    """Return the settings of the dataclass ``kind`` from the options of :func:`add_settings`."""
     try:
         return kind(**{name: getattr(options, name) for name in settings_of(kind)})
     except ValueError as error:
@@ -217,9 +205,6 @@ def check_outputs(
         inputs: files and recordings that are read, which are never replaced.
         results: files and folders that other code writes; only ``force`` and ``inputs`` are
             checked.
-
-    Raises:
-        CardboxError: an output exists, is an input, is named twice, or cannot be written.
     """
     files = [path for path in outputs if path is not None]
     every = [*files, *(path for path in results if path is not None)]

@@ -59,9 +59,6 @@ def from_checkout(module: str, targets: str) -> Any:
     Args:
         module: full name of the module, such as ``lab.benchmarks.run``.
         targets: words of ``make`` that run it.
-
-    Raises:
-        CardboxError: there is no checkout, or a library that the module needs is not installed.
     """
     folder = module.partition(".")[0]
     for root in (Path.cwd(), *Path.cwd().parents, _PACKAGE.parent):

@@ -98,11 +98,7 @@ class RecordingRequest:
         return next((source for source in sources if isinstance(source, Detector)), None)
 
     def open(self) -> AbstractContextManager[Recording]:
-        """Return the context of the open recording.
-
-        Raises:
-            CardboxError: see :func:`~.recordings.recording.open_recording`.
-        """
+        """Return the context of the open recording."""
         from cardbox_tracker.recordings.recording import open_recording
 
         return open_recording(
@@ -549,9 +545,6 @@ def tracking_request(options: argparse.Namespace, faults: Iterable[str] = ()) ->
     Args:
         options: the options.
         faults: what is wrong with other options.
-
-    Raises:
-        OptionsError: options are missing, wrong or contradict each other.
     """
     from cardbox_tracker.detectors.detector import Detector
     from cardbox_tracker.search.config import PRESETS
@@ -672,9 +665,6 @@ def points_named(given: object) -> Detector | PointTable:
 
     Args:
         given: the name of a detector, the path of points, a class, or a detector of one's own.
-
-    Raises:
-        CardboxError: the detector is not installed or is none, or there are no such points.
     """
     from cardbox_tracker.common.extensions import DETECTORS, extensions, loaded
     from cardbox_tracker.detectors.detector import MEDIAPIPE, Detector
@@ -787,11 +777,7 @@ def _of_stature(stature_m: float, distance_m: float | None, pitch_rad: float) ->
 
 
 def _config(options: argparse.Namespace, preset: TrackerConfig) -> TrackerConfig:
-    """Return the preset changed by depth images, the file of settings, and the options.
-
-    Raises:
-        CardboxError: the file cannot be read, or a value is wrong or has no effect.
-    """
+    """Return the preset changed by depth images, the file of settings, and the options."""
     from cardbox_tracker.search.settings_file import read_settings
 
     config = preset if options.depth is None else preset.with_depth()
@@ -821,9 +807,6 @@ def with_own_options(options: argparse.Namespace, folder: Path, name: str) -> ar
         options: the command line.
         folder: the folder of all recordings.
         name: name of the recording, see :func:`~.recordings.folder.recordings_in`.
-
-    Raises:
-        CardboxError: a file cannot be read, or has options that tracking does not know.
     """
     found = copy.copy(options)
     for part in reversed([PurePosixPath(name), *PurePosixPath(name).parents][:-1]):

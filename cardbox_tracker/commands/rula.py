@@ -87,11 +87,7 @@ def outputs_of(options: argparse.Namespace) -> tuple[Path | None, ...]:
 
 
 def write_scores(options: argparse.Namespace, content: PageContent) -> None:
-    """Print times, part scores and declared inputs, and write the files.
-
-    Raises:
-        CardboxError: a file cannot be written.
-    """
+    """Print times, part scores and declared inputs, and write the files."""
     from cardbox_tracker.applications.ergonomics import recording, report
 
     rows, config, method = content.rows, content.config, content.method

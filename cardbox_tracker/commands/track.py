@@ -144,11 +144,7 @@ def _without_effect(options: argparse.Namespace, names: tuple[str, ...], what: s
 
 
 def track_one(options: argparse.Namespace, show: Callable[[float], None] | None = None) -> None:
-    """Track one recording and write the requested files; see :func:`~.tracking.track`.
-
-    Raises:
-        CardboxError: options are wrong, or a file cannot be read or written.
-    """
+    """Track one recording and write the requested files; see :func:`~.tracking.track`."""
     from cardbox_tracker.recordings.result_table import check_table
 
     faults = _without_effect(options, _OF_MANY, "which is one recording: give --csv")

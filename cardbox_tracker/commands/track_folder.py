@@ -143,11 +143,7 @@ class Job(NamedTuple):
 
 
 def track_folder(options: argparse.Namespace) -> None:
-    """Track each recording of a folder that is not finished, and print a summary.
-
-    Raises:
-        CardboxError: the results cannot be written, or recordings failed; the text names them.
-    """
+    """Track each recording of a folder that is not finished, and print a summary."""
     folder = options.recording
     output = options.output or Path(f"{folder.resolve().name}_tracked")
     recordings = recordings_in(folder, output)
@@ -349,11 +345,7 @@ def _remove(output: Path, name: str) -> None:
 
 
 def _read_rows(path: Path) -> dict[str, Row]:
-    """Return the rows of a summary by the names of the recordings; none if there is no summary.
-
-    Raises:
-        CardboxError: the file is no summary.
-    """
+    """Return the rows of a summary by the names of the recordings; none if there is no summary."""
     if not path.exists():
         return {}
     expected = "a summary of tracked recordings; remove it, or give another --output"

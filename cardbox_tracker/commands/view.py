@@ -111,11 +111,7 @@ def _has_results(options: argparse.Namespace) -> bool:
 
 
 def _request_of(options: argparse.Namespace) -> TrackingRequest:
-    """Return what is tracked in a recording without results.
-
-    Raises:
-        CardboxError: options are missing or wrong.
-    """
+    """Return what is tracked in a recording without results."""
     try:
         return tracking_request(options)
     except OptionsError as error:

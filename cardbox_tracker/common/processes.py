@@ -84,12 +84,7 @@ def results_of(
 
 @contextmanager
 def _cluster(scheduler: str) -> Iterator[None]:
-    """Context in which a Dask cluster does the calls.
-
-    Raises:
-        CardboxError: Dask is not installed, nothing answers at the address, there are no workers,
-            or one has several threads.
-    """
+    """Context in which a Dask cluster does the calls."""
     try:
         from distributed import Client
         from distributed.comm import connect

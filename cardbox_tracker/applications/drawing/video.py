@@ -72,10 +72,6 @@ def _encoder(
 
     OpenCV's wheels have no encoder for H.264. Without PyAV, .mp4 has VP9, which browsers play, too,
     but which takes ten times longer.
-
-    Raises:
-        OSError: the file cannot be written.
-        ValueError: there is no encoder for it.
     """
     if find_spec("av") is None or path.suffix != ".mp4":
         code = "vp09" if path.suffix == ".mp4" else "MJPG"

@@ -249,11 +249,7 @@ class Scene:
         self._stream.set_time("stamp", timestamp=np.datetime64(stamp_ns, "ns"))
 
     def _robot(self, name: str, urdf: str) -> str:
-        """Log geometry and joints below ``name`` and return the root link.
-
-        Raises:
-            CardboxError: the description cannot be read.
-        """
+        """Log geometry and joints below ``name`` and return the root link."""
         with tempfile.TemporaryDirectory() as folder:
             path = Path(folder) / f"{name}.urdf"
             path.write_text(urdf, encoding="utf-8")

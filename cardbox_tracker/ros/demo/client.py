@@ -119,11 +119,7 @@ class Client:
             self.initialization_iou = mean_iou_of(message)
 
     def wait(self, condition: Callable[[], bool], what: str, timeout_s: float = 120.0) -> None:
-        """Spin until ``condition`` holds.
-
-        Raises:
-            CardboxError: ``condition`` does not hold in time, or a node died.
-        """
+        """Spin until ``condition`` holds."""
         end = time.monotonic() + timeout_s
         while not condition():
             self._executor.spin_once(timeout_sec=0.05)
@@ -174,11 +170,7 @@ class Client:
             self._executor.spin_once(timeout_sec=0.05)
 
     def call(self, service: str) -> str:
-        """Call a Trigger service and return its message.
-
-        Raises:
-            CardboxError: the service refused, or is not available.
-        """
+        """Call a Trigger service and return its message."""
         client = self._node.create_client(Trigger, service)
         self.wait(client.service_is_ready, f"the service {service}")
         future = client.call_async(Trigger.Request())

@@ -29,11 +29,7 @@ _NEUTRAL_S = 0.1
 
 
 def run_demo(output: Path, preset: str, seed: int, cameras: int = 1) -> None:
-    """Run the demo and write its results to the folder ``output``.
-
-    Raises:
-        CardboxError: ROS is not installed, or a step failed; the text names it.
-    """
+    """Run the demo and write its results to the folder ``output``."""
     isolate()
     try:
         import cardbox_tracker.ros.demo.client  # noqa: F401
@@ -70,9 +66,6 @@ def track_through_nodes(
 
     Returns:
         Joint states a second, and the mean fit of the references.
-
-    Raises:
-        CardboxError: a node failed, or a service refused.
     """
     from cardbox_tracker.ros.demo.client import Client
 
@@ -174,11 +167,7 @@ _VIDEO_HZ = 15.0
 
 
 def figures(results: Results, truth: GroundTruth, start_ns: int) -> dict[str, object]:
-    """Return the errors of the images from a stamp on, metres, and how many have a posture.
-
-    Raises:
-        CardboxError: no image has a posture.
-    """
+    """Return the errors of the images from a stamp on, metres, and how many have a posture."""
     expected = {stamp for stamp in truth.frames if stamp >= start_ns}
     points_m = results.of(POINT_COLUMNS).reshape(-1, len(POINT_COLUMNS) // 3, 3)
     images = zip(results.stamp_ns.tolist(), results.state, points_m, strict=True)
@@ -206,9 +195,6 @@ def write_report(output: Path, truth: GroundTruth, start_ns: int, run: dict[str,
         truth: ground truth of the session.
         start_ns: stamp of the first image after the initialization.
         run: further values of report.json.
-
-    Raises:
-        CardboxError: most images were not tracked, or a file cannot be written.
     """
     results = read_results(output / "bag")
     report = run | figures(results, truth, start_ns)

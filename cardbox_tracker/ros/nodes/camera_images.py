@@ -88,11 +88,7 @@ class CameraImages:
         )
 
     def on_info(self, message: CameraInfo, _: int) -> None:
-        """Use a CameraInfo if it is the first valid one, or lasts.
-
-        Raises:
-            CameraError: the message is invalid and no valid one has arrived yet.
-        """
+        """Use a CameraInfo if it is the first valid one, or lasts."""
         before = self.watch.remark
         changed = self.watch.see(message)
         if self.watch.remark and not before:
@@ -114,11 +110,7 @@ class CameraImages:
             self._use(*early, calibration)
 
     def on_image(self, message: Image | CompressedImage, sent_ns: int) -> None:
-        """Deliver an image if its stamp can be used and the calibration is known.
-
-        Raises:
-            CardboxError: the image cannot be decoded, or has another shape than its calibration.
-        """
+        """Deliver an image if its stamp can be used and the calibration is known."""
         order = self._node.diagnostics.input.add(conversions.stamp_ns(message.header.stamp))
         if not order.is_usable:
             return

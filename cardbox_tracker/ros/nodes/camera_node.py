@@ -108,11 +108,7 @@ class CameraNode(CardboxNode):
     """Reads images in a separate thread and publishes each with its calibration."""
 
     def __init__(self, **options: Any) -> None:
-        """Open the device or file and start reading.
-
-        Raises:
-            CameraError: the source cannot be opened, or the calibration cannot be read.
-        """
+        """Open the device or file and start reading."""
         super().__init__("camera", **options)
         self.parameters = LiveParameters(self, CameraParameters)
         settings = self.parameters.value

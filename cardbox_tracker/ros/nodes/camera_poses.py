@@ -51,12 +51,7 @@ class CameraPoses:
     def __init__(
         self, node: CardboxNode, cameras: Sequence[str], file: str, changed: Callable[[], None]
     ) -> None:
-        """Subscribe with ``node``; call ``changed`` when all cameras are known or one has changed.
-
-        Raises:
-            CardboxError: ``file`` does not have the extrinsics of these cameras, or a name is not
-                a valid namespace.
-        """
+        """Subscribe with ``node``; call ``changed`` when all are known or one has changed."""
         self.names = [camera.strip("/") for camera in cameras]
         self.others: list[OtherCamera] = []
         self._changed = changed

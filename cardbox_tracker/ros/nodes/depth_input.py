@@ -45,11 +45,7 @@ class DepthInput:
         self.camera = conversions.depth_camera_of(message)
 
     def seen_by(self, camera: Camera, message: Any) -> DepthImage:
-        """Return the depth (H, W), metres, of a message as ``camera`` sees it.
-
-        Raises:
-            EncodingError: the encoding of the message is not one of depth.
-        """
+        """Return the depth (H, W), metres, of a message as ``camera`` sees it."""
         depth_m = depth_from_image(message)
         if self.camera is None:
             return at_size(depth_m, camera.width, camera.height)

@@ -46,10 +46,6 @@ def find_topics(bag: str, wanted: Iterable[str], cameras: Sequence[str] = ()) ->
         bag: rosbag2 folder or file.
         wanted: ``image``, which includes ``image_transport``, and ``camera_info``.
         cameras: namespaces of several cameras; the names are then relative to each namespace.
-
-    Raises:
-        CardboxError: the bag cannot be read, does not have exactly one topic of each kind, or the
-            cameras differ.
     """
     with BagReader(bag) as reader:
         images = reader.image_topics
@@ -143,11 +139,7 @@ class PlayBagNode(CardboxNode):
     """Publishes the messages of a bag as they were recorded, byte for byte."""
 
     def __init__(self, **options: Any) -> None:
-        """Open the bag and advertise its topics.
-
-        Raises:
-            CardboxError: no bag is given, or the bag cannot be read or lacks a topic.
-        """
+        """Open the bag and advertise its topics."""
         super().__init__("play_bag", **options)
         self.parameters = LiveParameters(self, PlayBagParameters, lambda _: self._set_anchor())
         settings = self.parameters.value
@@ -303,11 +295,7 @@ class PlayBagNode(CardboxNode):
 
 
 def overrides_from(arguments: list[str]) -> list[Parameter]:
-    """Turn the command line (without ROS arguments) into values of the node's parameters.
-
-    Raises:
-        SystemExit: the command line is wrong, or requests help or topic names.
-    """
+    """Turn the command line (without ROS arguments) into values of the node's parameters."""
     parser = argparse.ArgumentParser(
         prog="play_bag",
         description="Play a rosbag2 recording (sqlite3 or mcap) with its original stamps.",

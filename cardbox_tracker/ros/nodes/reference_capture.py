@@ -72,11 +72,7 @@ class ReferenceCapture:
         self._received_s = 0.0
 
     def add(self, message: Image) -> None:
-        """Add the latest silhouette.
-
-        Raises:
-            EncodingError: the message is not a silhouette.
-        """
+        """Add the latest silhouette."""
         silhouette_of(message)
         self._recent.append(message)
         self._received_s = time.monotonic()
@@ -122,10 +118,6 @@ class ReferenceCapture:
 
         Returns:
             Text with the result and the missing references, for a person.
-
-        Raises:
-            InitializationError: there is no silhouette, or it shows nobody, a person who is cut
-                off, or another posture.
         """
         self.check_running()
         alike = alike_of(self._recent)
@@ -185,11 +177,7 @@ class DepthDistance:
             self._recent.append((stamp_ns(message.header.stamp), depth_m))
 
     def check(self) -> None:
-        """Check before the reference postures that a measurement will be possible.
-
-        Raises:
-            InitializationError: no depth image was received.
-        """
+        """Check before the reference postures that a measurement will be possible."""
         if not self._recent:
             raise InitializationError(
                 f"no depth image was received yet on {self._topic}, so the person's distance "
@@ -203,9 +191,6 @@ class DepthDistance:
         Args:
             name: name of the reference.
             now_ns: stamp of the camera's latest silhouette.
-
-        Raises:
-            InitializationError: no depth image has the time of the silhouettes.
         """
         if name not in SCALE_REFERENCES or now_ns is None:
             return
@@ -227,9 +212,6 @@ class DepthDistance:
         Args:
             measure: measurement with the camera at a given distance.
             config: settings; the search begins at their distance.
-
-        Raises:
-            InitializationError: ``measure`` failed, or the depth images do not fit the person.
         """
         camera, silhouettes = self._camera(), self._references.captured
         if camera is None or any(name not in self._captured for name in SCALE_REFERENCES):
@@ -253,11 +235,7 @@ class SecondCamera:
     """Captures the reference postures in the view of the second of several cameras."""
 
     def __init__(self, node: CardboxNode, settings: InitializerParameters) -> None:
-        """Subscribe with ``node``, the initializer, to the first two of its ``cameras``.
-
-        Raises:
-            CardboxError: the file of the extrinsics cannot be read, or a name is not allowed.
-        """
+        """Subscribe with ``node``, the initializer, to the first two of its ``cameras``."""
         cameras = settings.cameras[:2]
         self._poses = CameraPoses(node, cameras, settings.extrinsics_file, lambda: None)
         self._recent = RecentImages(KEPT)
@@ -271,12 +249,7 @@ class SecondCamera:
         self._recent.append(message)
 
     def check(self) -> None:
-        """Check before the reference postures that a measurement will be possible.
-
-        Raises:
-            CameraError: the poses of the cameras are unknown, or two sources disagree.
-            InitializationError: nothing was received from a camera.
-        """
+        """Check before the reference postures that a measurement will be possible."""
         self._poses.check()
         if self._poses.first is None or not self._recent:
             raise InitializationError(
@@ -291,9 +264,6 @@ class SecondCamera:
         Args:
             name: name of the reference.
             now_ns: stamp of the first camera's latest silhouette.
-
-        Raises:
-            InitializationError: this camera has no silhouette of that time.
         """
         if name not in SCALE_REFERENCES or now_ns is None:
             return
@@ -311,9 +281,6 @@ class SecondCamera:
         Args:
             measure: measurement with the first camera at a given distance.
             config: settings; the search begins at their distance.
-
-        Raises:
-            InitializationError: ``measure`` failed, or this camera's silhouettes do not fit.
         """
         self.check()
         first = self._poses.first
@@ -342,9 +309,6 @@ def distance_source(
         settings: parameters of the initializer.
         references: silhouettes of the first camera.
         camera: returns the first camera at the working resolution, or None until it is known.
-
-    Raises:
-        CardboxError: the file of the extrinsics cannot be read, or a name is not allowed.
     """
     if settings.depth:
         return DepthDistance(node, settings.depth, references, camera)
@@ -358,11 +322,7 @@ def measured(
     config: InitializationConfig,
     progress: Progress,
 ) -> InitializationResult:
-    """Measure the person of ``references`` with ``camera``, and the distance with ``distance``.
-
-    Raises:
-        InitializationError: the references are unusable, or the model does not fit them.
-    """
+    """Measure the person of ``references`` with ``camera``, and the distance with ``distance``."""
 
     def measure(at: InitializationConfig, done: Progress) -> InitializationResult:
         return initialize_body(references.captured, camera, at, done, references.images)

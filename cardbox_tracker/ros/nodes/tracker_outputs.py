@@ -40,11 +40,7 @@ class TfOutputs:
     def __init__(
         self, node: CardboxNode, settings: TrackerParameters, body_id: str | None = None
     ) -> None:
-        """Advertise ``/tf`` for ``node``; ``body_id`` is the ID of one of several people.
-
-        Raises:
-            CardboxError: the package tf2_msgs is not installed.
-        """
+        """Advertise ``/tf`` for ``node``; ``body_id`` is the ID of one of several people."""
         self._kind = optional_class("tf2_msgs", "TFMessage")
         if self._kind is None:
             raise CardboxError(
@@ -117,9 +113,6 @@ class TrackerOutputs:
             settings: its parameters.
             person: number of one of several people; None if there is only one.
             bodies: publishes the list of people after REP-155; None without it.
-
-        Raises:
-            CardboxError: TF is requested, but its messages are not installed.
         """
         topics = outputs(settings.torso_place, settings.hands)
         space = "" if person is None else f"{person_space(person)[1:]}/"

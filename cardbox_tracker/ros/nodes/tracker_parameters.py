@@ -172,12 +172,7 @@ class TrackerParameters(NodeParameters):
         return tuple(body.with_values(**changes) for body in bodies)
 
     def config(self) -> TrackerConfig:
-        """Return the settings of the core.
-
-        Raises:
-            CardboxError: the settings file cannot be used.
-            ValueError: values contradict each other, or one has no effect.
-        """
+        """Return the settings of the core."""
         base = PRESETS[self.preset]()
         if self.depth:
             base = base.with_depth()

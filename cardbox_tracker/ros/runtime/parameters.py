@@ -148,11 +148,7 @@ class LiveParameters(Generic[T]):
         return CardboxError(f"parameters of node '{self._node.get_name()}': {problem}")
 
     def _translate(self, parameters: list[Parameter]) -> list[Parameter]:
-        """Replace integers by floats where these are expected.
-
-        Raises:
-            NotDeclared: a name is unknown.
-        """
+        """Replace integers by floats where these are expected."""
         translated = []
         for given in parameters:
             if not self._node.has_parameter(given.name):
