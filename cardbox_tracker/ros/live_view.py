@@ -2,17 +2,30 @@
 
 from __future__ import annotations
 
+from functools import partial
+from typing import Any
+
 from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import PoseArray
 from sensor_msgs.msg import Image, JointState
 from std_msgs.msg import String
 
 from cardbox_tracker.applications.viewing.scene import Scene
+from cardbox_tracker.applications.viewing.sources import Handler, handlers_of
 from cardbox_tracker.ros.messages import conversions, results
 from cardbox_tracker.ros.runtime import qos
 from cardbox_tracker.ros.runtime.node import CardboxNode, run_node
 
 _ROBOT = "retarget"
+_TOPICS = {
+    "body_model": (String, qos.LATCHED),
+    "tracking_state": (String, qos.RESULT),
+    "joint_states": (JointState, qos.RESULT),
+    "joint_states_stddev": (JointState, qos.RESULT),
+    "keypoint_states": (DiagnosticArray, qos.RESULT),
+    "keypoints": (PoseArray, qos.RESULT),
+    "overlay": (Image, qos.SENSOR_DATA),
+}
 
 
 class LiveView(CardboxNode):
@@ -24,62 +37,26 @@ class LiveView(CardboxNode):
         self._scene = scene
         self._latest_ns: int | None = None
         self.diagnostics.wait_for(f"results on {self.resolve('joint_states')}")
-        self.subscribe(String, "body_model", self._on_model, qos.LATCHED)
-        self.subscribe(String, "tracking_state", self._on_state, qos.RESULT)
-        self.subscribe(JointState, "joint_states", self._on_joints, qos.RESULT)
-        self.subscribe(
-            JointState,
-            "joint_states_stddev",
-            lambda m, _: scene.deviations(_stamp_ns(m), results.joint_values_of(m)),
-            qos.RESULT,
-        )
-        self.subscribe(
-            DiagnosticArray,
-            "keypoint_states",
-            lambda m, _: scene.keypoint_states(_stamp_ns(m), [one.message for one in m.status]),
-            qos.RESULT,
-        )
-        self.subscribe(
-            PoseArray,
-            "keypoints",
-            lambda m, _: scene.keypoints(_stamp_ns(m), results.points_of(m).points_m),
-            qos.RESULT,
-        )
-        self.subscribe(
-            String,
-            f"{_ROBOT}/robot_description",
-            lambda m, _: scene.robot(_ROBOT, m.data),
-            qos.LATCHED,
-        )
-        self.subscribe(JointState, f"{_ROBOT}/joint_states", self._on_robot_joints, qos.RESULT)
-        self.subscribe(
-            Image,
-            "overlay",
-            lambda m, _: scene.image(_stamp_ns(m), conversions.image_of(m)),
-            qos.SENSOR_DATA,
-        )
+        handlers = handlers_of(scene, "the tracker")
+        for topic, (kind, profile) in _TOPICS.items():
+            show = partial(self._show, handlers[f"/{topic}"], topic)
+            self.subscribe(kind, topic, show, profile)
+        description, joints = f"{_ROBOT}/robot_description", f"{_ROBOT}/joint_states"
+        self.subscribe(String, description, lambda m, _: scene.robot(_ROBOT, m.data), qos.LATCHED)
+        self.subscribe(JointState, joints, self._on_robot_joints, qos.RESULT)
 
-    def _on_model(self, message: String, _: int) -> None:
-        self._scene.model(message.data, self.resolve("body_model"))
-
-    def _on_joints(self, message: JointState, sent_ns: int) -> None:
-        self._latest_ns = _stamp_ns(message)
-        self._scene.joints(self._latest_ns, results.joint_values_of(message))
-        self.diagnostics.working(sent_ns)
+    def _show(self, handler: Handler, topic: str, message: Any, sent_ns: int) -> None:
+        if topic == "joint_states":
+            self._latest_ns = conversions.stamp_ns(message.header.stamp)
+            self.diagnostics.working(sent_ns)
+        # The state has no stamp; it is sent before the other results of its image.
+        if topic != "tracking_state" or self._latest_ns is not None:
+            handler(self._latest_ns or 0, message)
 
     def _on_robot_joints(self, message: JointState, _: int) -> None:
-        stamp_ns = _stamp_ns(message) or self._latest_ns
+        stamp_ns = conversions.stamp_ns(message.header.stamp) or self._latest_ns
         if stamp_ns:
             self._scene.robot_joints(stamp_ns, _ROBOT, results.joint_values_of(message))
-
-    def _on_state(self, message: String, _: int) -> None:
-        # The state has no stamp; it is sent before the other results of its image.
-        if self._latest_ns is not None:
-            self._scene.state(self._latest_ns, message.data)
-
-
-def _stamp_ns(message: DiagnosticArray | Image | JointState | PoseArray) -> int:
-    return conversions.stamp_ns(message.header.stamp)
 
 
 def show_nodes(scene: Scene) -> int:

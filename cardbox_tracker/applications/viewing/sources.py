@@ -13,7 +13,7 @@ from cardbox_tracker.applications.viewing.scene import Scene
 from cardbox_tracker.camera.encodings import SentImage, decode_bgr
 from cardbox_tracker.common.errors import BagError
 from cardbox_tracker.person.model_file import dumps_body_model
-from cardbox_tracker.recordings.bag_reader import BagMessage, BagReader, stamp_ns_of
+from cardbox_tracker.recordings.bag_reader import BagReader, stamp_ns_of
 from cardbox_tracker.recordings.outputs import joint_deviations, joint_values
 from cardbox_tracker.recordings.result_reader import MODEL, joints_of, namespace_of, points_of
 from cardbox_tracker.recordings.silhouettes import RecordedFrame
@@ -78,7 +78,7 @@ def show_results(
         for message in bag.messages([topic for topic in bag.topics if topic in handlers]):
             content = bag.deserialize(message)
             try:
-                handlers[message.topic](message, content)
+                handlers[message.topic](message.time_ns, content)
             except (AttributeError, TypeError, ValueError) as error:
                 # A recording contains the definitions of its types.
                 raise BagError(
@@ -90,29 +90,37 @@ def show_results(
     return count
 
 
-def _handlers(
-    bag: BagReader, scene: Scene, space: str
-) -> dict[str, Callable[[BagMessage, Any], None]]:
-    """Return the handlers of the topics of the tracker in ``space``, and of robots in others."""
-    handlers: dict[str, Callable[[BagMessage, Any], None]] = {
-        space + MODEL: lambda m, c: scene.model(str(c.data), f"{m.topic} of {bag.path}"),
-        space + "/tracking_state": lambda m, c: scene.state(m.time_ns, str(c.data)),
-        space + _JOINTS: lambda _, c: scene.joints(stamp_ns_of(c), joints_of(c)),
-        space + "/joint_states_stddev": lambda _, c: scene.deviations(stamp_ns_of(c), joints_of(c)),
-        space + "/keypoint_states": lambda _, c: scene.keypoint_states(
-            stamp_ns_of(c), [str(one.message) for one in c.status]
+Handler = Callable[[int, Any], None]
+"""Callback that receives the time of a message, ns, and the message."""
+
+
+def handlers_of(scene: Scene, source: str) -> dict[str, Handler]:
+    """Return the handlers of the tracker's topics below its namespace; ``source`` names it."""
+    return {
+        MODEL: lambda _, m: scene.model(str(m.data), f"{MODEL} of {source}"),
+        "/tracking_state": lambda time_ns, m: scene.state(time_ns, str(m.data)),
+        _JOINTS: lambda _, m: scene.joints(stamp_ns_of(m), joints_of(m)),
+        "/joint_states_stddev": lambda _, m: scene.deviations(stamp_ns_of(m), joints_of(m)),
+        "/keypoint_states": lambda _, m: scene.keypoint_states(
+            stamp_ns_of(m), [str(one.message) for one in m.status]
         ),
-        space + "/keypoints": lambda _, c: scene.keypoints(stamp_ns_of(c), points_of(c)),
-        space + _OVERLAY: lambda _, c: scene.image(stamp_ns_of(c), decode_bgr(SentImage.of(c))),
+        "/keypoints": lambda _, m: scene.keypoints(stamp_ns_of(m), points_of(m)),
+        _OVERLAY: lambda _, m: scene.image(stamp_ns_of(m), decode_bgr(SentImage.of(m))),
     }
+
+
+def _handlers(bag: BagReader, scene: Scene, space: str) -> dict[str, Handler]:
+    """Return the handlers of the topics of the tracker in ``space``, and of robots in others."""
+    own = handlers_of(scene, str(bag.path))
+    handlers = {space + topic: handler for topic, handler in own.items()}
     for topic in bag.topics:
         is_person = topic.removesuffix(_ROBOT) + MODEL in bag.topics
         if topic.endswith(_ROBOT) and not is_person and topic != space + _ROBOT:
             robot = topic.removesuffix(_ROBOT)
             name = robot.strip("/").replace("/", "_") or "robot"
-            handlers[topic] = lambda _, c, name=name: scene.robot(name, str(c.data))  # type: ignore[misc]
-            handlers[robot + _JOINTS] = lambda _, c, name=name: scene.robot_joints(  # type: ignore[misc]
-                stamp_ns_of(c), name, joints_of(c)
+            handlers[topic] = lambda _, m, name=name: scene.robot(name, str(m.data))  # type: ignore[misc]
+            handlers[robot + _JOINTS] = lambda _, m, name=name: scene.robot_joints(  # type: ignore[misc]
+                stamp_ns_of(m), name, joints_of(m)
             )
     return handlers
 
