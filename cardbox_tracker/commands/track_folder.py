@@ -46,7 +46,7 @@ from cardbox_tracker.common.files import (
     write_table,
 )
 from cardbox_tracker.common.processes import cores, results_of
-from cardbox_tracker.common.progress import SharedProgress, progress_bar, told
+from cardbox_tracker.common.progress import progress_bar
 from cardbox_tracker.detectors.point_table import PointTable
 from cardbox_tracker.recordings.folder import FORMULA, SUMMARY, recordings_in
 from cardbox_tracker.recordings.result_table import check_table
@@ -127,8 +127,6 @@ class Job(NamedTuple):
         name: see :func:`~.recordings.folder.recordings_in`.
         request: what is tracked; its results are in a folder of the job's own.
         inputs: see :func:`digest_of_inputs`.
-        progress: the common progress.
-        number: number of the job in the common progress.
         folder: folder in which relative paths begin; None for that of the process.
         program: see :func:`digest_of_program`; empty if the process has this program.
     """
@@ -136,8 +134,6 @@ class Job(NamedTuple):
     name: str
     request: TrackingRequest
     inputs: str
-    progress: SharedProgress | None = None
-    number: int = 0
     folder: Path | None = None
     program: str = ""
 
@@ -253,24 +249,19 @@ def _track_all(
         if count > 1 or scheduler is not None:
             # Else each process would compile.
             compile_all(sorted({job.request.preset for job in jobs}))
-        progress = SharedProgress(work / "progress", len(jobs))
-        progress.start()
         prepared = [
-            _prepared(job, number, work, formats, progress)
+            _prepared(job, number, work, formats)
             for number, job in enumerate(sorted(jobs, key=_size, reverse=True))
         ]
-        with (
-            told(lambda _: show(progress.fraction()), "", every_s=1.0),
-            results_of(track_job, prepared, count, scheduler) as outcomes,
-        ):
-            for job, row, lines in outcomes:
+        with results_of(track_job, prepared, count, scheduler) as outcomes:
+            for number, (job, row, lines) in enumerate(outcomes, 1):
                 # Results without their row would be tracked again.
                 with interrupts.withheld():
                     if row.status == TRACKED:
                         _publish(job, output)
                     rows[job.name], remarks[job.name] = row, lines
                     _write_rows(output / SUMMARY, rows.values())
-        show(1.0)
+                show(number / len(prepared))
     return remarks
 
 
@@ -279,9 +270,7 @@ def _size(job: Job) -> int:
     return sum(file.stat().st_size for file in _files_of(job.request.recording.path))
 
 
-def _prepared(
-    job: Job, number: int, work: Path, formats: Sequence[str], progress: SharedProgress
-) -> Job:
+def _prepared(job: Job, number: int, work: Path, formats: Sequence[str]) -> Job:
     """Return the job with a folder of its own for its results."""
     place = work / str(number) / Path(job.name).name
     place.parent.mkdir()
@@ -291,7 +280,7 @@ def _prepared(
     scene = place.with_name(f"{place.name}{_SCENE}")
     files = TrackFiles(table, paths.get("mp4"), paths.get("bag"), body, scene)
     request = replace(job.request, files=files)
-    return job._replace(request=request, progress=progress, number=number)
+    return job._replace(request=request)
 
 
 def track_job(job: Job) -> tuple[Job, Row, list[str]]:
@@ -299,7 +288,6 @@ def track_job(job: Job) -> tuple[Job, Row, list[str]]:
     cv2.setNumThreads(1)
     if job.folder is not None:
         os.chdir(job.folder)
-    show = job.progress.of_task(job.number) if job.progress else lambda _: None
     printed = io.StringIO()
     try:
         if job.program and job.program != digest_of_program():
@@ -308,11 +296,10 @@ def track_job(job: Job) -> tuple[Job, Row, list[str]]:
                 "install the same on all computers"
             )
         with redirect_stdout(printed), redirect_stderr(printed):
-            row = Row.tracked(job.name, track(job.request, show=show), job.inputs)
+            row = Row.tracked(job.name, track(job.request, show=lambda _: None), job.inputs)
     except Exception as error:
         # A fault of the program in one recording must not stop a hundred others.
         row = Row.failed(job.name, error)
-    show(1.0)
     return job, row, printed.getvalue().splitlines()
 
 

@@ -7,10 +7,6 @@ import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
-from pathlib import Path
-
-import numpy as np
 
 
 @contextmanager
@@ -71,33 +67,3 @@ def told(say: Callable[[str], object], text: str, every_s: float = 5.0) -> Itera
     finally:
         done.set()
         thread.join()
-
-
-@dataclass(frozen=True)
-class SharedProgress:
-    """Finished fractions of several tasks, which processes write into one file.
-
-    Attributes:
-        path: the file.
-        count: number of tasks.
-    """
-
-    path: Path
-    count: int
-
-    def start(self) -> None:
-        """Make the file; no task has begun."""
-        np.zeros(self.count).tofile(self.path)
-
-    def of_task(self, number: int) -> Callable[[float], None]:
-        """Return the function that stores the finished fraction of a task, counted from 0."""
-        fractions = np.memmap(self.path, np.float64, "r+", shape=(self.count,))
-
-        def store(fraction: float) -> None:
-            fractions[number] = fraction
-
-        return store
-
-    def fraction(self) -> float:
-        """Return the mean of the finished fractions, 0 to 1."""
-        return float(np.clip(np.fromfile(self.path), 0.0, 1.0).mean())

@@ -21,7 +21,6 @@ import pytest
 from cardbox_tracker.common import interrupts, processes
 from cardbox_tracker.common.errors import CardboxError
 from cardbox_tracker.common.processes import cores, results_of
-from cardbox_tracker.common.progress import SharedProgress
 
 ROOT = Path(__file__).parents[2]
 
@@ -125,19 +124,6 @@ def test_a_withheld_ctrl_c_comes_at_the_end() -> None:
 
 def test_there_is_a_core() -> None:
     assert 1 <= cores() <= len(os.sched_getaffinity(0))
-
-
-def test_the_common_progress_is_the_mean_of_all(tmp_path: Path) -> None:
-    progress = SharedProgress(tmp_path / "progress", 4)
-    progress.start()
-    assert progress.fraction() == 0.0
-    first, last = progress.of_task(0), progress.of_task(3)
-    first(0.5)
-    # An image after the stated end of a recording is no more than its end.
-    last(1.5)
-    assert progress.fraction() == pytest.approx(0.375)
-    first(1.0)
-    assert progress.fraction() == pytest.approx(0.5)
 
 
 @pytest.mark.timeout(20)
