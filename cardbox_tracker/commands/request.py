@@ -410,7 +410,7 @@ def add_tracking(parser: argparse.ArgumentParser, needs_recording: bool = True) 
     )
     add(
         "--set",
-        action=_AddSetting,
+        action="append",
         type=_setting,
         metavar="NAME=VALUE",
         help="another setting of the tracker by its name in docs/parameters.md, such as "
@@ -454,22 +454,6 @@ def _person_choice(text: str) -> PersonChoice | int:
         return PersonChoice.parse(text)
     except ValueError as error:
         raise argparse.ArgumentTypeError(str(error)) from None
-
-
-class _AddSetting(argparse.Action):
-    """Adds a setting to those given before, of which the last one of a name counts."""
-
-    def __call__(
-        self,
-        parser: argparse.ArgumentParser,
-        namespace: argparse.Namespace,
-        values: Any,
-        option_string: str | None = None,
-    ) -> None:
-        before = getattr(namespace, self.dest)
-        name, value = values
-        after = {**before, name: value} if isinstance(before, dict) else {name: value}
-        setattr(namespace, self.dest, after)
 
 
 def _setting(text: str) -> tuple[str, bool | int | float | str]:
@@ -783,14 +767,14 @@ def _config(options: argparse.Namespace, preset: TrackerConfig) -> TrackerConfig
     config = preset if options.depth is None else preset.with_depth()
     if options.settings is not None:
         config = read_settings(options.settings, config)
-    given = dict(options.set or {})
+    given = dict(options.set or ())
     if options.effort is not None:
         given[_EFFORT] = options.effort
     try:
         return config.changed(nested(given))
     except NoEffectError as error:
         instead = "--effort" if error.instead == _EFFORT else f"--set {error.instead}=VALUE"
-        name = error.name if error.name in (options.set or {}) else "--effort"
+        name = error.name if error.name in dict(options.set or ()) else "--effort"
         raise CardboxError(f"{name} has no effect {error.where}; use {instead}") from None
     except ValueError as error:
         raise CardboxError(str(error).replace(_EFFORT, "--effort")) from None
@@ -817,7 +801,7 @@ def with_own_options(options: argparse.Namespace, folder: Path, name: str) -> ar
         for option in given:
             vars(found).update(dict.fromkeys(_REPLACED.get(option, ())))
         if "set" in given:
-            given["set"] = (found.set or {}) | given["set"]
+            given["set"] = [*(found.set or []), *given["set"]]
         vars(found).update(given)
     return found
 
@@ -832,11 +816,11 @@ def _read_options(path: Path) -> dict[str, Any]:
         def error(self, message: str) -> NoReturn:
             raise CardboxError(f"{path}: {message}; give options of 'cardbox track'")
 
-    parser, absent = Parser(add_help=False, allow_abbrev=False), object()
+    parser = Parser(add_help=False, allow_abbrev=False)
     add_tracking(parser, needs_recording=False)
-    values = argparse.Namespace(**dict.fromkeys(vars(parser.parse_args([])), absent))
+    values = argparse.Namespace(**dict.fromkeys(vars(parser.parse_args([]))))
     parser.parse_args(words, values)
-    given = {name: value for name, value in vars(values).items() if value is not absent}
+    given = {name: value for name, value in vars(values).items() if value is not None}
     other = given.pop("recording", None)
     if other is not None:
         parser.error(f"unrecognized arguments: {other}")

@@ -313,11 +313,11 @@ def test_files_change_the_command_line_and_inner_ones_the_outer(tmp_path: Path) 
     wave, bow = (with_own_options(given, tmp_path, f"anna/{name}") for name in ("wave", "bow"))
     assert (wave.stature, wave.start, wave.effort) == ((1.64,), 5.0, 2.0)
     assert (wave.background, wave.silhouettes) == (TimeSpan(0.0, 2.0), None)
-    assert wave.set == {"lost_frames": 9, "average": 2}
+    assert dict(wave.set) == {"lost_frames": 9, "average": 2}
     assert (bow.stature, bow.start, bow.background) == ((1.64,), 3.0, None)
     assert bow.silhouettes == "person_in_view"
     assert (given.stature, given.start) == ((1.7,), None)
-    assert given.set == bow.set == {"lost_frames": 9, "average": 3}
+    assert dict(given.set) == dict(bow.set) == {"lost_frames": 9, "average": 3}
 
 
 def test_a_measured_person_takes_the_place_of_a_stature(tmp_path: Path) -> None:
