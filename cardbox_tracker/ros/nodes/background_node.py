@@ -24,8 +24,8 @@ from cardbox_tracker.ros.nodes.shared_parameters import (
 )
 from cardbox_tracker.ros.nodes.silhouette_outputs import SilhouetteOutputs
 from cardbox_tracker.ros.runtime import qos
-from cardbox_tracker.ros.runtime.command_line import plain_command_line
-from cardbox_tracker.ros.runtime.node import CardboxNode, run_node
+from cardbox_tracker.ros.runtime.command_line import node_main
+from cardbox_tracker.ros.runtime.node import CardboxNode
 from cardbox_tracker.ros.runtime.parameter_fields import AT_START, NodeParameters, parameter
 from cardbox_tracker.ros.runtime.parameters import LiveParameters
 from cardbox_tracker.segmentation.background import warm_up
@@ -95,13 +95,12 @@ def advice(findings: Findings) -> dict[str, str]:
     return texts
 
 
-_DOES = "Cut the person out of a camera's images: images in, silhouettes out."
 _NEXT_LEARNING = "next learning"
 
 
 @dataclass(frozen=True)
 class BackgroundParameters(NodeParameters, BackgroundConfig):
-    """Cut the person out of the camera's images."""
+    """Cut the person out of a camera's images: images in, silhouettes out."""
 
     effects = MappingProxyType({"learn_images": _NEXT_LEARNING})
     image_transport: str = image_transport_parameter()
@@ -295,8 +294,4 @@ class BackgroundNode(CardboxNode):
         return advice(findings) | self.camera_images.remarks()
 
 
-def main(args: list[str] | None = None) -> int:
-    """Run the node; the exit code is 0 unless it could not start."""
-    return run_node(
-        BackgroundNode, plain_command_line("background", _DOES, BackgroundParameters, args)
-    )
+main = node_main("background", BackgroundNode, BackgroundParameters)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 import os
-import sys
 import threading
 import time
 from functools import partial
@@ -22,7 +21,6 @@ from cardbox_tracker.camera.camera import Camera
 from cardbox_tracker.common.errors import CardboxError, InitializationError
 from cardbox_tracker.common.progress import told
 from cardbox_tracker.measuring.guidance import (
-    ASK,
     Cancellation,
     Guidance,
     Prompt,
@@ -186,7 +184,7 @@ class InitializerNode(CardboxNode):
         self._guide.tell(text)
 
     def _show(self, prompt: Prompt) -> None:
-        self._guide.show(prompt, self.parameters.value.bell)
+        self._guide.show(prompt)
 
     def _progress(self, fraction: float) -> None:
         self._cancellation.wait(0.0)
@@ -236,16 +234,13 @@ class GuideOutputs:
         self._overlay = node.advertise(Image, "overlay", qos.SENSOR_DATA)
         self._guiding.publish(Bool(data=False))
 
-    def show(self, prompt: Prompt, bell: bool = False) -> None:
-        """Show a prompt; with ``bell``, ring the terminal bell at a success or failure."""
+    def show(self, prompt: Prompt) -> None:
+        """Show a prompt, and say its words."""
         if self._prompt is None:
             self._guiding.publish(Bool(data=True))
         words = spoken(self._prompt, prompt)
         if words:
             self._say.publish(String(data=words))
-            if bell and prompt.mood != ASK:
-                # 'ros2 launch' passes on a node's output only at the end of a line.
-                print("\a", file=sys.stderr, flush=True)
         self._prompt = prompt
         self._status.publish(String(data=prompt.text))
 

@@ -50,9 +50,6 @@ class InitializerParameters(NodeParameters):
     mirror: bool = parameter(
         True, "the guidance shows the person as in a mirror; false: as in the image"
     )
-    bell: bool = parameter(
-        False, "ring the terminal's bell after each success or failure of the guidance"
-    )
     model_file: str = parameter(
         "",
         "file to save the body model to; if it exists at the start, it is published; empty: none",

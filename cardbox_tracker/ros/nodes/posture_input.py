@@ -43,17 +43,20 @@ class Tracked(NamedTuple):
 class PostureInput:
     """Calls a function with what the tracker says of each image, with or without a posture."""
 
-    def __init__(self, node: CardboxNode, take: Callable[[Tracked], None]) -> None:
-        """Subscribe for ``node``."""
+    def __init__(
+        self, node: CardboxNode, take: Callable[[Tracked], None], has_states: bool = True
+    ) -> None:
+        """Subscribe for ``node``; with ``has_states`` also to states, keypoints and hands."""
         self._node, self._take = node, take
         self._body: BodyModel | None = None
         self._state, self._stamp_ns = "", 0
         self._joints, self._hands, self._points = JointState(), JointState(), DiagnosticArray()
         node.subscribe(String, "body_model", self._on_model, qos.LATCHED)
-        node.subscribe(String, "tracking_state", self._on_state, qos.RESULT)
-        node.subscribe(DiagnosticArray, "keypoint_states", self._on_points, qos.RESULT)
+        if has_states:
+            node.subscribe(String, "tracking_state", self._on_state, qos.RESULT)
+            node.subscribe(DiagnosticArray, "keypoint_states", self._on_points, qos.RESULT)
+            node.subscribe(JointState, "hands", self._on_hands, qos.RESULT)
         node.subscribe(JointState, "joint_states", self._on_joints, qos.RESULT)
-        node.subscribe(JointState, "hands", self._on_hands, qos.RESULT)
         node.subscribe(JointState, "joint_states_stddev", self._on_stddev, qos.RESULT)
         postures = f"postures on {node.resolve('joint_states')}"
         node.diagnostics.source = postures

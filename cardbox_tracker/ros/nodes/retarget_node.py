@@ -27,17 +27,15 @@ from cardbox_tracker.recordings.outputs import open_hands_from
 from cardbox_tracker.ros.messages.results import joint_values_of, posture_and_neck_of
 from cardbox_tracker.ros.nodes.posture_input import PostureInput, Tracked
 from cardbox_tracker.ros.runtime import qos
-from cardbox_tracker.ros.runtime.command_line import plain_command_line
-from cardbox_tracker.ros.runtime.node import CardboxNode, run_node
+from cardbox_tracker.ros.runtime.command_line import node_main
+from cardbox_tracker.ros.runtime.node import CardboxNode
 from cardbox_tracker.ros.runtime.parameter_fields import AT_START, NodeParameters, parameter
 from cardbox_tracker.ros.runtime.parameters import LiveParameters
-
-_DOES = "Move a robot arm as the tracked person moves theirs, within its limits."
 
 
 @dataclass(frozen=True)
 class RetargetParameters(NodeParameters, RetargetConfig):
-    """Move a robot arm as the tracked person moves theirs."""
+    """Move a robot arm as the tracked person moves theirs, within its limits."""
 
     # They cannot change while a robot moves.
     effects = MappingProxyType(dict.fromkeys(settings_of(RetargetConfig), AT_START))
@@ -187,6 +185,4 @@ def _now_ns() -> int:
     return round(time.monotonic() * 1e9)
 
 
-def main(args: list[str] | None = None) -> int:
-    """Run the node; the exit code is 0 unless it could not start."""
-    return run_node(RetargetNode, plain_command_line("retarget", _DOES, RetargetParameters, args))
+main = node_main("retarget", RetargetNode, RetargetParameters)

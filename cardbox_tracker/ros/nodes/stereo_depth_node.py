@@ -22,13 +22,12 @@ from cardbox_tracker.ros.nodes.shared_parameters import (
     max_megapixels_parameter,
 )
 from cardbox_tracker.ros.runtime import qos
-from cardbox_tracker.ros.runtime.command_line import plain_command_line
-from cardbox_tracker.ros.runtime.node import CardboxNode, run_node
+from cardbox_tracker.ros.runtime.command_line import node_main
+from cardbox_tracker.ros.runtime.node import CardboxNode
 from cardbox_tracker.ros.runtime.parameter_fields import AT_START, NodeParameters, parameter
 from cardbox_tracker.ros.runtime.parameters import LiveParameters
 from cardbox_tracker.ros.runtime.recent import RecentImages
 
-_DOES = "Measure depth in a rectified pair of cameras, by semi-global matching."
 # Largest number of images of one side that wait for the other side.
 _KEPT = 4
 # Pairs between two looks at whether the sides are swapped.
@@ -37,7 +36,7 @@ _LOOK_AGAIN = 30
 
 @dataclass(frozen=True)
 class StereoDepthParameters(NodeParameters):
-    """Measure depth in a rectified pair of cameras."""
+    """Measure depth in a rectified pair of cameras, by semi-global matching."""
 
     image_transport: str = image_transport_parameter()
     width: int = parameter(
@@ -197,8 +196,4 @@ class StereoDepthNode(CardboxNode):
         )
 
 
-def main(args: list[str] | None = None) -> int:
-    """Run the node; the exit code is 0 unless it could not start."""
-    return run_node(
-        StereoDepthNode, plain_command_line("stereo_depth", _DOES, StereoDepthParameters, args)
-    )
+main = node_main("stereo_depth", StereoDepthNode, StereoDepthParameters)

@@ -15,8 +15,8 @@ from cardbox_tracker.recordings.outputs import positions_of
 from cardbox_tracker.ros.messages.results import joint_values_of
 from cardbox_tracker.ros.nodes.posture_input import PostureInput, Tracked
 from cardbox_tracker.ros.runtime import qos
-from cardbox_tracker.ros.runtime.command_line import plain_command_line
-from cardbox_tracker.ros.runtime.node import CardboxNode, run_node
+from cardbox_tracker.ros.runtime.command_line import node_main
+from cardbox_tracker.ros.runtime.node import CardboxNode
 from cardbox_tracker.ros.runtime.parameter_fields import AT_START, NodeParameters, parameter
 from cardbox_tracker.ros.runtime.parameters import LiveParameters
 
@@ -25,12 +25,10 @@ _TOPICS: dict[str, tuple[Any, str]] = {
     "json": (String, "teleoperation/full_body"),
 }
 
-_DOES = "Stream the tracked person as 24 joints to programs that teleoperate robots."
-
 
 @dataclass(frozen=True)
 class TeleoperationParameters(NodeParameters):
-    """Stream the tracked person to programs that teleoperate robots."""
+    """Stream the tracked person as 24 joints to programs that teleoperate robots."""
 
     to: str = parameter("isaac", "who reads the stream", choices=tuple(PACKETS), effect=AT_START)
     address: str = parameter(
@@ -111,7 +109,4 @@ class TeleoperationNode(CardboxNode):
             self._sender.close()
 
 
-def main(args: list[str] | None = None) -> int:
-    """Run the node; the exit code is 0 unless it could not start."""
-    command_line = plain_command_line("teleoperation", _DOES, TeleoperationParameters, args)
-    return run_node(TeleoperationNode, command_line)
+main = node_main("teleoperation", TeleoperationNode, TeleoperationParameters)

@@ -7,11 +7,11 @@ import csv
 import re
 import sys
 import textwrap
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from cardbox_tracker.ros.runtime.node import own_arguments
+from cardbox_tracker.ros.runtime.node import CardboxNode, own_arguments, run_node
 from cardbox_tracker.ros.runtime.parameter_fields import (
     NodeParameters,
     default_of,
@@ -78,6 +78,21 @@ def plain_command_line(
     )
     parser.parse_args(own_arguments(command_line))
     return command_line
+
+
+def node_main(
+    name: str, node: Callable[[], CardboxNode], parameters: type[NodeParameters]
+) -> Callable[[list[str] | None], int]:
+    """Return the function ``main`` of a node, whose exit code is 0 unless it could not start.
+
+    Its help begins with the docstring of the parameters.
+    """
+
+    def main(args: list[str] | None = None) -> int:
+        does = (parameters.__doc__ or "").partition("\n")[0]
+        return run_node(node, plain_command_line(name, does, parameters, args))
+
+    return main
 
 
 def node_help(name: str, parameters: type[NodeParameters], words: str) -> dict[str, Any]:

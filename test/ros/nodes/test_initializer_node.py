@@ -13,7 +13,7 @@ pytest.importorskip("rclpy", reason="rclpy is not installed")
 from std_msgs.msg import Header
 
 from cardbox_tracker.camera.camera import Camera
-from cardbox_tracker.measuring.guidance import BAD, GOOD, Prompt
+from cardbox_tracker.measuring.guidance import GOOD, Prompt
 from cardbox_tracker.ros.messages.conversions import image_message
 from cardbox_tracker.ros.nodes.initializer_node import GuideOutputs
 from cardbox_tracker.ros.nodes.initializer_parameters import InitializerParameters
@@ -60,17 +60,6 @@ def test_details_go_to_the_status_and_few_words_to_the_loudspeaker() -> None:
         "measured; iou 0.9",
     ]
     assert node.texts("~/guiding") == [False, True, False]
-
-
-@pytest.mark.parametrize(("bell", "rings"), [(True, 2), (False, 0)])
-def test_the_bell_rings_where_a_posture_was_captured_or_not(
-    bell: bool, rings: int, capfd: pytest.CaptureFixture[str]
-) -> None:
-    guide = outputs(Node())
-    for mood in (GOOD, BAD):
-        guide.show(ASKED, bell)
-        guide.show(Prompt("front", mood, mood=mood), bell)
-    assert capfd.readouterr().err.count("\a\n") == rings
 
 
 def test_an_image_is_drawn_on_for_a_subscriber_only() -> None:
