@@ -26,7 +26,7 @@ from cardbox_tracker.ros.nodes.silhouette_outputs import SilhouetteOutputs
 from cardbox_tracker.ros.runtime import qos
 from cardbox_tracker.ros.runtime.command_line import node_main
 from cardbox_tracker.ros.runtime.node import CardboxNode
-from cardbox_tracker.ros.runtime.parameter_fields import AT_START, NodeParameters, parameter
+from cardbox_tracker.ros.runtime.parameter_fields import NodeParameters, at_start, parameter
 from cardbox_tracker.ros.runtime.parameters import LiveParameters
 from cardbox_tracker.segmentation.background import warm_up
 from cardbox_tracker.segmentation.background_config import BackgroundConfig
@@ -104,17 +104,12 @@ class BackgroundParameters(NodeParameters, BackgroundConfig):
 
     effects = MappingProxyType({"learn_images": _NEXT_LEARNING})
     image_transport: str = image_transport_parameter()
-    width: int = parameter(
-        320, "working resolution, width", unit="px", limits=(32, 4096), effect=AT_START
-    )
-    height: int = parameter(
-        240, "working resolution, height", unit="px", limits=(32, 4096), effect=AT_START
-    )
-    background_file: str = parameter(
+    width: int = at_start(320, "working resolution, width", unit="px", limits=(32, 4096))
+    height: int = at_start(240, "working resolution, height", unit="px", limits=(32, 4096))
+    background_file: str = at_start(
         "",
         "file of the learned background; if it exists at the start and fits the camera and the "
         "scene, nothing has to be learned, even with a person in view; empty: none",
-        effect=AT_START,
     )
     within_m: float = parameter(
         0.0,

@@ -35,7 +35,7 @@ from cardbox_tracker.ros.messages import conversions
 from cardbox_tracker.ros.runtime import qos
 from cardbox_tracker.ros.runtime.command_line import node_help
 from cardbox_tracker.ros.runtime.node import CardboxNode, own_arguments, run_node
-from cardbox_tracker.ros.runtime.parameter_fields import AT_START, NodeParameters, parameter
+from cardbox_tracker.ros.runtime.parameter_fields import NodeParameters, at_start, parameter
 from cardbox_tracker.ros.runtime.parameters import LiveParameters
 
 _RETRY_S = 1.0
@@ -47,23 +47,16 @@ _USUAL_HZ = 15.0
 class CameraParameters(NodeParameters):
     """Publish a V4L2 device or a video file."""
 
-    device: str = parameter(
-        "/dev/video0", "V4L2 device; unused if a file is given", effect=AT_START
-    )
-    file: str = parameter("", "video file to play instead of a device", effect=AT_START)
+    device: str = at_start("/dev/video0", "V4L2 device; unused if a file is given")
+    file: str = at_start("", "video file to play instead of a device")
     loop: bool = parameter(False, "play the file again and again", effect="end of the file")
-    width: int = parameter(
-        640, "width to ask the device for", unit="px", limits=(32, 8192), effect=AT_START
-    )
-    height: int = parameter(
-        480, "height to ask the device for", unit="px", limits=(32, 8192), effect=AT_START
-    )
-    rate_hz: float = parameter(
+    width: int = at_start(640, "width to ask the device for", unit="px", limits=(32, 8192))
+    height: int = at_start(480, "height to ask the device for", unit="px", limits=(32, 8192))
+    rate_hz: float = at_start(
         0.0,
         "images a second; 0: the file's own rate, and 15 of a device",
         unit="Hz",
         limits=(0.0, 240.0),
-        effect=AT_START,
     )
     encoding: str = parameter(
         "mono8",
@@ -71,26 +64,24 @@ class CameraParameters(NodeParameters):
         choices=("mono8", "bgr8"),
     )
     frame_id: str = parameter(OPTICAL_FRAME, "name of the camera's optical frame")
-    calibration_file: str = parameter(
-        "", "file of camera_calibration, OpenCV's FileStorage or Kalibr", effect=AT_START
+    calibration_file: str = at_start(
+        "", "file of camera_calibration, OpenCV's FileStorage or Kalibr"
     )
-    horizontal_fov_deg: float = parameter(
+    horizontal_fov_deg: float = at_start(
         0.0,
         "without a calibration file: assume an ideal lens of this field of view; 0: publish the "
         "camera as uncalibrated",
         unit="deg",
         limits=(0.0, 170.0),
-        effect=AT_START,
     )
-    settle_s: float = parameter(
+    settle_s: float = at_start(
         2.0,
         "time for the automatic exposure before it is locked, so that the background is constant",
         unit="s",
         limits=(0.0, 60.0),
-        effect=AT_START,
     )
-    lock_exposure: bool = parameter(
-        True, "switch exposure and white balance to manual where the device allows", effect=AT_START
+    lock_exposure: bool = at_start(
+        True, "switch exposure and white balance to manual where the device allows"
     )
 
     def check(self) -> None:

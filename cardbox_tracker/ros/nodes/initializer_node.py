@@ -20,13 +20,7 @@ from cardbox_tracker.applications.drawing.guidance import Guide
 from cardbox_tracker.camera.camera import Camera
 from cardbox_tracker.common.errors import CardboxError, InitializationError
 from cardbox_tracker.common.progress import told
-from cardbox_tracker.measuring.guidance import (
-    Cancellation,
-    Guidance,
-    Prompt,
-    measuring,
-    spoken,
-)
+from cardbox_tracker.measuring.guidance import Cancellation, Guidance, Prompt, measuring, spoken
 from cardbox_tracker.measuring.saved_model import SavedModel
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.model_file import dumps_body_model

@@ -13,7 +13,7 @@ from cardbox_tracker.ros.nodes.shared_parameters import (
     depth_parameter,
     extrinsics_parameter,
 )
-from cardbox_tracker.ros.runtime.parameter_fields import AT_START, NodeParameters, parameter, shared
+from cardbox_tracker.ros.runtime.parameter_fields import NodeParameters, at_start, parameter, shared
 
 _MAX_PITCH_DEG = round(math.degrees(MAX_PITCH_RAD), 6)
 _NEXT_GUIDANCE, _NEXT_MEASUREMENT = "next guidance", "next measurement"
@@ -50,10 +50,9 @@ class InitializerParameters(NodeParameters):
     mirror: bool = parameter(
         True, "the guidance shows the person as in a mirror; false: as in the image"
     )
-    model_file: str = parameter(
+    model_file: str = at_start(
         "",
         "file to save the body model to; if it exists at the start, it is published; empty: none",
-        effect=AT_START,
     )
     optical_frame_in_urdf: bool = parameter(
         True,

@@ -33,7 +33,7 @@ from cardbox_tracker.ros.messages.types import message_classes
 from cardbox_tracker.ros.runtime import qos
 from cardbox_tracker.ros.runtime.command_line import node_help
 from cardbox_tracker.ros.runtime.node import CardboxNode, own_arguments, run
-from cardbox_tracker.ros.runtime.parameter_fields import AT_START, NodeParameters, parameter
+from cardbox_tracker.ros.runtime.parameter_fields import NodeParameters, at_start, parameter
 from cardbox_tracker.ros.runtime.parameters import LiveParameters
 
 _COMPRESSED = "/compressed"
@@ -86,47 +86,37 @@ _LATCHED_ENDINGS = ("tf_static", "body_model", "robot_description", "background/
 class PlayBagParameters(NodeParameters):
     """Play a recording."""
 
-    bag: str = parameter("", "rosbag2 folder or .mcap file to play", effect=AT_START)
+    bag: str = at_start("", "rosbag2 folder or .mcap file to play")
     rate: float = parameter(
         1.0, "speed; 2 plays twice as fast", limits=(0.01, 100.0), effect="at once"
     )
     loop: bool = parameter(
         False, "play again and again; the stamps start over too", effect="end of the bag"
     )
-    topics: list[str] = parameter([], "topics to play; all if empty", effect=AT_START)
-    start_s: float = parameter(
-        0.0,
-        "play from this time on, from the bag's start",
-        unit="s",
-        limits=(0.0, 1e6),
-        effect=AT_START,
+    topics: list[str] = at_start([], "topics to play; all if empty")
+    start_s: float = at_start(
+        0.0, "play from this time on, from the bag's start", unit="s", limits=(0.0, 1e6)
     )
-    duration_s: float = parameter(
-        0.0,
-        "play this long; 0: to the end of the bag",
-        unit="s",
-        limits=(0.0, 1e6),
-        effect=AT_START,
+    duration_s: float = at_start(
+        0.0, "play this long; 0: to the end of the bag", unit="s", limits=(0.0, 1e6)
     )
-    pause_at: list[float] = parameter(
-        [], "pause at these times from the bag's start, s, until play_bag/resume", effect=AT_START
+    pause_at: list[float] = at_start(
+        [], "pause at these times from the bag's start, s, until play_bag/resume"
     )
-    wait_for_subscribers: bool = parameter(
-        True, "begin when somebody subscribes to a played image topic", effect=AT_START
+    wait_for_subscribers: bool = at_start(
+        True, "begin when somebody subscribes to a played image topic"
     )
-    wait_for_topics: list[str] = parameter(
+    wait_for_topics: list[str] = at_start(
         [],
         "begin when these topics have a publisher; with keypoints, the player waits for the "
         "tracker, which compiles for one to two minutes at its very first start",
-        effect=AT_START,
     )
-    delay_s: float = parameter(
+    delay_s: float = at_start(
         0.5,
         "send the first message when no subscriber has come or gone for this time, so that none "
         "misses the beginning; at least 3 s while images of a further camera have no subscriber",
         unit="s",
         limits=(0.0, 600.0),
-        effect=AT_START,
     )
 
     def check(self) -> None:

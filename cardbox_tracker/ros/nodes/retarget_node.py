@@ -29,7 +29,7 @@ from cardbox_tracker.ros.nodes.posture_input import PostureInput, Tracked
 from cardbox_tracker.ros.runtime import qos
 from cardbox_tracker.ros.runtime.command_line import node_main
 from cardbox_tracker.ros.runtime.node import CardboxNode
-from cardbox_tracker.ros.runtime.parameter_fields import AT_START, NodeParameters, parameter
+from cardbox_tracker.ros.runtime.parameter_fields import AT_START, NodeParameters, at_start
 from cardbox_tracker.ros.runtime.parameters import LiveParameters
 
 
@@ -40,25 +40,22 @@ class RetargetParameters(NodeParameters, RetargetConfig):
     # They cannot change while a robot moves.
     effects = MappingProxyType(dict.fromkeys(settings_of(RetargetConfig), AT_START))
 
-    robot_file: str = parameter("", "URDF of the robot; has to be given", effect=AT_START)
-    joint_map_file: str = parameter(
+    robot_file: str = at_start("", "URDF of the robot; has to be given")
+    joint_map_file: str = at_start(
         "",
         "map of joints, as in config/example_joint_map.yaml; empty: the robot's arm is found and "
         "points as the person's",
-        effect=AT_START,
     )
-    stream_address: str = parameter(
+    stream_address: str = at_start(
         "",
         "ZMQ address on which the commands are published, too, as tcp://127.0.0.1:5557, for "
         "LeRobot; empty: none",
-        effect=AT_START,
     )
-    timeout_s: float = parameter(
+    timeout_s: float = at_start(
         0.5,
         "dead-man: the robot stops after this time without a posture, or without its joint states",
         unit="s",
         limits=(0.05, 10.0),
-        effect=AT_START,
     )
 
 

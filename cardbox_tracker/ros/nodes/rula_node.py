@@ -27,7 +27,7 @@ from cardbox_tracker.ros.nodes.posture_input import PostureInput, Tracked
 from cardbox_tracker.ros.runtime import qos
 from cardbox_tracker.ros.runtime.command_line import node_main
 from cardbox_tracker.ros.runtime.node import CardboxNode
-from cardbox_tracker.ros.runtime.parameter_fields import AT_START, NodeParameters, parameter
+from cardbox_tracker.ros.runtime.parameter_fields import NodeParameters, at_start
 from cardbox_tracker.ros.runtime.parameters import LiveParameters
 from cardbox_tracker.tracking.sampling import normal_postures
 
@@ -36,9 +36,7 @@ from cardbox_tracker.tracking.sampling import normal_postures
 class RulaParameters(NodeParameters, RulaConfig):
     """Score the strain on arms, neck and trunk (RULA) while the tracker follows a person."""
 
-    seed: int = parameter(
-        0, "random seed of the posture samples", limits=(0, 2**31 - 1), effect=AT_START
-    )
+    seed: int = at_start(0, "random seed of the posture samples", limits=(0, 2**31 - 1))
 
 
 class RulaNode(CardboxNode):

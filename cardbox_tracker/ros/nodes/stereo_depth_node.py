@@ -24,7 +24,7 @@ from cardbox_tracker.ros.nodes.shared_parameters import (
 from cardbox_tracker.ros.runtime import qos
 from cardbox_tracker.ros.runtime.command_line import node_main
 from cardbox_tracker.ros.runtime.node import CardboxNode
-from cardbox_tracker.ros.runtime.parameter_fields import AT_START, NodeParameters, parameter
+from cardbox_tracker.ros.runtime.parameter_fields import NodeParameters, at_start, parameter
 from cardbox_tracker.ros.runtime.parameters import LiveParameters
 from cardbox_tracker.ros.runtime.recent import RecentImages
 
@@ -39,9 +39,7 @@ class StereoDepthParameters(NodeParameters):
     """Measure depth in a rectified pair of cameras, by semi-global matching."""
 
     image_transport: str = image_transport_parameter()
-    width: int = parameter(
-        320, "width at which depth is measured", unit="px", limits=(32, 4096), effect=AT_START
-    )
+    width: int = at_start(320, "width at which depth is measured", unit="px", limits=(32, 4096))
     nearest_m: float = parameter(
         NEAREST_M,
         "nearer objects are not found; smaller values cost more time",

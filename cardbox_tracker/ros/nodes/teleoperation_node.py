@@ -17,7 +17,7 @@ from cardbox_tracker.ros.nodes.posture_input import PostureInput, Tracked
 from cardbox_tracker.ros.runtime import qos
 from cardbox_tracker.ros.runtime.command_line import node_main
 from cardbox_tracker.ros.runtime.node import CardboxNode
-from cardbox_tracker.ros.runtime.parameter_fields import AT_START, NodeParameters, parameter
+from cardbox_tracker.ros.runtime.parameter_fields import NodeParameters, at_start
 from cardbox_tracker.ros.runtime.parameters import LiveParameters
 
 _TOPICS: dict[str, tuple[Any, str]] = {
@@ -30,22 +30,15 @@ _TOPICS: dict[str, tuple[Any, str]] = {
 class TeleoperationParameters(NodeParameters):
     """Stream the tracked person as 24 joints to programs that teleoperate robots."""
 
-    to: str = parameter("isaac", "who reads the stream", choices=tuple(PACKETS), effect=AT_START)
-    address: str = parameter(
+    to: str = at_start("isaac", "who reads the stream", choices=tuple(PACKETS))
+    address: str = at_start(
         "",
         "ZMQ address on which the stream is published, as tcp://127.0.0.1:5556; empty: the topic "
         "of the reader",
-        effect=AT_START,
     )
-    rate_hz: float = parameter(
-        50.0, "packets a second", unit="Hz", limits=(1.0, 1000.0), effect=AT_START
-    )
-    timeout_s: float = parameter(
-        0.5,
-        "no joint is valid after this time without a posture",
-        unit="s",
-        limits=(0.05, 10.0),
-        effect=AT_START,
+    rate_hz: float = at_start(50.0, "packets a second", unit="Hz", limits=(1.0, 1000.0))
+    timeout_s: float = at_start(
+        0.5, "no joint is valid after this time without a posture", unit="s", limits=(0.05, 10.0)
     )
 
 

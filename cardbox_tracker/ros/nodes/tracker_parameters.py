@@ -24,9 +24,9 @@ from cardbox_tracker.ros.nodes.shared_parameters import (
     keypoints_parameter,
 )
 from cardbox_tracker.ros.runtime.parameter_fields import (
-    AT_START,
     RESTARTS,
     NodeParameters,
+    at_start,
     parameter,
     shared,
 )
@@ -57,94 +57,79 @@ class TrackerParameters(NodeParameters):
         effect=RESTARTS,
     )
     effort: float = shared(WholeBodyConfig, "effort")
-    settings_file: str = parameter(
+    settings_file: str = at_start(
         "",
         "YAML file with further settings, by the names at the end of docs/parameters.md; "
         "parameters that differ from their default take precedence; empty: none",
-        effect=AT_START,
     )
     lost_iou: float = shared(TrackerConfig, "lost_iou")
     lost_frames: int = shared(TrackerConfig, "lost_frames")
     seed: int = parameter(0, "seed of the random draws", limits=(0, 2**31 - 1), effect=_NEXT_START)
-    model_file: str = parameter(
-        "",
-        "body model to start with; one that arrives on body_model replaces it; empty: none",
-        effect=AT_START,
+    model_file: str = at_start(
+        "", "body model to start with; one that arrives on body_model replaces it; empty: none"
     )
-    stature: float = parameter(
+    stature: float = at_start(
         0.0,
         "height of a person who is not measured; without a measured body, the person in the image "
         "is tracked with it, and distance and breadths are found; 0: a measured body is waited "
         "for, or with keypoints the mean of people is taken",
         unit="m",
         limits=(0.0, STATURE_LIMITS_M[1]),
-        effect=AT_START,
     )
-    statures: list[float] = parameter(
+    statures: list[float] = at_start(
         [],
         "heights of several people who are not measured, instead of stature: from left to right if "
         "they come together, else as they come; the last one is also that of further people",
         unit="m",
-        effect=AT_START,
     )
-    person_distance_m: float = parameter(
+    person_distance_m: float = at_start(
         0.0,
         "with people who are not measured: level distance from the camera at first; 0: it is found",
         unit="m",
         limits=(0.0, 20.0),
-        effect=AT_START,
     )
-    camera_pitch_deg: float = parameter(
+    camera_pitch_deg: float = at_start(
         NOT_GIVEN_DEG,
         "with people who are not measured: pitch of the camera, positive downwards; 90: the "
         "detector finds it, or the camera is taken as level",
         unit="deg",
         limits=(-80.0, NOT_GIVEN_DEG),
-        effect=AT_START,
     )
-    torso_place: bool = parameter(
+    torso_place: bool = at_start(
         True,
         "joint_states also has the joints of place, neck and clavicles; "
         "must be the same as the initializer's torso_place_in_urdf",
-        effect=AT_START,
     )
-    use_image: bool = parameter(
+    use_image: bool = at_start(
         True,
         "also use silhouette/image to find hands and forearms in front of the torso by the colours "
         "in the body model",
-        effect=AT_START,
     )
-    publish_tf: bool = parameter(
+    publish_tf: bool = at_start(
         False,
         "also publish the links of robot_description on /tf, instead of robot_state_publisher; "
         "not for several trackers in one TF tree; needs the package tf2_msgs",
-        effect=AT_START,
     )
-    optical_frame_in_tf: bool = parameter(
-        True,
-        "publish_tf includes the camera's optical frame; false if another node publishes it",
-        effect=AT_START,
+    optical_frame_in_tf: bool = at_start(
+        True, "publish_tf includes the camera's optical frame; false if another node publishes it"
     )
-    rep155_id: str = parameter(
+    rep155_id: str = at_start(
         "",
         "also publish /humans/bodies/ID/joint_states and .../robot_description after REP-155, for "
         "this ID of letters, digits and underscores; empty: do not",
-        effect=AT_START,
     )
 
-    hands: bool = parameter(
+    hands: bool = at_start(
         False,
         "also look at hands in silhouette/image, with the detector's network and the points on "
         "keypoints: the topic hands tells open from closed ones, and joint_states has their "
         "joints; must be the same as the initializer's hands",
-        effect=AT_START,
     )
-    people: int = parameter(
+    people: int = at_start(
         0,
         "number of people to track, each with topics below person_1, person_2 ...; "
         "body_model is the body of each; 0: one person without a number",
         limits=(0, MOST_PEOPLE),
-        effect=AT_START,
     )
     cameras: list[str] = cameras_parameter()
     extrinsics_file: str = extrinsics_parameter()

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import partial
 from types import MappingProxyType
 from typing import Any, ClassVar, get_type_hints
 
@@ -54,6 +55,10 @@ def parameter(
     if isinstance(default, list):
         return field(default_factory=list, metadata={"setting": spec})
     return field(default=default, metadata={"setting": spec})
+
+
+at_start = partial(parameter, effect=AT_START)
+"""A :func:`parameter` that cannot be changed while the node runs."""
 
 
 def shared(kind: Any, name: str, **changes: Any) -> Any:
