@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 import cardbox_tracker
-from cardbox_tracker.applications.simulation.person import person_keypoints_m
+from cardbox_tracker.applications.simulation.person import person_frames
 from cardbox_tracker.common import errors
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -138,7 +138,7 @@ def test_the_examples_of_the_document_run(
     assert state == estimate.state in ("tracking", "uncertain")
     assert "left_hand" in rest[0]
     assert estimate.iou > 0.85
-    true_m = person_keypoints_m(names["body"], names["wave"](time_s))
+    true_m = person_frames(names["body"], names["wave"](time_s)).keypoints_m
     off_m = estimate.keypoints_m - names["camera"].reference_to_optical(true_m)
     assert np.linalg.norm(off_m, axis=1).max() < 0.1
     assert names["silhouette"].shape == (240, 320)

@@ -7,7 +7,7 @@ import json
 from pathlib import Path
 
 from cardbox_tracker.commands.arguments import add_camera_count, add_preset, add_seed
-from cardbox_tracker.common.errors import CardboxError
+from cardbox_tracker.common.errors import CardboxError, RosMissingError
 from cardbox_tracker.common.files import atomic_path
 
 NAME = "demo"
@@ -34,8 +34,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(options: argparse.Namespace) -> None:
     """Track the film, or run the nodes; write the results."""
     if options.live:
-        from cardbox_tracker.ros.demo.run import run_demo
-
+        try:
+            from cardbox_tracker.ros.demo.run import run_demo
+        except ImportError as error:
+            raise RosMissingError(error) from None
         run_demo(options.output, options.preset, options.seed, options.cameras)
     elif options.cameras > 1 or options.preset != _PRESET:
         raise CardboxError("--cameras and --preset are for the nodes: give --live, too")

@@ -37,7 +37,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> None:
     """Read the results and send them."""
-    from cardbox_tracker.applications.teleoperation.recorded import at_rate, bodies_of
+    from cardbox_tracker.applications.teleoperation.full_body import at_rate, bodies_of
     from cardbox_tracker.applications.teleoperation.sending import ZmqSender, in_real_time, packet
     from cardbox_tracker.recordings.result_reader import read_results
 

@@ -19,8 +19,7 @@ from pathlib import Path
 import numpy as np
 
 from cardbox_tracker.applications.ergonomics.rula import (
-    ABOVE,
-    HIGHEST,
+    RULA,
     SAMPLES,
     RulaConfig,
     ScoreArray,
@@ -68,7 +67,7 @@ _HEAD = (
     "within 1",
     "chance of the true score",
     f"time at 1 to {LOW}, true",
-    f"time above {ABOVE}, true",
+    f"time above {RULA.above}, true",
 )
 WAYS = ("mean posture", "normal", "particles", "whole deviation", "always the same")
 """Sources of a score: the mean posture; mean and deviations, as in the node; the particles, as in
@@ -88,8 +87,8 @@ class ScoreError:
         chance_of_truth: mean chance that the distribution gives the true score.
         low: mean chance of a score up to ``LOW``.
         true_low: share of images whose true score is up to ``LOW``.
-        above: mean chance of a score above ``ABOVE``.
-        true_above: share of images whose true score is above ``ABOVE``.
+        above: mean chance of a score above ``RULA.above``.
+        true_above: share of images whose true score is above ``RULA.above``.
     """
 
     frames: int
@@ -129,7 +128,7 @@ def score_errors(
                 sampled_scores(tracker.body, estimate.posture, postures, *known, rula, rng)[0]
                 for postures in (normal, particles)
             ]
-            mean = np.eye(HIGHEST)[drawn[0].of_mean - 1]
+            mean = np.eye(RULA.highest)[drawn[0].of_mean - 1]
             necks = None
             if angles is not None and deviations is not None:
                 necks = neck_samples(angles, deviations, SAMPLES, rng)
@@ -147,7 +146,7 @@ def score_errors(
     errors: dict[str, dict[str, ScoreError]] = {}
     for task, rula in tasks.items():
         truth = true_scores(session, body[0], rula)[known]
-        same = np.eye(HIGHEST)[np.bincount(truth).argmax() - 1]
+        same = np.eye(RULA.highest)[np.bincount(truth).argmax() - 1]
         constant = [ScoreDistribution(same, same, same)] * len(truth)
         of_way = [[found[s][task, way] for s in stamps] for way in WAYS[:-1]]
         errors[task] = {
@@ -177,8 +176,8 @@ def score_error(scores: list[ScoreDistribution], truth: ScoreArray) -> ScoreErro
         chance_of_truth=float(chances[np.arange(len(truth)), truth - 1].mean()),
         low=float(chances[:, :LOW].sum(axis=1).mean()),
         true_low=float((truth <= LOW).mean()),
-        above=float(chances[:, ABOVE:].sum(axis=1).mean()),
-        true_above=float((truth > ABOVE).mean()),
+        above=float(chances[:, RULA.above :].sum(axis=1).mean()),
+        true_above=float((truth > RULA.above).mean()),
     )
 
 

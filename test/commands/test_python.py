@@ -15,7 +15,7 @@ import pytest
 
 import cardbox_tracker
 from cardbox_tracker.applications.drawing.video import video_file
-from cardbox_tracker.applications.simulation.person import person_keypoints_m
+from cardbox_tracker.applications.simulation.person import person_frames
 from cardbox_tracker.applications.simulation.renderer import Renderer, Scene
 from cardbox_tracker.camera.camera import Camera
 from cardbox_tracker.common.errors import CardboxError
@@ -39,7 +39,7 @@ def code_in(page: str, number: int) -> str:
 def coco_points() -> np.ndarray:
     """The points (1, 17, 3) that a network of COCO finds in each image of the film."""
     points = np.zeros((1, 17, 3), np.float32)
-    px = CAMERA.project(CAMERA.reference_to_optical(person_keypoints_m(BODY, FRONT)))
+    px = CAMERA.project(CAMERA.reference_to_optical(person_frames(BODY, FRONT).keypoints_m))
     points[0, [5, 7, 9, 6, 8, 10]] = np.column_stack([px, np.ones(6)])
     points[0, [11, 12]] = points[0, [5, 6]] + (0.0, 70.0, 0.0)
     points[0, 0] = *points[0, [5, 6], :2].mean(axis=0) - (0.0, 30.0), 1.0

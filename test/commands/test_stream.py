@@ -11,8 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from cardbox_tracker.applications.teleoperation.full_body import FullBody
-from cardbox_tracker.applications.teleoperation.recorded import at_rate
+from cardbox_tracker.applications.teleoperation.full_body import FullBody, at_rate
 from cardbox_tracker.applications.teleoperation.sending import in_real_time
 from cardbox_tracker.camera.camera import Camera
 from cardbox_tracker.person.model import BodyModel

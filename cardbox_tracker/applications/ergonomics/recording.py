@@ -45,7 +45,6 @@ def header_of(method: Method) -> tuple[str, ...]:
     )
 
 
-CSV_HEADER = header_of(RULA)
 MEAN_POSTURE = "mean_posture"
 """Name of the grand score of the mean posture among the shares."""
 SHARES_HEADER = ("part", "source", "score", "time_s", "share")
@@ -176,8 +175,8 @@ class RulaSummary:
 
     Attributes:
         measured_s: time with a posture.
-        above_s: time with a score above ``ABOVE``.
-        by_level_s: time at each of ``ACTION_LEVELS``.
+        above_s: time with a score above ``above`` of the method.
+        by_level_s: time at each action level.
         mean: expected score over the measured time; nan without any.
         of_mean: mean score of the mean postures over the same time.
         uncertain_s: part of the measured time whose postures may be wrong.

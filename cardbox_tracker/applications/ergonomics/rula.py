@@ -148,10 +148,6 @@ class RebaConfig(ErgonomicConfig):
     )
 
 
-DECLARED_PARTS = {"wrist_twist": 2, "legs": 2}
-"""Highest score of each part that no image shows."""
-
-
 class Declared(NamedTuple):
     """A declared input.
 
@@ -263,17 +259,6 @@ TABLE_C: ScoreArray = table_of(
 )
 """Grand score: wrist and arm (8 or more), neck, trunk and legs (7 or more)."""
 
-HIGHEST, ABOVE = 7, 5
-"""Highest grand score; score above which work has to be changed soon or at once."""
-
-ACTION_LEVELS: tuple[tuple[int, int, str], ...] = (
-    (1, 2, "acceptable unless it is held or repeated for long"),
-    (3, 4, "investigate further; changes may be required"),
-    (5, 6, "investigate and change soon"),
-    (7, 7, "investigate and change immediately"),
-)
-"""Lowest and highest grand score of each action level, and its meaning in the paper."""
-
 
 class ArmScores(NamedTuple):
     """Scores (...) of one arm: its parts, ``TABLE_A``, and the grand score with this arm."""
@@ -309,23 +294,6 @@ class Part(NamedTuple):
     of: Callable[[Any], ScoreArray]
 
 
-PARTS: tuple[Part, ...] = (
-    Part("left_upper_arm", "upper arm, left", 6, lambda scores: scores.left.upper_arm),
-    Part("right_upper_arm", "upper arm, right", 6, lambda scores: scores.right.upper_arm),
-    Part("left_lower_arm", "lower arm, left", 3, lambda scores: scores.left.lower_arm),
-    Part("right_lower_arm", "lower arm, right", 3, lambda scores: scores.right.lower_arm),
-    Part("trunk", "trunk", 6, lambda scores: scores.trunk),
-    Part("neck", "neck", 6, lambda scores: scores.neck),
-    Part("left_table_a", "table A, left", 9, lambda scores: scores.left.table_a),
-    Part("right_table_a", "table A, right", 9, lambda scores: scores.right.table_a),
-    Part("table_b", "table B", 9, lambda scores: scores.table_b),
-    Part("left_wrist", "wrist, left", 4, lambda scores: scores.left.wrist),
-    Part("right_wrist", "wrist, right", 4, lambda scores: scores.right.wrist),
-)
-"""Table A rates upper arm, lower arm and wrist, table B neck, trunk and legs; both without load and
-muscle use."""
-
-
 class Method(NamedTuple):
     """What tables and pages of scores need to know of a method.
 
@@ -348,7 +316,34 @@ class Method(NamedTuple):
     measurable: tuple[str, ...]
 
 
-RULA = Method(*("RULA", HIGHEST, ABOVE, ACTION_LEVELS, PARTS, DECLARED_PARTS), ("neck", *WRISTS))
+RULA = Method(
+    "RULA",
+    7,
+    5,
+    (
+        (1, 2, "acceptable unless it is held or repeated for long"),
+        (3, 4, "investigate further; changes may be required"),
+        (5, 6, "investigate and change soon"),
+        (7, 7, "investigate and change immediately"),
+    ),
+    (
+        Part("left_upper_arm", "upper arm, left", 6, lambda scores: scores.left.upper_arm),
+        Part("right_upper_arm", "upper arm, right", 6, lambda scores: scores.right.upper_arm),
+        Part("left_lower_arm", "lower arm, left", 3, lambda scores: scores.left.lower_arm),
+        Part("right_lower_arm", "lower arm, right", 3, lambda scores: scores.right.lower_arm),
+        Part("trunk", "trunk", 6, lambda scores: scores.trunk),
+        Part("neck", "neck", 6, lambda scores: scores.neck),
+        Part("left_table_a", "table A, left", 9, lambda scores: scores.left.table_a),
+        Part("right_table_a", "table A, right", 9, lambda scores: scores.right.table_a),
+        Part("table_b", "table B", 9, lambda scores: scores.table_b),
+        Part("left_wrist", "wrist, left", 4, lambda scores: scores.left.wrist),
+        Part("right_wrist", "wrist, right", 4, lambda scores: scores.right.wrist),
+    ),
+    {"wrist_twist": 2, "legs": 2},
+    ("neck", *WRISTS),
+)
+"""Table A rates upper arm, lower arm and wrist, table B neck, trunk and legs; both without load and
+muscle use."""
 
 
 class ScoreDistribution(NamedTuple):
@@ -358,8 +353,7 @@ class ScoreDistribution(NamedTuple):
         grand: chances for the worse arm.
         left: chances for the left arm.
         right: chances for the right arm.
-        parts: chances of the scores from 1 on of each of ``PARTS``, by its name; empty if they are
-            not known.
+        parts: the same of the scores of each part, by its name; empty if they are not known.
         of_mean: score of the mean posture, from which the samples deviate; 0 if it is not known.
     """
 
@@ -600,10 +594,10 @@ def part_values(
 ) -> dict[str, str]:
     """Return the part scores of one image in words, and the inputs that were not seen."""
     values = {}
-    for part in PARTS:
+    for part in RULA.parts:
         from_ = MEASURED if part.name in measured else DECLARED
         name = part.words + (f" ({from_})" if part.name in RULA.measurable else "")
         values[name] = f"{expected(scores.parts[part.name]):.2f}"
-    for name in DECLARED_PARTS:
+    for name in RULA.declared_parts:
         values[f"{name.replace('_', ' ')} ({DECLARED})"] = str(getattr(config, name))
     return values | {NOT_SEEN: ", ".join(map(str, declared(config, measured)))}

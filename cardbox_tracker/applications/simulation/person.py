@@ -96,19 +96,6 @@ def person_frames(body: BodyModel, postures: FloatArray) -> PosedBodies:
     return frames._replace(points_m=points_m)
 
 
-def person_keypoints_m(body: BodyModel, postures: FloatArray) -> FloatArray:
-    """Return shoulder, elbow and hand (the knuckles) of the left, then the right arm.
-
-    Args:
-        body: the person.
-        postures: shape (..., 12), rad and metres.
-
-    Returns:
-        Shape (..., 6, 3), metres in the reference frame, ordered as ``KEYPOINT_NAMES``.
-    """
-    return person_frames(body, postures).keypoints_m
-
-
 def girdle_lift_m(breadth_m: float, elevation_rad: FloatArray) -> FloatArray:
     """Return the lift (...) of a shoulder joint along the torso's axis, metres.
 

@@ -22,7 +22,7 @@ from cardbox_tracker.applications.simulation.cameras import (
     synthetic_cameras,
 )
 from cardbox_tracker.applications.simulation.motions import Segment, timeline
-from cardbox_tracker.applications.simulation.person import person_frames, person_keypoints_m
+from cardbox_tracker.applications.simulation.person import person_frames
 from cardbox_tracker.applications.simulation.renderer import Renderer, Scene
 from cardbox_tracker.camera.camera import Camera
 from cardbox_tracker.camera.extrinsics_files import save_camchain
@@ -187,7 +187,7 @@ def _truth(
 ) -> dict[str, Any]:
     frames = person_frames(body, posture)
     names = ("hips", "neck", "head", *KEYPOINT_NAMES)
-    points = np.vstack([frames.hip, frames.neck, frames.head, person_keypoints_m(body, posture)])
+    points = np.vstack([frames.hip, frames.neck, frames.head, frames.keypoints_m])
     optical = camera.reference_to_optical(points)
     return {
         "joints_m": dict(zip(names, np.round(optical, 4).tolist(), strict=True)),

@@ -6,14 +6,16 @@ and only turns, so a wrong pitch of the camera makes no robot walk. Legs that ar
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import math
+from collections.abc import Iterable, Iterator, Mapping
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from cardbox_tracker.person.hands import HAND_NAMES, WRIST_SHARE
+from cardbox_tracker.applications.exporting.placed import in_reference
+from cardbox_tracker.person.hands import HAND_NAMES, WRIST_SHARE, turn_of
 from cardbox_tracker.person.kinematics import pose
 from cardbox_tracker.person.legs import (
     ANKLE_SHARE,
@@ -38,6 +40,8 @@ from cardbox_tracker.person.skeleton import (
     rotation_y,
     rotation_z,
 )
+from cardbox_tracker.recordings.result_reader import Results
+from cardbox_tracker.recordings.result_table import PALM_COLUMNS
 from cardbox_tracker.tracking.estimate import TRACKING, UNCERTAIN
 
 NAMES: tuple[str, ...] = (
@@ -237,3 +241,49 @@ def _roll(palm: FloatArray, upper: FloatArray, fore: FloatArray, sign: float) ->
     if np.linalg.norm(inwards) < _LEAST_BEND:
         return 0.0
     return float(np.arctan2(np.cross(inwards, palm) @ fore, inwards @ palm))
+
+
+_NAMES = (*JOINT_NAMES, *NECK_NAMES, *LEG_NAMES, *HAND_NAMES)
+# Between images farther apart nothing is known; a longer gap is shortened.
+_LONGEST_S, _LONGEST_GAP_S = 0.5, 1.0
+
+
+def bodies_of(results: Results) -> Iterator[FullBody]:
+    """Yield the full body of each image, from the first one with a person on."""
+    make = FullBodies()
+    values, deviations = results.of(_NAMES), results.deviations_of(_NAMES)
+    palms, turns = results.of(PALM_COLUMNS).reshape(-1, 2, 3), [HAND_NAMES[0], HAND_NAMES[3]]
+    images = zip(results.state, results.bodies, values, deviations, palms, strict=True)
+    rows = zip(results.stamp_ns.tolist(), images, results.keypoints(), strict=True)
+    for stamp_ns, (state, body, row, stddev, palm), keypoints in rows:
+        found, known = (dict(zip(_NAMES, one.tolist(), strict=True)) for one in (row, stddev))
+        posture = row[: len(JOINT_NAMES)]
+        if body is not None and np.isfinite(palm).any() and np.isfinite(posture).all():
+            # A table has the palms in place of their turns about the forearms.
+            posed = pose(body, posture)
+            arms = zip(turns, (1.0, -1.0), (posed.left, posed.right), palm, strict=True)
+            for name, sign, arm, normal in arms:
+                found[name] = turn_of(in_reference(normal, body), arm.forearm_rotation, sign)
+                known[name] = 0.0
+        one = make.update(stamp_ns, state, body, found, known, keypoints)
+        if one is not None:
+            yield one
+
+
+def at_rate(bodies: Iterable[FullBody], rate_hz: float) -> Iterator[FullBody]:
+    """Yield the bodies at even times, between those of the images; all is invalid in gaps."""
+    before: FullBody | None = None
+    first_ns = number = 0
+    for after in bodies:
+        if before is None:
+            first_ns, before = after.stamp_ns, after
+        gap_s = (after.stamp_ns - before.stamp_ns) / 1e9
+        end_ns = min(after.stamp_ns, before.stamp_ns + round(_LONGEST_GAP_S * 1e9))
+        while (time_ns := first_ns + round(number * 1e9 / rate_hz)) < end_ns:
+            is_near = gap_s <= _LONGEST_S
+            yield before.until(after, time_ns) if is_near else before.invalid(time_ns)
+            number += 1
+        number = max(number, math.ceil((after.stamp_ns - first_ns) * rate_hz / 1e9))
+        before = after
+    if before is not None:
+        yield before

@@ -129,7 +129,8 @@ class Scene:
     def __init__(self, stream: Any, truth: Mapping[int, TrueFrame] | None = None) -> None:
         """Start an empty scene in a rerun.RecordingStream; ``truth`` has true frames by stamp."""
         self._rr = rerun()
-        self._stream, self._first_ns = stream, None
+        self._stream = stream
+        self._first_ns: int | None = None
         self._truth = truth or {}
         self._state = ""
         self._styled: set[str] = set()

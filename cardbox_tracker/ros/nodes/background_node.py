@@ -45,56 +45,6 @@ _DRIFT_TO_WARN_GREY_LEVELS = 12.0
 _COVERAGE_TO_WARN = 0.6
 
 
-@dataclass(frozen=True)
-class Findings:
-    """Measurements of the images.
-
-    Attributes:
-        topic: the images' topic.
-        loss: share of them that never arrived.
-        image_bytes: size of one.
-        drift: how much brighter they are than the background, grey levels.
-        follows: True if the light is followed.
-        covered: share of the image that is foreground.
-        within_m: pixels nearer than this are foreground, m; 0: the learned background decides.
-    """
-
-    topic: str
-    loss: float
-    image_bytes: int
-    drift: float
-    follows: bool
-    covered: float
-    within_m: float = 0.0
-
-
-def advice(findings: Findings) -> dict[str, str]:
-    """Return what a user should do about the images, a text for each kind of trouble."""
-    texts = {}
-    if findings.loss > _LOSS_TO_WARN and findings.image_bytes > _LARGE_IMAGE_BYTES:
-        texts["loss"] = (
-            f"{100 * findings.loss:.0f} % of the images on {findings.topic} "
-            f"({findings.image_bytes // 1000} kB each) are lost on the way: start all nodes "
-            "with FASTRTPS_DEFAULT_PROFILES_FILE set to this package's "
-            "config/fastdds_large_images.xml, or use smaller, grey or compressed images"
-        )
-    if findings.within_m > 0.0:
-        if findings.covered > _COVERAGE_TO_WARN:
-            texts["depth"] = (
-                f"most of the image is nearer than within_m, {findings.within_m:g} m: choose it "
-                "between the person and the wall, and let nothing else stand before it"
-            )
-        return texts
-    drifted = not findings.follows and abs(findings.drift) > _DRIFT_TO_WARN_GREY_LEVELS
-    if drifted or findings.covered > _COVERAGE_TO_WARN:
-        texts["brightness"] = (
-            "the whole scene changed its brightness: switch the camera's automatic exposure "
-            "and white balance off (v4l2-ctl -c auto_exposure=1,white_balance_automatic=0), "
-            "then call background/learn with nobody in view"
-        )
-    return texts
-
-
 _NEXT_LEARNING = "next learning"
 
 
@@ -275,18 +225,32 @@ class BackgroundNode(CardboxNode):
         return self._pipeline.drift(self._image)
 
     def _advice(self) -> dict[str, str]:
-        settings = self.parameters.value
-        findings = Findings(
-            self.camera_images.topic,
-            # A slow node leaves images out, which are not lost on the way.
-            0.0 if self.diagnostics.is_slow else self.diagnostics.input.loss,
-            self.camera_images.image_bytes,
-            self._drift(),
-            settings.follow and settings.clean_up,
-            self._outputs.covered,
-            settings.within_m,
-        )
-        return advice(findings) | self.camera_images.remarks()
+        """Return what a user should do about the images, a text for each kind of trouble."""
+        settings, texts = self.parameters.value, self.camera_images.remarks()
+        # A slow node leaves images out, which are not lost on the way.
+        loss = 0.0 if self.diagnostics.is_slow else self.diagnostics.input.loss
+        image_bytes, covered = self.camera_images.image_bytes, self._outputs.covered
+        if loss > _LOSS_TO_WARN and image_bytes > _LARGE_IMAGE_BYTES:
+            texts["loss"] = (
+                f"{100 * loss:.0f} % of the images on {self.camera_images.topic} "
+                f"({image_bytes // 1000} kB each) are lost on the way: start all nodes "
+                "with FASTRTPS_DEFAULT_PROFILES_FILE set to this package's "
+                "config/fastdds_large_images.xml, or use smaller, grey or compressed images"
+            )
+        follows = settings.follow and settings.clean_up
+        drifted = not follows and abs(self._drift()) > _DRIFT_TO_WARN_GREY_LEVELS
+        if settings.within_m > 0.0 and covered > _COVERAGE_TO_WARN:
+            texts["depth"] = (
+                f"most of the image is nearer than within_m, {settings.within_m:g} m: choose it "
+                "between the person and the wall, and let nothing else stand before it"
+            )
+        elif settings.within_m == 0.0 and (drifted or covered > _COVERAGE_TO_WARN):
+            texts["brightness"] = (
+                "the whole scene changed its brightness: switch the camera's automatic exposure "
+                "and white balance off (v4l2-ctl -c auto_exposure=1,white_balance_automatic=0), "
+                "then call background/learn with nobody in view"
+            )
+        return texts
 
 
 main = node_main("background", BackgroundNode, BackgroundParameters)

@@ -12,8 +12,7 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import Float32, Float32MultiArray, MultiArrayDimension, MultiArrayLayout
 
 from cardbox_tracker.applications.ergonomics.rula import (
-    ABOVE,
-    ACTION_LEVELS,
+    RULA,
     SAMPLES,
     RulaConfig,
     ScoreDistribution,
@@ -81,17 +80,17 @@ def _report_message(
     message: JointState, scores: ScoreDistribution, parts: Mapping[str, str], name: str
 ) -> DiagnosticArray:
     """Return the scores of one image, and those of its ``parts``, under its header."""
-    meaning = next(text for low, high, text in ACTION_LEVELS if low <= scores.likeliest <= high)
+    meaning = next(text for low, high, text in RULA.levels if low <= scores.likeliest <= high)
     values = {
         "score": f"{scores.mean:.2f}",
         "likeliest score": str(scores.likeliest),
         "score of the mean posture": str(scores.of_mean),
-        f"chance above {ABOVE}": f"{scores.chance_above(ABOVE):.3f}",
+        f"chance above {RULA.above}": f"{scores.chance_above(RULA.above):.3f}",
         "score with the left arm": f"{expected(scores.left):.2f}",
         "score with the right arm": f"{expected(scores.right):.2f}",
         **parts,
     }
-    is_high = scores.likeliest > ABOVE
+    is_high = scores.likeliest > RULA.above
     return DiagnosticArray(
         header=message.header,
         status=[

@@ -15,11 +15,11 @@ import numpy as np
 import pytest
 
 from cardbox_tracker.applications.ergonomics.recording import (
-    CSV_HEADER,
     SHARES_HEADER,
     MomentImages,
     RulaObserver,
     RulaRow,
+    header_of,
     score_shares,
     summarize,
     worst_moments,
@@ -34,7 +34,7 @@ from cardbox_tracker.applications.ergonomics.report import (
     write_page,
 )
 from cardbox_tracker.applications.ergonomics.rula import (
-    PARTS,
+    RULA,
     RulaConfig,
     ScoreDistribution,
     declared,
@@ -65,7 +65,7 @@ def row(
         grand = (1 + low - score) * one_of(low, 7)
         if score > low:
             grand = grand + (score - low) * one_of(low + 1, 7)
-        parts = {part.name: one_of(1, part.highest) for part in PARTS}
+        parts = {part.name: one_of(1, part.highest) for part in RULA.parts}
         parts["trunk"] = one_of(trunk, 6)
         scores = ScoreDistribution(grand, grand, grand, parts, of_mean=low)
     return RulaRow(round(time_s * 1e9), state, scores, time_s, frozenset(measured))
@@ -98,12 +98,17 @@ def test_the_table_has_a_row_an_image(tmp_path: Path) -> None:
     write_csv(rows_of(3, None, 6), tmp_path / "r.csv")
     with (tmp_path / "r.csv").open(encoding="utf-8") as file:
         header, first, lost, last = csv.reader(file)
-    assert tuple(header) == CSV_HEADER
+    assert tuple(header) == header_of(RULA)
     assert first[:5] == ["0", "tracking", "3.000", "3", "0.000"]
-    assert lost == ["100000000", "lost", *[""] * (len(CSV_HEADER) - 2)]
+    assert lost == ["100000000", "lost", *[""] * (len(header_of(RULA)) - 2)]
     assert (last[3], last[4]) == ("6", "1.000")
     declared = ["declared"] * 2
-    assert last[-4 - len(PARTS) :] == [*["1.000"] * len(PARTS), "declared", "6", *declared]
+    assert last[-4 - len(RULA.parts) :] == [
+        *["1.000"] * len(RULA.parts),
+        "declared",
+        "6",
+        *declared,
+    ]
 
 
 def test_time_is_divided_among_scores() -> None:
@@ -257,7 +262,7 @@ def test_a_page_has_what_the_reader_needs(tmp_path: Path) -> None:
     words = page(tmp_path, {6 * 10**9: JPEG}).words
     for one in declared(RulaConfig()):
         assert one.name.replace("_", " ") in words
-    for part in PARTS:
+    for part in RULA.parts:
         assert part.words in words
     assert "McAtamney" in words
     assert "1. 6.0 s: score 7.0, but the posture may be wrong (" in words

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from cardbox_tracker.applications.ergonomics.rula import (
-    PARTS,
+    RULA,
     SAMPLES,
     TABLE_A,
     TABLE_B,
@@ -140,7 +140,7 @@ def test_tables_count_without_load_and_muscle_use() -> None:
     assert (found.left.table_a, found.right.table_a, found.table_b) == (7, 3, 4)
     spread = score_distribution(BODY, posture(torso_pitch=30)[None], config)
     assert {name: len(chances) for name, chances in spread.parts.items()} == {
-        part.name: part.highest for part in PARTS
+        part.name: part.highest for part in RULA.parts
     }
     assert spread.parts["trunk"].tolist() == [0, 0, 1, 0, 0, 0]
 

@@ -11,7 +11,6 @@ from cardbox_tracker.applications.simulation.person import (
     FINGER_REACH,
     girdle_lift_m,
     person_frames,
-    person_keypoints_m,
     person_parts,
 )
 from cardbox_tracker.measuring.shoulders import GIRDLE_RISE
@@ -54,14 +53,14 @@ def test_hanging_arms_are_those_of_the_model() -> None:
     for name in ("front", "side"):
         posture = reference_posture(name)
         np.testing.assert_allclose(
-            person_keypoints_m(BODY, posture), pose(BODY.rigid, posture).keypoints_m
+            person_frames(BODY, posture).keypoints_m, pose(BODY.rigid, posture).keypoints_m
         )
 
 
 @pytest.mark.parametrize("roll", [0.0, 20.0])
 def test_a_raised_arm_is_lifted_along_the_torso_and_the_other_is_not(roll: float) -> None:
     posture = raised(90.0, yaw=40.0, roll=roll)
-    moved = person_keypoints_m(BODY, posture) - pose(BODY.rigid, posture).keypoints_m
+    moved = person_frames(BODY, posture).keypoints_m - pose(BODY.rigid, posture).keypoints_m
     up = pose(BODY.rigid, posture).torso_rotation[:, 2]
     lift = girdle_lift_m(BREADTH_M, np.pi / 2)
     np.testing.assert_allclose(moved[:3], np.tile(lift * up, (3, 1)), atol=1e-12)
@@ -79,9 +78,9 @@ def test_an_arm_raised_forwards_is_lifted_as_much() -> None:
 @given(st.lists(st.floats(-1.5, 1.5), min_size=2 * N_JOINTS, max_size=2 * N_JOINTS))
 def test_many_postures_are_those_one_by_one(angles: list[float]) -> None:
     postures = np.array(angles).reshape(2, N_JOINTS)
-    together = person_keypoints_m(BODY, postures)
+    together = person_frames(BODY, postures).keypoints_m
     for posture, points in zip(postures, together, strict=True):
-        np.testing.assert_allclose(points, person_keypoints_m(BODY, posture), atol=1e-12)
+        np.testing.assert_allclose(points, person_frames(BODY, posture).keypoints_m, atol=1e-12)
 
 
 def test_fingers_end_beyond_the_hand_and_are_narrower() -> None:

@@ -13,7 +13,6 @@ from cardbox_tracker.applications.simulation.person import (
     SHIRT,
     SKIN,
     person_frames,
-    person_keypoints_m,
     random_body,
 )
 from cardbox_tracker.applications.simulation.renderer import Renderer, Scene
@@ -69,7 +68,9 @@ def test_every_person_covers_their_skeleton(seed: int, name: str) -> None:
     silhouette = renderer(camera=camera).silhouette(body, posture)
     assert set(np.unique(silhouette)) == {0, 255}
     frames = person_frames(body, posture)
-    inner = np.vstack([person_keypoints_m(body, posture), frames.hip, frames.neck, frames.head])
+    inner = np.vstack(
+        [person_frames(body, posture).keypoints_m, frames.hip, frames.neck, frames.head]
+    )
     u, v = np.rint(camera.project(camera.reference_to_optical(inner))).astype(int).T
     seen = (u >= 0) & (u < camera.width) & (v >= 0) & (v < camera.height)
     assert seen[-3:].all()

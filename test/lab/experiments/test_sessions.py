@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from cardbox_tracker.applications.simulation.person import person_keypoints_m
+from cardbox_tracker.applications.simulation.person import person_frames
 from cardbox_tracker.common.errors import CardboxError
 from cardbox_tracker.person.model import BodyModel
 from lab.experiments.sessions import (
@@ -40,7 +40,9 @@ def test_silhouettes_and_truth_belong_together(session: Session) -> None:
 
 def test_the_truth_is_that_of_the_kinematics(session: Session) -> None:
     person = BodyModel.of(hip_height_m=-0.51)
-    expected = session.camera.reference_to_optical(person_keypoints_m(person, session.postures))
+    expected = session.camera.reference_to_optical(
+        person_frames(person, session.postures).keypoints_m
+    )
     np.testing.assert_allclose(session.keypoints_m, expected, atol=1e-4)
     np.testing.assert_allclose(session.torso_rad, session.postures[:, 1:4], atol=1e-3)
 

@@ -19,7 +19,7 @@ from cardbox_tracker.person.skeleton import JOINT_STATE_NAMES
 from cardbox_tracker.person.urdf import urdf_from_body
 from cardbox_tracker.recordings.outputs import OUTPUTS
 from cardbox_tracker.recordings.result_bag import result_writer
-from cardbox_tracker.ros.demo.client import Client, topics_of
+from cardbox_tracker.ros.demo.run import Client, topics_of
 
 NAMES = (
     *("body_model", "robot_description", "silhouette", "silhouette/camera_info", "overlay"),
