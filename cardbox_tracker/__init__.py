@@ -14,7 +14,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from cardbox_tracker.applications.exporting.result import Result, read_result
+    from cardbox_tracker.applications.exporting.formats import Result, read_result
     from cardbox_tracker.camera.calibration_file import load_calibration
     from cardbox_tracker.camera.camera import Calibration, Camera
     from cardbox_tracker.camera.extrinsics import Extrinsics
@@ -126,7 +126,7 @@ _MODULES = {
     "segmentation.empty_scene": ("BackgroundLearner", "BackgroundModel"),
     "camera.extrinsics": ("Extrinsics",),
     "camera.extrinsics_files": ("load_extrinsics",),
-    "applications.exporting.result": ("Result", "read_result"),
+    "applications.exporting.formats": ("Result", "read_result"),
     "commands.python": ("track",),
 }
 _MODULE_OF = {name: module for module, names in _MODULES.items() for name in names}

@@ -14,7 +14,7 @@ from cardbox_tracker.commands import track as command
 from cardbox_tracker.common.errors import CardboxError
 
 if TYPE_CHECKING:
-    from cardbox_tracker.applications.exporting.result import Result
+    from cardbox_tracker.applications.exporting.formats import Result
 
 _WITH_UNIT = ("fov_deg", "stature_m", "distance_m", "within_m", "start_s", "end_s")
 
@@ -38,7 +38,7 @@ def track(recording: str | os.PathLike[str], **options: Any) -> Result:
     Raises:
         CardboxError: options are wrong, or a file cannot be read or written.
     """
-    from cardbox_tracker.applications.exporting.result import read_result
+    from cardbox_tracker.applications.exporting.formats import read_result
     from cardbox_tracker.recordings.folder import is_one_recording
 
     own = options.get("detector")

@@ -7,9 +7,9 @@ import time
 import numpy as np
 from numpy.typing import NDArray
 
-from cardbox_tracker.applications.simulation.cameras import SyntheticCamera, synthetic_cameras
 from cardbox_tracker.applications.simulation.motions import WAVE_S, wave
 from cardbox_tracker.applications.simulation.renderer import Renderer, Scene
+from cardbox_tracker.applications.simulation.session import SyntheticCamera, synthetic_cameras
 from cardbox_tracker.camera.view import OtherCamera
 from cardbox_tracker.search.config import default_preset
 from cardbox_tracker.tracking.observation import Observation

@@ -9,8 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from cardbox_tracker.applications.exporting.formats import formats
-from cardbox_tracker.applications.exporting.result import read_result
+from cardbox_tracker.applications.exporting.formats import formats, read_result
 from cardbox_tracker.commands.main import main
 from cardbox_tracker.commands.request import points_named
 from cardbox_tracker.common.errors import CardboxError

@@ -15,8 +15,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from cardbox_tracker.applications.exporting.motion import Motion, held
-from cardbox_tracker.applications.exporting.placed import floor_below, frames_of
+from cardbox_tracker.applications.exporting.motion import Motion, floor_below, frames_of, held
 from cardbox_tracker.common.errors import CardboxError
 from cardbox_tracker.common.files import atomic_path
 from cardbox_tracker.person.legs import ANKLE_SHARE, HIP_SHARE, SHANK_SHARE, THIGH_SHARE, stature_of

@@ -2,25 +2,29 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from cardbox_tracker.applications.exporting.bvh import write_bvh
 from cardbox_tracker.applications.exporting.markers import ezc3d_or_error, write_c3d, write_trc
 from cardbox_tracker.applications.exporting.mot import write_mot
-from cardbox_tracker.applications.exporting.motion import Motion
-from cardbox_tracker.applications.exporting.placed import images_of_body
+from cardbox_tracker.applications.exporting.motion import Motion, images_of_body
 from cardbox_tracker.common.errors import CardboxError
 from cardbox_tracker.common.extensions import EXPORTERS, extensions, loaded
-from cardbox_tracker.common.files import write_table
+from cardbox_tracker.common.files import scene_beside, write_table
+from cardbox_tracker.measuring.scene import Scene, load_scene
 from cardbox_tracker.person.isb_angles import ISB_NAMES, isb_angles
 from cardbox_tracker.person.legs import floor_m
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.skeleton import JOINT_NAMES, NECK_NAMES, PLACE_NAMES, UNITS
+from cardbox_tracker.recordings import result_reader
 from cardbox_tracker.recordings.result_reader import Results
+from cardbox_tracker.recordings.result_table import units
 from cardbox_tracker.tracking.estimate import UNCERTAIN
 
 
@@ -122,3 +126,57 @@ def export(results: Results, path: Path, to: Format, model: BodyModel | None = N
     elif to.has_places and body is not None and floor_m(body) is None:
         lines.append("the floor is not known, so heights are those above the camera")
     return lines
+
+
+@dataclass(frozen=True)
+class Result(Results):
+    """Results of one person, with camera and people as of ``OUT.scene.yaml`` if they are known."""
+
+    scene: Scene | None = None
+
+    def to_pandas(self) -> Any:
+        """Return a ``pandas.DataFrame`` with a row for each image and the columns of the table.
+
+        Unknown numbers are nan, unknown texts empty; ``stamp_ns`` is the only stamp.
+
+        Raises:
+            CardboxError: pandas is not installed.
+        """
+        try:
+            import pandas
+        except ImportError as error:
+            raise CardboxError(
+                f"to_pandas needs the library pandas ({error}); install it with "
+                "pip install 'cardbox_tracker[pandas]'"
+            ) from None
+        times = {"stamp_ns": self.stamp_ns, "time_s": self.time_s, "state": self.state}
+        found = {**times, **self.numbers, **self.texts}
+        return pandas.DataFrame({name: found[name] for name in units(*[True] * 3) if name in found})
+
+    def save(self, path: str | os.PathLike[str]) -> list[str]:
+        """Write a file in the format of ``cardbox export`` that its ending says, and replace it.
+
+        Returns:
+            Lines that say what was written, and what is not known.
+
+        Raises:
+            CardboxError: no format has this ending, or see :func:`~.formats.export`.
+        """
+        path, known = Path(path), formats().values()
+        fitting = [one for one in known if path.name.endswith(one.suffix)]
+        if not fitting:
+            endings = ", ".join(one.suffix for one in known)
+            raise CardboxError(f"no format has the ending of {path}; those are {endings}")
+        return export(self, path, max(fitting, key=lambda one: len(one.suffix)))
+
+
+def read_result(path: str | os.PathLike[str], person: int | None = None) -> Result:
+    """Return the results in a table or a bag, see :func:`~.result_reader.read_results`, and scene.
+
+    Raises:
+        CardboxError: a file cannot be read, or contains what no result is; the text names the line.
+    """
+    path = Path(path)
+    results, beside = result_reader.read_results(path, person), scene_beside(path)
+    scene = load_scene(beside) if beside.is_file() else None
+    return Result(**vars(results), scene=scene)

@@ -12,8 +12,12 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from cardbox_tracker.applications.exporting.motion import Motion
-from cardbox_tracker.applications.exporting.placed import floor_below, frames_of, in_reference
+from cardbox_tracker.applications.exporting.motion import (
+    Motion,
+    floor_below,
+    frames_of,
+    in_reference,
+)
 from cardbox_tracker.common.errors import CardboxError
 from cardbox_tracker.common.files import atomic_path
 from cardbox_tracker.person.hands import WRIST_SHARE

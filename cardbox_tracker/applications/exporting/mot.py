@@ -12,8 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
-from cardbox_tracker.applications.exporting.motion import Motion, held
-from cardbox_tracker.applications.exporting.placed import floor_below, frames_of
+from cardbox_tracker.applications.exporting.motion import Motion, floor_below, frames_of, held
 from cardbox_tracker.common.files import atomic_path
 from cardbox_tracker.person.isb_angles import LABORATORY, LEAST_BENT_RAD, thorax_angles
 from cardbox_tracker.person.model import BodyModel

@@ -11,8 +11,7 @@ import numpy as np
 
 from cardbox_tracker.applications.drawing.page import png_of, render_page
 from cardbox_tracker.applications.exporting.markers import markers_of
-from cardbox_tracker.applications.exporting.motion import Motion
-from cardbox_tracker.applications.exporting.placed import floor_below, in_reference
+from cardbox_tracker.applications.exporting.motion import Motion, floor_below, in_reference
 from cardbox_tracker.person.isb_angles import LABORATORY
 from cardbox_tracker.person.legs import LEG_NAMES
 from cardbox_tracker.person.model import BodyModel

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from cardbox_tracker.applications.exporting.placed import in_reference
+from cardbox_tracker.applications.exporting.motion import in_reference
 from cardbox_tracker.person.hands import HAND_NAMES, WRIST_SHARE, turn_of
 from cardbox_tracker.person.kinematics import pose
 from cardbox_tracker.person.legs import (

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from cardbox_tracker.applications.exporting.markers import markers_of, write_c3d, write_trc
-from cardbox_tracker.applications.exporting.placed import images_of_body
+from cardbox_tracker.applications.exporting.motion import images_of_body
 from cardbox_tracker.common.errors import CardboxError
 from cardbox_tracker.person.model import BodyModel
 
