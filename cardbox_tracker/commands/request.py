@@ -195,10 +195,6 @@ class ClassName(str):
     """Module and name of a class, ``MODULE:CLASS``, which only a command line may give."""
 
 
-class OptionsError(CardboxError):
-    """Options are missing, wrong or contradict each other; the text names all of them."""
-
-
 class Problems:
     """What is wrong with the options of a recording, collected for one error.
 
@@ -231,7 +227,7 @@ class Problems:
             return otherwise
 
     def check(self) -> None:
-        """Raise OptionsError if there was a problem."""
+        """Raise CardboxError if there was a problem."""
         faults = list(dict.fromkeys(self._faults))
         if self._missing:
             *most, last = self._missing
@@ -239,7 +235,7 @@ class Problems:
             hints = f" ({'; '.join(self._hints)})" if self._hints else ""
             faults.insert(0, f"{self._recording} needs {needed}{hints}")
         if faults:
-            raise OptionsError("; also, ".join(faults))
+            raise CardboxError("; also, ".join(faults))
 
 
 def add_recording(parser: argparse.ArgumentParser, required: bool = True) -> None:

@@ -13,7 +13,6 @@ import pytest
 
 from cardbox_tracker.commands.main import build_parser
 from cardbox_tracker.commands.request import (
-    OptionsError,
     TrackingRequest,
     tracking_request,
     with_own_options,
@@ -52,7 +51,7 @@ def asked(recording: object, *words: object) -> TrackingRequest:
 
 
 def refused(recording: object, *words: object) -> str:
-    with pytest.raises(OptionsError) as caught:
+    with pytest.raises(CardboxError) as caught:
         asked(recording, *words)
     return str(caught.value)
 
@@ -294,7 +293,7 @@ def test_settings_that_are_wrong(
 def test_a_file_that_contradicts_itself_is_refused(tmp_path: Path) -> None:
     (tmp_path / "a.options").write_text("--stature 1.7 --model a.yaml --background 0:1")
     found = with_own_options(line("in", "--stature", 1.7), tmp_path, "a")
-    with pytest.raises(OptionsError, match="--stature and --model both say who is tracked"):
+    with pytest.raises(CardboxError, match="--stature and --model both say who is tracked"):
         tracking_request(found)
 
 

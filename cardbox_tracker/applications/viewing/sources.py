@@ -6,54 +6,13 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
-from cardbox_tracker.applications.drawing.overlay import draw_camera_overlay
 from cardbox_tracker.applications.viewing.scene import Scene
 from cardbox_tracker.camera.encodings import SentImage, decode_bgr
 from cardbox_tracker.common.errors import BagError
-from cardbox_tracker.person.model_file import dumps_body_model
 from cardbox_tracker.recordings.bag_reader import BagReader, stamp_ns_of
-from cardbox_tracker.recordings.outputs import joint_deviations, joint_values
 from cardbox_tracker.recordings.result_reader import MODEL, joints_of, namespace_of, points_of
-from cardbox_tracker.recordings.silhouettes import RecordedFrame
-from cardbox_tracker.tracking.estimate import Estimate
-from cardbox_tracker.tracking.tracker import Tracker
 
 _ROBOT, _JOINTS, _OVERLAY = "/robot_description", "/joint_states", "/overlay"
-
-
-class ShownTracking:
-    """Observer of :func:`~cardbox_tracker.recordings.track.track_recording` that shows each image.
-
-    Attributes:
-        count: number of images with a posture.
-    """
-
-    def __init__(self, scene: Scene) -> None:
-        """Start with no images."""
-        self._scene = scene
-        self._described: object = None
-        self.count = 0
-
-    def __call__(self, frame: RecordedFrame, estimate: Estimate, tracker: Tracker) -> None:
-        """Show one image."""
-        scene, stamp_ns, tilt = self._scene, frame.stamp_ns, tracker.body.camera_pose
-        if tracker.body is not self._described:
-            scene.model(dumps_body_model(tracker.body), "the tracker")
-        self._described = tracker.body
-        scene.state(stamp_ns, estimate.state)
-        scene.image(stamp_ns, draw_camera_overlay(frame.picture, 0, estimate, tracker))
-        joints, deviations = joint_values(estimate), joint_deviations(estimate)
-        if joints is not None and deviations is not None:
-            self.count += 1
-            scene.joints(stamp_ns, joints)
-            scene.deviations(stamp_ns, deviations)
-        if estimate.keypoint_states is not None:
-            scene.keypoint_states(stamp_ns, estimate.keypoint_states)
-        if estimate.keypoints_m is not None:
-            standing = estimate.as_camera_stands(tilt.roll_rad)
-            scene.keypoints(stamp_ns, np.asarray(standing.keypoints_m))
 
 
 def show_results(
@@ -123,19 +82,3 @@ def _handlers(bag: BagReader, scene: Scene, space: str) -> dict[str, Handler]:
                 stamp_ns_of(m), name, joints_of(m)
             )
     return handlers
-
-
-def image_stamps(path: Path, person: int | None = None) -> set[int]:
-    """Return the stamps of the images in a bag of results, ns.
-
-    Without overlays these are the images with joints.
-
-    Raises:
-        BagError: the bag cannot be read, or has no results of the tracker.
-    """
-    with BagReader(path) as bag:
-        space = namespace_of(bag, person)
-        named = (space + _OVERLAY, space + _JOINTS)
-        topic = next((topic for topic in named if topic in bag.topics), None)
-        messages = [] if topic is None else bag.messages([topic])
-        return {stamp_ns_of(bag.deserialize(message)) for message in messages}

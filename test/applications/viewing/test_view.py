@@ -178,21 +178,22 @@ def test_mistakes_are_told(
     assert expected in capsys.readouterr().err
 
 
-def test_images_alone_are_tracked_or_refused(
+def test_errors_are_plotted_where_the_truth_is_given(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     pytest.importorskip("rerun", reason="rerun-sdk is not installed")
-    synthesize_session(tmp_path / "session", "bow", form=SessionFormat(4.0, 160, 120))
+    session, out, found = tmp_path / "session", tmp_path / "v.rrd", tmp_path / "found"
+    synthesize_session(session, "bow", form=SessionFormat(4.0, 160, 120))
     save_body_model(BODY, tmp_path / "person.yaml")
-    out = tmp_path / "v.rrd"
-    assert view(tmp_path / "session", "--start", "22", "--save", out) == 1
-    assert "--model" in capsys.readouterr().err
+    assert view(session, "--save", out) == 1
+    assert "make them with 'cardbox track" in capsys.readouterr().err
     assert not out.exists()
-    rest = ("--background", "0:3.9", "--model", tmp_path / "person.yaml", "--start", "22")
-    assert view(tmp_path / "session", *rest, "--save", out) == 0
+    words = "--background", "0:3.9", "--start", "22", "--model", tmp_path / "person.yaml"
+    words = *words, "--csv", tmp_path / "found.csv", "--bag", found
+    assert main(["track", *map(str, (session, *words))]) == 0
+    assert view(found, "--truth", session / "ground_truth.json", "--save", out) == 0
     rows = rows_of(out)
     assert rows["image"] >= rows["keypoints/joints"] > 0
-    # The truth lies beside the recording.
     assert rows["error/absolute"] == rows["truth/joints"] == rows["keypoints/joints"]
 
 
