@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cardbox_tracker.applications.simulation.motions import WAVE_S, wave
-from cardbox_tracker.applications.simulation.renderer import Renderer, Scene
+from cardbox_tracker.applications.simulation.renderer import Renderer
 from cardbox_tracker.applications.simulation.session import session_camera
 from cardbox_tracker.camera.camera import Camera
 from cardbox_tracker.common.errors import CardboxError
@@ -46,7 +46,7 @@ def make_scene(width: int, height: int, count: int, empty: int = 30) -> Benchmar
     """Draw ``count`` images of the motion ``wave``, from its beginning on."""
     body = BodyModel.of(hip_height_m=-0.51)
     camera = session_camera(width, height)
-    renderer = Renderer(camera, Scene(), np.random.default_rng(0))
+    renderer = Renderer(camera, np.random.default_rng(0))
     background = np.array([renderer.image()[0] for _ in range(empty)])
     drawn = [renderer.image(body, wave(i / 15.0 % WAVE_S)) for i in range(count)]
     return BenchmarkScene(

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cardbox_tracker.applications.simulation.motions import WAVE_S, wave
-from cardbox_tracker.applications.simulation.renderer import Renderer, Scene
+from cardbox_tracker.applications.simulation.renderer import Renderer
 from cardbox_tracker.applications.simulation.session import SyntheticCamera, synthetic_cameras
 from cardbox_tracker.camera.view import OtherCamera
 from cardbox_tracker.search.config import default_preset
@@ -50,6 +50,6 @@ def beside(scene: BenchmarkScene) -> SyntheticCamera:
 
 def seen_by(scene: BenchmarkScene, other: SyntheticCamera) -> list[NDArray[np.uint8]]:
     """Return the silhouettes (H, W) of the scene in the image of ``other``."""
-    renderer = Renderer(other.camera, Scene(), np.random.default_rng(0))
+    renderer = Renderer(other.camera, np.random.default_rng(0))
     postures = (wave(i / 15.0 % WAVE_S) for i in range(len(scene.images)))
     return [renderer.silhouette(*other.seen(scene.body, posture)) for posture in postures]

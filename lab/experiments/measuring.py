@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cardbox_tracker.applications.simulation.person import random_body
-from cardbox_tracker.applications.simulation.renderer import Renderer, Scene
+from cardbox_tracker.applications.simulation.renderer import Renderer
 from cardbox_tracker.applications.simulation.session import session_camera
 from cardbox_tracker.measuring.config import InitializationConfig
 from cardbox_tracker.measuring.measure import initialize_body
@@ -67,7 +67,7 @@ def measure(seed: int, person: int, search_seed: int) -> Arrays:
     else:
         body = random_body(rng, DISTANCE_M)
     camera = session_camera()
-    renderer = Renderer(camera, Scene(), rng)
+    renderer = Renderer(camera, rng)
     references = {}
     for name in REFERENCE_NAMES:
         posture = reference_posture(name)

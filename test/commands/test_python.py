@@ -16,7 +16,7 @@ import pytest
 import cardbox_tracker
 from cardbox_tracker.applications.drawing.video import video_file
 from cardbox_tracker.applications.simulation.person import person_frames
-from cardbox_tracker.applications.simulation.renderer import Renderer, Scene
+from cardbox_tracker.applications.simulation.renderer import Renderer
 from cardbox_tracker.camera.camera import Camera
 from cardbox_tracker.common.errors import CardboxError
 from cardbox_tracker.detectors.detector import Detector
@@ -64,7 +64,7 @@ class FakeYolo:
 def film(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A film of somebody who stands, in a folder with the example's detector."""
     folder = tmp_path_factory.mktemp("film")
-    renderer = Renderer(CAMERA, Scene(), np.random.default_rng(0))
+    renderer = Renderer(CAMERA, np.random.default_rng(0))
     with video_file(folder / "film.mp4", 10.0) as add:
         for _ in range(6):
             add(np.repeat(renderer.image(BODY, FRONT)[0][..., None], 3, axis=2))

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from cardbox_tracker.applications.simulation.motions import wave
-from cardbox_tracker.applications.simulation.renderer import Renderer, Scene
+from cardbox_tracker.applications.simulation.renderer import Renderer
 from cardbox_tracker.camera.camera import Camera
 from cardbox_tracker.camera.extrinsics import Extrinsics
 from cardbox_tracker.camera.view import OtherCamera, View
@@ -54,8 +54,8 @@ def sightings(
 ) -> list[Sighting]:
     """A round person, who is not the model, as both cameras see them."""
     view = View.of(body, CAMERA, OtherCamera(OTHER, pose))
-    scene, rng = Scene(), np.random.default_rng(0)
-    first, other = Renderer(CAMERA, scene, rng), Renderer(view.camera, scene, rng)
+    rng = np.random.default_rng(0)
+    first, other = Renderer(CAMERA, rng), Renderer(view.camera, rng)
     found = []
     for state in states:
         there = view.states(state)

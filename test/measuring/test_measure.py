@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from cardbox_tracker.applications.simulation.person import FINGER_REACH, random_body
-from cardbox_tracker.applications.simulation.renderer import Renderer, Scene
+from cardbox_tracker.applications.simulation.renderer import Renderer
 from cardbox_tracker.applications.simulation.session import session_camera
 from cardbox_tracker.camera.rasterisation import render
 from cardbox_tracker.common.errors import InitializationError
@@ -207,7 +207,7 @@ def test_a_distance_too_large_makes_everything_as_much_larger() -> None:
 def test_a_rounded_person_with_legs_is_measured(seed: int) -> None:
     """The cardbox never fits them exactly; 0.80 is what recorded people have to reach."""
     body = random_body(np.random.default_rng(seed)).with_values(side_turn="right")
-    renderer = Renderer(CAMERA, Scene(), np.random.default_rng(seed))
+    renderer = Renderer(CAMERA, np.random.default_rng(seed))
     references = {
         name: renderer.silhouette(body, reference_posture(name, "right"))
         for name in REFERENCE_NAMES

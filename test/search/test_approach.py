@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from cardbox_tracker.applications.simulation.renderer import Renderer, Scene
+from cardbox_tracker.applications.simulation.renderer import Renderer
 from cardbox_tracker.camera.camera import Camera
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.posture import reference_posture, state_limits
@@ -29,7 +29,7 @@ FRONT = reference_posture("front")
 
 def seen_at(distances_m: list[float], body_m: float) -> list[Estimate]:
     """Estimates of a person measured at ``body_m`` who is at these distances, one each frame."""
-    renderer = Renderer(CAMERA, Scene(), np.random.default_rng(0))
+    renderer = Renderer(CAMERA, np.random.default_rng(0))
     body = BodyModel.of(distance_m=body_m, hip_height_m=HIP_HEIGHT_M)
     tracker = Tracker(body, CAMERA, default_preset(), np.random.default_rng(0))
     return [
@@ -60,7 +60,7 @@ def test_nobody_is_sought_where_a_steep_camera_does_not_see_the_body() -> None:
     """7 m away, with the hips as low as here, the body would be above the image."""
     body = BodyModel.of(distance_m=2.28, hip_height_m=-1.64, camera_pitch_rad=np.radians(30.0))
     view = Camera(320, 240, 514.0, 514.0, 159.5, 119.5)
-    renderer = Renderer(view.with_pitch(np.radians(30.0)), Scene(), np.random.default_rng(0))
+    renderer = Renderer(view.with_pitch(np.radians(30.0)), np.random.default_rng(0))
     tracker = Tracker(body, view, default_preset(), np.random.default_rng(0))
     found = tracker.track(renderer.silhouette(body, FRONT))
     assert distance_of(found, 2.28) == pytest.approx(2.28, rel=0.1)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from cardbox_tracker.applications.simulation.renderer import Renderer, Scene
+from cardbox_tracker.applications.simulation.renderer import Renderer
 from cardbox_tracker.camera.camera import Camera
 from cardbox_tracker.common.errors import InitializationError
 from cardbox_tracker.measuring import first_sight, seen_body
@@ -36,7 +36,7 @@ def silhouette(body: BodyModel, raised_rad: float = 0.0) -> np.ndarray:
     posture = reference_posture("front")
     posture[0] = body.placement.lateral_m
     posture[4] += raised_rad
-    renderer = Renderer(CAMERA, Scene(), np.random.default_rng(0))
+    renderer = Renderer(CAMERA, np.random.default_rng(0))
     seen: np.ndarray = renderer.silhouette(body, posture)
     return seen
 

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from cardbox_tracker.applications.simulation.motions import wave
-from cardbox_tracker.applications.simulation.renderer import Renderer, Scene
+from cardbox_tracker.applications.simulation.renderer import Renderer
 from cardbox_tracker.camera.camera import Camera
 from cardbox_tracker.camera.rasterisation import render
 from cardbox_tracker.detectors.image_points import ImagePoints
@@ -485,7 +485,7 @@ def test_an_image_takes_as_many_cycles_as_asked(cycles: int) -> None:
 def test_the_mean_of_the_best_is_steadier_than_the_best() -> None:
     """The standard deviation over ten seeds of the torso's angles, of one still person."""
     # A rounded body, which no posture of the model fits exactly.
-    person = Renderer(CAMERA, Scene(), np.random.default_rng(0)).silhouette(BODY, front())
+    person = Renderer(CAMERA, np.random.default_rng(0)).silhouette(BODY, front())
 
     def spread(average: int) -> float:
         config = replace(paper_preset(), average=average)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from itertools import pairwise
 
 import cv2
@@ -19,38 +18,21 @@ ImageArray = NDArray[np.uint8]
 # fillConvexPoly paints every pixel that an edge touches, which widens outlines by up to a subpixel.
 _SUPERSAMPLING = 4
 _SHIFT = 4
-
-
-@dataclass(frozen=True)
-class Scene:
-    """Wall and sensor.
-
-    Attributes:
-        wall: mean brightness of the wall, grey levels.
-        texture: standard deviation of the wall's blotches, grey levels.
-        noise: standard deviation of the sensor's noise, grey levels.
-        flicker: standard deviation of the whole scene's brightness, as a fraction.
-        shadow: darkening of the wall in the middle of the person's soft shadow, as a fraction.
-    """
-
-    wall: float = 180.0
-    texture: float = 8.0
-    noise: float = 3.0
-    flicker: float = 0.0
-    shadow: float = 0.0
+_WALL = 180.0
 
 
 class Renderer:
-    """Renders one scene; all random numbers come from the given generator."""
+    """Renders a person before a wall; all random numbers come from the given generator."""
 
-    def __init__(self, camera: Camera, scene: Scene, rng: np.random.Generator) -> None:
-        """Generate the wall."""
+    def __init__(
+        self, camera: Camera, rng: np.random.Generator, texture: float = 8.0, noise: float = 3.0
+    ) -> None:
+        """Generate the wall; ``texture`` and ``noise`` are standard deviations, grey levels."""
         self.camera = camera
-        self._scene = scene
-        self._rng = rng
+        self._rng, self._noise = rng, noise
         coarse = rng.normal(0.0, 1.0, (camera.height // 20 + 2, camera.width // 20 + 2))
         blotches = cv2.resize(coarse, (camera.width, camera.height), interpolation=cv2.INTER_CUBIC)
-        self.wall = np.clip(scene.wall + scene.texture * blotches, 0, 255).astype(np.float32)
+        self.wall = np.clip(_WALL + texture * blotches, 0, 255).astype(np.float32)
 
     def silhouette(self, body: BodyModel, posture: NDArray[np.float64]) -> ImageArray:
         """Return the exact silhouette (H, W), 0 or 255, legs included."""
@@ -60,23 +42,16 @@ class Renderer:
         self, body: BodyModel | None = None, posture: NDArray[np.float64] | None = None
     ) -> tuple[ImageArray, ImageArray]:
         """Return a noisy image (H, W) and its silhouette; without a body the empty scene."""
-        scene = self._scene
         clean = self.wall
         mask = np.zeros(clean.shape, np.uint8)
         if body is not None and posture is not None:
             person, cover = self._draw(body, posture)
-            clean = clean * (1.0 - scene.shadow * self._shade(cover)) * (1.0 - cover) + person
+            clean = clean * (1.0 - cover) + person
             mask = np.where(cover >= 0.5, 255, 0).astype(np.uint8)
-        gain = 1.0 + scene.flicker * self._rng.standard_normal()
-        noise = self._rng.standard_normal(clean.shape, dtype=np.float32) * scene.noise
-        return np.clip(np.rint(clean * gain + noise), 0, 255).astype(np.uint8), mask
-
-    def _shade(self, cover: NDArray[np.float32]) -> NDArray[np.float32]:
-        """Return the strength (H, W) of the shadow in [0, 1]; the light comes from above left."""
-        height, width = cover.shape
-        move = np.array([(1.0, 0.0, 0.05 * width), (0.0, 1.0, 0.04 * height)])
-        cast = cv2.warpAffine(cover, move, (width, height))
-        return np.asarray(cv2.GaussianBlur(cast, (0, 0), 0.02 * width), np.float32)
+        # Without this number, a seed would not give the images of committed figures.
+        self._rng.standard_normal()
+        noise = self._rng.standard_normal(clean.shape, dtype=np.float32) * self._noise
+        return np.clip(np.rint(clean + noise), 0, 255).astype(np.uint8), mask
 
     def _draw(
         self, body: BodyModel, posture: NDArray[np.float64]

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from cardbox_tracker.applications.simulation.motions import Segment, timeline
 from cardbox_tracker.applications.simulation.person import person_frames
-from cardbox_tracker.applications.simulation.renderer import Renderer, Scene
+from cardbox_tracker.applications.simulation.renderer import Renderer
 from cardbox_tracker.camera.camera import OPTICAL_FRAME, Camera
 from cardbox_tracker.camera.extrinsics import Extrinsics
 from cardbox_tracker.camera.extrinsics_files import save_camchain
@@ -203,8 +203,7 @@ def synthesize_session(
     rng = np.random.default_rng(seed)
     views = synthetic_cameras(body, camera, cameras)
     renderers = [
-        Renderer(view.camera, Scene(), own)
-        for view, own in zip(views, rng.spawn(cameras), strict=True)
+        Renderer(view.camera, own) for view, own in zip(views, rng.spawn(cameras), strict=True)
     ]
     count = round(segments[-1].end_s * fps)
     truth: list[dict[str, Any]] = []
