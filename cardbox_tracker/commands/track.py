@@ -188,15 +188,13 @@ def _check_derived(options: argparse.Namespace, is_piped: bool) -> None:
     """Check what is made of the finished table, before it is."""
     for form in (options.export or {}).values():
         form.check()
-    for flag, suffix in (("plot", ".png"), ("report", ".html")):
+    for flag, suffix in (("plot", ".png"), ("report", ".html"), ("video", ".mp4")):
         path = getattr(options, flag)
         if path is not None and path.suffix != suffix:
             raise CardboxError(f"--{flag} {path}: its name must end in {suffix}")
     given = [flag for flag in _OF_ONE[-3:] if getattr(options, flag) is not None]
     if given and is_piped:
         raise CardboxError(f"--{given[0]} reads the table, so --csv must name a file")
-    if options.report is not None and options.video is not None and options.video.suffix != ".mp4":
-        raise CardboxError("--report shows the video, which browsers play as .mp4: change --video")
 
 
 def _derived(

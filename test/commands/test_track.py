@@ -52,7 +52,7 @@ GIVEN = ("--background", "0:3.9", "--start", 16, "--stature", 1.72)
         (("--csv", "FOLDER/missing/out.csv"), "out.csv: No such file or directory; choose"),
         (("--csv", "FOLDER/text.txt/out.csv"), "out.csv: Not a directory; choose a folder"),
         (("--csv", "FOLDER/empty folder"), "it is a folder; give the name of a file"),
-        (("--video", "FOLDER/out.gif"), "its name must end in .mp4 or .avi"),
+        (("--video", "FOLDER/out.gif"), "its name must end in .mp4"),
         (("--video", "FOLDER/missing/out.mp4"), "out.mp4: No such file or directory"),
         (("--bag", "FOLDER/session"), "session: it is read, as"),
         (("--csv", "FOLDER/session/session.mcap"), "session.mcap: it is read, as"),

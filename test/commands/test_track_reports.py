@@ -114,7 +114,7 @@ def in_browser(page: Path) -> str:
         (("--export", "trc,fbx"), "expected formats of trc, bvh, c3d, mot, isb"),
         (("--plot", "FOLDER/angles.jpg"), "its name must end in .png"),
         (("--report", "FOLDER/page"), "its name must end in .html"),
-        (("--report", "FOLDER/a.html", "--video", "FOLDER/a.avi"), "--report shows the video"),
+        (("--report", "FOLDER/a.html", "--video", "FOLDER/a.avi"), "must end in .mp4"),
         (("--export", "trc", "--csv", "/dev/null"), "--export reads the table"),
         (("--plot", "FOLDER/there.png"), "there.png exists"),
     ],

@@ -6,7 +6,6 @@ import os
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
 from fractions import Fraction
-from importlib.util import find_spec
 from pathlib import Path
 
 import cv2
@@ -34,15 +33,15 @@ def video_file(path: str | os.PathLike[str], fps: float) -> Iterator[Callable[[I
     appears on exit, and after an error there is none.
 
     Args:
-        path: file to write, .mp4, which browsers play, or .avi.
+        path: file to write, .mp4, which browsers play.
         fps: frames a second.
 
     Raises:
-        CardboxError: the file cannot be written, or its suffix is not .mp4 or .avi.
+        CardboxError: the file cannot be written, or its suffix is not .mp4.
     """
     name = os.fspath(path)
-    if not name.endswith((".mp4", ".avi")):
-        raise CardboxError(f"cannot write the video {name}; its name must end in .mp4 or .avi")
+    if not name.endswith(".mp4"):
+        raise CardboxError(f"cannot write the video {name}; its name must end in .mp4")
     with atomic_path(path) as temporary, ExitStack() as stack:
         write, size = None, (0, 0)
 
@@ -68,21 +67,7 @@ def video_file(path: str | os.PathLike[str], fps: float) -> Iterator[Callable[[I
 def _encoder(
     path: Path, fps: float, size: tuple[int, int]
 ) -> Iterator[Callable[[ImageArray], object]]:
-    """Yield a function that adds an image of ``size`` to a file: H.264 for .mp4, else MJPG.
-
-    OpenCV's wheels have no encoder for H.264. Without PyAV, .mp4 has VP9, which browsers play, too,
-    but which takes ten times longer.
-    """
-    if find_spec("av") is None or path.suffix != ".mp4":
-        code = "vp09" if path.suffix == ".mp4" else "MJPG"
-        writer = cv2.VideoWriter(str(path), cv2.VideoWriter.fourcc(*code), fps, size)
-        if not writer.isOpened():
-            raise ValueError(f"OpenCV has no encoder for {code}")
-        try:
-            yield writer.write
-        finally:
-            writer.release()
-        return
+    """Yield a function that adds an image of ``size`` to a file, as H.264, which OpenCV lacks."""
     # It takes 0.1 s to import.
     import av
 
@@ -101,7 +86,7 @@ def overlay_video(path: Path, recording: Recording) -> Iterator[Observer]:
     enlarged to at least 640 px along the longer side.
 
     Raises:
-        CardboxError: the file cannot be written, or its suffix is not .mp4 or .avi.
+        CardboxError: the file cannot be written, or its suffix is not .mp4.
     """
     try:
         rate_hz = round(1e9 / max(1, recording.first.period_ns()), 2)

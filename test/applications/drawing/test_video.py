@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 from pathlib import Path
 
 import cv2
@@ -21,8 +20,8 @@ def write(path: Path | str, count: int = len(LEVELS)) -> None:
             add(np.full((48, 64, 3), level, np.uint8))
 
 
-@pytest.mark.parametrize("name", ["a.mp4", "a.avi"])
-def test_every_image_is_in_the_video(tmp_path: Path, name: str) -> None:
+def test_every_image_is_in_the_video(tmp_path: Path) -> None:
+    name = "a.mp4"
     write(tmp_path / name)
     assert [entry.name for entry in tmp_path.iterdir()] == [name]
     video = cv2.VideoCapture(str(tmp_path / name))
@@ -36,33 +35,28 @@ def test_every_image_is_in_the_video(tmp_path: Path, name: str) -> None:
     video.release()
 
 
-@pytest.mark.parametrize(("has_av", "code"), [(True, "h264"), (False, "VP90")])
-def test_mp4_has_a_codec_that_browsers_play(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, has_av: bool, code: str
-) -> None:
-    if not has_av:
-        monkeypatch.setitem(sys.modules, "av", None)
+def test_mp4_has_a_codec_that_browsers_play(tmp_path: Path) -> None:
     write(tmp_path / "a.mp4")
     video = cv2.VideoCapture(str(tmp_path / "a.mp4"))
-    assert int(video.get(cv2.CAP_PROP_FOURCC)).to_bytes(4, "little") == code.encode()
+    assert int(video.get(cv2.CAP_PROP_FOURCC)).to_bytes(4, "little") == b"h264"
     levels = []
     while (read := video.read())[0]:
         levels.append(read[1].mean())
     assert levels == pytest.approx(LEVELS, abs=4)
     # A browser that loads the file begins to play before its end is there.
     content = (tmp_path / "a.mp4").read_bytes()
-    assert not has_av or content.index(b"moov") < content.index(b"mdat")
+    assert content.index(b"moov") < content.index(b"mdat")
 
 
-@pytest.mark.parametrize("name", ["a.gif", "a", "mp4", "a.mp4.txt"])
+@pytest.mark.parametrize("name", ["a.gif", "a", "mp4", "a.mp4.txt", "a.avi"])
 def test_a_wrong_ending_is_refused(tmp_path: Path, name: str) -> None:
-    with pytest.raises(CardboxError, match=r"\.mp4.*\.avi"):
+    with pytest.raises(CardboxError, match=r"must end in \.mp4"):
         write(tmp_path / name)
     assert list(tmp_path.iterdir()) == []
 
 
 def test_nothing_appears_before_the_video_is_whole(tmp_path: Path) -> None:
-    path = tmp_path / "a.avi"
+    path = tmp_path / "a.mp4"
     with video_file(path, 10.0) as add:
         add(np.zeros((48, 64, 3), np.uint8))
         assert not path.exists()
@@ -70,22 +64,22 @@ def test_nothing_appears_before_the_video_is_whole(tmp_path: Path) -> None:
 
 
 def test_an_error_on_the_way_leaves_the_old_video(tmp_path: Path) -> None:
-    path = tmp_path / "a.avi"
+    path = tmp_path / "a.mp4"
     write(path)
     old = path.read_bytes()
     with pytest.raises(RuntimeError, match="stop"), video_file(path, 10.0):
         raise RuntimeError("stop")
     assert path.read_bytes() == old
-    assert [entry.name for entry in tmp_path.iterdir()] == ["a.avi"]
+    assert [entry.name for entry in tmp_path.iterdir()] == ["a.mp4"]
 
 
 def test_a_folder_that_is_not_there_is_named(tmp_path: Path) -> None:
-    with pytest.raises(CardboxError, match=r"none/a\.avi"):
-        write(tmp_path / "none" / "a.avi")
+    with pytest.raises(CardboxError, match=r"none/a\.mp4"):
+        write(tmp_path / "none" / "a.mp4")
 
 
-@pytest.mark.parametrize("name", ["a.mp4", "a.avi"])
-def test_the_first_image_gives_the_size(tmp_path: Path, name: str) -> None:
+def test_the_first_image_gives_the_size(tmp_path: Path) -> None:
+    name = "a.mp4"
     with video_file(tmp_path / name, 10.0) as add:
         add(np.full((81, 45, 3), 90, np.uint8))
         add(np.full((48, 64, 3), 90, np.uint8))
