@@ -22,6 +22,7 @@ from cardbox_tracker.common.errors import CardboxError, InitializationError
 from cardbox_tracker.common.progress import told
 from cardbox_tracker.measuring.guidance import Cancellation, Guidance, Prompt, measuring, spoken
 from cardbox_tracker.measuring.saved_model import SavedModel
+from cardbox_tracker.measuring.scale import SCALE_REFERENCES
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.model_file import dumps_body_model
 from cardbox_tracker.person.posture import REFERENCE_NAMES
@@ -30,7 +31,12 @@ from cardbox_tracker.ros.messages import conversions
 from cardbox_tracker.ros.messages.results import answer_text, measured_message, refused_message
 from cardbox_tracker.ros.nodes.camera_poses import silhouettes_of
 from cardbox_tracker.ros.nodes.initializer_parameters import InitializerParameters
-from cardbox_tracker.ros.nodes.reference_capture import ReferenceCapture, distance_source, measured
+from cardbox_tracker.ros.nodes.reference_capture import (
+    DepthDistance,
+    ReferenceCapture,
+    SecondCamera,
+    measured,
+)
 from cardbox_tracker.ros.runtime import qos
 from cardbox_tracker.ros.runtime.command_line import plain_command_line
 from cardbox_tracker.ros.runtime.node import CardboxNode, run_node
@@ -57,12 +63,17 @@ class InitializerNode(CardboxNode):
         self._description = self.advertise(String, "robot_description", qos.LATCHED)
         self._result = self.advertise(DiagnosticStatus, "~/result", qos.LATCHED)
         self._guide = GuideOutputs(self)
-        cameras = self.parameters.value.cameras
-        topic = silhouettes_of(cameras or [""])[0]
+        settings = self.parameters.value
+        topic = silhouettes_of(settings.cameras or [""])[0]
         self._topic = self.resolve(topic)
         self._references = ReferenceCapture(self._topic)
-        found = self.parameters.value, self._references, lambda: self._camera
-        self._distance = distance_source(self, *found)
+        self._distance: DepthDistance | SecondCamera | None = None
+        if settings.depth:
+            self._distance = DepthDistance(
+                self, settings.depth, self._references, lambda: self._camera
+            )
+        elif len(settings.cameras) > 1:
+            self._distance = SecondCamera(self, settings)
         self.subscribe(CameraInfo, f"{topic}/camera_info", self._on_info, qos.SILHOUETTE_INPUT)
         self.subscribe(Image, f"{topic}/image", self._references.add_image, qos.SILHOUETTE_INPUT)
         self.subscribe(Image, topic, self._on_silhouette, qos.SILHOUETTE_INPUT)
@@ -106,8 +117,9 @@ class InitializerNode(CardboxNode):
 
     def _capture(self, name: str) -> str:
         given = self.parameters.value
-        if self._distance is not None and given.measure_distance:
-            self._distance.capture(name, self._references.latest_ns)
+        now_ns, is_wanted = self._references.latest_ns, name in SCALE_REFERENCES
+        if self._distance and given.measure_distance and is_wanted and now_ns is not None:
+            self._distance.capture(name, now_ns)
         return self._references.capture(name, self._camera, given.config())
 
     async def _initialize(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:

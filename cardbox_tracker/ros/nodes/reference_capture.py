@@ -185,15 +185,8 @@ class DepthDistance:
                 "measure_distance to false"
             )
 
-    def capture(self, name: str, now_ns: int | None) -> None:
-        """Keep the depth of the reference ``name``, if it is needed.
-
-        Args:
-            name: name of the reference.
-            now_ns: stamp of the camera's latest silhouette.
-        """
-        if name not in SCALE_REFERENCES or now_ns is None:
-            return
+    def capture(self, name: str, now_ns: int) -> None:
+        """Keep the depth of the reference ``name`` at the stamp of its silhouette."""
         alike = [
             depth_m
             for at_ns, depth_m in self._recent
@@ -207,12 +200,7 @@ class DepthDistance:
         self._captured[name] = median_depth(alike)
 
     def measure(self, measure: Measure, config: InitializationConfig) -> InitializationResult:
-        """Measure a person, and the distance with the depth images.
-
-        Args:
-            measure: measurement with the camera at a given distance.
-            config: settings; the search begins at their distance.
-        """
+        """Measure a person by ``measure``, and the distance with the depth images."""
         camera, silhouettes = self._camera(), self._references.captured
         if camera is None or any(name not in self._captured for name in SCALE_REFERENCES):
             raise InitializationError(
@@ -258,15 +246,8 @@ class SecondCamera:
                 "node, or give person_distance_m and set measure_distance to false"
             )
 
-    def capture(self, name: str, now_ns: int | None) -> None:
-        """Keep this camera's silhouettes of the reference ``name``, if it is needed.
-
-        Args:
-            name: name of the reference.
-            now_ns: stamp of the first camera's latest silhouette.
-        """
-        if name not in SCALE_REFERENCES or now_ns is None:
-            return
+    def capture(self, name: str, now_ns: int) -> None:
+        """Keep this camera's silhouettes of ``name`` at the stamp of the first camera's."""
         alike = alike_of(self._recent) if self._recent else []
         if not alike or abs(stamp_ns(alike[-1].header.stamp) - now_ns) > ONE_POSTURE_NS:
             raise InitializationError(
@@ -276,12 +257,7 @@ class SecondCamera:
         self._captured[name] = average_silhouette([silhouette_of(message) for message in alike])
 
     def measure(self, measure: Measure, config: InitializationConfig) -> InitializationResult:
-        """Measure a person with the first camera, and the distance with this one.
-
-        Args:
-            measure: measurement with the first camera at a given distance.
-            config: settings; the search begins at their distance.
-        """
+        """Measure a person by ``measure`` with the first camera, and the distance with this one."""
         self.check()
         first = self._poses.first
         assert first is not None
@@ -294,25 +270,6 @@ class SecondCamera:
         other = self._poses.others[0]
         scale = partial(measured_scale, other=other, references=self._captured)
         return measured_at_scale(measure, config, first, scale)
-
-
-def distance_source(
-    node: CardboxNode,
-    settings: InitializerParameters,
-    references: ReferenceCapture,
-    camera: Callable[[], Camera | None],
-) -> DepthDistance | SecondCamera | None:
-    """Return the source of the person's distance, or None.
-
-    Args:
-        node: the initializer.
-        settings: parameters of the initializer.
-        references: silhouettes of the first camera.
-        camera: returns the first camera at the working resolution, or None until it is known.
-    """
-    if settings.depth:
-        return DepthDistance(node, settings.depth, references, camera)
-    return SecondCamera(node, settings) if len(settings.cameras) > 1 else None
 
 
 def measured(

@@ -85,7 +85,7 @@ def measure(at: InitializationConfig, _: bool) -> InitializationResult:
 
 
 def test_the_distance_is_that_of_the_depth_images(node: Node, distance: DepthDistance) -> None:
-    for second, name in ((1, "front"), (5, "side"), (9, "arms")):
+    for second, name in ((1, "front"), (9, "arms")):
         node.see(second, BODY.placement.distance_m - 0.1)
         distance.check()
         distance.capture(name, second * SECOND)
@@ -96,7 +96,6 @@ def test_the_distance_is_that_of_the_depth_images(node: Node, distance: DepthDis
 def test_what_is_missing_is_said(node: Node, distance: DepthDistance) -> None:
     with pytest.raises(InitializationError, match=r"no depth image .*/depth"):
         distance.check()
-    distance.capture("side", SECOND)
     node.see(1, 1.9)
     with pytest.raises(InitializationError, match=r"'front': no depth image .*/depth"):
         distance.capture("front", 9 * SECOND)
