@@ -55,10 +55,6 @@ def from_checkout(module: str, targets: str) -> Any:
     """Import a module of a folder at the top of a checkout.
 
     The checkout is the current directory, one above it, or the parent of this package.
-
-    Args:
-        module: full name of the module, such as ``lab.benchmarks.run``.
-        targets: words of ``make`` that run it.
     """
     folder = module.partition(".")[0]
     for root in (Path.cwd(), *Path.cwd().parents, _PACKAGE.parent):

@@ -520,12 +520,7 @@ def inputs_of(options: argparse.Namespace) -> tuple[Path, ...]:
 
 
 def tracking_request(options: argparse.Namespace, faults: Iterable[str] = ()) -> TrackingRequest:
-    """Return what the options of :func:`add_tracking` ask for.
-
-    Args:
-        options: the options.
-        faults: what is wrong with other options.
-    """
+    """Return what the options of :func:`add_tracking` ask for."""
     from cardbox_tracker.detectors.detector import Detector
     from cardbox_tracker.search.config import PRESETS
 
@@ -782,11 +777,6 @@ def with_own_options(options: argparse.Namespace, folder: Path, name: str) -> ar
     The file ``NAME.options`` beside a recording, or beside a folder of recordings, has options as
     they are typed. They change those of the command line, and inner files those of outer ones.
     Paths in a file begin at the folder of the file.
-
-    Args:
-        options: the command line.
-        folder: the folder of all recordings.
-        name: name of the recording, see :func:`~.recordings.folder.recordings_in`.
     """
     found = copy.copy(options)
     for part in reversed([PurePosixPath(name), *PurePosixPath(name).parents][:-1]):

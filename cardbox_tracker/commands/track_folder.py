@@ -367,10 +367,6 @@ def _reasons(rows: Iterable[Row], paths: Mapping[str, Path]) -> Iterator[tuple[s
     """Yield the recordings that failed for one reason, and the reason.
 
     Reasons that differ only in the path of the recording are one, and it has the first one's.
-
-    Args:
-        rows: all rows.
-        paths: each recording's path by its name.
     """
     reasons: dict[str, list[Row]] = {}
     for row in sorted(rows):
@@ -387,11 +383,6 @@ def digest_of_inputs(request: TrackingRequest, formats: Sequence[str], program: 
     """Return a digest of all that determines the results of a recording.
 
     The recording counts by the names, sizes and times of its files, other files by their content.
-
-    Args:
-        request: what is tracked.
-        formats: formats of its results.
-        program: see :func:`digest_of_program`.
     """
     path = request.recording.path
     asked = replace(request, recording=replace(request.recording, path=Path()), inputs=())

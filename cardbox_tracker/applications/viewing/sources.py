@@ -20,12 +20,6 @@ def show_results(
 ) -> int:
     """Show a bag of results; return the number of images with joints.
 
-    Args:
-        path: the bag.
-        scene: where it is shown.
-        progress: called with the finished fraction, 0 to 1.
-        person: number of one of several people.
-
     Raises:
         BagError: the bag has no results of the tracker, or is damaged.
     """

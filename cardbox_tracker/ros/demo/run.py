@@ -160,12 +160,7 @@ class Client:
         )
 
     def wait_for_pause(self, time_s: float, stamp_ns: int) -> None:
-        """Wait until the player pauses at ``time_s`` and its images have come out as silhouettes.
-
-        Args:
-            time_s: time from the start of the bag.
-            stamp_ns: stamp of the last image before it.
-        """
+        """Wait until the player pauses at ``time_s``, and the image before it is a silhouette."""
         self.wait(lambda: self._player_status == f"paused at {time_s:.3f} s", f"{time_s:g} s")
         self.wait(
             lambda: min(self._newest_ns.get(one, 0) for one in self._silhouettes) >= stamp_ns,
@@ -361,14 +356,7 @@ def figures(results: Results, truth: GroundTruth, start_ns: int) -> dict[str, ob
 
 
 def write_report(output: Path, truth: GroundTruth, start_ns: int, run: dict[str, object]) -> None:
-    """Write all files about the bag in ``output``, and print the table.
-
-    Args:
-        output: folder of the results.
-        truth: ground truth of the session.
-        start_ns: stamp of the first image after the initialization.
-        run: further values of report.json.
-    """
+    """Write all files about the bag in ``output`` and the values ``run``; print the table."""
     results = read_results(output / "bag")
     report = run | figures(results, truth, start_ns)
     with atomic_path(output / "report.json") as path:

@@ -123,13 +123,7 @@ def silhouette_of(message: Image) -> ImageArray:
 
 
 def image_message(header: Header, image: NDArray[Any], encoding: str = "") -> Image:
-    """Return a message of ``image`` (H, W) or (H, W, 3), uint8 or float32.
-
-    Args:
-        header: header of the message.
-        image: pixels.
-        encoding: encoding of the pixels; mono8 or bgr8 by default.
-    """
+    """Return a message of ``image`` (H, W) or (H, W, 3), uint8 or float32."""
     contiguous = np.ascontiguousarray(image)
     message = Image(
         header=header,

@@ -24,13 +24,7 @@ Deliver = Callable[[Header, ImageArray, int], None]
 
 
 def image_topic(node: CardboxNode, topic: str, transport: str) -> tuple[str, Any]:
-    """Return the full name and the type of the images; a remapping of ``topic`` holds for both.
-
-    Args:
-        node: the node that subscribes.
-        topic: name of the raw images.
-        transport: ``raw``, or ``compressed`` for those below it.
-    """
+    """Return the full name and the type of the images; a remapping of ``topic`` holds for both."""
     if transport == "compressed":
         return node.resolve(f"{node.resolve(topic)}/compressed"), CompressedImage
     return node.resolve(topic), Image

@@ -36,14 +36,7 @@ class SilhouetteOutputs:
     def send(
         self, header: Header, silhouette: ImageArray, camera: Camera, info: CameraInfo | None
     ) -> None:
-        """Publish a silhouette (H, W), 0 or 255, and then its calibration.
-
-        Args:
-            header: header of the image.
-            silhouette: the silhouette.
-            camera: camera of the silhouette.
-            info: CameraInfo of the original image, with its place in a stereo pair.
-        """
+        """Publish a silhouette (H, W), 0 or 255, and then its calibration."""
         self._silhouettes.publish(conversions.image_message(header, silhouette, "mono8"))
         self._infos.publish(conversions.camera_info_message(header, camera, info))
         self.covered = np.count_nonzero(silhouette) / silhouette.size

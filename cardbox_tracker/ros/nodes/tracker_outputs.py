@@ -106,14 +106,7 @@ class TrackerOutputs:
         person: int | None = None,
         bodies: TrackedBodies | None = None,
     ) -> None:
-        """Advertise the topics for ``node``; ``settings`` decide about REP-155 and TF.
-
-        Args:
-            node: the tracker.
-            settings: its parameters.
-            person: number of one of several people; None if there is only one.
-            bodies: publishes the list of people after REP-155; None without it.
-        """
+        """Advertise the topics for ``node``, of one ``person`` by number if there are several."""
         topics = outputs(settings.torso_place, settings.hands)
         space = "" if person is None else f"{person_space(person)[1:]}/"
         self._publishers = {

@@ -27,11 +27,7 @@ _TYPE = "std_srvs/srv/Trigger"
 
 
 def call_service(service: str, say: Callable[[str], None]) -> str:
-    """Call the Trigger service ``service`` and return its answer.
-
-    Args:
-        service: name of the service, such as ``initializer/initialize``.
-        say: called with each line of the node's topic ``status``, and with a line while waiting.
+    """Call a Trigger service and return its answer; ``say`` gets lines of its node's status.
 
     Raises:
         CardboxError: ``service`` is not a valid name or not available, or it refused; the text

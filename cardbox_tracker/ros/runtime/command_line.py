@@ -62,12 +62,6 @@ def plain_command_line(
 ) -> list[str]:
     """Return the complete command line of the node ``name``, which has only ROS arguments.
 
-    Args:
-        name: name of the executable.
-        does: sentence for the help.
-        parameters: the node's parameters, for the help.
-        args: arguments after the name; None for those of this process.
-
     Raises:
         SystemExit: there are other arguments (code 2), or help was requested (code 0).
     """
@@ -96,13 +90,7 @@ def node_main(
 
 
 def node_help(name: str, parameters: type[NodeParameters], words: str) -> dict[str, Any]:
-    """Return arguments of an ArgumentParser whose help ends with what the node has.
-
-    Args:
-        name: name of the node.
-        parameters: its parameters.
-        words: sentence before the lists.
-    """
+    """Return arguments of an ArgumentParser whose help ends with what the node has."""
     lines = [*textwrap.wrap(words, _WIDTH), *_parameters(parameters), *_topics(entries(name))]
     # The parser takes a percent sign for a place of its own.
     text = "\n".join(lines).replace("%", "%%")

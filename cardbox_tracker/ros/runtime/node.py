@@ -94,13 +94,7 @@ class CardboxNode(Node):
     def __init__(
         self, name: str, intra_process: IntraProcess | None = None, **options: Any
     ) -> None:
-        """Create the node.
-
-        Args:
-            name: name of the node.
-            intra_process: shared by the nodes of one process; publishers must be created first.
-            options: options of :class:`rclpy.node.Node`.
-        """
+        """Create the node; nodes that share ``intra_process`` make their publishers first."""
         super().__init__(name, **options)
         self._intra_process = intra_process
         self.diagnostics = NodeDiagnostics(self)
@@ -153,14 +147,8 @@ class CardboxNode(Node):
     ) -> Subscription | None:
         """Subscribe to a topic, bypassing DDS if a node of this process offers it.
 
-        An exception in ``callback`` is reported, and the node continues.
-
-        Args:
-            kind: class of the messages.
-            topic: name of the topic.
-            callback: receives each message.
-            profile: quality of service, which can be overridden.
-            has_one_type: False if the caller adapts to publishers of another type.
+        An exception in ``callback`` is reported, and the node continues. Without ``has_one_type``,
+        the caller adapts to publishers of another type.
 
         Returns:
             The subscription; None without DDS.
