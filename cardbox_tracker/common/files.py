@@ -38,11 +38,6 @@ def foreign(
 
     Parsers of foreign formats can raise errors of any type.
 
-    Args:
-        path: the file, which the text names.
-        kind: type of the error.
-        expected: what the file should be, for the text.
-
     Raises:
         CardboxError: reading failed; one that names the file stays as it is.
     """

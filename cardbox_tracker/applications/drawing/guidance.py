@@ -82,14 +82,7 @@ class Guide:
     def draw(
         self, prompt: Prompt, silhouette: ImageArray, image: ImageArray | None, mirror: bool
     ) -> ImageArray:
-        """Return a prompt as a picture, bgr: see :func:`draw_guidance`.
-
-        Args:
-            prompt: what to do.
-            silhouette: (H, W), 0 or 255, of the camera's size.
-            image: image of the silhouette, (H, W) or (H, W, 3) bgr; None to show the silhouette.
-            mirror: show a mirror image.
-        """
+        """Return a prompt as a picture, bgr, over the image or else its silhouette, (H, W)."""
         picture = silhouette
         if image is not None:
             picture = image.copy()

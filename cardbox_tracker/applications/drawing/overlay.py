@@ -91,15 +91,10 @@ def draw_overlay(
 def draw_camera_overlay(
     picture: ImageArray, number: int, estimate: Estimate, tracker: Tracker
 ) -> ImageArray:
-    """Return a picture with the model over it; that of a further camera is turned upright.
+    """Return the picture of a camera, 0 for the first, with the model; others are turned upright.
 
-    A small picture is enlarged by a whole factor, so that lines and text are readable.
-
-    Args:
-        picture: (H, W) grey or (H, W, 3) bgr, of the camera.
-        number: of the camera; 0 is the first one.
-        estimate: what ``tracker`` found at that time.
-        tracker: it knows the person and the cameras.
+    A small picture, (H, W) grey or (H, W, 3) bgr, is enlarged by a whole factor, so that lines and
+    text are readable.
     """
     scale = _readable_scale(picture)
     if number == 0:

@@ -32,10 +32,6 @@ def video_file(path: str | os.PathLike[str], fps: float) -> Iterator[Callable[[I
     The first image determines the size of the video; later ones are resized to it. The file
     appears on exit, and after an error there is none.
 
-    Args:
-        path: file to write, .mp4, which browsers play.
-        fps: frames a second.
-
     Raises:
         CardboxError: the file cannot be written, or its suffix is not .mp4.
     """

@@ -124,13 +124,7 @@ class RulaObserver:
     """
 
     def __init__(self, config: RulaConfig, seed: int, images: MomentImages | None = None) -> None:
-        """Seed the random numbers; the same images and ``seed`` give the same rows.
-
-        Args:
-            config: settings of the score.
-            seed: random seed.
-            images: keeps the images of high scores; None if none are wanted.
-        """
+        """Seed the random numbers; the same images and ``seed`` give the same rows."""
         self._config, self._images = config, images
         self._rng = np.random.default_rng([seed, _STREAM])
         self.rows: list[RulaRow] = []

@@ -135,13 +135,7 @@ def plot_scores(rows: Sequence[RulaRow], path: Path, method: Method = RULA) -> N
 def score_plot(
     rows: Sequence[RulaRow], moments: Sequence[RulaRow] = (), method: Method = RULA
 ) -> bytes:
-    """Return the expected score over time, with its standard deviation, as PNG.
-
-    Args:
-        rows: one image each, in order; at least one.
-        moments: images to mark with numbers in their order.
-        method: of the scores.
-    """
+    """Return the expected score over time, with its deviation and numbered moments, as PNG."""
     from matplotlib.figure import Figure
 
     time_s, durations_s = np.array([row.time_s for row in rows], float), durations_of(rows)

@@ -464,13 +464,7 @@ def score_distribution(
 
 
 def distribution_of(scores: Any, method: Method, of_mean: int = 0) -> ScoreDistribution:
-    """Return the distribution of the scores (n,) of equally likely postures.
-
-    Args:
-        scores: those of the method, such as :class:`RulaScores`.
-        method: how they were scored.
-        of_mean: score of the mean posture.
-    """
+    """Return the distribution of the scores (n,) of equally likely postures."""
 
     def chances(found: ScoreArray, highest: int = method.highest) -> FloatArray:
         return np.asarray(np.bincount(found, minlength=highest + 1)[1:] / len(found))

@@ -31,11 +31,6 @@ from cardbox_tracker.tracking.estimate import UNCERTAIN
 def write_isb(path: Path, motion: Motion, body: BodyModel | None = None) -> None:
     """Write a CSV file with the angles of the ISB in degrees, then our own joints.
 
-    Args:
-        path: file to write.
-        motion: the results; a row for each image, empty in gaps.
-        body: not needed.
-
     Raises:
         CardboxError: the file cannot be written.
     """
@@ -92,13 +87,7 @@ def formats() -> dict[str, Format]:
 
 
 def export(results: Results, path: Path, to: Format, model: BodyModel | None = None) -> list[str]:
-    """Write results of one person to a file.
-
-    Args:
-        results: the results.
-        path: file to write.
-        to: its format.
-        model: the person with whom they were tracked; None for the one that the results have.
+    """Write results of one person, by default of the body that they have, to a file.
 
     Returns:
         Lines that say what was written, and what is not known.

@@ -50,12 +50,7 @@ class Markers(NamedTuple):
 
 
 def markers_of(motion: Motion, body: BodyModel | None) -> Markers:
-    """Return the markers of a motion.
-
-    Args:
-        motion: the results.
-        body: the person that was tracked; without it the camera is taken as level.
-    """
+    """Return the markers of a motion; without the body the camera is taken as level."""
     names: tuple[str, ...] = KEYPOINT_MARKERS
     keypoints_m = in_reference(motion.keypoints_m, body)
     points_m = [keypoints_m]

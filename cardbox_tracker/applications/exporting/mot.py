@@ -89,10 +89,7 @@ def _arm_angles(upper: FloatArray, lower: FloatArray) -> FloatArray:
 def write_mot(path: Path, motion: Motion, body: BodyModel | None) -> None:
     """Write a row for each image with a posture: time (s), rotations (degrees), place (m).
 
-    Args:
-        path: file to write.
-        motion: the results.
-        body: the person that was tracked; without it there is no place.
+    Without the body there is no place.
 
     Raises:
         CardboxError: the file cannot be written.

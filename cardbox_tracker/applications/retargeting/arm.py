@@ -252,12 +252,7 @@ class ArmFollower:
     """
 
     def __init__(self, robot: Robot, config: RetargetConfig, side: str = "") -> None:
-        """Prepare.
-
-        Args:
-            robot: the robot.
-            config: settings; its ``base``, ``hand`` and ``gripper`` choose the arm.
-            side: ``left`` or ``right``; ``config.side`` if empty.
+        """Prepare for one ``side``; that of the settings if it is empty.
 
         Raises:
             CardboxError: see :func:`~.chain.find_arm` and :class:`Kinematics`.

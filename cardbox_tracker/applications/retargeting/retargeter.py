@@ -377,10 +377,7 @@ def make_retargeter(
 ) -> tuple[Robot, Retargeter, str]:
     """Return a robot, its retargeter, and a table of the joints that were found.
 
-    Args:
-        robot_file: URDF of the robot.
-        joint_map: file of a joint map; if None, the robot's arm is found and follows.
-        config: settings.
+    Without a joint map, the robot's arm is found and follows.
 
     Raises:
         CardboxError: a file cannot be read, the robot lacks a joint or link, its arm is not clear,

@@ -79,13 +79,7 @@ class Supervisor:
         self._robot = now_ns, positions
 
     def follow(self, update: Callable[[], Command], state: str, now_ns: int) -> Command | None:
-        """Take an image's posture; return the command to send, or None if none may be sent.
-
-        Args:
-            update: calls :meth:`.retargeter.Retargeter.update` with the posture.
-            state: tracking state of the image.
-            now_ns: time of its arrival.
-        """
+        """Take an image's posture; return the command to send, or None if none may be sent."""
         self.tick(now_ns)
         self._heard_ns = now_ns
         if self.phase is Phase.READY:

@@ -76,10 +76,6 @@ _JPEG_QUALITY = 92
 def layout(has_truth: bool = False, is_live: bool = False) -> Any:
     """Return the blueprint of the views.
 
-    Args:
-        has_truth: whether there is a view of the errors.
-        is_live: whether the viewer follows the newest result; otherwise it plays from the start.
-
     Raises:
         CardboxError: rerun-sdk is not installed.
     """

@@ -46,13 +46,7 @@ def optional_class(package: str, name: str) -> Any:
 def message_classes(
     kinds: Mapping[str, str], chosen: Iterable[str], leave_out: Callable[[str], None]
 ) -> dict[str, Any]:
-    """Return the class of each topic's messages.
-
-    Args:
-        kinds: message type by topic.
-        chosen: requested topics; if empty, all topics whose type is installed.
-        leave_out: called with a text for each topic that is skipped because its type is not
-            installed.
+    """Return the class of each topic's messages; ``leave_out`` is told of those not installed.
 
     Raises:
         BagError: the type of a chosen topic is not installed, or no type is.

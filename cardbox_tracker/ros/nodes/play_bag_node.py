@@ -42,10 +42,8 @@ _COMPRESSED = "/compressed"
 def find_topics(bag: str, wanted: Iterable[str], cameras: Sequence[str] = ()) -> dict[str, str]:
     """Return the topics of a bag as values of the launch arguments of the same names.
 
-    Args:
-        bag: rosbag2 folder or file.
-        wanted: ``image``, which includes ``image_transport``, and ``camera_info``.
-        cameras: namespaces of several cameras; the names are then relative to each namespace.
+    Wanted are ``image``, with ``image_transport``, and ``camera_info``; those of several
+    ``cameras`` are relative to each namespace.
     """
     with BagReader(bag) as reader:
         images = reader.image_topics
