@@ -62,7 +62,6 @@ def track(recording: str | os.PathLike[str], **options: Any) -> Result:
 
 
 def _words(name: str, value: Any) -> Iterator[str]:
-    """Yield the words of an option, as they are typed."""
     flag = "--" + (name.rpartition("_")[0] if name in _WITH_UNIT else name).replace("_", "-")
     if isinstance(value, dict):
         texts = (

@@ -555,7 +555,6 @@ def tracking_request(options: argparse.Namespace, faults: Iterable[str] = ()) ->
 def _hands(
     options: argparse.Namespace, recording: RecordingRequest, problems: Problems
 ) -> Path | None:
-    """Return the network file of hands if they are asked for."""
     from cardbox_tracker.detectors.detector import Detector
     from cardbox_tracker.detectors.model_files import installed_hands
 
@@ -752,7 +751,6 @@ def _of_stature(stature_m: float, distance_m: float | None, pitch_rad: float) ->
 
 
 def _config(options: argparse.Namespace, preset: TrackerConfig) -> TrackerConfig:
-    """Return the preset changed by depth images, the file of settings, and the options."""
     from cardbox_tracker.search.settings_file import read_settings
 
     config = preset if options.depth is None else preset.with_depth()

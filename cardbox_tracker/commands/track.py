@@ -229,7 +229,6 @@ def _derived(
 
 
 def _account(summary: TrackSummary) -> dict[str, Any]:
-    """Return what ``--json`` writes of a run, or of one of its people."""
     found: dict[str, Any] = {
         "images": summary.frames,
         "tracked": summary.frames_tracked,

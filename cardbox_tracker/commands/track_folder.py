@@ -266,12 +266,10 @@ def _track_all(
 
 
 def _size(job: Job) -> int:
-    """Return the bytes of a recording: the largest is tracked first, so that none is left last."""
     return sum(file.stat().st_size for file in _files_of(job.request.recording.path))
 
 
 def _prepared(job: Job, number: int, work: Path, formats: Sequence[str]) -> Job:
-    """Return the job with a folder of its own for its results."""
     place = work / str(number) / Path(job.name).name
     place.parent.mkdir()
     paths = {ending: place.with_name(f"{place.name}.{ending}") for ending in formats}
@@ -304,7 +302,6 @@ def track_job(job: Job) -> tuple[Job, Row, list[str]]:
 
 
 def _publish(job: Job, output: Path) -> None:
-    """Move the results of a job to their places."""
     _remove(output, job.name)
     place = (output / job.name).parent
     place.mkdir(parents=True, exist_ok=True)
@@ -315,7 +312,6 @@ def _publish(job: Job, output: Path) -> None:
 
 
 def _remove(output: Path, name: str) -> None:
-    """Remove the former results of a recording."""
     paths = [
         output / f"{name}{ending}" for ending in (*(f".{one}" for one in FORMATS), _BODY, _SCENE)
     ]
@@ -350,7 +346,6 @@ def _write_rows(path: Path, rows: Iterable[Row]) -> None:
 
 
 def _table(rows: Sequence[Row]) -> Iterator[str]:
-    """Yield the lines of a table for people."""
     width = max(len(row.recording) for row in rows)
     yield f"{'':{width}}  images  tracked  uncertain  mean IoU"
     for row in rows:

@@ -261,7 +261,6 @@ def _open(target: Path) -> int:
 
 
 def _remove_leftovers(target: Path) -> None:
-    """Remove temporary files and folders of ``target`` whose writer was killed."""
     stem, suffix = re.escape(target.stem[:_STEM_LENGTH]), re.escape(target.suffix)
     pattern = re.compile(rf"\.{stem}{re.escape(_MARK)}[0-9a-f]{{16}}{suffix}")
     with contextlib.suppress(OSError), os.scandir(target.parent) as entries:

@@ -84,7 +84,6 @@ def results_of(
 
 @contextmanager
 def _cluster(scheduler: str) -> Iterator[None]:
-    """Context in which a Dask cluster does the calls."""
     try:
         from distributed import Client
         from distributed.comm import connect
@@ -158,7 +157,6 @@ def _checked(results: Iterator[R]) -> Iterator[R]:
 
 @contextmanager
 def _told() -> Iterator[None]:
-    """Context in which the unexpected end of a process is told in words."""
     try:
         yield
     except Exception as error:

@@ -242,7 +242,6 @@ def _draw_hands(canvas: ImageArray, camera: Camera, estimate: Estimate) -> None:
 
 
 def _draw_legs(canvas: ImageArray, camera: Camera, estimate: Estimate) -> None:
-    """Draw thighs and shanks like the arms."""
     if estimate.legs is None or not in_front(estimate.legs.points_m).all():
         return
     pixels = camera.project(estimate.legs.points_m)

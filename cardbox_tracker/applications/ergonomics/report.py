@@ -180,7 +180,6 @@ def _share_words(shares: ScoreShares) -> str:
 
 
 def _measured_words(summary: RulaSummary) -> Iterator[str]:
-    """Yield a text on each part that was measured in some images."""
     for name, time_s in summary.measured_parts_s.items():
         words, (was, counts) = name.replace("_", " "), ("was", "counts")
         if name == "legs":

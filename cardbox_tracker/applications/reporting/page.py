@@ -146,7 +146,6 @@ def space_view(motion: Motion, body: BodyModel | None, true_m: FloatArray | None
 
 
 def _bones() -> list[tuple[str, str, str]]:
-    """Return the markers at both ends of each bone, and its colour."""
     bones = [("Hip", "Neck", _TRUNK)]
     for side, colour in (("L", _LEFT), ("R", _RIGHT)):
         for begin, end in (*_ARMS, *_LEGS):

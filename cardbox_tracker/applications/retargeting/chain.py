@@ -119,7 +119,6 @@ def _names(path: Iterable[Joint]) -> tuple[str, ...]:
 
 
 def _fingers(robot: Robot) -> set[str]:
-    """Return the links moved by joints of grippers and hands."""
     roots = {name for name, one in robot.joints.items() if _GRIPPER.search(name)}
     branches: dict[frozenset[str], list[Joint]] = {}
     for one in robot.joints.values():
@@ -149,7 +148,6 @@ def _rigid(robot: Robot, link: str) -> set[str]:
 
 
 def _length(robot: Robot, link: str) -> float:
-    """Return the length of the longest chain beyond ``link``, m."""
     return max(
         (
             float(np.linalg.norm(one.origin_m)) + _length(robot, one.child)

@@ -239,7 +239,6 @@ class Scene:
             self._plot(f"{_ERROR}/{name}", name, value, number, 2.0)
 
     def _at(self, stamp_ns: int) -> None:
-        """Select the image that what follows belongs to."""
         if self._first_ns is None:
             self._first_ns = stamp_ns
         self._stream.set_time("time", duration=(stamp_ns - self._first_ns) / 1e9)
@@ -287,7 +286,6 @@ class Scene:
         self._log(entity, self._rr.Scalars(value))
 
     def _once(self, entity: str, what: Any) -> None:
-        """Log a constant entity once."""
         if entity not in self._styled:
             self._log(entity, what, static=True)
         self._styled.add(entity)
@@ -325,7 +323,6 @@ def level_points(points_m: FloatArray, pitch_rad: float, roll_rad: float = 0.0) 
 
 
 def _unit_of(group: str) -> str:
-    """Return the unit of a plot."""
     return "m" if group in _METRES else "deg"
 
 

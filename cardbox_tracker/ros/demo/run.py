@@ -225,7 +225,6 @@ def run_demo(output: Path, preset: str, seed: int, cameras: int = 1) -> None:
 
 
 def _last_before(truth: GroundTruth, time_s: float) -> int:
-    """Return the stamp of the last image before a time from the start of the bag, ns."""
     return max(stamp for stamp in truth.frames if stamp < truth.start_ns + round(time_s * 1e9))
 
 

@@ -200,7 +200,6 @@ class BackgroundNode(CardboxNode):
     def _send(
         self, header: Header, silhouette: conversions.ImageArray, camera: Camera, sent_ns: int
     ) -> None:
-        """Publish a silhouette (H, W), 0 or 255, and then its calibration."""
         self._outputs.send(header, silhouette, camera, self.camera_images.info)
         self.diagnostics.working(sent_ns)
 

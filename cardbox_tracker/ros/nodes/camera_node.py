@@ -136,7 +136,6 @@ class CameraNode(CardboxNode):
         return capture
 
     def _period(self, settings: CameraParameters) -> float:
-        """Return the seconds from image to image of a file."""
         rate_hz = settings.rate_hz or self._capture.get(cv2.CAP_PROP_FPS)
         return 1.0 / rate_hz if 0 < rate_hz < 1000 else 1.0 / _USUAL_HZ
 
@@ -208,7 +207,6 @@ class CameraNode(CardboxNode):
         self.diagnostics.working()
 
     def _lock_exposure(self) -> None:
-        """Switch exposure and white balance to manual where the device allows it."""
         self._locked = True
         for what, done in lock_exposure(self._capture).items():
             if done:

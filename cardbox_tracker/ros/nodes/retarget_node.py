@@ -110,7 +110,6 @@ class RetargetNode(CardboxNode):
         return response
 
     def _follow(self, image: Tracked) -> None:
-        """Command the robot after an image."""
         # Stamps may run faster than the robot's own time, which its speed is about.
         now_ns = _now_ns()
         posture = stddev = hands = None
@@ -178,7 +177,6 @@ class RetargetNode(CardboxNode):
 
 
 def _now_ns() -> int:
-    """Return the time of the robot's clock, ns."""
     return round(time.monotonic() * 1e9)
 
 

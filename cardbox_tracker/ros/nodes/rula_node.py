@@ -52,7 +52,6 @@ class RulaNode(CardboxNode):
         self._input = PostureInput(self, self._rate, has_states=False)
 
     def _rate(self, image: Tracked) -> None:
-        """Score the posture of an image."""
         joints, message = image.joints, image.stddev
         if joints is None or message is None or image.body is None:
             return

@@ -122,7 +122,6 @@ def _topics(found: list[Entry]) -> Iterator[str]:
 
 
 def _indented(text: str) -> list[str]:
-    """Return lines of a phrase without the marks of Markdown."""
     plain = _LINK.sub(r"\1", text).replace("`", "")
     margin = " " * 6
     return textwrap.wrap(plain, _WIDTH, initial_indent=margin, subsequent_indent=margin)

@@ -195,7 +195,6 @@ class NodeDiagnostics:
             self._node.get_logger().warning(text)
 
     def _look_for_silence(self) -> None:
-        """Detect that the input has ceased or has come back."""
         received, since_s = self._arrived
         now_s = time.monotonic()
         if self.input.received != received:

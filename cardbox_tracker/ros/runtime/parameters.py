@@ -137,7 +137,6 @@ class LiveParameters(Generic[T]):
             self._node.get_logger().warning(self._unknown(name))
 
     def _unknown(self, name: str) -> str:
-        """Return the answer to a change of a parameter that does not exist."""
         return (
             f"'{cut(name)}' is not a parameter of node '{self._node.get_name()}' and has no "
             f"effect; {suggestion(name, self._specs)}see 'ros2 param list' or docs/parameters.md "

@@ -82,7 +82,6 @@ class Nodes:
             )
 
     def _program(self, called: str) -> list[str]:
-        """Return the command that takes the name of an executable and its arguments."""
         return [*_OF_PACKAGE, "cardbox_tracker.start"]
 
     def check(self) -> None:
