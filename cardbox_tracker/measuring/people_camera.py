@@ -44,6 +44,8 @@ FORWARD = np.array([0.09, 0.045, 0.0, 0.0, 0.01, 0.0])
 _HEIGHT_STDDEVS = np.array([0.025, 0.016, 0.013, 0.016, 0.014, 0.010])
 _FORWARD_STDDEVS = np.array([0.03, 0.02, 0.015, 0.015, 0.015, 0.01])
 _SHOULDER, _HIP, _KNEE, _ANKLE = range(2, 6)
+# How much higher MediaPipe marks the hips where no feet are in the image.
+_HIP_ALONE = 0.022
 # Leans of legs, trunk and aside of a person, rad: means, and deviations among people and images.
 _LEANS = np.radians((0.5, 2.0, 0.0))
 _LEAN_STDDEVS, _LEAN_CHANGES = np.radians((3.0, 4.0, 2.0)), np.radians((3.0, 4.0, 3.0))
@@ -148,8 +150,11 @@ def people_camera(
     spread = (*_HEIGHT_STDDEVS, *_FORWARD_STDDEVS, *_LEAN_STDDEVS)
     of_people_stddev = np.array([[one, *spread] for one in unsure])
     for number in range(len(statures)):
-        if not (seen.lowered[seen.person == number] < _OTHER_LEGS).any():
+        its = seen.person == number
+        if not (seen.lowered[its] < _OTHER_LEGS).any():
             of_people_stddev[number, -2] = _SITTING_LEAN
+        if not known[its, _ANKLE].any():
+            of_people[number, 1 + _HIP] = _HIP_ALONE
     place = np.column_stack([seen.rays[:, _SHOULDER, 0] * distance, np.log(distance)])
     of_images = np.column_stack([place, np.zeros((images, 5))])
     free = np.full((images, 2), 3.0)
@@ -274,17 +279,14 @@ def _rays(seen: _Seen, unknowns: FloatArray) -> FloatArray:
 
 def _upright(sights: Sightings, number: int, camera: Camera) -> _Seen | None:
     """Return some of the images in which a person is upright; None without any."""
-    border = _BORDER * max(camera.width, camera.height)
-    low, high = border - 0.5, np.array([camera.width, camera.height]) - 0.5 - border
     rows = []
     for time_s, points in sights:
         px, known = _levels(points)
         # The network guesses what is outside of the image, and puts some of it at the border.
-        known &= ((px > low) & (px < high)).all(axis=1)
+        known &= is_inside(px, camera)
         if points.legs is not None:
             # Ankles are doubtful where heels or toes are cut off.
-            feet = points.legs.px[4:]
-            known[_ANKLE] &= bool(((feet > low) & (feet < high)).all())
+            known[_ANKLE] &= bool(is_inside(points.legs.px[4:], camera).all())
         facing, is_bowed, bend, is_straight, sits = _posture(points)
         # The network guesses legs that are not in the image.
         is_straight, sits = is_straight and bool(known[_KNEE]), sits and bool(known[_KNEE])
@@ -315,6 +317,19 @@ def _upright(sights: Sightings, number: int, camera: Camera) -> _Seen | None:
         np.full(len(rows), independent / len(rows)),
         np.full(len(rows), float(number)),
     )
+
+
+def is_inside(px: FloatArray, camera: Camera, share: float = _BORDER) -> NDArray[np.bool_]:
+    """Return which points (..., 2) are inside of the image and not at its border, (...).
+
+    Args:
+        px: column and row of each.
+        camera: of the image.
+        share: width of the border as a share of the longer side.
+    """
+    border = share * max(camera.width, camera.height)
+    low, high = border - 0.5, np.array([camera.width, camera.height]) - 0.5 - border
+    return np.asarray(((px > low) & (px < high)).all(axis=-1))
 
 
 def _levels(points: ImagePoints) -> tuple[FloatArray, NDArray[np.bool_]]:
