@@ -8,12 +8,14 @@ height and focal length together. Who stays in one place shows little, and the d
 
 All images are one robust least-squares problem. Its unknowns are those of the camera; those of
 each person: logarithm of the stature, heights and forward distances of the levels, leans of legs
-and trunk forwards, and aside; and those of each image: the place, the leans, and how far bent legs
-lower the hips. Lengths are in statures.
+and trunk forwards, and aside; and those of each image: the place, the leans, how far bent legs
+lower the hips, and how high what the person stands on is. Of each person, only the images count in
+which hips and knees are as straight as they get. Lengths are in statures.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from typing import NamedTuple
 
@@ -42,6 +44,8 @@ FORWARD = np.array([0.09, 0.045, 0.0, 0.0, 0.01, 0.0])
 _HEIGHT_STDDEVS = np.array([0.025, 0.016, 0.013, 0.016, 0.014, 0.010])
 _FORWARD_STDDEVS = np.array([0.03, 0.02, 0.015, 0.015, 0.015, 0.01])
 _SHOULDER, _HIP, _KNEE, _ANKLE = range(2, 6)
+# How much higher MediaPipe marks the hips where no feet are in the image.
+_HIP_ALONE = 0.022
 # Leans of legs, trunk and aside of a person, rad: means, and deviations among people and images.
 _LEANS = np.radians((0.5, 2.0, 0.0))
 _LEAN_STDDEVS, _LEAN_CHANGES = np.radians((3.0, 4.0, 2.0)), np.radians((3.0, 4.0, 3.0))
@@ -49,6 +53,11 @@ _LEAN_STDDEVS, _LEAN_CHANGES = np.radians((3.0, 4.0, 2.0)), np.radians((3.0, 4.0
 _SITTING_LEAN = np.radians(8.0)
 # How far the hips of an image are lowered: legs that are seen straight, others, and who sits.
 _STRAIGHT, _OTHER_LEGS, _SEAT = 0.008, 0.08, 0.4
+# Deviations of the height of what a person stands on, such as a box, and of a floor; who differs
+# less from most images stands on the floor.
+_STEP_UP, _FLOOR, _ON_FLOOR = 0.1, 0.01, 0.045
+# Hips and knees of an image that counts bend at most this much more, rad, than in this share.
+_BENT_MORE, _STRAIGHTEST = np.radians(20.0), 0.1
 # Deviations of a level in an image, aside and along the body; of the ankles of bent legs.
 _SIDE, _ALONG, _STEPPING = 0.02, 0.012, 0.03
 # A trunk that leans more in space is not upright, and a knee not straight; who bends the hips more
@@ -61,7 +70,7 @@ _MOST_IMAGES, _SAME_S, _SITTING_IMAGES = 24, 4.0, 3.0
 _ROBUST, _ROUNDS, _STEP, _LAST_STEP = 2.0, 60, 1e-5, 1e-6
 # Nearest and farthest logarithm of a distance, statures.
 _NEAREST, _FARTHEST = np.log((0.3, 30.0))
-_SHARED, _OF_PERSON, _OF_IMAGE = 4, 2 * len(LEVELS) + 4, 6
+_SHARED, _OF_PERSON, _OF_IMAGE = 4, 2 * len(LEVELS) + 4, 7
 
 
 class PeopleCamera(NamedTuple):
@@ -141,13 +150,17 @@ def people_camera(
     spread = (*_HEIGHT_STDDEVS, *_FORWARD_STDDEVS, *_LEAN_STDDEVS)
     of_people_stddev = np.array([[one, *spread] for one in unsure])
     for number in range(len(statures)):
-        if not (seen.lowered[seen.person == number] < _OTHER_LEGS).any():
+        its = seen.person == number
+        if not (seen.lowered[its] < _OTHER_LEGS).any():
             of_people_stddev[number, -2] = _SITTING_LEAN
+        if not known[its, _ANKLE].any():
+            of_people[number, 1 + _HIP] = _HIP_ALONE
     place = np.column_stack([seen.rays[:, _SHOULDER, 0] * distance, np.log(distance)])
-    of_images = np.column_stack([place, np.zeros((images, 4))])
+    of_images = np.column_stack([place, np.zeros((images, 5))])
     free = np.full((images, 2), 3.0)
     leans = np.tile(_LEAN_CHANGES, (images, 1))
-    of_images_stddev = np.column_stack([free, leans, seen.lowered])
+    steps = np.full(images, _STEP_UP)
+    of_images_stddev = np.column_stack([free, leans, seen.lowered, steps])
     of_images_stddev /= np.sqrt(seen.weight)[:, None]
     mean = np.concatenate([camera_mean, of_people.ravel(), of_images.ravel()])
     precision = np.concatenate([camera_stddev, of_people_stddev.ravel(), of_images_stddev.ravel()])
@@ -162,6 +175,11 @@ def people_camera(
             last[:, None] + np.arange(_OF_IMAGE),
         ]
     )
+    found, information = _fitted(seen, distance, own, mean, precision)
+    # Most images show the floor; only who stands on something else may do so in the second fit.
+    high = found[last + _OF_IMAGE - 1]
+    on_floor = np.abs(high - np.median(high)) < _ON_FLOOR
+    precision[last[on_floor] + _OF_IMAGE - 1] *= (_STEP_UP / _FLOOR) ** 2
     found, information = _fitted(seen, distance, own, mean, precision)
     if not np.isfinite(found).all():
         return None
@@ -240,12 +258,12 @@ def _rays(seen: _Seen, unknowns: FloatArray) -> FloatArray:
     pitch, roll, height_m, log_focal, log_stature = unknowns[:, :5, None].transpose(1, 0, 2)
     heights = HEIGHTS + unknowns[:, 5 : 5 + count]
     forward = FORWARD + unknowns[:, 5 + count : 5 + 2 * count]
-    leans, changes = unknowns[:, 5 + 2 * count : 8 + 2 * count], unknowns[:, -4:-1]
-    aside, far = unknowns[:, -6:-5], np.exp(np.clip(unknowns[:, -5:-4], _NEAREST, _FARTHEST))
+    leans, changes = unknowns[:, 5 + 2 * count : 8 + 2 * count], unknowns[:, -5:-2]
+    aside, far = unknowns[:, -7:-6], np.exp(np.clip(unknowns[:, -6:-5], _NEAREST, _FARTHEST))
     legs = np.minimum(heights, heights[:, _HIP : _HIP + 1]) - heights[:, _ANKLE:]
     trunk = np.maximum(heights - heights[:, _HIP : _HIP + 1], 0.0)
     forward = forward + leans[:, :1] * legs + leans[:, 1:2] * trunk
-    lowered = unknowns[:, -1:] * (np.arange(count) <= _HIP)
+    lowered = unknowns[:, -2:-1] * (np.arange(count) <= _HIP) - unknowns[:, -1:]
     # Optical axes of a level camera: right, down, forward.
     x = aside + seen.facing[:, :1] * forward + (leans[:, 2:] + changes[:, 2:]) * heights
     y = height_m / np.exp(log_stature) - heights + lowered
@@ -261,28 +279,29 @@ def _rays(seen: _Seen, unknowns: FloatArray) -> FloatArray:
 
 def _upright(sights: Sightings, number: int, camera: Camera) -> _Seen | None:
     """Return some of the images in which a person is upright; None without any."""
-    border = _BORDER * max(camera.width, camera.height)
-    low, high = border - 0.5, np.array([camera.width, camera.height]) - 0.5 - border
     rows = []
     for time_s, points in sights:
         px, known = _levels(points)
         # The network guesses what is outside of the image, and puts some of it at the border.
-        known &= ((px > low) & (px < high)).all(axis=1)
+        known &= is_inside(px, camera)
         if points.legs is not None:
             # Ankles are doubtful where heels or toes are cut off.
-            feet = points.legs.px[4:]
-            known[_ANKLE] &= bool(((feet > low) & (feet < high)).all())
-        facing, is_bowed, is_straight, sits = _posture(points)
+            known[_ANKLE] &= bool(is_inside(points.legs.px[4:], camera).all())
+        facing, is_bowed, bend, is_straight, sits = _posture(points)
         # The network guesses legs that are not in the image.
         is_straight, sits = is_straight and bool(known[_KNEE]), sits and bool(known[_KNEE])
         known[_KNEE] &= is_straight
         known[_ANKLE] &= not sits
         if not is_bowed and known[[_SHOULDER, _HIP]].all() and known.sum() >= _LEAST_LEVELS:
-            rows.append((time_s, px, known, facing, is_straight, sits))
+            rows.append((time_s, px, known, facing, is_straight, sits, bend))
     if not rows:
         return None
+    bends = np.array([row[-1] for row in rows])
+    if np.isfinite(bends).any():
+        most = np.nanquantile(bends, _STRAIGHTEST) + _BENT_MORE
+        rows = [row for row, bend in zip(rows, bends, strict=True) if not bend > most]
     rows = [rows[i] for i in np.unique(np.linspace(0, len(rows) - 1, _MOST_IMAGES).astype(int))]
-    times_s, px, known, faces, straight, sitting = (
+    times_s, px, known, faces, straight, sitting, _ = (
         np.array(one) for one in zip(*rows, strict=True)
     )
     stddevs = np.where(known, _ALONG, np.inf)[..., None] * np.array([_SIDE / _ALONG, 1.0])
@@ -298,6 +317,19 @@ def _upright(sights: Sightings, number: int, camera: Camera) -> _Seen | None:
         np.full(len(rows), independent / len(rows)),
         np.full(len(rows), float(number)),
     )
+
+
+def is_inside(px: FloatArray, camera: Camera, share: float = _BORDER) -> NDArray[np.bool_]:
+    """Return which points (..., 2) are inside of the image and not at its border, (...).
+
+    Args:
+        px: column and row of each.
+        camera: of the image.
+        share: width of the border as a share of the longer side.
+    """
+    border = share * max(camera.width, camera.height)
+    low, high = border - 0.5, np.array([camera.width, camera.height]) - 0.5 - border
+    return np.asarray(((px > low) & (px < high)).all(axis=-1))
 
 
 def _levels(points: ImagePoints) -> tuple[FloatArray, NDArray[np.bool_]]:
@@ -318,10 +350,13 @@ def _levels(points: ImagePoints) -> tuple[FloatArray, NDArray[np.bool_]]:
     return px, known
 
 
-def _posture(points: ImagePoints) -> tuple[tuple[float, float], bool, bool, bool]:
-    """Return where a person faces, and whether they bow, have straight legs, and sit."""
+def _posture(points: ImagePoints) -> tuple[tuple[float, float], bool, float, bool, bool]:
+    """Return where a person faces, if they bow, a bend, and if legs are straight, or they sit.
+
+    The bend is that of hips and knees in all, rad; nan if the legs are unknown.
+    """
     if points.spatial_m is None:
-        return (0.0, 1.0), False, True, False
+        return (0.0, 1.0), False, math.nan, True, False
     there = points.spatial_m
     shoulders, hips = (
         np.array([there[POINT_INDEX[f"{side}_{name}"]] for side in ("left", "right")])
@@ -336,11 +371,13 @@ def _posture(points: ImagePoints) -> tuple[tuple[float, float], bool, bool, bool
     is_bowed = bool((elbows[:, 1] < shoulders[:, 1]).any())
     is_bowed |= float(np.hypot(trunk[0], trunk[2])) > np.tan(_BOWED) * -float(trunk[1])
     if points.legs is None or points.legs.spatial_m is None:
-        return facing, is_bowed, False, False
+        return facing, is_bowed, math.nan, False, False
     knees, ankles = points.legs.spatial_m[0:2], points.legs.spatial_m[2:4]
     thighs, shanks = knees - hips, ankles - knees
-    is_straight = all(_angle(*pair) < _BENT for pair in zip(thighs, shanks, strict=True))
-    return facing, is_bowed, is_straight, _angle(thighs.sum(axis=0), -trunk) > _SITS
+    of_knees = [_angle(*pair) for pair in zip(thighs, shanks, strict=True)]
+    of_hips = _angle(thighs.sum(axis=0), -trunk)
+    bend = of_hips + sum(of_knees) / 2
+    return facing, is_bowed, bend, max(of_knees) < _BENT, of_hips > _SITS
 
 
 def _angle(a: FloatArray, b: FloatArray) -> float:

@@ -33,6 +33,7 @@ from cardbox_tracker.detectors.image_points import (
     POINT_INDEX,
     ImagePoints,
 )
+from cardbox_tracker.measuring.people_camera import is_inside
 from cardbox_tracker.person.kinematics import pose
 from cardbox_tracker.person.legs import (
     HIP_SHARE,
@@ -72,6 +73,8 @@ _SHOULDERS = [POINT_INDEX[f"{side}_shoulder"] for side in ("left", "right")]
 _ANKLE_SHARE = 0.039
 # A point with a lower score is not seen.
 LEAST_SCORE = 0.5
+# Width of the image's border, as a share of its longer side, where the detector guesses points.
+_BORDER = 0.005
 # Deviations of the points of knee and ankle, m and px; how much larger that of an unseen one is.
 _POINT_M, _POINT_PX, _UNSEEN = np.array([0.025, 0.025]), 1.5, 6.0
 # Deviations of the slopes of thigh and shank, and how much larger those of unseen ones are.
@@ -253,6 +256,10 @@ class _Fit:
         assert points.legs is not None
         px, scores, spatial_m = points.legs.px[_ENDS], points.legs.scores[_ENDS], None
         known = np.asarray(np.isfinite(px).all(axis=-1))
+        # The detector guesses what is outside of the image, such as a foot that is cut off.
+        inside = is_inside(points.legs.px, self._camera, _BORDER) | (points.legs.scores <= 0.0)
+        scores[:, 0] *= inside[:2]
+        scores[:, 1] *= inside[2:].reshape(3, 2).all(axis=0)
         px, scores = np.where(known[..., None], px, 0.0), np.where(known, scores, 0.0)
         is_seen = scores >= LEAST_SCORE
         depth_m = float(self._camera.reference_to_optical(self._hip_m)[2])

@@ -25,8 +25,10 @@ STAND = [(3.0, 0.0)] * 6
 BLANK = np.full((480, 640), 128, np.uint8)
 
 
-def points(distance_m: float, aside_m: float, pitch_deg: float, roll_deg: float) -> ImagePoints:
-    """Return who stands at a place before a camera ``HEIGHT_M`` above the floor."""
+def points(
+    distance_m: float, aside_m: float, pitch_deg: float, roll_deg: float, on_m: float = 0.0
+) -> ImagePoints:
+    """Return who stands at a place before a camera ``HEIGHT_M`` above the floor, or on a box."""
     view = CAMERA.with_pitch(np.radians(pitch_deg))
     c, s = np.cos(np.radians(roll_deg)), np.sin(np.radians(roll_deg))
     px = dict[str, np.ndarray]()
@@ -39,7 +41,7 @@ def points(distance_m: float, aside_m: float, pitch_deg: float, roll_deg: float)
             (
                 STATURE_M * FORWARD[at] - distance_m,
                 aside_m + across_m,
-                STATURE_M * HEIGHTS[at] - HEIGHT_M,
+                STATURE_M * HEIGHTS[at] - HEIGHT_M + on_m,
             )
         )
         u, v = view.project(view.reference_to_optical(there)) - (CAMERA.cx, CAMERA.cy)
@@ -107,6 +109,47 @@ def test_who_stays_in_one_place_shows_little() -> None:
     assert nobody.camera.height_m is None and not nobody.sources
     assert nobody.camera.pitch_rad.origin == "usual"
     assert nobody.camera.pitch_rad.stddev > np.radians(11.0)
+
+
+def squatting(pitch_deg: float, bend_deg: float) -> ImagePoints:
+    """Return who bends knees and hips, and leans forward, at one place; 0 degrees for upright."""
+    view, bend = CAMERA.with_pitch(np.radians(pitch_deg)), np.radians(bend_deg)
+    # Ankles, knees, hips, and what is above, forward and up, in statures.
+    shin, thigh = HEIGHTS[4] - HEIGHTS[5], HEIGHTS[3] - HEIGHTS[4]
+    ankle = np.array((0.0, HEIGHTS[5]))
+    knee = ankle + shin * np.array((np.sin(bend / 2), np.cos(bend / 2)))
+    hip = knee + thigh * np.array((-np.sin(bend), np.cos(bend)))
+    lean = np.array(((np.cos(bend / 2), np.sin(bend / 2)), (-np.sin(bend / 2), np.cos(bend / 2))))
+    px, there_m = dict[str, np.ndarray](), dict[str, np.ndarray]()
+    for name in (*POINT_NAMES, *LEG_POINT_NAMES):
+        level = name.split("_")[-1].replace("heel", "ankle").replace("foot", "ankle")
+        at = LEVELS.index(level) if level in LEVELS else LEVELS.index("shoulder")
+        above = lean @ (FORWARD[at], HEIGHTS[at] - HEIGHTS[3])
+        forward, up = STATURE_M * {3: hip, 4: knee, 5: ankle}.get(at, hip + above)
+        aside_m = 0.0 if name == "nose" else 0.12 * (1 if "left" in name else -1)
+        there = np.array((forward - 3.0, aside_m, up - HEIGHT_M))
+        px[name] = view.project(view.reference_to_optical(there))
+        there_m[name] = view.reference_to_optical(there)
+    legs = LegPoints(
+        np.array([px[name] for name in LEG_POINT_NAMES]),
+        np.ones(8),
+        np.array([there_m[name] for name in LEG_POINT_NAMES]),
+    )
+    whole, in_space = (np.array([one[name] for name in POINT_NAMES]) for one in (px, there_m))
+    return ImagePoints(whole, np.ones(len(POINT_NAMES)), None, in_space, legs)
+
+
+@pytest.mark.parametrize("pitch_deg", [0.0, 20.0])
+def test_who_squats_or_steps_on_a_box_does_not_tilt_the_camera(pitch_deg: float) -> None:
+    bends = [0.0, 10.0, 45.0, 80.0, 80.0, 45.0, 10.0] * 3
+    squats = [(2.0 * k, squatting(pitch_deg, bend)) for k, bend in enumerate(bends)]
+    steps = [
+        (2.0 * k, points(3.0, 0.1 * (k % 3), pitch_deg, 0.0, 0.3 * (k % 5 == 4))) for k in range(20)
+    ]
+    for people, upright in ((squats, squats[::7]), (steps, [*steps[:4], *steps[5:9]])):
+        shown, by_upright = (people_camera([one], [STATURE_M], CAMERA) for one in (people, upright))
+        assert shown is not None and by_upright is not None
+        assert abs(shown.values[0] - by_upright.values[0]) < np.sqrt(shown.covariance[0, 0])
 
 
 @pytest.mark.parametrize("roll_deg", [12.0, 25.0, -12.0])
