@@ -105,13 +105,8 @@ class SentImage(NamedTuple):
 def decode_grey(sent: SentImage, levels: Levels | None = None) -> ImageArray:
     """Return the brightness (H, W) uint8 of an image; mono8 is not copied.
 
-    Args:
-        sent: the image.
-        levels: what scales 16 bits, the same for all images of a camera; without it, the range of
-            this image counts.
-
-    Raises:
-        EncodingError: the encoding is not supported, or the bytes do not fit it.
+    ``levels`` scales 16 bits alike for all images of a camera; without it, the range of this image
+    counts. Raises EncodingError if the encoding is not supported or the bytes do not fit it.
     """
     raw, kind = _pixels(sent, levels)
     if kind.shared is not None:
@@ -120,11 +115,7 @@ def decode_grey(sent: SentImage, levels: Levels | None = None) -> ImageArray:
 
 
 def decode_bgr(sent: SentImage, levels: Levels | None = None) -> ImageArray:
-    """Return the colours (H, W, 3) uint8, bgr, of an image; see :func:`decode_grey`.
-
-    Raises:
-        EncodingError: the encoding is not supported, or the bytes do not fit it.
-    """
+    """Return the colours (H, W, 3) uint8, bgr, of an image; see :func:`decode_grey`."""
     raw, kind = _pixels(sent, levels)
     if kind.shared is None:
         return raw if kind.to_bgr is None else np.asarray(cv2.cvtColor(raw, kind.to_bgr), np.uint8)
@@ -147,9 +138,7 @@ def decode_as_sent(
 ) -> ImageArray:
     """Return bgr (H, W, 3) uint8 of a colour image, brightness (H, W) uint8 of a grey one.
 
-    Raises:
-        EncodingError: the encoding is not supported, the bytes do not fit it, or the image has more
-            than ``most_pixels``.
+    Raises EncodingError as :func:`decode_grey`, or if it has more than ``most_pixels``.
     """
     check_pixels(sent.width, sent.height, most_pixels)
     is_grey = sent.encoding.startswith("mono") or sent.encoding in ("8UC1", "16UC1")
@@ -159,15 +148,9 @@ def decode_as_sent(
 def decode_compressed(
     data: Any, most_pixels: float = MOST_PIXELS, levels: Levels | None = None
 ) -> ImageArray:
-    """Return a JPEG or PNG image as (H, W) grey or (H, W, 3) bgr, uint8.
+    """Return a JPEG or PNG image as (H, W) grey or (H, W, 3) bgr, uint8; see :func:`decode_grey`.
 
-    Args:
-        data: the bytes of the file.
-        most_pixels: larger images are refused before memory is allocated.
-        levels: see :func:`decode_grey`.
-
-    Raises:
-        EncodingError: the bytes cannot be decoded as an image, or it is too large.
+    Raises EncodingError if it cannot be decoded, or has more than ``most_pixels``.
     """
     raw = np.frombuffer(data, np.uint8)
     check_pixels(*compressed_size(raw.tobytes()), most_pixels)

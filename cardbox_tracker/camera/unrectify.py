@@ -9,18 +9,9 @@ from cardbox_tracker.camera.camera import Calibration, FloatArray
 
 
 def unrectified(calibration: Calibration, px: FloatArray, width: int, height: int) -> FloatArray:
-    """Return where pixels (N, 2) of the working image lie in the calibrated image, px.
+    """Return where pixels (N, 2) of a working image of that size lie in the calibrated image.
 
-    This is the inverse of :meth:`.Calibration.rectified`.
-
-    Args:
-        calibration: calibration of the camera.
-        px: column and row of each pixel.
-        width: width of the working image, px.
-        height: height of the working image, px.
-
-    Raises:
-        CameraError: the camera is uncalibrated or its distortion model is unknown.
+    This is the inverse of :meth:`.Calibration.rectified`, and raises CameraError like that.
     """
     camera = calibration.camera(width, height)
     rays = camera.rays(px)[:, :2] @ calibration.turn()[:2, :2]

@@ -80,9 +80,8 @@ class View:
     def of(cls, body: BodyModel, first: Camera, other: OtherCamera) -> View:
         """Return the view of ``body`` before ``first``, which includes its pitch.
 
-        Raises:
-            CameraError: the other camera looks straight up or down, or the person was measured
-                behind it.
+        Raises CameraError if the other camera looks straight up or down, or does not have the
+        person in front of it.
         """
         axes = other.extrinsics.rotation @ first.reference_to_optical_rotation()
         ahead = axes[2]
@@ -135,10 +134,7 @@ class View:
         return moved
 
     def upright(self, image: AnyImage, is_mask: bool = False) -> AnyImage:
-        """Return an image (H, W) or (H, W, 3) of the camera turned upright.
-
-        Pixels beyond the image are 0 in a mask, or else those of the nearest border.
-        """
+        """Return an image (H, W) or (H, W, 3) turned upright; a mask is 0 beyond its border."""
         if self.turn is None:
             return image
         border = cv2.BORDER_CONSTANT if is_mask else cv2.BORDER_REPLICATE
@@ -160,10 +156,10 @@ class View:
         return axes
 
     def line_of_sight(self, bearing: float) -> tuple[LevelPoint, LevelPoint]:
-        """Return the camera's place and the unit direction of a line of sight.
+        """Return the camera's place and the unit direction of a line of sight, metres.
 
-        Both are in the first camera's level frame, metres. ``bearing`` is the lateral coordinate
-        divided by the depth.
+        Both are in the first level frame; ``bearing`` is the lateral coordinate divided by the
+        depth.
         """
         c, s = cos(self.yaw_rad), sin(self.yaw_rad)
         x_m, y_m, _ = self.offset_m.tolist()

@@ -114,11 +114,7 @@ def _fits(result: InitializationResult) -> str:
 
 
 def check_fit(result: InitializationResult, config: InitializationConfig) -> None:
-    """Refuse a result whose mean IoU, or whose IoU of a single reference, is too low.
-
-    Raises:
-        InitializationError: the text has each fit and names the references with a poor fit.
-    """
+    """Raise InitializationError if the mean IoU, or that of a single reference, is too low."""
     fits = _fits(result)
     advice = (
         f"check person_distance_m ({config.distance_m:g} m), the camera's pitch "

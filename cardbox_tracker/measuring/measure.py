@@ -100,20 +100,14 @@ def initialize_body(
 ) -> InitializationResult:
     """Measure a person and learn the person's colours.
 
-    Args:
-        references: silhouettes (H, W) of ``front``, ``side`` and ``arms``, or masks of any numeric
-            type, see :func:`~cardbox_tracker.camera.given_arrays.silhouette_from`.
-        camera: working camera of the silhouettes' size.
-        config: settings; None for the defaults.
-        progress: called with the finished fraction.
-        images: images (H, W, 3) bgr or (H, W) of the references ``front`` and ``arms``, of the
-            camera's size; without them the body has no appearance.
+    ``references`` are silhouettes (H, W) of ``front``, ``side`` and ``arms``, of the camera's size,
+    or masks of any numeric type, see :func:`~cardbox_tracker.camera.given_arrays.silhouette_from`.
+    Without ``images``, (H, W, 3) bgr or (H, W), of ``front`` and ``arms``, the body has no
+    appearance.
 
-    Raises:
-        InitializationError: the references are unusable, show other postures, or the model does
-            not fit them; the text names the reference and the remedy.
-        ValueError: a silhouette or an image has another size than the camera, or its type or values
-            are impossible.
+    Raises InitializationError, with the reference and the remedy, if the references are unusable,
+    show other postures, or the model does not fit them; and ValueError if arrays are of another
+    size, type or range.
     """
     config = config or InitializationConfig()
     references = {

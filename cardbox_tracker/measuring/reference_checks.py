@@ -115,11 +115,8 @@ def posture_problems(
 ) -> list[str]:
     """Return the problems of the references as sentences; an empty list if there are none.
 
-    Args:
-        references: silhouettes (H, W) of ``front``, ``side`` and ``arms``, as ``outline.filled``
-            returns them.
-        camera: working camera including the pitch.
-        distance_m: level distance to the person.
+    Silhouettes (H, W) of ``front``, ``side`` and ``arms`` are as ``outline.filled`` returns them;
+    the camera includes the pitch.
     """
     view = _View(references, camera, distance_m)
     mixed_up = _mixed_up(view.widths())
@@ -137,11 +134,7 @@ def posture_problems(
 
 
 def check_postures(references: Mapping[str, Silhouette], camera: Camera, distance_m: float) -> None:
-    """Refuse references in wrong postures; the arguments are those of ``posture_problems``.
-
-    Raises:
-        InitializationError: the text names the reference and the mistake.
-    """
+    """Raise InitializationError, with the mistake, for references in wrong postures."""
     problems = posture_problems(references, camera, distance_m)
     if problems:
         raise InitializationError("; ".join(problems))

@@ -48,11 +48,9 @@ MEASURED, PROPORTIONS = SOURCES = ("measured", "proportions")
 
 
 def check_range(name: str, value: float, lowest: float, highest: float, unit: str) -> None:
-    """Refuse a value that is not finite or lies outside ``lowest`` to ``highest``.
+    """Raise BodyModelError if a value is not finite or outside of ``lowest`` to ``highest``.
 
-    Raises:
-        BodyModelError: the value is refused; the text gives name, value, unit, range and a likely
-            wrong unit.
+    The text gives name, value, unit, range and a likely wrong unit.
     """
     if not math.isfinite(value):
         raise BodyModelError(f"{name} is {value}; expected a finite number of {unit}")
@@ -224,15 +222,10 @@ class BodyModel:
 
     @classmethod
     def of(cls, sizes: FloatArray | None = None, **values: Any) -> BodyModel:
-        """Create a model from plain numbers.
+        """Create a model from sizes (18,), metres, and numbers; what is missing has its default.
 
-        Args:
-            sizes: shape (18,), metres; None for the default sizes.
-            values: any of ``CONSTANTS``, ``CAMERA_ROLL``, ``side_turn``, ``appearance``,
-                ``source``, ``unknown`` and ``shoulder_rise``; missing values have their defaults.
-
-        Raises:
-            BodyModelError: a number is outside of its range; the text names it.
+        ``values`` are any of ``CONSTANTS``, ``CAMERA_ROLL``, ``side_turn``, ``appearance``,
+        ``source``, ``unknown`` and ``shoulder_rise``. Raises BodyModelError for one out of range.
         """
         model = cls() if sizes is None else cls(Person(sizes))
         return model.with_values(**values)
@@ -240,13 +233,8 @@ class BodyModel:
     def with_values(self, **values: Any) -> BodyModel:
         """Return the same model with other numbers.
 
-        Args:
-            values: any of ``sizes``, ``CONSTANTS``, ``CAMERA_ROLL``, ``CAMERA_HEIGHT``,
-                ``height_stddev_m``, ``side_turn``, ``appearance``, ``source``, ``unknown`` and
-                ``shoulder_rise``.
-
-        Raises:
-            BodyModelError: a number is outside of its range; the text names it.
+        ``values`` are those of :meth:`of`, ``sizes``, ``CAMERA_HEIGHT`` and ``height_stddev_m``.
+        Raises BodyModelError for one out of range.
         """
         changed: dict[str, Any] = {}
         if "sizes" in values:

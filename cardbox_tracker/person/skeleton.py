@@ -292,9 +292,7 @@ def neck_rotation(angles_rad: FloatArray) -> FloatArray:
 def arm_rotations(angles_rad: FloatArray, side: float) -> tuple[FloatArray, FloatArray]:
     """Return rotations (..., 3, 3) from upper arm and forearm, which hang along -Z, to torso.
 
-    Args:
-        angles_rad: the four angles of an arm, (..., 4).
-        side: +1 for the left arm, -1 for the right.
+    The four angles of an arm are (..., 4), rad; ``side`` is +1 for the left arm, -1 for the right.
     """
     a = np.asarray(angles_rad, dtype=np.float64)
     upper_arm = rotation_x(side * a[..., 0]) @ rotation_y(-a[..., 1])
@@ -302,11 +300,6 @@ def arm_rotations(angles_rad: FloatArray, side: float) -> tuple[FloatArray, Floa
 
 
 def arm_directions(angles_rad: FloatArray, side: float) -> tuple[FloatArray, FloatArray]:
-    """Return unit vectors (..., 3) along upper arm and forearm in the torso's frame.
-
-    Args:
-        angles_rad: the four angles of an arm, (..., 4).
-        side: +1 for the left arm, -1 for the right.
-    """
+    """Return unit vectors (..., 3) along upper arm and forearm; see :func:`arm_rotations`."""
     upper_arm, forearm = arm_rotations(angles_rad, side)
     return -upper_arm[..., 2], -forearm[..., 2]

@@ -52,17 +52,10 @@ def calibrate_recording(
 ) -> CalibratedCameras:
     """Estimate the poses of further cameras in the optical frame of the first one.
 
-    Args:
-        path: a recording as :class:`BagReader` takes it.
-        cameras: namespaces; the person faces the first camera in the reference postures.
-        background: span without a person in any image.
-        references: spans of the postures ``front``, ``side`` and ``arms``.
-        motion: span in which the person moves; it begins in the posture ``front``.
-        config: settings of the measurement by the first camera.
-        progress: called with the finished fraction.
-
-    Raises:
-        CardboxError: the recording or a span is unusable, or no camera pose fits.
+    The person faces the first of the namespaces ``cameras`` in the ``references`` ``front``,
+    ``side`` and ``arms``. Nobody is in an image of the span ``background``; in ``motion`` the
+    person moves, from the posture ``front`` on. Raises CardboxError if the recording or a span is
+    unusable, or no pose fits.
     """
     names = [camera.strip("/") for camera in cameras]
     if not 2 <= len(set(names)) == len(names) <= MOST_CAMERAS:

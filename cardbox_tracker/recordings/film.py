@@ -37,11 +37,7 @@ class Film:
         """Do nothing: files are only open while they are read."""
 
     def image_topic(self, camera: str | None = None) -> str:
-        """Return the name of the file or folder; there is only one camera.
-
-        Raises:
-            BagError: a camera is named.
-        """
+        """Return the name of the file or folder; raise BagError if a camera is named."""
         if camera is not None:
             raise BagError(f"{self.path} is of one camera, and {camera!r} is none; omit --cameras")
         return self.path.name
@@ -49,9 +45,8 @@ class Film:
     def calibration(self, camera: str | None = None) -> Calibration:
         """Return the given calibration, or what the file tells, or that of a usual camera.
 
-        Raises:
-            BagError: a camera is named.
-            CameraError: the given calibration does not fit the images.
+        Raises BagError if a camera is named, CameraError if the calibration does not fit the
+        images.
         """
         self.image_topic(camera)
         return self._given.calibrated(self.path, *self._size, stored=self._stored, file=self._file)

@@ -63,11 +63,7 @@ class GivenCamera:
         return replace(self, roll_rad=-roll_rad if self.is_mirrored else roll_rad)
 
     def check(self) -> None:
-        """Check what is given, as far as it can be without the images.
-
-        Raises:
-            CameraError: the calibration cannot be read, or the field of view is impossible.
-        """
+        """Raise CameraError if the calibration is unreadable or the field of view impossible."""
         if self.calibration is not None:
             load_calibration(self.calibration)
         elif self.fov_deg is not None and not LEAST_FOV_DEG <= self.fov_deg <= MOST_FOV_DEG:
@@ -87,17 +83,10 @@ class GivenCamera:
     ) -> Calibration:
         """Return the calibration of images of ``width`` x ``height`` px in the recording ``path``.
 
-        Args:
-            path: the recording, for texts.
-            width: width of the images, px.
-            height: height of the images, px.
-            frame_id: name of the camera's optical frame.
-            stored: size, px, before pixels were made square, of which a file may be; 0 if the same.
-            file: film or image that may tell the field of view if none is given; if it does not,
-                a usual one is assumed. None if there is no such file.
-
-        Raises:
-            CameraError: neither field of view nor calibration is given, or they do not fit.
+        ``stored`` is their size, px, before pixels were made square, of which a calibration file
+        may be. If nothing is given, ``file``, a film or image, may tell the field of view, else a
+        usual one is assumed; without ``file``, or if what is given does not fit, CameraError is
+        raised.
         """
         if self.calibration is not None:
             found = load_calibration(self.calibration)

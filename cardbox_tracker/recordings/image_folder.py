@@ -29,10 +29,7 @@ _MOST_BYTES = 4 * MOST_PIXELS
 
 
 def image_files(folder: Path) -> list[Path]:
-    """Return the images of a folder, ordered by name; numbers in names count as numbers.
-
-    Hidden files are no images, such as ``._NAME``, which a Mac writes beside each NAME.
-    """
+    """Return the images of a folder by name, numbers as numbers, without hidden files."""
     files = (path for path in folder.iterdir() if path.suffix.lower() in SUFFIXES)
     seen = (path for path in files if path.is_file() and not path.name.startswith("."))
     return sorted(seen, key=_by_number)

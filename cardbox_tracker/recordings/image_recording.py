@@ -23,8 +23,8 @@ _MULTIPLE_PX = 8
 def working_size(width: int, height: int) -> tuple[int, int]:
     """Return the working size for images of ``width`` x ``height`` px.
 
-    It has the same aspect ratio, as nearly as multiples of 8 px allow, and about as many pixels
-    as ``WORKING_SIZE``, which it is for 4:3.
+    It has their aspect ratio, as nearly as multiples of 8 px allow, and about as many pixels as
+    ``WORKING_SIZE``, which it is for 4:3.
     """
     pixels, aspect = WORKING_SIZE[0] * WORKING_SIZE[1], width / height
     sides = sqrt(pixels * aspect), sqrt(pixels / aspect)
@@ -51,11 +51,7 @@ class RecordedImage:
 
     @property
     def as_sent(self) -> NDArray[np.uint8]:
-        """BGR colours (H, W, 3) of a colour camera, else brightness (H, W), uint8.
-
-        Raises:
-            EncodingError: the image cannot be decoded.
-        """
+        """BGR (H, W, 3) of a colour camera, else brightness (H, W), uint8; or EncodingError."""
         return self._decode()
 
 
@@ -87,12 +83,7 @@ class ImageRecording(Protocol):
         """Warnings about what was read so far."""
 
     def left_out(self, topic: str, used: Collection[str] = ()) -> list[str]:
-        """Return what was read of these images so far but not used, with the reasons.
-
-        Args:
-            topic: name of the images.
-            used: topics of other images that are used, too.
-        """
+        """Return what of these images was not used, and why; topics in ``used`` are no reason."""
 
     def __enter__(self) -> ImageRecording:
         """Open the recording."""
@@ -112,8 +103,4 @@ class ImageRecording(Protocol):
         """Yield the images of that name, in order."""
 
     def calibration(self, camera: str | None = None) -> Calibration:
-        """Return the calibration of a camera.
-
-        Raises:
-            CameraError: the camera is not calibrated.
-        """
+        """Return the calibration of a camera; raise CameraError if there is none."""

@@ -51,7 +51,7 @@ def marker_shapes(
 ) -> tuple[MarkerShape, MarkerShape]:
     """Return the patches and the skeleton of ``body`` in a posture (12,) before its camera.
 
-    If ``neck`` (2,), rad, is given, the skeleton has a line in the direction of the face.
+    With ``neck`` (2,), rad, the skeleton has a line in the direction of the face.
     """
     frames = pose(body, posture)
     tilt = body.camera_pose

@@ -255,11 +255,7 @@ def _joints(
 
 
 def posture_from(joints: JointValues) -> FloatArray:
-    """Return the posture (12,) from named joints in any order.
-
-    Raises:
-        ValueError: a joint of the posture is missing.
-    """
+    """Return the posture (12,) from named joints in any order; ValueError if one is missing."""
     by_name = positions_of(joints)
     missing = [name for name in JOINT_NAMES if name not in by_name]
     if missing:
@@ -322,8 +318,8 @@ def _markers(estimate: Estimate, tracker: Tracker) -> Markers | None:
 def outputs(torso_place: bool = True, hands: bool = True) -> tuple[Output, ...]:
     """Return the topics of the tracker in the order of publication.
 
-    With ``torso_place``, the joints include those of place, neck and clavicles, and of what else is
-    measured; with ``hands``, there is the topic of hands, which has no message without any.
+    With ``torso_place``, the joints include place, neck, clavicles and what else is measured; with
+    ``hands``, there is the topic of hands, which has no message without any.
     """
     opened = Output("hands", JointValues, lambda found, _: open_hands(found))
     return (
@@ -404,7 +400,7 @@ class _Motion:
     def velocities(self, stamp_ns: int, estimate: Estimate, tracker: Tracker) -> FloatArray | None:
         """Return those of :func:`joint_values`, rad/s and m/s; None without an image before.
 
-        An image counts that has a posture of the same tracker, at most ``_LONGEST_NS`` before.
+        It has a posture of the same tracker and is at most ``_LONGEST_NS`` old.
         """
         before, self._last = self._last, None
         joints = joint_values(estimate)

@@ -85,16 +85,10 @@ class GroundTruth:
 
 
 def load_ground_truth(path: str | os.PathLike[str], camera: str | None = None) -> GroundTruth:
-    """Read the ``ground_truth.json`` of a session.
+    """Read the ``ground_truth.json`` of a session, for the first camera or for ``camera``.
 
-    Args:
-        path: the file.
-        camera: namespace of the camera to which keypoints, stamps, distance and pitch belong; None
-            for the first camera. The distance to any other camera than the first is that of the
-            true hips, or else shoulders, in its first images.
-
-    Raises:
-        CardboxError: the file cannot be read or is not a ground truth.
+    The distance to any other camera than the first is that of the true hips, or else shoulders, in
+    its first images. Raises CardboxError if the file cannot be read or is none.
     """
     expected = "the ground_truth.json of a session, such as 'cardbox synthesize' writes"
     with foreign(path, CardboxError, expected):
@@ -198,8 +192,7 @@ class TrackingError:
 def tracking_error(estimates: Mapping[int, FloatArray], truth: GroundTruth) -> TrackingError:
     """Compare keypoints (6, 3), metres in the optical frame, by stamp, with the truth.
 
-    Raises:
-        CardboxError: no estimate has the stamp of a true frame.
+    Raises CardboxError if no estimate has the stamp of a true frame.
     """
     stamps = [stamp for stamp in estimates if stamp in truth.frames]
     if not stamps:

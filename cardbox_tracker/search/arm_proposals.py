@@ -161,16 +161,11 @@ def propose_arms(
 
     The first arm is that of the first state; then follow varied arms of the best states. The last
     arms are, from the end: arms of the first four states mirrored in depth; arms that reach for the
-    end of the uncovered foreground, if there is any; arms from the bank.
-
-    Args:
-        pool: states, the best first.
-        arm: 0 left, 1 right.
-        plan: fields of :class:`ArmPlan`.
-        uncovered: planes outside of trunk and other arm, (2, words, rows or more).
-        size: number of rows that count, and width, px.
-        body: fields of :class:`~cardbox_tracker.terms.kernel_arguments.Body`.
-        numbers: fields of :class:`~.joint_moves.Numbers`, (N, 4) and (N, 3).
+    end of the uncovered foreground, if there is any; arms from the bank. ``plan``, ``body`` and
+    ``numbers``, (N, 4) and (N, 3), are fields of :class:`ArmPlan`,
+    :class:`~cardbox_tracker.terms.kernel_arguments.Body` and :class:`~.joint_moves.Numbers`;
+    ``uncovered`` are planes outside of trunk and other arm, (2, words, rows or more), and ``size``
+    the rows that count, and the width, px.
     """
     sources, sigma_rad, mirrors, tips, banked, bank, arm_limits = plan
     normals, uniforms = numbers

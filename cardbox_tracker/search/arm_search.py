@@ -38,11 +38,7 @@ class ArmSearch:
     ) -> tuple[FloatArray, FloatArray]:
         """Return arms (N, 4), 0 left or 1 right, and their ratings (N,).
 
-        Args:
-            pool: states (M, 14) with this torso, the best first.
-            arm: 0 left, 1 right.
-            profile: numbers of arms.
-            draws: random numbers.
+        The states ``pool`` (M, 14) have this torso, the best first.
         """
         cost = self._cost
         arms = self._proposed(pool, arm, profile, *draws.for_arms())

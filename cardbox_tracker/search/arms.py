@@ -36,13 +36,9 @@ def propose_arms(
 ) -> FloatArray:
     """Return arms (N, 4), 0 left or 1 right, for the torso of the first state of a pool.
 
-    Args:
-        pool: states (M, 14) before the camera of ``cost``, the best first.
-        arm: 0 left, 1 right.
-        config: numbers of mirrored, reaching and likely arms.
-        cost: cost of one camera with a fixed torso.
-        numbers: random numbers, unit normal (N, 4) and uniform in 0..1 (N, 3).
-        share: number of cameras, by which the numbers of ``config`` are divided.
+    The states ``pool`` (M, 14) are before the camera of ``cost``, whose torso is fixed, the best
+    first. ``numbers`` are unit normal (N, 4) and uniform in 0..1 (N, 3); ``share`` is the number of
+    cameras, by which the numbers of ``config`` are divided.
     """
     # With several cameras, rounding may leave fewer arms than these kinds need together.
     left = len(numbers[0]) - 1

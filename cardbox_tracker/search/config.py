@@ -131,11 +131,7 @@ class TrackerConfig(Settings):
         return self.filter == "whole_body"
 
     def __post_init__(self) -> None:
-        """Check the ranges.
-
-        Raises:
-            ValueError: a value is out of range; the text names it.
-        """
+        """Raise ValueError, with the name, if a value is out of range."""
         super().__post_init__()
         fewest = min(self.torso.particles, self.arm.particles)
         if self.average > fewest:
@@ -150,14 +146,10 @@ class TrackerConfig(Settings):
         return replace(self, terms=(*self.terms, Depth()))
 
     def changed(self, given: Mapping[str, Any]) -> TrackerConfig:
-        """Return these settings with other values, each of which acts in the selected filter.
+        """Return these settings with other values, nested as ``{"whole_body": {"effort": 0.5}}``.
 
-        Args:
-            given: values by name, nested ones as mappings: ``{"whole_body": {"effort": 0.5}}``.
-
-        Raises:
-            NoEffectError: one of the values has no effect.
-            ValueError: a name is unknown, a value has the wrong type or is out of range.
+        Raises NoEffectError if one has no effect in the selected filter, and ValueError if a name
+        is unknown, or a value has the wrong type or is out of range.
         """
         config = changed(self, given)
         for name in _names(given):
@@ -187,9 +179,7 @@ class TrackerConfig(Settings):
     def with_particles(self, particles: int) -> TrackerConfig:
         """Return these settings with N = ``particles`` in each of the three filters.
 
-        Raises:
-            NoEffectError: the filter is not ``hierarchical``.
-            ValueError: the number is out of range.
+        Raises NoEffectError if the filter is not ``hierarchical``, ValueError if N is out of range.
         """
         number = {"particles": particles}
         fewer = {"average": particles} if particles < self.average else {}

@@ -41,12 +41,9 @@ class Cycles:
         views: Sequence[View] = (),
         make_hierarchy: MakeHierarchy = HierarchicalFilter,
     ) -> None:
-        """Prepare; see ``MakeFilter``.
+        """Prepare as ``MakeFilter``; raise ValueError if there are ``views``, as it has one camera.
 
         ``make_hierarchy`` takes settings, pixels of an image and random numbers.
-
-        Raises:
-            ValueError: there are ``views``, but the paper's filter has one camera.
         """
         if views:
             raise ValueError("the filter hierarchical has one camera; whole_body takes several")

@@ -97,10 +97,7 @@ class HierarchicalFilter:
     def __init__(self, config: TrackerConfig, image_px: int, rng: np.random.Generator) -> None:
         """Create the filters; :meth:`initialize` creates their particles.
 
-        Args:
-            config: settings.
-            image_px: pixels of an image; settings that refer to 320x240 are scaled to it.
-            rng: split into one stream per filter.
+        Settings that refer to 320x240 are scaled to an image of ``image_px``; ``rng`` is split.
         """
         self._config = config
         self._scale = image_px / _REFERENCE_AREA_PX

@@ -41,13 +41,9 @@ class Locator:
     def __init__(
         self, cost: MultiViewCost, distance_m: float, views: Sequence[View], crosses: bool
     ) -> None:
-        """Prepare.
+        """Prepare for ``views`` of further cameras; ``distance_m`` is that of the body model.
 
-        Args:
-            cost: source of the bearings.
-            distance_m: distance of the hips from the first camera in the body model.
-            views: views of the further cameras.
-            crosses: whether the intersection of the lines of sight is computed.
+        ``crosses`` says whether the intersection of the lines of sight is computed.
         """
         self._cost, self._distance_m = cost, distance_m
         self._views, self._crosses = views, crosses
@@ -65,12 +61,9 @@ class Locator:
     def locate(
         self, frames: Sequence[Frame], seeing: Sequence[int], before: FloatArray
     ) -> Location:
-        """Return the place of the person.
+        """Return the place of the person in frames of all cameras, of which ``seeing`` show them.
 
-        Args:
-            frames: frames of all cameras, whose silhouettes the cost has.
-            seeing: indices of the cameras that show the person.
-            before: state (14,) of the previous frame.
+        The cost has their silhouettes; ``before`` (14,) is the state of the previous frame.
         """
         costs, step_m = self._cost.costs, 0.0
         bearings = {number: costs[number].bearing() for number in seeing}
@@ -103,9 +96,7 @@ def crossing_of(
 
         (w I + sum of (I - a a^T)) x = w before + sum of (I - a a^T) place
 
-    Args:
-        lines: point and unit direction of each line, metres in the first level frame.
-        before: previous place of the person, metres.
+    All are metres in the first level frame.
     """
     # Without numpy, whose calls for such small matrices take ten times as long.
     weight = _LEAST_ANGLE**2

@@ -81,20 +81,13 @@ class PoseFilter(Protocol):
         """Set the frames of all cameras; return whether they can show a person."""
 
     def follow(self, frames: Sequence[Frame], terms: Sequence[Sequence[Term]]) -> Fit:
-        """Estimate the posture in the frames of the last call of :meth:`look`.
+        """Estimate the posture in the frames of the last :meth:`look`, by the cameras' terms.
 
         A new search starts around the front reference posture.
-
-        Args:
-            frames: frames of the first camera, then of the further cameras.
-            terms: further terms of the cost for each camera.
         """
 
     def ious(self) -> list[float | None]:
-        """Return the IoU of the last result and each camera's silhouette.
-
-        It is None for a camera that showed no person, and before the first result.
-        """
+        """Return the IoU of the last result in each camera; None where there was none."""
 
     def forget(self) -> None:
         """Start a new search with the next frame, because the person has left."""
@@ -110,13 +103,7 @@ class Corrector(Protocol):
     """Changes the results of the preset ``default``, see :class:`~cardbox_tracker.Tracker`."""
 
     def __call__(self, frames: Sequence[Frame], state: FloatArray) -> FloatArray:
-        """Return the corrected state (14,).
-
-        Args:
-            frames: frames of the first camera, then of the further cameras.
-            state: the state that fits the frames: d1..d12, ``torso_x``, ``torso_z``, (14,), rad and
-                metres.
-        """
+        """Return the corrected state (14,), rad and metres, for one that fits the frames."""
 
 
 MakeFilter = Callable[

@@ -22,9 +22,7 @@ from cardbox_tracker.search.config import TrackerConfig
 def read_settings(path: str | os.PathLike[str], config: TrackerConfig) -> TrackerConfig:
     """Return ``config`` with the values of the file at ``path``; docs/parameters.md has all names.
 
-    Raises:
-        CardboxError: the file cannot be read; a name is unknown; a value has the wrong type, is out
-            of range, or has no effect beside the others.
+    Raises CardboxError if it cannot be read, or a name or a value is none that acts.
     """
     expected = "a YAML file with names of docs/parameters.md, such as 'lost_frames: 10'"
     with foreign(path, CardboxError, expected):

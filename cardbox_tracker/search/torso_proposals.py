@@ -78,16 +78,9 @@ def propose_torsos(
     """Return states (N, 14) with new torsos around ``survivors`` (M, 14), whose arms they keep.
 
     Every second torso rotates about the shoulders. Half of either kind moves by ``step_m``, the
-    step of the silhouette, because a walking person moves further than the noise. The last
-    ``explorers`` bow, turn or mirror their yaw; the last of these stand upright.
-
-    Args:
-        survivors: states of the last frame.
-        noise: fields of :class:`~.joint_moves.Noise`.
-        step_m: lateral step, metres.
-        explorers: number of explorers.
-        upright: fields of :class:`Upright`.
-        numbers: fields of :class:`~.joint_moves.Numbers`, (N, 14) and (N, 2).
+    lateral step of the silhouette, because a walking person moves further than the noise. The last
+    ``explorers`` bow, turn or mirror their yaw; the last of these stand upright. ``noise``,
+    ``upright`` and ``numbers``, (N, 14) and (N, 2), are fields of their classes.
     """
     sigma, limits, lever_m = noise
     fresh, fresh_state, fresh_x_m, sight, distance_m = upright

@@ -27,20 +27,12 @@ def _is_inside(uncovered: Planes, row: int, column: int, step: int) -> bool:
 def farthest_uncovered(
     uncovered: Planes, size: tuple[int, int], u: float, v: float, reach_px: float
 ) -> tuple[int, float, float]:
-    """Find the farthest uncovered foreground from the pixel (u, v).
+    """Return how many uncovered points are near a pixel, and column and row of the farthest one.
 
     A point of the grid counts if it is foreground, the values 1 - 2 f of the five pixels around it
-    in its row add up to at most -4, and the point above or below is foreground.
-
-    Args:
-        uncovered: planes, (2, words, rows or more), without the covered pixels.
-        size: number of rows that count, and width, px.
-        u: column, px.
-        v: row, px.
-        reach_px: largest distance.
-
-    Returns:
-        Number of points within ``reach_px``, and column and row of the farthest one.
+    in its row add up to at most -4, and the point above or below is foreground. ``uncovered`` are
+    planes (2, words, rows or more) without the covered pixels, of which ``size`` count, rows and
+    width; ``u``, ``v`` and the largest distance are px.
     """
     rows, width = size
     count, best = 0, -1.0

@@ -30,17 +30,10 @@ class Walk:
         self.way_m = 0.0
 
     def see(self, silhouette: Silhouette, bearing: float, ahead_m: float) -> float:
-        """Update with the next silhouette.
+        """Return the lateral motion of the next silhouette (H, W), 0 or 255, metres.
 
-        A person who first appears at a border of the image is assumed to walk in.
-
-        Args:
-            silhouette: (H, W), 0 or 255.
-            bearing: lateral coordinate over depth of its middle.
-            ahead_m: distance of the person, metres.
-
-        Returns:
-            Lateral motion of the middle since the last silhouette, metres.
+        ``bearing`` is the lateral coordinate over depth of its middle, ``ahead_m`` the distance. A
+        person who first appears at a border of the image is assumed to walk in.
         """
         if self._bearing is None:
             step_m = 0.0

@@ -138,11 +138,7 @@ class KeptBackground:
     """
 
     def __init__(self, path: Path | None, size: tuple[int, int]) -> None:
-        """Read the file ``path`` if there is one; ``size`` is the working size, px.
-
-        Raises:
-            BackgroundFileError: the file contains no background of that size.
-        """
+        """Read the file ``path`` if there is one; ``size`` is the working size, px."""
         self.path = path
         self._stored: StoredBackground | None = None
         self._before: BackgroundModel | None = None
@@ -163,11 +159,8 @@ class KeptBackground:
     def resume(self, pipeline: SilhouettePipeline, image: ImageArray) -> str:
         """Resume the kept background in ``pipeline`` if it fits a prepared image.
 
-        Returns:
-            A text for the log; empty if the scene has to be learned.
-
-        Raises:
-            BackgroundFileError: the background in the file does not fit; the text gives the reason.
+        Returns a text for the log, empty if the scene has to be learned. Raises
+        BackgroundFileError, with the reason, if the background in the file does not fit.
         """
         if self._stored is not None:
             self._resume_file(self._stored, pipeline, image)
@@ -196,11 +189,7 @@ class KeptBackground:
         self._stored, self.use = None, "used"
 
     def keep(self, pipeline: SilhouettePipeline) -> str:
-        """Save the background of ``pipeline`` to the file; return a text for the log.
-
-        Raises:
-            BackgroundFileError: the file cannot be written.
-        """
+        """Save the background of ``pipeline`` to the file; return a text for the log."""
         model = pipeline.model
         if self.path is None or model is None:
             return ""

@@ -31,15 +31,9 @@ image."""
 
 
 def remove_small_regions(image: ImageArray, colour: int, area_px: float) -> None:
-    """Invert regions of ``colour`` with fewer than ``area_px`` pixels, in place.
+    """Invert regions of ``colour``, 0 or 255, with fewer than ``area_px`` pixels, in place.
 
-    Args:
-        image: (H, W), contiguous, 0 or 255.
-        colour: 0 or 255.
-        area_px: smallest area that is kept, px.
-
-    Raises:
-        ValueError: the image is read-only, or of another type or layout.
+    Raises ValueError if the image (H, W) is read-only, or of another type or layout.
     """
     check_array("image", image, (ANY, ANY), is_written=True)
     height, width = image.shape
@@ -69,19 +63,10 @@ class Regions(NamedTuple):
 def clean_silhouette(
     foreground: ImageArray, min_area: float, max_hole: float, window: Window | None = None
 ) -> ImageArray:
-    """Remove small specks and fill small holes of a binary image.
+    """Return a binary image (H, W), 0 or 255, without small specks and holes.
 
-    Args:
-        foreground: (H, W), 0 or 255.
-        min_area: smallest speck to keep, as a fraction of the image.
-        max_hole: largest hole to fill, as a fraction of the image.
-        window: a window that contains all foreground; the whole image if None.
-
-    Returns:
-        A new (H, W) image, 0 or 255.
-
-    Raises:
-        ValueError: the image is of another type or layout.
+    ``min_area`` and ``max_hole`` are fractions of the image; ``window`` contains all foreground.
+    Raises ValueError if the image is of another type or layout.
     """
     return clean_in_window(foreground, min_area, max_hole, window)[0]
 
@@ -116,11 +101,7 @@ def clean_in_window(
 
 
 def find_regions(image: ImageArray) -> Regions:
-    """Return the connected regions of the pixels of ``image`` (H, W), uint8, that are 255.
-
-    Raises:
-        ValueError: the image is of another type.
-    """
+    """Return the connected regions of the pixels of ``image`` (H, W), uint8, that are 255."""
     # A read-only array would make numba compile another version.
     image = np.require(image, requirements=("C", "W", "A"))
     check_array("image", image, (ANY, ANY))

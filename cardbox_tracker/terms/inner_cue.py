@@ -92,11 +92,7 @@ class InnerCueTerm:
     """The cue for one person with known colours."""
 
     def __init__(self, config: InnerCue, body: BodyModel, camera: Camera) -> None:
-        """Prepare for one body and one camera, and compile the kernels if necessary.
-
-        Raises:
-            ValueError: ``body`` has no appearance.
-        """
+        """Prepare for a body, which must have an appearance, before one camera."""
         if body.appearance is None:
             raise ValueError("the body has no appearance; learn it, or track without this term")
         self.config = config
@@ -185,10 +181,7 @@ class InnerCueTerm:
 def chest_levels(image: Image, silhouette: Silhouette, zones: FloatArray) -> FloatArray | None:
     """Return the median (channels,) over the chest, below the head; None if it is not visible.
 
-    Args:
-        image: (H, W, channels).
-        silhouette: (H, W), 0 or 255.
-        zones: (6,), see :func:`~.inner_cue_arms.zones_of`.
+    The image is (H, W, channels), ``zones`` (6,) are those of :func:`~.inner_cue_arms.zones_of`.
     """
     u, v, half_width, half_height, hips, _ = zones.tolist()
     top, bottom = max(int(v + 1.6 * half_height), 0), int(hips - 0.1 * (hips - v))

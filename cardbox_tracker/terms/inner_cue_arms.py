@@ -15,11 +15,9 @@ from cardbox_tracker.terms.term import Posed
 
 
 def arms_in_image(posed: Posed, arm: int) -> tuple[FloatArray, NDArray[np.bool_]]:
-    """Return the left arm, 0, or the right arm, 1, of N states in the image.
+    """Return column, row and pixels per metre of elbow and hand of one arm, (N, 2, 3).
 
-    Returns:
-        Column, row and pixels per metre of elbow and hand, (N, 2, 3); whether the hand is hidden
-        behind the trunk, (N,).
+    ``arm`` is 0 left or 1 right. Also returns whether the hand is behind the trunk, (N,).
     """
     points, hidden = np.empty((len(posed), 2, 3)), np.empty(len(posed), np.bool_)
     kernels.project_arms(posed.states, arm, posed.body, points, hidden)
@@ -32,11 +30,7 @@ def forearm_of(person: BodyModel) -> tuple[float, float]:
 
 
 def zones_of(posed: Posed) -> FloatArray:
-    """Return the places of head and torso of the first state in the image, (6,), px.
-
-    The values are the head's centre (u, v), the half axes of an ellipse around it, the row of the
-    hips, and the row of the torso's top.
-    """
+    """Return the places of head and torso of the first state, (6,), px, see ``torso_zones``."""
     zones = np.empty(6)
     kernels.torso_zones(posed.states[0], posed.body, zones)
     return zones
@@ -63,12 +57,9 @@ class ArmGains:
     def __call__(
         self, points: FloatArray, hidden: NDArray[np.bool_], others: FloatArray
     ) -> FloatArray:
-        """Return the gains (N,), px, of arms.
+        """Return the gains (N,), px, of arms; ``points`` and ``hidden`` as :func:`arms_in_image`.
 
-        Args:
-            points: see :func:`arms_in_image`.
-            hidden: see :func:`arms_in_image`.
-            others: points of the other arm, (N, 2, 3), or (1, 2, 3) for all.
+        ``others`` are points of the other arm, (N, 2, 3), or (1, 2, 3) for all.
         """
         gains = np.empty(len(points))
         kernels.arm_gains(points, hidden, others, *self.arguments, gains)

@@ -43,12 +43,9 @@ class Sleeves:
     def __init__(
         self, histograms: FloatArray, forearm_m: tuple[float, float], px_per_m: float
     ) -> None:
-        """Prepare for a person with ``histograms`` (5, bins).
+        """Prepare for a person with ``histograms`` (5, bins), probabilities of bins for each part.
 
-        Args:
-            histograms: probability of each bin for each part.
-            forearm_m: length and width of the forearm.
-            px_per_m: scale at the expected place of the person.
+        ``forearm_m`` are length and width; ``px_per_m`` is the scale at the expected place.
         """
         self._histograms, self._forearm_m, self._px_per_m = histograms.copy(), forearm_m, px_per_m
         forearm_px = forearm_m[0] * forearm_m[1] * px_per_m**2
@@ -75,16 +72,10 @@ class Sleeves:
         return histograms
 
     def see(self, skin: NDArray[np.float32], corner: tuple[int, int], posed: Posed) -> bool:
-        """Learn from one image.
+        """Learn from one image; return whether ``histograms`` have changed.
 
-        Args:
-            skin: log-likelihood ratios of the hand against the part behind, (h, w), nats; 0 where
-                both are alike.
-            corner: column and row of the image where ``skin`` begins.
-            posed: the person, one state.
-
-        Returns:
-            Whether ``histograms`` have changed.
+        ``skin`` (h, w) has log-likelihood ratios of the hand against the part behind, nats, and
+        begins at the column and row ``corner``; 0 where both are alike. The person has one state.
         """
         inclined = np.where(skin != 0.0, skin + np.float32(_TOWARDS_BARE), np.float32(0.0))
         maps = np.stack([inclined, inclined])

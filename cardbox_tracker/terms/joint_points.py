@@ -328,12 +328,9 @@ def points_of(points: ImagePoints) -> FloatArray:
 def bones_of(spatial_m: FloatArray, found: FloatArray) -> FloatArray:
     """Return component along z as a fraction of the length, and score, of each bone, (6, 2).
 
-    The bones are upper arm and forearm of each arm, the left one first, the line from the right
-    to the left shoulder, and that from the middle of the hips to that of the shoulders.
-
-    Args:
-        spatial_m: ``ImagePoints.spatial_m``, (17, 3).
-        found: see :func:`points_of`.
+    The bones are upper arm and forearm of each arm, the left one first, the line from the right to
+    the left shoulder, and that from the middle of the hips to that of the shoulders. ``spatial_m``
+    (17, 3) is that of ``ImagePoints``, ``found`` that of :func:`points_of`.
     """
 
     def at(*names: str) -> FloatArray:

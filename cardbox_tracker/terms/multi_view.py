@@ -85,10 +85,7 @@ class MultiViewCost:
         self.limits = state_limits(float(self.place[0]), facing_rad)
 
     def cover(self, covered: Sequence[Silhouette | None]) -> None:
-        """Set the pixels (H, W) of other people in the frames of all cameras, which do not count.
-
-        They apply from the next call of :meth:`see` on.
-        """
+        """Set the pixels (H, W) of other people, which do not count from the next :meth:`see`."""
         for cost, pixels in zip(self.costs, covered, strict=True):
             cost.covered = pixels
 
@@ -178,9 +175,8 @@ class MultiViewCost:
     def shares(self, state: FloatArray) -> list[tuple[float, float]]:
         """Return each camera's silhouette as shares of the frontal model's area.
 
-        Returns:
-            The share of the larger and of the smaller one of the areas at the measured distance and
-            at that of ``state`` (14,), for each camera.
+        They are shares of the larger and of the smaller one of the areas at the measured distance
+        and at that of ``state`` (14,).
         """
         found = []
         for cost, scale in zip(self.costs, self._scales(state), strict=True):
@@ -214,8 +210,7 @@ class MultiViewCost:
     def arms(self, arms: FloatArray, arm: int) -> tuple[FloatArray, FloatArray]:
         """Rate arms (N, 4), 0 left or 1 right, beside the fixed torso.
 
-        Returns:
-            Ratings (N,); shoulder, elbow and hand in the torso's frame, (N, 3, 3), metres.
+        Returns ratings (N,); shoulder, elbow and hand in the torso's frame, (N, 3, 3), metres.
         """
         ratings, joints_m = self.costs[0].arms(arms, arm)
         for number in self._others:
@@ -253,10 +248,7 @@ class MultiViewCost:
         return Bodies(ratings, costs_px, areas_px, points)
 
     def ious(self, state: FloatArray, seeing: Sequence[int]) -> list[float | None]:
-        """Return the IoU of a state (14,) and the silhouette of each camera.
-
-        Cameras that are not in ``seeing`` have None.
-        """
+        """Return the IoU of a state (14,) in each camera; None for those not in ``seeing``."""
         found: list[float | None] = [None] * len(self.costs)
         for number in seeing:
             cost = self.costs[number]

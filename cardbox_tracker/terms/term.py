@@ -203,9 +203,9 @@ class TermObservation:
         return None
 
     def evidence(self, posed: Posed) -> Mapping[str, FloatArray]:
-        """Return what tells that a result, one state, may be wrong, by name.
+        """Return what tells that a result, one state, may be wrong: by name, of keypoints (6,).
 
-        Each has one value for each keypoint, (6,); the doubt (:mod:`.doubt`) has its coefficients.
+        The doubt (:mod:`.doubt`) has its coefficients.
         """
         return MappingProxyType({})
 
@@ -221,8 +221,8 @@ class TermSettings(Protocol):
     """The settings of a term, an element of ``TrackerConfig.terms``."""
 
     def build(self, person: BodyModel, camera: Camera) -> Term | None:
-        """Return the term for a person before an upright working camera.
+        """Return the term for a person before an upright working camera, or None.
 
-        None if the term can say nothing about this person. With several cameras it is called once
-        for each; ``person`` is then placed before ``camera``.
+        It is None if the term can say nothing. With several cameras it is called once for each;
+        ``person`` is then placed before ``camera``.
         """

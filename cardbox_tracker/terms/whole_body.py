@@ -167,10 +167,7 @@ class WholeBodyCost:
         return (planes, *self.counted, base_px, self._scale), self._prior
 
     def loosen(self, x_factor: float, yaw_unit_rad: float, z_units_m: tuple[float, float]) -> None:
-        """Set the factor on the units of ``torso_x``, and the units of yaw and ``torso_z``.
-
-        The latter are those of step and home.
-        """
+        """Set the factor on the units of ``torso_x``, and the units of yaw and ``torso_z``."""
         self._rules[priors.X_STEP] = x_factor * self._config.x_step_m
         self._rules[priors.X_HOME] = x_factor * self._config.x_home_m
         self._rules[priors.YAW_UNIT] = yaw_unit_rad
@@ -234,14 +231,10 @@ class WholeBodyCost:
         return joints
 
     def arms_by_points(self, arms: FloatArray, joints: FloatArray, arm: int) -> FloatArray:
-        """Return approximate ratings (N,) of arms (N, 4), 0 left or 1 right, without priors.
+        """Return approximate ratings (N,) of arms (N, 4), rad, 0 left or 1 right, without priors.
 
-        The silhouette's part is that of :mod:`cardbox_tracker.terms.arm_points`.
-
-        Args:
-            arms: angles, (N, 4), rad.
-            joints: their :meth:`joints`.
-            arm: 0 left, 1 right.
+        The silhouette's part is that of :mod:`cardbox_tracker.terms.arm_points`; ``joints`` are the
+        arms' :meth:`joints`.
         """
         ratings = np.zeros(len(joints))
         seen = self.uncovered(arm), self.counted, self._scale
@@ -249,11 +242,7 @@ class WholeBodyCost:
         return self._with_terms_of_arms(ratings, arms, arm)
 
     def arms(self, arms: FloatArray, arm: int) -> tuple[FloatArray, FloatArray]:
-        """Rate arms (N, 4), 0 left or 1 right, beside the fixed torso.
-
-        Returns:
-            Ratings (N,); shoulder, elbow and hand in the torso's frame, (N, 3, 3), metres.
-        """
+        """Rate arms (N, 4), 0 left or 1 right, beside the torso, as ``MultiViewCost.arms``."""
         ratings, joints_m = np.empty(len(arms)), np.empty((len(arms), 3, 3))
         of_arms = 1.0 - 2.0 * arm, self._torso, self.body, *self._by_arms
         kernels.rate_arms(arms, *of_arms, ratings, joints_m)

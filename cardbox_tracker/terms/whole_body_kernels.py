@@ -161,14 +161,9 @@ def rate_bodies(
 ) -> None:
     """Write ratings (N,) of states (N, 14), their pixels, and the points of their arms.
 
-    Args:
-        states: (N, 14).
-        body: fields of :class:`~.kernel_arguments.Body`.
-        observed: fields of :class:`Observed`.
-        prior: fields of :class:`~.body_priors.Prior`.
-        ratings: written, (N,).
-        pixels: written: pixels in which model and silhouette differ, and of the model, (N,) each.
-        points: fields of :class:`Points`, written.
+    ``body``, ``observed``, ``prior`` and ``points`` are fields of :class:`~.kernel_arguments.Body`,
+    :class:`Observed`, :class:`~.body_priors.Prior` and :class:`Points`. ``pixels`` (N,) each are
+    those in which model and silhouette differ, and of the model.
     """
     seen, given = Observed(*observed), Prior(*prior)
     scratch = new_scratch(int(BODY_PATCHES), seen, given)
@@ -211,8 +206,8 @@ def rate_pairs(
 ) -> None:
     """Write ratings (N,) and points of states (N, 14) that all have the trunk of the first one.
 
-    ``observed`` is the silhouette with that trunk drawn, so only the arms are. The other arguments
-    are those of :func:`rate_bodies`.
+    ``observed`` is the silhouette with that trunk drawn, so only the arms are; see
+    :func:`rate_bodies`.
     """
     seen, given = Observed(*observed), Prior(*prior)
     scratch = new_scratch(int(2 * ARM_PATCHES), seen, given)
@@ -250,8 +245,8 @@ def cover(
 ) -> int:
     """Write the planes outside of the ``drawn`` parts of a state; return the gain of the parts.
 
-    The gain is the sum of (1 - 2 f) under these parts; ``size`` is the number of rows that count,
-    and the width.
+    The gain is the sum of (1 - 2 f) under these parts; ``size`` is the rows that count, and the
+    width.
     """
     of = body_of(body)
     has_trunk, has_left, has_right = drawn

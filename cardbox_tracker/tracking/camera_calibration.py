@@ -84,20 +84,12 @@ def calibrated_camera(
     seed: int = 0,
     progress: Callable[[float], None] | None = None,
 ) -> CalibratedCamera:
-    """Return the pose of a further camera.
+    """Return the pose of a further camera; the two ``cameras`` lack their pitch.
 
-    Args:
-        body: the person, measured by the first camera.
-        cameras: the first camera and the further one, without their pitch.
-        references: silhouettes of both cameras by the names of the reference postures.
-        moving: frames in which the person moves, starting in the front reference posture.
-        side_turn: direction in which the person turned for ``side``.
-        seed: seed of the tracker.
-        progress: called with the finished fraction.
-
-    Raises:
-        InitializationError: the silhouettes do not show the same person, or too few frames show
-            the person in both cameras.
+    ``body`` was measured by the first camera; ``references`` are silhouettes of both by the names
+    of the postures; in the frames ``moving`` the person moves, from the front posture on. Raises
+    InitializationError if the silhouettes do not show the same person, or too few frames show them
+    in both cameras.
     """
     first, other = cameras
     states = reference_states(body, side_turn)

@@ -170,10 +170,7 @@ class Estimate:
     legs: Legs | None = None
 
     def as_camera_stands(self, roll_rad: float) -> Estimate:
-        """Return the estimate in the optical frame of a camera that is rolled.
-
-        The points of the tracker are those in images that are turned upright.
-        """
+        """Return the estimate in the frame of the rolled camera, not of images turned upright."""
         if not roll_rad or self.keypoints_m is None:
             return self
         turn = roll_turn(roll_rad)

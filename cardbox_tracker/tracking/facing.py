@@ -68,12 +68,9 @@ class Facing:
             self._brightness = self._appearance.brightness
 
     def see(self, frame: Frame, posed: Posed) -> None:
-        """Compare the head in an image with the learned colours.
+        """Compare the head of a person, one state, in a frame with the learned colours.
 
-        Args:
-            frame: the image with its silhouette. One in grey, or none, shows nothing; certain
-                points of a detector tell the back better.
-            posed: the person in it, one state.
+        A grey image, or none, shows nothing; certain points of a detector tell the back better.
         """
         state = posed.states[0]
         if frame.points is not None and frame.points.are_certain:

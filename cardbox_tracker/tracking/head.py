@@ -99,15 +99,8 @@ def fit_neck(
 ) -> Neck | None:
     """Return the direction of the head that fits the points of the face best.
 
-    Args:
-        points: of the image of ``camera``.
-        body: the person.
-        camera: working camera, with the pitch of the body model.
-        state: d1..d12, (12,), or with ``torso_x`` and ``torso_z``, (14,), rad and metres; its torso
-            is taken as exact.
-
-    Returns:
-        The angles; None if the points are too few or too uncertain, or do not form a face.
+    The ``camera`` has the pitch of the body model, and the torso of ``state``, (12,) or (14,), rad
+    and metres, is taken as exact. None if points are too few or uncertain, or form no face.
     """
     known = points.scores[_CHOSEN] >= LEAST_SCORE
     if np.count_nonzero(known) < LEAST_POINTS:
@@ -150,16 +143,11 @@ def _residuals(
 ) -> None:
     """Write the residuals (2n + 6,) of values (6,), in standard deviations.
 
-    Args:
-        values: yaw, pitch and roll of the neck, rad; place across and up, m; logarithm of the size.
-        torso: rotation (3, 3) from the torso's to the optical frame.
-        axes: rows are the reference frame's axes X, Y and Z in the optical frame, (3, 3).
-        centre_m: where the model has the middle of the head, (3,), optical frame.
-        face_m: points of a face of this size, (n, 3).
-        px: the same points in the image, (n, 2).
-        lens: focal lengths and principal point, px.
-        sigma_px: standard deviation of a coordinate.
-        residuals: written.
+    The values are yaw, pitch and roll of the neck, rad; place across and up, m; logarithm of the
+    size. ``torso`` (3, 3) turns the torso's to the optical frame; rows of ``axes`` (3, 3) are the
+    reference frame's axes and ``centre_m`` (3,) is the middle of the head there. A face of this
+    size has the points ``face_m`` (n, 3), which are at ``px`` (n, 2) in the image, with the
+    deviation ``sigma_px``.
     """
     cy, sy = cos(values[0]), sin(values[0])
     cp, sp = cos(values[1]), sin(values[1])
@@ -246,12 +234,7 @@ class HeadTracker:
     """
 
     def __init__(self, body: BodyModel, camera: Camera) -> None:
-        """Start without a direction.
-
-        Args:
-            body: the person.
-            camera: working camera of the points, with the pitch of the body model.
-        """
+        """Start without a direction; the working camera has the pitch of the body model."""
         self._body, self._camera = body, camera
         self._smooth = LowPass(_SMOOTHING_S)
         self._last: Neck | None = None

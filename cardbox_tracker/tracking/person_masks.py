@@ -94,11 +94,9 @@ class PersonDrawer:
         self.front = body.reference_state()
 
     def masks(self, posture: FloatArray, near_m: float) -> PersonMasks:
-        """Return the masks of a person for their last posture.
+        """Return the masks of a person for their last posture, (12,) or (14,), rad and metres.
 
-        Args:
-            posture: (12,) or with ``torso_x`` and ``torso_z`` (14,), rad and metres.
-            near_m: largest movement of a body part until the next frame.
+        ``near_m`` is the largest movement of a body part until the next frame.
         """
         points = self._points(posture)
         core: Mask = np.zeros(self.shape, np.uint8)
@@ -199,7 +197,7 @@ def _reaches_of(radius: int) -> NDArray[np.uint8]:
 def _dilate(mask: Mask, reaches: NDArray[np.uint8], nearest: Mask, found: Mask) -> None:
     """Add the dilation of ``mask`` (h, w) to ``found``; ``nearest`` (h, w) is scratch memory.
 
-    ``nearest`` becomes the distance of each cell to the nearest one of its row that is 1.
+    It becomes the distance of each cell to the nearest one of its row that is 1.
     """
     height, width = mask.shape
     radius = len(reaches) // 2

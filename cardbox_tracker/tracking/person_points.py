@@ -28,15 +28,10 @@ class PersonPoints:
         self._body, self._camera = body, camera
 
     def of(self, posture: FloatArray) -> FloatArray:
-        """Return column and row, px, and pixels per metre of hip, neck, head, and both arms.
+        """Return column and row, px, and pixels per metre of hip, neck, head and arms, (9, 3).
 
-        Points nearer than 0.2 m are treated as if they were 0.2 m away.
-
-        Args:
-            posture: (12,), or with ``torso_x`` and ``torso_z`` (14,), rad and metres.
-
-        Returns:
-            Shape (9, 3); rows as :data:`HIP` and the names beside it.
+        The posture is (12,) or (14,), rad and metres. Rows are as :data:`HIP` and the names beside
+        it. Points nearer than 0.2 m are treated as if they were 0.2 m away.
         """
         camera, state = self._camera, np.zeros(N_STATE)
         state[: len(posture)] = posture

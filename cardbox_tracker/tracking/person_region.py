@@ -82,18 +82,12 @@ class PersonRegion:
         is_sure: bool,
         image: NDArray[np.uint8] | None = None,
     ) -> Mask:
-        """Return the person's part of a silhouette; the same array if nothing is removed.
+        """Return the person's part of a silhouette (H, W), 0 or 255; itself if nothing is removed.
 
-        Args:
-            silhouette: (H, W), 0 or 255, of the camera's size.
-            posture: state of the previous frame, (12,) or with ``torso_x`` and ``torso_z`` (14,);
-                None at the start of tracking.
-            is_sure: whether that posture fitted well.
-            image: (H, W) grey or (H, W, 3) bgr of the same frame; without it, pixels in front of
-                an object at rest belong to the person only near the last posture.
-
-        Raises:
-            ValueError: the silhouette is not of that size and type.
+        ``posture`` is that of the previous frame, (12,) or (14,), or None at the start, and
+        ``is_sure`` whether it fitted. Without the ``image`` (H, W) or (H, W, 3), pixels in front of
+        an object at rest belong to the person only near the last posture. Raises ValueError if the
+        silhouette is not of the camera's size.
         """
         check_array("silhouette", silhouette, self._size)
         regions = find_regions(silhouette)
@@ -128,13 +122,9 @@ class PersonRegion:
         fit: float | None,
         same: NDArray[np.bool_] | None,
     ) -> NDArray[np.bool_]:
-        """Return whether each region is the person's.
+        """Return whether each region is the person's; ``fit`` is the score of head and shoulders.
 
-        Args:
-            regions: connected regions of the silhouette.
-            masks: masks of the expected person.
-            fit: score of head and shoulders; None if they were not searched.
-            same: pixels (H, W) of objects at rest; None without an image.
+        ``same`` are the pixels (H, W) of objects at rest.
         """
         before = grown(self._person, self._around) & masks.reach
         none = self._none
@@ -254,10 +244,7 @@ def _overlaps(
     cell_px: Any,
     areas_px: Any,
 ) -> None:
-    """Count the pixels of each region in the cells of five masks (h, w), (5, m).
-
-    Cells of ``other`` are not ``near``.
-    """
+    """Count pixels of each region in five masks (h, w), (5, m); ``other`` is not ``near``."""
     for run in range(len(rows)):
         label, v = labels[run], rows[run] // cell_px
         begin, end = starts[run], ends[run]

@@ -14,14 +14,8 @@ def normal_postures(
 ) -> FloatArray:
     """Return postures (count, 12) with independent normal joints, clipped to their limits.
 
-    Mean and deviations have neither correlations nor the mirror ambiguity in depth;
-    :func:`likely_postures` has both.
-
-    Args:
-        posture: mean, (12,), rad and metres.
-        stddev: standard deviations, (12,).
-        count: number of samples.
-        rng: random numbers.
+    They have neither the correlations nor the mirror ambiguity in depth of :func:`likely_postures`.
+    Mean and deviations are (12,), rad and metres.
     """
     noise = rng.standard_normal((count, len(posture)))
     drawn: FloatArray = np.clip(
@@ -40,18 +34,8 @@ def likely_postures(
 ) -> FloatArray:
     """Return equally weighted samples (count, 12) of the posterior of an estimate.
 
-    They are drawn from the particles, or by :func:`normal_postures` without particles.
-
-    Args:
-        posture: posture of the estimate, (12,).
-        stddev: standard deviations of the estimate, (12,).
-        offset_m: ``torso_x`` and ``torso_z`` of the estimate, (2,), needed with particles.
-        particles: particles of the same image.
-        count: number of samples.
-        rng: random numbers.
-
-    Raises:
-        ValueError: the estimate has no posture.
+    They are drawn from the ``particles`` of the same image, which need ``offset_m``, or by
+    :func:`normal_postures`. Raises ValueError if the estimate has no posture.
     """
     if posture is None or stddev is None:
         raise ValueError("the estimate has no posture to sample from")

@@ -100,28 +100,19 @@ class Tracker:
         corrector: Corrector | None = None,
         look: Look | None = None,
     ) -> None:
-        """Set up for ``body``; the camera gets the pitch of the body model.
+        """Set up for ``body``; the camera, of the silhouettes' size, gets the pitch of the model.
 
-        Args:
-            body: the person. Unknown values are measured while tracking: the attribute ``body`` has
-                a few versions, see :class:`~cardbox_tracker.measuring.seen_body.SeenBody`. Before
-                the first one, or if the camera's pitch is not known to 10 degrees, estimates are at
-                best ``uncertain``.
-            camera: working camera, of the silhouettes' size.
-            config: settings; the paper's by default.
-            rng: source of all noise; seeded with 0 by default.
-            silhouette: implementation of the silhouette's term; compiled by default.
-            make_filter: filter that replaces the one of the settings.
-            others: further cameras; they need the filter ``whole_body``.
-            corrector: changes the fitted state of each frame before it becomes the result; joints
-                are kept within their limits. It needs the filter ``whole_body``.
-            look: finds the points of hands in images of the first camera, which are then part of
-                all estimates.
+        Unknown values are measured while tracking: the attribute ``body`` has a few versions, see
+        :class:`~cardbox_tracker.measuring.seen_body.SeenBody`. Before the first one, or if the
+        camera's pitch is not known to 10 degrees, estimates are at best ``uncertain``. Settings are
+        the paper's by default, and noise is seeded with 0. ``silhouette`` and ``make_filter``
+        replace the compiled term and the filter of the settings. ``look`` finds the points of hands
+        in images of the first camera. ``corrector`` changes the fitted state of each frame before
+        it becomes the result; it needs the filter ``whole_body``, as ``others``, the further
+        cameras, do.
 
-        Raises:
-            CameraError: the person was not measured in front of one of ``others``.
-            ValueError: there are ``others`` or a ``corrector``, but the filter is not
-                ``whole_body``.
+        Raises CameraError if the person was not measured in front of one of ``others``, and
+        ValueError if the filter does not support what is given.
         """
         self.camera = camera.with_pitch(body.camera_pose.pitch_rad)
         self.config = config or TrackerConfig()
@@ -192,11 +183,7 @@ class Tracker:
         self._seen_iou = 0.0
 
     def configure(self, config: TrackerConfig) -> bool:
-        """Use other settings from the next frame on.
-
-        Returns:
-            True if tracking starts again, as after :meth:`reset`, because the particles change.
-        """
+        """Use other settings from the next frame on; return whether tracking starts again."""
         is_new_start = restarts(self.config, config)
         if config.terms != self.config.terms:
             for camera in self.cameras:
@@ -229,11 +216,7 @@ class Tracker:
         return {f"{name} used": f"{count} of {self.images}" for name, count in self.used.items()}
 
     def camera_ious(self) -> list[float | None]:
-        """Return the IoU of the last estimate with each camera's silhouette, the first one first.
-
-        Returns:
-            One value for each camera; None for a camera that showed no person.
-        """
+        """Return the IoU of the last estimate in each camera; None in one without a person."""
         return self._filter.ious()
 
     def track(
@@ -244,20 +227,15 @@ class Tracker:
     ) -> Estimate:
         """Estimate the posture from the observations of all cameras at one time.
 
-        Args:
-            observations: one for each camera, the first camera first. A camera without data has
-                None or an observation without a silhouette, and may be missing at the end. A single
-                observation or silhouette (H, W) belongs to the first camera. Masks of any numeric
-                type are silhouettes, see
-                :func:`~cardbox_tracker.camera.given_arrays.silhouette_from`.
-            image: (H, W) grey or (H, W, 3) bgr of the same time as a bare silhouette.
-            stamp_ns: time of a bare silhouette, ns. Without a stamp, the interval to the previous
-                frame is 1/15 s.
+        There is one for each camera, the first one first. A camera without data has None or an
+        observation without a silhouette, and may be missing at the end. A single observation or
+        silhouette (H, W) belongs to the first camera; ``image``, (H, W) grey or (H, W, 3) bgr, and
+        ``stamp_ns`` go with a bare silhouette. Masks of any numeric type are silhouettes, see
+        :func:`~cardbox_tracker.camera.given_arrays.silhouette_from`. Without a stamp, the interval
+        to the previous frame is 1/15 s.
 
-        Raises:
-            ValueError: the size of an array is not its camera's, or its type or values are
-                impossible; points are no ImagePoints; there are more observations than cameras; or
-                ``image`` or ``stamp_ns`` is given in addition to observations.
+        Raises ValueError if the size of an array is not its camera's, its type or values are
+        impossible, points are no ImagePoints, or the arguments do not go together.
         """
         if isinstance(observations, np.ndarray):
             observations = Observation(observations, image, stamp_ns=stamp_ns)
