@@ -26,23 +26,16 @@ MOST_PIXELS = 2**25
 
 
 class _Encoding(NamedTuple):
-    """How the pixels of an encoding are stored.
+    """How the pixels of an encoding are stored."""
 
-    Attributes:
-        channels: channels of the array.
-        to_grey: OpenCV's code to grey; None: unchanged.
-        to_bgr: OpenCV's code to bgr; None: unchanged.
-        word_bytes: bytes of a number; those of 16 bits are scaled to eight.
-        shared: across and down, pixels that share a colour of YUV; None for other colours. With two
-            channels it lies beside the brightness, with one in rows below all brightness.
-        order: place of the brightness in a pixel of two channels; place of u in a colour below.
-    """
-
-    channels: int
-    to_grey: int | None = None
-    to_bgr: int | None = None
-    word_bytes: int = 1
+    channels: int  #: channels of the array
+    to_grey: int | None = None  #: OpenCV's code to grey; None: unchanged
+    to_bgr: int | None = None  #: OpenCV's code to bgr; None: unchanged
+    word_bytes: int = 1  #: bytes of a number; those of 16 bits are scaled to eight
+    #: across and down, pixels that share a colour of YUV; None for other colours. With two channels
+    #: it lies beside the brightness, with one in rows below all brightness.
     shared: tuple[int, int] | None = None
+    #: place of the brightness in a pixel of two channels; place of u in a colour below.
     order: int = 0
 
 
@@ -78,23 +71,14 @@ SUPPORTED_ENCODINGS: tuple[str, ...] = tuple(_ENCODINGS)
 
 
 class SentImage(NamedTuple):
-    """An image as it is sent.
+    """An image as it is sent."""
 
-    Attributes:
-        data: the bytes, as bytes, array.array or uint8 array.
-        height: rows.
-        width: columns.
-        step: bytes per row, padding included.
-        encoding: one of ``SUPPORTED_ENCODINGS``, or that of a depth image.
-        is_bigendian: byte order of numbers of more than a byte.
-    """
-
-    data: Any
-    height: int
-    width: int
-    step: int
-    encoding: str
-    is_bigendian: bool = False
+    data: Any  #: the bytes, as bytes, array.array or uint8 array
+    height: int  #: rows
+    width: int  #: columns
+    step: int  #: bytes per row, padding included
+    encoding: str  #: one of ``SUPPORTED_ENCODINGS``, or that of a depth image
+    is_bigendian: bool = False  #: byte order of numbers of more than a byte
 
     @classmethod
     def of(cls, message: Any) -> SentImage:

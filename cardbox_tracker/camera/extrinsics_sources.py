@@ -24,17 +24,11 @@ _AGREE_DEG, _AGREE_M = 1.0, 0.02
 
 
 class FrameTransform(NamedTuple):
-    """One transform of ``/tf_static``.
+    """One transform of ``/tf_static``."""
 
-    Attributes:
-        parent: name of the parent frame.
-        child: name of the child frame.
-        to_parent: transform of points from the child frame into the parent frame.
-    """
-
-    parent: str
-    child: str
-    to_parent: Extrinsics
+    parent: str  #: name of the parent frame
+    child: str  #: name of the child frame
+    to_parent: Extrinsics  #: transform of points from the child frame into the parent frame
 
 
 def of_rectified_pair(first: Any, other: Any, name: str) -> Extrinsics | None:

@@ -52,29 +52,21 @@ class View:
     """One body before a further camera.
 
     The state in the frame of this camera is ``turned`` @ (state of the first camera) + ``moved``.
-
-    Attributes:
-        body: the person, placed before that camera.
-        camera: that camera, turned upright.
-        yaw_rad: rotation of its level frame about the vertical.
-        roll_rad: rotation of its image about the optical axis, which the upright camera lacks.
-        offset_m: translation from the first level frame into its own, after the rotation, (3,).
-        turn: pixel of the camera's image for each pixel of the upright image, (H, W, 2) int16; None
-            if the camera stands upright.
-        raw_px: map from pixels of the upright image to those of the camera's image, (2, 3).
-        turned: (14, 14).
-        moved: (14,).
     """
 
-    body: BodyModel
-    camera: Camera
-    yaw_rad: float
-    roll_rad: float
+    body: BodyModel  #: the person, placed before that camera
+    camera: Camera  #: that camera, turned upright
+    yaw_rad: float  #: rotation of its level frame about the vertical
+    roll_rad: float  #: rotation of its image about the optical axis, which the upright camera lacks
+    #: translation from the first level frame into its own, after the rotation, (3,).
     offset_m: FloatArray
+    #: pixel of the camera's image for each pixel of the upright image, (H, W, 2) int16; None if the
+    #: camera stands upright.
     turn: NDArray[np.int16] | None
+    #: map from pixels of the upright image to those of the camera's image, (2, 3).
     raw_px: FloatArray
-    turned: FloatArray
-    moved: FloatArray
+    turned: FloatArray  #: (14, 14)
+    moved: FloatArray  #: (14,)
 
     @classmethod
     def of(cls, body: BodyModel, first: Camera, other: OtherCamera) -> View:

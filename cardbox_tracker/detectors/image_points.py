@@ -57,17 +57,12 @@ _OTHER_SIDE = [
 
 
 class LegPoints(NamedTuple):
-    """The points ``LEG_POINT_NAMES`` of one person in one image.
+    """The points ``LEG_POINT_NAMES`` of one person in one image."""
 
-    Attributes:
-        px: column and row, (8, 2), as in :class:`ImagePoints`.
-        scores: chance that the point is in the image and visible, 0 to 1, (8,).
-        spatial_m: the points in space, (8, 3), with the axes, origin and scale of
-            ``ImagePoints.spatial_m``; None without it.
-    """
-
-    px: FloatArray
-    scores: FloatArray
+    px: FloatArray  #: column and row, (8, 2), as in :class:`ImagePoints`
+    scores: FloatArray  #: chance that the point is in the image and visible, 0 to 1, (8,)
+    #: the points in space, (8, 3), with the axes, origin and scale of ``ImagePoints.spatial_m``;
+    #: None without it.
     spatial_m: FloatArray | None = None
 
     @property

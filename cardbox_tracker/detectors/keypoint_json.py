@@ -57,17 +57,11 @@ COCO-WholeBody."""
 
 
 class FoundPerson(NamedTuple):
-    """The points of one person in one image.
+    """The points of one person in one image."""
 
-    Attributes:
-        image: number of the image, counted from 0, or its name.
-        points: the points.
-        place: where they stand, for errors.
-    """
-
-    image: int | str
-    points: list[NamedPoint]
-    place: str
+    image: int | str  #: number of the image, counted from 0, or its name
+    points: list[NamedPoint]  #: the points
+    place: str  #: where they stand, for errors
 
 
 def openpose_people(folder: Path) -> Iterator[FoundPerson]:

@@ -53,14 +53,10 @@ class PointTable(NamedTuple):
     image, px; and ``score``, 0 to 1. With several people, ``person`` tells them apart. A recording
     of several cameras also needs ``camera``, the camera's namespace. For JSON see
     :mod:`.keypoint_json`; there, each camera has a folder or file of its name.
-
-    Attributes:
-        path: the table, a file of COCO, or a folder of OpenPose's files.
-        people: 0 for the person in the silhouette, more for all people.
     """
 
-    path: Path
-    people: int = 0
+    path: Path  #: the table, a file of COCO, or a folder of OpenPose's files
+    people: int = 0  #: 0 for the person in the silhouette, more for all people
 
     def read(self, camera: str | None, size: Size | None = None) -> GivenPoints:
         """Return the points of one camera, px of its own image, or of the only one.

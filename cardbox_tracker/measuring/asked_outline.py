@@ -116,17 +116,11 @@ _LEAST_PX = 20
 
 
 class _Outline(NamedTuple):
-    """A rendered person in a posture on the grid, above the hips.
+    """A rendered person in a posture on the grid, above the hips."""
 
-    Attributes:
-        name: reference posture.
-        mask: (h, w); the first row has the top of the head.
-        column: middle of head and chest in ``mask``.
-    """
-
-    name: str
-    mask: NDArray[np.bool_]
-    column: int
+    name: str  #: reference posture
+    mask: NDArray[np.bool_]  #: (h, w); the first row has the top of the head
+    column: int  #: middle of head and chest in ``mask``
 
 
 class LiveFit:

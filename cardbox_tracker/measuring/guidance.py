@@ -46,21 +46,14 @@ def short_words(name: str, side_turn: str) -> str:
 
 
 class Prompt(NamedTuple):
-    """An instruction or a message of the guidance.
+    """An instruction or a message of the guidance."""
 
-    Attributes:
-        name: name of the reference, or ``measuring``.
-        words: short text for the person.
-        left_s: remaining seconds of the count-down; None if there is no count-down.
-        detail: text for the operator; ``words`` if empty.
-        mood: ``ask``, ``good`` or ``bad``.
-    """
-
-    name: str
-    words: str
+    name: str  #: name of the reference, or ``measuring``
+    words: str  #: short text for the person
+    #: remaining seconds of the count-down; None if there is no count-down.
     left_s: int | None = None
-    detail: str = ""
-    mood: str = ASK
+    detail: str = ""  #: text for the operator; ``words`` if empty
+    mood: str = ASK  #: ``ask``, ``good`` or ``bad``
 
     @property
     def text(self) -> str:

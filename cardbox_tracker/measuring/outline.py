@@ -39,21 +39,13 @@ _HANGING = (0.02, 0.27)
 
 @dataclass(frozen=True)
 class LevelArm:
-    """One arm in the reference ``arms``, in the upright plane.
+    """One arm in the reference ``arms``, in the upright plane."""
 
-    Attributes:
-        tip_m: Y of the fingertips.
-        armpit_m: Y of the trunk's edge.
-        slope: slope of the axis, Z = slope Y + height.
-        height_m: height of the axis at Y = 0.
-        thickness_m: median height of the arm's outline between elbow and wrist.
-    """
-
-    tip_m: float
-    armpit_m: float
-    slope: float
-    height_m: float
-    thickness_m: float
+    tip_m: float  #: Y of the fingertips
+    armpit_m: float  #: Y of the trunk's edge
+    slope: float  #: slope of the axis, Z = slope Y + height
+    height_m: float  #: height of the axis at Y = 0
+    thickness_m: float  #: median height of the arm's outline between elbow and wrist
 
     @property
     def reach_m(self) -> float:

@@ -47,15 +47,10 @@ Its second argument is False in the first call, and True in the last one at the 
 
 
 class DepthReference(NamedTuple):
-    """Silhouette and depth of a reference posture.
+    """Silhouette and depth of a reference posture."""
 
-    Attributes:
-        silhouette: (H, W), 0 or 255.
-        depth_m: (H, W), metres along the optical axis; 0 if unknown.
-    """
-
-    silhouette: NDArray[np.uint8]
-    depth_m: DepthImage
+    silhouette: NDArray[np.uint8]  #: (H, W), 0 or 255
+    depth_m: DepthImage  #: (H, W), metres along the optical axis; 0 if unknown
 
 
 def measured_at_scale(

@@ -38,17 +38,12 @@ _Hull = tuple[FloatArray, NDArray[np.bool_]]
 
 
 class Pencil(NamedTuple):
-    """The planes through both cameras of a pose.
+    """The planes through both cameras of a pose."""
 
-    Attributes:
-        along: direction of the baseline in the other camera's frame, (3,).
-        here: directions up and ahead across the baseline, (2, 3), in the first camera's frame.
-        there: the same in the other camera's frame.
-    """
-
-    along: FloatArray
+    along: FloatArray  #: direction of the baseline in the other camera's frame, (3,)
+    #: directions up and ahead across the baseline, (2, 3), in the first camera's frame.
     here: FloatArray
-    there: FloatArray
+    there: FloatArray  #: the same in the other camera's frame
 
 
 class TopTangents:

@@ -74,23 +74,14 @@ _BREADTH_SD = np.array([0.05, 0.031, 0.046])
 
 @dataclass(frozen=True)
 class Skeleton:
-    """The bones of the arms, metres.
+    """The bones of the arms, metres."""
 
-    Attributes:
-        shoulder_breadth_m: distance between the shoulder joints.
-        shoulder_height_m: height of the shoulder joints, with hanging arms, above the camera.
-        upper_arm_m: distance from shoulder joint to elbow joint.
-        forearm_m: distance from elbow joint to knuckles.
-        span_m: distance from fingertip to fingertip in ``arms``.
-        forward_m: how far the shoulder joints are before the hips.
-    """
-
-    shoulder_breadth_m: float
-    shoulder_height_m: float
-    upper_arm_m: float
-    forearm_m: float
-    span_m: float
-    forward_m: float = 0.0
+    shoulder_breadth_m: float  #: distance between the shoulder joints
+    shoulder_height_m: float  #: height of the shoulder joints, with hanging arms, above the camera
+    upper_arm_m: float  #: distance from shoulder joint to elbow joint
+    forearm_m: float  #: distance from elbow joint to knuckles
+    span_m: float  #: distance from fingertip to fingertip in ``arms``
+    forward_m: float = 0.0  #: how far the shoulder joints are before the hips
 
 
 def measure_skeleton(

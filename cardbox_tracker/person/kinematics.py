@@ -123,19 +123,12 @@ class Boned(Protocol):
 
 
 class Bones(NamedTuple):
-    """A person in a place before a camera; kernels get a plain tuple.
+    """A person in a place before a camera; kernels get a plain tuple."""
 
-    Attributes:
-        parts: six lengths of six parts, (6, 6), metres, see :func:`.parts.shape_of`.
-        girdle: shoulder joints and how they rise with the arms, (3,).
-        place: place of the hips.
-        camera: pitch of the camera.
-    """
-
-    parts: FloatArray
-    girdle: FloatArray
-    place: Place
-    camera: Pitched
+    parts: FloatArray  #: six lengths of six parts, (6, 6), metres, see :func:`.parts.shape_of`
+    girdle: FloatArray  #: shoulder joints and how they rise with the arms, (3,)
+    place: Place  #: place of the hips
+    camera: Pitched  #: pitch of the camera
 
 
 BonesTuple = tuple[FloatArray, FloatArray, tuple[float, float], tuple[float, float]]
@@ -152,17 +145,11 @@ class Arm(NamedTuple):
 
 
 class PosedBodies(NamedTuple):
-    """Bodies in the reference frame, or in a camera's optical frame.
+    """Bodies in the reference frame, or in a camera's optical frame."""
 
-    Attributes:
-        points_m: points of ``POINT_NAMES``, (..., 9, 3), metres.
-        rotations: rotations from the frames of ``FRAME_NAMES``, (..., 5, 3, 3).
-        clavicles_m: rise of the left and right shoulder, (..., 2), metres: the values of
-            ``CLAVICLE_NAMES``.
-    """
-
-    points_m: FloatArray
-    rotations: FloatArray
+    points_m: FloatArray  #: points of ``POINT_NAMES``, (..., 9, 3), metres
+    rotations: FloatArray  #: rotations from the frames of ``FRAME_NAMES``, (..., 5, 3, 3)
+    #: rise of the left and right shoulder, (..., 2), metres: the values of ``CLAVICLE_NAMES``.
     clavicles_m: FloatArray
 
     @property

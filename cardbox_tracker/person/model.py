@@ -114,18 +114,13 @@ class Person:
 class Placement:
     """Position of mid-hip in the front reference posture, metres in the reference frame.
 
-    Attributes:
-        distance_m: level distance from the camera: X is ``-distance_m``.
-        hip_height_m: Z, usually negative.
-        lateral_m: Y, which is ``torso_y`` where tracking starts.
-
     Raises:
         BodyModelError: a value is not finite or outside of its range; the text names it.
     """
 
-    distance_m: float = 2.0
-    hip_height_m: float = -0.5
-    lateral_m: float = 0.0
+    distance_m: float = 2.0  #: level distance from the camera: X is ``-distance_m``
+    hip_height_m: float = -0.5  #: Z, usually negative
+    lateral_m: float = 0.0  #: Y, which is ``torso_y`` where tracking starts
 
     def __post_init__(self) -> None:
         """Check every value."""
@@ -138,23 +133,18 @@ class Placement:
 class CameraPose:
     """Pose of the camera in the reference frame, whose origin is the camera's centre.
 
-    Attributes:
-        pitch_rad: downward pitch, rad.
-        pitch_stddev_rad: its standard deviation, rad; it is no part of a model file.
-        roll_rad: how far the camera is turned clockwise about its axis, seen from behind it. The
-            tracker's images are turned back, and its results are those of the camera as it stands.
-        height_m: height above the floor, metres; None if it is not known.
-        height_stddev_m: its standard deviation, metres; it is no part of a model file.
-
     Raises:
         BodyModelError: a value is not finite or outside of its range.
     """
 
-    pitch_rad: float = 0.0
+    pitch_rad: float = 0.0  #: downward pitch, rad
+    #: its standard deviation, rad; it is no part of a model file.
     pitch_stddev_rad: float = math.radians(2.0)
+    #: how far the camera is turned clockwise about its axis, seen from behind it. The tracker's
+    #: images are turned back, and its results are those of the camera as it stands.
     roll_rad: float = 0.0
-    height_m: float | None = None
-    height_stddev_m: float = 0.1
+    height_m: float | None = None  #: height above the floor, metres; None if it is not known
+    height_stddev_m: float = 0.1  #: its standard deviation, metres; it is no part of a model file
 
     def __post_init__(self) -> None:
         """Check the values."""

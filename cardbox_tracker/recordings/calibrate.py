@@ -28,17 +28,11 @@ _TOLERANCE_NS = 50_000_000
 
 
 class CalibratedCameras(NamedTuple):
-    """The calibration of a recording's cameras.
+    """The calibration of a recording's cameras."""
 
-    Attributes:
-        body: the person, measured by the first camera.
-        cameras: working cameras by name, the first camera first.
-        found: calibration of each further camera by name.
-    """
-
-    body: BodyModel
-    cameras: dict[str, Camera]
-    found: dict[str, CalibratedCamera]
+    body: BodyModel  #: the person, measured by the first camera
+    cameras: dict[str, Camera]  #: working cameras by name, the first camera first
+    found: dict[str, CalibratedCamera]  #: calibration of each further camera by name
 
 
 def calibrate_recording(

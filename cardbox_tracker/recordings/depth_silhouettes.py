@@ -43,15 +43,10 @@ def depth_images(
 
 
 class Within(NamedTuple):
-    """Segmentation by depth: pixels nearer than a limit belong to the person.
+    """Segmentation by depth: pixels nearer than a limit belong to the person."""
 
-    Attributes:
-        topic: topic of depth images with the camera's field of view.
-        metres: the limit along the optical axis.
-    """
-
-    topic: str
-    metres: float
+    topic: str  #: topic of depth images with the camera's field of view
+    metres: float  #: the limit along the optical axis
 
 
 class DepthSilhouetteSource(SilhouetteSource):

@@ -26,24 +26,18 @@ GUESSED_STDDEV = 0.2
 
 @dataclass(frozen=True)
 class GivenCamera:
-    """Properties of one camera; None for those that are not given.
+    """Properties of one camera; None for those that are not given."""
 
-    Attributes:
-        fov_deg: field of view across the width of the image as it is shown, degrees.
-        calibration: file of camera_calibration, in place of the field of view.
-        roll_rad: how far the camera is turned clockwise about its axis, seen from behind it; the
-            images are turned back.
-        fps: images a second, in place of the rate that the recording states.
-        is_mirrored: whether the images are mirrored; they are turned back.
-        focal_stddev: relative standard deviation of a focal length by ``fov_deg`` that was found;
-            None for one that a person states.
-    """
-
+    #: field of view across the width of the image as it is shown, degrees.
     fov_deg: float | None = None
-    calibration: Path | None = None
+    calibration: Path | None = None  #: file of camera_calibration, in place of the field of view
+    #: how far the camera is turned clockwise about its axis, seen from behind it; the images are
+    #: turned back.
     roll_rad: float | None = None
-    fps: float | None = None
-    is_mirrored: bool = False
+    fps: float | None = None  #: images a second, in place of the rate that the recording states
+    is_mirrored: bool = False  #: whether the images are mirrored; they are turned back
+    #: relative standard deviation of a focal length by ``fov_deg`` that was found; None for one
+    #: that a person states.
     focal_stddev: float | None = None
 
     @property

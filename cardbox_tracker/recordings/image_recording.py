@@ -34,20 +34,13 @@ def working_size(width: int, height: int) -> tuple[int, int]:
 
 @dataclass(frozen=True)
 class RecordedImage:
-    """One image of a recording, decoded by its properties.
+    """One image of a recording, decoded by its properties."""
 
-    Attributes:
-        stamp_ns: stamp of the image; of a video, ns from its first image.
-        frame_id: name of the camera's optical frame.
-        time_ns: recording time.
-        name: name of its file, if it is one.
-    """
-
-    stamp_ns: int
-    frame_id: str
-    time_ns: int
+    stamp_ns: int  #: stamp of the image; of a video, ns from its first image
+    frame_id: str  #: name of the camera's optical frame
+    time_ns: int  #: recording time
     _decode: Callable[[], NDArray[np.uint8]]
-    name: str = ""
+    name: str = ""  #: name of its file, if it is one
 
     @property
     def as_sent(self) -> NDArray[np.uint8]:

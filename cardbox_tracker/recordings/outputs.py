@@ -115,39 +115,26 @@ Value = JointValues | Points | Markers | Text | KeypointStates
 
 @dataclass(frozen=True)
 class Output:
-    """One topic.
+    """One topic."""
 
-    Attributes:
-        topic: relative name.
-        kind: class of the values, which determines the message type.
-        of: value for an estimate with a posture; None if the estimate has no such value.
-        absent: value that is sent once when the posture is lost; None if nothing is sent.
-        needs_posture: False if ``of`` has a value for every estimate.
-        moves: whether the values are joints with velocities.
-    """
-
-    topic: str
-    kind: type[Value]
+    topic: str  #: relative name
+    kind: type[Value]  #: class of the values, which determines the message type
+    #: value for an estimate with a posture; None if the estimate has no such value.
     of: Callable[[Estimate, Tracker], Value | None]
+    #: value that is sent once when the posture is lost; None if nothing is sent.
     absent: Value | None = None
-    needs_posture: bool = True
-    moves: bool = False
+    needs_posture: bool = True  #: False if ``of`` has a value for every estimate
+    moves: bool = False  #: whether the values are joints with velocities
 
 
 @dataclass(frozen=True)
 class Metric:
-    """One number of an estimate.
+    """One number of an estimate."""
 
-    Attributes:
-        name: name of the column.
-        unit: empty for a plain number.
-        format: format specification of the number.
-        of: the number of an estimate; None if it has no such number.
-    """
-
-    name: str
-    unit: str
-    format: str
+    name: str  #: name of the column
+    unit: str  #: empty for a plain number
+    format: str  #: format specification of the number
+    #: the number of an estimate; None if it has no such number.
     of: Callable[[Estimate], float | None]
 
     @property

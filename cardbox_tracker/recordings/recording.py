@@ -47,22 +47,16 @@ _STATIC_TOPIC = "/tf_static"
 
 
 class FrameSet(NamedTuple):
-    """Frames of all cameras at one time.
+    """Frames of all cameras at one time."""
 
-    Attributes:
-        stamp_ns: stamp of the first camera's image, or of the earliest image without it.
-        time_s: the same time in seconds from the bag's start.
-        frames: one frame for each camera, the first camera's first; None if it has no image.
-        first: frame of the first camera, black without an image.
-        depth_m: depth (H, W) in the first camera, metres; None without a depth image.
-        picture: returns the first camera's image at the resolution of the recording.
-    """
-
-    stamp_ns: int
-    time_s: float
+    stamp_ns: int  #: stamp of the first camera's image, or of the earliest image without it
+    time_s: float  #: the same time in seconds from the bag's start
+    #: one frame for each camera, the first camera's first; None if it has no image.
     frames: tuple[RecordedFrame | None, ...]
-    first: RecordedFrame
+    first: RecordedFrame  #: frame of the first camera, black without an image
+    #: depth (H, W) in the first camera, metres; None without a depth image.
     depth_m: DepthImage | None = None
+    #: returns the first camera's image at the resolution of the recording.
     picture: Callable[[], NDArray[np.uint8]] | None = None
 
     @property

@@ -78,26 +78,18 @@ _LATEST_NS = np.iinfo(np.int64).max
 
 @dataclass(frozen=True)
 class Results:
-    """Results of n images in order of time; those of a gap, without a posture, are nan.
+    """Results of n images in order of time; those of a gap, without a posture, are nan."""
 
-    Attributes:
-        path: table or bag.
-        stamp_ns: stamps of the images, (n,), rising.
-        time_s: seconds from the start of the recording, (n,).
-        state: tracking state of each image, n texts.
-        numbers: values (n,) by the names of the columns of a table (``docs/results.md``), in their
-            units; nan where they are unknown.
-        texts: the same for columns of texts, such as the states of keypoints.
-        bodies: the person as of each image; None where it is not known.
-    """
-
-    path: Path
-    stamp_ns: NDArray[np.int64]
-    time_s: FloatArray
-    state: tuple[str, ...]
+    path: Path  #: table or bag
+    stamp_ns: NDArray[np.int64]  #: stamps of the images, (n,), rising
+    time_s: FloatArray  #: seconds from the start of the recording, (n,)
+    state: tuple[str, ...]  #: tracking state of each image, n texts
+    #: values (n,) by the names of the columns of a table (``docs/results.md``), in their units; nan
+    #: where they are unknown.
     numbers: Mapping[str, FloatArray]
+    #: the same for columns of texts, such as the states of keypoints.
     texts: Mapping[str, tuple[str, ...]]
-    bodies: tuple[BodyModel | None, ...]
+    bodies: tuple[BodyModel | None, ...]  #: the person as of each image; None where it is not known
 
     @property
     def body(self) -> BodyModel | None:

@@ -43,42 +43,26 @@ _INWARDS_PX = 3.0
 
 
 class ArmPlan(NamedTuple):
-    """Kinds and numbers of proposals.
+    """Kinds and numbers of proposals."""
 
-    Attributes:
-        sources: number of states of the pool whose arms are varied.
-        sigma_rad: noise of varied arms, rad.
-        mirrors: number of arms mirrored in depth.
-        tips: number of arms that reach for uncovered foreground.
-        banked: number of arms from ``bank``.
-        bank: samples of the prior, (K, 4), rad.
-        limits: lowest and highest angles, (4, 2), rad.
-    """
-
-    sources: int
-    sigma_rad: float
-    mirrors: int
-    tips: int
-    banked: int
-    bank: Floats
-    limits: Floats
+    sources: int  #: number of states of the pool whose arms are varied
+    sigma_rad: float  #: noise of varied arms, rad
+    mirrors: int  #: number of arms mirrored in depth
+    tips: int  #: number of arms that reach for uncovered foreground
+    banked: int  #: number of arms from ``bank``
+    bank: Floats  #: samples of the prior, (K, 4), rad
+    limits: Floats  #: lowest and highest angles, (4, 2), rad
 
 
 ArmPlanTuple = tuple[int, float, int, int, int, Floats, Floats]
 
 
 class Ray(NamedTuple):
-    """A line of sight to a hand, and the arm's shoulder.
+    """A line of sight to a hand, and the arm's shoulder."""
 
-    Attributes:
-        shoulder: in the optical frame, (3,), metres.
-        direction: unit vector, (3,).
-        rotation: rotation of the torso, (3, 3).
-    """
-
-    shoulder: Floats
-    direction: Floats
-    rotation: Floats
+    shoulder: Floats  #: in the optical frame, (3,), metres
+    direction: Floats  #: unit vector, (3,)
+    rotation: Floats  #: rotation of the torso, (3, 3)
 
 
 @inlined_kernel

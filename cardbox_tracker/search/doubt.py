@@ -96,15 +96,10 @@ class Source(StrEnum):
 
 
 class Model(NamedTuple):
-    """A logistic regression.
+    """A logistic regression."""
 
-    Attributes:
-        intercept: logit without evidence.
-        coefficients: by the names of the evidence.
-    """
-
-    intercept: float
-    coefficients: Mapping[str, float]
+    intercept: float  #: logit without evidence
+    coefficients: Mapping[str, float]  #: by the names of the evidence
 
 
 class Models(NamedTuple):
@@ -125,21 +120,13 @@ class Models(NamedTuple):
 
 
 class Judgement(NamedTuple):
-    """The doubt about one result.
+    """The doubt about one result."""
 
-    Attributes:
-        chances: probability of each keypoint to be wrong, (6,).
-        states: state of each keypoint.
-        is_uncertain: whether the posture may be wrong.
-        is_poor: whether it does not fit; several such results in a row mean a lost person.
-        evidence: what the probabilities follow from, by name.
-    """
-
-    chances: FloatArray
-    states: tuple[KeypointState, ...]
-    is_uncertain: bool
-    is_poor: bool
-    evidence: Values
+    chances: FloatArray  #: probability of each keypoint to be wrong, (6,)
+    states: tuple[KeypointState, ...]  #: state of each keypoint
+    is_uncertain: bool  #: whether the posture may be wrong
+    is_poor: bool  #: whether it does not fit; several such results in a row mean a lost person
+    evidence: Values  #: what the probabilities follow from, by name
 
 
 class Doubt:

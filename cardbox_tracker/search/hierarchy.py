@@ -47,17 +47,12 @@ class HierarchicalCost(Protocol):
 
 @dataclass(frozen=True)
 class SumOfTerms:
-    """The silhouette's cost and that of further terms.
+    """The silhouette's cost and that of further terms."""
 
-    Attributes:
-        silhouette: the paper's cost.
-        terms: observations of further terms.
-        body: fields of :class:`~cardbox_tracker.terms.kernel_arguments.Body` with the
-            paper's shoulders, which the arms do not raise.
-    """
-
-    silhouette: HierarchicalCost
-    terms: Sequence[TermObservation]
+    silhouette: HierarchicalCost  #: the paper's cost
+    terms: Sequence[TermObservation]  #: observations of further terms
+    #: fields of :class:`~cardbox_tracker.terms.kernel_arguments.Body` with the paper's shoulders,
+    #: which the arms do not raise.
     body: BodyTuple
 
     def torsos_beside(self, arms: FloatArray | None) -> TorsoCosts:

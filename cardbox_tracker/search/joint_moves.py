@@ -29,29 +29,18 @@ _LEFT, _RIGHT = FIRST_ANGLES
 
 
 class Numbers(NamedTuple):
-    """Random numbers of N proposals.
+    """Random numbers of N proposals."""
 
-    Attributes:
-        normals: unit normal, (N, D).
-        uniforms: uniform in 0..1, (N, K).
-    """
-
-    normals: Floats
-    uniforms: Floats
+    normals: Floats  #: unit normal, (N, D)
+    uniforms: Floats  #: uniform in 0..1, (N, K)
 
 
 class Noise(NamedTuple):
-    """Noise of a state.
+    """Noise of a state."""
 
-    Attributes:
-        sigma: deviations, (14,).
-        limits: lowest and highest values, (14, 2).
-        lever_m: height of the shoulders above the hips.
-    """
-
-    sigma: Floats
-    limits: Floats
-    lever_m: float
+    sigma: Floats  #: deviations, (14,)
+    limits: Floats  #: lowest and highest values, (14, 2)
+    lever_m: float  #: height of the shoulders above the hips
 
 
 NumbersTuple = tuple[Floats, Floats]

@@ -20,18 +20,13 @@ _LEAST_ANGLE = 0.05
 
 
 class Location(NamedTuple):
-    """Estimated place of the person.
+    """Estimated place of the person."""
 
-    Attributes:
-        bearing: lateral coordinate over depth of the silhouette's middle in the first camera.
-        step_m: lateral motion of the middle since the last frame, metres.
-        x_m: ``torso_x`` of the intersection of the lines of sight; None if it is not computed.
-        x_stddev_m: standard deviation of ``x_m``; None if the lines do not determine it.
-    """
-
-    bearing: float
-    step_m: float
+    bearing: float  #: lateral coordinate over depth of the silhouette's middle in the first camera
+    step_m: float  #: lateral motion of the middle since the last frame, metres
+    #: ``torso_x`` of the intersection of the lines of sight; None if it is not computed.
     x_m: float | None = None
+    #: standard deviation of ``x_m``; None if the lines do not determine it.
     x_stddev_m: float | None = None
 
 

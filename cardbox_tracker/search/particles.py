@@ -13,19 +13,12 @@ from cardbox_tracker.search.doubt import calibrated_deviations
 
 @dataclass(frozen=True)
 class Particles:
-    """Rated states; each has the weight exp(-rating / ``spread``).
+    """Rated states; each has the weight exp(-rating / ``spread``)."""
 
-    Attributes:
-        states: (N, 14).
-        ratings: ratings of the states, (N,).
-        mean: mean of the states, (14,), before smoothing.
-        spread: difference of ratings that changes a weight by the factor e.
-    """
-
-    states: FloatArray
-    ratings: FloatArray
-    mean: FloatArray
-    spread: float
+    states: FloatArray  #: (N, 14)
+    ratings: FloatArray  #: ratings of the states, (N,)
+    mean: FloatArray  #: mean of the states, (14,), before smoothing
+    spread: float  #: difference of ratings that changes a weight by the factor e
 
     def postures(self, around: FloatArray, count: int, rng: np.random.Generator) -> FloatArray:
         """Return equally weighted postures (count, 12), drawn from the weighted particles.

@@ -29,37 +29,23 @@ class Presence(Enum):
 
 @dataclass(frozen=True)
 class Fit:
-    """The result of a filter in a frame.
+    """The result of a filter in a frame."""
 
-    Attributes:
-        posture: d1..d12, (12,), rad and metres.
-        posture_stddev: standard deviations, (12,).
-        keypoints_m: shoulder, elbow, hand of the left, then the right arm, (6, 3), metres in the
-            optical frame.
-        cost_px: pixels in which the drawn posture and the silhouette differ.
-        iou: intersection over union of drawn posture and silhouette.
-        is_poor: whether it does not fit; several such frames in a row mean that the person is lost.
-        seen: state that fits the image best, before any correction, (14,), or (12,) without
-            an offset.
-        seen_iou: ``iou`` of ``seen``.
-        offset_m: ``torso_x`` and ``torso_z``, (2,), or None.
-        offset_stddev_m: standard deviations of ``offset_m``, (2,), or None.
-        particles: particles of whole states; None if the filter has none.
-        judged: the doubt about the result; None if the filter has none.
-    """
-
-    posture: FloatArray
-    posture_stddev: FloatArray
+    posture: FloatArray  #: d1..d12, (12,), rad and metres
+    posture_stddev: FloatArray  #: standard deviations, (12,)
+    #: shoulder, elbow, hand of the left, then the right arm, (6, 3), metres in the optical frame.
     keypoints_m: FloatArray
-    cost_px: int
-    iou: float
+    cost_px: int  #: pixels in which the drawn posture and the silhouette differ
+    iou: float  #: intersection over union of drawn posture and silhouette
+    #: whether it does not fit; several such frames in a row mean that the person is lost.
     is_poor: bool
+    #: state that fits the image best, before any correction, (14,), or (12,) without an offset.
     seen: FloatArray
-    seen_iou: float
-    offset_m: FloatArray | None = None
-    offset_stddev_m: FloatArray | None = None
-    particles: Particles | None = None
-    judged: Judgement | None = None
+    seen_iou: float  #: ``iou`` of ``seen``
+    offset_m: FloatArray | None = None  #: ``torso_x`` and ``torso_z``, (2,), or None
+    offset_stddev_m: FloatArray | None = None  #: standard deviations of ``offset_m``, (2,), or None
+    particles: Particles | None = None  #: particles of whole states; None if the filter has none
+    judged: Judgement | None = None  #: the doubt about the result; None if the filter has none
 
     @property
     def is_finite(self) -> bool:

@@ -35,15 +35,10 @@ _SAME = np.eye(N_STATE)
 
 
 class Prior(NamedTuple):
-    """A normal prior of a state.
+    """A normal prior of a state."""
 
-    Attributes:
-        mean: (14,), or (N, 14) for each state.
-        inverse: inverse variances, (14,).
-    """
-
-    mean: FloatArray
-    inverse: FloatArray
+    mean: FloatArray  #: (14,), or (N, 14) for each state
+    inverse: FloatArray  #: inverse variances, (14,)
 
 
 class Refiner:

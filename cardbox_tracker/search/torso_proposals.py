@@ -46,21 +46,13 @@ _FRESH_TURNED, _FRESH_YAW_RAD = 0.5, 0.3
 
 
 class Upright(NamedTuple):
-    """Upright torsos at the place of the silhouette.
+    """Upright torsos at the place of the silhouette."""
 
-    Attributes:
-        number: number of torsos.
-        state: state with hanging arms, (14,).
-        x_deviation_m: deviation of ``torso_x``, metres.
-        direction: bearing of the silhouette: lateral coordinate over depth.
-        distance_m: distance of the person in the body model.
-    """
-
-    number: int
-    state: Floats
-    x_deviation_m: float
-    direction: float
-    distance_m: float
+    number: int  #: number of torsos
+    state: Floats  #: state with hanging arms, (14,)
+    x_deviation_m: float  #: deviation of ``torso_x``, metres
+    direction: float  #: bearing of the silhouette: lateral coordinate over depth
+    distance_m: float  #: distance of the person in the body model
 
 
 UprightTuple = tuple[int, Floats, float, float, float]

@@ -75,35 +75,20 @@ _KEPT = 0.6
 
 @dataclass
 class Search:
-    """The search of one frame.
+    """The search of one frame."""
 
-    Attributes:
-        cost: rates states by the cameras that show the person.
-        profile: numbers of the search.
-        survivors: states (M, 14) of the last frame, the best first.
-        before: state (14,) of the last frame.
-        rated: rated states, to which each stage adds.
-        location: the person's place by the silhouettes.
-        reference: state (14,) of the front reference posture.
-        draws: random numbers.
-        age: frames since the search began.
-        is_new: whether the person is new in this frame.
-        is_lost: whether the person was lost.
-        cues: observations that tell where joints are, by camera.
-    """
-
-    cost: MultiViewCost
-    profile: SearchProfile
-    survivors: FloatArray
-    before: FloatArray
-    rated: RatedStates
-    location: Location
-    reference: FloatArray
-    draws: Draws
-    age: int
-    is_new: bool
-    is_lost: bool
-    cues: list[Cue]
+    cost: MultiViewCost  #: rates states by the cameras that show the person
+    profile: SearchProfile  #: numbers of the search
+    survivors: FloatArray  #: states (M, 14) of the last frame, the best first
+    before: FloatArray  #: state (14,) of the last frame
+    rated: RatedStates  #: rated states, to which each stage adds
+    location: Location  #: the person's place by the silhouettes
+    reference: FloatArray  #: state (14,) of the front reference posture
+    draws: Draws  #: random numbers
+    age: int  #: frames since the search began
+    is_new: bool  #: whether the person is new in this frame
+    is_lost: bool  #: whether the person was lost
+    cues: list[Cue]  #: observations that tell where joints are, by camera
 
 
 class WholeBodyFilter:

@@ -47,15 +47,10 @@ _BRIGHTEST = 255.0
 
 
 class StoredBackground(NamedTuple):
-    """A background and the calibration of the camera that it was learned with.
+    """A background and the calibration of the camera that it was learned with."""
 
-    Attributes:
-        model: the learned scene.
-        calibration: calibration of the images that the scene was learned from.
-    """
-
-    model: BackgroundModel
-    calibration: Calibration
+    model: BackgroundModel  #: the learned scene
+    calibration: Calibration  #: calibration of the images that the scene was learned from
 
     def check_camera(self, calibration: Calibration, name: str) -> None:
         """Raise BackgroundFileError unless ``calibration`` is that of this background's camera."""

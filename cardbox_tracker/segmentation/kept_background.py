@@ -42,21 +42,13 @@ _DARKEST = 8.0
 
 @dataclass(frozen=True)
 class SceneFit:
-    """Result of the comparison of an image with the learned scene.
+    """Result of the comparison of an image with the learned scene."""
 
-    Attributes:
-        tiles: number of tiles that have texture.
-        in_place: number of tiles found where they were learned.
-        shifted: number of tiles found elsewhere.
-        shift_px: median shift (right, down) of the shifted tiles, px.
-        changed: share of the pixels that look different, after correction for the light.
-    """
-
-    tiles: int
-    in_place: int
-    shifted: int
-    shift_px: tuple[int, int]
-    changed: float
+    tiles: int  #: number of tiles that have texture
+    in_place: int  #: number of tiles found where they were learned
+    shifted: int  #: number of tiles found elsewhere
+    shift_px: tuple[int, int]  #: median shift (right, down) of the shifted tiles, px
+    changed: float  #: share of the pixels that look different, after correction for the light
 
     @property
     def is_moved(self) -> bool:

@@ -43,21 +43,14 @@ def remove_small_regions(image: ImageArray, colour: int, area_px: float) -> None
 
 
 class Regions(NamedTuple):
-    """Connected regions of a binary image as runs of pixels, row by row.
+    """Connected regions of a binary image as runs of pixels, row by row."""
 
-    Attributes:
-        rows: row of each run, (n,).
-        starts: first column of each run, (n,).
-        ends: column after the last of each run, (n,).
-        labels: region of each run, (n,), counted from 0 in the order of the first pixels.
-        areas_px: number of pixels of each region, (m,).
-    """
-
-    rows: NDArray[np.int32]
-    starts: NDArray[np.int32]
-    ends: NDArray[np.int32]
+    rows: NDArray[np.int32]  #: row of each run, (n,)
+    starts: NDArray[np.int32]  #: first column of each run, (n,)
+    ends: NDArray[np.int32]  #: column after the last of each run, (n,)
+    #: region of each run, (n,), counted from 0 in the order of the first pixels.
     labels: NDArray[np.int32]
-    areas_px: NDArray[np.int32]
+    areas_px: NDArray[np.int32]  #: number of pixels of each region, (m,)
 
 
 def clean_silhouette(

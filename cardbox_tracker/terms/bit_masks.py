@@ -38,17 +38,11 @@ _padded = inlined_kernel(padded)
 
 
 class Masks(NamedTuple):
-    """Scratch arrays for K patches.
+    """Scratch arrays for K patches."""
 
-    Attributes:
-        drawn: pixels of the union, (words, rows); rows outside of ``rows_of`` have no meaning.
-        words_of: first and end column of words of each patch, (K, 2).
-        rows_of: first and end row of each column of words, (words, 2).
-    """
-
-    drawn: Drawn
-    words_of: Counts
-    rows_of: Counts
+    drawn: Drawn  #: pixels of the union, (words, rows); rows outside of ``rows_of`` have no meaning
+    words_of: Counts  #: first and end column of words of each patch, (K, 2)
+    rows_of: Counts  #: first and end row of each column of words, (words, 2)
 
 
 @inlined_allocation

@@ -207,15 +207,10 @@ def ratios_of(histograms: FloatArray) -> NDArray[np.float32]:
 
 @dataclass(frozen=True, eq=False)
 class InnerCueObservation(TermObservation):
-    """The cue of one frame.
+    """The cue of one frame."""
 
-    Attributes:
-        gains: gains of arms in this frame.
-        before: elbow and hand of each arm in the previous frame, (2, 1, 2, 3).
-    """
-
-    gains: ArmGains
-    before: FloatArray
+    gains: ArmGains  #: gains of arms in this frame
+    before: FloatArray  #: elbow and hand of each arm in the previous frame, (2, 1, 2, 3)
 
     def rate(self, posed: Posed) -> FloatArray:
         """Rate the arms that count; the outline determines the trunk."""

@@ -38,21 +38,13 @@ def zones_of(posed: Posed) -> FloatArray:
 
 @dataclass(frozen=True, eq=False)
 class ArmGains:
-    """The gains of arms in one image.
+    """The gains of arms in one image."""
 
-    Attributes:
-        maps: log-likelihood ratios of hand and forearm, (2, h, w), nats.
-        corner: column and row of the image where the maps begin.
-        weights: weight of a nat of hand and forearm, px of the outline, (2,).
-        px_per_m: scale at the expected place of the person.
-        forearm_m: length, including the fist, and width of the forearm.
-    """
-
-    maps: NDArray[np.float32]
-    corner: tuple[int, int]
-    weights: FloatArray
-    px_per_m: float
-    forearm_m: tuple[float, float]
+    maps: NDArray[np.float32]  #: log-likelihood ratios of hand and forearm, (2, h, w), nats
+    corner: tuple[int, int]  #: column and row of the image where the maps begin
+    weights: FloatArray  #: weight of a nat of hand and forearm, px of the outline, (2,)
+    px_per_m: float  #: scale at the expected place of the person
+    forearm_m: tuple[float, float]  #: length, including the fist, and width of the forearm
 
     def __call__(
         self, points: FloatArray, hidden: NDArray[np.bool_], others: FloatArray

@@ -45,17 +45,12 @@ class Maps(NamedTuple):
 
 
 class Forearm(NamedTuple):
-    """A forearm and its scale in the image.
+    """A forearm and its scale in the image."""
 
-    Attributes:
-        length_m: including the fist.
-        width_m: width of the forearm.
-        px_per_m: scale at the expected place of the person; areas use it, so that a nearer state
-            has no advantage.
-    """
-
-    length_m: float
-    width_m: float
+    length_m: float  #: including the fist
+    width_m: float  #: width of the forearm
+    #: scale at the expected place of the person; areas use it, so that a nearer state has no
+    #: advantage.
     px_per_m: float
 
 

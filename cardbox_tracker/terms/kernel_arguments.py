@@ -33,37 +33,23 @@ class Intrinsics(NamedTuple):
 
 
 class Cardbox(NamedTuple):
-    """A cardbox model before a camera.
+    """A cardbox model before a camera."""
 
-    Attributes:
-        parts: six lengths of six parts, (6, 6), metres; (N, 6, 6) for N bodies.
-        shoulder: the shoulder joint in the torso's frame, aside and upwards, (2,), metres; (N, 2).
-        place: place of the hips.
-        camera: intrinsics and pitch of the camera.
-    """
-
-    parts: Floats
+    parts: Floats  #: six lengths of six parts, (6, 6), metres; (N, 6, 6) for N bodies
+    #: the shoulder joint in the torso's frame, aside and upwards, (2,), metres; (N, 2).
     shoulder: Floats
-    place: Place
-    camera: Intrinsics
+    place: Place  #: place of the hips
+    camera: Intrinsics  #: intrinsics and pitch of the camera
 
 
 class Body(NamedTuple):
-    """A whole body with a shoulder girdle before a camera.
+    """A whole body with a shoulder girdle before a camera."""
 
-    Attributes:
-        parts: the measured parts, (6, 6), metres.
-        drawn: the parts whose outlines are drawn, with a longer waist, neck and forearm.
-        girdle: shoulder joints and how they rise with the arms, (3,).
-        place: place of the hips.
-        camera: intrinsics and pitch of the camera.
-    """
-
-    parts: Floats
-    drawn: Floats
-    girdle: Floats
-    place: Place
-    camera: Intrinsics
+    parts: Floats  #: the measured parts, (6, 6), metres
+    drawn: Floats  #: the parts whose outlines are drawn, with a longer waist, neck and forearm
+    girdle: Floats  #: shoulder joints and how they rise with the arms, (3,)
+    place: Place  #: place of the hips
+    camera: Intrinsics  #: intrinsics and pitch of the camera
 
 
 IntrinsicsTuple = tuple[float, float, float, float, float, float]

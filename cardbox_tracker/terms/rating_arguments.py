@@ -16,33 +16,20 @@ from cardbox_tracker.terms.rasterisation import Workspace, new_workspace
 
 
 class Observed(NamedTuple):
-    """A silhouette, or the part of it outside of parts that are already drawn.
+    """A silhouette, or the part of it outside of parts that are already drawn."""
 
-    Attributes:
-        planes: pixels that count, and foreground, (2, words, rows); see :mod:`.bit_planes`.
-        rows: number of rows that count, from the top.
-        width: width of the image, px.
-        base_px: cost without further parts, px.
-        scale: 1 / (pixels of the silhouette).
-    """
-
-    planes: Planes
-    rows: int
-    width: int
-    base_px: int
-    scale: float
+    planes: Planes  #: pixels that count, and foreground, (2, words, rows); see :mod:`.bit_planes`
+    rows: int  #: number of rows that count, from the top
+    width: int  #: width of the image, px
+    base_px: int  #: cost without further parts, px
+    scale: float  #: 1 / (pixels of the silhouette)
 
 
 class Points(NamedTuple):
-    """Shoulder, elbow and hand of the left, then of the right arm of N states.
+    """Shoulder, elbow and hand of the left, then of the right arm of N states."""
 
-    Attributes:
-        joints_m: in the torso's frame, (N, 6, 3), metres.
-        keypoints_m: in the optical frame, (N, 6, 3), metres.
-    """
-
-    joints_m: Floats
-    keypoints_m: Floats
+    joints_m: Floats  #: in the torso's frame, (N, 6, 3), metres
+    keypoints_m: Floats  #: in the optical frame, (N, 6, 3), metres
 
 
 ObservedTuple = tuple[Planes, int, int, int, float]
@@ -50,19 +37,12 @@ PointsTuple = tuple[Floats, Floats]
 
 
 class Scratch(NamedTuple):
-    """Scratch arrays of the ratings.
+    """Scratch arrays of the ratings."""
 
-    Attributes:
-        work: for the drawn patches.
-        arm: for one arm.
-        masks: for the union of the patches.
-        logs: one value for each Gaussian of the prior, (K,).
-    """
-
-    work: Workspace
-    arm: PosedArm
-    masks: Masks
-    logs: Floats
+    work: Workspace  #: for the drawn patches
+    arm: PosedArm  #: for one arm
+    masks: Masks  #: for the union of the patches
+    logs: Floats  #: one value for each Gaussian of the prior, (K,)
 
 
 @inlined_allocation

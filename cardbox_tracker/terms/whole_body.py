@@ -59,19 +59,12 @@ _BOTH_ARMS = (False, True, True)
 
 
 class Bodies(NamedTuple):
-    """Rated states.
+    """Rated states."""
 
-    Attributes:
-        ratings: (N,); lower is better.
-        costs_px: pixels in which model and silhouettes differ, (N,).
-        areas_px: pixels of the model, (N,).
-        points: joints of the arms.
-    """
-
-    ratings: FloatArray
-    costs_px: FloatArray
-    areas_px: FloatArray
-    points: Points
+    ratings: FloatArray  #: (N,); lower is better
+    costs_px: FloatArray  #: pixels in which model and silhouettes differ, (N,)
+    areas_px: FloatArray  #: pixels of the model, (N,)
+    points: Points  #: joints of the arms
 
 
 class Ratings(NamedTuple):

@@ -50,21 +50,14 @@ class MovingFrame(NamedTuple):
 
 
 class CalibratedCamera(NamedTuple):
-    """The pose of a further camera and its uncertainty.
+    """The pose of a further camera and its uncertainty."""
 
-    Attributes:
-        extrinsics: transform from the first camera's optical frame to the further camera's.
-        halves_deg: angle between the poses estimated from each half of the frames, degrees.
-        halves_m: distance between the camera centres of these poses, metres.
-        iou: mean intersection over union of model and silhouettes while both cameras track.
-        frames: number of frames that were used.
-    """
-
+    #: transform from the first camera's optical frame to the further camera's.
     extrinsics: Extrinsics
-    halves_deg: float
-    halves_m: float
-    iou: float
-    frames: int
+    halves_deg: float  #: angle between the poses estimated from each half of the frames, degrees
+    halves_m: float  #: distance between the camera centres of these poses, metres
+    iou: float  #: mean intersection over union of model and silhouettes while both cameras track
+    frames: int  #: number of frames that were used
 
     def __str__(self) -> str:
         """Return the pose and its uncertainty as text."""

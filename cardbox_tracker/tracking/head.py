@@ -83,15 +83,10 @@ _DRIFT_RAD_S = 1.0
 
 
 class Neck(NamedTuple):
-    """Direction of the head relative to the torso.
+    """Direction of the head relative to the torso."""
 
-    Attributes:
-        angles: yaw and pitch, (2,), rad.
-        stddev: their standard deviations, (2,), rad.
-    """
-
-    angles: FloatArray
-    stddev: FloatArray
+    angles: FloatArray  #: yaw and pitch, (2,), rad
+    stddev: FloatArray  #: their standard deviations, (2,), rad
 
 
 def fit_neck(

@@ -100,23 +100,16 @@ _LEAST_M = 0.05
 
 
 class _Seen(NamedTuple):
-    """What one image shows; the rows of arrays are the left and the right leg.
+    """What one image shows; the rows of arrays are the left and the right leg."""
 
-    Attributes:
-        px: knee and ankle, (2, 2, 2).
-        sigma_px: their deviations, (2, 2).
-        slopes: components of thigh and shank along the line of sight, (2, 2); nan if unknown.
-        sigma_slopes: their deviations, (2, 2).
-        scores: of hip, knee and ankle, (2, 3).
-        shows_back: whether the tracker and the detector exchange left and right, as they do for a
-            person seen from behind, whose knees then bend to the wrong side.
-    """
-
-    px: FloatArray
-    sigma_px: FloatArray
+    px: FloatArray  #: knee and ankle, (2, 2, 2)
+    sigma_px: FloatArray  #: their deviations, (2, 2)
+    #: components of thigh and shank along the line of sight, (2, 2); nan if unknown.
     slopes: FloatArray
-    sigma_slopes: FloatArray
-    scores: FloatArray
+    sigma_slopes: FloatArray  #: their deviations, (2, 2)
+    scores: FloatArray  #: of hip, knee and ankle, (2, 3)
+    #: whether the tracker and the detector exchange left and right, as they do for a person seen
+    #: from behind, whose knees then bend to the wrong side.
     shows_back: bool
 
 

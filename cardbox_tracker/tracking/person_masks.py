@@ -44,21 +44,13 @@ _GAP_M, _RING_M = 0.05, 0.2
 
 @dataclass(frozen=True)
 class PersonMasks:
-    """Regions of the expected person on the grid, each (h, w), 0 or 1.
+    """Regions of the expected person on the grid, each (h, w), 0 or 1."""
 
-    Attributes:
-        core: the body in the last posture.
-        near: cells that the person can occupy in the next frame.
-        reach: cells that the arms can reach.
-        hip: column and row of mid-hip, cells.
-        cells_per_m: scale at the hips.
-    """
-
-    core: Mask
-    near: Mask
-    reach: Mask
-    hip: tuple[float, float]
-    cells_per_m: float
+    core: Mask  #: the body in the last posture
+    near: Mask  #: cells that the person can occupy in the next frame
+    reach: Mask  #: cells that the arms can reach
+    hip: tuple[float, float]  #: column and row of mid-hip, cells
+    cells_per_m: float  #: scale at the hips
 
     def band(self) -> Mask:
         """Return all cells (h, w) within 10 cm of the body, 0 or 1."""

@@ -78,35 +78,21 @@ _PROJECTED = {
 
 
 class Shown(NamedTuple):
-    """A figure in one image.
+    """A figure in one image."""
 
-    Attributes:
-        points: joints from a detector; None for a region of the silhouette.
-        figure: place and size; None for a region.
-        pixels: (H, W), 255 at the person's pixels as far as they are known, else 0.
-    """
-
-    points: ImagePoints | None
-    figure: Figure | None
-    pixels: Silhouette
+    points: ImagePoints | None  #: joints from a detector; None for a region of the silhouette
+    figure: Figure | None  #: place and size; None for a region
+    pixels: Silhouette  #: (H, W), 255 at the person's pixels as far as they are known, else 0
 
 
 class _Share(NamedTuple):
-    """What a camera shows of a person.
+    """What a camera shows of a person."""
 
-    Attributes:
-        seen: the observation with the person's part of the silhouette.
-        is_found: whether one of the figures is the person.
-        is_missed: whether the person is where the silhouette shows nothing of them.
-        is_hidden: whether others hide the person there.
-        is_detected: whether a detector finds the figures.
-    """
-
-    seen: Observation
-    is_found: bool
-    is_missed: bool
-    is_hidden: bool
-    is_detected: bool
+    seen: Observation  #: the observation with the person's part of the silhouette
+    is_found: bool  #: whether one of the figures is the person
+    is_missed: bool  #: whether the person is where the silhouette shows nothing of them
+    is_hidden: bool  #: whether others hide the person there
+    is_detected: bool  #: whether a detector finds the figures
 
 
 class _Sight:
