@@ -798,7 +798,7 @@ def _config(options: argparse.Namespace, preset: TrackerConfig) -> TrackerConfig
     Raises:
         CardboxError: the file cannot be read, or a value is wrong or has no effect.
     """
-    from cardbox_tracker.search.settings_file import read_settings
+    from cardbox_tracker.search.config import read_settings
 
     config = preset if options.depth is None else preset.with_depth()
     if options.settings is not None:

@@ -18,8 +18,7 @@ from cardbox_tracker.camera.rasterisation import render
 from cardbox_tracker.common.errors import InitializationError
 from cardbox_tracker.measuring.config import InitializationConfig
 from cardbox_tracker.measuring.outline import filled
-from cardbox_tracker.measuring.references import POSTURE_TEXT, lateral_m
-from cardbox_tracker.measuring.wording import rounded_down
+from cardbox_tracker.measuring.references import POSTURE_TEXT, lateral_m, rounded_down
 from cardbox_tracker.person.cardbox import cardbox_patches
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.posture import REFERENCE_NAMES, reference_posture

@@ -8,7 +8,7 @@ import numpy as np
 
 from cardbox_tracker.common.errors import InitializationError
 from cardbox_tracker.common.settings import Settings, setting
-from cardbox_tracker.measuring.wording import rounded_down
+from cardbox_tracker.measuring.references import rounded_down
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.posture import REFERENCE_NAMES, SIDE_TURNS
 

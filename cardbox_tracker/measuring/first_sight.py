@@ -26,9 +26,9 @@ from cardbox_tracker.measuring.references import (
     MAX_PERSON_FRACTION,
     MIN_PERSON_FRACTION,
     lateral_m,
+    rounded_down,
 )
 from cardbox_tracker.measuring.stature import at_height_of
-from cardbox_tracker.measuring.wording import rounded_down
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.posture import N_STATE, PLACE, POSTURE, TORSO_Y
 from cardbox_tracker.person.proportions import BREADTHS

@@ -12,7 +12,7 @@
 
 Without references, one image of any posture teaches the colours of head, torso and legs. Forearms
 are then half bare and half in sleeves, until tracking tells
-(:mod:`cardbox_tracker.terms.inner_cue_sleeves`).
+(:mod:`cardbox_tracker.terms.inner_cue`).
 """
 
 from __future__ import annotations

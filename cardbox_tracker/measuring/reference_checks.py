@@ -24,9 +24,8 @@ from cardbox_tracker.measuring.outline import (
     span_m,
     width_m,
 )
-from cardbox_tracker.measuring.references import POSTURE_TEXT
+from cardbox_tracker.measuring.references import POSTURE_TEXT, rounded_down, rounded_up
 from cardbox_tracker.measuring.skeleton import BREADTH_OF_SPAN
-from cardbox_tracker.measuring.wording import rounded_down, rounded_up
 from cardbox_tracker.person.posture import REFERENCE_NAMES
 
 Silhouette = NDArray[np.uint8]

@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 
 import numpy as np
@@ -12,8 +13,23 @@ from numpy.typing import NDArray
 
 from cardbox_tracker.camera.camera import Camera
 from cardbox_tracker.common.errors import InitializationError
-from cardbox_tracker.measuring.wording import rounded_down, rounded_up
 from cardbox_tracker.person.posture import REFERENCE_NAMES
+
+# Tolerance of floating-point errors.
+_TINY = 1e-9
+
+
+def rounded_down(value: float, digits: int = 2) -> str:
+    """Return a number rounded down, for values below a bound."""
+    unit = 10**digits
+    return f"{math.floor(value * unit + _TINY) / unit:.{digits}f}"
+
+
+def rounded_up(value: float, digits: int = 2) -> str:
+    """Return a number rounded up, for values above a bound."""
+    unit = 10**digits
+    return f"{math.ceil(value * unit - _TINY) / unit:.{digits}f}"
+
 
 Silhouette = NDArray[np.uint8]
 

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from types import MappingProxyType
 from typing import Any
 
 from cardbox_tracker.common.errors import CardboxError
+from cardbox_tracker.common.files import foreign
 from cardbox_tracker.common.settings import (
     NoEffectError,
     Settings,
@@ -16,6 +18,7 @@ from cardbox_tracker.common.settings import (
     setting,
     suggestion,
 )
+from cardbox_tracker.common.small_yaml import parse_small_yaml, read_small_text
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.search.resampling import STRATEGIES
 from cardbox_tracker.search.whole_body_config import WholeBodyConfig
@@ -221,3 +224,16 @@ class _Presets(dict[str, Callable[[], TrackerConfig]]):
 
 PRESETS = MappingProxyType(_Presets(paper=paper_preset, default=default_preset))
 """Functions that return the settings of the presets; a wrong name raises CardboxError."""
+
+
+def read_settings(path: str | os.PathLike[str], config: TrackerConfig) -> TrackerConfig:
+    """Return ``config`` with the values of the file at ``path``; docs/parameters.md has all names.
+
+    Raises CardboxError if it cannot be read, or a name or a value is none that acts.
+    """
+    expected = "a YAML file with names of docs/parameters.md, such as 'lost_frames: 10'"
+    with foreign(path, CardboxError, expected):
+        given = parse_small_yaml(read_small_text(path))
+        if not isinstance(given, dict):
+            raise ValueError("expected names and values, such as 'lost_frames: 10'")
+        return config.changed(given)

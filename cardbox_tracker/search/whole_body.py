@@ -31,8 +31,7 @@ from cardbox_tracker.person.posture import (
 from cardbox_tracker.person.sizes import FloatArray
 from cardbox_tracker.search import doubt, joint_moves, state_choice, torso_proposals
 from cardbox_tracker.search.approach import Approach
-from cardbox_tracker.search.arm_search import ArmSearch
-from cardbox_tracker.search.arms import ARM_LIMITS
+from cardbox_tracker.search.arm_search import ARM_LIMITS, ArmSearch
 from cardbox_tracker.search.config import TrackerConfig
 from cardbox_tracker.search.draws import Draws
 from cardbox_tracker.search.locating import Location, Locator

@@ -10,8 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cardbox_tracker.camera.camera import Calibration
-from cardbox_tracker.camera.encodings import brightness_of
-from cardbox_tracker.camera.resize import to_working_size
+from cardbox_tracker.camera.encodings import brightness_of, to_working_size
 from cardbox_tracker.segmentation.background import SilhouetteExtractor
 from cardbox_tracker.segmentation.background_config import BackgroundConfig
 from cardbox_tracker.segmentation.empty_scene import BackgroundModel

@@ -18,8 +18,7 @@ from cardbox_tracker.person.appearance import COLOR_STEPS, HAND, HEAD, steps_of_
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.posture import PITCH, YAW
 from cardbox_tracker.person.sizes import FloatArray
-from cardbox_tracker.terms.inner_cue import chest_levels
-from cardbox_tracker.terms.inner_cue_arms import zones_of
+from cardbox_tracker.terms.inner_cue import chest_levels, zones_of
 from cardbox_tracker.terms.term import Frame, Image, Posed, Silhouette
 
 # Grid from the forehead to the cheeks, as shares of the half axes of the head's ellipse; fewest of

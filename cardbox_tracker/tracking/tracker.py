@@ -32,7 +32,7 @@ from cardbox_tracker.person.sizes import FloatArray
 from cardbox_tracker.search.config import TrackerConfig
 from cardbox_tracker.search.cycles import Cycles
 from cardbox_tracker.search.doubt import doubted
-from cardbox_tracker.search.particles import Particles
+from cardbox_tracker.search.particles import Particles, likely_postures
 from cardbox_tracker.search.pose_filter import (
     Corrector,
     MakeFilter,
@@ -61,7 +61,6 @@ from cardbox_tracker.tracking.head import HeadTracker
 from cardbox_tracker.tracking.legs import LegReader
 from cardbox_tracker.tracking.observation import Observation, Observations, stamp_of
 from cardbox_tracker.tracking.place import PlaceWatch
-from cardbox_tracker.tracking.sampling import likely_postures
 from cardbox_tracker.tracking.tracked_camera import TrackedCamera
 
 FILTERS: MappingProxyType[str, MakeFilter] = MappingProxyType(

@@ -51,9 +51,8 @@ from cardbox_tracker.terms.term import Frame, Posed
 from cardbox_tracker.terms.whole_body import WholeBodyCost
 from cardbox_tracker.terms.whole_body_config import WholeBodyCostConfig
 from cardbox_tracker.tracking.observation import Observation
-from cardbox_tracker.tracking.person_region import PersonRegion
+from cardbox_tracker.tracking.person_region import PersonRegion, StillThings
 from cardbox_tracker.tracking.precompile import quickest
-from cardbox_tracker.tracking.still_things import StillThings
 from cardbox_tracker.tracking.tracked_camera import TrackedCamera
 from cardbox_tracker.tracking.tracker import Tracker
 

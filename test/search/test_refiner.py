@@ -28,7 +28,7 @@ from cardbox_tracker.person.posture import (
     reference_posture,
     state_limits,
 )
-from cardbox_tracker.search.arms import ARM_LIMITS
+from cardbox_tracker.search.arm_search import ARM_LIMITS
 from cardbox_tracker.search.mirroring import mirrored_states
 from cardbox_tracker.search.refiner import Cue, Prior, Refiner
 from cardbox_tracker.terms import joint_points_kernels as kernels

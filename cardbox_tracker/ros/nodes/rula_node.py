@@ -31,7 +31,7 @@ from cardbox_tracker.ros.runtime.command_line import plain_command_line
 from cardbox_tracker.ros.runtime.node import CardboxNode, run_node
 from cardbox_tracker.ros.runtime.parameter_fields import AT_START, NodeParameters, parameter
 from cardbox_tracker.ros.runtime.parameters import LiveParameters
-from cardbox_tracker.tracking.sampling import normal_postures
+from cardbox_tracker.search.particles import normal_postures
 
 _DOES = "Score the strain on arms, neck and trunk (RULA) while the tracker follows a person."
 
