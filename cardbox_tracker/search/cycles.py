@@ -104,8 +104,7 @@ class Cycles:
         area = frame.foreground_px / self._person_px
         evidence = doubt.evidence_of_particles(iou, area, posture, stddev, self._posable)
         judged = self._doubt.judge(evidence, doubt.Source.PAPER, np.zeros(6, np.bool_))
-        fit = posture, stddev, keypoints_m, cost_px, iou, is_poor, posture, iou
-        return Fit(*fit, judged=judged)
+        return Fit(posture, stddev, keypoints_m, cost_px, iou, is_poor, judged=judged)
 
     def _start(self, frame: Frame, observation: SumOfTerms) -> None:
         """Start around the front reference at the person's place, then run the first cycles."""

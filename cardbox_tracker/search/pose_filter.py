@@ -39,9 +39,6 @@ class Fit:
     iou: float  #: intersection over union of drawn posture and silhouette
     #: whether it does not fit; several such frames in a row mean that the person is lost.
     is_poor: bool
-    #: state that fits the image best, before any correction, (14,), or (12,) without an offset.
-    seen: FloatArray
-    seen_iou: float  #: ``iou`` of ``seen``
     offset_m: FloatArray | None = None  #: ``torso_x`` and ``torso_z``, (2,), or None
     offset_stddev_m: FloatArray | None = None  #: standard deviations of ``offset_m``, (2,), or None
     particles: Particles | None = None  #: particles of whole states; None if the filter has none
@@ -83,13 +80,6 @@ class PoseFilter(Protocol):
 
     def configure(self, config: TrackerConfig) -> None:
         """Use other settings; settings that restart tracking are the same."""
-
-
-class Corrector(Protocol):
-    """Changes the results of the preset ``default``, see :class:`~cardbox_tracker.Tracker`."""
-
-    def __call__(self, frames: Sequence[Frame], state: FloatArray) -> FloatArray:
-        """Return the corrected state (14,), rad and metres, for one that fits the frames."""
 
 
 MakeFilter = Callable[

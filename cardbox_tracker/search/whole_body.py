@@ -37,7 +37,7 @@ from cardbox_tracker.search.draws import Draws
 from cardbox_tracker.search.locating import Location, Locator
 from cardbox_tracker.search.mirroring import mirrored_states, turned_states
 from cardbox_tracker.search.particles import Particles
-from cardbox_tracker.search.pose_filter import Corrector, Fit, Presence
+from cardbox_tracker.search.pose_filter import Fit, Presence
 from cardbox_tracker.search.presence import PersonPresence
 from cardbox_tracker.search.rated_states import RatedStates
 from cardbox_tracker.search.refiner import Cue, Prior, Refiner
@@ -108,10 +108,8 @@ class WholeBodyFilter:
         silhouette: SilhouetteTerm,
         rng: np.random.Generator,
         views: Sequence[View] = (),
-        corrector: Corrector | None = None,
     ) -> None:
         """Prepare, and compile the kernels if necessary; see ``MakeFilter``."""
-        self._corrector = corrector
         self._config = settings = config.whole_body
         self._profile = settings.profile_for(1 + len(views)).scaled(settings.effort)
         self._located = self._profile.scaled(_LOCATED_EFFORT)
@@ -326,31 +324,29 @@ class WholeBodyFilter:
         before = mean if self._output is None else self._output
         kept = self._config.smoothing * profile.smoothing
         self._output = kept * before + (1.0 - kept) * mean
-        fitted = self._refined(frames, self._output)
-        result = self._corrected(frames, fitted)
+        result = self._refined(frames, self._output)
         is_back = cost.facing_rad != 0.0
         if self._cues:
             # The image in which somebody is found to have turned counts as one of a back, too.
-            fitted, result = self._turned(np.array([fitted, result]))
+            (result,) = self._turned(result[None])
         mirrored = mirrored_states(result, cost.body, ARM_LIMITS)[_ONE_MIRRORED]
-        found = cost.bodies(np.concatenate([fitted[None], result[None], mirrored]))
+        found = cost.bodies(np.concatenate([result[None], mirrored]))
         ratings, points = found.ratings, found.points
-        differs_px, cost_px = found.costs_px[:2]
-        drawn_px, area_px = found.areas_px[:2]
+        cost_px, area_px = found.costs_px[0], found.areas_px[0]
         deviations, total = doubt.deviations_of(stddev), cost.silhouette_px
-        fit_iou = iou_of(total, drawn_px, differs_px)
+        iou = iou_of(total, area_px, cost_px)
         pixels = float(total), float(cost.frontal_px_at(result)), float(area_px), float(cost_px)
-        prior = float(ratings[1]) - float(cost_px) / max(total, 1)
+        prior = float(ratings[0]) - float(cost_px) / max(total, 1)
         ahead = result.copy()
         ahead[YAW] -= cost.facing_rad
         evidence = doubt.evidence_of_search(
             pixels, prior, self._arm.spreads_m, (ahead, deviations), cost.body, self._age
         )
         evidence |= doubt.evidence_of_arms(
-            points.keypoints_m[1],
-            float(ratings[1]),
+            points.keypoints_m[0],
+            float(ratings[0]),
             (self.rated.keypoints_m, self.rated.ratings),
-            (points.keypoints_m[2:], ratings[2:]),
+            (points.keypoints_m[1:], ratings[1:]),
         )
         for number, cue in self._cues:
             there = cost.to_views[number](result[None])
@@ -359,21 +355,19 @@ class WholeBodyFilter:
         source = doubt.Source.POINTS if self._cues else self._outline
         is_back = is_back or cost.facing_rad != 0.0
         evidence["back"] = np.full(6, float(is_back))
-        vetoes = not is_trackable(cost, fitted), is_back
+        vetoes = not is_trackable(cost, result), is_back
         judged = self._doubt.judge(evidence, source, are_hidden(cost, result), vetoes)
         self._result = result
         if profile.keeps_result:
-            self._survivors[-1] = fitted  # in place of the worst one
+            self._survivors[-1] = result  # in place of the worst one
         return Fit(
             posture=result[POSTURE],
             posture_stddev=deviations[POSTURE],
-            keypoints_m=points.keypoints_m[1],
+            keypoints_m=points.keypoints_m[0],
             cost_px=int(cost_px),
-            iou=iou_of(total, area_px, cost_px),
+            iou=iou,
             # Points that the result fits show that a silhouette which it does not fit is wrong.
-            is_poor=judged.is_poor or (fit_iou < self._lost_iou and not self._cues),
-            seen=fitted,
-            seen_iou=fit_iou,
+            is_poor=judged.is_poor or (iou < self._lost_iou and not self._cues),
             offset_m=result[PLACE],
             offset_stddev_m=deviations[PLACE],
             particles=Particles(*rated, mean, profile.spread),
@@ -426,15 +420,6 @@ class WholeBodyFilter:
         self._correction = _KEPT * before + (1.0 - _KEPT) * (refined - state)
         smooth: FloatArray = np.clip(state + self._correction, *cost.limits.T)
         return smooth
-
-    def _corrected(self, frames: Sequence[Frame], fitted: FloatArray) -> FloatArray:
-        """Return the state (14,) that the corrector makes of ``fitted``, within the limits."""
-        if self._corrector is None:
-            return fitted
-        corrected = np.array(self._corrector(frames, fitted.copy()), np.float64)
-        if corrected.shape != fitted.shape:
-            raise ValueError(f"the corrector returned the shape {corrected.shape}; expected (14,)")
-        return np.clip(corrected, *self._cost.limits.T)
 
     def ious(self) -> list[float | None]:
         """See :class:`~.pose_filter.PoseFilter`."""

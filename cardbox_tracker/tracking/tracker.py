@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from functools import partial
 from itertools import zip_longest
 from types import MappingProxyType
 
@@ -21,7 +20,6 @@ from cardbox_tracker.person.kinematics import clavicles
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.posture import (
     LEFT_ARM,
-    N_STATE,
     PITCH,
     RIGHT_ARM,
     TORSO_Y,
@@ -34,7 +32,6 @@ from cardbox_tracker.search.cycles import Cycles
 from cardbox_tracker.search.doubt import doubted
 from cardbox_tracker.search.particles import Particles, likely_postures
 from cardbox_tracker.search.pose_filter import (
-    Corrector,
     MakeFilter,
     PoseFilter,
     Presence,
@@ -96,7 +93,6 @@ class Tracker:
         silhouette: SilhouetteTerm | None = None,
         make_filter: MakeFilter | None = None,
         others: Sequence[OtherCamera] = (),
-        corrector: Corrector | None = None,
         look: Look | None = None,
     ) -> None:
         """Set up for ``body``; the camera, of the silhouettes' size, gets the pitch of the model.
@@ -106,21 +102,19 @@ class Tracker:
         camera's pitch is not known to 10 degrees, estimates are at best ``uncertain``. Settings are
         the paper's by default, and noise is seeded with 0. ``silhouette`` and ``make_filter``
         replace the compiled term and the filter of the settings. ``look`` finds the points of hands
-        in images of the first camera. ``corrector`` changes the fitted state of each frame before
-        it becomes the result; it needs the filter ``whole_body``, as ``others``, the further
-        cameras, do.
+        in images of the first camera. ``others``, the further cameras, need the filter
+        ``whole_body``.
 
         Raises CameraError if the person was not measured in front of one of ``others``, and
-        ValueError if the filter does not support what is given.
+        ValueError if the filter has one camera only.
         """
         self.camera = camera.with_pitch(body.camera_pose.pitch_rad)
         self.config = config or TrackerConfig()
         self._rng = rng or np.random.default_rng(0)
-        self._make_filter, self._corrector, self._look = make_filter, corrector, look
+        self._make_filter, self._look = make_filter, look
         self._others = tuple(others)
-        if (others or corrector) and (make_filter or not self.config.has_several_views):
-            what = "several cameras need" if others else "a corrector needs"
-            raise ValueError(f"{what} the filter whole_body: the preset default")
+        if others and (make_filter or not self.config.has_several_views):
+            raise ValueError("several cameras need the filter whole_body: the preset default")
         self._place = PlaceWatch(body, self.camera)
         self.agreement: CameraAgreement | None = None
         self.faults = CameraFaults(1 + len(self._others))
@@ -159,8 +153,6 @@ class Tracker:
     def reset(self) -> None:
         """Forget the posture; the next frame is tracked from the front reference posture."""
         make_filter = self._make_filter or FILTERS[self.config.filter]
-        if self._corrector is not None:
-            make_filter = partial(WholeBodyFilter, corrector=self._corrector)
         for camera in self.cameras:
             camera.reset(self.config)
         self._identities = [Identity() for _ in self.cameras]
@@ -178,8 +170,6 @@ class Tracker:
         self._particles: Particles | None = None
         # State (14,) of the previous frame for the terms.
         self._before: FloatArray | None = None
-        # IoU of the last result before any correction.
-        self._seen_iou = 0.0
 
     def configure(self, config: TrackerConfig) -> bool:
         """Use other settings from the next frame on; return whether tracking starts again."""
@@ -470,8 +460,7 @@ class Tracker:
                 self._before = None
                 self._filter.forget()
             return Estimate(LOST)
-        self._before, self._seen_iou = np.zeros(N_STATE), fit.seen_iou
-        self._before[: len(fit.seen)] = fit.seen
+        self._before = np.append(fit.posture, np.zeros(2) if fit.offset_m is None else fit.offset_m)
         self._poor_frames = self._poor_frames + 1 if fit.is_poor else 0
         if self._poor_frames >= self.config.lost_frames:
             if self.config.relocalize:
