@@ -41,17 +41,6 @@ class InitializationConfig(Settings):
     max_rounds: int = setting(
         100, "largest number of rounds of an estimation step", limits=(1, 10000)
     )
-    sigma_alpha_m: float = setting(
-        0.05, "initial noise of the sizes (paper)", unit="m", limits=(1e-4, 1.0)
-    )
-    accuracy_m: float = setting(
-        0.002, "noise of the sizes at which a step ends", unit="m", limits=(0.0, 1.0)
-    )
-    prior: float = setting(
-        0.003,
-        "cost of one standard deviation of a size, as a fraction of the silhouette's pixels",
-        limits=(0.0, 1.0),
-    )
     min_iou: float = setting(
         0.6,
         "least mean fit (IoU) of the references; a measurement with less is refused",

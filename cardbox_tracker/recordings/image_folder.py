@@ -16,9 +16,8 @@ from cardbox_tracker.camera.encodings import MOST_PIXELS, decode_compressed
 from cardbox_tracker.camera.levels import Levels
 from cardbox_tracker.common.errors import BagError, EncodingError
 from cardbox_tracker.common.files import UnreadableFileError, read_regular
-from cardbox_tracker.recordings.film import Film
 from cardbox_tracker.recordings.given_camera import GivenCamera
-from cardbox_tracker.recordings.image_recording import RecordedImage
+from cardbox_tracker.recordings.image_recording import Film, RecordedImage
 
 SUFFIXES = (".jpg", ".jpeg", ".png")
 """Endings of the images, in small or capital letters."""

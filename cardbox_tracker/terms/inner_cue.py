@@ -11,7 +11,7 @@ person's parts (``BodyModel.appearance``), and the term uses them in five steps:
    limbs are preferred.
 4. A hand gains less where the other forearm covers it, and nothing behind the torso.
 5. Whether the forearms of a person without reference postures are bare is learned while tracking
-   (:mod:`.inner_cue_sleeves`).
+   (:class:`Sleeves`).
 
 The gain is subtracted from the cost. The term is zero without an image, without a previous posture,
 and for a person with unknown colours.
@@ -298,7 +298,7 @@ class InnerCueTerm:
 def chest_levels(image: Image, silhouette: Silhouette, zones: FloatArray) -> FloatArray | None:
     """Return the median (channels,) over the chest, below the head; None if it is not visible.
 
-    The image is (H, W, channels), ``zones`` (6,) are those of :func:`~.inner_cue_arms.zones_of`.
+    The image is (H, W, channels), ``zones`` (6,) are those of :func:`zones_of`.
     """
     u, v, half_width, half_height, hips, _ = zones.tolist()
     top, bottom = max(int(v + 1.6 * half_height), 0), int(hips - 0.1 * (hips - v))
