@@ -8,7 +8,7 @@ number to ``METRICS``.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Any, NamedTuple
@@ -252,18 +252,17 @@ def posture_from(joints: JointValues) -> FloatArray:
 
 def place_from(joints: JointValues) -> FloatArray | None:
     """Return ``torso_x`` and ``torso_z`` (2,) from named joints; None if one is missing."""
-    by_name = positions_of(joints)
-    if not by_name.keys() >= set(PLACE_NAMES):
-        return None
-    return np.array([by_name[name] for name in PLACE_NAMES])
+    return _all_of(joints, PLACE_NAMES)
 
 
 def neck_from(joints: JointValues) -> FloatArray | None:
     """Return ``neck_yaw`` and ``neck_pitch`` (2,) from named joints; None if one is missing."""
+    return _all_of(joints, NECK_NAMES)
+
+
+def _all_of(joints: JointValues, names: Sequence[str]) -> FloatArray | None:
     by_name = positions_of(joints)
-    if not by_name.keys() >= set(NECK_NAMES):
-        return None
-    return np.array([by_name[name] for name in NECK_NAMES])
+    return np.array([by_name[name] for name in names]) if by_name.keys() >= set(names) else None
 
 
 def wrists_from(joints: JointValues) -> FloatArray:

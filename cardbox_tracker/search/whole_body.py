@@ -10,7 +10,7 @@ Proposals are in :mod:`.torso_proposals`, :mod:`.arm_search` and :mod:`.joint_mo
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -40,7 +40,7 @@ from cardbox_tracker.search.particles import Particles
 from cardbox_tracker.search.pose_filter import Fit, Presence
 from cardbox_tracker.search.presence import PersonPresence
 from cardbox_tracker.search.rated_states import RatedStates
-from cardbox_tracker.search.refiner import Cue, Prior, Refiner
+from cardbox_tracker.search.refiner import Prior, Refiner
 from cardbox_tracker.search.visibility import are_hidden, is_trackable
 from cardbox_tracker.search.whole_body_config import SearchProfile
 from cardbox_tracker.terms.multi_view import MultiViewCost
@@ -72,22 +72,13 @@ _ONE_MIRRORED = [1, 2, 3, 4, 8, 12]
 _KEPT = 0.6
 
 
-@dataclass
-class Search:
-    """The search of one frame."""
+class Search(NamedTuple):
+    """What the stages of one frame's search share beside the filter itself."""
 
-    cost: MultiViewCost  #: rates states by the cameras that show the person
     profile: SearchProfile  #: numbers of the search
-    survivors: FloatArray  #: states (M, 14) of the last frame, the best first
     before: FloatArray  #: state (14,) of the last frame
-    rated: RatedStates  #: rated states, to which each stage adds
     location: Location  #: the person's place by the silhouettes
-    reference: FloatArray  #: state (14,) of the front reference posture
     draws: Draws  #: random numbers
-    age: int  #: frames since the search began
-    is_new: bool  #: whether the person is new in this frame
-    is_lost: bool  #: whether the person was lost
-    cues: list[Cue]  #: observations that tell where joints are, by camera
 
 
 class WholeBodyFilter:
@@ -212,35 +203,22 @@ class WholeBodyFilter:
         shows_legs = any(cue.shows_legs for _, cue in self._cues)
         cost.expect(*expected, bool(self._cues), shows_legs)
         self.rated = RatedStates(cost)
-        search = Search(
-            cost,
-            profile,
-            self._survivors,
-            before,
-            self.rated,
-            location,
-            self._reference,
-            Draws(self._rng, profile),
-            self._age,
-            self._is_new,
-            self._is_lost,
-            self._cues,
-        )
+        search = Search(profile, before, location, Draws(self._rng, profile))
         for stage in STAGES:
             stage(self, search)
         self._survivors = self.rated.different(profile.survivors, profile.alike, profile.apart_m)
 
     def torsos(self, search: Search) -> None:
         """Rate survivors and new torsos with arms; of a new person, also arms of upright ones."""
-        profile, cost, before = search.profile, search.cost, search.before
+        profile, cost, before = search.profile, self._cost, search.before
         location = search.location
-        is_settled = not search.is_new and search.age > _SETTLED_FRAMES
-        fresh = search.reference.copy()
+        is_settled = not self._is_new and self._age > _SETTLED_FRAMES
+        fresh = self._reference.copy()
         fresh[TORSO_X] = before[TORSO_X] if location.x_m is None else location.x_m
         fresh_x_m = location.x_stddev_m or (_SETTLED_X_M if is_settled else _YOUNG_X_M)
         upright = profile.fresh_torsos if is_settled else profile.torso_explorers
         torsos = torso_proposals.propose_torsos(
-            search.survivors,
+            self._survivors,
             (_of_torso(profile.noise()), cost.limits, _lever_m(cost)),
             location.step_m,
             profile.torso_explorers,
@@ -249,47 +227,47 @@ class WholeBodyFilter:
         )
         ratings = cost.torsos(torsos, before)
         pool = torso_proposals.pool_of(
-            search.survivors, torsos, ratings, profile.best_torsos, before, cost.body, ARM_LIMITS
+            self._survivors, torsos, ratings, profile.best_torsos, before, cost.body, ARM_LIMITS
         )
         # Upright torsos were rated with the arms of the last frame, but keep their hanging arms.
         standing = torsos[len(torsos) - upright :]
         more = [standing, self.approach.nearer_and_farther(before, cost)]
-        if search.cues:
-            turned, hanging = before.copy(), search.reference.copy()
+        if self._cues:
+            turned, hanging = before.copy(), self._reference.copy()
             turned[YAW] = 2.0 * cost.facing_rad - turned[YAW]
             hanging[[TORSO_X, TORSO_Y]] = before[[TORSO_X, TORSO_Y]]
-            begin = [search.survivors[0], search.survivors[-1], turned, hanging]
+            begin = [self._survivors[0], self._survivors[-1], turned, hanging]
             more.append(self._located_by_cues(np.array(begin)))
-        search.rated.add(np.concatenate([pool, *more]))
-        if (search.is_new or search.is_lost) and len(standing):
+        self.rated.add(np.concatenate([pool, *more]))
+        if (self._is_new or self._is_lost) and len(standing):
             # Its own arms make a wrong torso better than an upright one with hanging arms.
-            rated = search.rated.ratings[len(pool) : len(pool) + upright]
-            best = search.rated.best(profile.survivors)
+            rated = self.rated.ratings[len(pool) : len(pool) + upright]
+            best = self.rated.best(profile.survivors)
             first = standing[np.argmin(rated)]
             self._add_arms(search, np.concatenate([first[None], best]), Draws(self._rng, profile))
 
     def arms(self, search: Search) -> None:
         """Rate arms beside the best torso, and pairs of the best ones."""
-        self._add_arms(search, search.rated.best(search.profile.survivors), search.draws)
+        self._add_arms(search, self.rated.best(search.profile.survivors), search.draws)
 
     def _add_arms(self, search: Search, pool: FloatArray, draws: Draws) -> None:
         """Search arms for the torso of the first state of a pool (M, 14), and rate their pairs."""
-        search.cost.fix_torso(pool[0])
+        self._cost.fix_torso(pool[0])
         left, right = (self._arm(pool, arm, search.profile, draws) for arm in (0, 1))
         most = search.profile.paired_arms
-        search.rated.add_pairs(joint_moves.combine(pool[0], *left, *right, most))
+        self.rated.add_pairs(joint_moves.combine(pool[0], *left, *right, most))
 
     def fitted(self, search: Search) -> None:
         """Rate states that are fitted to the cues, from the best different ones."""
-        rated = search.rated
+        rated = self.rated
         if search.profile.fits_outlines:
             chosen = rated.different(*_OUTLINED)
             near = Prior(chosen, _NEAR)
             rated.add(self.refine(chosen, self._cost.outlines(chosen[0]), near, _OUTLINED_STEPS)[0])
-        if search.cues:
+        if self._cues:
             chosen = rated.different(*_FITTED)
             # A point gives a line of sight, on which a bone has two directions.
-            mirrored = mirrored_states(chosen[0], search.cost.body, ARM_LIMITS)
+            mirrored = mirrored_states(chosen[0], self._cost.body, ARM_LIMITS)
             rated.add(self._located_by_cues(np.concatenate([chosen, mirrored[1:]])))
 
     def _located_by_cues(self, states: FloatArray) -> FloatArray:
@@ -299,7 +277,7 @@ class WholeBodyFilter:
 
     def together(self, search: Search) -> None:
         """Move all joints of the best states together, and by the differences of others."""
-        profile, rated = search.profile, search.rated
+        profile, rated = search.profile, self.rated
         sigma = profile.together_noise * profile.noise()
         sources = rated.different(profile.survivors, profile.alike, profile.apart_m)
         for number in range(profile.rounds):
@@ -307,7 +285,7 @@ class WholeBodyFilter:
                 sources = rated.best(profile.survivors)
             moved = joint_moves.move_all(
                 sources,
-                (sigma, search.cost.limits, _lever_m(search.cost)),
+                (sigma, self._cost.limits, _lever_m(self._cost)),
                 int(profile.differing * profile.together),
                 profile.difference_scale,
                 search.draws.for_states(profile.together),
