@@ -21,7 +21,7 @@ from cardbox_tracker.person.kinematics import (
 )
 from cardbox_tracker.person.parts import FOREARM, HEIGHT, UPPER_ARM
 from cardbox_tracker.person.posture import ARM_ANGLES
-from cardbox_tracker.search.joint_moves import NumbersTuple
+from cardbox_tracker.search.joint_moves import Numbers
 from cardbox_tracker.search.mirroring import mirror
 from cardbox_tracker.search.state_choice import least_of
 from cardbox_tracker.search.uncovered import farthest_uncovered
@@ -42,19 +42,10 @@ _REACH, _FEWEST_TIPS = 1.1, 3
 _INWARDS_PX = 3.0
 
 
-class ArmPlan(NamedTuple):
-    """Kinds and numbers of proposals."""
-
-    sources: int  #: number of states of the pool whose arms are varied
-    sigma_rad: float  #: noise of varied arms, rad
-    mirrors: int  #: number of arms mirrored in depth
-    tips: int  #: number of arms that reach for uncovered foreground
-    banked: int  #: number of arms from ``bank``
-    bank: Floats  #: samples of the prior, (K, 4), rad
-    limits: Floats  #: lowest and highest angles, (4, 2), rad
-
-
-ArmPlanTuple = tuple[int, float, int, int, int, Floats, Floats]
+ArmPlan = tuple[int, float, int, int, int, Floats, Floats]
+"""Numbers of states whose arms are varied, and noise of these, rad; numbers of arms mirrored in
+depth, of those that reach for uncovered foreground, and of those from a bank; the bank's samples of
+the prior, (K, 4), rad; lowest and highest angles, (4, 2), rad."""
 
 
 class Ray(NamedTuple):
@@ -135,19 +126,18 @@ def _reach(
 def propose_arms(
     pool: Floats,
     arm: int,
-    plan: ArmPlanTuple,
+    plan: ArmPlan,
     uncovered: Planes,
     size: tuple[int, int],
     body: BodyTuple,
-    numbers: NumbersTuple,
+    numbers: Numbers,
 ) -> Floats:
     """Return arms (N, 4), 0 left or 1 right, for the torso of the first state of ``pool`` (M, 14).
 
     The first arm is that of the first state; then follow varied arms of the best states. The last
     arms are, from the end: arms of the first four states mirrored in depth; arms that reach for the
-    end of the uncovered foreground, if there is any; arms from the bank. ``plan``, ``body`` and
-    ``numbers``, (N, 4) and (N, 3), are fields of :class:`ArmPlan`,
-    :class:`~cardbox_tracker.terms.kernel_arguments.Body` and :class:`~.joint_moves.Numbers`;
+    end of the uncovered foreground, if there is any; arms from the bank. ``numbers`` are (N, 4) and
+    (N, 3), ``body`` the fields of :class:`~cardbox_tracker.terms.kernel_arguments.Body`;
     ``uncovered`` are planes outside of trunk and other arm, (2, words, rows or more), and ``size``
     the rows that count, and the width, px.
     """

@@ -168,7 +168,7 @@ class ArmGains:
         return gains
 
     @cached_property
-    def arguments(self) -> tuple[kernels.MapsTuple, kernels.ForearmTuple, FloatArray]:
+    def arguments(self) -> tuple[kernels.Maps, kernels.Forearm, FloatArray]:
         """The same for the kernels."""
         return (self.maps, *self.corner), (*self.forearm_m, self.px_per_m), self.weights
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from math import sqrt
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -36,26 +36,13 @@ _BEHIND_M, _NEAREST_M = 0.03, 0.1
 _TORSO_ZONE, _HEAD_ZONE, _LOWER_ZONE = 0, 1, 2
 
 
-class Maps(NamedTuple):
-    """Log-likelihood ratios (2, h, w), nats, of hand and forearm, from column u0 and row v0 on."""
+Maps = tuple[Any, int, int]
+"""Log-likelihood ratios (2, h, w), nats, of hand and forearm, and their first column and row."""
 
-    ratios: Any
-    u0: int
-    v0: int
+Forearm = tuple[float, float, float]
+"""Length including the fist and width of a forearm, m; scale at the expected place of the person,
+px/m, which areas use, so that a nearer state has no advantage."""
 
-
-class Forearm(NamedTuple):
-    """A forearm and its scale in the image."""
-
-    length_m: float  #: including the fist
-    width_m: float  #: width of the forearm
-    #: scale at the expected place of the person; areas use it, so that a nearer state has no
-    #: advantage.
-    px_per_m: float
-
-
-MapsTuple = tuple[Any, int, int]
-ForearmTuple = tuple[float, float, float]
 Pair = tuple[float, float]
 
 
@@ -179,8 +166,8 @@ def arm_gains(
     points: Any,
     hidden: Any,
     others: Any,
-    maps: MapsTuple,
-    forearm: ForearmTuple,
+    maps: Maps,
+    forearm: Forearm,
     weights: Any,
     gains: Any,
 ) -> None:
@@ -226,8 +213,8 @@ def costs_of_arms(
     counted: Drawn,
     body: BodyTuple,
     before: Any,
-    maps: MapsTuple,
-    forearm: ForearmTuple,
+    maps: Maps,
+    forearm: Forearm,
     weights: Any,
     costs: Any,
 ) -> None:

@@ -72,8 +72,7 @@ class MultiViewCost:
         self.to_views: list[ToView] = [lambda states: states, *(view.states for view in views)]
         self.choose([0])
         first = self.costs[0]
-        self.parts, self.girdle = first.parts, first.girdle
-        self.place, self.view, self.body = first.place, first.view, first.body
+        self.parts, self.place, self.body = first.parts, first.place, first.body
         self.x_factor, self.yaw_unit_rad = 1.0, np.radians(config.yaw_deg)
         self._z_units_m = config.z_step_m, config.z_home_m
         self.anchor = first.anchor
@@ -167,11 +166,6 @@ class MultiViewCost:
         """Foreground pixels that count, summed over the cameras that show the person."""
         return sum(self.costs[number].silhouette_px for number in self.seeing)
 
-    @property
-    def frontal_px(self) -> int:
-        """Pixels of the model in the front reference posture, summed over the same cameras."""
-        return sum(self.costs[number].frontal_px for number in self.seeing)
-
     def shares(self, state: FloatArray) -> list[tuple[float, float]]:
         """Return each camera's silhouette as shares of the frontal model's area.
 
@@ -185,7 +179,7 @@ class MultiViewCost:
         return found
 
     def frontal_px_at(self, state: FloatArray) -> int:
-        """Return :attr:`frontal_px` for the distance of ``state`` (14,)."""
+        """Return the pixels of the frontal model at the place of a state (14,), of all cameras."""
         scales = self._scales(state)
         areas_px = (scales[number] * self.costs[number].frontal_px for number in self.seeing)
         return max(round(sum(areas_px)), 1)
@@ -255,10 +249,6 @@ class MultiViewCost:
             rated = cost.bodies(self.to_views[number](state)[None])
             found[number] = iou_of(cost.silhouette_px, rated.areas_px[0], rated.costs_px[0])
         return found
-
-    def keypoints(self, state: FloatArray) -> FloatArray:
-        """Return the keypoints (6, 3) of a state (14,), metres in the first optical frame."""
-        return self.costs[0].keypoints(state)
 
     def _divide(self, ratings: FloatArray) -> None:
         """Divide the sum over the cameras by their number."""

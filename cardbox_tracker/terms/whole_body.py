@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from cardbox_tracker.camera.camera import Camera
 from cardbox_tracker.common.array_checks import check_array
 from cardbox_tracker.person.kinematics import pose
-from cardbox_tracker.person.model import MEASURED, BodyModel
+from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.posture import (
     TORSO_X,
     TORSO_Y,
@@ -88,7 +88,6 @@ class WholeBodyCost:
         size: width and height of the image, px.
         limits: lowest and highest value of each value of a state, (14, 2).
         pitch_rad: pitch of the camera, rad, positive downwards.
-        is_measured: whether the body was measured, not estimated from proportions.
         frontal_px: pixels of the model in the front reference posture.
         counted: number of rows of the present silhouette that count, from the top, and width, px.
         silhouette_px: foreground pixels that count in the present silhouette.
@@ -106,7 +105,6 @@ class WholeBodyCost:
         self.size = camera.width, camera.height
         self.limits = state_limits(body.placement.distance_m)
         self.pitch_rad = camera.pitch_rad
-        self.is_measured = body.source == MEASURED
         self._rules = priors.rules_of(config)
         self._waist_m = float(body.size("waist_width"))
         self._gaussians = np.ascontiguousarray(load_gmm().T)
