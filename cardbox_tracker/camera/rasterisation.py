@@ -3,8 +3,8 @@
 A pixel is covered where its centre lies inside the projected patch. To give the same result on
 every computer, coordinates are integers: corners are rounded to a grid of 1/256 px, and an edge is
 a line that starts at the first row v0 of the image below its upper end (x0, y0), and moves by the
-same multiple of 1/65536 px from row to row down to its lower end (x1,
-y1). With s = (x1 - x0) / (y1 - y0), row v of y0 <= v < y1 is crossed at
+same multiple of 1/65536 px from row to row down to its lower end (x1, y1). With
+s = (x1 - x0) / (y1 - y0), row v of y0 <= v < y1 is crossed at
 
     X(v) = round(65536 (x0 + (v0 - y0) s)) + (v - v0) round(65536 s)
 

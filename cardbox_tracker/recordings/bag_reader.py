@@ -21,11 +21,11 @@ from cardbox_tracker.camera.calibration_watch import CalibrationWatch
 from cardbox_tracker.camera.camera import Calibration
 from cardbox_tracker.camera.camera_info import is_other_lens
 from cardbox_tracker.camera.encodings import (
+    Levels,
     SentImage,
     decode_as_sent,
     decode_compressed,
 )
-from cardbox_tracker.camera.levels import Levels
 from cardbox_tracker.camera.stamps import RecordedStamps, StampOrder
 from cardbox_tracker.common.errors import BagError, CameraError, EncodingError, cut
 from cardbox_tracker.recordings.bag_files import check_parts, paths_to_open

@@ -12,8 +12,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from cardbox_tracker.camera.encodings import MOST_PIXELS, decode_compressed
-from cardbox_tracker.camera.levels import Levels
+from cardbox_tracker.camera.encodings import MOST_PIXELS, Levels, decode_compressed
 from cardbox_tracker.common.errors import BagError, EncodingError
 from cardbox_tracker.common.files import UnreadableFileError, read_regular
 from cardbox_tracker.recordings.given_camera import GivenCamera

@@ -15,7 +15,7 @@ from cardbox_tracker.search import doubt
 from cardbox_tracker.search.config import TrackerConfig
 from cardbox_tracker.search.hierarchy import HierarchicalFilter, SumOfTerms
 from cardbox_tracker.search.pose_filter import Fit, Presence
-from cardbox_tracker.terms.drawn_body import body_tuple
+from cardbox_tracker.terms.kernel_arguments import body_tuple
 from cardbox_tracker.terms.silhouette import SilhouetteTerm
 from cardbox_tracker.terms.term import Frame, Silhouette, Term
 

@@ -13,8 +13,13 @@ from numpy.typing import NDArray
 
 from cardbox_tracker.camera.camera import Camera
 from cardbox_tracker.common.compiling import copied_kernel
-from cardbox_tracker.person.kinematics import Place
+from cardbox_tracker.person.kinematics import Place, girdle_of
 from cardbox_tracker.person.model import BodyModel
+from cardbox_tracker.person.parts import BOTTOM, FOREARM, HEAD, HEIGHT, NECK, WAIST, shape_of
+from cardbox_tracker.terms.whole_body_config import WholeBodyCostConfig
+
+# Overlap of neck and head, as a fraction of the head's height: an outline has no gap below the jaw.
+_NECK_INTO_HEAD = 0.25
 
 Floats = NDArray[np.float64]
 Whole = NDArray[np.int32]
@@ -84,3 +89,24 @@ def intrinsics_of(camera: Camera) -> IntrinsicsTuple:
 def place_of(body: BodyModel) -> PlaceTuple:
     """Return the fields of :class:`Place` of ``body``."""
     return float(body.placement.distance_m), float(body.placement.hip_height_m)
+
+
+def body_tuple(
+    body: BodyModel, camera: Camera, config: WholeBodyCostConfig | None = None
+) -> BodyTuple:
+    """Return the fields of :class:`Body` of a body before a camera."""
+    config = config or WholeBodyCostConfig()
+    parts, _ = shape_of(body.sizes, config.neck_to_head)
+    drawn = _drawn_parts(parts, config)
+    return parts, drawn, girdle_of(body), place_of(body), intrinsics_of(camera)
+
+
+def _drawn_parts(parts: Floats, config: WholeBodyCostConfig) -> Floats:
+    """Return the parts (6, 6) whose outlines are drawn."""
+    drawn = parts.copy()
+    drawn[WAIST, BOTTOM] -= config.waist_extension_m
+    drawn[WAIST, HEIGHT] += config.waist_extension_m
+    into_m = _NECK_INTO_HEAD * parts[HEAD, HEIGHT]
+    drawn[NECK, HEIGHT] += into_m
+    drawn[FOREARM, HEIGHT] += config.fingers_m
+    return drawn

@@ -37,11 +37,9 @@ from cardbox_tracker.terms.bit_planes import (
     new_planes,
 )
 from cardbox_tracker.terms.body_outline import BODY_PATCHES, corners_of_body
-from cardbox_tracker.terms.drawn_body import body_tuple
-from cardbox_tracker.terms.kernel_arguments import Drawn, intrinsics_of, place_of
+from cardbox_tracker.terms.kernel_arguments import Drawn, body_tuple, intrinsics_of, place_of
 from cardbox_tracker.terms.outline import Outline
 from cardbox_tracker.terms.pose_prior import load_gmm
-from cardbox_tracker.terms.rating_arguments import ObservedTuple, Points
 from cardbox_tracker.terms.term import (
     ARM,
     ARMS,
@@ -52,6 +50,7 @@ from cardbox_tracker.terms.term import (
     TermObservation,
 )
 from cardbox_tracker.terms.whole_body_config import WholeBodyCostConfig
+from cardbox_tracker.terms.whole_body_kernels import ObservedTuple, Points
 
 SIDES = tuple(ARMS)
 _NO_WORDS = np.zeros((1, 0), np.uint64)
@@ -68,7 +67,7 @@ class Bodies(NamedTuple):
 
 
 class Ratings(NamedTuple):
-    """Ratings (N,) and the fields of :class:`~.rating_arguments.Points` of N states."""
+    """Ratings (N,) and the fields of :class:`~.whole_body_kernels.Points` of N states."""
 
     ratings: FloatArray
     joints_m: FloatArray

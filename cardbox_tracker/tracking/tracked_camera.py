@@ -12,7 +12,7 @@ from cardbox_tracker.camera.view import OtherCamera, View
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.sizes import FloatArray
 from cardbox_tracker.search.config import TrackerConfig
-from cardbox_tracker.terms.drawn_body import body_tuple
+from cardbox_tracker.terms.kernel_arguments import body_tuple
 from cardbox_tracker.terms.silhouette import rows_above_hips
 from cardbox_tracker.terms.term import USUAL_INTERVAL_S, Frame, Posed, Silhouette, Term
 from cardbox_tracker.tracking.depth_agreement import DepthAgreement

@@ -18,7 +18,6 @@ from cardbox_tracker.person.kinematics import pose
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.posture import reference_posture
 from cardbox_tracker.search.config import default_preset
-from cardbox_tracker.terms.drawn_body import body_tuple
 from cardbox_tracker.terms.inner_cue import (
     ArmGains,
     InnerCue,
@@ -29,6 +28,7 @@ from cardbox_tracker.terms.inner_cue import (
     ratios_of,
     zones_of,
 )
+from cardbox_tracker.terms.kernel_arguments import body_tuple
 from cardbox_tracker.terms.term import (
     ARM,
     ARMS,

@@ -23,7 +23,7 @@ from cardbox_tracker.person.cardbox import cardbox_patches
 from cardbox_tracker.person.kinematics import pose
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.posture import reference_posture
-from cardbox_tracker.terms.drawn_body import body_tuple
+from cardbox_tracker.terms.kernel_arguments import body_tuple
 from cardbox_tracker.terms.term import ARM, TRUNK, WHOLE, Frame, Posed
 from cardbox_tracker.tracking.observation import Observation
 from cardbox_tracker.tracking.tracked_camera import TrackedCamera
