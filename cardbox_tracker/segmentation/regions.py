@@ -30,18 +30,6 @@ LEAST_AREA, MOST_HOLE = 0.004, 0.0008
 image."""
 
 
-def remove_small_regions(image: ImageArray, colour: int, area_px: float) -> None:
-    """Invert regions of ``colour``, 0 or 255, with fewer than ``area_px`` pixels, in place.
-
-    Raises ValueError if the image (H, W) is read-only, or of another type or layout.
-    """
-    check_array("image", image, (ANY, ANY), is_written=True)
-    height, width = image.shape
-    words = image.view(np.uint64) if width % 8 == 0 else _NO_WORDS
-    runs = np.empty((4, height * (width // 2 + 1)), np.int32)
-    _recolour(image, words, np.uint8(colour), float(area_px), runs)
-
-
 class Regions(NamedTuple):
     """Connected regions of a binary image as runs of pixels, row by row."""
 
@@ -219,6 +207,7 @@ def _clean(
 
 @kernel
 def _recolour(image: Any, words: Any, colour: Any, area_px: float, runs: Any) -> None:
+    """Invert regions of ``colour``, 0 or 255, with fewer than ``area_px`` pixels, in place."""
     starts, ends, parents, areas = runs[0], runs[1], runs[2], runs[3]
     height = image.shape[0]
     other = np.uint8(255) - colour
