@@ -25,7 +25,7 @@ from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.posture import N_STATE
 from cardbox_tracker.search.config import PRESETS
 from cardbox_tracker.terms import joint_points_kernels as kernels
-from cardbox_tracker.terms.drawn_body import body_tuple
+from cardbox_tracker.terms.kernel_arguments import body_tuple
 from cardbox_tracker.terms.whole_body_config import WholeBodyCostConfig
 from cardbox_tracker.tracking.precompile import compile_all
 

@@ -33,15 +33,10 @@ _ALIASES = MappingProxyType(
 
 
 def load_calibration(path: str | os.PathLike[str]) -> Calibration:
-    """Read a calibration of one camera.
+    """Read a calibration of one camera; raise CameraError if it cannot be read or lacks a key.
 
-    Args:
-        path: YAML file as camera_calibration writes it; YAML, JSON or XML of OpenCV's FileStorage;
-            camchain of Kalibr with one pinhole camera; or YAML of a CameraInfo, as 'ros2 topic
-            echo' prints it.
-
-    Raises:
-        CameraError: the file cannot be read or lacks a key; the text names the key.
+    The file is YAML of camera_calibration, YAML, JSON or XML of OpenCV's FileStorage, a camchain of
+    Kalibr with one pinhole camera, or YAML of a CameraInfo, as 'ros2 topic echo' prints it.
     """
     with foreign(path, CameraError, _EXPECTED):
         data = _parsed(read_small_text(path))

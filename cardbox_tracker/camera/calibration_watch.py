@@ -32,13 +32,7 @@ class CalibrationWatch:
     """
 
     def __init__(self, topic: str, image_topic: str, roll_rad: float = 0.0) -> None:
-        """Watch the calibrations on ``topic``, which belong to the images on ``image_topic``.
-
-        Args:
-            topic: name of the topic.
-            image_topic: name of the images' topic.
-            roll_rad: roll of the camera, see :class:`.Calibration`.
-        """
+        """Watch the calibrations on ``topic``, which belong to the images on ``image_topic``."""
         self._roll_rad = roll_rad
         self.current: Calibration | None = None
         self.seen = False
@@ -53,8 +47,7 @@ class CalibrationWatch:
     def see(self, message: Any) -> bool:
         """Process a sensor_msgs/CameraInfo; return whether the calibration in use has changed.
 
-        Raises:
-            CameraError: the message is invalid and no valid one has arrived yet.
+        Raises CameraError if the message is invalid and no valid one has arrived yet.
         """
         self.seen = True
         try:

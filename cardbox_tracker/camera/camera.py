@@ -43,8 +43,8 @@ def roll_turn(roll_rad: float) -> FloatArray:
 def level_to_optical(pitch_rad: float, roll_rad: float = 0.0) -> FloatArray:
     """Return the rotation (3, 3) from the level reference frame into the optical frame.
 
-    Without ``roll_rad`` it is the frame of the images that are turned upright, else that of the
-    camera as it stands.
+    Without ``roll_rad`` it is the frame of images that are turned upright, else of the camera
+    itself.
     """
     # Level camera: x_optical = Y, y_optical = -Z, z_optical = -X of the reference frame.
     level = np.array([(0.0, 1.0, 0.0), (0.0, 0.0, -1.0), (-1.0, 0.0, 0.0)])
@@ -190,11 +190,7 @@ class Calibration:
 
     @classmethod
     def of_fov(cls, width: int, height: int, fov_deg: float) -> Calibration:
-        """Return an ideal lens with a field of view, degrees, across the width of the image.
-
-        Raises:
-            CameraError: the field of view is not between 0 and 180 degrees.
-        """
+        """Return an ideal lens with a field of view, 0 to 180 degrees, across the image's width."""
         if not 0.0 < fov_deg < 180.0:
             raise CameraError(
                 f"the field of view is {fov_deg:g} degrees; expected more than 0 and less than 180"
@@ -250,16 +246,9 @@ class Calibration:
         return round(self.roll_rad / (math.pi / 2)) % 4
 
     def check_shape(self, width: int, height: int, images: str, source: str) -> None:
-        """Check that images of ``width`` x ``height`` px have the calibration's aspect ratio.
+        """Raise CameraError unless images of ``width`` x ``height`` px have this aspect ratio.
 
-        Args:
-            width: width of the images, px.
-            height: height of the images, px.
-            images: name of the images, for the text.
-            source: where the calibration comes from, for the text.
-
-        Raises:
-            CameraError: the aspect ratios differ, so the calibration is not that of the images.
+        ``images`` and ``source`` name the images and the origin of the calibration in the text.
         """
         if min(self.width, self.height) > 0 and not self.has_shape(width, height):
             raise CameraError(
@@ -271,8 +260,7 @@ class Calibration:
     def camera(self, width: int, height: int, pitch_rad: float = 0.0) -> Camera:
         """Return the pinhole camera at the working resolution ``width`` x ``height``, px.
 
-        Raises:
-            CameraError: the camera is uncalibrated or its distortion model is unknown.
+        Raises CameraError if the camera is uncalibrated or its distortion model is unknown.
         """
         self._check()
         w, h, k = self.width, self.height, self.k
@@ -286,12 +274,9 @@ class Calibration:
         return full.scaled(width, height)
 
     def rectifier(self, width: int, height: int) -> Rectifier | None:
-        """Return a rectifier for images of ``width`` x ``height`` px; None if none is needed.
+        """Return a rectifier for level images of ``width`` x ``height`` px; None if none is needed.
 
-        The size is that of the level images, see :meth:`level_size`.
-
-        Raises:
-            CameraError: the camera is uncalibrated or its distortion model is unknown.
+        Raises CameraError as :meth:`camera` does.
         """
         self._check()
         turn = self.turn()
@@ -322,11 +307,7 @@ class Calibration:
         return turn * [(-1.0,), (1.0,), (1.0,)] if self.is_mirrored else turn
 
     def rectified(self, px: FloatArray, width: int, height: int) -> FloatArray:
-        """Return where pixels (N, 2) of the calibrated image lie in the working image, px.
-
-        Raises:
-            CameraError: the camera is uncalibrated or its distortion model is unknown.
-        """
+        """Return where pixels (N, 2) of the calibrated image lie in the working image, px."""
         camera, rays = self.camera(width, height), np.empty((len(px), 2))
         if not self.is_distorted:
             rays[:] = (px - self.k[:2, 2]) / self.k.diagonal()[:2]
@@ -379,9 +360,24 @@ class Rectifier:
         self._maps = (map_1, map_2)
 
     def __call__(self, image: NDArray[np.uint8]) -> NDArray[np.uint8]:
-        """Return ``image`` (H, W) or (H, W, 3) undistorted.
-
-        Pixels outside the lens's view repeat the border, so that they stay background.
-        """
+        """Return ``image`` (H, W) or (H, W, 3) undistorted; its border is repeated beyond it."""
         rectified = cv2.remap(image, *self._maps, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
         return np.asarray(rectified, dtype=np.uint8)
+
+
+def unrectified(calibration: Calibration, px: FloatArray, width: int, height: int) -> FloatArray:
+    """Return where pixels (N, 2) of a working image of that size lie in the calibrated image.
+
+    This is the inverse of :meth:`.Calibration.rectified`, and raises CameraError like that.
+    """
+    camera = calibration.camera(width, height)
+    rays = camera.rays(px)[:, :2] @ calibration.turn()[:2, :2]
+    k, lens = calibration.k, calibration.distortion
+    if not calibration.is_distorted:
+        return np.asarray(rays * k.diagonal()[:2] + k[:2, 2])
+    if calibration.distortion_model == "equidistant":
+        placed = cv2.fisheye.distortPoints(rays[:, None], k, lens[:4].reshape(4, 1))
+    else:
+        ahead, none = np.column_stack([rays, np.ones(len(rays))]), np.zeros(3)
+        placed, _ = cv2.projectPoints(ahead, none, none, k, lens)
+    return np.asarray(placed.reshape(-1, 2))

@@ -81,10 +81,7 @@ _MOST = 1e9
 
 
 def matrix_problem(k: NDArray[Any], width: int, height: int) -> str:
-    """Return the problem of a matrix K (3, 3) for images of a size in px; empty if there is none.
-
-    The text continues a sentence whose subject is the matrix, such as "is all zero".
-    """
+    """Return the problem of a matrix K (3, 3) for an image size, px, as "is all zero"; or ""."""
     values = np.asarray(k, dtype=np.float64)
     if not values.any():
         return "is all zero"
@@ -108,11 +105,7 @@ def matrix_problem(k: NDArray[Any], width: int, height: int) -> str:
 
 
 def whole_pixels(name: str, value: object) -> int:
-    """Return a camera's ``width`` or ``height``, px, as ``int``.
-
-    Raises:
-        CameraError: the value is no whole number.
-    """
+    """Return a camera's ``width`` or ``height``, px, as ``int``, or raise CameraError."""
     number = real_number(name, value)
     if not abs(number) < _MOST or number % 1 != 0:
         raise CameraError(
@@ -123,11 +116,7 @@ def whole_pixels(name: str, value: object) -> int:
 
 
 def real_number(name: str, value: object) -> float:
-    """Return one of a camera's other values as ``float``.
-
-    Raises:
-        CameraError: the value is no number, or too large for ``float``.
-    """
+    """Return one of a camera's other values as ``float``, or raise CameraError."""
     try:
         if isinstance(value, Real):
             return float(value)

@@ -15,11 +15,7 @@ _DEVICES, _NAMES = Path("/dev"), Path("/sys/class/video4linux")
 
 
 def open_device(device: str) -> cv2.VideoCapture:
-    """Open a V4L2 device such as ``/dev/video0`` or ``0``.
-
-    Raises:
-        CameraError: the device does not exist or cannot be opened.
-    """
+    """Open a V4L2 device such as ``/dev/video0`` or ``0``; raise CameraError if that fails."""
     path = Path(f"/dev/video{device}" if device.isdigit() else device)
     if not path.exists():
         found = ", ".join(sorted(str(other) for other in Path("/dev").glob("video*")))
@@ -37,11 +33,7 @@ def open_device(device: str) -> cv2.VideoCapture:
 
 
 def open_video(name: str) -> cv2.VideoCapture:
-    """Open a video file.
-
-    Raises:
-        CameraError: the file does not exist, or OpenCV cannot read it.
-    """
+    """Open a video file; raise CameraError if it does not exist or OpenCV cannot read it."""
     path = Path(name).expanduser()
     if not path.is_file():
         raise CameraError(f"there is no video {path}; set the parameter 'file' to one that exists")
@@ -55,11 +47,7 @@ def open_video(name: str) -> cv2.VideoCapture:
 
 
 def lock_exposure(capture: cv2.VideoCapture) -> dict[str, bool]:
-    """Set exposure and white balance to manual and keep their present values.
-
-    Returns:
-        Whether the device accepted this, by ``exposure`` and ``white balance``.
-    """
+    """Keep exposure and white balance as they are; return by name whether the device does."""
     exposure = capture.get(cv2.CAP_PROP_EXPOSURE)
     fixed = capture.set(cv2.CAP_PROP_AUTO_EXPOSURE, _V4L2_MANUAL)
     if fixed and exposure > 0:
@@ -69,12 +57,7 @@ def lock_exposure(capture: cv2.VideoCapture) -> dict[str, bool]:
 
 
 def describe_devices(devices: Path = _DEVICES, names: Path = _NAMES) -> str:
-    """Return a readable list of the cameras and their modes.
-
-    Args:
-        devices: folder of the devices ``video0``, ``video1``, ...
-        names: folder where the kernel describes them.
-    """
+    """Return a readable list of the cameras and their modes; ``names`` is the kernel's folder."""
     found = sorted(devices.glob("video*"), key=lambda path: (len(path.name), path.name))
     if not found:
         return f"no camera: there is no {devices}/video*; plug one in"
@@ -101,10 +84,7 @@ def _offer(path: Path) -> str:
 
 
 def describe_capture(capture: cv2.VideoCapture) -> str:
-    """Return the sizes and rates of an open device and which controls can be set to manual.
-
-    Exposure and white balance are automatic afterwards.
-    """
+    """Return sizes, rates and controls of an open device, whose controls are automatic then."""
     modes: dict[tuple[int, int], float] = {}
     for width, height in _SIZES:
         capture.set(cv2.CAP_PROP_FRAME_WIDTH, width)

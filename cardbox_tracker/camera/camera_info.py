@@ -25,10 +25,7 @@ _STEADY = 0.02
 def unusual(k: NDArray[np.float64], width: int, height: int) -> str:
     """Return what no usual camera has in a matrix K (3, 3) of full images; empty if all is usual.
 
-    Args:
-        k: intrinsic matrix before regions of interest and binning.
-        width: width of the images, px.
-        height: height of the images, px.
+    K, width and height, px, are those before regions of interest and binning.
     """
     focal, middle = k.diagonal()[:2], 2 * k[:2, 2] + 1
     size = np.array([width, height])
@@ -85,11 +82,8 @@ def calibration_from_info(message: Any, image_topic: str, info_topic: str) -> Ca
     """Return the calibration of the images that go with a sensor_msgs/CameraInfo.
 
     The matrix is adapted to the region of interest and to binning. R is not used, and P only if K
-    is all zero: the images are rectified then.
-
-    Raises:
-        CameraError: the camera is not calibrated, or K has impossible values; the text names both
-            topics.
+    is all zero: the images are rectified then. Raises CameraError, which names both topics, if K is
+    zero or impossible.
     """
     k, distortion = info_array(message, "k").reshape(3, 3), info_array(message, "d")
     if is_rectified_only(message):

@@ -35,9 +35,8 @@ _KINDS = {"16UC1": ("u2", 0.001), "mono16": ("u2", 0.001), "32FC1": ("f4", 1.0)}
 def decode_depth(sent: SentImage) -> DepthImage:
     """Return a depth image (H, W), metres along the optical axis; 0 where nothing was measured.
 
-    Raises:
-        EncodingError: the encoding is not that of a depth image, the bytes do not fit it or seem to
-            be of 32 bit a pixel where it has 16, or the image is too large.
+    Raises EncodingError if the encoding is not one of depth, the bytes do not fit it, or the image
+    is too large.
     """
     data, height, width, step, encoding, is_bigendian = sent
     if encoding not in _KINDS:
@@ -69,14 +68,9 @@ def decode_depth(sent: SentImage) -> DepthImage:
 def unpack_depth(data: Any, encoding: str) -> DepthImage:
     """Return the depth image (H, W), metres, in the bytes of a ``compressedDepth`` message.
 
-    32FC1 packs a depth of z metres as the whole number n = a / z + b; 0 is unknown.
-
-    Args:
-        data: the data of the message.
-        encoding: the ``format`` of the message, such as ``16UC1; compressedDepth png``.
-
-    Raises:
-        EncodingError: the message is no depth image, not packed as PNG, or too large.
+    32FC1 packs a depth of z metres as the whole number n = a / z + b; 0 is unknown. ``encoding`` is
+    the ``format`` of the message, such as ``16UC1; compressedDepth png``. Raises EncodingError if
+    it is no depth, no PNG, or too large.
     """
     kind, _, how = encoding.partition(";")
     raw = bytes(data)
@@ -101,16 +95,10 @@ def unpack_depth(data: Any, encoding: str) -> DepthImage:
 
 
 def depth_from_image(message: Any) -> DepthImage:
-    """Return the depth (H, W), metres, in a message of rclpy or of a recording.
+    """Return the depth (H, W), metres, in a sensor_msgs/Image or a packed CompressedImage.
 
-    If half of the known depths are beyond 100 m, their unit is not the metre.
-
-    Args:
-        message: a sensor_msgs/Image, or a sensor_msgs/CompressedImage of ``compressedDepth``.
-
-    Raises:
-        EncodingError: as :func:`decode_depth` and :func:`unpack_depth`, or the depths look like
-            millimetres.
+    Raises EncodingError as :func:`decode_depth` and :func:`unpack_depth`, or if half of the known
+    depths are beyond 100 m, so that they look like millimetres.
     """
     if hasattr(message, "format"):
         depth_m = unpack_depth(message.data, message.format)
@@ -125,8 +113,7 @@ def depth_from_image(message: Any) -> DepthImage:
 def at_size(depth_m: DepthImage, width: int, height: int) -> DepthImage:
     """Resize a depth image by picking pixels, so that each value is measured and no mean.
 
-    Raises:
-        EncodingError: the aspect ratio is another one, so the image has another view.
+    Raises EncodingError if the aspect ratio is another one, so that the image has another view.
     """
     rows, columns = depth_m.shape
     if (rows, columns) == (height, width):
@@ -152,15 +139,9 @@ def median_depth(depths_m: Sequence[DepthImage]) -> DepthImage:
 
 
 def as_seen_by(depth_m: DepthImage, own: Camera, camera: Camera) -> DepthImage:
-    """Resample a depth image for another pinhole camera at the same place; 0 outside the view.
+    """Resample a depth image (H, W), metres, of ``own`` for another pinhole camera at its place.
 
-    Args:
-        depth_m: (H, W), metres, with the aspect ratio of ``own``.
-        own: the camera that measured it.
-        camera: the camera whose pixels the result has.
-
-    Raises:
-        EncodingError: the image is longer than OpenCV can remap.
+    It is 0 outside the view. Raises EncodingError if the image is longer than OpenCV can remap.
     """
     height, width = depth_m.shape
     if max(height, width) > _LONGEST_PX:

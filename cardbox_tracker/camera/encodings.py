@@ -14,8 +14,29 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cardbox_tracker.camera.image_headers import check_pixels, compressed_size
-from cardbox_tracker.camera.levels import Levels
 from cardbox_tracker.common.errors import EncodingError, quoted
+
+# The darkest and brightest pixels of an image, which may be faulty, do not count.
+_FAULTY = 0.001
+# The scale changes if more of an image lies outside of the range; a person covers less.
+_MOST_OUTSIDE = 0.25
+# A camera whose first image would have fewer of 256 levels measures temperatures.
+_FEW = 10
+_EVERY = 4
+_ALL = 1 << 16
+
+
+def to_working_size(image: NDArray[np.uint8], width: int, height: int) -> NDArray[np.uint8]:
+    """Resize ``image`` (H, W) or (H, W, 3) to (height, width); return the same array if it fits.
+
+    Shrinking averages over area, which also averages the sensor's noise.
+    """
+    if image.shape[:2] == (height, width):
+        return image
+    shrinks = image.shape[0] >= height and image.shape[1] >= width
+    method = cv2.INTER_AREA if shrinks else cv2.INTER_LINEAR
+    return np.asarray(cv2.resize(image, (width, height), interpolation=method), dtype=np.uint8)
+
 
 ImageArray = NDArray[np.uint8]
 
@@ -26,23 +47,16 @@ MOST_PIXELS = 2**25
 
 
 class _Encoding(NamedTuple):
-    """How the pixels of an encoding are stored.
+    """How the pixels of an encoding are stored."""
 
-    Attributes:
-        channels: channels of the array.
-        to_grey: OpenCV's code to grey; None: unchanged.
-        to_bgr: OpenCV's code to bgr; None: unchanged.
-        word_bytes: bytes of a number; those of 16 bits are scaled to eight.
-        shared: across and down, pixels that share a colour of YUV; None for other colours. With two
-            channels it lies beside the brightness, with one in rows below all brightness.
-        order: place of the brightness in a pixel of two channels; place of u in a colour below.
-    """
-
-    channels: int
-    to_grey: int | None = None
-    to_bgr: int | None = None
-    word_bytes: int = 1
+    channels: int  #: channels of the array
+    to_grey: int | None = None  #: OpenCV's code to grey; None: unchanged
+    to_bgr: int | None = None  #: OpenCV's code to bgr; None: unchanged
+    word_bytes: int = 1  #: bytes of a number; those of 16 bits are scaled to eight
+    #: across and down, pixels that share a colour of YUV; None for other colours. With two channels
+    #: it lies beside the brightness, with one in rows below all brightness.
     shared: tuple[int, int] | None = None
+    #: place of the brightness in a pixel of two channels; place of u in a colour below.
     order: int = 0
 
 
@@ -78,23 +92,14 @@ SUPPORTED_ENCODINGS: tuple[str, ...] = tuple(_ENCODINGS)
 
 
 class SentImage(NamedTuple):
-    """An image as it is sent.
+    """An image as it is sent."""
 
-    Attributes:
-        data: the bytes, as bytes, array.array or uint8 array.
-        height: rows.
-        width: columns.
-        step: bytes per row, padding included.
-        encoding: one of ``SUPPORTED_ENCODINGS``, or that of a depth image.
-        is_bigendian: byte order of numbers of more than a byte.
-    """
-
-    data: Any
-    height: int
-    width: int
-    step: int
-    encoding: str
-    is_bigendian: bool = False
+    data: Any  #: the bytes, as bytes, array.array or uint8 array
+    height: int  #: rows
+    width: int  #: columns
+    step: int  #: bytes per row, padding included
+    encoding: str  #: one of ``SUPPORTED_ENCODINGS``, or that of a depth image
+    is_bigendian: bool = False  #: byte order of numbers of more than a byte
 
     @classmethod
     def of(cls, message: Any) -> SentImage:
@@ -105,13 +110,8 @@ class SentImage(NamedTuple):
 def decode_grey(sent: SentImage, levels: Levels | None = None) -> ImageArray:
     """Return the brightness (H, W) uint8 of an image; mono8 is not copied.
 
-    Args:
-        sent: the image.
-        levels: what scales 16 bits, the same for all images of a camera; without it, the range of
-            this image counts.
-
-    Raises:
-        EncodingError: the encoding is not supported, or the bytes do not fit it.
+    ``levels`` scales 16 bits alike for all images of a camera; without it, the range of this image
+    counts. Raises EncodingError if the encoding is not supported or the bytes do not fit it.
     """
     raw, kind = _pixels(sent, levels)
     if kind.shared is not None:
@@ -120,11 +120,7 @@ def decode_grey(sent: SentImage, levels: Levels | None = None) -> ImageArray:
 
 
 def decode_bgr(sent: SentImage, levels: Levels | None = None) -> ImageArray:
-    """Return the colours (H, W, 3) uint8, bgr, of an image; see :func:`decode_grey`.
-
-    Raises:
-        EncodingError: the encoding is not supported, or the bytes do not fit it.
-    """
+    """Return the colours (H, W, 3) uint8, bgr, of an image; see :func:`decode_grey`."""
     raw, kind = _pixels(sent, levels)
     if kind.shared is None:
         return raw if kind.to_bgr is None else np.asarray(cv2.cvtColor(raw, kind.to_bgr), np.uint8)
@@ -147,9 +143,7 @@ def decode_as_sent(
 ) -> ImageArray:
     """Return bgr (H, W, 3) uint8 of a colour image, brightness (H, W) uint8 of a grey one.
 
-    Raises:
-        EncodingError: the encoding is not supported, the bytes do not fit it, or the image has more
-            than ``most_pixels``.
+    Raises EncodingError as :func:`decode_grey`, or if it has more than ``most_pixels``.
     """
     check_pixels(sent.width, sent.height, most_pixels)
     is_grey = sent.encoding.startswith("mono") or sent.encoding in ("8UC1", "16UC1")
@@ -159,15 +153,9 @@ def decode_as_sent(
 def decode_compressed(
     data: Any, most_pixels: float = MOST_PIXELS, levels: Levels | None = None
 ) -> ImageArray:
-    """Return a JPEG or PNG image as (H, W) grey or (H, W, 3) bgr, uint8.
+    """Return a JPEG or PNG image as (H, W) grey or (H, W, 3) bgr, uint8; see :func:`decode_grey`.
 
-    Args:
-        data: the bytes of the file.
-        most_pixels: larger images are refused before memory is allocated.
-        levels: see :func:`decode_grey`.
-
-    Raises:
-        EncodingError: the bytes cannot be decoded as an image, or it is too large.
+    Raises EncodingError if it cannot be decoded, or has more than ``most_pixels``.
     """
     raw = np.frombuffer(data, np.uint8)
     check_pixels(*compressed_size(raw.tobytes()), most_pixels)
@@ -249,3 +237,48 @@ def brightness_of(image: NDArray[Any]) -> NDArray[np.uint8]:
     if image.ndim == 2:
         return np.asarray(image, np.uint8)
     return np.asarray(cv2.cvtColor(np.asarray(image, np.uint8), cv2.COLOR_BGR2GRAY), np.uint8)
+
+
+class Levels:
+    """Scales images of 16 bits to eight by the range that one camera uses.
+
+    Infrared and thermal cameras use 10 to 14 of the bits, or a small part in the middle. All images
+    of a camera get the same scale, because a background is compared with them.
+
+    Attributes:
+        text: the scale in words; empty before the first image, and if all 16 bits are used.
+        changes: how often the scale was set, which a large change of the brightness does again.
+    """
+
+    def __init__(self) -> None:
+        """Begin without a scale."""
+        self.text, self.changes = "", 0
+        self._low, self._width = 0, 0
+
+    def __call__(self, image: NDArray[Any]) -> NDArray[np.uint8]:
+        """Return an image uint16 as uint8 of the same shape."""
+        sample = image[::_EVERY, ::_EVERY]
+        outside = (sample < self._low) | (sample >= self._low + self._width)
+        if np.mean(outside) > _MOST_OUTSIDE:
+            self._set(image)
+        shift = self._width.bit_length() - 9
+        if self._width == _ALL:
+            return (image >> shift).astype(np.uint8)
+        inside = np.clip(image.astype(np.int32) - self._low, 0, self._width - 1)
+        return (inside >> shift).astype(np.uint8)
+
+    def _set(self, image: NDArray[Any]) -> None:
+        low, high = (int(value) for value in np.quantile(image, (_FAULTY, 1 - _FAULTY)))
+        self._low, self._width = 0, max(256, 1 << high.bit_length())
+        narrow = max(256, 1 << (2 * (high - low)).bit_length())
+        # A plain wall has few levels, too, and people before it need those below and above.
+        if 256 * (high - low) < _FEW * self._width and narrow < self._width:
+            self._low, self._width = max(0, (low + high - narrow) // 2), narrow
+        self.changes += 1
+        last = self._low + self._width - 1
+        self.text = (
+            f"images of 16 bits have values from {low} to {high}; {self._low} to {last} are scaled "
+            "to 0 to 255"
+            if self._width < _ALL
+            else ""
+        )

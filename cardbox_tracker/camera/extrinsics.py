@@ -43,10 +43,9 @@ class Extrinsics:
 
     @classmethod
     def of(cls, matrix: object, source: str = "") -> Extrinsics:
-        """Create extrinsics from a matrix, (4, 4) or (3, 4).
+        """Create extrinsics from a matrix (4, 4) or (3, 4).
 
-        Raises:
-            CameraError: the matrix is no rigid transform; the text names ``source``.
+        Raises CameraError, which names ``source``, if it is no rigid transform.
         """
         try:
             values = np.array(matrix, dtype=np.float64)
@@ -76,8 +75,7 @@ class Extrinsics:
     def of_vectors(cls, rotation: object, translation_m: object, source: str = "") -> Extrinsics:
         """Create extrinsics from a rotation vector (3,), rad, and a translation (3,), metres.
 
-        Raises:
-            CameraError: the vectors do not have three finite numbers each.
+        Raises CameraError, which names ``source``, without three finite numbers each.
         """
         try:
             vectors = np.array([rotation, translation_m], dtype=np.float64).reshape(2, 3)

@@ -20,21 +20,14 @@ _EXPECTED = "a camchain of Kalibr (YAML with T_cn_cnm1) or a camera group of ani
 
 
 def load_extrinsics(path: str | os.PathLike[str], cameras: Sequence[str]) -> dict[str, Extrinsics]:
-    """Read the extrinsics of cameras relative to the first one.
+    """Return the extrinsics of each further camera relative to the first one, by its name.
 
-    A camera is found by its name in the file. In a camchain the first part of its ``rostopic`` is a
-    name, too, and counts if it is another camera's key.
+    The file is a camchain of Kalibr or a TOML file of aniposelib. A camera is found by its name in
+    it; in a camchain the first part of its ``rostopic`` is a name, too, and counts if it is another
+    camera's key. Lengths are metres; a TOML file whose cameras would be more than 30 m apart is
+    read as millimetres.
 
-    Args:
-        path: a camchain of Kalibr, or a TOML file of aniposelib. Lengths are metres; a TOML file
-            whose cameras would be more than 30 m apart is read as millimetres.
-        cameras: names, the first camera first.
-
-    Returns:
-        Extrinsics of each further camera, by its name.
-
-    Raises:
-        CameraError: the file cannot be read, lacks a camera, or has no rigid transforms.
+    Raises CameraError if the file cannot be read, lacks a camera, or has no rigid transforms.
     """
     name = os.fspath(path)
     with foreign(path, CameraError, _EXPECTED):
@@ -60,13 +53,8 @@ def save_camchain(
 ) -> None:
     """Write a camchain as Kalibr does, which :func:`load_extrinsics` reads.
 
-    Args:
-        path: the file, which is written atomically.
-        cameras: cameras without lens distortion by namespace, the first camera first.
-        extrinsics: extrinsics of each further camera relative to the first one, by namespace.
-
-    Raises:
-        CardboxError: the file cannot be written.
+    ``cameras`` have no lens distortion and are by namespace, the first one first, as are the
+    ``extrinsics`` of the further ones. Raises CardboxError if the file cannot be written.
     """
     chain: dict[str, Any] = {}
     before = Extrinsics(np.eye(3), np.zeros(3))

@@ -24,30 +24,19 @@ _AGREE_DEG, _AGREE_M = 1.0, 0.02
 
 
 class FrameTransform(NamedTuple):
-    """One transform of ``/tf_static``.
+    """One transform of ``/tf_static``."""
 
-    Attributes:
-        parent: name of the parent frame.
-        child: name of the child frame.
-        to_parent: transform of points from the child frame into the parent frame.
-    """
-
-    parent: str
-    child: str
-    to_parent: Extrinsics
+    parent: str  #: name of the parent frame
+    child: str  #: name of the child frame
+    to_parent: Extrinsics  #: transform of points from the child frame into the parent frame
 
 
 def of_rectified_pair(first: Any, other: Any, name: str) -> Extrinsics | None:
     """Return the extrinsics in the projection matrices of two sensor_msgs/CameraInfo.
 
     The fourth column of P places a camera in the rectified frame: P[0,3] = -fx B for a right camera
-    at the baseline B. R relates unrectified images to that frame.
-
-    Returns:
-        The extrinsics; None if both columns are zero, so that the cameras are no rectified pair.
-
-    Raises:
-        CameraError: R is no rotation.
+    at the baseline B. R relates unrectified images to that frame. None if both columns are zero, so
+    that the cameras are no rectified pair; CameraError if R is no rotation.
     """
     at = []
     for info in (first, other):
@@ -90,10 +79,7 @@ def of_transforms(
 
 
 def transforms_of(message: Any) -> list[FrameTransform]:
-    """Return the transforms in a tf2_msgs/TFMessage of rclpy or of a recording.
-
-    Transforms that are not rigid or not finite are left out, as tf2 does.
-    """
+    """Return the rigid transforms in a tf2_msgs/TFMessage; others are left out, as tf2 does."""
     found = []
     for stamped in message.transforms:
         place, turn = stamped.transform.translation, stamped.transform.rotation
@@ -126,14 +112,8 @@ def extrinsics_between(
 ) -> list[Extrinsics]:
     """Return the extrinsics of each further camera relative to the first one.
 
-    Args:
-        infos: sensor_msgs/CameraInfo of each camera, the first camera first.
-        names: names of the same cameras.
-        transforms: the transforms on ``/tf_static``.
-        of_file: extrinsics from a file, by name.
-
-    Raises:
-        CameraError: a camera has no extrinsics, or two sources disagree.
+    The CameraInfo ``infos`` and the ``names`` are of all cameras, the first one first; ``of_file``
+    is by name. Raises CameraError if a camera has no extrinsics, or two sources disagree.
     """
     first_frame, *frames = (str(info.header.frame_id).lstrip("/") for info in infos)
     return [
@@ -151,16 +131,10 @@ def extrinsics_between(
 
 
 def choose(found: Sequence[Extrinsics | None], first: str, other: str) -> Extrinsics:
-    """Return the first extrinsics that are present, after a check that all agree.
+    """Return the first extrinsics that are present: from P, from ``/tf_static``, or from a file.
 
-    Args:
-        found: extrinsics from P, from ``/tf_static`` and from a file; None where absent.
-        first: name of the first camera, for the texts.
-        other: name of the other camera.
-
-    Raises:
-        CameraError: all are None, two differ by more than a degree or two centimetres, or the
-            cameras are more than 30 m apart.
+    Raises CameraError if there are none, if two differ by more than a degree or two centimetres, or
+    if the cameras ``first`` and ``other`` are more than 30 m apart.
     """
     there = [extrinsics for extrinsics in found if extrinsics is not None]
     if not there:

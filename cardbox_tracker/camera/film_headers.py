@@ -33,15 +33,7 @@ _WITH_TIMES = (b"\0\0\1\xb3", b"\0\0\1\xba")
 
 
 def check_times(path: Path, remedy: str) -> None:
-    """Check that a film is no raw stream, which has neither times nor a rate.
-
-    Args:
-        path: the film.
-        remedy: how its rate can be given, for the text.
-
-    Raises:
-        CameraError: it is such a stream.
-    """
+    """Raise CameraError, with a ``remedy``, if a film is a raw stream without times or a rate."""
     with path.open("rb") as file:
         start = file.read(5)
     code = start.removeprefix(b"\0") if start.startswith(b"\0\0\0\1") else start
@@ -88,8 +80,7 @@ def with_square_pixels(image: NDArray[Any], shape: float) -> NDArray[np.uint8]:
 def shown_s(path: Path) -> float | None:
     """Return for how long the images of an MP4 or MOV are shown, seconds, as its edit list says.
 
-    Films that were trimmed on a phone keep the images before and after. It is None for other
-    films, and for those that do not state it.
+    Films trimmed on a phone keep the images before and after. None if a film does not state it.
     """
     timescale, times = 0, [0]
     try:
@@ -112,9 +103,7 @@ def shown_s(path: Path) -> float | None:
 def boxes(file: BinaryIO, inside: Container[bytes] = ()) -> Iterator[tuple[bytes, int, int]]:
     """Return kind, and begin and end of the content, of the first boxes of an MP4 or MOV.
 
-    Args:
-        file: the film, or the content of a box.
-        inside: kinds of boxes in which the boxes follow, too.
+    Boxes follow in those of the kinds ``inside``, too.
     """
     return islice(_boxes(file, inside, 0, file.seek(0, os.SEEK_END)), _MOST_BOXES)
 

@@ -25,23 +25,14 @@ _FARTHEST_M = 100.0
 def silhouette_from(
     given: ArrayLike, name: str = "silhouette", size: Size | None = None
 ) -> ImageArray:
-    """Return a mask of any numeric type as a silhouette.
+    """Return a mask (H, W) or (H, W, 1) of any numeric type as a silhouette (H, W), 0 or 255.
 
     If the largest value of the mask is at most 1, the person is where a value is 0.5 or more, as in
     masks of bool, of 0 and 1, and of probabilities. Otherwise, the person is where a value is 128
-    or more.
+    or more. The silhouette is a C-contiguous copy.
 
-    Args:
-        given: (H, W) or (H, W, 1), values 0 to 255.
-        name: name of the mask in errors.
-        size: expected height and width, px; None for any.
-
-    Returns:
-        (H, W), C-contiguous, 0 or 255; a copy.
-
-    Raises:
-        ValueError: the array has another shape, is not numeric, or has values that are negative,
-            above 255 or not a number; the text has the expectation and the remedy.
+    Raises ValueError, with the ``name``, if the height and width are not ``size``, or values are
+    not numeric, negative, above 255 or nan.
     """
     mask = _array(given, name)
     if mask.ndim != 2 or not mask.size:
@@ -62,22 +53,11 @@ def silhouette_from(
 
 
 def image_from(given: ArrayLike, name: str = "image", size: Size | None = None) -> ImageArray:
-    """Return an image of any numeric type as 8 bits a channel.
+    """Return an image (H, W), (H, W, 1) or (H, W, 3), bgr, of any numeric type as 8 bits a channel.
 
-    Values are levels of 0 to 255; but numbers of a floating-point type of which none is above 1
-    are levels of 0 to 1.
-
-    Args:
-        given: (H, W) or (H, W, 1) grey, or (H, W, 3) bgr.
-        name: name of the image in errors.
-        size: expected height and width, px; None for any.
-
-    Returns:
-        (H, W) or (H, W, 3), C-contiguous; the same array if it is one already.
-
-    Raises:
-        ValueError: the array has another shape, is not numeric, or has values that are negative,
-            above 255 or not a number; the text has the expectation and the remedy.
+    Values are levels of 0 to 255; floats of which none is above 1 are levels of 0 to 1. The result
+    is C-contiguous, the same array if it is such a one. Raises ValueError, with the ``name``, if
+    the height and width are not ``size``, or values are not numeric, negative, above 255 or nan.
     """
     image = _array(given, name)
     if not (image.ndim == 2 or (image.ndim == 3 and image.shape[2] == 3)) or not image.size:
@@ -100,19 +80,10 @@ def image_from(given: ArrayLike, name: str = "image", size: Size | None = None) 
 
 
 def depth_from(given: ArrayLike, name: str = "depth_m", size: Size | None = None) -> DepthImage:
-    """Return a depth image; values that are not finite or not above 0 are unknown.
+    """Return a depth image (H, W) or (H, W, 1) of floats, metres; 0 where it is not above 0.
 
-    Args:
-        given: (H, W) or (H, W, 1), metres, of a floating-point type.
-        name: name of the depth image in errors.
-        size: expected height and width, px; None for any.
-
-    Returns:
-        (H, W), C-contiguous, metres; 0 where the depth is unknown.
-
-    Raises:
-        ValueError: the array has another shape or type, or looks like millimetres, since half of
-            the known depths are above 100.
+    Raises ValueError, with the ``name``, if the height and width are not ``size``, the type is none
+    of floats, or half of the known depths are above 100, which looks like millimetres.
     """
     depth = _array(given, name)
     if depth.ndim != 2:

@@ -19,11 +19,7 @@ _ENDS = (0xD9, 0xDA)
 
 
 def compressed_size(data: bytes) -> tuple[int, int]:
-    """Return width and height, px, of a JPEG or PNG image that is not decoded yet.
-
-    Raises:
-        EncodingError: the data is neither JPEG nor PNG, or its header is damaged.
-    """
+    """Return width and height, px, of a JPEG or PNG image by its header, or raise EncodingError."""
     size = None
     if data.startswith(_PNG):
         size = _png_size(data)

@@ -29,12 +29,9 @@ _RESTART_NS = 1_000_000_000
 
 
 def camera_names(cameras: Sequence[str]) -> list[str]:
-    """Return the namespaces of cameras without leading and trailing slashes.
+    """Return the namespaces of cameras without outer slashes; that of a camera alone may be "".
 
-    The root namespace is empty, and that of a camera alone.
-
-    Raises:
-        CardboxError: there are too many names, or a name is empty or occurs twice.
+    Raises CardboxError if there are too many names, or a name is empty or occurs twice.
     """
     names = [camera.strip("/") for camera in cameras]
     is_alone = len(names) == 1
@@ -65,10 +62,7 @@ def side_by_side(
 
 
 def _together(stamps_ns: Sequence[int | None], tolerance_ns: int) -> list[bool]:
-    """Return for each of the next items, given their stamps, whether it belongs to this group.
-
-    A missing item has the stamp None; at least one item is present.
-    """
+    """Return whether the next item of each stream, None if missing, belongs to this group."""
     first_ns = min(stamp_ns for stamp_ns in stamps_ns if stamp_ns is not None)
     return [stamp_ns is not None and stamp_ns - first_ns <= tolerance_ns for stamp_ns in stamps_ns]
 

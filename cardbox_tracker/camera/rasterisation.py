@@ -3,8 +3,8 @@
 A pixel is covered where its centre lies inside the projected patch. To give the same result on
 every computer, coordinates are integers: corners are rounded to a grid of 1/256 px, and an edge is
 a line that starts at the first row v0 of the image below its upper end (x0, y0), and moves by the
-same multiple of 1/65536 px from row to row down to its lower end (x1,
-y1). With s = (x1 - x0) / (y1 - y0), row v of y0 <= v < y1 is crossed at
+same multiple of 1/65536 px from row to row down to its lower end (x1, y1). With
+s = (x1 - x0) / (y1 - y0), row v of y0 <= v < y1 is crossed at
 
     X(v) = round(65536 (x0 + (v0 - y0) s)) + (v - v0) round(65536 s)
 
@@ -38,19 +38,15 @@ FARTHEST_PX = 16000.0
 def in_front(points_m: FloatArray) -> NDArray[np.bool_]:
     """Return which points (..., 3), metres, of the optical frame lie on or behind the near plane.
 
-    All drawing follows this rule: polygons are cut by :func:`clip_near`, which keeps just these
-    points. Lines of a skeleton, which are not cut, are dropped unless all their points are kept.
+    Polygons are cut there by :func:`clip_near`; lines of a skeleton are dropped unless all their
+    points are kept.
     """
     visible: NDArray[np.bool_] = np.asarray(points_m)[..., 2] >= NEAR_PLANE_M
     return visible
 
 
 def clip_near(corners_m: FloatArray) -> FloatArray:
-    """Clip a polygon (n, 3), metres, of the optical frame at the near plane (Sutherland-Hodgman).
-
-    Returns:
-        Shape (m, 3), metres; m is 0 to n + 1 for a planar convex polygon.
-    """
+    """Clip a convex polygon (n, 3), metres, optical frame, at the near plane: n + 1 or fewer."""
     kept = []
     for start, end in zip(corners_m, np.roll(corners_m, -1, axis=0), strict=True):
         if in_front(start):
@@ -69,12 +65,7 @@ def snap(pixels: FloatArray) -> FloatArray:
 
 
 def fill_convex(mask: NDArray[np.uint8], polygon_px: FloatArray) -> None:
-    """Set the covered pixels of ``mask`` (H, W) to 255.
-
-    Args:
-        mask: changed in place.
-        polygon_px: convex, shape (n, 2), snapped pixel coordinates; parts outside are ignored.
-    """
+    """Set the pixels of ``mask`` (H, W) that a convex polygon (n, 2), snapped px, covers to 255."""
     height = mask.shape[0]
     if len(polygon_px) < 3:
         return
@@ -99,15 +90,10 @@ def _fixed(pixels: float) -> int:
 
 
 def render(patches_m: FloatArray, camera: Camera, height: int | None = None) -> NDArray[np.uint8]:
-    """Render patches of the reference frame as seen by the camera: h(x, y, d) of equation (2).
+    """Render convex patches (n, 4, 3), metres, as seen by the camera: h(x, y, d) of equation (2).
 
-    Args:
-        patches_m: shape (n, 4, 3), planar convex patches, metres in the reference frame.
-        camera: the camera at the working resolution.
-        height: number of rows to render, from the top; by default those of the camera.
-
-    Returns:
-        Shape (height, camera.width), 0 or 255.
+    The patches are in the reference frame. The image (height, camera.width) is 0 or 255; its
+    ``height`` is that of the camera unless it is cut off below.
     """
     mask = np.zeros((camera.height if height is None else height, camera.width), np.uint8)
     for corners_m in camera.reference_to_optical(patches_m):

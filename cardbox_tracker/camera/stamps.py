@@ -176,10 +176,7 @@ class StreamStatistics:
 
     @property
     def period_ns(self) -> int:
-        """Spacing of the stamps without losses, ns.
-
-        It is low, since the median is a multiple of the period if most images are lost.
-        """
+        """Spacing of the stamps without losses, ns: a low one, as most images may be lost."""
         return sorted(self._low_ns)[(len(self._low_ns) - 1) // 2] if self._low_ns else 0
 
     @property
@@ -246,12 +243,7 @@ class RecordedStamps:
         self._jump_ns = 0
 
     def add(self, stamp_ns: int, recorded_ns: int) -> int | None:
-        """Return the time of the next message, ns; None if it is to be left out.
-
-        Args:
-            stamp_ns: its stamp; 0 if it has none.
-            recorded_ns: time at which it was recorded.
-        """
+        """Return the time of the next message, ns, by its stamp (0: none); None to leave it out."""
         order = self.statistics.add(stamp_ns)
         if not order.is_usable:
             return None

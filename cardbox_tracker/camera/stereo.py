@@ -33,16 +33,10 @@ class StereoDepth:
     """Measures depth in the left one of two rectified images."""
 
     def __init__(self, fx: float, baseline_m: float, nearest_m: float = NEAREST_M) -> None:
-        """Prepare the matcher.
+        """Prepare the matcher for a focal length, px, and a baseline and least distance, metres.
 
-        Args:
-            fx: focal length of both images, px.
-            baseline_m: distance of the cameras, metres.
-            nearest_m: smallest measured distance, metres; a smaller one takes more time.
-
-        Raises:
-            CameraError: focal length or baseline is not positive, or the cameras are too far apart
-                for a person so near.
+        A smaller distance takes more time. Raises CameraError if one is not positive, or the
+        cameras are too far apart for a person so near.
         """
         if not (fx > 0 and baseline_m > 0 and nearest_m > 0):
             raise CameraError(
@@ -74,9 +68,7 @@ class StereoDepth:
     def __call__(self, left: NDArray[np.uint8], right: NDArray[np.uint8]) -> DepthImage:
         """Return the depth (H, W), metres along the optical axis; 0 where none was found.
 
-        Args:
-            left: left image, (H, W) grey or (H, W, 3) bgr, rectified.
-            right: right image of the same size.
+        The images are rectified, of one size, (H, W) grey or (H, W, 3) bgr.
         """
         pair = (np.ascontiguousarray(brightness_of(image)) for image in (left, right))
         disparity = np.asarray(self._matcher.compute(*pair), np.float32) / np.float32(_PARTS)
@@ -87,14 +79,9 @@ class StereoDepth:
     def seem_swapped(
         self, left: NDArray[np.uint8], right: NDArray[np.uint8], depth: DepthImage
     ) -> bool:
-        """Return whether the images seem to be those of each other's camera.
+        """Return whether images of a measurement seem to be those of each other's camera.
 
-        This takes as long as one measurement, unless much is known.
-
-        Args:
-            left: image that was taken for the left one, as for a measurement.
-            right: image that was taken for the right one.
-            depth: their depth (H, W), metres; 0 where none was found.
+        This takes as long as one measurement, unless ``depth`` knows much.
         """
         known = np.count_nonzero(depth)
         if known > _MUCH_KNOWN * depth.size:
@@ -105,16 +92,10 @@ class StereoDepth:
 def stereo_of_pair(
     left: Camera, right: Camera, where: Extrinsics, nearest_m: float = NEAREST_M
 ) -> StereoDepth:
-    """Create the depth measurement of a rectified pair.
+    """Create the depth measurement of a rectified pair of cameras whose images have one size.
 
-    Args:
-        left: camera of the left images.
-        right: camera of the right images, of the same size.
-        where: extrinsics of the right camera relative to the left one.
-        nearest_m: see :class:`StereoDepth`.
-
-    Raises:
-        CameraError: the cameras are no rectified pair with the left camera first.
+    ``where`` are the extrinsics of the right one relative to the left one. Raises CameraError if
+    they are no rectified pair with the left camera first.
     """
     x, *rest = where.translation_m.tolist()
     one, other = ((c.fx, c.fy, c.cx, c.cy) for c in (left, right))

@@ -52,37 +52,28 @@ class View:
     """One body before a further camera.
 
     The state in the frame of this camera is ``turned`` @ (state of the first camera) + ``moved``.
-
-    Attributes:
-        body: the person, placed before that camera.
-        camera: that camera, turned upright.
-        yaw_rad: rotation of its level frame about the vertical.
-        roll_rad: rotation of its image about the optical axis, which the upright camera lacks.
-        offset_m: translation from the first level frame into its own, after the rotation, (3,).
-        turn: pixel of the camera's image for each pixel of the upright image, (H, W, 2) int16; None
-            if the camera stands upright.
-        raw_px: map from pixels of the upright image to those of the camera's image, (2, 3).
-        turned: (14, 14).
-        moved: (14,).
     """
 
-    body: BodyModel
-    camera: Camera
-    yaw_rad: float
-    roll_rad: float
+    body: BodyModel  #: the person, placed before that camera
+    camera: Camera  #: that camera, turned upright
+    yaw_rad: float  #: rotation of its level frame about the vertical
+    roll_rad: float  #: rotation of its image about the optical axis, which the upright camera lacks
+    #: translation from the first level frame into its own, after the rotation, (3,).
     offset_m: FloatArray
+    #: pixel of the camera's image for each pixel of the upright image, (H, W, 2) int16; None if the
+    #: camera stands upright.
     turn: NDArray[np.int16] | None
+    #: map from pixels of the upright image to those of the camera's image, (2, 3).
     raw_px: FloatArray
-    turned: FloatArray
-    moved: FloatArray
+    turned: FloatArray  #: (14, 14)
+    moved: FloatArray  #: (14,)
 
     @classmethod
     def of(cls, body: BodyModel, first: Camera, other: OtherCamera) -> View:
         """Return the view of ``body`` before ``first``, which includes its pitch.
 
-        Raises:
-            CameraError: the other camera looks straight up or down, or the person was measured
-                behind it.
+        Raises CameraError if the other camera looks straight up or down, or does not have the
+        person in front of it.
         """
         axes = other.extrinsics.rotation @ first.reference_to_optical_rotation()
         ahead = axes[2]
@@ -135,10 +126,7 @@ class View:
         return moved
 
     def upright(self, image: AnyImage, is_mask: bool = False) -> AnyImage:
-        """Return an image (H, W) or (H, W, 3) of the camera turned upright.
-
-        Pixels beyond the image are 0 in a mask, or else those of the nearest border.
-        """
+        """Return an image (H, W) or (H, W, 3) turned upright; a mask is 0 beyond its border."""
         if self.turn is None:
             return image
         border = cv2.BORDER_CONSTANT if is_mask else cv2.BORDER_REPLICATE
@@ -160,10 +148,10 @@ class View:
         return axes
 
     def line_of_sight(self, bearing: float) -> tuple[LevelPoint, LevelPoint]:
-        """Return the camera's place and the unit direction of a line of sight.
+        """Return the camera's place and the unit direction of a line of sight, metres.
 
-        Both are in the first camera's level frame, metres. ``bearing`` is the lateral coordinate
-        divided by the depth.
+        Both are in the first level frame; ``bearing`` is the lateral coordinate divided by the
+        depth.
         """
         c, s = cos(self.yaw_rad), sin(self.yaw_rad)
         x_m, y_m, _ = self.offset_m.tolist()

@@ -751,7 +751,7 @@ def _of_stature(stature_m: float, distance_m: float | None, pitch_rad: float) ->
 
 
 def _config(options: argparse.Namespace, preset: TrackerConfig) -> TrackerConfig:
-    from cardbox_tracker.search.settings_file import read_settings
+    from cardbox_tracker.search.config import read_settings
 
     config = preset if options.depth is None else preset.with_depth()
     if options.settings is not None:

@@ -54,8 +54,8 @@ class Figure:
     def apart(self, other: Figure) -> float:
         """Return the mean distance of the joints of trunk and arms, in lengths of the larger trunk.
 
-        A detector that takes left for right has found the same person. It is infinite if too
-        few joints are known.
+        A detector that takes left for right has found the same person. It is infinite if too few
+        joints are known.
         """
         own = np.array([self._at.get(name, _UNKNOWN) for name in _COMPARED])
         means = []

@@ -51,18 +51,11 @@ class HandNetwork:
     """Finds the points of a hand whose place is known."""
 
     def __init__(self, path: Path) -> None:
-        """Load the network.
-
-        Raises:
-            CardboxError: LiteRT is not installed, or the file is missing or damaged.
-        """
+        """Load the network; raise CardboxError if LiteRT or the file is missing or damaged."""
         self._locate = Network(path)
 
     def __call__(self, image: ColorImage, square: Square) -> HandPoints | None:
-        """Return the hand in a square of an image (H, W, 3), bgr; None if there is none.
-
-        The fingers of an upright hand point to the top of the square.
-        """
+        """Return the hand in a square of an image (H, W, 3), bgr; the fingers point to its top."""
         cut = cut_out(image, square, _INPUT_PX, cv2.BORDER_REPLICATE)
         placed, presence, _, spatial = self._locate(np.ascontiguousarray(cut[..., ::-1]))
         if float(presence[0, 0]) < _LEAST_PRESENCE:

@@ -31,12 +31,7 @@ _LEAST_PX, _EMPTY_NS = 20, 60_000_000_000
 def colours_in(image: NDArray[np.uint8], mask: NDArray[np.uint8]) -> FloatArray | None:
     """Return the histogram of colours, or of brightness, where ``mask`` (H, W) is not 0.
 
-    Args:
-        image: (H, W) or (H, W, 3), bgr.
-        mask: pixels that count.
-
-    Returns:
-        None if too few do.
+    The image is (H, W) or (H, W, 3), bgr. None if too few pixels count.
     """
     if cv2.countNonZero(mask) < _LEAST_PX:
         return None
@@ -108,10 +103,7 @@ class Identity:
     def is_same(self, figure: Figure, colours: FloatArray | None, now_ns: int) -> bool:
         """Return whether somebody in an image is the person; the first one is.
 
-        Args:
-            figure: of somebody, px.
-            colours: of the trunk, see :func:`colours_in`; None if they are not known.
-            now_ns: time of the image, ns.
+        ``colours`` are those of the trunk, see :func:`colours_in`, or None.
         """
         self.nobody(now_ns)
         self._anybody_ns = now_ns

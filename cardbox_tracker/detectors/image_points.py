@@ -57,17 +57,12 @@ _OTHER_SIDE = [
 
 
 class LegPoints(NamedTuple):
-    """The points ``LEG_POINT_NAMES`` of one person in one image.
+    """The points ``LEG_POINT_NAMES`` of one person in one image."""
 
-    Attributes:
-        px: column and row, (8, 2), as in :class:`ImagePoints`.
-        scores: chance that the point is in the image and visible, 0 to 1, (8,).
-        spatial_m: the points in space, (8, 3), with the axes, origin and scale of
-            ``ImagePoints.spatial_m``; None without it.
-    """
-
-    px: FloatArray
-    scores: FloatArray
+    px: FloatArray  #: column and row, (8, 2), as in :class:`ImagePoints`
+    scores: FloatArray  #: chance that the point is in the image and visible, 0 to 1, (8,)
+    #: the points in space, (8, 3), with the axes, origin and scale of ``ImagePoints.spatial_m``;
+    #: None without it.
     spatial_m: FloatArray | None = None
 
     @property
@@ -145,13 +140,8 @@ class ImagePoints:
     def from_coco17(cls, points: FloatArray, stamp_ns: int | None = None) -> ImagePoints:
         """Return the points of COCO, which most detectors have; knees and ankles are not used.
 
-        Args:
-            points: column, row (px) and score, 0 to 1, of each of ``COCO_NAMES``, (17, 3); nan or
-                the score 0 where a point is missing.
-            stamp_ns: see the class.
-
-        Raises:
-            ValueError: the array has another shape or is not numeric.
+        ``points``, (17, 3), are column, row (px) and score, 0 to 1, of each of ``COCO_NAMES``; nan
+        or the score 0 where one is missing. Raises ValueError for another shape or type.
         """
         found = _array("points", points, (len(COCO_NAMES), 3), "COCO_NAMES")
         return cls.of(dict(zip(COCO_NAMES, found.tolist(), strict=True)), stamp_ns)

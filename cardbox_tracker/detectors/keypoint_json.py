@@ -57,25 +57,15 @@ COCO-WholeBody."""
 
 
 class FoundPerson(NamedTuple):
-    """The points of one person in one image.
+    """The points of one person in one image."""
 
-    Attributes:
-        image: number of the image, counted from 0, or its name.
-        points: the points.
-        place: where they stand, for errors.
-    """
-
-    image: int | str
-    points: list[NamedPoint]
-    place: str
+    image: int | str  #: number of the image, counted from 0, or its name
+    points: list[NamedPoint]  #: the points
+    place: str  #: where they stand, for errors
 
 
 def openpose_people(folder: Path) -> Iterator[FoundPerson]:
-    """Yield the people in a folder of OpenPose's files.
-
-    Raises:
-        CardboxError: there is no such file, or one cannot be read.
-    """
+    """Yield the people in a folder of OpenPose's files; raise CardboxError if there are none."""
     files = sorted(folder.glob("*.json"))
     if not files:
         raise CardboxError(
@@ -104,11 +94,7 @@ def openpose_people(folder: Path) -> Iterator[FoundPerson]:
 
 
 def coco_people(file: Path) -> Iterator[FoundPerson]:
-    """Yield the people in a file of COCO.
-
-    Raises:
-        CardboxError: the file cannot be read, or is none.
-    """
+    """Yield the people in a file of COCO; raise CardboxError if it cannot be read, or is none."""
     content = _content(file, _MOST_BYTES)
     is_annotated = isinstance(content, dict)
     found = content.get("annotations") if is_annotated else content
@@ -182,10 +168,7 @@ def _named(
 
 
 def _is_25b(values: Sequence[float]) -> bool:
-    """Return whether 25 points are in the order of BODY_25B: eyes and ears follow the nose.
-
-    In BODY_25, neck and right arm follow the nose, and eyes and ears come later.
-    """
+    """Return whether 25 points are of BODY_25B, where eyes and ears follow the nose."""
     points = np.reshape(values, (-1, 3))
     away = np.hypot(*(points[:, :2] - points[0, :2]).T)
     known = points[:, 2] > 0.0

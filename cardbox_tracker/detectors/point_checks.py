@@ -24,14 +24,9 @@ _SHARES, _LEAST_POINTS = 1.5, 3
 
 
 def check_point(point: NamedPoint, size: Size | None) -> None:
-    """Check one point; one with the score 0 is missing and may be anywhere.
+    """Raise CardboxError if a score is no chance, or its place is not in or near the image.
 
-    Args:
-        point: the point.
-        size: size of the camera's image; None if it is not known, so that any place will do.
-
-    Raises:
-        CardboxError: its score is no chance, or its place is not in or near the image.
+    A point with the score 0 is missing and may be anywhere, as may others without a ``size``.
     """
     name, column, row, score = point
     if not 0.0 <= score <= _MOST_SCORE:
@@ -49,11 +44,7 @@ def check_point(point: NamedPoint, size: Size | None) -> None:
 
 
 def person_of(points: Iterable[NamedPoint], size: Size | None) -> ImagePoints:
-    """Return the person of some points; those with the score 0 are missing.
-
-    Raises:
-        CardboxError: see :func:`check_point`; or the places are shares of the image.
-    """
+    """Return the person of some points, which are checked; those with the score 0 are missing."""
     found = {}
     for point in points:
         check_point(point, size)
@@ -64,11 +55,7 @@ def person_of(points: Iterable[NamedPoint], size: Size | None) -> ImagePoints:
 
 
 def check_person(found: dict[str, tuple[float, float, float]]) -> None:
-    """Check that the points of one person, by name, are not shares of the image.
-
-    Raises:
-        CardboxError: they are.
-    """
+    """Raise CardboxError if the points of one person, by name, are shares of the image."""
     places = np.array([point[:2] for point in found.values()])
     if len(places) >= _LEAST_POINTS and np.abs(places).max() <= _SHARES:
         raise CardboxError(
@@ -79,11 +66,7 @@ def check_person(found: dict[str, tuple[float, float, float]]) -> None:
 
 
 def check_places(person: ImagePoints, size: Size) -> None:
-    """Check the places of points that were read before the ``size`` of the image was known.
-
-    Raises:
-        CardboxError: see :func:`check_point`.
-    """
+    """Check the places of points that were read before the ``size`` of the image was known."""
     points = zip(POINT_NAMES, person.px.tolist(), person.scores.tolist(), strict=True)
     for name, (column, row), score in points:
         check_point((name, column, row, score), size)

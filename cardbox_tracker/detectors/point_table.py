@@ -53,24 +53,16 @@ class PointTable(NamedTuple):
     image, px; and ``score``, 0 to 1. With several people, ``person`` tells them apart. A recording
     of several cameras also needs ``camera``, the camera's namespace. For JSON see
     :mod:`.keypoint_json`; there, each camera has a folder or file of its name.
-
-    Attributes:
-        path: the table, a file of COCO, or a folder of OpenPose's files.
-        people: 0 for the person in the silhouette, more for all people.
     """
 
-    path: Path
-    people: int = 0
+    path: Path  #: the table, a file of COCO, or a folder of OpenPose's files
+    people: int = 0  #: 0 for the person in the silhouette, more for all people
 
     def read(self, camera: str | None, size: Size | None = None) -> GivenPoints:
-        """Return the points of one camera, px of its own image.
+        """Return the points of one camera, px of its own image, or of the only one.
 
-        Args:
-            camera: namespace of the camera; None if there is only one.
-            size: size of its image; None if it is not known, so that any place will do.
-
-        Raises:
-            CardboxError: a file cannot be read, lacks a column, or has an impossible point.
+        Without the ``size`` of the image any place will do. Raises CardboxError if a file cannot be
+        read, lacks a column, or has an impossible point.
         """
         path = self.path
         if path.suffix == ".json" or path.is_dir():
@@ -161,12 +153,7 @@ class PointTable(NamedTuple):
 
 
 def _image_of(text: str, column: str) -> int:
-    """Return the number of an image, or its stamp in ns.
-
-    Raises:
-        ValueError: the text is no such number.
-        ArithmeticError: likewise.
-    """
+    """Return the number of an image, or its stamp in ns; ValueError or ArithmeticError if none."""
     if column == FRAME:
         return int(text)
     stamp_ns = Decimal(text) * _STAMPS[column]
@@ -288,11 +275,7 @@ class GivenPoints:
         return f"the points of {self._path} are used in 0 of {self.images} images: {self._why}"
 
     def check_span(self, first_ns: int, last_ns: int) -> None:
-        """Check before tracking that stamps lie between those of the first and last image.
-
-        Raises:
-            CardboxError: none does.
-        """
+        """Raise CardboxError unless a stamp lies between those of the first and last image."""
         margin_ns = _SPAN_NS + (last_ns - first_ns) // 10
         number = bisect_left(self._stamps, first_ns - margin_ns)
         is_apart = number == len(self._stamps) or self._stamps[number] > last_ns + margin_ns

@@ -18,12 +18,10 @@ from cardbox_tracker.camera.rasterisation import render
 from cardbox_tracker.common.errors import InitializationError
 from cardbox_tracker.measuring.config import InitializationConfig
 from cardbox_tracker.measuring.outline import filled
-from cardbox_tracker.measuring.references import POSTURE_TEXT, lateral_m
-from cardbox_tracker.measuring.stature import at_height_of
-from cardbox_tracker.measuring.wording import rounded_down
+from cardbox_tracker.measuring.references import POSTURE_TEXT, lateral_m, rounded_down
 from cardbox_tracker.person.cardbox import cardbox_patches
 from cardbox_tracker.person.model import BodyModel
-from cardbox_tracker.person.posture import REFERENCE_NAMES, TORSO_Y, reference_posture
+from cardbox_tracker.person.posture import REFERENCE_NAMES, reference_posture
 from cardbox_tracker.person.proportions import sizes_of_stature
 
 Silhouette = NDArray[np.uint8]
@@ -35,78 +33,6 @@ STATURES_M = (1.3, 1.45, 1.6, 1.75, 1.9)
 """Statures of the rendered people."""
 
 
-def outline_ious(
-    silhouette: Silhouette, camera: Camera, config: InitializationConfig
-) -> dict[str, float]:
-    """Return the IoU of the best stature with each reference posture, by name.
-
-    Args:
-        silhouette: (H, W), 0 or 255, of the camera's size.
-        camera: working camera.
-        config: distance, pitch and direction of the side reference.
-    """
-    view = camera.with_pitch(config.camera_pitch_rad)
-    seen = filled(silhouette) > 0
-    ious = dict.fromkeys(REFERENCE_NAMES, 0.0)
-    for stature_m in STATURES_M:
-        body = BodyModel.of(
-            sizes_of_stature(stature_m),
-            distance_m=config.distance_m,
-            camera_pitch_rad=config.camera_pitch_rad,
-            side_turn=config.side_turn,
-        )
-        body = at_height_of(silhouette, body, view)
-        hips = view.reference_to_optical(
-            np.array([-config.distance_m, 0.0, body.placement.hip_height_m])
-        )
-        row = int(np.clip(view.project(hips)[1], 1, view.height))
-        for name in REFERENCE_NAMES:
-            posture = reference_posture(name, config.side_turn)
-            posture[TORSO_Y] = lateral_m(silhouette, view, config.distance_m)
-            drawn = render(cardbox_patches(body, posture), view)[:row] > 0
-            union = np.count_nonzero(drawn | seen[:row])
-            iou = np.count_nonzero(drawn & seen[:row]) / union if union else 0.0
-            ious[name] = max(ious[name], iou)
-    return ious
-
-
-def check_asked(
-    name: str, silhouette: Silhouette, camera: Camera, config: InitializationConfig
-) -> str:
-    """Refuse a silhouette that shows another reference posture than ``name``.
-
-    Args:
-        name: ``front``, ``side`` or ``arms``.
-        silhouette: (H, W), 0 or 255, of the camera's size, accepted by ``check_reference``.
-        camera: working camera.
-        config: see :func:`outline_ious`; nothing is checked without ``check_postures``.
-
-    Returns:
-        A warning if no posture fits the silhouette, else an empty text.
-
-    Raises:
-        InitializationError: another posture fits better; the text names it.
-    """
-    if not config.check_postures:
-        return ""
-    ious = outline_ious(silhouette, camera, config)
-    likest = max(ious, key=lambda other: ious[other])
-    if ious[likest] >= LEAST_IOU and ious[likest] - ious[name] >= CLEARLY:
-        raise InitializationError(
-            f"reference '{name}': it looks like '{likest}' (IoU of the outline "
-            f"{rounded_down(ious[name])} with '{name}', {rounded_down(ious[likest])} with "
-            f"'{likest}'); {POSTURE_TEXT[name]}",
-            "Not this posture",
-        )
-    if ious[name] < LEAST_IOU:
-        return (
-            f"; warning: the silhouette does not look like '{name}' (IoU of the outline "
-            f"{rounded_down(ious[name])}, expected {LEAST_IOU:.2f} or more): check the silhouette "
-            f"and the distance ({config.distance_m:g} m), and {POSTURE_TEXT[name]}"
-        )
-    return ""
-
-
 FITS, NEARLY, FAR = "fits", "nearly", "far"
 """A capture would be accepted without a warning, or almost; or another posture is shown."""
 
@@ -116,17 +42,11 @@ _LEAST_PX = 20
 
 
 class _Outline(NamedTuple):
-    """A rendered person in a posture on the grid, above the hips.
+    """A rendered person in a posture on the grid, above the hips."""
 
-    Attributes:
-        name: reference posture.
-        mask: (h, w); the first row has the top of the head.
-        column: middle of head and chest in ``mask``.
-    """
-
-    name: str
-    mask: NDArray[np.bool_]
-    column: int
+    name: str  #: reference posture
+    mask: NDArray[np.bool_]  #: (h, w); the first row has the top of the head
+    column: int  #: middle of head and chest in ``mask``
 
 
 class LiveFit:
@@ -172,6 +92,34 @@ class LiveFit:
             iou = _iou(seen[crown:], outline.mask, column - outline.column)
             ious[outline.name] = max(ious[outline.name], iou)
         return ious
+
+
+def check_asked(
+    name: str, silhouette: Silhouette, camera: Camera, config: InitializationConfig
+) -> str:
+    """Return a warning if no posture fits a silhouette (H, W), 0 or 255, else an empty text.
+
+    ``check_reference`` has accepted it. Raises InitializationError, with the name, if another
+    reference posture than ``name`` fits better, unless ``config`` has no ``check_postures``.
+    """
+    if not config.check_postures:
+        return ""
+    ious = LiveFit(camera, config).ious(silhouette)
+    likest = max(ious, key=lambda other: ious[other])
+    if ious[likest] >= LEAST_IOU and ious[likest] - ious[name] >= CLEARLY:
+        raise InitializationError(
+            f"reference '{name}': it looks like '{likest}' (IoU of the outline "
+            f"{rounded_down(ious[name])} with '{name}', {rounded_down(ious[likest])} with "
+            f"'{likest}'); {POSTURE_TEXT[name]}",
+            "Not this posture",
+        )
+    if ious[name] < LEAST_IOU:
+        return (
+            f"; warning: the silhouette does not look like '{name}' (IoU of the outline "
+            f"{rounded_down(ious[name])}, expected {LEAST_IOU:.2f} or more): check the silhouette "
+            f"and the distance ({config.distance_m:g} m), and {POSTURE_TEXT[name]}"
+        )
+    return ""
 
 
 def _outline(name: str, stature_m: float, camera: Camera, config: InitializationConfig) -> _Outline:

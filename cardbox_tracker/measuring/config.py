@@ -8,7 +8,7 @@ import numpy as np
 
 from cardbox_tracker.common.errors import InitializationError
 from cardbox_tracker.common.settings import Settings, setting
-from cardbox_tracker.measuring.wording import rounded_down
+from cardbox_tracker.measuring.references import rounded_down
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.posture import REFERENCE_NAMES, SIDE_TURNS
 
@@ -40,17 +40,6 @@ class InitializationConfig(Settings):
     hypotheses: int = setting(500, "hypotheses M of the estimation", limits=(10, 100000))
     max_rounds: int = setting(
         100, "largest number of rounds of an estimation step", limits=(1, 10000)
-    )
-    sigma_alpha_m: float = setting(
-        0.05, "initial noise of the sizes (paper)", unit="m", limits=(1e-4, 1.0)
-    )
-    accuracy_m: float = setting(
-        0.002, "noise of the sizes at which a step ends", unit="m", limits=(0.0, 1.0)
-    )
-    prior: float = setting(
-        0.003,
-        "cost of one standard deviation of a size, as a fraction of the silhouette's pixels",
-        limits=(0.0, 1.0),
     )
     min_iou: float = setting(
         0.6,
@@ -114,11 +103,7 @@ def _fits(result: InitializationResult) -> str:
 
 
 def check_fit(result: InitializationResult, config: InitializationConfig) -> None:
-    """Refuse a result whose mean IoU, or whose IoU of a single reference, is too low.
-
-    Raises:
-        InitializationError: the text has each fit and names the references with a poor fit.
-    """
+    """Raise InitializationError if the mean IoU, or that of a single reference, is too low."""
     fits = _fits(result)
     advice = (
         f"check person_distance_m ({config.distance_m:g} m), the camera's pitch "

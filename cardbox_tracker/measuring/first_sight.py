@@ -26,9 +26,9 @@ from cardbox_tracker.measuring.references import (
     MAX_PERSON_FRACTION,
     MIN_PERSON_FRACTION,
     lateral_m,
+    rounded_down,
 )
 from cardbox_tracker.measuring.stature import at_height_of
-from cardbox_tracker.measuring.wording import rounded_down
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.posture import N_STATE, PLACE, POSTURE, TORSO_Y
 from cardbox_tracker.person.proportions import BREADTHS
@@ -64,14 +64,10 @@ _PRIOR = 0.003
 
 
 def upper_body(silhouette: Silhouette, is_detected: bool = False) -> Silhouette | None:
-    """Return the person of a silhouette (H, W), which is its largest region.
+    """Return the person of a silhouette (H, W), 0 or 255, which is its largest region, or None.
 
-    Args:
-        silhouette: 0 or 255.
-        is_detected: whether a detector finds the person, who may then be small or far.
-
-    Returns:
-        None if the region is too small or too large, or the head is cut off.
+    The region is not too small, unless a detector finds the person, nor too large, nor is the head
+    cut off.
     """
     seen = filled(silhouette)
     share = np.count_nonzero(seen) / seen.size
@@ -103,18 +99,10 @@ def fit_first_sight(
     config: TrackerConfig,
     rng: np.random.Generator,
 ) -> FirstSight:
-    """Estimate the unknown values of a body from one silhouette.
+    """Estimate the unknown values of a body from one silhouette (H, W) of :func:`upper_body`.
 
-    Args:
-        body: body model with ``unknown`` values.
-        camera: working camera.
-        silhouette: (H, W), 0 or 255, as :func:`upper_body` returns it.
-        image: (H, W, 3) bgr or (H, W) of the same frame, for the colours; None to skip them.
-        config: settings of the tracker, of which ``whole_body`` is used.
-        rng: random numbers.
-
-    Raises:
-        InitializationError: no body stands where the silhouette is.
+    The ``image``, (H, W, 3) bgr or (H, W), of the same frame teaches the colours. Raises
+    InitializationError if no body stands where the silhouette is.
     """
     camera = camera.with_pitch(body.camera_pose.pitch_rad)
     found, posture, iou = _Search(body, camera, silhouette, config, rng).run()

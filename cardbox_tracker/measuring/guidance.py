@@ -46,21 +46,14 @@ def short_words(name: str, side_turn: str) -> str:
 
 
 class Prompt(NamedTuple):
-    """An instruction or a message of the guidance.
+    """An instruction or a message of the guidance."""
 
-    Attributes:
-        name: name of the reference, or ``measuring``.
-        words: short text for the person.
-        left_s: remaining seconds of the count-down; None if there is no count-down.
-        detail: text for the operator; ``words`` if empty.
-        mood: ``ask``, ``good`` or ``bad``.
-    """
-
-    name: str
-    words: str
+    name: str  #: name of the reference, or ``measuring``
+    words: str  #: short text for the person
+    #: remaining seconds of the count-down; None if there is no count-down.
     left_s: int | None = None
-    detail: str = ""
-    mood: str = ASK
+    detail: str = ""  #: text for the operator; ``words`` if empty
+    mood: str = ASK  #: ``ask``, ``good`` or ``bad``
 
     @property
     def text(self) -> str:
@@ -92,21 +85,15 @@ class Guidance:
         capture: Callable[[str], str],
         wait: Callable[[float], None],
     ) -> None:
-        """Store the functions of the caller.
+        """Store the functions that show a prompt, capture a reference by name, and wait seconds.
 
-        Args:
-            show: shows a prompt to the person.
-            capture: captures the named reference and returns a text; raises InitializationError.
-            wait: waits for a number of seconds; an exception of it ends the guidance.
+        ``capture`` returns a text or raises InitializationError; an error of ``wait`` ends the
+        guidance.
         """
         self._show, self._capture, self._wait = show, capture, wait
 
     def run(self, missing: Sequence[str], side_turn: str, count_down_s: int, attempts: int) -> None:
-        """Capture each reference in ``missing``.
-
-        Raises:
-            InitializationError: a reference could not be captured in ``attempts`` attempts.
-        """
+        """Capture each missing reference, or raise InitializationError after some ``attempts``."""
         for name in missing:
             words, detail = short_words(name, side_turn), instruction(name, side_turn)
             for attempt in range(1, attempts + 1):
@@ -160,11 +147,7 @@ class Cancellation:
         return CANCELLED if is_cancelled else FAILED
 
     def cancel(self) -> str:
-        """End the running initialization at its next wait; return the answer of the service.
-
-        Raises:
-            InitializationError: no initialization is running.
-        """
+        """End the running initialization at its next wait, or raise InitializationError."""
         if not self.is_running:
             raise InitializationError("nothing to cancel: no initialization is running")
         self._why = "the initialization was cancelled; call initialize to start again"
@@ -177,10 +160,6 @@ class Cancellation:
         self._ended.set()
 
     def wait(self, duration_s: float) -> None:
-        """Wait for ``duration_s``.
-
-        Raises:
-            InitializationError: the initialization was cancelled or stopped.
-        """
+        """Wait, s; raise InitializationError if the initialization was cancelled or stopped."""
         if self._ended.wait(duration_s):
             raise InitializationError(self._why)

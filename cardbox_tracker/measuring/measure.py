@@ -9,7 +9,7 @@ until the accuracy is reached. Extensions to the paper:
   the search (:mod:`.skeleton`), because an outline does not determine them.
 - In ``arms``, the shoulder joints are higher by the lift of the girdle.
 - sigma_alpha starts at the paper's 5 cm and shrinks after each round without improvement; the
-  accuracy is reached when it falls below ``accuracy_m``.
+  accuracy is reached when it falls below 2 mm.
 - Angles and place of the reference posture are estimated together with the sizes, with a prior
   standard deviation of a few degrees around the requested angles.
 - A weak prior keeps sizes that an outline hardly shows, such as the height of the chin, near the
@@ -87,6 +87,10 @@ _TORSO_TOP = [SIZE_INDEX["waist_height"], SIZE_INDEX["torso_height"]]
 _LOOSE_ANGLE_RAD = np.radians(5.0)
 # Noise of the place of a reference posture in each round.
 _PLACE_NOISE_M = 0.02
+# Initial noise of the sizes (paper), and noise at which a step ends, m.
+_SIGMA_ALPHA_M, _ACCURACY_M = 0.05, 0.002
+# Cost of one standard deviation of a size, as a fraction of the silhouette's pixels.
+_PRIOR = 0.003
 # Factor of the noise after a round without improvement.
 _SHRINK = 0.7
 
@@ -100,20 +104,14 @@ def initialize_body(
 ) -> InitializationResult:
     """Measure a person and learn the person's colours.
 
-    Args:
-        references: silhouettes (H, W) of ``front``, ``side`` and ``arms``, or masks of any numeric
-            type, see :func:`~cardbox_tracker.camera.given_arrays.silhouette_from`.
-        camera: working camera of the silhouettes' size.
-        config: settings; None for the defaults.
-        progress: called with the finished fraction.
-        images: images (H, W, 3) bgr or (H, W) of the references ``front`` and ``arms``, of the
-            camera's size; without them the body has no appearance.
+    ``references`` are silhouettes (H, W) of ``front``, ``side`` and ``arms``, of the camera's size,
+    or masks of any numeric type, see :func:`~cardbox_tracker.camera.given_arrays.silhouette_from`.
+    Without ``images``, (H, W, 3) bgr or (H, W), of ``front`` and ``arms``, the body has no
+    appearance.
 
-    Raises:
-        InitializationError: the references are unusable, show other postures, or the model does
-            not fit them; the text names the reference and the remedy.
-        ValueError: a silhouette or an image has another size than the camera, or its type or values
-            are impossible.
+    Raises InitializationError, with the reference and the remedy, if the references are unusable,
+    show other postures, or the model does not fit them; and ValueError if arrays are of another
+    size, type or range.
     """
     config = config or InitializationConfig()
     references = {
@@ -208,7 +206,7 @@ class _Search:
             self._rounds[subset] += 1
             noise = self._rng.standard_normal((config.hypotheses, N_SIZES + N_JOINTS)) * scale
             hypotheses = np.clip(
-                sizes + noise[:, :N_SIZES] * size_mask * config.sigma_alpha_m,
+                sizes + noise[:, :N_SIZES] * size_mask * _SIGMA_ALPHA_M,
                 SIZE_LIMITS[:, 0],
                 SIZE_LIMITS[:, 1],
             )
@@ -222,7 +220,7 @@ class _Search:
             else:
                 scale *= _SHRINK
             history.append(best)
-            if scale * config.sigma_alpha_m < config.accuracy_m:
+            if scale * _SIGMA_ALPHA_M < _ACCURACY_M:
                 break
         self._history[subset].append(tuple(history))
         self._sizes, self._postures[name] = sizes, posture
@@ -236,7 +234,7 @@ class _Search:
 
     def _rate(self, name: str, sizes: FloatArray, postures: FloatArray) -> FloatArray:
         seen = self._seen[name]
-        weight_px = self._config.prior * seen.frame.foreground_px
+        weight_px = _PRIOR * seen.frame.foreground_px
         size_steps = (sizes - self._initial) / self._scatter
         angle_steps = ((postures - self._asked[name]) / _LOOSE_ANGLE_RAD)[:, 1:]
         prior = np.sum(size_steps**2, axis=1) + np.sum(angle_steps**2, axis=1)

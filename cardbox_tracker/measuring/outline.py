@@ -39,21 +39,13 @@ _HANGING = (0.02, 0.27)
 
 @dataclass(frozen=True)
 class LevelArm:
-    """One arm in the reference ``arms``, in the upright plane.
+    """One arm in the reference ``arms``, in the upright plane."""
 
-    Attributes:
-        tip_m: Y of the fingertips.
-        armpit_m: Y of the trunk's edge.
-        slope: slope of the axis, Z = slope Y + height.
-        height_m: height of the axis at Y = 0.
-        thickness_m: median height of the arm's outline between elbow and wrist.
-    """
-
-    tip_m: float
-    armpit_m: float
-    slope: float
-    height_m: float
-    thickness_m: float
+    tip_m: float  #: Y of the fingertips
+    armpit_m: float  #: Y of the trunk's edge
+    slope: float  #: slope of the axis, Z = slope Y + height
+    height_m: float  #: height of the axis at Y = 0
+    thickness_m: float  #: median height of the arm's outline between elbow and wrist
 
     @property
     def reach_m(self) -> float:
@@ -68,14 +60,7 @@ class LevelArm:
 def plane_points_m(
     camera: Camera, columns: NDArray[Any], rows: NDArray[Any], distance_m: float
 ) -> FloatArray:
-    """Return the points (n, 2), Y and Z, of the upright plane at pixels.
-
-    Args:
-        camera: working camera.
-        columns: shape (n,), px.
-        rows: shape (n,), px.
-        distance_m: level distance to the plane.
-    """
+    """Return the points (n, 2), Y and Z, of an upright plane at a level distance at pixels (n,)."""
     points = camera.optical_to_reference(camera.rays(np.column_stack([columns, rows])))
     scaled: FloatArray = points[:, 1:] * (-distance_m / points[:, :1])
     return scaled
@@ -107,16 +92,9 @@ def filled(silhouette: Silhouette) -> Silhouette:
 def level_arm(
     silhouette: Silhouette, camera: Camera, distance_m: float, side: int
 ) -> LevelArm | None:
-    """Trace one arm of the reference ``arms`` from the fingertips to the trunk.
+    """Trace one arm of the silhouette of ``arms`` from the fingertips to the trunk, or None.
 
-    Args:
-        silhouette: (H, W) of ``arms``.
-        camera: working camera.
-        distance_m: level distance to the person.
-        side: 1 for the arm at the image's right, -1 for the other arm.
-
-    Returns:
-        None if there is no arm.
+    ``side`` is 1 for the arm at the image's right, -1 for the other arm.
     """
     used = np.nonzero(silhouette.any(axis=0))[0]
     if len(used) < _FEWEST_COLUMNS:
@@ -151,17 +129,10 @@ def level_arm(
 def span_m(
     arms: Silhouette, camera: Camera, distance_m: float, left: LevelArm, right: LevelArm
 ) -> float:
-    """Return the distance from fingertip to fingertip.
+    """Return the distance from fingertip to fingertip in the silhouette ``arms`` (H, W).
 
     If the middle of the span is not below the head, a part of one arm is missing in the silhouette,
     and the span is twice the reach of the longer arm.
-
-    Args:
-        arms: silhouette (H, W).
-        camera: working camera.
-        distance_m: level distance to the person.
-        left: the left arm in it.
-        right: the right arm in it.
     """
     span = left.tip_m - right.tip_m
     centre = (left.tip_m + right.tip_m) / 2.0
@@ -222,17 +193,8 @@ def axes_distance_m(
 ) -> float:
     """Return the distance between the axes of hanging arms at the height of the shoulder joints.
 
-    Args:
-        front: silhouette (H, W).
-        camera: working camera.
-        distance_m: level distance to the person.
-        axis_m: height of the axes of the level arms of ``arms``.
-        joint_m: height of the shoulder joints.
-        span_m: distance from fingertip to fingertip.
-        arm: one of the level arms, of which the thickness is used.
-
-    Returns:
-        NaN if the arms are separate from the trunk in too few rows.
+    ``axis_m`` is the height of the axes of the level arms, of which ``arm`` gives the thickness.
+    NaN if the arms are separate from the trunk in too few rows.
     """
     heights = row_heights_m(front, camera, distance_m)
     thickness_px = arm.thickness_m * camera.fx / distance_m

@@ -12,7 +12,7 @@
 
 Without references, one image of any posture teaches the colours of head, torso and legs. Forearms
 are then half bare and half in sleeves, until tracking tells
-(:mod:`cardbox_tracker.terms.inner_cue_sleeves`).
+(:mod:`cardbox_tracker.terms.inner_cue`).
 """
 
 from __future__ import annotations
@@ -86,14 +86,9 @@ def learn_appearance(
     camera: Camera,
     seed: int = 0,
 ) -> Appearance:
-    """Learn the colours of the parts.
+    """Learn the colours of the parts from images and silhouettes of each of ``LEARNED_FROM``.
 
-    Args:
-        images: images (H, W, 3) bgr or (H, W) of each of ``LEARNED_FROM``, all of one kind.
-        references: silhouettes (H, W) of ``LEARNED_FROM``.
-        body: the measured person.
-        camera: working camera with the pitch of the body model.
-        seed: seed of the search for the actual posture.
+    All images are (H, W, 3) bgr or (H, W). The camera has the pitch of the body model.
     """
     return Appearance.of(*learn_histograms(images, references, body, camera, seed))
 
@@ -133,20 +128,11 @@ def learn_histograms(
 def seen_appearance(
     image: Image, silhouette: Silhouette, body: BodyModel, camera: Camera, posture: FloatArray
 ) -> Appearance | None:
-    """Learn colours from one image of any posture.
+    """Learn colours from one image (H, W, 3), bgr, or (H, W) of a posture (12,), or return None.
 
     Each part of a colour image is counted as it looks in less and in more light. The hands get the
-    colours of the face, and the forearms those of face and torso in equal parts.
-
-    Args:
-        image: (H, W, 3) bgr or (H, W).
-        silhouette: (H, W) of the person.
-        body: the person at the current place.
-        camera: working camera with the pitch of the body model.
-        posture: posture of the person, (12,).
-
-    Returns:
-        None if head or torso are not visible.
+    colours of the face, and the forearms those of face and torso in equal parts. Head and torso
+    must be visible. The camera has the pitch of the body model.
     """
     labels = part_labels(body, camera, posture, silhouette)
     channels = 1 if image.ndim == 2 else 3

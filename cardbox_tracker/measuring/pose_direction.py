@@ -40,14 +40,7 @@ class PoseDirection:
     """Compares the heights of one further camera's tangents for its pose and the inverse pose."""
 
     def __init__(self, first: Camera, other: Camera, given: Extrinsics, roll_rad: float) -> None:
-        """Begin without samples.
-
-        Args:
-            first: the first camera, including its pitch.
-            other: the further camera, turned upright.
-            given: the given pose, from the first camera to the upright one.
-            roll_rad: angle by which the further camera was turned upright.
-        """
+        """Begin without samples; ``other``, of the pose ``given``, was turned upright by a roll."""
         self._tangents = TopTangents(first, other, most=1)
         # The images have been turned by the roll of the given pose, even if that pose is inverted.
         c, s = np.cos(roll_rad), np.sin(roll_rad)

@@ -24,9 +24,8 @@ from cardbox_tracker.measuring.outline import (
     span_m,
     width_m,
 )
-from cardbox_tracker.measuring.references import POSTURE_TEXT
+from cardbox_tracker.measuring.references import POSTURE_TEXT, rounded_down, rounded_up
 from cardbox_tracker.measuring.skeleton import BREADTH_OF_SPAN
-from cardbox_tracker.measuring.wording import rounded_down, rounded_up
 from cardbox_tracker.person.posture import REFERENCE_NAMES
 
 Silhouette = NDArray[np.uint8]
@@ -115,11 +114,8 @@ def posture_problems(
 ) -> list[str]:
     """Return the problems of the references as sentences; an empty list if there are none.
 
-    Args:
-        references: silhouettes (H, W) of ``front``, ``side`` and ``arms``, as ``outline.filled``
-            returns them.
-        camera: working camera including the pitch.
-        distance_m: level distance to the person.
+    Silhouettes (H, W) of ``front``, ``side`` and ``arms`` are as ``outline.filled`` returns them;
+    the camera includes the pitch.
     """
     view = _View(references, camera, distance_m)
     mixed_up = _mixed_up(view.widths())
@@ -137,11 +133,7 @@ def posture_problems(
 
 
 def check_postures(references: Mapping[str, Silhouette], camera: Camera, distance_m: float) -> None:
-    """Refuse references in wrong postures; the arguments are those of ``posture_problems``.
-
-    Raises:
-        InitializationError: the text names the reference and the mistake.
-    """
+    """Raise InitializationError, with the mistake, for references in wrong postures."""
     problems = posture_problems(references, camera, distance_m)
     if problems:
         raise InitializationError("; ".join(problems))

@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 
 import numpy as np
@@ -12,8 +13,23 @@ from numpy.typing import NDArray
 
 from cardbox_tracker.camera.camera import Camera
 from cardbox_tracker.common.errors import InitializationError
-from cardbox_tracker.measuring.wording import rounded_down, rounded_up
 from cardbox_tracker.person.posture import REFERENCE_NAMES
+
+# Tolerance of floating-point errors.
+_TINY = 1e-9
+
+
+def rounded_down(value: float, digits: int = 2) -> str:
+    """Return a number rounded down, for values below a bound."""
+    unit = 10**digits
+    return f"{math.floor(value * unit + _TINY) / unit:.{digits}f}"
+
+
+def rounded_up(value: float, digits: int = 2) -> str:
+    """Return a number rounded up, for values above a bound."""
+    unit = 10**digits
+    return f"{math.ceil(value * unit - _TINY) / unit:.{digits}f}"
+
 
 Silhouette = NDArray[np.uint8]
 
@@ -35,11 +51,7 @@ POSTURE_TEXT = {
 
 
 def average_silhouette(silhouettes: Sequence[Silhouette]) -> Silhouette:
-    """Return the pixelwise majority (H, W) of the silhouettes of one posture.
-
-    Raises:
-        InitializationError: there are no silhouettes.
-    """
+    """Return the pixelwise majority (H, W) of silhouettes of one posture; there must be some."""
     if not silhouettes:
         raise InitializationError(
             "no silhouette was captured; check the times, or that the background node runs"
@@ -49,11 +61,7 @@ def average_silhouette(silhouettes: Sequence[Silhouette]) -> Silhouette:
 
 
 def check_reference(name: str, silhouette: Silhouette) -> None:
-    """Refuse a silhouette (H, W) that cannot show the reference posture ``name``.
-
-    Raises:
-        InitializationError: no person is in the image, or the person is cut off at its border.
-    """
+    """Raise InitializationError if a silhouette (H, W) cannot show the posture ``name``."""
     if name not in REFERENCE_NAMES:
         raise ValueError(f"reference {name!r} is unknown; it is one of {REFERENCE_NAMES}")
     share = np.count_nonzero(silhouette) / silhouette.size
@@ -86,11 +94,7 @@ def check_reference(name: str, silhouette: Silhouette) -> None:
 
 
 def check_references(references: Mapping[str, Silhouette]) -> None:
-    """Refuse silhouettes that are missing, differ in size, or show the same posture twice.
-
-    Raises:
-        InitializationError: the text names the references and the remedy.
-    """
+    """Raise InitializationError if silhouettes are missing, of several sizes, or of one posture."""
     missing = [name for name in REFERENCE_NAMES if name not in references]
     if missing:
         raise InitializationError(f"missing references: {', '.join(missing)}; capture them first")

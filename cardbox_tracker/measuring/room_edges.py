@@ -33,12 +33,8 @@ _LONGER_PX = 960
 def edge_likelihoods(pictures: list[NDArray[np.uint8]], camera: Camera) -> FloatArray:
     """Return the logarithm of the likelihood of each pitch and roll, (P, R).
 
-    Args:
-        pictures: images (H, W) or (H, W, 3) of the camera at any resolution, undistorted.
-        camera: intrinsics; its pitch is not used.
-
-    Returns:
-        For ``PITCHES_RAD`` and ``ROLLS_RAD``; 0 everywhere without lines.
+    Pictures (H, W) or (H, W, 3) are of the camera at any resolution, undistorted. It is for
+    ``PITCHES_RAD`` and ``ROLLS_RAD``; 0 everywhere without lines.
     """
     pitches, rolls = np.meshgrid(PITCHES_RAD, ROLLS_RAD, indexing="ij")
     down = np.stack(

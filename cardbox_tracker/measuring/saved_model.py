@@ -19,11 +19,7 @@ class SavedModel:
     """
 
     def __init__(self, name: str) -> None:
-        """Read the file if it exists, and check whether it can be written.
-
-        Raises:
-            CardboxError: the file is not a body model, or does not exist and cannot be written.
-        """
+        """Read the file if it exists; raise CardboxError if it is no model or cannot be written."""
         self._path = user_path(name) if name else None
         self.body: BodyModel | None = None
         self.warning = ""
@@ -41,8 +37,7 @@ class SavedModel:
     def save(self, body: BodyModel) -> str:
         """Write ``body`` if there is a file name; return a text with the path for the answer.
 
-        Raises:
-            InitializationError: the file cannot be written.
+        Raises InitializationError if the file cannot be written.
         """
         if self._path is None:
             return ""

@@ -24,7 +24,7 @@ from cardbox_tracker.measuring.config import (
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.sizes import FloatArray
 from cardbox_tracker.terms.depth import Depth, DepthTerm
-from cardbox_tracker.terms.drawn_body import body_tuple
+from cardbox_tracker.terms.kernel_arguments import body_tuple
 from cardbox_tracker.terms.term import DepthImage, Frame, Posed
 from cardbox_tracker.terms.whole_body import WholeBodyCost
 from cardbox_tracker.terms.whole_body_config import WholeBodyCostConfig
@@ -47,15 +47,10 @@ Its second argument is False in the first call, and True in the last one at the 
 
 
 class DepthReference(NamedTuple):
-    """Silhouette and depth of a reference posture.
+    """Silhouette and depth of a reference posture."""
 
-    Attributes:
-        silhouette: (H, W), 0 or 255.
-        depth_m: (H, W), metres along the optical axis; 0 if unknown.
-    """
-
-    silhouette: NDArray[np.uint8]
-    depth_m: DepthImage
+    silhouette: NDArray[np.uint8]  #: (H, W), 0 or 255
+    depth_m: DepthImage  #: (H, W), metres along the optical axis; 0 if unknown
 
 
 def measured_at_scale(
@@ -66,14 +61,8 @@ def measured_at_scale(
 ) -> InitializationResult:
     """Measure a person with the first camera, and the distance with a second one or depth images.
 
-    Args:
-        measure: measurement with the first camera.
-        config: settings; the search starts at their distance.
-        camera: the first camera; its pitch is replaced by that of ``config``.
-        scale: :func:`measured_scale` or :func:`depth_scale`, given its references.
-
-    Raises:
-        InitializationError: see ``measure`` and ``scale``.
+    The search starts at the distance of ``config``; ``scale`` is :func:`measured_scale` or
+    :func:`depth_scale`, given its references. Raises what ``measure`` and ``scale`` do.
     """
     guessed = measure(config, False).body
     found = scale(guessed, camera.with_pitch(config.camera_pitch_rad))
@@ -89,15 +78,9 @@ def measured_scale(
 ) -> float:
     """Return the factor by which size and distance of ``body`` must be multiplied.
 
-    Args:
-        body: measured by ``camera`` at an assumed distance.
-        camera: the first camera including its pitch.
-        other: the second camera.
-        references: silhouettes (H, W) of the second camera, 0 or 255, by the names of the
-            reference postures ``front`` and ``arms``.
-
-    Raises:
-        InitializationError: the body does not fit the second camera's silhouettes at any scale.
+    ``camera``, with its pitch, has measured it at an assumed distance; ``references`` are
+    silhouettes (H, W), 0 or 255, of the ``other`` camera by the names of the postures. Raises
+    InitializationError if the body does not fit them at any scale.
     """
     best, share = _best_scale(body, lambda there: _share(there, camera, other, references))
     if share > _LARGEST_SHARE:
@@ -113,15 +96,7 @@ def depth_scale(body: BodyModel, camera: Camera, references: Mapping[str, DepthR
     """Return the factor by which size and distance of ``body`` must be multiplied.
 
     The visible surface of the model is compared with the depth images, see
-    :mod:`cardbox_tracker.terms.depth`.
-
-    Args:
-        body: measured by ``camera`` at an assumed distance.
-        camera: camera of silhouettes and depth, including its pitch.
-        references: silhouettes and depths by reference posture, ``front`` and ``arms``.
-
-    Raises:
-        InitializationError: the depth images do not show the person.
+    :mod:`cardbox_tracker.terms.depth`. Raises InitializationError if these do not show the person.
     """
     frames = {
         name: Frame(
@@ -151,11 +126,7 @@ def depth_scale(body: BodyModel, camera: Camera, references: Mapping[str, DepthR
 
 
 def scaled(body: BodyModel, scale: float) -> BodyModel:
-    """Return ``body`` with sizes and place multiplied by ``scale``.
-
-    Raises:
-        BodyModelError: the sizes or the place are out of range.
-    """
+    """Return ``body`` with sizes and place multiplied by ``scale``, or raise BodyModelError."""
     place = body.placement
     sizes: FloatArray = scale * body.sizes
     return body.with_values(

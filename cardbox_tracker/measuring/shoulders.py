@@ -58,14 +58,8 @@ def shoulder_height_m(
 ) -> float:
     """Return the height of the shoulder joints while the arms hang.
 
-    Args:
-        front: silhouette (H, W).
-        camera: working camera.
-        distance_m: level distance to the shoulders.
-        raised_m: height of the axes of the level arms of ``arms`` at the joints.
-        middle_m: Y of the middle of the shoulders in ``front``.
-        breadth_m: distance of the shoulder joints.
-        span_m: distance from fingertip to fingertip.
+    ``raised_m`` is the height of the axes of the level arms of ``arms`` at the joints, ``middle_m``
+    the Y of the middle of the shoulders in ``front``.
     """
     sides_m = middle_m + np.array([-0.5, 0.5]) * breadth_m
     tops_m = [top_m(front, camera, distance_m, y) for y in sides_m]
@@ -102,13 +96,7 @@ def shoulders_forward_m(
 ) -> float:
     """Return how far the shoulders are before the hips; 0 if ``side`` does not show the hips.
 
-    Args:
-        side: silhouette (H, W).
-        camera: working camera.
-        distance_m: level distance to the person.
-        height_m: height of the shoulder joints.
-        span_m: distance from fingertip to fingertip.
-        side_turn: ``left`` or ``right``, the side to which the person turned.
+    ``height_m`` is that of the shoulder joints.
     """
     below = (height_m - row_heights_m(side, camera, distance_m)) / span_m
     middles = []
@@ -125,11 +113,9 @@ def shoulders_forward_m(
 
 
 def robust_mean(readings: FloatArray, sd: FloatArray) -> float:
-    """Return the mean of readings, weighted by precision and by Cauchy weights.
+    """Return the mean of readings (n,), weighted by precision and by Cauchy weights.
 
-    Args:
-        readings: shape (n,); NaN if missing. The first reading must not be missing.
-        sd: standard deviations (n,).
+    ``sd`` (n,) are their standard deviations. NaN is missing, but not as the first reading.
     """
     known = np.isfinite(readings)
     values, weights = readings[known], sd[known] ** -2.0

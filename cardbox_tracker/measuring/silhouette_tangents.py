@@ -38,17 +38,12 @@ _Hull = tuple[FloatArray, NDArray[np.bool_]]
 
 
 class Pencil(NamedTuple):
-    """The planes through both cameras of a pose.
+    """The planes through both cameras of a pose."""
 
-    Attributes:
-        along: direction of the baseline in the other camera's frame, (3,).
-        here: directions up and ahead across the baseline, (2, 3), in the first camera's frame.
-        there: the same in the other camera's frame.
-    """
-
-    along: FloatArray
+    along: FloatArray  #: direction of the baseline in the other camera's frame, (3,)
+    #: directions up and ahead across the baseline, (2, 3), in the first camera's frame.
     here: FloatArray
-    there: FloatArray
+    there: FloatArray  #: the same in the other camera's frame
 
 
 class TopTangents:
@@ -61,13 +56,9 @@ class TopTangents:
         pairs: Iterable[tuple[Silhouette, Silhouette]] = (),
         most: int | None = None,
     ) -> None:
-        """Add the silhouettes of some frames.
+        """Add silhouettes (H, W), 0 or 255, of both cameras, of which the latest frames are kept.
 
-        Args:
-            first: the first camera, including its pitch.
-            other: the further camera.
-            pairs: silhouettes (H, W), 0 or 255, of both cameras.
-            most: number of latest frames that are kept; None keeps all.
+        The first camera includes its pitch.
         """
         self._first, self._other = first, other
         self._up = first.reference_to_optical_rotation() @ np.array([0.0, 0.0, 1.0])
@@ -104,7 +95,7 @@ class TopTangents:
     def heights(self, pose: Extrinsics | Pencil) -> FloatArray:
         """Return the height of the first camera's tangent above the other camera's, (n,), px.
 
-        It is measured in pixels of the other camera; NaN if a silhouette is cut off at the border.
+        It is in pixels of the other camera; NaN if a silhouette is cut off at the border.
         """
         along, axes_here, axes = self.pencil(pose) if isinstance(pose, Extrinsics) else pose
         found = np.full(len(self._hulls), np.nan)
@@ -122,10 +113,8 @@ class TopTangents:
     ) -> tuple[FloatArray, FloatArray]:
         """Return the normal equations, ``matrix`` @ change = -``right``, of a change of the pose.
 
-        Args:
-            extrinsics: the pose.
-            beside: for each number of the change the pose with a larger and with a smaller value,
-                and the difference of the values.
+        ``beside`` has, for each number of the change, the pose with a larger and with a smaller
+        value, and the difference of the values.
         """
         now = self.heights(extrinsics)
         slopes = np.array(
@@ -139,18 +128,11 @@ class TopTangents:
 
 
 def roll_of(tangents: TopTangents, extrinsics: Extrinsics) -> tuple[float, float]:
-    """Return the roll of the other camera against ``extrinsics``, and its standard deviation.
+    """Return the roll of the other camera against ``extrinsics``, and its standard deviation, rad.
 
     Pitch changes all heights equally, while the effect of roll depends on the column; both are
     estimated by weighted least squares. So the highest points (head, raised hands) must lie at
-    different columns.
-
-    Args:
-        tangents: tangents of several frames.
-        extrinsics: assumed pose.
-
-    Returns:
-        Roll and its standard deviation, rad; the deviation is inf if the roll is undetermined.
+    different columns; if they do not, the deviation is inf.
     """
     turn = np.zeros(2)
     for _ in range(_ROLL_STEPS):

@@ -74,23 +74,14 @@ _BREADTH_SD = np.array([0.05, 0.031, 0.046])
 
 @dataclass(frozen=True)
 class Skeleton:
-    """The bones of the arms, metres.
+    """The bones of the arms, metres."""
 
-    Attributes:
-        shoulder_breadth_m: distance between the shoulder joints.
-        shoulder_height_m: height of the shoulder joints, with hanging arms, above the camera.
-        upper_arm_m: distance from shoulder joint to elbow joint.
-        forearm_m: distance from elbow joint to knuckles.
-        span_m: distance from fingertip to fingertip in ``arms``.
-        forward_m: how far the shoulder joints are before the hips.
-    """
-
-    shoulder_breadth_m: float
-    shoulder_height_m: float
-    upper_arm_m: float
-    forearm_m: float
-    span_m: float
-    forward_m: float = 0.0
+    shoulder_breadth_m: float  #: distance between the shoulder joints
+    shoulder_height_m: float  #: height of the shoulder joints, with hanging arms, above the camera
+    upper_arm_m: float  #: distance from shoulder joint to elbow joint
+    forearm_m: float  #: distance from elbow joint to knuckles
+    span_m: float  #: distance from fingertip to fingertip in ``arms``
+    forward_m: float = 0.0  #: how far the shoulder joints are before the hips
 
 
 def measure_skeleton(
@@ -99,17 +90,10 @@ def measure_skeleton(
     distance_m: float,
     side_turn: str = "left",
 ) -> Skeleton | None:
-    """Measure the bones of the arms.
+    """Measure the bones of the arms; None if ``arms`` shows no arms.
 
-    Args:
-        references: silhouettes (H, W) of ``front``, ``side`` and ``arms``, as ``outline.filled``
-            returns them.
-        camera: working camera including the pitch.
-        distance_m: level distance to the person's hips.
-        side_turn: ``left`` or ``right``, the side to which the person turned for ``side``.
-
-    Returns:
-        None if ``arms`` shows no arms.
+    ``references`` are silhouettes (H, W) as ``outline.filled`` returns them. The camera includes
+    its pitch, and the distance is the level one to the hips.
     """
     first = _measured_in_plane(references, camera, distance_m)
     if first is None:
@@ -151,11 +135,9 @@ def _measured_in_plane(
 
 
 def combined(readings: FloatArray, sd: FloatArray) -> float:
-    """Return the robust mean of lengths.
+    """Return the robust mean of lengths (n,) above 0, by relative deviations (n,).
 
-    Args:
-        readings: shape (n,), above 0; NaN if missing. The first reading must not be missing.
-        sd: relative standard deviations (n,).
+    NaN is missing, but not as the first reading.
     """
     logs = np.log(np.where(readings > 0, readings, np.nan))
     return float(np.exp(robust_mean(logs, sd)))

@@ -52,14 +52,7 @@ def height_of_row_m(camera: Camera, row: float, distance_m: float) -> float:
 def stature_m(
     front: NDArray[np.uint8], skeleton: Skeleton, camera: Camera, distance_m: float
 ) -> float:
-    """Return the estimated stature in metres.
-
-    Args:
-        front: silhouette (H, W) of ``front``.
-        skeleton: bones of the arms.
-        camera: working camera including the pitch.
-        distance_m: level distance to the person.
-    """
+    """Return the estimated stature in metres by the silhouette ``front`` (H, W) and the bones."""
     rows = np.nonzero(np.any(front, axis=1))[0]
     crown_m = height_of_row_m(camera, rows[0] - 0.5, distance_m)
     above_m = crown_m - skeleton.shoulder_height_m
@@ -82,13 +75,7 @@ _SPECK_PX = 2
 def at_height_of(silhouette: NDArray[np.uint8], body: BodyModel, camera: Camera) -> BodyModel:
     """Return ``body`` with the hip height that aligns its head with the silhouette's top row.
 
-    Args:
-        silhouette: (H, W), 0 or 255, of the camera's size.
-        body: body model with the person's distance and the camera's pitch.
-        camera: working camera.
-
-    Returns:
-        ``body`` unchanged if the silhouette is empty or the head is cut off.
+    It is unchanged if the silhouette (H, W) is empty or the head is cut off.
     """
     rows = np.flatnonzero(np.count_nonzero(silhouette, axis=1) > _SPECK_PX)
     if rows.size == 0 or rows[0] == 0:

@@ -41,10 +41,7 @@ def bins_of(channels: int) -> int:
 def steps_of_levels(brightness: FloatArray, learned: FloatArray) -> NDArray[np.int32]:
     """Return the step of each level 0 to 255 in each channel, (channels, 256).
 
-    Args:
-        brightness: brightness of the torso in the image, (channels,).
-        learned: brightness of the torso when the colours were learned, (channels,); levels are
-            scaled by the ratio of both.
+    Levels are scaled by the ratio of the torso's brightness in the image and when it was learned.
     """
     steps = GREY_STEPS if len(learned) == 1 else COLOR_STEPS
     gains = learned / np.maximum(brightness, 1.0)
@@ -87,11 +84,7 @@ class Appearance:
 
     @classmethod
     def of(cls, histograms: FloatArray, brightness: FloatArray) -> Appearance:
-        """Return the appearance of probabilities (5, bins), each row summing to one.
-
-        Raises:
-            BodyModelError: the shapes do not fit.
-        """
+        """Return the appearance of probabilities (5, bins), each row summing to one."""
         least = UNSEEN / histograms.shape[1]
         way = 1.0 - np.log(np.clip(histograms, least, 1.0)) / np.log(least)
         return cls(np.round(_LARGEST * way).astype(np.uint8), brightness)
@@ -133,11 +126,7 @@ class Appearance:
 
     @classmethod
     def from_text(cls, text: str) -> Appearance:
-        """Parse the text of :meth:`to_text`; white space is ignored.
-
-        Raises:
-            BodyModelError: the text is damaged.
-        """
+        """Parse the text of :meth:`to_text`; raise BodyModelError if it is damaged."""
         most = 1 + 2 * max(_CHANNELS) + len(PARTS) * bins_of(max(_CHANNELS))
         try:
             packed = base64.b64decode("".join(text.split()), validate=True)

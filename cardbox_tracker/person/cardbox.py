@@ -58,11 +58,9 @@ class PartPatches(NamedTuple):
 
 
 def part_patches(sizes_m: FloatArray, neck_to_head: float = 0.0) -> PartPatches:
-    """Return the patches of one or many bodies in the frames of their parts.
+    """Return the patches of bodies with sizes (..., 18) in the frames of their parts.
 
-    Args:
-        sizes_m: shape (..., 18).
-        neck_to_head: width of the neck as a fraction of the head's; 0, as in the paper, draws none.
+    ``neck_to_head`` is the width of the neck as a fraction of the head's; 0 draws none.
     """
     parts = parts_of_bodies(sizes_m, neck_to_head)
     trunk = [_frontal(parts.torso), _sagittal(parts.torso), _lid(parts.torso)]
@@ -80,26 +78,17 @@ def part_patches(sizes_m: FloatArray, neck_to_head: float = 0.0) -> PartPatches:
 
 
 def cardbox_patches(body: BodyModel, postures: FloatArray, neck_to_head: float = 0.0) -> FloatArray:
-    """Return the corners of the 15 patches in each posture, with rigid shoulders as in the paper.
+    """Return the corners of the 15 patches in postures (..., 12), rad and metres: (..., 15, 4, 3).
 
-    Args:
-        body: the measured person.
-        postures: shape (..., 12), rad and metres.
-        neck_to_head: width of the neck as a fraction of the head's; 0, as in the paper, draws none.
-
-    Returns:
-        Shape (..., 15, 4, 3), metres in the reference frame; the corners of a patch are in order
-        around it, the patches ordered as ``PATCH_NAMES``. With a neck its patch follows as the
-        16th, ``NECK_PATCHES``.
+    Shoulders are rigid as in the paper. Corners are metres in the reference frame, in order around
+    the patch, the patches ordered as ``PATCH_NAMES``. With a neck, of this width as a fraction of
+    the head's, its patch follows as the 16th, ``NECK_PATCHES``.
     """
     return patches_at(body, pose(body.rigid, postures), neck_to_head)
 
 
 def patches_at(body: BodyModel, frames: PosedBodies, neck_to_head: float = 0.0) -> FloatArray:
-    """Return the corners of the patches of a posed body, in its frame.
-
-    See :func:`cardbox_patches`, which takes postures.
-    """
+    """Return the corners of the patches of a posed body, as :func:`cardbox_patches`."""
     patches = part_patches(body.sizes, neck_to_head)
     return np.concatenate(
         [

@@ -60,10 +60,8 @@ HAND_OPEN_NAMES = "left_hand_open", "right_hand_open"
 def turn_of(palm: FloatArray, forearm: FloatArray, side: float) -> float:
     """Return the turn of a hand about its forearm, rad.
 
-    Args:
-        palm: normal out of the palm, unit vector (3,).
-        forearm: rotation (3, 3) of the forearm's frame in the same axes.
-        side: +1 for the left hand, -1 for the right.
+    ``palm`` (3,) is the normal out of the palm, ``forearm`` (3, 3) the rotation of its frame in the
+    same axes; ``side`` is +1 for the left hand, -1 for the right.
     """
     x, y, _ = forearm.T @ palm
     return -side * math.atan2(side * float(x), -side * float(y))

@@ -49,10 +49,9 @@ _MIRROR = np.array([1.0, 1.0, -1.0])
 
 
 def isb_angles(states: FloatArray) -> FloatArray:
-    """Return the angles of ``ISB_NAMES``, (n, 11), rad; nan where they are not determined.
+    """Return the angles of ``ISB_NAMES``, (n, 11), rad, for states (n, 14) or postures (n, 12).
 
-    Args:
-        states: (n, 14), or postures (n, 12), rad and metres; nan in gaps.
+    They are nan in gaps, and where they are not determined.
     """
     d = np.asarray(states, dtype=np.float64)
     left = arm_angles(*arm_directions(d[:, LEFT_ARM], 1.0), side=1.0)
@@ -65,10 +64,8 @@ def anatomical_angles(posture: FloatArray) -> FloatArray:
 
     The bend of an elbow is 0 for a straight arm. Elevation is the angle between the upper arm and
     the hanging one, and its plane is 0 to the side and 90 to the front; both are against the trunk.
-    The trunk leans to the front and to the right of the direction in which the person faces.
-
-    Args:
-        posture: (12,), rad and metres.
+    The trunk leans to the front and to the right of the direction in which the person faces. The
+    posture is (12,), rad and metres.
     """
     found = dict(zip(ISB_NAMES, np.degrees(isb_angles(posture[None]))[0], strict=True))
     arms = [sign * found[f"{side}_{name}"] for side in SIDES for name, sign in _OF_ARM]
@@ -78,10 +75,7 @@ def anatomical_angles(posture: FloatArray) -> FloatArray:
 def thorax_angles(postures: FloatArray) -> FloatArray:
     """Return extension, lateral flexion to the right and rotation to the left, (n, 3), rad.
 
-    They are those of the whole trunk: the model's torso is one part from the hips to the neck.
-
-    Args:
-        postures: (n, 12) or (n, 14), rad and metres.
+    They are those of the whole trunk, which is one part, for states (n, 14) or postures (n, 12).
     """
     roll, pitch, yaw = (postures[:, i] for i in (ROLL, PITCH, YAW))
     torso = rotation_z(yaw) @ rotation_y(pitch) @ rotation_x(roll)
@@ -100,10 +94,8 @@ def thorax_angles(postures: FloatArray) -> FloatArray:
 def arm_angles(upper_arm: FloatArray, forearm: FloatArray, side: float) -> FloatArray:
     """Return the angles of ``ARM``, (n, 4), rad; nan where they are not determined.
 
-    Args:
-        upper_arm: unit vectors (n, 3) from shoulder to elbow in the torso's frame.
-        forearm: unit vectors (n, 3) from elbow to hand in the same frame.
-        side: +1 for the left arm, -1 for the right.
+    Unit vectors (n, 3) lead from shoulder to elbow and to the hand in the torso's frame; ``side``
+    is +1 for the left arm, -1 for the right.
     """
     mirror = _MIRROR if side > 0 else np.ones(3)
     upper, lower = (v @ LABORATORY.T * mirror for v in (upper_arm, forearm))

@@ -123,19 +123,12 @@ class Boned(Protocol):
 
 
 class Bones(NamedTuple):
-    """A person in a place before a camera; kernels get a plain tuple.
+    """A person in a place before a camera; kernels get a plain tuple."""
 
-    Attributes:
-        parts: six lengths of six parts, (6, 6), metres, see :func:`.parts.shape_of`.
-        girdle: shoulder joints and how they rise with the arms, (3,).
-        place: place of the hips.
-        camera: pitch of the camera.
-    """
-
-    parts: FloatArray
-    girdle: FloatArray
-    place: Place
-    camera: Pitched
+    parts: FloatArray  #: six lengths of six parts, (6, 6), metres, see :func:`.parts.shape_of`
+    girdle: FloatArray  #: shoulder joints and how they rise with the arms, (3,)
+    place: Place  #: place of the hips
+    camera: Pitched  #: pitch of the camera
 
 
 BonesTuple = tuple[FloatArray, FloatArray, tuple[float, float], tuple[float, float]]
@@ -152,17 +145,11 @@ class Arm(NamedTuple):
 
 
 class PosedBodies(NamedTuple):
-    """Bodies in the reference frame, or in a camera's optical frame.
+    """Bodies in the reference frame, or in a camera's optical frame."""
 
-    Attributes:
-        points_m: points of ``POINT_NAMES``, (..., 9, 3), metres.
-        rotations: rotations from the frames of ``FRAME_NAMES``, (..., 5, 3, 3).
-        clavicles_m: rise of the left and right shoulder, (..., 2), metres: the values of
-            ``CLAVICLE_NAMES``.
-    """
-
-    points_m: FloatArray
-    rotations: FloatArray
+    points_m: FloatArray  #: points of ``POINT_NAMES``, (..., 9, 3), metres
+    rotations: FloatArray  #: rotations from the frames of ``FRAME_NAMES``, (..., 5, 3, 3)
+    #: rise of the left and right shoulder, (..., 2), metres: the values of ``CLAVICLE_NAMES``.
     clavicles_m: FloatArray
 
     @property
@@ -212,14 +199,11 @@ def pose(
     pitch_rad: float | None = None,
     clavicles_m: FloatArray | None = None,
 ) -> PosedBodies:
-    """Return a body in each state.
+    """Return a body in each state (..., 14), or posture (..., 12), rad and metres.
 
-    Args:
-        body: the person, whose shoulders rise unless it is ``rigid``.
-        states: postures (..., 12), or states (..., 14), rad and metres.
-        pitch_rad: None for the reference frame; else how far the camera looks down, for its optical
-            frame.
-        clavicles_m: rise of the shoulders, (..., 2), metres; that of the arms if it is None.
+    The frame is the reference frame, or the optical one of a camera that looks down by
+    ``pitch_rad``. Shoulders rise by ``clavicles_m`` (..., 2), metres; if it is None, with the arms,
+    unless the body is ``rigid``.
     """
     flat, shape = _flat(states)
     points, rotations = np.empty((len(flat), _N_POINTS, 3)), np.empty((len(flat), _N_FRAMES, 3, 3))
@@ -240,10 +224,7 @@ def pose(
 def jacobian(body: BodyModel, states: FloatArray, pitch_rad: float | None = None) -> FloatArray:
     """Return the derivatives of :attr:`PosedBodies.points_m`, (..., 9, 3, 14), by the states.
 
-    Args:
-        body: the person.
-        states: postures (..., 12), or states (..., 14), rad and metres.
-        pitch_rad: as for :func:`pose`.
+    The arguments are those of :func:`pose`.
     """
     flat, shape = _flat(states)
     derivatives = np.empty((len(flat), _N_POINTS, 3, N_STATE))
@@ -259,10 +240,7 @@ def clavicles(
 ) -> tuple[FloatArray, FloatArray]:
     """Return rise and standard deviation of both shoulders, (2,) each, metres.
 
-    Args:
-        body: the person.
-        posture: (12,), rad and metres.
-        stddev: standard deviations of the posture, (12,).
+    Posture and standard deviations are (12,), rad and metres.
     """
     found = np.empty(2), np.empty(2)
     _clavicles(posture, stddev, girdle_of(body), *found)
@@ -270,16 +248,10 @@ def clavicles(
 
 
 def gaze_m(parts: BodyParts[float], posed: PosedBodies, angles_rad: FloatArray) -> FloatArray:
-    """Return a line from the middle of the head along the direction of the face.
+    """Return both ends (2, 3), metres, of a line along the direction of the face.
 
-    Args:
-        parts: parts of the body.
-        posed: the body in one posture.
-        angles_rad: ``neck_yaw`` and ``neck_pitch``, (2,).
-
-    Returns:
-        Both ends, (2, 3), metres in the frame of ``posed``; the line is as long as the head is
-        high.
+    It begins in the middle of the head of the ``posed`` body, in whose frame it is, and is as long
+    as the head is high. ``angles_rad`` (2,) are ``neck_yaw`` and ``neck_pitch``.
     """
     rotation = neck_rotation(angles_rad)
     middle = np.array(neck_pivot_m(parts)) + rotation @ head_from_pivot_m(parts)

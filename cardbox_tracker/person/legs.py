@@ -63,11 +63,9 @@ def floor_m(body: BodyModel) -> float | None:
 def legs_m(body: BodyModel, hips_m: FloatArray, yaw: FloatArray, angles: FloatArray) -> FloatArray:
     """Return hips, knees and ankles, ordered as ``LEG_KEYPOINT_NAMES``, (n, 6, 3), metres.
 
-    Args:
-        body: the person, whose bones have the mean lengths of people of their stature.
-        hips_m: middle of the hips, (n, 3), in the reference frame, as the result.
-        yaw: ``torso_yaw``, (n,), rad.
-        angles: ``LEG_NAMES``, (n, 8), rad.
+    The bones have the mean lengths of people of that stature. Like the result, the middle of the
+    hips (n, 3) is in the reference frame; ``yaw`` (n,) is ``torso_yaw`` and ``angles`` (n, 8) are
+    ``LEG_NAMES``, rad.
     """
     stature_m, turn = stature_of(body_parts(body.sizes)), rotation_z(yaw)
     points = []
@@ -131,9 +129,7 @@ LEG_KEYPOINT_NAMES: tuple[str, ...] = (
 def leg_directions(angles_rad: FloatArray, side: float) -> tuple[FloatArray, FloatArray]:
     """Return unit vectors (..., 3) along thigh and shank in the frame of the hips.
 
-    Args:
-        angles_rad: the four angles of a leg, (..., 4).
-        side: +1 for the left leg, -1 for the right.
+    The four angles of a leg are (..., 4), rad; ``side`` is +1 for the left leg, -1 for the right.
     """
     thigh, shank = leg_rotations(angles_rad, side)
     return -thigh[..., 2], -shank[..., 2]
@@ -149,7 +145,7 @@ def leg_rotations(angles_rad: FloatArray, side: float) -> tuple[FloatArray, Floa
 def leg_angles(thigh: FloatArray, shank: FloatArray, side: float) -> FloatArray:
     """Return angles (4,) of a leg with these directions (3,), see :func:`leg_directions`.
 
-    The rotation is that of a leg that bends its knee backwards, within a quarter of a turn.
+    The knee bends backwards, within a quarter of a turn.
     """
     flexion = np.arctan2(thigh[0], -thigh[2])
     abduction = side * np.arcsin(np.clip(thigh[1], -1.0, 1.0))

@@ -48,11 +48,9 @@ MEASURED, PROPORTIONS = SOURCES = ("measured", "proportions")
 
 
 def check_range(name: str, value: float, lowest: float, highest: float, unit: str) -> None:
-    """Refuse a value that is not finite or lies outside ``lowest`` to ``highest``.
+    """Raise BodyModelError if a value is not finite or outside of ``lowest`` to ``highest``.
 
-    Raises:
-        BodyModelError: the value is refused; the text gives name, value, unit, range and a likely
-            wrong unit.
+    The text gives name, value, unit, range and a likely wrong unit.
     """
     if not math.isfinite(value):
         raise BodyModelError(f"{name} is {value}; expected a finite number of {unit}")
@@ -116,18 +114,13 @@ class Person:
 class Placement:
     """Position of mid-hip in the front reference posture, metres in the reference frame.
 
-    Attributes:
-        distance_m: level distance from the camera: X is ``-distance_m``.
-        hip_height_m: Z, usually negative.
-        lateral_m: Y, which is ``torso_y`` where tracking starts.
-
     Raises:
         BodyModelError: a value is not finite or outside of its range; the text names it.
     """
 
-    distance_m: float = 2.0
-    hip_height_m: float = -0.5
-    lateral_m: float = 0.0
+    distance_m: float = 2.0  #: level distance from the camera: X is ``-distance_m``
+    hip_height_m: float = -0.5  #: Z, usually negative
+    lateral_m: float = 0.0  #: Y, which is ``torso_y`` where tracking starts
 
     def __post_init__(self) -> None:
         """Check every value."""
@@ -140,23 +133,18 @@ class Placement:
 class CameraPose:
     """Pose of the camera in the reference frame, whose origin is the camera's centre.
 
-    Attributes:
-        pitch_rad: downward pitch, rad.
-        pitch_stddev_rad: its standard deviation, rad; it is no part of a model file.
-        roll_rad: how far the camera is turned clockwise about its axis, seen from behind it. The
-            tracker's images are turned back, and its results are those of the camera as it stands.
-        height_m: height above the floor, metres; None if it is not known.
-        height_stddev_m: its standard deviation, metres; it is no part of a model file.
-
     Raises:
         BodyModelError: a value is not finite or outside of its range.
     """
 
-    pitch_rad: float = 0.0
+    pitch_rad: float = 0.0  #: downward pitch, rad
+    #: its standard deviation, rad; it is no part of a model file.
     pitch_stddev_rad: float = math.radians(2.0)
+    #: how far the camera is turned clockwise about its axis, seen from behind it. The tracker's
+    #: images are turned back, and its results are those of the camera as it stands.
     roll_rad: float = 0.0
-    height_m: float | None = None
-    height_stddev_m: float = 0.1
+    height_m: float | None = None  #: height above the floor, metres; None if it is not known
+    height_stddev_m: float = 0.1  #: its standard deviation, metres; it is no part of a model file
 
     def __post_init__(self) -> None:
         """Check the values."""
@@ -224,15 +212,10 @@ class BodyModel:
 
     @classmethod
     def of(cls, sizes: FloatArray | None = None, **values: Any) -> BodyModel:
-        """Create a model from plain numbers.
+        """Create a model from sizes (18,), metres, and numbers; what is missing has its default.
 
-        Args:
-            sizes: shape (18,), metres; None for the default sizes.
-            values: any of ``CONSTANTS``, ``CAMERA_ROLL``, ``side_turn``, ``appearance``,
-                ``source``, ``unknown`` and ``shoulder_rise``; missing values have their defaults.
-
-        Raises:
-            BodyModelError: a number is outside of its range; the text names it.
+        ``values`` are any of ``CONSTANTS``, ``CAMERA_ROLL``, ``side_turn``, ``appearance``,
+        ``source``, ``unknown`` and ``shoulder_rise``. Raises BodyModelError for one out of range.
         """
         model = cls() if sizes is None else cls(Person(sizes))
         return model.with_values(**values)
@@ -240,13 +223,8 @@ class BodyModel:
     def with_values(self, **values: Any) -> BodyModel:
         """Return the same model with other numbers.
 
-        Args:
-            values: any of ``sizes``, ``CONSTANTS``, ``CAMERA_ROLL``, ``CAMERA_HEIGHT``,
-                ``height_stddev_m``, ``side_turn``, ``appearance``, ``source``, ``unknown`` and
-                ``shoulder_rise``.
-
-        Raises:
-            BodyModelError: a number is outside of its range; the text names it.
+        ``values`` are those of :meth:`of`, ``sizes``, ``CAMERA_HEIGHT`` and ``height_stddev_m``.
+        Raises BodyModelError for one out of range.
         """
         changed: dict[str, Any] = {}
         if "sizes" in values:

@@ -82,14 +82,9 @@ def _yaml_number(value: float) -> str:
 
 
 def loads_body_model(text: str, source: str = "body model") -> BodyModel:
-    """Parse a body model.
+    """Parse YAML as :func:`dumps_body_model` writes it; ``source`` names the text in errors.
 
-    Args:
-        text: YAML as :func:`dumps_body_model` writes it.
-        source: name of the text in errors, such as a path or a topic.
-
-    Raises:
-        BodyModelError: the text is no body model; the error names the wrong key.
+    Raises BodyModelError, with the wrong key, if it is no body model.
     """
     try:
         data = parse_small_yaml(text)
@@ -104,11 +99,7 @@ def loads_body_model(text: str, source: str = "body model") -> BodyModel:
 
 
 def load_body_model(path: str | os.PathLike[str]) -> BodyModel:
-    """Read a body model file.
-
-    Raises:
-        BodyModelError: the file cannot be read or is no body model.
-    """
+    """Read a body model file; raise BodyModelError if it cannot be read or is none."""
     expected = "the body model that 'cardbox initialize' or the initializer node wrote"
     with foreign(path, BodyModelError, expected):
         text = read_small_text(path)
@@ -116,11 +107,7 @@ def load_body_model(path: str | os.PathLike[str]) -> BodyModel:
 
 
 def save_body_model(model: BodyModel, path: str | os.PathLike[str]) -> None:
-    """Write ``model`` to ``path`` atomically: a reader sees either the old file or the new one.
-
-    Raises:
-        BodyModelError: the file cannot be written.
-    """
+    """Write ``model`` to ``path`` atomically; raise BodyModelError if that fails."""
     try:
         with atomic_path(path) as temporary, temporary.open("w", encoding="utf-8") as file:
             file.write(dumps_body_model(model))

@@ -77,12 +77,7 @@ class BodyParts(NamedTuple, Generic[Length]):
 
 
 def body_parts(sizes_m: FloatArray, neck_to_head: float = 0.0) -> BodyParts[float]:
-    """Return the parts of one body.
-
-    Args:
-        sizes_m: shape (18,), ordered as ``SIZE_NAMES``.
-        neck_to_head: width of the neck as a fraction of the head's, 0 without a neck.
-    """
+    """Return the parts of one body, with a neck of a fraction of the head's width, or without."""
     return _parts(np.asarray(sizes_m).tolist(), neck_to_head)
 
 
@@ -92,16 +87,11 @@ def parts_of_bodies(sizes_m: FloatArray, neck_to_head: float = 0.0) -> BodyParts
 
 
 def shape_of(sizes_m: FloatArray, neck_to_head: float = 0.0) -> tuple[FloatArray, FloatArray]:
-    """Return parts and shoulders of one or many bodies, metres.
+    """Return parts and shoulders of bodies with sizes (..., 18), metres.
 
-    Args:
-        sizes_m: shape (..., 18).
-        neck_to_head: width of the neck as a fraction of the head's; 0, as in the paper, draws none.
-
-    Returns:
-        The six lengths of each :class:`Part`, (..., 6, 6), the parts
-        ordered as in :class:`BodyParts`; and the lateral and vertical
-        coordinate of a shoulder joint in the torso's frame, (..., 2).
+    They are the six lengths of each :class:`Part`, (..., 6, 6), ordered as in :class:`BodyParts`,
+    and the lateral and vertical coordinate of a shoulder joint in the torso's frame, (..., 2).
+    ``neck_to_head`` is the width of the neck as a fraction of the head's, 0 for none.
     """
     *parts, aside, height = parts_of_bodies(sizes_m, neck_to_head)
     lengths = np.array([length for part in parts for length in part])

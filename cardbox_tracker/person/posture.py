@@ -58,10 +58,7 @@ def place_limits(distance_m: float) -> FloatArray:
     """Return the lowest and highest value of each of ``PLACE_NAMES``, (2, 2), metres.
 
     The person moves between ``NEAREST_M`` and ``FARTHEST_M`` from the camera; the range always
-    contains the measured place, and a step away from it.
-
-    Args:
-        distance_m: distance of the hips in the body model.
+    contains the measured place, ``distance_m`` away, and a step away from it.
     """
     farthest_m = max(FARTHEST_M, distance_m + _FARTHER_M)
     nearest_m = min(NEAREST_M, distance_m)
@@ -72,9 +69,8 @@ def place_limits(distance_m: float) -> FloatArray:
 def state_limits(distance_m: float, facing_rad: float = 0.0) -> FloatArray:
     """Return the lowest and highest value of each value of a state, (14, 2); not writable.
 
-    Args:
-        distance_m: distance of the hips in the body model, metres.
-        facing_rad: yaw around which the person turns: 0 faces the camera, pi or -pi away from it.
+    ``distance_m`` is that of the hips in the body model. The person turns around the yaw
+    ``facing_rad``: 0 faces the camera, pi or -pi away from it.
     """
     limits: FloatArray = np.vstack([TURNING_LIMITS, place_limits(distance_m)])
     limits[YAW] = facing_rad - _ASIDE_RAD, facing_rad + _ASIDE_RAD
@@ -90,19 +86,11 @@ _STRETCHED_ABDUCTION_RAD = np.radians(80.0)
 
 
 def reference_posture(name: str, side_turn: str = "left") -> FloatArray:
-    """Return the reference posture d_ref with the given name.
+    """Return the reference posture (12,), rad and metres, with the given name; ``torso_y`` is 0.
 
-    Args:
-        name: ``front`` (facing the camera, arms 20 degrees away from the body), ``side`` (the same,
-            turned by 90 degrees) or ``arms`` (facing, both arms stretched sideways, 80 degrees).
-        side_turn: ``left`` if the person turned to their own left for ``side``, so that their right
-            side is towards the camera, or ``right``.
-
-    Returns:
-        Shape (12,), rad and metres; ``torso_y`` is 0.
-
-    Raises:
-        ValueError: ``name`` or ``side_turn`` is unknown.
+    It is ``front`` (facing the camera, arms 20 degrees away from the body), ``side`` (the same,
+    turned by 90 degrees to the person's own ``left`` or ``right``) or ``arms`` (facing, both arms
+    stretched sideways, 80 degrees). Raises ValueError for another name or turn.
     """
     if name not in REFERENCE_NAMES:
         raise ValueError(f"reference posture {name!r} is unknown; it is one of {REFERENCE_NAMES}")

@@ -56,15 +56,8 @@ def body_from_proportions(
 ) -> BodyModel:
     """Return a body of the given stature; values that are not given are marked as unknown.
 
-    Args:
-        stature_m: height of the person, crown to floor.
-        distance_m: level distance from the camera.
-        shoulder_breadth_m: distance between the shoulder joints.
-        hip_height_m: height of the middle of the hips above the camera's centre.
-        camera_pitch_rad: downward pitch of the camera.
-
-    Raises:
-        BodyModelError: a number is outside of its range; the text names it.
+    The distance is level, the breadth between the shoulder joints, the height that of the middle of
+    the hips above the camera's centre. Raises BodyModelError if one is out of range.
     """
     check_range("stature", stature_m, *STATURE_LIMITS_M, "m")
     sizes = sizes_of_stature(stature_m)

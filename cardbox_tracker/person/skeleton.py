@@ -84,29 +84,18 @@ def _at_parent(_: BodyParts[float]) -> Point:
 
 
 class Joint(NamedTuple):
-    """A joint; the first values are those of the frame that its parent moves, at rest.
+    """A joint; the first values are those of the frame that its parent moves, at rest."""
 
-    Attributes:
-        name: its name in joint states and tables.
-        group: what determines it, see :class:`Group`.
-        parent: name of the joint that carries it; empty for the middle of the hips as measured.
-        kind: ``prismatic`` (metres), ``revolute`` (rad) or ``fixed``.
-        axis: unit vector.
-        limits: lowest and highest value; those of ``torso_x`` depend on the person's distance.
-        rep155: its name in REP-155, without the body's id (:mod:`.rep155`).
-        moves: name of what it moves; empty for an intermediate frame.
-        offset: function of the body's parts that returns its place, metres.
-    """
-
-    name: str
-    group: str
-    parent: str
-    kind: str
-    axis: Point
+    name: str  #: its name in joint states and tables
+    group: str  #: what determines it, see :class:`Group`
+    parent: str  #: name of the joint that carries it; empty for the middle of the hips as measured
+    kind: str  #: ``prismatic`` (metres), ``revolute`` (rad) or ``fixed``
+    axis: Point  #: unit vector
+    #: lowest and highest value; those of ``torso_x`` depend on the person's distance.
     limits: tuple[float, float]
-    rep155: str
-    moves: str = ""
-    offset: Offset = _at_parent
+    rep155: str  #: its name in REP-155, without the body's id (:mod:`.rep155`)
+    moves: str = ""  #: name of what it moves; empty for an intermediate frame
+    offset: Offset = _at_parent  #: function of the body's parts that returns its place, metres
 
     @property
     def link(self) -> str:
@@ -292,9 +281,7 @@ def neck_rotation(angles_rad: FloatArray) -> FloatArray:
 def arm_rotations(angles_rad: FloatArray, side: float) -> tuple[FloatArray, FloatArray]:
     """Return rotations (..., 3, 3) from upper arm and forearm, which hang along -Z, to torso.
 
-    Args:
-        angles_rad: the four angles of an arm, (..., 4).
-        side: +1 for the left arm, -1 for the right.
+    The four angles of an arm are (..., 4), rad; ``side`` is +1 for the left arm, -1 for the right.
     """
     a = np.asarray(angles_rad, dtype=np.float64)
     upper_arm = rotation_x(side * a[..., 0]) @ rotation_y(-a[..., 1])
@@ -302,11 +289,6 @@ def arm_rotations(angles_rad: FloatArray, side: float) -> tuple[FloatArray, Floa
 
 
 def arm_directions(angles_rad: FloatArray, side: float) -> tuple[FloatArray, FloatArray]:
-    """Return unit vectors (..., 3) along upper arm and forearm in the torso's frame.
-
-    Args:
-        angles_rad: the four angles of an arm, (..., 4).
-        side: +1 for the left arm, -1 for the right.
-    """
+    """Return unit vectors (..., 3) along upper arm and forearm; see :func:`arm_rotations`."""
     upper_arm, forearm = arm_rotations(angles_rad, side)
     return -upper_arm[..., 2], -forearm[..., 2]

@@ -80,14 +80,10 @@ def urdf_from_body(
 ) -> str:
     """Return the URDF of ``body`` as XML text.
 
-    Args:
-        body: the measured person.
-        optical_frame: name of the camera's optical frame; if given, it is added with the camera's
-            pitch, so that markers and keypoints are in the same tree.
-        torso_place: add the joints beside the 12 of the posture; the joint states then must contain
-            them, or the transforms beyond are missing. Legs have the mean lengths of people of
-            that size.
-        hands: also add those of the hands.
+    The ``optical_frame``, if given, is added with the camera's pitch, so that markers and keypoints
+    are in the same tree. With ``torso_place`` it has the joints beside the 12 of the posture, with
+    ``hands`` those of the hands; joint states must then contain them, or the transforms beyond are
+    missing. Legs have the mean lengths of people of that size.
     """
     robot = _Robot("cardbox_person", ROOT_LINK)
     if optical_frame:
@@ -124,12 +120,9 @@ def urdf_from_body(
 def rep155_urdf(body: BodyModel, body_id: str, optical_frame: str, torso_place: bool = True) -> str:
     """Return the URDF of ``body`` after REP-155 as XML text.
 
-    Args:
-        body: the measured person.
-        body_id: ending of all link and joint names; letters, digits and underscores.
-        optical_frame: frame of the camera, the root of the tree.
-        torso_place: add the joints of place, head and clavicles, which the joint states then must
-            contain.
+    ``body_id``, of letters, digits and underscores, ends all names of links and joints. The root is
+    the camera's ``optical_frame``. With ``torso_place`` it has the joints of place, head and
+    clavicles, which the joint states then must contain.
     """
     robot = _Robot(f"human_{body_id}", optical_frame, f"_{body_id}")
     hips_m, turned = _seen_from_camera(body)
@@ -317,8 +310,7 @@ class LinkTransforms:
     def at(self, positions: Mapping[str, float]) -> list[LinkTransform]:
         """Return the transform of every link but the root, at ``positions``, rad and metres.
 
-        Raises:
-            ValueError: a movable joint has no position.
+        Raises ValueError if a movable joint has no position.
         """
         missing = [name for name in self.joint_names if name not in positions]
         if missing:

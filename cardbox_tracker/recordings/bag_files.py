@@ -29,10 +29,7 @@ def is_bag_file(path: Path) -> bool:
 
 
 def files_of_one(folder: Path) -> list[Path]:
-    """Return the files of the only bag in a folder without metadata, the parts of a split one.
-
-    The list is empty if there is no bag, or if the files are bags of their own.
-    """
+    """Return the parts of the only bag in a folder without metadata, in order; none of several."""
     files = [path for path in folder.iterdir() if is_bag_file(path) and path.is_file()]
     if len(files) < 2:
         return files

@@ -39,11 +39,7 @@ _MCAP: Any = storage_mcap
 
 
 def check_recording(path: Path) -> None:
-    """Check that a recording consists of regular files and states sensible unpacked sizes.
-
-    Raises:
-        BagError: a file is not regular, or the stated sizes are too large.
-    """
+    """Raise BagError unless a recording is of regular files and states sensible unpacked sizes."""
     if path.is_dir():
         for name in sorted(os.listdir(path)):
             inside = path / name

@@ -21,11 +21,11 @@ from cardbox_tracker.camera.calibration_watch import CalibrationWatch
 from cardbox_tracker.camera.camera import Calibration
 from cardbox_tracker.camera.camera_info import is_other_lens
 from cardbox_tracker.camera.encodings import (
+    Levels,
     SentImage,
     decode_as_sent,
     decode_compressed,
 )
-from cardbox_tracker.camera.levels import Levels
 from cardbox_tracker.camera.stamps import RecordedStamps, StampOrder
 from cardbox_tracker.common.errors import BagError, CameraError, EncodingError, cut
 from cardbox_tracker.recordings.bag_files import check_parts, paths_to_open
@@ -72,11 +72,9 @@ class BagReader:
     """
 
     def __init__(self, path: str | os.PathLike[str], camera: GivenCamera | None = None) -> None:
-        """Store the path; the recording is opened on entry.
+        """Store the path: folder of a rosbag2 recording, or its .mcap or .db3 file.
 
-        Args:
-            path: folder of a rosbag2 recording, or its .mcap or .db3 file.
-            camera: properties of the only camera that replace those of the recording.
+        The properties of ``camera`` replace those of the recording's only camera.
         """
         self.path, self.working_size = Path(path), WORKING_SIZE
         self._given = camera or GivenCamera()
@@ -170,8 +168,7 @@ class BagReader:
     def image_topic(self, camera: str | None = None) -> str:
         """Return the only image topic in the namespace ``camera``, or in the recording.
 
-        Of the transports of one camera, such as ``image_raw`` and ``image_raw/compressed``, the
-        first that has messages is taken.
+        Of the transports of one camera, the first that has messages is taken.
         """
         return self._only(IMAGE_TYPES, "image", camera)
 
@@ -215,11 +212,7 @@ class BagReader:
         return found[0]
 
     def messages(self, topics: Sequence[str] | None = None) -> Iterator[BagMessage]:
-        """Yield the messages of ``topics``, or of all topics, in the order of recording.
-
-        Raises:
-            BagError: the recording lacks one of the topics, or is damaged.
-        """
+        """Yield the messages of ``topics``, or of all topics, in the order of recording."""
         missing = sorted(set(topics or ()) - set(self.topics))
         if missing:
             raise BagError(f"{self.path} has no topic {', '.join(missing)}; it has {self._list()}")
@@ -250,10 +243,7 @@ class BagReader:
         return ", ".join(f"{n} ({t})" for n, t in sorted(self.topics.items())) or "no topics"
 
     def stamped(self, topic: str) -> Iterator[tuple[int, BagMessage, Any]]:
-        """Yield the messages of a topic whose stamps can be used, with stamp, ns, and object.
-
-        Stamps that are zero or go back are replaced, see :class:`.RecordedStamps`.
-        """
+        """Yield stamp, ns, and decoded message of a topic; see :class:`.RecordedStamps`."""
         stamps, before = RecordedStamps(), self._stamps.get(topic)
         for message in self.messages([topic]):
             decoded = self.deserialize(message)
@@ -298,10 +288,6 @@ class BagReader:
         """Return the first CameraInfo of a calibrated camera, and its calibration.
 
         All after it are compared with it once, for the remarks.
-
-        Raises:
-            BagError: the recording has no CameraInfo.
-            CameraError: the camera is not calibrated; the text names both topics.
         """
         if camera in self._infos:
             return self._infos[camera]
@@ -343,10 +329,8 @@ class BagReader:
     def calibration(self, camera: str | None = None) -> Calibration:
         """Return the given calibration, or that in the first CameraInfo that has one.
 
-        Raises:
-            BagError: the recording has no CameraInfo.
-            CameraError: the camera is not calibrated, or its CameraInfo is that of images of
-                another shape; the text names both topics.
+        Raises BagError without a CameraInfo, and CameraError, with both topics, if the camera is
+        not calibrated or its images have another shape.
         """
         topic = self.image_topic(camera)
         if self._given.is_calibrated:
@@ -405,11 +389,7 @@ class BagReader:
 
 
 def chosen_transports(messages: Mapping[str, int]) -> list[str]:
-    """Return one image topic for each camera, the raw one or else one of its transports.
-
-    Args:
-        messages: number of messages of each image topic.
-    """
+    """Return one topic for each camera, the raw one or a transport, by numbers of messages."""
     groups: dict[str, list[str]] = {}
     for topic in sorted(messages):
         base, _, last = topic.rpartition("/")

@@ -54,17 +54,11 @@ class BagWriter:
         compress: bool = False,
         latched: Sequence[str] = (),
     ) -> None:
-        """Check the folder's name.
+        """Prepare a new folder ``path``, with ``storage`` ``mcap`` or ``sqlite3``.
 
-        Args:
-            path: folder to make.
-            storage: ``mcap`` or ``sqlite3``.
-            overwrite: replace an existing recording of that name, but nothing else.
-            compress: compress the chunks of an mcap file with zstd, which all its readers support.
-            latched: topics that 'ros2 bag play' offers as transient local.
-
-        Raises:
-            BagError: the storage is unknown, or ``path`` exists and may not be replaced.
+        With ``overwrite`` it replaces a recording, but nothing else; ``compress`` packs the chunks
+        of an mcap file with zstd; ``latched`` topics are transient local. Raises BagError if the
+        storage is unknown, or ``path`` exists and may not be replaced.
         """
         self.path = Path(os.path.realpath(path)) if os.path.islink(path) else Path(path)
         if storage not in STORAGES:
@@ -83,11 +77,7 @@ class BagWriter:
         self._connections: dict[str, Connection] = {}
 
     def __enter__(self) -> BagWriter:
-        """Open a temporary folder beside the target.
-
-        Raises:
-            BagError: the target's folder cannot be written.
-        """
+        """Open a temporary folder beside the target; raise BagError if it cannot be written."""
         self._resources = ExitStack()
         try:
             claim = claimed_name(self.path, is_folder=True)

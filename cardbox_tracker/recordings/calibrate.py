@@ -28,17 +28,11 @@ _TOLERANCE_NS = 50_000_000
 
 
 class CalibratedCameras(NamedTuple):
-    """The calibration of a recording's cameras.
+    """The calibration of a recording's cameras."""
 
-    Attributes:
-        body: the person, measured by the first camera.
-        cameras: working cameras by name, the first camera first.
-        found: calibration of each further camera by name.
-    """
-
-    body: BodyModel
-    cameras: dict[str, Camera]
-    found: dict[str, CalibratedCamera]
+    body: BodyModel  #: the person, measured by the first camera
+    cameras: dict[str, Camera]  #: working cameras by name, the first camera first
+    found: dict[str, CalibratedCamera]  #: calibration of each further camera by name
 
 
 def calibrate_recording(
@@ -52,17 +46,10 @@ def calibrate_recording(
 ) -> CalibratedCameras:
     """Estimate the poses of further cameras in the optical frame of the first one.
 
-    Args:
-        path: a recording as :class:`BagReader` takes it.
-        cameras: namespaces; the person faces the first camera in the reference postures.
-        background: span without a person in any image.
-        references: spans of the postures ``front``, ``side`` and ``arms``.
-        motion: span in which the person moves; it begins in the posture ``front``.
-        config: settings of the measurement by the first camera.
-        progress: called with the finished fraction.
-
-    Raises:
-        CardboxError: the recording or a span is unusable, or no camera pose fits.
+    The person faces the first of the namespaces ``cameras`` in the ``references`` ``front``,
+    ``side`` and ``arms``. Nobody is in an image of the span ``background``; in ``motion`` the
+    person moves, from the posture ``front`` on. Raises CardboxError if the recording or a span is
+    unusable, or no pose fits.
     """
     names = [camera.strip("/") for camera in cameras]
     if not 2 <= len(set(names)) == len(names) <= MOST_CAMERAS:

@@ -29,9 +29,7 @@ def depth_images(
 ) -> Iterator[tuple[int, DepthImage]]:
     """Yield stamp, ns, and depth (H, W), metres, of each depth image, at the size of ``camera``.
 
-    Raises:
-        BagError: the recording cannot be read, lacks the topic, or has other messages on it.
-        EncodingError: the encoding of an image is not one of depth.
+    Raises BagError if the topic is missing or has other messages, EncodingError if one is no depth.
     """
     with BagReader(path) as bag:
         kind = bag.topics.get(topic, IMAGE_TYPES[0])
@@ -45,15 +43,10 @@ def depth_images(
 
 
 class Within(NamedTuple):
-    """Segmentation by depth: pixels nearer than a limit belong to the person.
+    """Segmentation by depth: pixels nearer than a limit belong to the person."""
 
-    Attributes:
-        topic: topic of depth images with the camera's field of view.
-        metres: the limit along the optical axis.
-    """
-
-    topic: str
-    metres: float
+    topic: str  #: topic of depth images with the camera's field of view
+    metres: float  #: the limit along the optical axis
 
 
 class DepthSilhouetteSource(SilhouetteSource):
@@ -66,19 +59,7 @@ class DepthSilhouetteSource(SilhouetteSource):
         camera: str | None = None,
         points: Detector | PointTable | None = None,
     ) -> None:
-        """Prepare to read.
-
-        Args:
-            bag: an open recording.
-            within: depth topic and limit.
-            camera: namespace of the camera; without it, the recording has only one.
-            points: source of the person's points in the images.
-
-        Raises:
-            BagError: the recording has no images.
-            CameraError: the recording's camera is not calibrated.
-            CardboxError: the limit is out of range, or ``points`` cannot be read.
-        """
+        """Prepare to read; see :class:`SilhouetteSource`, and CardboxError for a wrong limit."""
         least_m, most_m = WITHIN_LIMITS_M
         if not least_m <= within.metres <= most_m:
             raise CardboxError(

@@ -24,18 +24,10 @@ class DetectorSilhouetteSource(SilhouetteSource):
         camera: str | None = None,
         points: Detector | PointTable | None = None,
     ) -> None:
-        """Load the networks and prepare to read.
+        """Load the networks and prepare to read; see :class:`SilhouetteSource`.
 
-        Args:
-            bag: an open recording.
-            detector: the detector.
-            camera: namespace of the camera; without it, the recording has only one.
-            points: source of the person's points; a detector finds points and mask at once.
-
-        Raises:
-            BagError: the recording has no images.
-            CameraError: the recording's camera is not calibrated.
-            CardboxError: the networks or ``points`` cannot be loaded.
+        A detector as ``points`` finds points and mask at once. Raises CardboxError if the networks
+        cannot be loaded.
         """
         self._open(bag, bag.working_size, camera)
         self._find_points(None if isinstance(points, Detector) else points, camera)

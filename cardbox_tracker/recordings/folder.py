@@ -24,9 +24,8 @@ _DEEPEST = 50
 def is_one_recording(path: Path) -> bool:
     """Return whether a path is a single recording, not a folder of them.
 
-    A folder is a recording if it is a rosbag2, if its folder ``bag`` is one, or if it has exactly
-    one file of a bag, or the parts of one. It is also one if it has images, unless such recordings
-    are in its folders.
+    A folder is one if it or its ``bag`` is a rosbag2, if it has just one bag or the parts of one,
+    or if it has images and no rosbag2 in its folders.
     """
     if not path.is_dir() or _is_rosbag2(path):
         return True
@@ -40,18 +39,12 @@ def _is_rosbag2(path: Path) -> bool:
 
 
 def recordings_in(folder: Path, output: Path | None = None) -> dict[str, Path]:
-    """Return the recordings in ``folder`` and in its folders, by their names, in order.
+    """Return the recordings in and below ``folder``, which is none itself, by name, in order.
 
     A name is the path from ``folder`` on, with "/". It has the ending of the file only where
-    another recording would have the same name. Hidden entries and folders of results are left out,
-    and links to folders are followed only if they are recordings.
-
-    Args:
-        folder: a folder that is no recording itself.
-        output: a folder that is left out; None for none.
-
-    Raises:
-        CardboxError: a folder cannot be read, or folders are nested too deep.
+    another recording would have the same name. Hidden entries, folders of results and ``output``
+    are left out, and links to folders are followed only if they are recordings. Raises CardboxError
+    if a folder cannot be read, or folders are nested too deep.
     """
     left_out = None if output is None else output.resolve()
     paths = {path.relative_to(folder): path for path in _found(folder, left_out, 0)}

@@ -26,24 +26,18 @@ GUESSED_STDDEV = 0.2
 
 @dataclass(frozen=True)
 class GivenCamera:
-    """Properties of one camera; None for those that are not given.
+    """Properties of one camera; None for those that are not given."""
 
-    Attributes:
-        fov_deg: field of view across the width of the image as it is shown, degrees.
-        calibration: file of camera_calibration, in place of the field of view.
-        roll_rad: how far the camera is turned clockwise about its axis, seen from behind it; the
-            images are turned back.
-        fps: images a second, in place of the rate that the recording states.
-        is_mirrored: whether the images are mirrored; they are turned back.
-        focal_stddev: relative standard deviation of a focal length by ``fov_deg`` that was found;
-            None for one that a person states.
-    """
-
+    #: field of view across the width of the image as it is shown, degrees.
     fov_deg: float | None = None
-    calibration: Path | None = None
+    calibration: Path | None = None  #: file of camera_calibration, in place of the field of view
+    #: how far the camera is turned clockwise about its axis, seen from behind it; the images are
+    #: turned back.
     roll_rad: float | None = None
-    fps: float | None = None
-    is_mirrored: bool = False
+    fps: float | None = None  #: images a second, in place of the rate that the recording states
+    is_mirrored: bool = False  #: whether the images are mirrored; they are turned back
+    #: relative standard deviation of a focal length by ``fov_deg`` that was found; None for one
+    #: that a person states.
     focal_stddev: float | None = None
 
     @property
@@ -63,11 +57,7 @@ class GivenCamera:
         return replace(self, roll_rad=-roll_rad if self.is_mirrored else roll_rad)
 
     def check(self) -> None:
-        """Check what is given, as far as it can be without the images.
-
-        Raises:
-            CameraError: the calibration cannot be read, or the field of view is impossible.
-        """
+        """Raise CameraError if the calibration is unreadable or the field of view impossible."""
         if self.calibration is not None:
             load_calibration(self.calibration)
         elif self.fov_deg is not None and not LEAST_FOV_DEG <= self.fov_deg <= MOST_FOV_DEG:
@@ -87,17 +77,10 @@ class GivenCamera:
     ) -> Calibration:
         """Return the calibration of images of ``width`` x ``height`` px in the recording ``path``.
 
-        Args:
-            path: the recording, for texts.
-            width: width of the images, px.
-            height: height of the images, px.
-            frame_id: name of the camera's optical frame.
-            stored: size, px, before pixels were made square, of which a file may be; 0 if the same.
-            file: film or image that may tell the field of view if none is given; if it does not,
-                a usual one is assumed. None if there is no such file.
-
-        Raises:
-            CameraError: neither field of view nor calibration is given, or they do not fit.
+        ``stored`` is their size, px, before pixels were made square, of which a calibration file
+        may be. If nothing is given, ``file``, a film or image, may tell the field of view, else a
+        usual one is assumed; without ``file``, or if what is given does not fit, CameraError is
+        raised.
         """
         if self.calibration is not None:
             found = load_calibration(self.calibration)

@@ -12,13 +12,11 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from cardbox_tracker.camera.encodings import MOST_PIXELS, decode_compressed
-from cardbox_tracker.camera.levels import Levels
+from cardbox_tracker.camera.encodings import MOST_PIXELS, Levels, decode_compressed
 from cardbox_tracker.common.errors import BagError, EncodingError
 from cardbox_tracker.common.files import UnreadableFileError, read_regular
-from cardbox_tracker.recordings.film import Film
 from cardbox_tracker.recordings.given_camera import GivenCamera
-from cardbox_tracker.recordings.image_recording import RecordedImage
+from cardbox_tracker.recordings.image_recording import Film, RecordedImage
 
 SUFFIXES = (".jpg", ".jpeg", ".png")
 """Endings of the images, in small or capital letters."""
@@ -29,10 +27,7 @@ _MOST_BYTES = 4 * MOST_PIXELS
 
 
 def image_files(folder: Path) -> list[Path]:
-    """Return the images of a folder, ordered by name; numbers in names count as numbers.
-
-    Hidden files are no images, such as ``._NAME``, which a Mac writes beside each NAME.
-    """
+    """Return the images of a folder by name, numbers as numbers, without hidden files."""
     files = (path for path in folder.iterdir() if path.suffix.lower() in SUFFIXES)
     seen = (path for path in files if path.is_file() and not path.name.startswith("."))
     return sorted(seen, key=_by_number)

@@ -13,6 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cardbox_tracker.camera.camera import Calibration
+from cardbox_tracker.common.errors import BagError
+from cardbox_tracker.recordings.given_camera import GivenCamera
 
 WORKING_SIZE = (320, 240)
 """Working size (width, height), px, of bags, whatever the aspect ratio of their images."""
@@ -23,8 +25,8 @@ _MULTIPLE_PX = 8
 def working_size(width: int, height: int) -> tuple[int, int]:
     """Return the working size for images of ``width`` x ``height`` px.
 
-    It has the same aspect ratio, as nearly as multiples of 8 px allow, and about as many pixels
-    as ``WORKING_SIZE``, which it is for 4:3.
+    It has their aspect ratio, as nearly as multiples of 8 px allow, and about as many pixels as
+    ``WORKING_SIZE``, which it is for 4:3.
     """
     pixels, aspect = WORKING_SIZE[0] * WORKING_SIZE[1], width / height
     sides = sqrt(pixels * aspect), sqrt(pixels / aspect)
@@ -34,28 +36,17 @@ def working_size(width: int, height: int) -> tuple[int, int]:
 
 @dataclass(frozen=True)
 class RecordedImage:
-    """One image of a recording, decoded by its properties.
+    """One image of a recording, decoded by its properties."""
 
-    Attributes:
-        stamp_ns: stamp of the image; of a video, ns from its first image.
-        frame_id: name of the camera's optical frame.
-        time_ns: recording time.
-        name: name of its file, if it is one.
-    """
-
-    stamp_ns: int
-    frame_id: str
-    time_ns: int
+    stamp_ns: int  #: stamp of the image; of a video, ns from its first image
+    frame_id: str  #: name of the camera's optical frame
+    time_ns: int  #: recording time
     _decode: Callable[[], NDArray[np.uint8]]
-    name: str = ""
+    name: str = ""  #: name of its file, if it is one
 
     @property
     def as_sent(self) -> NDArray[np.uint8]:
-        """BGR colours (H, W, 3) of a colour camera, else brightness (H, W), uint8.
-
-        Raises:
-            EncodingError: the image cannot be decoded.
-        """
+        """BGR (H, W, 3) of a colour camera, else brightness (H, W), uint8; or EncodingError."""
         return self._decode()
 
 
@@ -87,12 +78,7 @@ class ImageRecording(Protocol):
         """Warnings about what was read so far."""
 
     def left_out(self, topic: str, used: Collection[str] = ()) -> list[str]:
-        """Return what was read of these images so far but not used, with the reasons.
-
-        Args:
-            topic: name of the images.
-            used: topics of other images that are used, too.
-        """
+        """Return what of these images was not used, and why; topics in ``used`` are no reason."""
 
     def __enter__(self) -> ImageRecording:
         """Open the recording."""
@@ -112,8 +98,61 @@ class ImageRecording(Protocol):
         """Yield the images of that name, in order."""
 
     def calibration(self, camera: str | None = None) -> Calibration:
-        """Return the calibration of a camera.
+        """Return the calibration of a camera; raise CameraError if there is none."""
 
-        Raises:
-            CameraError: the camera is not calibrated.
+
+class Film:
+    """Base of videos and folders of images: one camera that the user describes.
+
+    Times count from the first image.
+
+    Attributes:
+        path: the file or folder.
+        working_size: see ``ImageRecording``.
+        duration_s: seconds from the first to the last image.
+    """
+
+    start_ns = 0
+
+    def __init__(self, path: Path, camera: GivenCamera) -> None:
+        """Store the path and the camera; the recording is read on entry."""
+        self.path, self._given = path, camera
+        self.working_size, self.duration_s = (0, 0), 0.0
+        self._size = self._stored = (0, 0)
+
+    def _set_size(self, width: int, height: int) -> None:
+        """Store the size of the images, px, and the working size that follows from it."""
+        self._stored = self._stored if any(self._stored) else (width, height)
+        self._size, self.working_size = (width, height), working_size(width, height)
+
+    def __exit__(self, *_: object) -> None:
+        """Do nothing: files are only open while they are read."""
+
+    def image_topic(self, camera: str | None = None) -> str:
+        """Return the name of the file or folder; raise BagError if a camera is named."""
+        if camera is not None:
+            raise BagError(f"{self.path} is of one camera, and {camera!r} is none; omit --cameras")
+        return self.path.name
+
+    def calibration(self, camera: str | None = None) -> Calibration:
+        """Return the given calibration, or what the file tells, or that of a usual camera.
+
+        Raises BagError if a camera is named, CameraError if the calibration does not fit the
+        images.
         """
+        self.image_topic(camera)
+        return self._given.calibrated(self.path, *self._size, stored=self._stored, file=self._file)
+
+    def left_out(self, topic: str, used: Collection[str] = ()) -> list[str]:
+        """Return what is no image; see ``ImageRecording``."""
+        return []
+
+    @property
+    def remarks(self) -> list[str]:
+        """Warnings about the field of view."""
+        return self._given.remarks(self._file, *self._size)
+
+    @property
+    def _file(self) -> Path:
+        """The file that may tell the field of view."""
+        return self.path

@@ -38,10 +38,8 @@ def initialize_from_recording(
 ) -> InitializationResult:
     """Measure the person who holds the reference postures in ``spans`` (by reference name).
 
-    Raises:
-        CardboxError: a span has no image.
-        InitializationError: the references are unusable or show other postures, or the model does
-            not fit them.
+    Raises CardboxError if a span has no image, and InitializationError if the references are
+    unusable or show other postures, or the model does not fit them.
     """
     references, images = {}, {}
     for name, span in spans.items():
@@ -60,12 +58,9 @@ def initialize_from_cameras(
 ) -> InitializationResult:
     """Measure the person with the first camera, and the distance with the second one.
 
-    The search for the distance begins at that of ``config``.
-
-    Raises:
-        CardboxError: a span has no image.
-        InitializationError: see :func:`initialize_from_recording`; or the silhouettes of the
-            second camera do not fit the person.
+    The search for the distance begins at that of ``config``. Raises as
+    :func:`initialize_from_recording`, also if the silhouettes of the second camera do not fit the
+    person.
     """
     second = recording.sources[1]
     references = {
@@ -84,12 +79,8 @@ def initialize_with_depth(
 ) -> InitializationResult:
     """Measure the person with the first camera, and the distance with its depth images.
 
-    The search for the distance begins at that of ``config``.
-
-    Raises:
-        CardboxError: a span has no image, or no depth image.
-        InitializationError: see :func:`initialize_from_recording`; or the depth images do not fit
-            the person.
+    The search for the distance begins at that of ``config``. Raises as
+    :func:`initialize_from_recording`, also if there are no depth images or they do not fit.
     """
     references = {name: _depth_reference(recording, spans[name], name) for name in SCALE_REFERENCES}
     scale = partial(depth_scale, references=references)

@@ -26,24 +26,15 @@ _TRIANGLES = (0, 1, 2, 0, 2, 3)
 
 
 class MarkerShape(NamedTuple):
-    """Shape of one marker.
+    """Shape of one marker."""
 
-    Attributes:
-        namespace: content of the marker, ``patches`` or ``skeleton``.
-        kind: ``TRIANGLE_LIST`` or ``LINE_LIST``.
-        scale: 1 for triangles, the width in metres for lines.
-        points_m: (n, 3), three corners per triangle or both ends of each line, metres in the
-            optical frame.
-        rgba: colour of the whole marker, used if ``colors`` is empty.
-        colors: colour of each point, or empty.
-    """
-
-    namespace: str
-    kind: int
-    scale: float
+    namespace: str  #: content of the marker, ``patches`` or ``skeleton``
+    kind: int  #: ``TRIANGLE_LIST`` or ``LINE_LIST``
+    scale: float  #: 1 for triangles, the width in metres for lines
+    #: (n, 3), three corners per triangle or both ends of each line, metres in the optical frame.
     points_m: FloatArray
-    rgba: Rgba
-    colors: tuple[Rgba, ...] = ()
+    rgba: Rgba  #: colour of the whole marker, used if ``colors`` is empty
+    colors: tuple[Rgba, ...] = ()  #: colour of each point, or empty
 
 
 def marker_shapes(
@@ -51,7 +42,7 @@ def marker_shapes(
 ) -> tuple[MarkerShape, MarkerShape]:
     """Return the patches and the skeleton of ``body`` in a posture (12,) before its camera.
 
-    If ``neck`` (2,), rad, is given, the skeleton has a line in the direction of the face.
+    With ``neck`` (2,), rad, the skeleton has a line in the direction of the face.
     """
     frames = pose(body, posture)
     tilt = body.camera_pose

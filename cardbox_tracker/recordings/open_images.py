@@ -65,14 +65,9 @@ def _check_packed(path: Path) -> None:
 
 
 def open_images(path: str | os.PathLike[str], camera: GivenCamera | None = None) -> ImageRecording:
-    """Return the context of the recording at ``path``.
+    """Return the context of a recording: rosbag2 folder or file, video, or folder of images.
 
-    Args:
-        path: rosbag2 folder or file, video, or folder of JPEG or PNG images.
-        camera: properties of the camera that the recording does not have.
-
-    Raises:
-        BagError: there is no recording of these kinds.
+    ``camera`` has what the recording does not tell. Raises BagError if it is none of these.
     """
     path, camera = Path(path), camera or GivenCamera()
     if is_bag(path):

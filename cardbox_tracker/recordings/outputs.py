@@ -8,7 +8,7 @@ number to ``METRICS``.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Any, NamedTuple
@@ -115,39 +115,26 @@ Value = JointValues | Points | Markers | Text | KeypointStates
 
 @dataclass(frozen=True)
 class Output:
-    """One topic.
+    """One topic."""
 
-    Attributes:
-        topic: relative name.
-        kind: class of the values, which determines the message type.
-        of: value for an estimate with a posture; None if the estimate has no such value.
-        absent: value that is sent once when the posture is lost; None if nothing is sent.
-        needs_posture: False if ``of`` has a value for every estimate.
-        moves: whether the values are joints with velocities.
-    """
-
-    topic: str
-    kind: type[Value]
+    topic: str  #: relative name
+    kind: type[Value]  #: class of the values, which determines the message type
+    #: value for an estimate with a posture; None if the estimate has no such value.
     of: Callable[[Estimate, Tracker], Value | None]
+    #: value that is sent once when the posture is lost; None if nothing is sent.
     absent: Value | None = None
-    needs_posture: bool = True
-    moves: bool = False
+    needs_posture: bool = True  #: False if ``of`` has a value for every estimate
+    moves: bool = False  #: whether the values are joints with velocities
 
 
 @dataclass(frozen=True)
 class Metric:
-    """One number of an estimate.
+    """One number of an estimate."""
 
-    Attributes:
-        name: name of the column.
-        unit: empty for a plain number.
-        format: format specification of the number.
-        of: the number of an estimate; None if it has no such number.
-    """
-
-    name: str
-    unit: str
-    format: str
+    name: str  #: name of the column
+    unit: str  #: empty for a plain number
+    format: str  #: format specification of the number
+    #: the number of an estimate; None if it has no such number.
     of: Callable[[Estimate], float | None]
 
     @property
@@ -255,11 +242,7 @@ def _joints(
 
 
 def posture_from(joints: JointValues) -> FloatArray:
-    """Return the posture (12,) from named joints in any order.
-
-    Raises:
-        ValueError: a joint of the posture is missing.
-    """
+    """Return the posture (12,) from named joints in any order; ValueError if one is missing."""
     by_name = positions_of(joints)
     missing = [name for name in JOINT_NAMES if name not in by_name]
     if missing:
@@ -269,18 +252,17 @@ def posture_from(joints: JointValues) -> FloatArray:
 
 def place_from(joints: JointValues) -> FloatArray | None:
     """Return ``torso_x`` and ``torso_z`` (2,) from named joints; None if one is missing."""
-    by_name = positions_of(joints)
-    if not by_name.keys() >= set(PLACE_NAMES):
-        return None
-    return np.array([by_name[name] for name in PLACE_NAMES])
+    return _all_of(joints, PLACE_NAMES)
 
 
 def neck_from(joints: JointValues) -> FloatArray | None:
     """Return ``neck_yaw`` and ``neck_pitch`` (2,) from named joints; None if one is missing."""
+    return _all_of(joints, NECK_NAMES)
+
+
+def _all_of(joints: JointValues, names: Sequence[str]) -> FloatArray | None:
     by_name = positions_of(joints)
-    if not by_name.keys() >= set(NECK_NAMES):
-        return None
-    return np.array([by_name[name] for name in NECK_NAMES])
+    return np.array([by_name[name] for name in names]) if by_name.keys() >= set(names) else None
 
 
 def wrists_from(joints: JointValues) -> FloatArray:
@@ -322,8 +304,8 @@ def _markers(estimate: Estimate, tracker: Tracker) -> Markers | None:
 def outputs(torso_place: bool = True, hands: bool = True) -> tuple[Output, ...]:
     """Return the topics of the tracker in the order of publication.
 
-    With ``torso_place``, the joints include those of place, neck and clavicles, and of what else is
-    measured; with ``hands``, there is the topic of hands, which has no message without any.
+    With ``torso_place``, the joints include place, neck, clavicles and what else is measured; with
+    ``hands``, there is the topic of hands, which has no message without any.
     """
     opened = Output("hands", JointValues, lambda found, _: open_hands(found))
     return (
@@ -404,7 +386,7 @@ class _Motion:
     def velocities(self, stamp_ns: int, estimate: Estimate, tracker: Tracker) -> FloatArray | None:
         """Return those of :func:`joint_values`, rad/s and m/s; None without an image before.
 
-        An image counts that has a posture of the same tracker, at most ``_LONGEST_NS`` before.
+        It has a posture of the same tracker and is at most ``_LONGEST_NS`` old.
         """
         before, self._last = self._last, None
         joints = joint_values(estimate)

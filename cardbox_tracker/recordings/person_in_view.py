@@ -31,16 +31,8 @@ class PersonInViewSource(SilhouetteSource):
     ) -> None:
         """Learn the scene from the first images that show all of it, each part at its own time.
 
-        Args:
-            bag: an open recording.
-            camera: namespace of the camera; without it, the recording has only one.
-            points: source of the person's points in the images.
-
-        Raises:
-            BagError: the recording has fewer than two images.
-            CameraError: the recording's camera is not calibrated.
-            CardboxError: the person hides a part of the scene in all images, or ``points`` cannot
-                be read.
+        See :class:`SilhouetteSource`. Raises CardboxError if the person hides a part of the scene
+        in all images.
         """
         self._open(bag, bag.working_size, camera, learning=PersonInViewLearning)
         self._find_points(points, camera)

@@ -64,7 +64,7 @@ class Quality:
     def lines(self) -> Iterator[str]:
         """Yield shares of sure images and hands, typical deviations, and the worst moments.
 
-        Hands and distances are sure in the state ``tracked``. Typical is the median over the images
+        Hands and distances are sure in the state ``tracked``. Typical is the median over images
         with a posture; a hand moves beside the shoulders with the deviations of all joints.
         """
         if not self._images:

@@ -47,22 +47,16 @@ _STATIC_TOPIC = "/tf_static"
 
 
 class FrameSet(NamedTuple):
-    """Frames of all cameras at one time.
+    """Frames of all cameras at one time."""
 
-    Attributes:
-        stamp_ns: stamp of the first camera's image, or of the earliest image without it.
-        time_s: the same time in seconds from the bag's start.
-        frames: one frame for each camera, the first camera's first; None if it has no image.
-        first: frame of the first camera, black without an image.
-        depth_m: depth (H, W) in the first camera, metres; None without a depth image.
-        picture: returns the first camera's image at the resolution of the recording.
-    """
-
-    stamp_ns: int
-    time_s: float
+    stamp_ns: int  #: stamp of the first camera's image, or of the earliest image without it
+    time_s: float  #: the same time in seconds from the bag's start
+    #: one frame for each camera, the first camera's first; None if it has no image.
     frames: tuple[RecordedFrame | None, ...]
-    first: RecordedFrame
+    first: RecordedFrame  #: frame of the first camera, black without an image
+    #: depth (H, W) in the first camera, metres; None without a depth image.
     depth_m: DepthImage | None = None
+    #: returns the first camera's image at the resolution of the recording.
     picture: Callable[[], NDArray[np.uint8]] | None = None
 
     @property
@@ -102,19 +96,12 @@ class Recording:
         extrinsics: Sequence[Extrinsics] = (),
         depth: str | None = None,
     ) -> None:
-        """Combine the cameras that :func:`open_recording` opens.
+        """Combine the cameras that :func:`open_recording` opens, the first one first.
 
-        Args:
-            names: namespaces of the cameras, the first camera's first.
-            sources: silhouettes of each camera.
-            extrinsics: pose of each further camera.
-            depth: topic of depth images with the optical frame and the aspect ratio of the first
-                camera, or ``stereo`` for depth from the first two cameras, a rectified pair.
-
-        Raises:
-            BagError: there are several streams, but fewer than two images of the first camera.
-            CameraError: ``depth`` is ``stereo``, but the first two cameras are not a rectified
-                pair.
+        ``extrinsics`` are of the further cameras. ``depth`` is a topic of depth images with the
+        optical frame and aspect ratio of the first camera, or ``stereo`` for depth from the first
+        two. Raises BagError if there are several streams, but fewer than two images, and
+        CameraError if ``depth`` is ``stereo`` and they are no rectified pair.
         """
         self.names, self.sources = tuple(names), tuple(sources)
         self.others = [
@@ -191,20 +178,13 @@ def open_recording(
 ) -> Iterator[Recording]:
     """Open a recording, find the extrinsics of its cameras and learn their backgrounds.
 
-    Args:
-        path: a recording as :func:`open_images` takes it.
-        background: see ``Segmentation``; a depth limit is for one camera.
-        cameras: namespaces, the first camera's first; empty if the recording has one camera.
-        extrinsics: file of the poses, see :func:`load_extrinsics`.
-        depth: see :class:`Recording`.
-        points: source of the person's points in the images; None for no points.
-        camera: properties of the only camera that the recording does not have.
+    ``path`` is one that :func:`open_images` takes, and ``camera`` has what that does not tell.
+    ``cameras`` are namespaces, the first one first, or none if there is one camera, and
+    ``extrinsics`` is a file of :func:`load_extrinsics`. ``points`` are the source of the person's
+    points.
 
-    Raises:
-        BagError: the recording cannot be read, or lacks a camera.
-        CameraError: extrinsics are missing or disagree, or a camera is not calibrated.
-        CardboxError: there are too many cameras, a camera is given twice, or ``points`` cannot be
-            read.
+    Raises BagError if the recording cannot be read or lacks a camera; CameraError if extrinsics are
+    missing or disagree, or a camera is not calibrated; CardboxError for what does not go together.
     """
     names = camera_names(cameras)
     for fault in input_faults(path, background, names, depth, camera):
@@ -279,8 +259,7 @@ def _source(
 def stereo_of(left: Camera, others: Sequence[OtherCamera]) -> StereoDepth:
     """Return stereo depth for the rectified pair of ``left`` and the first of ``others``.
 
-    Raises:
-        CameraError: the cameras are not a rectified pair with the left camera first.
+    Raises CameraError if they are none with the left camera first.
     """
     if not others:
         raise CameraError("depth from stereo needs two cameras: give both to --cameras, left first")
@@ -291,11 +270,8 @@ def extrinsics_of(bag: BagReader, cameras: Sequence[str], file: Path | None) -> 
     """Return the pose of each further camera relative to the first one.
 
     The sources are the projection matrices of a rectified pair, ``/tf_static``, and ``file``.
-
-    Raises:
-        BagError: a camera has no CameraInfo.
-        CameraError: no source has the pose, sources disagree, or ``file`` is not a file of
-            extrinsics.
+    Raises BagError if a camera has no CameraInfo, and CameraError if no source has the pose, or
+    sources disagree.
     """
     if len(cameras) < 2:
         return []

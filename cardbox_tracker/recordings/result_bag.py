@@ -53,11 +53,7 @@ class BagTransforms:
         self._links = LinkTransforms(urdf)
 
     def write(self, stamp_ns: int, positions: Mapping[str, float]) -> None:
-        """Write the transforms at ``positions`` of the joints, rad and metres.
-
-        Raises:
-            ValueError: a joint of the URDF has no position.
-        """
+        """Write the transforms at ``positions`` of all joints of the URDF, rad and metres."""
         if self._links is None:
             return
         new, transforms = self._writer.new, []
@@ -122,13 +118,7 @@ _LATCHED = ("/body_model", "/robot_description")
 
 
 def result_writer(path: Path, overwrite: bool = False) -> BagWriter:
-    """Return the writer of a bag of results.
-
-    With ``overwrite`` a recording of that name is replaced.
-
-    Raises:
-        BagError: ``path`` exists and may not be replaced.
-    """
+    """Return the writer of a bag of results, which with ``overwrite`` replaces a recording."""
     return BagWriter(path, "mcap", overwrite, compress=True, latched=_LATCHED)
 
 
@@ -138,16 +128,9 @@ def result_bag(
 ) -> Iterator[Observer]:
     """Context of an observer that writes the outputs of each image to a bag.
 
-    The bag appears on exit; after an error there is none.
-
-    Args:
-        path: folder to write.
-        frame_id: optical frame of the first camera.
-        overwrite: replace a recording of that name.
-        draw: makes the pictures of ``/overlay``; None for none.
-
-    Raises:
-        BagError: ``path`` exists and may not be replaced.
+    The bag ``path`` appears on exit; after an error there is none. ``frame_id`` is the optical
+    frame of the first camera, and ``draw`` makes the pictures of ``/overlay``. Raises BagError if
+    ``path`` exists and may not be replaced.
     """
     with result_writer(path, overwrite) as writer:
         people: dict[int | None, _ResultBag] = {}

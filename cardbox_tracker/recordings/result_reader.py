@@ -78,44 +78,29 @@ _LATEST_NS = np.iinfo(np.int64).max
 
 @dataclass(frozen=True)
 class Results:
-    """Results of n images in order of time; those of a gap, without a posture, are nan.
+    """Results of n images in order of time; those of a gap, without a posture, are nan."""
 
-    Attributes:
-        path: table or bag.
-        stamp_ns: stamps of the images, (n,), rising.
-        time_s: seconds from the start of the recording, (n,).
-        state: tracking state of each image, n texts.
-        numbers: values (n,) by the names of the columns of a table (``docs/results.md``), in their
-            units; nan where they are unknown.
-        texts: the same for columns of texts, such as the states of keypoints.
-        bodies: the person as of each image; None where it is not known.
-    """
-
-    path: Path
-    stamp_ns: NDArray[np.int64]
-    time_s: FloatArray
-    state: tuple[str, ...]
+    path: Path  #: table or bag
+    stamp_ns: NDArray[np.int64]  #: stamps of the images, (n,), rising
+    time_s: FloatArray  #: seconds from the start of the recording, (n,)
+    state: tuple[str, ...]  #: tracking state of each image, n texts
+    #: values (n,) by the names of the columns of a table (``docs/results.md``), in their units; nan
+    #: where they are unknown.
     numbers: Mapping[str, FloatArray]
+    #: the same for columns of texts, such as the states of keypoints.
     texts: Mapping[str, tuple[str, ...]]
-    bodies: tuple[BodyModel | None, ...]
+    bodies: tuple[BodyModel | None, ...]  #: the person as of each image; None where it is not known
 
     @property
     def body(self) -> BodyModel | None:
-        """The person as of most images with a posture; None if not known.
-
-        A running tracker may get another body from the initializer.
-        """
+        """The person as of most images with a posture, since a tracker may get another; or None."""
         pairs = zip(self.bodies, self.state, strict=True)
         known = {id(body): body for body in self.bodies}
         counts = Counter(id(body) for body, state in pairs if body and state in _SEEN)
         return known[counts.most_common(1)[0][0]] if counts else None
 
     def check_body(self) -> None:
-        """Check that the person is known.
-
-        Raises:
-            CardboxError: it is not.
-        """
+        """Raise CardboxError unless the person is known."""
         if not any(self.bodies):
             raise CardboxError(
                 f"{self.path} has no posture of a known person: keep OUT.body.yaml, which "
@@ -167,8 +152,7 @@ class _Rows:
     def add(self, row: Mapping[str, Any]) -> None:
         """Take the values of an image by name, as numbers or texts; None and "" are unknown.
 
-        Raises:
-            ValueError: a value is not that of a result; the text names it.
+        Raises ValueError, which names the value, if it is not that of a result.
         """
         stamp_ns = _number(row, "stamp_ns", int)
         time_s, state = _number(row, "time_s"), str(row["state"])
@@ -245,15 +229,9 @@ def _number(row: Mapping[str, Any], name: str, kind: Callable[[Any], Any] = floa
 def read_results(path: Path, person: int | None = None) -> Results:
     """Return the results in a table or a bag, and the body with which they were tracked.
 
-    That of a table is in the file OUT.body.yaml beside it.
-
-    Args:
-        path: table of ``cardbox track``, or bag of ``cardbox track --bag`` or of nodes.
-        person: number of one of several people; without it, the first one counts.
-
-    Raises:
-        CardboxError: the file cannot be read, or contains what no result is; the text names the
-            line.
+    The body of a table is in the file OUT.body.yaml beside it. Of several people, ``person`` is the
+    number of one, or the first one. Raises CardboxError, with the line, if the file cannot be read
+    or has what no result is.
     """
     if not path.exists():
         raise CardboxError(
@@ -339,10 +317,7 @@ def has_results(bag: BagReader) -> bool:
 def namespace_of(bag: BagReader, person: int | None = None) -> str:
     """Return the first namespace with the tracker's topics, such as "" or "/left".
 
-    With ``person``, that of one of several people.
-
-    Raises:
-        BagError: the bag has no results of the tracker, or of that person.
+    With ``person``, that of one of several people. Raises BagError if there is none.
     """
     models = sorted(topic for topic in bag.topics if topic.endswith(MODEL))
     if not models:
@@ -362,11 +337,7 @@ def namespace_of(bag: BagReader, person: int | None = None) -> str:
 
 
 def joints_of(message: Any) -> JointValues:
-    """Return names and positions of a JointState.
-
-    Raises:
-        ValueError: they are not as many.
-    """
+    """Return names and positions of a JointState; ValueError if they are not as many."""
     if len(message.name) != len(message.position):
         raise ValueError(f"{len(message.name)} joints with {len(message.position)} positions")
     return JointValues(tuple(message.name), np.array(message.position, np.float64))
@@ -379,11 +350,7 @@ def points_of(message: Any) -> FloatArray:
 
 
 def results_in(bag: BagReader, person: int | None = None) -> Results:
-    """Return the results in an open bag, the last one of each stamp; see :func:`read_results`.
-
-    Raises:
-        BagError: the bag has no results of the tracker, or is damaged.
-    """
+    """Return the results in an open bag, the last one of each stamp; see :func:`read_results`."""
     space = namespace_of(bag, person)
     of_images = _STATE, _JOINTS, _STDDEV, _KEYPOINTS, _HANDS, _STATES
     topics = [space + name for name in (MODEL, *of_images)]

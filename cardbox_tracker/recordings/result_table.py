@@ -83,8 +83,7 @@ def units(
     """Return the unit of each column by its name, in their order; empty for none.
 
     The names up to the person's place are fixed, because scripts read them; standard deviations end
-    in their unit. With ``has_points``, for recordings with points of the person, neck and legs are
-    among them; with ``has_people``, the number of the person; with ``has_hands``, both hands.
+    in their unit. Neck and legs are there for recordings with points of the person.
     """
     return {
         "stamp": "s",
@@ -214,11 +213,7 @@ def _known(value: float) -> float | None:
 
 
 def check_table(path: Path) -> None:
-    """Check that the libraries for the format of a table are installed.
-
-    Raises:
-        CardboxError: ``path`` ends in .parquet, and pyarrow is missing.
-    """
+    """Raise CardboxError if ``path`` ends in .parquet and pyarrow is missing."""
     if path.suffix == PARQUET:
         pyarrow_or_error()
 
@@ -232,14 +227,9 @@ def result_table(
 ) -> Iterator[Callable[[RecordedFrame, Estimate], None]]:
     """Context of a function that adds the row of an image to a table, which appears on exit.
 
-    Args:
-        path: file to write; with the suffix .parquet it is a Parquet file, else CSV.
-        has_points: see :func:`columns`.
-        has_people: see :func:`columns`; then each person of an image has a row.
-        has_hands: see :func:`columns`.
-
-    Raises:
-        CardboxError: the file cannot be written, or pyarrow is missing.
+    A ``path`` with the suffix .parquet is a Parquet file, else CSV; with ``has_people`` each person
+    of an image has a row. See :func:`columns`. Raises CardboxError if the file cannot be written,
+    or pyarrow is missing.
     """
     has = has_points, has_people, has_hands
     names = columns(*has)
@@ -281,11 +271,7 @@ def _text(cell: Cell) -> str:
 
 
 def pyarrow_or_error() -> tuple[Any, Any]:
-    """Return the modules pyarrow and pyarrow.parquet.
-
-    Raises:
-        CardboxError: they are not installed.
-    """
+    """Return the modules pyarrow and pyarrow.parquet, or raise CardboxError."""
     try:
         import pyarrow
         import pyarrow.parquet

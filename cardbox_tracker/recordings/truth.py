@@ -29,54 +29,37 @@ _MOST_BYTES = 256 * 1024 * 1024
 
 @dataclass(frozen=True)
 class TrueFrame:
-    """One image with a person.
+    """One image with a person."""
 
-    Attributes:
-        segment: name of the person's action.
-        keypoints_m: shape (6, 3), metres in the optical frame, ordered as ``KEYPOINT_NAMES``.
-        posture: d1..d12 (12,); None if the person does not have the model's joints.
-        torso_rad: roll, pitch and yaw of the torso (3,); None if unknown.
-        is_in_sight: True if the neck is in the image, so that the person can be tracked.
-        hips_m: middle of the hips (3,), metres in the optical frame; None if unknown.
-    """
-
-    segment: str
+    segment: str  #: name of the person's action
+    #: shape (6, 3), metres in the optical frame, ordered as ``KEYPOINT_NAMES``.
     keypoints_m: FloatArray
+    #: d1..d12 (12,); None if the person does not have the model's joints.
     posture: FloatArray | None
-    torso_rad: FloatArray | None
-    is_in_sight: bool = True
+    torso_rad: FloatArray | None  #: roll, pitch and yaw of the torso (3,); None if unknown
+    is_in_sight: bool = True  #: True if the neck is in the image, so that the person can be tracked
+    #: middle of the hips (3,), metres in the optical frame; None if unknown.
     hips_m: FloatArray | None = None
 
 
 @dataclass(frozen=True)
 class GroundTruth:
-    """Ground truth of a session.
+    """Ground truth of a session."""
 
-    Attributes:
-        frames: images with a person, by stamp in nanoseconds.
-        spans: start and end of the first segment of each name, seconds from the first image.
-        start_ns: stamp of the first image.
-        distance_m: horizontal distance to the person.
-        pitch_deg: downward pitch of the camera.
-        side_turn: direction in which the person turned for the side reference.
-        cameras: namespaces of several cameras, the first camera's first; empty with one.
-        is_rectified: True if the first two cameras are a rectified pair.
-        stature_m: height of the person; None if unknown.
-        depth_topic: topic of depth images with the first camera's field of view; None without.
-        source: origin and licence of the recording; empty if the file does not say.
-    """
-
-    frames: Mapping[int, TrueFrame]
+    frames: Mapping[int, TrueFrame]  #: images with a person, by stamp in nanoseconds
+    #: start and end of the first segment of each name, seconds from the first image.
     spans: Mapping[str, tuple[float, float]]
-    start_ns: int
-    distance_m: float
-    pitch_deg: float
-    side_turn: str
+    start_ns: int  #: stamp of the first image
+    distance_m: float  #: horizontal distance to the person
+    pitch_deg: float  #: downward pitch of the camera
+    side_turn: str  #: direction in which the person turned for the side reference
+    #: namespaces of several cameras, the first camera's first; empty with one.
     cameras: tuple[str, ...] = ()
-    is_rectified: bool = False
-    stature_m: float | None = None
+    is_rectified: bool = False  #: True if the first two cameras are a rectified pair
+    stature_m: float | None = None  #: height of the person; None if unknown
+    #: topic of depth images with the first camera's field of view; None without.
     depth_topic: str | None = None
-    source: str = ""
+    source: str = ""  #: origin and licence of the recording; empty if the file does not say
 
     @property
     def to_optical(self) -> FloatArray:
@@ -85,16 +68,10 @@ class GroundTruth:
 
 
 def load_ground_truth(path: str | os.PathLike[str], camera: str | None = None) -> GroundTruth:
-    """Read the ``ground_truth.json`` of a session.
+    """Read the ``ground_truth.json`` of a session, for the first camera or for ``camera``.
 
-    Args:
-        path: the file.
-        camera: namespace of the camera to which keypoints, stamps, distance and pitch belong; None
-            for the first camera. The distance to any other camera than the first is that of the
-            true hips, or else shoulders, in its first images.
-
-    Raises:
-        CardboxError: the file cannot be read or is not a ground truth.
+    The distance to any other camera than the first is that of the true hips, or else shoulders, in
+    its first images. Raises CardboxError if the file cannot be read or is none.
     """
     expected = "the ground_truth.json of a session, such as 'cardbox synthesize' writes"
     with foreign(path, CardboxError, expected):
@@ -174,32 +151,21 @@ def _is_in_sight(entry: Mapping[str, Any], camera: Mapping[str, Any]) -> bool:
 
 @dataclass(frozen=True)
 class TrackingError:
-    """Distances between estimated and true keypoints.
+    """Distances between estimated and true keypoints."""
 
-    Attributes:
-        mean_m: mean 3D error over shoulders, elbows and hands (MPJPE).
-        by_keypoint_m: mean 3D error of each keypoint.
-        by_segment_m: mean 3D error in each segment of the session.
-        lateral_m: mean error along x of the optical frame.
-        vertical_m: mean error along y.
-        depth_m: mean error along z.
-        frames: number of compared images.
-    """
-
-    mean_m: float
-    by_keypoint_m: dict[str, float]
-    by_segment_m: dict[str, float]
-    lateral_m: float
-    vertical_m: float
-    depth_m: float
-    frames: int
+    mean_m: float  #: mean 3D error over shoulders, elbows and hands (MPJPE)
+    by_keypoint_m: dict[str, float]  #: mean 3D error of each keypoint
+    by_segment_m: dict[str, float]  #: mean 3D error in each segment of the session
+    lateral_m: float  #: mean error along x of the optical frame
+    vertical_m: float  #: mean error along y
+    depth_m: float  #: mean error along z
+    frames: int  #: number of compared images
 
 
 def tracking_error(estimates: Mapping[int, FloatArray], truth: GroundTruth) -> TrackingError:
     """Compare keypoints (6, 3), metres in the optical frame, by stamp, with the truth.
 
-    Raises:
-        CardboxError: no estimate has the stamp of a true frame.
+    Raises CardboxError if no estimate has the stamp of a true frame.
     """
     stamps = [stamp for stamp in estimates if stamp in truth.frames]
     if not stamps:

@@ -24,9 +24,8 @@ from cardbox_tracker.camera.film_headers import (
 )
 from cardbox_tracker.camera.image_headers import check_pixels
 from cardbox_tracker.common.errors import BagError, EncodingError
-from cardbox_tracker.recordings.film import Film
 from cardbox_tracker.recordings.given_camera import GivenCamera
-from cardbox_tracker.recordings.image_recording import RecordedImage
+from cardbox_tracker.recordings.image_recording import Film, RecordedImage
 
 FORMATS = "MP4, MOV, AVI, MKV or WebM"
 """Common containers, for texts; any that OpenCV can read will do."""

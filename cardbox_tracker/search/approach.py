@@ -81,17 +81,11 @@ class Approach:
         bearing: float,
         is_new: bool,
     ) -> FloatArray:
-        """Return ``survivors`` (N, 14) with upright states at the silhouette's place.
+        """Return ``survivors`` (N, 14), best first, with upright states at the silhouette's place.
 
-        The person is expected at the place of the first one.
-
-        Args:
-            cost: rates the states.
-            frames: frames of all cameras.
-            survivors: states of the last frame, the best first; the last one is replaced.
-            reference: state (14,) of the front reference posture.
-            bearing: lateral coordinate over depth of the silhouette.
-            is_new: whether the person is new, so that the survivors mean nothing.
+        The person is expected at the place of the first one; the last one is replaced.
+        ``reference`` (14,) is the front posture, ``bearing`` the lateral coordinate over depth of
+        the silhouette; the survivors of somebody who ``is_new`` mean nothing.
         """
         upright, kept = reference.copy(), survivors.copy()
         upright[TORSO_Y] = bearing * cost.place[0]
@@ -115,11 +109,8 @@ def at_distances(
 ) -> FloatArray:
     """Return a state (14,) at other distances, at the same column of the image, (N, 14).
 
-    Args:
-        state: the state.
-        distances_m: distances (N,) of the hips from the camera.
-        body_m: distance of the hips in the body model, metres.
-        limits: lowest and highest value of each value of a state, (14, 2).
+    ``distances_m`` (N,) and ``body_m``, that of the body model, are those of the hips; ``limits``
+    (14, 2) are those of a state.
     """
     states = np.empty((distances_m.shape[0], N_STATE))
     ahead_m = max(body_m - state[TORSO_X], 1e-3)
@@ -140,13 +131,8 @@ def placed_upright(
     """Return an upright state (14,) that fits better than ``expected``, at any distance, or None.
 
     The rows of the image that count depend on the distance, so each state is rated with its own.
-    The cost then has the silhouettes for the better state.
-
-    Args:
-        cost: rates the states.
-        silhouettes: silhouettes (H, W) of all cameras.
-        expected: state (14,) that is preferred to those of a similar rating.
-        upright: state (14,) at the column of the silhouette.
+    ``expected`` is preferred to states of a similar rating; ``upright`` is at the column of the
+    silhouettes (H, W). The cost then has these for the better state.
     """
     seeing = cost.seeing
     candidates = [

@@ -21,11 +21,10 @@ from cardbox_tracker.person.kinematics import (
 )
 from cardbox_tracker.person.parts import FOREARM, HEIGHT, UPPER_ARM
 from cardbox_tracker.person.posture import ARM_ANGLES
-from cardbox_tracker.search.joint_moves import NumbersTuple
+from cardbox_tracker.search.joint_moves import Numbers
 from cardbox_tracker.search.mirroring import mirror
 from cardbox_tracker.search.state_choice import least_of
-from cardbox_tracker.search.uncovered import farthest_uncovered
-from cardbox_tracker.terms.bit_planes import Planes
+from cardbox_tracker.terms.bit_planes import FOREGROUND, PIXELS, Planes, value_at
 from cardbox_tracker.terms.kernel_arguments import BodyTuple, Floats, body_of
 
 # Margins of the distance from shoulder to hand of an arm that reaches for a pixel, against the
@@ -40,45 +39,21 @@ _ELBOW_TURNS_RAD = 1.2 * pi
 # points.
 _REACH, _FEWEST_TIPS = 1.1, 3
 _INWARDS_PX = 3.0
+# Distance between the points of the grid that is searched for it, px.
+_GRID_PX = 3
 
-
-class ArmPlan(NamedTuple):
-    """Kinds and numbers of proposals.
-
-    Attributes:
-        sources: number of states of the pool whose arms are varied.
-        sigma_rad: noise of varied arms, rad.
-        mirrors: number of arms mirrored in depth.
-        tips: number of arms that reach for uncovered foreground.
-        banked: number of arms from ``bank``.
-        bank: samples of the prior, (K, 4), rad.
-        limits: lowest and highest angles, (4, 2), rad.
-    """
-
-    sources: int
-    sigma_rad: float
-    mirrors: int
-    tips: int
-    banked: int
-    bank: Floats
-    limits: Floats
-
-
-ArmPlanTuple = tuple[int, float, int, int, int, Floats, Floats]
+ArmPlan = tuple[int, float, int, int, int, Floats, Floats]
+"""Numbers of states whose arms are varied, and noise of these, rad; numbers of arms mirrored in
+depth, of those that reach for uncovered foreground, and of those from a bank; the bank's samples of
+the prior, (K, 4), rad; lowest and highest angles, (4, 2), rad."""
 
 
 class Ray(NamedTuple):
-    """A line of sight to a hand, and the arm's shoulder.
+    """A line of sight to a hand, and the arm's shoulder."""
 
-    Attributes:
-        shoulder: in the optical frame, (3,), metres.
-        direction: unit vector, (3,).
-        rotation: rotation of the torso, (3, 3).
-    """
-
-    shoulder: Floats
-    direction: Floats
-    rotation: Floats
+    shoulder: Floats  #: in the optical frame, (3,), metres
+    direction: Floats  #: unit vector, (3,)
+    rotation: Floats  #: rotation of the torso, (3, 3)
 
 
 @inlined_kernel
@@ -147,30 +122,70 @@ def _reach(
     angles_of_arm(directions, side, arm_limits, angles)
 
 
+@inlined_kernel
+def _is_inside(uncovered: Planes, row: int, column: int, step: int) -> bool:
+    """Return whether a point of the grid counts, see :func:`farthest_uncovered`."""
+    if value_at(uncovered, row, column) != -1:
+        return False
+    level = 0
+    for beside in range(column - 2, column + 3):
+        level += value_at(uncovered, row, beside)
+    if level > -4:
+        return False
+    above, below = row - step, row + step
+    return value_at(uncovered, above, column) == -1 or value_at(uncovered, below, column) == -1
+
+
+@kernel
+def farthest_uncovered(
+    uncovered: Planes, size: tuple[int, int], u: float, v: float, reach_px: float
+) -> tuple[int, float, float]:
+    """Return how many uncovered points are near a pixel, and column and row of the farthest one.
+
+    A point of the grid counts if it is foreground, the values 1 - 2 f of the five pixels around it
+    in its row add up to at most -4, and the point above or below is foreground. ``uncovered`` are
+    planes (2, words, rows or more) without the covered pixels, of which ``size`` count, rows and
+    width; ``u``, ``v`` and the largest distance are px.
+    """
+    rows, width = size
+    count, best = 0, -1.0
+    tip_u, tip_v = 0.0, 0.0
+    step = _GRID_PX
+    left, right = max(int(u - reach_px), step), min(int(u + reach_px), width - step - 1)
+    top, bottom = max(int(v - reach_px), step), min(int(v + reach_px), rows - step - 1)
+    for row in range(top, bottom, step):
+        for w in range(left // PIXELS, (right + PIXELS - 1) // PIXELS):
+            # Most words have no uncovered foreground.
+            if uncovered[FOREGROUND, w, row] == 0:
+                continue
+            begin = left + max(PIXELS * w - left + step - 1, 0) // step * step
+            for column in range(begin, min(PIXELS * (w + 1), right), step):
+                far = (column - u) ** 2 + (row - v) ** 2
+                if far <= reach_px * reach_px and _is_inside(uncovered, row, column, step):
+                    count += 1
+                    if far > best:
+                        best, tip_u, tip_v = far, float(column), float(row)
+    return count, tip_u, tip_v
+
+
 @kernel
 def propose_arms(
     pool: Floats,
     arm: int,
-    plan: ArmPlanTuple,
+    plan: ArmPlan,
     uncovered: Planes,
     size: tuple[int, int],
     body: BodyTuple,
-    numbers: NumbersTuple,
+    numbers: Numbers,
 ) -> Floats:
     """Return arms (N, 4), 0 left or 1 right, for the torso of the first state of ``pool`` (M, 14).
 
     The first arm is that of the first state; then follow varied arms of the best states. The last
     arms are, from the end: arms of the first four states mirrored in depth; arms that reach for the
-    end of the uncovered foreground, if there is any; arms from the bank.
-
-    Args:
-        pool: states, the best first.
-        arm: 0 left, 1 right.
-        plan: fields of :class:`ArmPlan`.
-        uncovered: planes outside of trunk and other arm, (2, words, rows or more).
-        size: number of rows that count, and width, px.
-        body: fields of :class:`~cardbox_tracker.terms.kernel_arguments.Body`.
-        numbers: fields of :class:`~.joint_moves.Numbers`, (N, 4) and (N, 3).
+    end of the uncovered foreground, if there is any; arms from the bank. ``numbers`` are (N, 4) and
+    (N, 3), ``body`` the fields of :class:`~cardbox_tracker.terms.kernel_arguments.Body`;
+    ``uncovered`` are planes outside of trunk and other arm, (2, words, rows or more), and ``size``
+    the rows that count, and the width, px.
     """
     sources, sigma_rad, mirrors, tips, banked, bank, arm_limits = plan
     normals, uniforms = numbers

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from types import MappingProxyType
 from typing import Any
 
 from cardbox_tracker.common.errors import CardboxError
+from cardbox_tracker.common.files import foreign
 from cardbox_tracker.common.settings import (
     NoEffectError,
     Settings,
@@ -16,6 +18,7 @@ from cardbox_tracker.common.settings import (
     setting,
     suggestion,
 )
+from cardbox_tracker.common.small_yaml import parse_small_yaml, read_small_text
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.search.resampling import STRATEGIES
 from cardbox_tracker.search.whole_body_config import WholeBodyConfig
@@ -131,11 +134,7 @@ class TrackerConfig(Settings):
         return self.filter == "whole_body"
 
     def __post_init__(self) -> None:
-        """Check the ranges.
-
-        Raises:
-            ValueError: a value is out of range; the text names it.
-        """
+        """Raise ValueError, with the name, if a value is out of range."""
         super().__post_init__()
         fewest = min(self.torso.particles, self.arm.particles)
         if self.average > fewest:
@@ -150,14 +149,10 @@ class TrackerConfig(Settings):
         return replace(self, terms=(*self.terms, Depth()))
 
     def changed(self, given: Mapping[str, Any]) -> TrackerConfig:
-        """Return these settings with other values, each of which acts in the selected filter.
+        """Return these settings with other values, nested as ``{"whole_body": {"effort": 0.5}}``.
 
-        Args:
-            given: values by name, nested ones as mappings: ``{"whole_body": {"effort": 0.5}}``.
-
-        Raises:
-            NoEffectError: one of the values has no effect.
-            ValueError: a name is unknown, a value has the wrong type or is out of range.
+        Raises NoEffectError if one has no effect in the selected filter, and ValueError if a name
+        is unknown, or a value has the wrong type or is out of range.
         """
         config = changed(self, given)
         for name in _names(given):
@@ -187,9 +182,7 @@ class TrackerConfig(Settings):
     def with_particles(self, particles: int) -> TrackerConfig:
         """Return these settings with N = ``particles`` in each of the three filters.
 
-        Raises:
-            NoEffectError: the filter is not ``hierarchical``.
-            ValueError: the number is out of range.
+        Raises NoEffectError if the filter is not ``hierarchical``, ValueError if N is out of range.
         """
         number = {"particles": particles}
         fewer = {"average": particles} if particles < self.average else {}
@@ -231,3 +224,16 @@ class _Presets(dict[str, Callable[[], TrackerConfig]]):
 
 PRESETS = MappingProxyType(_Presets(paper=paper_preset, default=default_preset))
 """Functions that return the settings of the presets; a wrong name raises CardboxError."""
+
+
+def read_settings(path: str | os.PathLike[str], config: TrackerConfig) -> TrackerConfig:
+    """Return ``config`` with the values of the file at ``path``; docs/parameters.md has all names.
+
+    Raises CardboxError if it cannot be read, or a name or a value is none that acts.
+    """
+    expected = "a YAML file with names of docs/parameters.md, such as 'lost_frames: 10'"
+    with foreign(path, CardboxError, expected):
+        given = parse_small_yaml(read_small_text(path))
+        if not isinstance(given, dict):
+            raise ValueError("expected names and values, such as 'lost_frames: 10'")
+        return config.changed(given)

@@ -15,7 +15,7 @@ from cardbox_tracker.search import doubt
 from cardbox_tracker.search.config import TrackerConfig
 from cardbox_tracker.search.hierarchy import HierarchicalFilter, SumOfTerms
 from cardbox_tracker.search.pose_filter import Fit, Presence
-from cardbox_tracker.terms.drawn_body import body_tuple
+from cardbox_tracker.terms.kernel_arguments import body_tuple
 from cardbox_tracker.terms.silhouette import SilhouetteTerm
 from cardbox_tracker.terms.term import Frame, Silhouette, Term
 
@@ -41,12 +41,9 @@ class Cycles:
         views: Sequence[View] = (),
         make_hierarchy: MakeHierarchy = HierarchicalFilter,
     ) -> None:
-        """Prepare; see ``MakeFilter``.
+        """Prepare as ``MakeFilter``; raise ValueError if there are ``views``, as it has one camera.
 
         ``make_hierarchy`` takes settings, pixels of an image and random numbers.
-
-        Raises:
-            ValueError: there are ``views``, but the paper's filter has one camera.
         """
         if views:
             raise ValueError("the filter hierarchical has one camera; whole_body takes several")
@@ -107,8 +104,7 @@ class Cycles:
         area = frame.foreground_px / self._person_px
         evidence = doubt.evidence_of_particles(iou, area, posture, stddev, self._posable)
         judged = self._doubt.judge(evidence, doubt.Source.PAPER, np.zeros(6, np.bool_))
-        fit = posture, stddev, keypoints_m, cost_px, iou, is_poor, posture, iou
-        return Fit(*fit, judged=judged)
+        return Fit(posture, stddev, keypoints_m, cost_px, iou, is_poor, judged=judged)
 
     def _start(self, frame: Frame, observation: SumOfTerms) -> None:
         """Start around the front reference at the person's place, then run the first cycles."""

@@ -96,15 +96,10 @@ class Source(StrEnum):
 
 
 class Model(NamedTuple):
-    """A logistic regression.
+    """A logistic regression."""
 
-    Attributes:
-        intercept: logit without evidence.
-        coefficients: by the names of the evidence.
-    """
-
-    intercept: float
-    coefficients: Mapping[str, float]
+    intercept: float  #: logit without evidence
+    coefficients: Mapping[str, float]  #: by the names of the evidence
 
 
 class Models(NamedTuple):
@@ -125,21 +120,13 @@ class Models(NamedTuple):
 
 
 class Judgement(NamedTuple):
-    """The doubt about one result.
+    """The doubt about one result."""
 
-    Attributes:
-        chances: probability of each keypoint to be wrong, (6,).
-        states: state of each keypoint.
-        is_uncertain: whether the posture may be wrong.
-        is_poor: whether it does not fit; several such results in a row mean a lost person.
-        evidence: what the probabilities follow from, by name.
-    """
-
-    chances: FloatArray
-    states: tuple[KeypointState, ...]
-    is_uncertain: bool
-    is_poor: bool
-    evidence: Values
+    chances: FloatArray  #: probability of each keypoint to be wrong, (6,)
+    states: tuple[KeypointState, ...]  #: state of each keypoint
+    is_uncertain: bool  #: whether the posture may be wrong
+    is_poor: bool  #: whether it does not fit; several such results in a row mean a lost person
+    evidence: Values  #: what the probabilities follow from, by name
 
 
 class Doubt:
@@ -158,14 +145,10 @@ class Doubt:
     def judge(
         self, evidence: Values, source: Source, hidden: BoolArray, vetoes: Sequence[bool] = ()
     ) -> Judgement:
-        """Return the doubt about a result.
+        """Return the doubt about a result that rests on ``source``, by its evidence.
 
-        Args:
-            evidence: see :func:`evidence_of_search`, :func:`evidence_of_arms`, and
-                ``TermObservation.evidence``.
-            source: what the result rests on.
-            hidden: whether no camera sees a keypoint, (6,).
-            vetoes: facts of which each makes the whole result uncertain, such as a person's back.
+        ``hidden`` (6,) says whether no camera sees a keypoint; each of ``vetoes``, such as a
+        person's back, makes the whole result uncertain.
         """
         uncertain_from, doubtful_from, of = self._models[source]
         values = {name: each.tolist() for name, each in evidence.items()}
@@ -243,14 +226,11 @@ def evidence_of_search(
 ) -> dict[str, FloatArray]:
     """Return the evidence of search and silhouettes; numbers of pixels become shares.
 
-    Args:
-        pixels: pixels of the silhouettes, of the model in the front posture at the person's
-            distance, of the model in the result, and pixels in which the result differs.
-        prior: rating of the best state beyond its differing pixels: priors and further terms.
-        spreads_m: deviation of left elbow and hand, then right ones, in the search of the arms, m.
-        result: state (14,) and its deviations (14,), see :func:`deviations_of`.
-        body: fields of :class:`~cardbox_tracker.terms.kernel_arguments.Body`.
-        age: frames since the search began.
+    ``pixels`` are those of the silhouettes, of the model in the front posture at the person's
+    distance, of the model in the result, and those in which the result differs. ``prior`` is the
+    rating of the best state beyond these; ``spreads_m`` the deviation of left elbow and hand, then
+    right ones, in the search of the arms; ``result`` the state (14,) and its deviations (14,), see
+    :func:`deviations_of`; ``age`` the number of frames since the search began.
     """
     silhouette_px, frontal_px, model_px, differing_px = pixels
     state, deviations = result
@@ -289,21 +269,15 @@ def evidence_of_arms(
 ) -> dict[str, FloatArray]:
     """Return the evidence of single arms: whether others fit as well, and whether they are seen.
 
-    One outline is that of several arms. They are those that the search rated, and the mirror images
-    of the result in depth, whose outlines hardly differ.
+    One outline is that of several arms. They are those that the search ``rated``, keypoints (N, 6,
+    3) and ratings (N,), and the ``mirrored`` images of the result in depth, whose outlines hardly
+    differ: keypoints (6, 6, 3) and ratings (6,) with upper arm, forearm, and both, of the left arm,
+    then of the right one. ``keypoints_m`` (6, 3) and ``rating`` are of the result.
 
-    Args:
-        keypoints_m: of the result, (6, 3), metres in the optical frame.
-        rating: rating of the result.
-        rated: keypoints (N, 6, 3) and ratings (N,) of the search.
-        mirrored: keypoints (6, 6, 3) and ratings (6,) of the result with its upper arm, its
-            forearm, and both mirrored in depth, of the left arm, then of the right one.
-
-    Returns:
-        By name: ``better``, by how much states are rated worse in which the keypoint is more than
-        ``FAR_M`` away (logarithm); ``sure``, that times how little the mirrored arms move it;
-        ``slope``, the cosine between upper arm and line of sight; ``beside trunk``, how far the
-        joints up to the keypoint are beside or above the trunk in the image, m.
+    By name: ``better``, by how much states are rated worse in which the keypoint is more than
+    ``FAR_M`` away (logarithm); ``sure``, that times how little the mirrored arms move it;
+    ``slope``, the cosine between upper arm and line of sight; ``beside trunk``, how far the joints
+    up to the keypoint are beside or above the trunk in the image, m.
     """
     found = np.zeros((4, 6))
     _arms(keypoints_m, rating, *rated, *mirrored, found)
@@ -370,14 +344,9 @@ def _arms(
 def evidence_of_particles(
     iou: float, area: float, posture: FloatArray, stddev: FloatArray, body: BodyTuple
 ) -> dict[str, FloatArray]:
-    """Return the evidence of the paper's filter.
+    """Return the evidence of the paper's filter, of posture and deviations (12,) of particles.
 
-    Args:
-        iou: intersection over union of model and silhouette.
-        area: pixels of the silhouette divided by those of the model in the front posture.
-        posture: d1..d12, (12,).
-        stddev: standard deviations of the particles, (12,).
-        body: fields of :class:`~cardbox_tracker.terms.kernel_arguments.Body`.
+    ``area`` are pixels of the silhouette divided by those of the model in the front posture.
     """
     state, deviations, spread_m = np.zeros(N_STATE), np.zeros(N_STATE), np.empty(6)
     state[: len(posture)], deviations[: len(stddev)] = posture, stddev
@@ -440,9 +409,7 @@ def deviations_of(stddev: FloatArray) -> FloatArray:
 def calibrated_deviations(deviations: FloatArray, rng: np.random.Generator) -> FloatArray:
     """Return differences (n, 14) from a result with the deviations of :func:`deviations_of`.
 
-    Args:
-        deviations: differences of states, drawn by their weights, from the mean, (n, 14).
-        rng: source of the noise that the floors add.
+    ``deviations`` (n, 14) are those of states, drawn by their weights, from the mean.
     """
     calibrated: FloatArray = _GAINS * deviations + _FLOORS * rng.standard_normal(deviations.shape)
     return calibrated

@@ -47,17 +47,12 @@ class HierarchicalCost(Protocol):
 
 @dataclass(frozen=True)
 class SumOfTerms:
-    """The silhouette's cost and that of further terms.
+    """The silhouette's cost and that of further terms."""
 
-    Attributes:
-        silhouette: the paper's cost.
-        terms: observations of further terms.
-        body: fields of :class:`~cardbox_tracker.terms.kernel_arguments.Body` with the
-            paper's shoulders, which the arms do not raise.
-    """
-
-    silhouette: HierarchicalCost
-    terms: Sequence[TermObservation]
+    silhouette: HierarchicalCost  #: the paper's cost
+    terms: Sequence[TermObservation]  #: observations of further terms
+    #: fields of :class:`~cardbox_tracker.terms.kernel_arguments.Body` with the paper's shoulders,
+    #: which the arms do not raise.
     body: BodyTuple
 
     def torsos_beside(self, arms: FloatArray | None) -> TorsoCosts:
@@ -97,10 +92,7 @@ class HierarchicalFilter:
     def __init__(self, config: TrackerConfig, image_px: int, rng: np.random.Generator) -> None:
         """Create the filters; :meth:`initialize` creates their particles.
 
-        Args:
-            config: settings.
-            image_px: pixels of an image; settings that refer to 320x240 are scaled to it.
-            rng: split into one stream per filter.
+        Settings that refer to 320x240 are scaled to an image of ``image_px``; ``rng`` is split.
         """
         self._config = config
         self._scale = image_px / _REFERENCE_AREA_PX

@@ -6,7 +6,6 @@ Callers pass the random numbers, unit normal or uniform in 0..1.
 from __future__ import annotations
 
 from math import sin
-from typing import NamedTuple
 
 import numpy as np
 
@@ -28,34 +27,12 @@ _NOISE_OF_DIFFERENCE = 0.2
 _LEFT, _RIGHT = FIRST_ANGLES
 
 
-class Numbers(NamedTuple):
-    """Random numbers of N proposals.
+Numbers = tuple[Floats, Floats]
+"""Random numbers of N proposals: unit normal, (N, D), and uniform in 0..1, (N, K)."""
 
-    Attributes:
-        normals: unit normal, (N, D).
-        uniforms: uniform in 0..1, (N, K).
-    """
-
-    normals: Floats
-    uniforms: Floats
-
-
-class Noise(NamedTuple):
-    """Noise of a state.
-
-    Attributes:
-        sigma: deviations, (14,).
-        limits: lowest and highest values, (14, 2).
-        lever_m: height of the shoulders above the hips.
-    """
-
-    sigma: Floats
-    limits: Floats
-    lever_m: float
-
-
-NumbersTuple = tuple[Floats, Floats]
-NoiseTuple = tuple[Floats, Floats, float]
+Noise = tuple[Floats, Floats, float]
+"""Deviations of a state, (14,), its lowest and highest values, (14, 2), and the height of the
+shoulders above the hips, m."""
 
 
 @inlined_kernel
@@ -100,17 +77,17 @@ def combine(
 @kernel
 def move_all(
     sources: Floats,
-    noise: NoiseTuple,
+    noise: Noise,
     differing: int,
     difference_scale: float,
-    numbers: NumbersTuple,
+    numbers: Numbers,
 ) -> Floats:
     """Return states (N, 14) around ``sources`` (M, 14), all joints moved together.
 
     Every second state rotates about the shoulders. In the first half, states in turn move only the
     torso, only the left arm, and only the right arm. The last ``differing`` states move by the
     difference of two sources, which follows the flat directions of the cost (differential
-    evolution). ``numbers`` are fields of :class:`Numbers`, (N, 14) and (N, 2).
+    evolution). ``numbers`` are (N, 14) and (N, 2).
     """
     sigma, limits, lever_m = noise
     normals, uniforms = numbers

@@ -3,15 +3,60 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from math import hypot
+from math import copysign, hypot, radians
 from typing import NamedTuple
 
 from cardbox_tracker.camera.view import LevelPoint, View
 from cardbox_tracker.person.posture import TORSO_X, TORSO_Y
 from cardbox_tracker.person.sizes import FloatArray
-from cardbox_tracker.search.walking import Walk
 from cardbox_tracker.terms.multi_view import MultiViewCost
-from cardbox_tracker.terms.term import Frame
+from cardbox_tracker.terms.term import Frame, Silhouette
+
+# Lateral motion of a walking person, m; a person who sways moves up to half of it.
+_WAY_M = 0.25
+# Decay of the lateral motion per frame.
+_FORGOTTEN = 0.05
+# A person who walks sideways is seen nearly from the side.
+_ASIDE_RAD = radians(80.0)
+
+
+class Walk:
+    """The lateral motion of a person, who faces the direction of travel.
+
+    An outline from the side is nearly the same for both directions, but the motion is not.
+
+    Attributes:
+        way_m: decaying sum of the recent motion, positive towards positive ``torso_y``, metres.
+    """
+
+    def __init__(self) -> None:
+        """Begin without a person."""
+        self._bearing: float | None = None
+        self.way_m = 0.0
+
+    def see(self, silhouette: Silhouette, bearing: float, ahead_m: float) -> float:
+        """Return the lateral motion of the next silhouette (H, W), 0 or 255, metres.
+
+        ``bearing`` is the lateral coordinate over depth of its middle, ``ahead_m`` the distance. A
+        person who first appears at a border of the image is assumed to walk in.
+        """
+        if self._bearing is None:
+            step_m = 0.0
+            left, right = (bool(silhouette[:, edge].any()) for edge in (0, -1))
+            self.way_m = _WAY_M * (left - right)
+        else:
+            step_m = (bearing - self._bearing) * ahead_m
+            way_m = (1.0 - _FORGOTTEN) * self.way_m + step_m
+            self.way_m = min(max(way_m, -_WAY_M), _WAY_M)
+        self._bearing = bearing
+        return step_m
+
+    @property
+    def yaw_rad(self) -> float:
+        """Expected yaw of the torso, rad; 0 unless the person walks."""
+        walking = max(0.0, 2.0 * abs(self.way_m) / _WAY_M - 1.0)
+        return copysign(_ASIDE_RAD * walking, self.way_m)
+
 
 # Deviation of the intersection, m: median columns of two cameras show different body points.
 _CROSSING_M = 0.1
@@ -20,18 +65,13 @@ _LEAST_ANGLE = 0.05
 
 
 class Location(NamedTuple):
-    """Estimated place of the person.
+    """Estimated place of the person."""
 
-    Attributes:
-        bearing: lateral coordinate over depth of the silhouette's middle in the first camera.
-        step_m: lateral motion of the middle since the last frame, metres.
-        x_m: ``torso_x`` of the intersection of the lines of sight; None if it is not computed.
-        x_stddev_m: standard deviation of ``x_m``; None if the lines do not determine it.
-    """
-
-    bearing: float
-    step_m: float
+    bearing: float  #: lateral coordinate over depth of the silhouette's middle in the first camera
+    step_m: float  #: lateral motion of the middle since the last frame, metres
+    #: ``torso_x`` of the intersection of the lines of sight; None if it is not computed.
     x_m: float | None = None
+    #: standard deviation of ``x_m``; None if the lines do not determine it.
     x_stddev_m: float | None = None
 
 
@@ -41,13 +81,9 @@ class Locator:
     def __init__(
         self, cost: MultiViewCost, distance_m: float, views: Sequence[View], crosses: bool
     ) -> None:
-        """Prepare.
+        """Prepare for ``views`` of further cameras; ``distance_m`` is that of the body model.
 
-        Args:
-            cost: source of the bearings.
-            distance_m: distance of the hips from the first camera in the body model.
-            views: views of the further cameras.
-            crosses: whether the intersection of the lines of sight is computed.
+        ``crosses`` says whether the intersection of the lines of sight is computed.
         """
         self._cost, self._distance_m = cost, distance_m
         self._views, self._crosses = views, crosses
@@ -65,12 +101,9 @@ class Locator:
     def locate(
         self, frames: Sequence[Frame], seeing: Sequence[int], before: FloatArray
     ) -> Location:
-        """Return the place of the person.
+        """Return the place of the person in frames of all cameras, of which ``seeing`` show them.
 
-        Args:
-            frames: frames of all cameras, whose silhouettes the cost has.
-            seeing: indices of the cameras that show the person.
-            before: state (14,) of the previous frame.
+        The cost has their silhouettes; ``before`` (14,) is the state of the previous frame.
         """
         costs, step_m = self._cost.costs, 0.0
         bearings = {number: costs[number].bearing() for number in seeing}
@@ -103,9 +136,7 @@ def crossing_of(
 
         (w I + sum of (I - a a^T)) x = w before + sum of (I - a a^T) place
 
-    Args:
-        lines: point and unit direction of each line, metres in the first level frame.
-        before: previous place of the person, metres.
+    All are metres in the first level frame.
     """
     # Without numpy, whose calls for such small matrices take ten times as long.
     weight = _LEAST_ANGLE**2

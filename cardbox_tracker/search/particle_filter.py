@@ -39,14 +39,9 @@ class ParticleFilter:
         limits: FloatArray,
         rng: np.random.Generator,
     ) -> None:
-        """Create the filter; :meth:`initialize` creates its particles.
+        """Create the filter with a strategy of :mod:`.resampling`, and no particles yet.
 
-        Args:
-            config: settings of Table I.
-            strategy: name of a strategy in :mod:`cardbox_tracker.search.resampling`.
-            noise: sigma_beta of each joint, (D,), rad and metres.
-            limits: lowest and highest value of each joint, (D, 2).
-            rng: source of the noise.
+        ``noise`` (D,) is sigma_beta of each joint, ``limits`` (D, 2) its range, rad and metres.
         """
         self.config = config
         self.strategy = strategy
@@ -71,13 +66,7 @@ class ParticleFilter:
         noise_scale: float = 1.0,
         sigma_scale: float = 1.0,
     ) -> None:
-        """Run one estimation cycle.
-
-        Args:
-            evaluate: costs of particles against the present frame.
-            noise_scale: factor on sigma_beta.
-            sigma_scale: factor on sigma_gamma, such as for a larger image.
-        """
+        """Run one estimation cycle, with factors on sigma_beta and sigma_gamma."""
         ancestors = resample(
             self.strategy,
             self.costs,
@@ -118,8 +107,8 @@ class ParticleFilter:
     def stddev(self, mean: FloatArray, spread_scale: float = 1.0) -> FloatArray:
         """Return the standard deviation (D,) of all particles around ``mean`` (D,).
 
-        The weights are those of :meth:`mean`, so a deviation measures how far a joint can move
-        until the fit becomes worse.
+        The weights are those of :meth:`mean`, so it tells how far a joint can move until the fit is
+        worse.
         """
         stddev: FloatArray = weighted_stddev(
             self.particles, self.costs, mean, SPREAD_PX * spread_scale

@@ -14,8 +14,7 @@ from cardbox_tracker.common.compiling import kernel
 def propagate(steps: Any, particles: Any, ancestors: Any, sigma: Any) -> None:
     """Turn ``steps`` (N, D) of unit noise into new particles, in place.
 
-    A new particle is its ancestor in ``particles`` (N, D) plus ``sigma`` (D,) times its noise.
-    ``ancestors`` has the indices (N,) of the ancestors.
+    A new particle is that of its index in ``ancestors`` (N,) plus ``sigma`` (D,) times its noise.
     """
     for i in range(steps.shape[0]):
         ancestor = ancestors[i]
@@ -73,8 +72,7 @@ def _cheapest(costs: Any, count: int) -> Any:
 def truncate(costs: Any, count: int) -> Any:
     """Return ancestors (N,): the best particle, the other survivors, then copies of the best.
 
-    The survivors are the ``count`` particles with the lowest ``costs`` (N,); of equal costs the
-    first ones survive.
+    The ``count`` particles with the lowest ``costs`` (N,) survive; of equal costs the first ones.
     """
     best = np.argmin(costs)
     ancestors = np.full(costs.shape[0], best)

@@ -29,37 +29,20 @@ class Presence(Enum):
 
 @dataclass(frozen=True)
 class Fit:
-    """The result of a filter in a frame.
+    """The result of a filter in a frame."""
 
-    Attributes:
-        posture: d1..d12, (12,), rad and metres.
-        posture_stddev: standard deviations, (12,).
-        keypoints_m: shoulder, elbow, hand of the left, then the right arm, (6, 3), metres in the
-            optical frame.
-        cost_px: pixels in which the drawn posture and the silhouette differ.
-        iou: intersection over union of drawn posture and silhouette.
-        is_poor: whether it does not fit; several such frames in a row mean that the person is lost.
-        seen: state that fits the image best, before any correction, (14,), or (12,) without
-            an offset.
-        seen_iou: ``iou`` of ``seen``.
-        offset_m: ``torso_x`` and ``torso_z``, (2,), or None.
-        offset_stddev_m: standard deviations of ``offset_m``, (2,), or None.
-        particles: particles of whole states; None if the filter has none.
-        judged: the doubt about the result; None if the filter has none.
-    """
-
-    posture: FloatArray
-    posture_stddev: FloatArray
+    posture: FloatArray  #: d1..d12, (12,), rad and metres
+    posture_stddev: FloatArray  #: standard deviations, (12,)
+    #: shoulder, elbow, hand of the left, then the right arm, (6, 3), metres in the optical frame.
     keypoints_m: FloatArray
-    cost_px: int
-    iou: float
+    cost_px: int  #: pixels in which the drawn posture and the silhouette differ
+    iou: float  #: intersection over union of drawn posture and silhouette
+    #: whether it does not fit; several such frames in a row mean that the person is lost.
     is_poor: bool
-    seen: FloatArray
-    seen_iou: float
-    offset_m: FloatArray | None = None
-    offset_stddev_m: FloatArray | None = None
-    particles: Particles | None = None
-    judged: Judgement | None = None
+    offset_m: FloatArray | None = None  #: ``torso_x`` and ``torso_z``, (2,), or None
+    offset_stddev_m: FloatArray | None = None  #: standard deviations of ``offset_m``, (2,), or None
+    particles: Particles | None = None  #: particles of whole states; None if the filter has none
+    judged: Judgement | None = None  #: the doubt about the result; None if the filter has none
 
     @property
     def is_finite(self) -> bool:
@@ -81,20 +64,13 @@ class PoseFilter(Protocol):
         """Set the frames of all cameras; return whether they can show a person."""
 
     def follow(self, frames: Sequence[Frame], terms: Sequence[Sequence[Term]]) -> Fit:
-        """Estimate the posture in the frames of the last call of :meth:`look`.
+        """Estimate the posture in the frames of the last :meth:`look`, by the cameras' terms.
 
         A new search starts around the front reference posture.
-
-        Args:
-            frames: frames of the first camera, then of the further cameras.
-            terms: further terms of the cost for each camera.
         """
 
     def ious(self) -> list[float | None]:
-        """Return the IoU of the last result and each camera's silhouette.
-
-        It is None for a camera that showed no person, and before the first result.
-        """
+        """Return the IoU of the last result in each camera; None where there was none."""
 
     def forget(self) -> None:
         """Start a new search with the next frame, because the person has left."""
@@ -104,19 +80,6 @@ class PoseFilter(Protocol):
 
     def configure(self, config: TrackerConfig) -> None:
         """Use other settings; settings that restart tracking are the same."""
-
-
-class Corrector(Protocol):
-    """Changes the results of the preset ``default``, see :class:`~cardbox_tracker.Tracker`."""
-
-    def __call__(self, frames: Sequence[Frame], state: FloatArray) -> FloatArray:
-        """Return the corrected state (14,).
-
-        Args:
-            frames: frames of the first camera, then of the further cameras.
-            state: the state that fits the frames: d1..d12, ``torso_x``, ``torso_z``, (14,), rad and
-                metres.
-        """
 
 
 MakeFilter = Callable[

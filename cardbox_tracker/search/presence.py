@@ -47,9 +47,7 @@ class PersonPresence:
     def see(self, frames: Sequence[Frame], near: FloatArray) -> tuple[Presence, list[int]]:
         """Return the presence, and the indices of the cameras that show the person.
 
-        Args:
-            frames: frames of all cameras, whose silhouettes the cost has.
-            near: state (14,) of the last frame.
+        The cost has the silhouettes of ``frames``; ``near`` (14,) is the state of the last frame.
         """
         found = []
         for share, frame in zip(self._cost.shares(near), frames, strict=True):
@@ -74,15 +72,10 @@ class PersonPresence:
 def presence_of(
     low: float, high: float, smallest: float, largest: float, is_detected: bool = False
 ) -> Presence:
-    """Return the presence from shares of the frontal model's area.
+    """Return the presence from the silhouette's area as shares of the frontal model's.
 
-    Args:
-        low: silhouette's area divided by the frontal model's where the model is largest.
-        high: the same where the model is smallest.
-        smallest: least share of a person.
-        largest: largest share of a person.
-        is_detected: whether a detector finds the person, so that a spoilt silhouette does no harm,
-            and neither does a person who is smaller than expected.
+    ``low`` is where the model is largest, ``high`` where it is smallest; a person has ``smallest``
+    to ``largest``. Whom a detector finds may be smaller, and a spoilt silhouette does no harm.
     """
     if high < smallest and not (is_detected and high > 0.0):
         return Presence.NOBODY

@@ -35,15 +35,10 @@ _SAME = np.eye(N_STATE)
 
 
 class Prior(NamedTuple):
-    """A normal prior of a state.
+    """A normal prior of a state."""
 
-    Attributes:
-        mean: (14,), or (N, 14) for each state.
-        inverse: inverse variances, (14,).
-    """
-
-    mean: FloatArray
-    inverse: FloatArray
+    mean: FloatArray  #: (14,), or (N, 14) for each state
+    inverse: FloatArray  #: inverse variances, (14,)
 
 
 class Refiner:
@@ -64,16 +59,9 @@ class Refiner:
     ) -> tuple[FloatArray, FloatArray]:
         """Return states (N, 14) near ``states`` that fit the cues, and their information.
 
-        Args:
-            states: initial states of the first camera, (N, 14).
-            cues: observations of the frame; those without residuals do not count.
-            prior: prior of the states.
-            steps: number of Gauss-Newton steps.
-            damping: inverse variance of a step.
-
-        Returns:
-            The states within their limits; the matrix of the normal equations at the last accepted
-            state, (N, 14, 14), whose inverse is the covariance of the posterior.
+        Cues without residuals do not count; ``damping`` is the inverse variance of a step. The
+        states are within their limits. The information (N, 14, 14) is the matrix of the normal
+        equations at the last accepted state, whose inverse is the covariance of the posterior.
         """
         low, high = self._cost.limits.T
         states = np.ascontiguousarray(states, np.float64)

@@ -140,15 +140,10 @@ def resample(
     rng: np.random.Generator,
     elite: bool = True,
 ) -> Indices:
-    """Return the ancestors (N,) of the next particles.
+    """Return the ancestors (N,) of the next particles for their ``costs`` (N,), px.
 
-    Args:
-        strategy: one of ``STRATEGIES``.
-        costs: costs of the present particles, (N,), px.
-        survival_rate: e; only ``drs`` uses it.
-        sigma_gamma_px: width of the weights; ``drs`` does not use it.
-        rng: source of random numbers; ``drs`` draws none.
-        elite: whether the best particle replaces the first draw.
+    ``drs`` uses the ``survival_rate`` and draws nothing, the others ``sigma_gamma_px``. With
+    ``elite`` the best particle replaces the first draw.
     """
     if strategy == "drs":
         return truncation(costs, survival_rate)

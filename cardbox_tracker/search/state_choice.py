@@ -20,8 +20,7 @@ Indices = NDArray[np.int64]
 def least_of(ratings: Floats, count: int) -> Indices:
     """Return the indices of the least ``count`` of ratings (N,), least first; all if N is less.
 
-    Equal ratings keep their order, and those that are not numbers come last. For few of many
-    ratings, this is faster than sorting all.
+    Equal ratings keep their order, and those that are not numbers come last.
     """
     most = min(count, ratings.shape[0])
     chosen, values = np.empty(most, np.int64), np.empty(most)

@@ -6,7 +6,6 @@ Callers pass the random numbers, unit normal or uniform in 0..1.
 from __future__ import annotations
 
 from math import pi
-from typing import NamedTuple
 
 import numpy as np
 
@@ -27,8 +26,8 @@ from cardbox_tracker.person.posture import (
     YAW,
 )
 from cardbox_tracker.search.joint_moves import (
-    NoiseTuple,
-    NumbersTuple,
+    Noise,
+    Numbers,
     clip_state,
     pivot,
 )
@@ -45,49 +44,27 @@ _EXPLORERS_X_M = 0.06
 _FRESH_TURNED, _FRESH_YAW_RAD = 0.5, 0.3
 
 
-class Upright(NamedTuple):
-    """Upright torsos at the place of the silhouette.
-
-    Attributes:
-        number: number of torsos.
-        state: state with hanging arms, (14,).
-        x_deviation_m: deviation of ``torso_x``, metres.
-        direction: bearing of the silhouette: lateral coordinate over depth.
-        distance_m: distance of the person in the body model.
-    """
-
-    number: int
-    state: Floats
-    x_deviation_m: float
-    direction: float
-    distance_m: float
-
-
-UprightTuple = tuple[int, Floats, float, float, float]
+Upright = tuple[int, Floats, float, float, float]
+"""Number of upright torsos at the place of the silhouette; state with hanging arms, (14,);
+deviation of ``torso_x``, m; bearing of the silhouette, lateral coordinate over depth; distance of
+the person in the body model, m."""
 
 
 @kernel
 def propose_torsos(
     survivors: Floats,
-    noise: NoiseTuple,
+    noise: Noise,
     step_m: float,
     explorers: int,
-    upright: UprightTuple,
-    numbers: NumbersTuple,
+    upright: Upright,
+    numbers: Numbers,
 ) -> Floats:
     """Return states (N, 14) with new torsos around ``survivors`` (M, 14), whose arms they keep.
 
     Every second torso rotates about the shoulders. Half of either kind moves by ``step_m``, the
-    step of the silhouette, because a walking person moves further than the noise. The last
-    ``explorers`` bow, turn or mirror their yaw; the last of these stand upright.
-
-    Args:
-        survivors: states of the last frame.
-        noise: fields of :class:`~.joint_moves.Noise`.
-        step_m: lateral step, metres.
-        explorers: number of explorers.
-        upright: fields of :class:`Upright`.
-        numbers: fields of :class:`~.joint_moves.Numbers`, (N, 14) and (N, 2).
+    lateral step of the silhouette, because a walking person moves further than the noise. The last
+    ``explorers`` bow, turn or mirror their yaw; the last of these stand upright. ``numbers`` are
+    (N, 14) and (N, 2).
     """
     sigma, limits, lever_m = noise
     fresh, fresh_state, fresh_x_m, sight, distance_m = upright

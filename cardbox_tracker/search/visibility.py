@@ -50,8 +50,8 @@ def is_trackable(cost: MultiViewCost, state: FloatArray) -> bool:
 def are_hidden(cost: MultiViewCost, state: FloatArray) -> BoolArray:
     """Return which keypoints (6,) of a state (14,) no camera sees that sees the person.
 
-    A keypoint is hidden outside of the image, behind the trunk and behind another person; shoulders
-    are part of the trunk.
+    Hidden is what is outside of the image, behind the trunk, of which shoulders are part, or behind
+    another person.
     """
     hidden = np.ones(6, dtype=np.bool_)
     for number in cost.seeing:

@@ -10,7 +10,7 @@ Proposals are in :mod:`.torso_proposals`, :mod:`.arm_search` and :mod:`.joint_mo
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -31,17 +31,16 @@ from cardbox_tracker.person.posture import (
 from cardbox_tracker.person.sizes import FloatArray
 from cardbox_tracker.search import doubt, joint_moves, state_choice, torso_proposals
 from cardbox_tracker.search.approach import Approach
-from cardbox_tracker.search.arm_search import ArmSearch
-from cardbox_tracker.search.arms import ARM_LIMITS
+from cardbox_tracker.search.arm_search import ARM_LIMITS, ArmSearch
 from cardbox_tracker.search.config import TrackerConfig
 from cardbox_tracker.search.draws import Draws
 from cardbox_tracker.search.locating import Location, Locator
 from cardbox_tracker.search.mirroring import mirrored_states, turned_states
 from cardbox_tracker.search.particles import Particles
-from cardbox_tracker.search.pose_filter import Corrector, Fit, Presence
+from cardbox_tracker.search.pose_filter import Fit, Presence
 from cardbox_tracker.search.presence import PersonPresence
 from cardbox_tracker.search.rated_states import RatedStates
-from cardbox_tracker.search.refiner import Cue, Prior, Refiner
+from cardbox_tracker.search.refiner import Prior, Refiner
 from cardbox_tracker.search.visibility import are_hidden, is_trackable
 from cardbox_tracker.search.whole_body_config import SearchProfile
 from cardbox_tracker.terms.multi_view import MultiViewCost
@@ -73,37 +72,13 @@ _ONE_MIRRORED = [1, 2, 3, 4, 8, 12]
 _KEPT = 0.6
 
 
-@dataclass
-class Search:
-    """The search of one frame.
+class Search(NamedTuple):
+    """What the stages of one frame's search share beside the filter itself."""
 
-    Attributes:
-        cost: rates states by the cameras that show the person.
-        profile: numbers of the search.
-        survivors: states (M, 14) of the last frame, the best first.
-        before: state (14,) of the last frame.
-        rated: rated states, to which each stage adds.
-        location: the person's place by the silhouettes.
-        reference: state (14,) of the front reference posture.
-        draws: random numbers.
-        age: frames since the search began.
-        is_new: whether the person is new in this frame.
-        is_lost: whether the person was lost.
-        cues: observations that tell where joints are, by camera.
-    """
-
-    cost: MultiViewCost
-    profile: SearchProfile
-    survivors: FloatArray
-    before: FloatArray
-    rated: RatedStates
-    location: Location
-    reference: FloatArray
-    draws: Draws
-    age: int
-    is_new: bool
-    is_lost: bool
-    cues: list[Cue]
+    profile: SearchProfile  #: numbers of the search
+    before: FloatArray  #: state (14,) of the last frame
+    location: Location  #: the person's place by the silhouettes
+    draws: Draws  #: random numbers
 
 
 class WholeBodyFilter:
@@ -124,10 +99,8 @@ class WholeBodyFilter:
         silhouette: SilhouetteTerm,
         rng: np.random.Generator,
         views: Sequence[View] = (),
-        corrector: Corrector | None = None,
     ) -> None:
         """Prepare, and compile the kernels if necessary; see ``MakeFilter``."""
-        self._corrector = corrector
         self._config = settings = config.whole_body
         self._profile = settings.profile_for(1 + len(views)).scaled(settings.effort)
         self._located = self._profile.scaled(_LOCATED_EFFORT)
@@ -230,35 +203,22 @@ class WholeBodyFilter:
         shows_legs = any(cue.shows_legs for _, cue in self._cues)
         cost.expect(*expected, bool(self._cues), shows_legs)
         self.rated = RatedStates(cost)
-        search = Search(
-            cost,
-            profile,
-            self._survivors,
-            before,
-            self.rated,
-            location,
-            self._reference,
-            Draws(self._rng, profile),
-            self._age,
-            self._is_new,
-            self._is_lost,
-            self._cues,
-        )
+        search = Search(profile, before, location, Draws(self._rng, profile))
         for stage in STAGES:
             stage(self, search)
         self._survivors = self.rated.different(profile.survivors, profile.alike, profile.apart_m)
 
     def torsos(self, search: Search) -> None:
         """Rate survivors and new torsos with arms; of a new person, also arms of upright ones."""
-        profile, cost, before = search.profile, search.cost, search.before
+        profile, cost, before = search.profile, self._cost, search.before
         location = search.location
-        is_settled = not search.is_new and search.age > _SETTLED_FRAMES
-        fresh = search.reference.copy()
+        is_settled = not self._is_new and self._age > _SETTLED_FRAMES
+        fresh = self._reference.copy()
         fresh[TORSO_X] = before[TORSO_X] if location.x_m is None else location.x_m
         fresh_x_m = location.x_stddev_m or (_SETTLED_X_M if is_settled else _YOUNG_X_M)
         upright = profile.fresh_torsos if is_settled else profile.torso_explorers
         torsos = torso_proposals.propose_torsos(
-            search.survivors,
+            self._survivors,
             (_of_torso(profile.noise()), cost.limits, _lever_m(cost)),
             location.step_m,
             profile.torso_explorers,
@@ -267,47 +227,47 @@ class WholeBodyFilter:
         )
         ratings = cost.torsos(torsos, before)
         pool = torso_proposals.pool_of(
-            search.survivors, torsos, ratings, profile.best_torsos, before, cost.body, ARM_LIMITS
+            self._survivors, torsos, ratings, profile.best_torsos, before, cost.body, ARM_LIMITS
         )
         # Upright torsos were rated with the arms of the last frame, but keep their hanging arms.
         standing = torsos[len(torsos) - upright :]
         more = [standing, self.approach.nearer_and_farther(before, cost)]
-        if search.cues:
-            turned, hanging = before.copy(), search.reference.copy()
+        if self._cues:
+            turned, hanging = before.copy(), self._reference.copy()
             turned[YAW] = 2.0 * cost.facing_rad - turned[YAW]
             hanging[[TORSO_X, TORSO_Y]] = before[[TORSO_X, TORSO_Y]]
-            begin = [search.survivors[0], search.survivors[-1], turned, hanging]
+            begin = [self._survivors[0], self._survivors[-1], turned, hanging]
             more.append(self._located_by_cues(np.array(begin)))
-        search.rated.add(np.concatenate([pool, *more]))
-        if (search.is_new or search.is_lost) and len(standing):
+        self.rated.add(np.concatenate([pool, *more]))
+        if (self._is_new or self._is_lost) and len(standing):
             # Its own arms make a wrong torso better than an upright one with hanging arms.
-            rated = search.rated.ratings[len(pool) : len(pool) + upright]
-            best = search.rated.best(profile.survivors)
+            rated = self.rated.ratings[len(pool) : len(pool) + upright]
+            best = self.rated.best(profile.survivors)
             first = standing[np.argmin(rated)]
             self._add_arms(search, np.concatenate([first[None], best]), Draws(self._rng, profile))
 
     def arms(self, search: Search) -> None:
         """Rate arms beside the best torso, and pairs of the best ones."""
-        self._add_arms(search, search.rated.best(search.profile.survivors), search.draws)
+        self._add_arms(search, self.rated.best(search.profile.survivors), search.draws)
 
     def _add_arms(self, search: Search, pool: FloatArray, draws: Draws) -> None:
         """Search arms for the torso of the first state of a pool (M, 14), and rate their pairs."""
-        search.cost.fix_torso(pool[0])
+        self._cost.fix_torso(pool[0])
         left, right = (self._arm(pool, arm, search.profile, draws) for arm in (0, 1))
         most = search.profile.paired_arms
-        search.rated.add_pairs(joint_moves.combine(pool[0], *left, *right, most))
+        self.rated.add_pairs(joint_moves.combine(pool[0], *left, *right, most))
 
     def fitted(self, search: Search) -> None:
         """Rate states that are fitted to the cues, from the best different ones."""
-        rated = search.rated
+        rated = self.rated
         if search.profile.fits_outlines:
             chosen = rated.different(*_OUTLINED)
             near = Prior(chosen, _NEAR)
             rated.add(self.refine(chosen, self._cost.outlines(chosen[0]), near, _OUTLINED_STEPS)[0])
-        if search.cues:
+        if self._cues:
             chosen = rated.different(*_FITTED)
             # A point gives a line of sight, on which a bone has two directions.
-            mirrored = mirrored_states(chosen[0], search.cost.body, ARM_LIMITS)
+            mirrored = mirrored_states(chosen[0], self._cost.body, ARM_LIMITS)
             rated.add(self._located_by_cues(np.concatenate([chosen, mirrored[1:]])))
 
     def _located_by_cues(self, states: FloatArray) -> FloatArray:
@@ -317,7 +277,7 @@ class WholeBodyFilter:
 
     def together(self, search: Search) -> None:
         """Move all joints of the best states together, and by the differences of others."""
-        profile, rated = search.profile, search.rated
+        profile, rated = search.profile, self.rated
         sigma = profile.together_noise * profile.noise()
         sources = rated.different(profile.survivors, profile.alike, profile.apart_m)
         for number in range(profile.rounds):
@@ -325,7 +285,7 @@ class WholeBodyFilter:
                 sources = rated.best(profile.survivors)
             moved = joint_moves.move_all(
                 sources,
-                (sigma, search.cost.limits, _lever_m(search.cost)),
+                (sigma, self._cost.limits, _lever_m(self._cost)),
                 int(profile.differing * profile.together),
                 profile.difference_scale,
                 search.draws.for_states(profile.together),
@@ -342,31 +302,29 @@ class WholeBodyFilter:
         before = mean if self._output is None else self._output
         kept = self._config.smoothing * profile.smoothing
         self._output = kept * before + (1.0 - kept) * mean
-        fitted = self._refined(frames, self._output)
-        result = self._corrected(frames, fitted)
+        result = self._refined(frames, self._output)
         is_back = cost.facing_rad != 0.0
         if self._cues:
             # The image in which somebody is found to have turned counts as one of a back, too.
-            fitted, result = self._turned(np.array([fitted, result]))
+            (result,) = self._turned(result[None])
         mirrored = mirrored_states(result, cost.body, ARM_LIMITS)[_ONE_MIRRORED]
-        found = cost.bodies(np.concatenate([fitted[None], result[None], mirrored]))
+        found = cost.bodies(np.concatenate([result[None], mirrored]))
         ratings, points = found.ratings, found.points
-        differs_px, cost_px = found.costs_px[:2]
-        drawn_px, area_px = found.areas_px[:2]
+        cost_px, area_px = found.costs_px[0], found.areas_px[0]
         deviations, total = doubt.deviations_of(stddev), cost.silhouette_px
-        fit_iou = iou_of(total, drawn_px, differs_px)
+        iou = iou_of(total, area_px, cost_px)
         pixels = float(total), float(cost.frontal_px_at(result)), float(area_px), float(cost_px)
-        prior = float(ratings[1]) - float(cost_px) / max(total, 1)
+        prior = float(ratings[0]) - float(cost_px) / max(total, 1)
         ahead = result.copy()
         ahead[YAW] -= cost.facing_rad
         evidence = doubt.evidence_of_search(
             pixels, prior, self._arm.spreads_m, (ahead, deviations), cost.body, self._age
         )
         evidence |= doubt.evidence_of_arms(
-            points.keypoints_m[1],
-            float(ratings[1]),
+            points.keypoints_m[0],
+            float(ratings[0]),
             (self.rated.keypoints_m, self.rated.ratings),
-            (points.keypoints_m[2:], ratings[2:]),
+            (points.keypoints_m[1:], ratings[1:]),
         )
         for number, cue in self._cues:
             there = cost.to_views[number](result[None])
@@ -375,21 +333,19 @@ class WholeBodyFilter:
         source = doubt.Source.POINTS if self._cues else self._outline
         is_back = is_back or cost.facing_rad != 0.0
         evidence["back"] = np.full(6, float(is_back))
-        vetoes = not is_trackable(cost, fitted), is_back
+        vetoes = not is_trackable(cost, result), is_back
         judged = self._doubt.judge(evidence, source, are_hidden(cost, result), vetoes)
         self._result = result
         if profile.keeps_result:
-            self._survivors[-1] = fitted  # in place of the worst one
+            self._survivors[-1] = result  # in place of the worst one
         return Fit(
             posture=result[POSTURE],
             posture_stddev=deviations[POSTURE],
-            keypoints_m=points.keypoints_m[1],
+            keypoints_m=points.keypoints_m[0],
             cost_px=int(cost_px),
-            iou=iou_of(total, area_px, cost_px),
+            iou=iou,
             # Points that the result fits show that a silhouette which it does not fit is wrong.
-            is_poor=judged.is_poor or (fit_iou < self._lost_iou and not self._cues),
-            seen=fitted,
-            seen_iou=fit_iou,
+            is_poor=judged.is_poor or (iou < self._lost_iou and not self._cues),
             offset_m=result[PLACE],
             offset_stddev_m=deviations[PLACE],
             particles=Particles(*rated, mean, profile.spread),
@@ -442,15 +398,6 @@ class WholeBodyFilter:
         self._correction = _KEPT * before + (1.0 - _KEPT) * (refined - state)
         smooth: FloatArray = np.clip(state + self._correction, *cost.limits.T)
         return smooth
-
-    def _corrected(self, frames: Sequence[Frame], fitted: FloatArray) -> FloatArray:
-        """Return the state (14,) that the corrector makes of ``fitted``, within the limits."""
-        if self._corrector is None:
-            return fitted
-        corrected = np.array(self._corrector(frames, fitted.copy()), np.float64)
-        if corrected.shape != fitted.shape:
-            raise ValueError(f"the corrector returned the shape {corrected.shape}; expected (14,)")
-        return np.clip(corrected, *self._cost.limits.T)
 
     def ious(self) -> list[float | None]:
         """See :class:`~.pose_filter.PoseFilter`."""

@@ -38,91 +38,59 @@ class SearchProfile:
     """Constants of the search; ``docs/architecture.md`` explains the stages.
 
     The values were chosen on recorded sessions with ground truth (``docs/research.md#search``).
-
-    Attributes:
-        survivors: states kept from frame to frame.
-        alike: survivors that may be similar; each other one differs from all better ones.
-        apart_m: least distance of different survivors, m.
-        torsos: torsos that are rated.
-        torso_explorers: number of the torsos that bow or turn by any angle.
-        fresh_torsos: number of the torso_explorers that stand upright at the place of the
-            silhouette; at first, all of them do.
-        best_torsos: best torsos that are rated with arms, both moved along and fixed in space.
-        arms: arms that are proposed per side.
-        candidates: proposed arms per rated arm, which is the most promising of them; 1: all are
-            rated. Several cameras propose four times as many arms and rate a quarter of them.
-        arm_mirrors: number of the arms that are survivors mirrored in depth.
-        arm_tips: number of the arms that reach for foreground that the model leaves uncovered.
-        banked_arms: number of the arms that are drawn from the learned prior.
-        best_arms: best arms around which others are proposed.
-        arms_again: arms that are proposed around the best ones.
-        paired_arms: best arms of either side that are combined.
-        rounds: rounds in which all joints move together.
-        together: states in such a round.
-        differing: fraction of these states that move by the difference of two others.
-        difference_scale: factor on such a difference.
-        y_noise_m: noise of the torso's y, m.
-        roll_noise_rad: noise of the torso's roll, rad.
-        pitch_noise_rad: noise of the torso's pitch, rad.
-        yaw_noise_rad: noise of the torso's yaw, rad.
-        x_noise_m: noise of the torso's x, m.
-        z_noise_m: noise of the torso's z, m.
-        arm_noise_rad: noise of an arm's angles, rad.
-        together_noise: factor on the noise of the first round of all joints.
-        round_decay: factor on the noise from one round to the next.
-        home_rate: weight of a frame in the low-pass filter of the torso's usual x.
-        average: best states whose weighted mean is the result.
-        spread: difference to the best rating, as a fraction of the silhouette's pixels, at which
-            the weight of a state is 1/e.
-        refining_steps: Gauss-Newton steps that fit the result to the outlines; twice as many if
-            there are cues that tell where joints are.
-        start_passes: searches in the first silhouette of a person.
-        crosses: whether an upright person is proposed at the intersection of the lines of sight.
-        fits_outlines: whether a few different states are fitted to the outlines before all joints
-            move together.
-        keeps_result: whether the refined result of a frame is among the survivors.
-        smoothing: factor on the setting ``smoothing``.
     """
 
-    survivors: int = 32
-    alike: int = 12
-    apart_m: float = 0.12
-    torsos: int = 70
-    torso_explorers: int = 16
+    survivors: int = 32  #: states kept from frame to frame
+    alike: int = 12  #: survivors that may be similar; each other one differs from all better ones
+    apart_m: float = 0.12  #: least distance of different survivors, m
+    torsos: int = 70  #: torsos that are rated
+    torso_explorers: int = 16  #: number of the torsos that bow or turn by any angle
+    #: number of the torso_explorers that stand upright at the place of the silhouette; at first,
+    #: all of them do.
     fresh_torsos: int = 8
+    #: best torsos that are rated with arms, both moved along and fixed in space.
     best_torsos: int = 12
-    arms: int = 90
+    arms: int = 90  #: arms that are proposed per side
+    #: proposed arms per rated arm, which is the most promising of them; 1: all are rated. Several
+    #: cameras propose four times as many arms and rate a quarter of them.
     candidates: int = 3
-    arm_mirrors: int = 8
+    arm_mirrors: int = 8  #: number of the arms that are survivors mirrored in depth
+    #: number of the arms that reach for foreground that the model leaves uncovered.
     arm_tips: int = 10
-    banked_arms: int = 20
-    best_arms: int = 15
-    arms_again: int = 51
-    paired_arms: int = 12
-    rounds: int = 2
-    together: int = 36
+    banked_arms: int = 20  #: number of the arms that are drawn from the learned prior
+    best_arms: int = 15  #: best arms around which others are proposed
+    arms_again: int = 51  #: arms that are proposed around the best ones
+    paired_arms: int = 12  #: best arms of either side that are combined
+    rounds: int = 2  #: rounds in which all joints move together
+    together: int = 36  #: states in such a round
     # Differences of survivors follow flat directions of the cost (Storn & Price,
     # "Differential Evolution", 1997).
-    differing: float = 0.4
-    difference_scale: float = 0.6
-    y_noise_m: float = 0.02
-    roll_noise_rad: float = 0.08
-    pitch_noise_rad: float = 0.08
-    yaw_noise_rad: float = 0.10
-    x_noise_m: float = 0.02
-    z_noise_m: float = 0.01
-    arm_noise_rad: float = 0.22
-    together_noise: float = 0.3
-    round_decay: float = 0.6
-    home_rate: float = 0.02
-    average: int = 150
+    differing: float = 0.4  #: fraction of these states that move by the difference of two others
+    difference_scale: float = 0.6  #: factor on such a difference
+    y_noise_m: float = 0.02  #: noise of the torso's y, m
+    roll_noise_rad: float = 0.08  #: noise of the torso's roll, rad
+    pitch_noise_rad: float = 0.08  #: noise of the torso's pitch, rad
+    yaw_noise_rad: float = 0.10  #: noise of the torso's yaw, rad
+    x_noise_m: float = 0.02  #: noise of the torso's x, m
+    z_noise_m: float = 0.01  #: noise of the torso's z, m
+    arm_noise_rad: float = 0.22  #: noise of an arm's angles, rad
+    together_noise: float = 0.3  #: factor on the noise of the first round of all joints
+    round_decay: float = 0.6  #: factor on the noise from one round to the next
+    home_rate: float = 0.02  #: weight of a frame in the low-pass filter of the torso's usual x
+    average: int = 150  #: best states whose weighted mean is the result
+    #: difference to the best rating, as a fraction of the silhouette's pixels, at which the weight
+    #: of a state is 1/e.
     spread: float = 0.02
+    #: Gauss-Newton steps that fit the result to the outlines; twice as many if there are cues that
+    #: tell where joints are.
     refining_steps: int = 2
-    start_passes: int = 3
+    start_passes: int = 3  #: searches in the first silhouette of a person
+    #: whether an upright person is proposed at the intersection of the lines of sight.
     crosses: bool = False
+    #: whether a few different states are fitted to the outlines before all joints move together.
     fits_outlines: bool = False
-    keeps_result: bool = False
-    smoothing: float = 1.0
+    keeps_result: bool = False  #: whether the refined result of a frame is among the survivors
+    smoothing: float = 1.0  #: factor on the setting ``smoothing``
 
     def noise(self) -> FloatArray:
         """Return the standard deviations (14,) of a state's noise, metres and rad."""

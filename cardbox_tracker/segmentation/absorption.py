@@ -57,12 +57,9 @@ class StillRegions:
     def add(self, brightness: ImageArray, silhouette: ImageArray, level: float) -> Mask | None:
         """Add an image and its silhouette, both (H, W) uint8; ``level`` is the light's factor.
 
-        Returns:
-            Every fifteenth time, a mask (H, W) of the objects that stay; None in between.
-
-        Raises:
-            ValueError: the images are of another type or layout, differ in shape, or have no
-                pixels.
+        Returns, every fifteenth time, a mask (H, W) of the objects that stay, and None in between.
+        Raises ValueError if images are of another type or layout, differ in shape, or have no
+        pixels.
         """
         check_array("brightness", brightness, (ANY, ANY))
         check_array("silhouette", silhouette, brightness.shape)
@@ -149,19 +146,11 @@ class Absorber:
         level: float,
         stamp_ns: int = 0,
     ) -> tuple[Mask, BackgroundModel] | None:
-        """Add an image, grey (H, W) or bgr (H, W, 3), and its silhouette (H, W).
+        """Return pixels (H, W) that have become background, and a model of them as they look.
 
-        Args:
-            image: the image that the extractor got.
-            brightness: the brightness of the image, (H, W).
-            silhouette: the silhouette, 0 or 255.
-            level: brightness of the scene relative to the learned background.
-            stamp_ns: stamp of the image, 0 if unknown; an image less than 50 ms after the last one
-                is skipped.
-
-        Returns:
-            A mask (H, W) of pixels that have become background and a model of their present
-            appearance; None if there are no such pixels.
+        None if there are none. The image is grey (H, W) or bgr (H, W, 3), the silhouette (H, W) 0
+        or 255; ``level`` is the brightness of the scene relative to the learned background. An
+        image whose stamp is less than 50 ms after the last one is skipped.
         """
         if self._is_too_soon(stamp_ns):
             return None
@@ -201,11 +190,7 @@ def _disk(radius_px: int) -> ImageArray:
 def _add_halved(brightness: Any, silhouette: Any, total: Any, seen: Any) -> None:
     """Add the rounded means of squares of 2x2 px, and mark the squares with a person.
 
-    Args:
-        brightness: (2 h, 2 w).
-        silhouette: (2 h, 2 w).
-        total: sum of the means, (h, w) uint16.
-        seen: not 0 in squares with a person, (h, w).
+    Brightness and silhouette are (2 h, 2 w), ``total`` (h, w) uint16 and ``seen`` (h, w).
     """
     height, width = total.shape
     for v in range(height):

@@ -49,21 +49,13 @@ def segment_foreground(
 ) -> tuple[ImageArray, Window]:
     """Mark the pixels whose score is at least 1 and at least ``edge`` times their neighbours'.
 
-    The score of a difference is the larger of its products with ``brighter`` and ``darker``.
+    The score of a difference, (H, W), grey levels, is the larger of its products with ``brighter``
+    and ``darker``: scores of one grey level more than the background, and negative ones of one
+    less, (H, W). ``edge`` is a fraction of the highest score among a pixel and its 8 neighbours;
+    ``score`` (H, W) is scratch.
 
-    Args:
-        difference: image minus background, (H, W), grey levels.
-        brighter: score of one grey level more than the background, (H, W).
-        darker: negative score of one grey level less, (H, W).
-        edge: smallest score of a foreground pixel, as a fraction of the highest score among it and
-            its 8 neighbours.
-        score: scratch, (H, W).
-
-    Returns:
-        (H, W), 0 or 255, and its window as :func:`~.window.window_of` has it.
-
-    Raises:
-        ValueError: the arrays differ in shape, or one is read-only.
+    Returns (H, W), 0 or 255, and its window as :func:`~.window.window_of` has it. Raises ValueError
+    if the arrays differ in shape, or one is read-only.
     """
     check_array("difference", difference, (ANY, ANY), np.float32, is_written=True)
     shape = difference.shape
@@ -193,14 +185,9 @@ class SilhouetteExtractor:
     def __call__(self, image: ImageArray, stamp_ns: int = 0) -> ImageArray:
         """Return the silhouette (H, W) of an image: 255 for the person, else 0.
 
-        Args:
-            image: brightness (H, W), or bgr (H, W, 3); other types than uint8 are converted, see
-                :func:`~cardbox_tracker.camera.given_arrays.image_from`.
-            stamp_ns: stamp of the image; 0 if unknown.
-
-        Raises:
-            ValueError: the image's size is not the background's, or its type or values are
-                impossible.
+        It is brightness (H, W), or bgr (H, W, 3); other types than uint8 are converted, see
+        :func:`~cardbox_tracker.camera.given_arrays.image_from`. Its stamp, ns, is 0 if unknown.
+        Raises ValueError if the size is not the background's, or type or values are impossible.
         """
         image = image_from(image)
         if image.shape[:2] != self.model.mean.shape:
@@ -241,12 +228,7 @@ class SilhouetteExtractor:
         return silhouette
 
     def _near(self, window: Window, shape: tuple[int, ...]) -> Window | None:
-        """Return where to look for foreground by its colour; None: everywhere.
-
-        Args:
-            window: of the foreground by brightness.
-            shape: of the image.
-        """
+        """Return where to look for foreground by colour, near that by brightness; None: all."""
         number, self._images = self._images, self._images + 1
         is_settling = self._light is not None and self._light.is_settling
         if number % _WHOLE_EVERY == 0 or is_settling or not self._is_even:

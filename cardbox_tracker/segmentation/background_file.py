@@ -47,22 +47,13 @@ _BRIGHTEST = 255.0
 
 
 class StoredBackground(NamedTuple):
-    """A background and the calibration of the camera that it was learned with.
+    """A background and the calibration of the camera that it was learned with."""
 
-    Attributes:
-        model: the learned scene.
-        calibration: calibration of the images that the scene was learned from.
-    """
-
-    model: BackgroundModel
-    calibration: Calibration
+    model: BackgroundModel  #: the learned scene
+    calibration: Calibration  #: calibration of the images that the scene was learned from
 
     def check_camera(self, calibration: Calibration, name: str) -> None:
-        """Check that ``calibration`` belongs to the camera of this background.
-
-        Raises:
-            BackgroundFileError: the calibration differs; the text calls the file ``name``.
-        """
+        """Raise BackgroundFileError unless ``calibration`` is that of this background's camera."""
         if not self.calibration.is_same(calibration):
             raise BackgroundFileError(
                 f"the background in {name} was learned with another camera or calibration "
@@ -75,8 +66,7 @@ class StoredBackground(NamedTuple):
 def background_path(name: str) -> Path | None:
     """Return the path that ``name`` stands for, ``~`` expanded; None for an empty name.
 
-    Raises:
-        BackgroundFileError: no file can be read or written there.
+    Raises BackgroundFileError if no file can be read or written there.
     """
     if not name:
         return None
@@ -100,11 +90,7 @@ def background_path(name: str) -> Path | None:
 
 
 def save_background(stored: StoredBackground, path: str | os.PathLike[str]) -> None:
-    """Write a background atomically: a reader sees either the old file or the new one.
-
-    Raises:
-        BackgroundFileError: the file cannot be written.
-    """
+    """Write a background atomically; raise BackgroundFileError if that fails."""
     model, calibration = stored
     arrays: dict[str, NDArray[Any]] = {
         _FORMAT: np.array(FORMAT),
@@ -134,8 +120,7 @@ def save_background(stored: StoredBackground, path: str | os.PathLike[str]) -> N
 def load_background(path: str | os.PathLike[str], size: tuple[int, int]) -> StoredBackground:
     """Read a background of the working size (width, height), px.
 
-    Raises:
-        BackgroundFileError: the file cannot be read, is no background, or is of another size.
+    Raises BackgroundFileError if it cannot be read, is no background, or is of another size.
     """
     expected = (
         "a background that can be used: the file that the background node wrote. Delete it, or "

@@ -75,19 +75,13 @@ class ChromaScore:
         follow: bool = False,
         before: ChromaScore | None = None,
     ) -> None:
-        """Prepare the limits of every pixel.
+        """Prepare the limits of every pixel of the empty scene ``model``.
 
-        Args:
-            model: the empty scene.
-            threshold: smallest difference that counts, in standard deviations.
-            min_contrast: smallest difference that counts, grey levels.
-            edge: fraction of the highest score nearby at which the outline is put.
-            follow: compensate a change of the white balance.
-            before: the previous score, whose estimate of the white balance is kept.
-
-        Raises:
-            ValueError: mean or standard deviation is not of the shape (3, h, w), they differ in
-                shape, or they have no pixels.
+        The smallest difference that counts is ``threshold``, in standard deviations, and
+        ``min_contrast``, grey levels; the outline is put at the fraction ``edge`` of the highest
+        score nearby. With ``follow`` a change of the white balance is compensated, whose estimate
+        that of the score ``before`` begins. Raises ValueError unless mean and standard deviation
+        are of one shape (3, h, w) with pixels.
         """
         mean = model.mean
         check_array("mean", mean, (3, ANY, ANY), np.float32)
@@ -119,22 +113,15 @@ class ChromaScore:
     def __call__(
         self, colors: ImageArray, size: tuple[int, ...], window: Window | None = None
     ) -> ImageArray:
-        """Return a mask of the pixels whose colour differs.
+        """Return a mask of the pixels of an image of this size whose colour differs, 255, else 0.
 
-        Args:
-            colors: brightness, Cr and Cb of an image at half its resolution, (3, h, w), as
-                :class:`~cardbox_tracker.segmentation.color_reader.ColorReader` has them.
-            size: height and width of the image, px.
-            window: part that is compared, with even edges. Without it the whole image is compared
-                and its white balance is estimated.
+        ``colors``, (3, h, w), are brightness, Cr and Cb at half its resolution, as
+        :class:`~cardbox_tracker.segmentation.color_reader.ColorReader` has them. The part in
+        ``window``, with even edges, is compared; without it the whole image is, and its white
+        balance is estimated. The mask has the size of that, and the next call may change it.
 
-        Returns:
-            (H, W), or of the window's size, 255 where the colour differs, else 0. The next call may
-            change it.
-
-        Raises:
-            ValueError: the colours or the size are not those of the learned images, or the window
-                is empty, not in the image, or has odd edges.
+        Raises ValueError if colours or size are not those of the learned images, or the window is
+        empty, not in the image, or has odd edges.
         """
         half = self._background.shape[1:]
         check_array("colors", colors, (3, *half))
@@ -160,19 +147,8 @@ class ChromaScore:
         """Add coloured pixels to ``foreground`` and remove soft shadows from it, in place.
 
         This does in one call what :meth:`__call__` and
-        :func:`~cardbox_tracker.segmentation.shadows.decide_shadows` do.
-
-        Args:
-            colors: as for :meth:`__call__`.
-            foreground: (H, W), 0 or 255, found by brightness alone; H and W are even.
-            difference: image minus background, (H, W), grey levels.
-            per_level: one grey level as a fraction of the background, (H, W).
-            shadow: darkest and softest, as for ``decide_shadows``.
-            window: as for :meth:`__call__`, and as for ``decide_shadows``.
-
-        Raises:
-            ValueError: an array has another shape or type or is read-only, or the window does not
-                fit.
+        :func:`~cardbox_tracker.segmentation.shadows.decide_shadows` do, and takes and refuses what
+        they do; H and W are even.
         """
         _, rows, columns = self._background.shape
         shape = 2 * rows, 2 * columns

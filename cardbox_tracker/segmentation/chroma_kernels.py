@@ -28,11 +28,8 @@ _i32, _f32, _u16 = np.int32, np.float32, np.uint16
 def collect_shares(colors: Any, background: Any, step: Any, shares: Any) -> None:
     """Write what the white balance adds to Cr and Cb, as shares of the brightness, (2, n).
 
-    Args:
-        colors: brightness, Cr and Cb, (3, h, w); they are smoothed by 3x3 px here.
-        background: as for :func:`rate_colors`.
-        step: distance of the pixels that are used.
-        shares: result.
+    ``colors`` are brightness, Cr and Cb, (3, h, w), smoothed by 3x3 px here; every ``step``-th
+    pixel is used. ``background`` is as for :func:`rate_colors`.
     """
     ninth, half, neutral = _f32(1 / 9), _f32(4.5), _f32(NEUTRAL)
     height, width = colors.shape[1:]
@@ -148,20 +145,13 @@ def rate_colors(
 ) -> None:
     """Write the margin of each pixel of a window, which is at least 0 in the foreground.
 
-    Args:
-        colors: brightness, Cr and Cb at half the resolution, (3, H, W) uint8. In the window, they
-            are smoothed by 3x3 px.
-        top: first row of the window.
-        left: its first column.
-        height: its number of rows, h.
-        width: its number of columns, w.
-        background: planes of the model, (6, H, W): what one grey level is of the brightness, Cr
-            and Cb less that of grey, what one level of each is of its limit, the brightest channel.
-        red_cast: Cr that the white balance adds, as a share of the brightness.
-        blue_cast: Cb that it adds.
-        edge: fraction of the highest score nearby at which the outline is put.
-        score: scratch, one for each pixel of a window of any size.
-        margin: result, (h, w) in its first elements; it has the same size.
+    ``colors`` are brightness, Cr and Cb at half the resolution, (3, H, W) uint8; in the window,
+    they are smoothed by 3x3 px. ``background`` are planes of the model, (6, H, W): what one grey
+    level is of the brightness, Cr and Cb less that of grey, what one level of each is of its limit,
+    the brightest channel. The casts are the Cr and Cb that the white balance adds, as shares of the
+    brightness; ``edge`` is the fraction of the highest score nearby at which the outline is put.
+    ``score`` is scratch, one for each pixel of a window of any size; ``margin``, of its size, has
+    the result (h, w) in its first elements.
     """
     scores, margins = _part(score, height, width), _part(margin, height, width)
     rows = np.empty((3, width + 2 * REACH_PX), np.float32)

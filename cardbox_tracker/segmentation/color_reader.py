@@ -48,11 +48,7 @@ class ColorReader:
             self._rows = channels, channels.view(np.uint16), means
 
     def read(self, image: ImageArray) -> None:
-        """Replace brightness and colours by those of a bgr image (H, W, 3).
-
-        Raises:
-            ValueError: the image has another size or type, or no pixels.
-        """
+        """Take brightness and colours of a bgr image (H, W, 3), or raise ValueError."""
         height, width = self.brightness.shape
         check_array("image", image, (height, width, 3))
         if not image.size:
@@ -68,12 +64,9 @@ class ColorReader:
 def _read(image: Any, rows: Any, brightness: Any, colors: Any) -> None:
     """Write the brightness (2 h, 2 w), and brightness, Cr and Cb (3, h, w) of squares of 2x2 px.
 
-    Args:
-        image: (2 h, 6 w).
-        rows: scratch: the channels of two rows, (2, 3, 2 w) uint8; the same memory as pairs of
-            pixels, (2, 3, w) uint16; means of the squares' channels, (3, w) int32.
-        brightness: result.
-        colors: result.
+    ``image`` is (2 h, 6 w). The scratch ``rows`` are the channels of two rows, (2, 3, 2 w) uint8;
+    the same memory as pairs of pixels, (2, 3, w) uint16; means of the squares' channels, (3, w)
+    int32.
     """
     channels, pairs, means = rows
     height, width = colors.shape[1:]

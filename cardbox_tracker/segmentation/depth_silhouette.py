@@ -33,9 +33,7 @@ def nearest_m(depth_m: DepthImage) -> float:
 def silhouette_within(depth_m: DepthImage, within_m: float) -> NDArray[np.uint8]:
     """Return the silhouette (H, W), 0 or 255, of the pixels nearer than ``within_m``.
 
-    Args:
-        depth_m: (H, W), metres; not finite or 0 where it is unknown.
-        within_m: the limit, metres along the optical axis.
+    The depth is (H, W), metres along the optical axis; not finite or 0 where it is unknown.
     """
     is_known = np.isfinite(depth_m) & (depth_m > 0)
     near = np.where(is_known & (depth_m < within_m), 255, 0).astype(np.uint8)

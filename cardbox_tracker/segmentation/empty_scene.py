@@ -58,14 +58,10 @@ class BackgroundLearner:
         return self._brightness.count
 
     def add(self, image: NDArray[np.uint8] | FloatImage) -> None:
-        """Learn from one image: brightness (H, W), or bgr (H, W, 3).
+        """Learn from one image: brightness (H, W), or bgr (H, W, 3), of any type of ``image_from``.
 
-        Types other than uint8 are converted, see
-        :func:`~cardbox_tracker.camera.given_arrays.image_from`.
-
-        Raises:
-            ValueError: the size differs from that of the earlier images, or the image's type or
-                values are impossible.
+        Raises ValueError if its size differs from the earlier ones', or type or values are
+        impossible.
         """
         image = image_from(image)
         self._brightness.add(brightness_of(image) if image.ndim == 3 else image)
@@ -74,11 +70,7 @@ class BackgroundLearner:
             self._chroma.add(chroma_planes(image))
 
     def model(self) -> BackgroundModel:
-        """Return the learned background.
-
-        Raises:
-            ValueError: fewer than two images were added.
-        """
+        """Return the learned background; ValueError if fewer than two images were added."""
         mean, stddev = self._brightness.result()
         whole = self._chroma.count == self._brightness.count
         chroma = ChromaModel(*self._chroma.result()) if whole else None

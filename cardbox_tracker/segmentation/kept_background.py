@@ -42,21 +42,13 @@ _DARKEST = 8.0
 
 @dataclass(frozen=True)
 class SceneFit:
-    """Result of the comparison of an image with the learned scene.
+    """Result of the comparison of an image with the learned scene."""
 
-    Attributes:
-        tiles: number of tiles that have texture.
-        in_place: number of tiles found where they were learned.
-        shifted: number of tiles found elsewhere.
-        shift_px: median shift (right, down) of the shifted tiles, px.
-        changed: share of the pixels that look different, after correction for the light.
-    """
-
-    tiles: int
-    in_place: int
-    shifted: int
-    shift_px: tuple[int, int]
-    changed: float
+    tiles: int  #: number of tiles that have texture
+    in_place: int  #: number of tiles found where they were learned
+    shifted: int  #: number of tiles found elsewhere
+    shift_px: tuple[int, int]  #: median shift (right, down) of the shifted tiles, px
+    changed: float  #: share of the pixels that look different, after correction for the light
 
     @property
     def is_moved(self) -> bool:
@@ -138,11 +130,7 @@ class KeptBackground:
     """
 
     def __init__(self, path: Path | None, size: tuple[int, int]) -> None:
-        """Read the file ``path`` if there is one; ``size`` is the working size, px.
-
-        Raises:
-            BackgroundFileError: the file contains no background of that size.
-        """
+        """Read the file ``path`` if there is one; ``size`` is the working size, px."""
         self.path = path
         self._stored: StoredBackground | None = None
         self._before: BackgroundModel | None = None
@@ -163,11 +151,8 @@ class KeptBackground:
     def resume(self, pipeline: SilhouettePipeline, image: ImageArray) -> str:
         """Resume the kept background in ``pipeline`` if it fits a prepared image.
 
-        Returns:
-            A text for the log; empty if the scene has to be learned.
-
-        Raises:
-            BackgroundFileError: the background in the file does not fit; the text gives the reason.
+        Returns a text for the log, empty if the scene has to be learned. Raises
+        BackgroundFileError, with the reason, if the background in the file does not fit.
         """
         if self._stored is not None:
             self._resume_file(self._stored, pipeline, image)
@@ -196,11 +181,7 @@ class KeptBackground:
         self._stored, self.use = None, "used"
 
     def keep(self, pipeline: SilhouettePipeline) -> str:
-        """Save the background of ``pipeline`` to the file; return a text for the log.
-
-        Raises:
-            BackgroundFileError: the file cannot be written.
-        """
+        """Save the background of ``pipeline`` to the file; return a text for the log."""
         model = pipeline.model
         if self.path is None or model is None:
             return ""

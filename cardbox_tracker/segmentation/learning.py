@@ -35,11 +35,7 @@ class Learning:
         return self.count >= self.images
 
     def model(self) -> BackgroundModel:
-        """Return the learned background.
-
-        Raises:
-            ValueError: fewer than two images were added.
-        """
+        """Return the learned background; ValueError if fewer than two images were added."""
         return self._learner.model()
 
     def values(self) -> dict[str, str]:
@@ -125,11 +121,7 @@ class PersonInViewLearning(Learning):
         return self._scene.is_whole
 
     def model(self) -> BackgroundModel:
-        """Return the combined scene.
-
-        Raises:
-            ValueError: a part of the scene was not seen yet.
-        """
+        """Return the combined scene; ValueError if a part of the scene was not seen yet."""
         return self._scene.model()
 
     def values(self) -> dict[str, str]:

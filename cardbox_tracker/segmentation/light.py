@@ -39,12 +39,9 @@ _f32 = np.float32
 def update_field(cells: Any, base: Any, rate: Any, field: Any) -> Any:
     """Move the field towards the base times the change, and return the field's extremes.
 
-    Args:
-        cells: smoothed change of each cell times its share of known pixels, and that share,
-            (h, w, 2).
-        base: factors that the change is relative to, (h, w).
-        rate: share of the new estimate in the field.
-        field: factors of the level, (h, w), which are changed.
+    ``cells`` (h, w, 2) are the smoothed change of each cell times its share of known pixels, and
+    that share. The change is relative to ``base`` (h, w); ``rate`` is its share in the ``field``
+    (h, w), factors of the level.
     """
     height, width = field.shape
     least, most = _f32(np.inf), _f32(-np.inf)
@@ -129,15 +126,10 @@ class LightFollower:
     """
 
     def __init__(self, mean: FloatImage, chroma: FloatImage | None = None) -> None:
-        """Start with the light of the learned background.
+        """Start with the light of the learned background, whose mean brightness (H, W) is float32.
 
-        Args:
-            mean: mean brightness of the background, (H, W) float32.
-            chroma: its brightness, Cr and Cb at any resolution, (3, h, w); None if it is grey.
-
-        Raises:
-            ValueError: an array has another shape or type, or the background is narrower or lower
-                than 2 px.
+        ``chroma`` are its brightness, Cr and Cb at any resolution, (3, h, w), or None. Raises
+        ValueError for another shape or type, or less than 2 px a side.
         """
         check_array("mean", mean, (ANY, ANY), np.float32)
         if chroma is not None:
@@ -212,13 +204,9 @@ class LightFollower:
         self._settling = max(self._settling, 1)
 
     def follow(self, brightness: ImageArray) -> tuple[FloatImage, float]:
-        """Return the background (H, W) and a factor, whose product has the present brightness.
+        """Return the background (H, W) and a factor, whose product is as bright as an image (H, W).
 
-        Args:
-            brightness: brightness of an image, (H, W) uint8.
-
-        Returns:
-            The background, an array that the next call may change, and the factor.
+        The next call may change the background.
         """
         check_array("brightness", brightness, self._mean.shape)
         self._estimate(brightness)
@@ -296,12 +284,7 @@ class LightFollower:
             self._relative = self._scaled
 
     def exclude(self, silhouette: ImageArray, window: Window | None = None) -> None:
-        """Exclude the person.
-
-        Args:
-            silhouette: the silhouette of the last image, (H, W).
-            window: a window that contains all of it; the whole image if None.
-        """
+        """Exclude the person: the silhouette (H, W) of the last image, all of it in ``window``."""
         check_array("silhouette", silhouette, self._mean.shape)
         least = _COVERAGE * silhouette.size
         if (window is None or window.area_px > least) and cv2.countNonZero(silhouette) > least:

@@ -21,11 +21,9 @@ _f32, _u32 = np.float32, np.uint32
 
 @kernel
 def average_blocks(quads: Any, means: Any) -> None:
-    """Write the rounded means of blocks of 4x4 px.
+    """Write the rounded means (h, w) float32 of blocks of 4x4 px.
 
-    Args:
-        quads: an image, four pixels of a row in a number, (4 h, w) uint32.
-        means: result, (h, w) float32.
+    ``quads`` (4 h, w) uint32 are an image with four pixels of a row in a number.
     """
     low, eight = _u32(0x00FF00FF), _u32(8)
     ten, bits = _u32(16), _u32(0xFFFF)
@@ -49,17 +47,11 @@ def find_smooth(
 ) -> Any:
     """Find foreground into which the brightness passes smoothly from the background.
 
-    Args:
-        means: brightness of an image, (h, w) float32; it becomes relative to the background.
-        blocks: brightness of the background, (h, w).
-        fine: expected factors of the level, (h, w).
-        level: brightness of the scene relative to the learned background.
-        silhouette: foreground at the resolution of the image, (H, W), not 0 where set.
-        smooth: result, (h, w) bool.
-        lit: result: its part that is brighter than the background, (h, w) bool.
-
-    Returns:
-        Number of pixels of ``lit``.
+    ``means`` (h, w) are the brightness of an image, and become relative to the background's
+    ``blocks`` (h, w); ``fine`` (h, w) are expected factors of the ``level``, the brightness of the
+    scene relative to the learned one. The silhouette (H, W) has the resolution of the image.
+    ``smooth`` (h, w) is written, as is ``lit``, its part that is brighter than the background,
+    whose number of pixels is returned.
     """
     height, width = means.shape
     one, level = _f32(1), _f32(level)
@@ -134,10 +126,7 @@ def _flood(state: Any, reached: Any) -> None:
 def grow_person(silhouette: Any, without: Any, grown: Any) -> None:
     """Write the samples of a silhouette with a margin, (h, w): 0, or the highest value nearby.
 
-    Args:
-        silhouette: foreground at the resolution of the image, (H, W) uint8.
-        without: samples that are not the person, (h, w) bool.
-        grown: result.
+    The silhouette (H, W) has the resolution of the image; samples ``without`` (h, w) are no person.
     """
     height, width = grown.shape
     person = np.empty((height, width), np.uint8)

@@ -45,20 +45,12 @@ def measure_level(
 ) -> Any:
     """Return the median relative brightness outside the person; -1 without usable pixels.
 
-    With too few usable pixels outside the person, those of the person are used, too. The arrays of
-    samples are (h, w), with n elements.
-
-    Args:
-        image: brightness of an image, (H, W) uint8.
-        samples: result: its samples.
-        mean: brightness of the background's samples.
-        brightest: their brightest channel; infinite where it must not be used.
-        field: their expected brightness as factors of the level.
-        person: not 0 where the person is.
-        ratios: scratch, (n + 2,) float32.
-        bits: the same memory, int32.
-        last: the last level, near which the median is found sooner.
-        share: smallest share of usable pixels outside the person.
+    With too few usable pixels outside the person, less than ``share``, those of the person are
+    used, too. Arrays of samples are (h, w), with n elements: ``samples`` of the image (H, W),
+    written; ``mean`` and ``brightest`` channel of the background, infinite where it must not be
+    used; ``field``, their expected brightness as factors of the level; ``person``, not 0 where one
+    is. ``ratios`` (n + 2,) and ``bits``, the same memory, are scratch. Near the level ``last`` the
+    median is found sooner.
     """
     take_samples(image, samples)
     n, last = samples.size, _f32(last)
@@ -107,16 +99,11 @@ def sum_cells(
 ) -> None:
     """Write each cell's mean change times its share of usable pixels, and that share.
 
-    Args:
-        small: brightness of an image, (h, w) uint8.
-        mean: brightness of the background.
-        brightest: the brightest channel of the background; infinite where it must not be used.
-        around: expected factors of the level, (h, w).
-        base: factors of the level that the change is relative to, (h, w).
-        person: not 0 where the person is.
-        level: brightness of the scene relative to the learned background.
-        tolerance: pixels that differ from ``around`` by more than this fraction are not used.
-        cells: result, (rows, columns, 2).
+    ``small`` (h, w) is the brightness of an image, ``mean`` that of the background, ``brightest``
+    its brightest channel, infinite where it must not be used. ``around`` (h, w) are expected
+    factors of the ``level``, ``base`` those that the change is relative to. Pixels that differ from
+    ``around`` by more than the fraction ``tolerance``, and those of the person, are not used.
+    ``cells`` (rows, columns, 2) is written.
     """
     cells[:] = 0
     height, width = small.shape
@@ -161,16 +148,10 @@ def limit_channels(
 ) -> None:
     """Write the present brightness, with each channel limited to 255, to ``now``, (n,).
 
-    Args:
-        relative: the background with the light's field, (n,).
-        level: level of the light.
-        limit: brightness above which a channel may be cut off.
-        mean: learned background, (n,).
-        channels: its channels, (k, n).
-        brightest: its brightest channel, (n,).
-        blocks: the maximum of each 64 pixels of ``brightest``.
-        weights: of the channels in the brightness, (k,).
-        now: result, (n,).
+    ``relative`` (n,) is the background with the light's field; ``mean`` (n,), ``channels`` (k, n)
+    and ``brightest`` (n,) are of the learned one, of which ``blocks`` are the maxima of each 64
+    pixels. Above the brightness ``limit`` a channel may be cut off; ``weights`` (k,) are those of
+    the channels in the brightness.
     """
     one, most = _f32(1), _f32(255)
     factors, values = np.empty(BLOCK, np.float32), np.empty(BLOCK, np.float32)

@@ -48,12 +48,7 @@ class PartialScene:
         return self._known is not None and self.hidden <= _REST
 
     def add(self, model: BackgroundModel, moved: Mask) -> None:
-        """Add the part of the scene that was visible in a span of time.
-
-        Args:
-            model: mean and standard deviation (H, W) of the images in that span.
-            moved: mask of pixels that moved in it, at any resolution.
-        """
+        """Add mean and deviation (H, W) of a span of time, but not where something ``moved``."""
         size = model.mean.shape[1], model.mean.shape[0]
         body = bodies(_resized(moved, size))
         if self._model is None or self._known is None:
@@ -65,11 +60,7 @@ class PartialScene:
         self._known = self._known | new
 
     def model(self) -> BackgroundModel:
-        """Return the whole scene; hidden specks are filled from their surroundings.
-
-        Raises:
-            ValueError: a part larger than a speck is hidden.
-        """
+        """Return the whole scene; ValueError if a part larger than a speck is hidden."""
         if self._model is None or self._known is None or not self.is_whole:
             raise ValueError(f"{100 * self.hidden:.1f} % of the scene was not seen yet")
         if self._known.all():
@@ -140,14 +131,7 @@ def _merged(
 def merged(
     known: BackgroundModel, other: BackgroundModel, new: Mask, light: FloatImage
 ) -> BackgroundModel:
-    """Return a model with some pixels replaced by those of another one.
-
-    Args:
-        known: the model, (H, W).
-        other: a model of the same scene at another time.
-        new: mask (H, W) of the pixels that are taken from it.
-        light: factor applied to its brightness, (H, W).
-    """
+    """Return a model with the pixels ``new`` (H, W) of another one, times the factors ``light``."""
     mean = np.where(new, other.mean * light, known.mean)
     stddev = np.where(new, other.stddev, known.stddev)
     if known.chroma is None or other.chroma is None:

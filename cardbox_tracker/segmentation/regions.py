@@ -30,58 +30,24 @@ LEAST_AREA, MOST_HOLE = 0.004, 0.0008
 image."""
 
 
-def remove_small_regions(image: ImageArray, colour: int, area_px: float) -> None:
-    """Invert regions of ``colour`` with fewer than ``area_px`` pixels, in place.
-
-    Args:
-        image: (H, W), contiguous, 0 or 255.
-        colour: 0 or 255.
-        area_px: smallest area that is kept, px.
-
-    Raises:
-        ValueError: the image is read-only, or of another type or layout.
-    """
-    check_array("image", image, (ANY, ANY), is_written=True)
-    height, width = image.shape
-    words = image.view(np.uint64) if width % 8 == 0 else _NO_WORDS
-    runs = np.empty((4, height * (width // 2 + 1)), np.int32)
-    _recolour(image, words, np.uint8(colour), float(area_px), runs)
-
-
 class Regions(NamedTuple):
-    """Connected regions of a binary image as runs of pixels, row by row.
+    """Connected regions of a binary image as runs of pixels, row by row."""
 
-    Attributes:
-        rows: row of each run, (n,).
-        starts: first column of each run, (n,).
-        ends: column after the last of each run, (n,).
-        labels: region of each run, (n,), counted from 0 in the order of the first pixels.
-        areas_px: number of pixels of each region, (m,).
-    """
-
-    rows: NDArray[np.int32]
-    starts: NDArray[np.int32]
-    ends: NDArray[np.int32]
+    rows: NDArray[np.int32]  #: row of each run, (n,)
+    starts: NDArray[np.int32]  #: first column of each run, (n,)
+    ends: NDArray[np.int32]  #: column after the last of each run, (n,)
+    #: region of each run, (n,), counted from 0 in the order of the first pixels.
     labels: NDArray[np.int32]
-    areas_px: NDArray[np.int32]
+    areas_px: NDArray[np.int32]  #: number of pixels of each region, (m,)
 
 
 def clean_silhouette(
     foreground: ImageArray, min_area: float, max_hole: float, window: Window | None = None
 ) -> ImageArray:
-    """Remove small specks and fill small holes of a binary image.
+    """Return a binary image (H, W), 0 or 255, without small specks and holes.
 
-    Args:
-        foreground: (H, W), 0 or 255.
-        min_area: smallest speck to keep, as a fraction of the image.
-        max_hole: largest hole to fill, as a fraction of the image.
-        window: a window that contains all foreground; the whole image if None.
-
-    Returns:
-        A new (H, W) image, 0 or 255.
-
-    Raises:
-        ValueError: the image is of another type or layout.
+    ``min_area`` and ``max_hole`` are fractions of the image; ``window`` contains all foreground.
+    Raises ValueError if the image is of another type or layout.
     """
     return clean_in_window(foreground, min_area, max_hole, window)[0]
 
@@ -116,11 +82,7 @@ def clean_in_window(
 
 
 def find_regions(image: ImageArray) -> Regions:
-    """Return the connected regions of the pixels of ``image`` (H, W), uint8, that are 255.
-
-    Raises:
-        ValueError: the image is of another type.
-    """
+    """Return the connected regions of the pixels of ``image`` (H, W), uint8, that are 255."""
     # A read-only array would make numba compile another version.
     image = np.require(image, requirements=("C", "W", "A"))
     check_array("image", image, (ANY, ANY))
@@ -245,6 +207,7 @@ def _clean(
 
 @kernel
 def _recolour(image: Any, words: Any, colour: Any, area_px: float, runs: Any) -> None:
+    """Invert regions of ``colour``, 0 or 255, with fewer than ``area_px`` pixels, in place."""
     starts, ends, parents, areas = runs[0], runs[1], runs[2], runs[3]
     height = image.shape[0]
     other = np.uint8(255) - colour

@@ -36,21 +36,14 @@ def decide_shadows(
 ) -> None:
     """Add coloured pixels to ``foreground`` and remove soft shadows from it, in place.
 
-    The darkness of a pixel is its difference times ``per_level``, a fraction of the background.
+    The foreground (H, W), 0 or 255, was found by brightness alone. The darkness of a pixel is its
+    ``difference`` from the background, (H, W), grey levels, times ``per_level``, one of these as a
+    fraction of the background. ``colored`` is 255 where the colour differs, of the window's size;
+    None without colour. A shadow is at most ``darkest``, and varies around a pixel by ``softest``
+    at most. ``window`` contains all foreground; its columns are multiples of 8 if the width is one.
 
-    Args:
-        foreground: (H, W), 0 or 255, found by brightness alone.
-        difference: image minus background, (H, W), grey levels.
-        per_level: one grey level as a fraction of the background, (H, W).
-        colored: 255 where the colour differs, else 0, of the window's size; None without colour.
-        darkest: largest darkness of a shadow.
-        softest: largest variation of the darkness around a pixel of a shadow.
-        window: a window that contains all foreground, whose columns are multiples of 8 if the
-            width is one; the whole image if None.
-
-    Raises:
-        ValueError: the arrays differ in shape or type, one is read-only, or the window is not in
-            the image.
+    Raises ValueError if the arrays differ in shape or type, one is read-only, or the window is not
+    in the image.
     """
     check_array("foreground", foreground, (ANY, ANY), is_written=True)
     height, width = shape = foreground.shape

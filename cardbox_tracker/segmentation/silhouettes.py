@@ -10,8 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cardbox_tracker.camera.camera import Calibration
-from cardbox_tracker.camera.encodings import brightness_of
-from cardbox_tracker.camera.resize import to_working_size
+from cardbox_tracker.camera.encodings import brightness_of, to_working_size
 from cardbox_tracker.segmentation.background import SilhouetteExtractor
 from cardbox_tracker.segmentation.background_config import BackgroundConfig
 from cardbox_tracker.segmentation.empty_scene import BackgroundModel
@@ -39,17 +38,11 @@ class SilhouettePipeline:
         config: BackgroundConfig | None = None,
         learning: type[Learning] = Learning,
     ) -> None:
-        """Start without a background.
+        """Start without a background; ``size`` (width, height), px, is that of working images.
 
-        Args:
-            calibration: calibration of the input images, which may have any size of its aspect
-                ratio.
-            size: working size (width, height), px, of the images as they are sent.
-            config: settings of the background model.
-            learning: the method of learning the empty scene.
-
-        Raises:
-            CameraError: the camera is uncalibrated or its distortion model is unknown.
+        ``calibration`` is that of the images, which may have any size of its aspect ratio;
+        ``learning`` learns the empty scene. Raises CameraError if the camera is uncalibrated or its
+        distortion model is unknown.
         """
         self.calibration = calibration
         self._size, level = size, calibration.level_size(*size)
@@ -102,11 +95,7 @@ class SilhouettePipeline:
         self.learning.add(image)
 
     def finish_learning(self) -> BackgroundModel:
-        """Make a background from the added images; later images are compared with it.
-
-        Raises:
-            ValueError: fewer than two images were added.
-        """
+        """Make a background from the added images; ValueError if there are fewer than two."""
         model = self.learning.model()
         self._extractor = SilhouetteExtractor(model, self._config)
         return model
@@ -135,10 +124,7 @@ class SilhouettePipeline:
     def silhouette(self, image: ImageArray, stamp_ns: int = 0) -> ImageArray:
         """Return the silhouette (H, W), 0 or 255, of a prepared image, grey or bgr.
 
-        The stamp, ns, 0 if unknown, is only used to measure the rate of the images.
-
-        Raises:
-            RuntimeError: no background is learned yet.
+        The stamp, ns, 0 if unknown, only tells the rate. Raises RuntimeError without a background.
         """
         if self._extractor is None:
             raise RuntimeError("no background is learned yet; call finish_learning() first")
@@ -157,8 +143,7 @@ class SilhouettePipeline:
     def drift(self, image: ImageArray) -> float:
         """Return the median difference of a prepared image from the background, grey levels.
 
-        The median is robust, since the person covers less than half of the image. It is 0 before a
-        background is learned.
+        The person covers less than half of the image. It is 0 before a background is learned.
         """
         if self._extractor is None:
             return 0.0

@@ -37,11 +37,7 @@ class Window(NamedTuple):
         return max(self.bottom - self.top, 0) * max(self.right - self.left, 0)
 
     def check_within(self, shape: tuple[int, ...], unit: int) -> None:
-        """Refuse a window that is not in an image of ``shape``, or not in steps of ``unit`` px.
-
-        Raises:
-            ValueError: its edges are elsewhere.
-        """
+        """Raise ValueError unless it is in an image of ``shape`` and in steps of ``unit`` px."""
         top, bottom, left, right = self
         is_inside = 0 <= top <= bottom <= shape[0] and 0 <= left <= right <= shape[1]
         if not is_inside or left % unit or right % unit:
@@ -81,9 +77,6 @@ def window_of(image: ImageArray) -> Window:
     """Return a window that contains all pixels of an image (H, W), uint8, that are not 0.
 
     It may be up to eight columns wider at either side than necessary; it is empty if all are 0.
-
-    Raises:
-        ValueError: the image is of another type.
     """
     # A read-only array would make numba compile another version.
     flags = getattr(image, "flags", None)
@@ -95,10 +88,9 @@ def window_of(image: ImageArray) -> Window:
 
 @kernel
 def find_edges(image: Any) -> Any:
-    """Return first row, row after the last, first column and column after the last of a window.
+    """Return first and end row, first and end column of the window of an image (H, W) uint8.
 
-    Args:
-        image: (H, W) uint8. The columns of the window are multiples of 8 if W is one.
+    The columns are multiples of 8 if W is one.
     """
     if image.shape[1] % 8:
         return _edges(image, 1)

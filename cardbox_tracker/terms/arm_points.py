@@ -52,14 +52,9 @@ def add_costs_of_arms(
 ) -> None:
     """Add the approximate costs of arms beside the state ``torso`` (14,) to ``costs`` (N,).
 
-    Args:
-        joints: joints of the arms in the torso's frame, (N, 3, 3), metres.
-        torso: state of the trunk to which the arms belong.
-        body: fields of :class:`~.kernel_arguments.Body`.
-        uncovered: planes outside of trunk and other arm, (2, words, rows or more).
-        size: number of rows that count, and width, px.
-        scale: 1 / (pixels of the silhouette).
-        costs: changed; as fractions of the silhouette.
+    ``joints`` (N, 3, 3) are those of the arms in the torso's frame, metres; ``uncovered`` are
+    planes outside of trunk and other arm, (2, words, rows or more), of which ``size`` count, rows
+    and width, px; ``scale`` is 1 / (pixels of the silhouette).
     """
     rows, width = size
     of = body_of(body)

@@ -38,17 +38,11 @@ _padded = inlined_kernel(padded)
 
 
 class Masks(NamedTuple):
-    """Scratch arrays for K patches.
+    """Scratch arrays for K patches."""
 
-    Attributes:
-        drawn: pixels of the union, (words, rows); rows outside of ``rows_of`` have no meaning.
-        words_of: first and end column of words of each patch, (K, 2).
-        rows_of: first and end row of each column of words, (words, 2).
-    """
-
-    drawn: Drawn
-    words_of: Counts
-    rows_of: Counts
+    drawn: Drawn  #: pixels of the union, (words, rows); rows outside of ``rows_of`` have no meaning
+    words_of: Counts  #: first and end column of words of each patch, (K, 2)
+    rows_of: Counts  #: first and end row of each column of words, (words, 2)
 
 
 @inlined_allocation
@@ -130,14 +124,11 @@ def _count(drawn: Drawn, rows_of: Counts, planes: Planes) -> tuple[int, int]:
 def sum_masks(
     work: Workspace, has_cuts: bool, width: int, planes: Planes, masks: Masks
 ) -> tuple[int, int]:
-    """Return sum of (1 - 2 f) and area, px, of the union of all patches.
+    """Return sum of (1 - 2 f) and area, px, of the union of all patches of ``work``.
 
-    Args:
-        work: the patches, with sides of as many rows as the planes.
-        has_cuts: whether a corner is behind the near plane, from :func:`~.rasterisation.draw`.
-        width: width of the image, px.
-        planes: (2, words, rows), see :func:`~.bit_planes.fill_planes`.
-        masks: scratch arrays for as many patches.
+    Their sides have as many rows as the ``planes`` (2, words, rows), see
+    :func:`~.bit_planes.fill_planes`. ``has_cuts`` is from :func:`~.rasterisation.draw`; ``masks``
+    are scratch arrays for as many patches.
     """
     _place(work, has_cuts, width, masks)
     _add(work.sides, work.extent, masks.words_of, masks.drawn)

@@ -83,13 +83,11 @@ def _eight_bits(pixels: np.uint64) -> np.uint64:
 
 @kernel
 def fill_planes(silhouette: NDArray[np.uint8], words: NDArray[np.uint64], planes: Planes) -> int:
-    """Write a silhouette, all of whose pixels count; return its foreground, px.
+    """Write a silhouette (rows, W), not 0 in the foreground; return its foreground, px.
 
-    Args:
-        silhouette: (rows, W); foreground is not zero.
-        words: the same memory as (rows, W / 8) of 64 bits, so that eight pixels are read at a time;
-            with (rows, 0) each pixel is read by itself.
-        planes: (2, words, rows or more), written.
+    ``words`` is the same memory as (rows, W / 8) of 64 bits, so that eight pixels are read at a
+    time; with (rows, 0) each pixel is read by itself. ``planes`` (2, words, rows or more) is
+    written.
     """
     rows, width = silhouette.shape
     last = planes.shape[1] - 1
@@ -123,11 +121,7 @@ def fill_planes(silhouette: NDArray[np.uint8], words: NDArray[np.uint64], planes
 
 @kernel
 def leave_out(planes: Planes, first_row: int, end_row: int, start: int, end: int) -> int:
-    """Let the columns ``start`` to ``end`` of these rows, those of the legs, no longer count.
-
-    Returns:
-        Foreground pixels of this area.
-    """
+    """Let these rows and columns, those of legs, no longer count; return their foreground, px."""
     taken = 0
     for w in range(_index(planes.shape[1])):
         column = np.int32(PIXELS) * np.int32(w)

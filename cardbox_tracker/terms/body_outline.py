@@ -105,7 +105,7 @@ def _place_limb(
 ) -> None:
     """Write patches ``p``, a bar that faces the camera, and ``p`` + 1, a square around its end.
 
-    ``size`` is the length of the bar, half its width, and half the side of the square, metres.
+    ``size`` is the length of the bar, half its width, and half the side of the square, metres;
     ``limb`` is 0 for the upper arm, 1 for the forearm.
     """
     start, end, axis = arm.joints[limb], arm.joints[limb + 1], arm.axes[limb]

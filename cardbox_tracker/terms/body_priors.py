@@ -51,17 +51,12 @@ _HIPS_END_M = -0.1
 
 
 class Prior(NamedTuple):
-    """The priors of one frame.
+    """The priors of one frame."""
 
-    Attributes:
-        anchor: x and z of the last frame, the home of x, metres, and the expected yaw, rad; (4,).
-        rules: units and weights, (15,).
-        gaussians: mixture of an arm's directions, (28, K), see :func:`.pose_prior.nats_of`.
-    """
-
+    #: x and z of the last frame, the home of x, metres, and the expected yaw, rad; (4,).
     anchor: Floats
-    rules: Floats
-    gaussians: Floats
+    rules: Floats  #: units and weights, (15,)
+    gaussians: Floats  #: mixture of an arm's directions, (28, K), see :func:`.pose_prior.nats_of`
 
 
 PriorTuple = tuple[Floats, Floats, Floats]

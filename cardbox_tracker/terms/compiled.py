@@ -71,17 +71,11 @@ class CompiledSilhouette(SilhouetteTerm):
 
 @dataclass(frozen=True, eq=False)
 class CompiledObservation(SilhouetteObservation):
-    """One silhouette as running sums along its rows.
+    """One silhouette as running sums along its rows."""
 
-    Attributes:
-        frame: the frame.
-        row_sums: running sums of 1 - 2 f along each row, (rows, W + 1).
-        cardbox: fields of :class:`~cardbox_tracker.terms.kernel_arguments.Cardbox`.
-    """
-
-    frame: Frame
-    row_sums: NDArray[Any]
-    cardbox: CardboxTuple
+    frame: Frame  #: the frame
+    row_sums: NDArray[Any]  #: running sums of 1 - 2 f along each row, (rows, W + 1)
+    cardbox: CardboxTuple  #: fields of :class:`~cardbox_tracker.terms.kernel_arguments.Cardbox`
 
     def torsos_beside(self, arms: FloatArray | None) -> TorsoCosts:
         """See :class:`SilhouetteObservation`."""

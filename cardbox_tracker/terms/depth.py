@@ -91,13 +91,9 @@ class DepthTerm:
 
 @dataclass(frozen=True, eq=False)
 class DepthObservation(TermObservation):
-    """The depth of one frame.
+    """The depth of one frame."""
 
-    Attributes:
-        surface: fields of :class:`~.depth_kernels.Surface`.
-    """
-
-    surface: kernels.SurfaceTuple
+    surface: kernels.SurfaceTuple  #: fields of :class:`~.depth_kernels.Surface`
 
     def rate(self, posed: Posed) -> FloatArray:
         """Rate the visible surface of the parts that count."""

@@ -60,19 +60,12 @@ _OCCLUDED = 0.5
 
 
 class Surface(NamedTuple):
-    """A measured surface and the costs of differences from it.
+    """A measured surface and the costs of differences from it."""
 
-    Attributes:
-        depth: (H, W), metres along the optical axis; 0 if unknown.
-        areas_px: areas of torso, waist, head, upper arm and forearm, (5,).
-        unit_m: difference that costs 0.5.
-        expected: mean cost of a point, which is subtracted.
-    """
-
-    depth: DepthMap
-    areas_px: Floats
-    unit_m: float
-    expected: float
+    depth: DepthMap  #: (H, W), metres along the optical axis; 0 if unknown
+    areas_px: Floats  #: areas of torso, waist, head, upper arm and forearm, (5,)
+    unit_m: float  #: difference that costs 0.5
+    expected: float  #: mean cost of a point, which is subtracted
 
 
 SurfaceTuple = tuple[DepthMap, Floats, float, float]

@@ -31,13 +31,9 @@ def padded_width(width: int) -> int:
 def signed_distances_of(mask: NDArray[np.uint8], distances: NDArray[np.float32]) -> None:
     """Write the distance of each pixel from the nearest pixel of the other side, px.
 
-    The distances have ``FAR`` columns more to the left of the mask, and ``FAR`` or more to its
-    right. There the mask continues as in its outermost columns.
-
-    Args:
-        mask: (H, W), 0 outside and 1 inside.
-        distances: written, (H, :func:`padded_width` (W)): negative inside, between -``FAR_PX`` and
-            ``FAR_PX``.
+    The mask (H, W) is 0 outside and 1 inside. The distances (H, :func:`padded_width` (W)), negative
+    inside and limited to ``FAR_PX``, have ``FAR`` columns more to the left of the mask, and ``FAR``
+    or more to its right, where the mask continues as in its outermost columns.
     """
     height, width = mask.shape
     sides = np.empty(distances.shape, np.uint8)

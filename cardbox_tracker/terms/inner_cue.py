@@ -11,7 +11,7 @@ person's parts (``BodyModel.appearance``), and the term uses them in five steps:
    limbs are preferred.
 4. A hand gains less where the other forearm covers it, and nothing behind the torso.
 5. Whether the forearms of a person without reference postures are bare is learned while tracking
-   (:mod:`.inner_cue_sleeves`).
+   (:class:`Sleeves`).
 
 The gain is subtracted from the cost. The term is zero without an image, without a previous posture,
 and for a person with unknown colours.
@@ -20,6 +20,7 @@ and for a person with unknown colours.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import cv2
 import numpy as np
@@ -39,14 +40,8 @@ from cardbox_tracker.person.appearance import (
 )
 from cardbox_tracker.person.model import MEASURED, BodyModel
 from cardbox_tracker.person.sizes import FloatArray
-from cardbox_tracker.terms.inner_cue_arms import (
-    ArmGains,
-    arms_in_image,
-    forearm_of,
-    zones_of,
-)
+from cardbox_tracker.terms import inner_cue_kernels as kernels
 from cardbox_tracker.terms.inner_cue_kernels import costs_of_arms, ratio_maps
-from cardbox_tracker.terms.inner_cue_sleeves import Sleeves
 from cardbox_tracker.terms.term import (
     Frame,
     Image,
@@ -55,6 +50,128 @@ from cardbox_tracker.terms.term import (
     Term,
     TermObservation,
 )
+
+# Weight of a nat over the area of a forearm; neighbouring pixels and successive images are alike.
+_WEIGHT = 0.1
+# Added to each ratio, nats: an arm that is not found shows the shirt, whatever it wears.
+_TOWARDS_BARE = 0.2
+# Logarithm of the odds before the first image: whoever is not known more often shows the forearms.
+_FIRST = 1.0
+# Limit of the logarithm of the odds, so that a jacket that is taken off is noticed.
+_MOST = 3.0
+# Share of a hand's weight that is lost beside bare forearms.
+_LOST = 0.5
+# Change of the chance that is worth new ratios.
+_STEP = 0.01
+
+
+class Sleeves:
+    """The chance that the forearms of a person who was not measured are bare.
+
+    Both skin and shirt are possible at first, so the forearm's histogram is their mixture by this
+    chance. Each image changes it: the log-likelihood ratio of skin against the part behind, over
+    the forearms of the last posture, is added to the logarithm of the odds. Bare skin gains as much
+    as a hand would, so a hand weighs less, the more probably forearms are bare.
+
+    Attributes:
+        log_odds: logarithm of the odds of bare forearms against sleeves.
+    """
+
+    def __init__(
+        self, histograms: FloatArray, forearm_m: tuple[float, float], px_per_m: float
+    ) -> None:
+        """Prepare for a person with ``histograms`` (5, bins), probabilities of bins for each part.
+
+        ``forearm_m`` are length and width; ``px_per_m`` is the scale at the expected place.
+        """
+        self._histograms, self._forearm_m, self._px_per_m = histograms.copy(), forearm_m, px_per_m
+        forearm_px = forearm_m[0] * forearm_m[1] * px_per_m**2
+        self._weights = np.array([0.0, _WEIGHT / forearm_px])
+        self.log_odds, self._told = _FIRST, 0.0
+
+    @property
+    def bare(self) -> float:
+        """The chance that the forearms are bare, 0 to 1."""
+        return float(1.0 / (1.0 + np.exp(-self.log_odds)))
+
+    @property
+    def hand_weight(self) -> float:
+        """Factor on the weight of a hand, 0 to 1."""
+        return 1.0 - _LOST * self.bare
+
+    @property
+    def histograms(self) -> FloatArray:
+        """Probability of each bin for each part, (5, bins), with forearms as they probably are."""
+        self._told = self.bare
+        histograms = self._histograms.copy()
+        skin, shirt = histograms[HAND], histograms[TORSO]
+        histograms[FOREARM] = self._told * skin + (1.0 - self._told) * shirt
+        return histograms
+
+    def see(self, skin: NDArray[np.float32], corner: tuple[int, int], posed: Posed) -> bool:
+        """Learn from one image; return whether ``histograms`` have changed.
+
+        ``skin`` (h, w) has log-likelihood ratios of the hand against the part behind, nats, and
+        begins at the column and row ``corner``; 0 where both are alike. The person has one state.
+        """
+        inclined = np.where(skin != 0.0, skin + np.float32(_TOWARDS_BARE), np.float32(0.0))
+        maps = np.stack([inclined, inclined])
+        gains = ArmGains(maps, corner, self._weights, self._px_per_m, self._forearm_m)
+        for arm in (0, 1):
+            points, hidden = arms_in_image(posed, arm)
+            self.log_odds += float(gains(points, hidden, points)[0])
+        self.log_odds = float(np.clip(self.log_odds, -_MOST, _MOST))
+        return abs(self.bare - self._told) > _STEP
+
+
+def arms_in_image(posed: Posed, arm: int) -> tuple[FloatArray, NDArray[np.bool_]]:
+    """Return column, row and pixels per metre of elbow and hand of one arm, (N, 2, 3).
+
+    ``arm`` is 0 left or 1 right. Also returns whether the hand is behind the trunk, (N,).
+    """
+    points, hidden = np.empty((len(posed), 2, 3)), np.empty(len(posed), np.bool_)
+    kernels.project_arms(posed.states, arm, posed.body, points, hidden)
+    return points, hidden
+
+
+def forearm_of(person: BodyModel) -> tuple[float, float]:
+    """Return length, including the fist, and width of a person's forearm, m."""
+    return person.size("forearm_length"), person.size("forearm_width")
+
+
+def zones_of(posed: Posed) -> FloatArray:
+    """Return the places of head and torso of the first state, (6,), px, see ``torso_zones``."""
+    zones = np.empty(6)
+    kernels.torso_zones(posed.states[0], posed.body, zones)
+    return zones
+
+
+@dataclass(frozen=True, eq=False)
+class ArmGains:
+    """The gains of arms in one image."""
+
+    maps: NDArray[np.float32]  #: log-likelihood ratios of hand and forearm, (2, h, w), nats
+    corner: tuple[int, int]  #: column and row of the image where the maps begin
+    weights: FloatArray  #: weight of a nat of hand and forearm, px of the outline, (2,)
+    px_per_m: float  #: scale at the expected place of the person
+    forearm_m: tuple[float, float]  #: length, including the fist, and width of the forearm
+
+    def __call__(
+        self, points: FloatArray, hidden: NDArray[np.bool_], others: FloatArray
+    ) -> FloatArray:
+        """Return the gains (N,), px, of arms; ``points`` and ``hidden`` as :func:`arms_in_image`.
+
+        ``others`` are points of the other arm, (N, 2, 3), or (1, 2, 3) for all.
+        """
+        gains = np.empty(len(points))
+        kernels.arm_gains(points, hidden, others, *self.arguments, gains)
+        return gains
+
+    @cached_property
+    def arguments(self) -> tuple[kernels.Maps, kernels.Forearm, FloatArray]:
+        """The same for the kernels."""
+        return (self.maps, *self.corner), (*self.forearm_m, self.px_per_m), self.weights
+
 
 # Limit of a ratio, since histograms of a few hundred pixels are uncertain.
 _LIMIT_NATS = 2.5
@@ -92,11 +209,7 @@ class InnerCueTerm:
     """The cue for one person with known colours."""
 
     def __init__(self, config: InnerCue, body: BodyModel, camera: Camera) -> None:
-        """Prepare for one body and one camera, and compile the kernels if necessary.
-
-        Raises:
-            ValueError: ``body`` has no appearance.
-        """
+        """Prepare for a body, which must have an appearance, before one camera."""
         if body.appearance is None:
             raise ValueError("the body has no appearance; learn it, or track without this term")
         self.config = config
@@ -185,10 +298,7 @@ class InnerCueTerm:
 def chest_levels(image: Image, silhouette: Silhouette, zones: FloatArray) -> FloatArray | None:
     """Return the median (channels,) over the chest, below the head; None if it is not visible.
 
-    Args:
-        image: (H, W, channels).
-        silhouette: (H, W), 0 or 255.
-        zones: (6,), see :func:`~.inner_cue_arms.zones_of`.
+    The image is (H, W, channels), ``zones`` (6,) are those of :func:`zones_of`.
     """
     u, v, half_width, half_height, hips, _ = zones.tolist()
     top, bottom = max(int(v + 1.6 * half_height), 0), int(hips - 0.1 * (hips - v))
@@ -214,15 +324,10 @@ def ratios_of(histograms: FloatArray) -> NDArray[np.float32]:
 
 @dataclass(frozen=True, eq=False)
 class InnerCueObservation(TermObservation):
-    """The cue of one frame.
+    """The cue of one frame."""
 
-    Attributes:
-        gains: gains of arms in this frame.
-        before: elbow and hand of each arm in the previous frame, (2, 1, 2, 3).
-    """
-
-    gains: ArmGains
-    before: FloatArray
+    gains: ArmGains  #: gains of arms in this frame
+    before: FloatArray  #: elbow and hand of each arm in the previous frame, (2, 1, 2, 3)
 
     def rate(self, posed: Posed) -> FloatArray:
         """Rate the arms that count; the outline determines the trunk."""

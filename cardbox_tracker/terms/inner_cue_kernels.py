@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from math import sqrt
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -36,31 +36,13 @@ _BEHIND_M, _NEAREST_M = 0.03, 0.1
 _TORSO_ZONE, _HEAD_ZONE, _LOWER_ZONE = 0, 1, 2
 
 
-class Maps(NamedTuple):
-    """Log-likelihood ratios (2, h, w), nats, of hand and forearm, from column u0 and row v0 on."""
+Maps = tuple[Any, int, int]
+"""Log-likelihood ratios (2, h, w), nats, of hand and forearm, and their first column and row."""
 
-    ratios: Any
-    u0: int
-    v0: int
+Forearm = tuple[float, float, float]
+"""Length including the fist and width of a forearm, m; scale at the expected place of the person,
+px/m, which areas use, so that a nearer state has no advantage."""
 
-
-class Forearm(NamedTuple):
-    """A forearm and its scale in the image.
-
-    Attributes:
-        length_m: including the fist.
-        width_m: width of the forearm.
-        px_per_m: scale at the expected place of the person; areas use it, so that a nearer state
-            has no advantage.
-    """
-
-    length_m: float
-    width_m: float
-    px_per_m: float
-
-
-MapsTuple = tuple[Any, int, int]
-ForearmTuple = tuple[float, float, float]
 Pair = tuple[float, float]
 
 
@@ -99,14 +81,9 @@ def ratio_maps(
 ) -> None:
     """Write the log-likelihood ratios (2, h, w), nats, of hand and forearm against other parts.
 
-    Args:
-        pixels: (h, w, channels).
-        inside: silhouette (h, w), 0 outside.
-        steps_of_levels: step of each level of each channel, (channels, 256).
-        steps: number of steps.
-        ratios: log-likelihood ratios by zone, hand or forearm, and bin, (3, 2, bins).
-        zones: (6,), in pixels of these arrays, see :func:`torso_zones`.
-        maps: written.
+    ``pixels`` are (h, w, channels), ``inside`` the silhouette (h, w); ``steps_of_levels``
+    (channels, 256) maps levels to one of ``steps``. ``ratios`` (3, 2, bins) are by zone, hand or
+    forearm, and bin; ``zones`` (6,) are in pixels of these arrays, see :func:`torso_zones`.
     """
     for v in range(maps.shape[1]):
         for u in range(maps.shape[2]):
@@ -127,10 +104,10 @@ def ratio_maps(
 
 @kernel
 def project_arms(states: Any, arm: int, body: BodyTuple, points: Any, hidden: Any) -> None:
-    """Write the places of arms in the image: ``points`` (N, 2, 3) and ``hidden`` (N,).
+    """Write the places of arms 0, left, or 1, right, of ``states`` (N, 14) in the image.
 
-    ``points`` has column, row and pixels per metre of elbow and hand (the forearm's end) of the
-    left arms, 0, or right arms, 1, of ``states`` (N, 14). ``hidden`` marks hands behind the trunk.
+    ``points`` (N, 2, 3) has column, row and pixels per metre of elbow and hand (the forearm's end);
+    ``hidden`` (N,) marks hands behind the trunk.
     """
     of = body_of(body)
     camera, side = of.camera, side_of(arm)
@@ -154,10 +131,9 @@ def project_arms(states: Any, arm: int, body: BodyTuple, points: Any, hidden: An
 
 @kernel
 def _mean(ratios: Any, centre: Pair, half: Pair, aside: Pair, points: tuple[int, int]) -> float:
-    """Return the mean of ``ratios`` (h, w) over a grid of ``points`` of a patch.
+    """Return the mean of ``ratios`` (h, w) over a grid of ``points`` of a patch, 0 outside of it.
 
-    ``half`` and ``aside`` are the half axes of the patch along and across the limb, px. Points
-    outside of the image count as 0.
+    ``half`` and ``aside`` are the half axes of the patch along and across the limb, px.
     """
     h, w = ratios.shape
     along, across = points
@@ -190,21 +166,15 @@ def arm_gains(
     points: Any,
     hidden: Any,
     others: Any,
-    maps: MapsTuple,
-    forearm: ForearmTuple,
+    maps: Maps,
+    forearm: Forearm,
     weights: Any,
     gains: Any,
 ) -> None:
-    """Write the gains (N,), px, of arms.
+    """Write the gains (N,), px, of arms with the ``points`` and ``hidden`` of :func:`project_arms`.
 
-    Args:
-        points: (N, 2, 3), see :func:`project_arms`.
-        hidden: (N,), whether the hand is hidden.
-        others: (N, 2, 3), or (1, 2, 3) for all: points of the other arm.
-        maps: fields of :class:`Maps`.
-        forearm: fields of :class:`Forearm`.
-        weights: weight of a nat of hand and forearm, px of the outline, (2,).
-        gains: written.
+    ``others`` are points of the other arm, (N, 2, 3), or (1, 2, 3) for all; ``weights`` (2,) are
+    those of a nat of hand and forearm, px of the outline.
     """
     ratios, u0, v0 = maps
     forearm_m, width_m, px_per_m = forearm
@@ -243,23 +213,16 @@ def costs_of_arms(
     counted: Drawn,
     body: BodyTuple,
     before: Any,
-    maps: MapsTuple,
-    forearm: ForearmTuple,
+    maps: Maps,
+    forearm: Forearm,
     weights: Any,
     costs: Any,
 ) -> None:
     """Subtract the gains of the arms of states (N, 14) from ``costs`` (N,), px.
 
-    Args:
-        states: of the camera.
-        counted: whether trunk, left arm and right arm count.
-        body: fields of :class:`~.kernel_arguments.Body`.
-        before: points of the left and the right arm in the previous frame, (2, 1, 2, 3). While one
-            arm is rated, the other one has its last place.
-        maps: fields of :class:`Maps`.
-        forearm: fields of :class:`Forearm`.
-        weights: see :func:`arm_gains`.
-        costs: changed.
+    ``counted`` says whether trunk, left arm and right arm count. While one arm is rated, the other
+    one has its place in the previous frame: ``before`` (2, 1, 2, 3) has both. ``weights`` are those
+    of :func:`arm_gains`.
     """
     count = states.shape[0]
     points, hidden = np.empty((2, count, 2, 3)), np.empty((2, count), np.bool_)

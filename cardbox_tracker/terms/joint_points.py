@@ -198,20 +198,14 @@ class JointPointsTerm:
 
 @dataclass(frozen=True, eq=False)
 class JointPointsObservation(TermObservation):
-    """The points of one frame.
+    """The points of one frame."""
 
-    Attributes:
-        seen: fields of :class:`~.joint_points_kernels.Evidence`.
-        weight_px: cost of a squared residual of 1, px.
-        shows_back: whether left and right have been exchanged for long, so that the person faces
-            the other way; at the start of tracking, whether the points are those of a back.
-        shows_legs: whether points of the legs are certain.
-    """
-
-    seen: EvidenceTuple
-    weight_px: float
+    seen: EvidenceTuple  #: fields of :class:`~.joint_points_kernels.Evidence`
+    weight_px: float  #: cost of a squared residual of 1, px
+    #: whether left and right have been exchanged for long, so that the person faces the other way;
+    #: at the start of tracking, whether the points are those of a back.
     shows_back: bool = False
-    shows_legs: bool = False
+    shows_legs: bool = False  #: whether points of the legs are certain
     locates = True
 
     def rate(self, posed: Posed) -> FloatArray:
@@ -328,12 +322,9 @@ def points_of(points: ImagePoints) -> FloatArray:
 def bones_of(spatial_m: FloatArray, found: FloatArray) -> FloatArray:
     """Return component along z as a fraction of the length, and score, of each bone, (6, 2).
 
-    The bones are upper arm and forearm of each arm, the left one first, the line from the right
-    to the left shoulder, and that from the middle of the hips to that of the shoulders.
-
-    Args:
-        spatial_m: ``ImagePoints.spatial_m``, (17, 3).
-        found: see :func:`points_of`.
+    The bones are upper arm and forearm of each arm, the left one first, the line from the right to
+    the left shoulder, and that from the middle of the hips to that of the shoulders. ``spatial_m``
+    (17, 3) is that of ``ImagePoints``, ``found`` that of :func:`points_of`.
     """
 
     def at(*names: str) -> FloatArray:

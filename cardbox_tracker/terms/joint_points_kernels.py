@@ -63,20 +63,15 @@ _NEAREST_M = 0.1
 
 
 class Evidence(NamedTuple):
-    """The points of one camera in one frame.
+    """The points of one camera in one frame."""
 
-    Attributes:
-        points: column, row and score of each point, (10, 3); a score of 0 for an unknown point.
-        deviations: of each point, metres and px, (10, 2).
-        bones: component along ``away`` as a fraction of the length, score and deviation of each
-            bone, (6, 3).
-        away: unit vector in the optical frame for each bone, (6, 3).
-    """
-
+    #: column, row and score of each point, (10, 3); a score of 0 for an unknown point.
     points: Floats
-    deviations: Floats
+    deviations: Floats  #: of each point, metres and px, (10, 2)
+    #: component along ``away`` as a fraction of the length, score and deviation of each bone, (6,
+    #: 3).
     bones: Floats
-    away: Floats
+    away: Floats  #: unit vector in the optical frame for each bone, (6, 3)
 
 
 EvidenceTuple = tuple[Floats, Floats, Floats, Floats]

@@ -13,8 +13,13 @@ from numpy.typing import NDArray
 
 from cardbox_tracker.camera.camera import Camera
 from cardbox_tracker.common.compiling import copied_kernel
-from cardbox_tracker.person.kinematics import Place
+from cardbox_tracker.person.kinematics import Place, girdle_of
 from cardbox_tracker.person.model import BodyModel
+from cardbox_tracker.person.parts import BOTTOM, FOREARM, HEAD, HEIGHT, NECK, WAIST, shape_of
+from cardbox_tracker.terms.whole_body_config import WholeBodyCostConfig
+
+# Overlap of neck and head, as a fraction of the head's height: an outline has no gap below the jaw.
+_NECK_INTO_HEAD = 0.25
 
 Floats = NDArray[np.float64]
 Whole = NDArray[np.int32]
@@ -33,37 +38,23 @@ class Intrinsics(NamedTuple):
 
 
 class Cardbox(NamedTuple):
-    """A cardbox model before a camera.
+    """A cardbox model before a camera."""
 
-    Attributes:
-        parts: six lengths of six parts, (6, 6), metres; (N, 6, 6) for N bodies.
-        shoulder: the shoulder joint in the torso's frame, aside and upwards, (2,), metres; (N, 2).
-        place: place of the hips.
-        camera: intrinsics and pitch of the camera.
-    """
-
-    parts: Floats
+    parts: Floats  #: six lengths of six parts, (6, 6), metres; (N, 6, 6) for N bodies
+    #: the shoulder joint in the torso's frame, aside and upwards, (2,), metres; (N, 2).
     shoulder: Floats
-    place: Place
-    camera: Intrinsics
+    place: Place  #: place of the hips
+    camera: Intrinsics  #: intrinsics and pitch of the camera
 
 
 class Body(NamedTuple):
-    """A whole body with a shoulder girdle before a camera.
+    """A whole body with a shoulder girdle before a camera."""
 
-    Attributes:
-        parts: the measured parts, (6, 6), metres.
-        drawn: the parts whose outlines are drawn, with a longer waist, neck and forearm.
-        girdle: shoulder joints and how they rise with the arms, (3,).
-        place: place of the hips.
-        camera: intrinsics and pitch of the camera.
-    """
-
-    parts: Floats
-    drawn: Floats
-    girdle: Floats
-    place: Place
-    camera: Intrinsics
+    parts: Floats  #: the measured parts, (6, 6), metres
+    drawn: Floats  #: the parts whose outlines are drawn, with a longer waist, neck and forearm
+    girdle: Floats  #: shoulder joints and how they rise with the arms, (3,)
+    place: Place  #: place of the hips
+    camera: Intrinsics  #: intrinsics and pitch of the camera
 
 
 IntrinsicsTuple = tuple[float, float, float, float, float, float]
@@ -98,3 +89,24 @@ def intrinsics_of(camera: Camera) -> IntrinsicsTuple:
 def place_of(body: BodyModel) -> PlaceTuple:
     """Return the fields of :class:`Place` of ``body``."""
     return float(body.placement.distance_m), float(body.placement.hip_height_m)
+
+
+def body_tuple(
+    body: BodyModel, camera: Camera, config: WholeBodyCostConfig | None = None
+) -> BodyTuple:
+    """Return the fields of :class:`Body` of a body before a camera."""
+    config = config or WholeBodyCostConfig()
+    parts, _ = shape_of(body.sizes, config.neck_to_head)
+    drawn = _drawn_parts(parts, config)
+    return parts, drawn, girdle_of(body), place_of(body), intrinsics_of(camera)
+
+
+def _drawn_parts(parts: Floats, config: WholeBodyCostConfig) -> Floats:
+    """Return the parts (6, 6) whose outlines are drawn."""
+    drawn = parts.copy()
+    drawn[WAIST, BOTTOM] -= config.waist_extension_m
+    drawn[WAIST, HEIGHT] += config.waist_extension_m
+    into_m = _NECK_INTO_HEAD * parts[HEAD, HEIGHT]
+    drawn[NECK, HEIGHT] += into_m
+    drawn[FOREARM, HEIGHT] += config.fingers_m
+    return drawn

@@ -10,11 +10,9 @@ from cardbox_tracker.terms.kernel_arguments import Floats
 
 @kernel
 def solve(matrix: Floats, right: Floats) -> None:
-    """Solve a linear system in place by a Cholesky decomposition.
+    """Solve a linear system in place by a Cholesky decomposition; ``right`` (n,) is the solution.
 
-    Args:
-        matrix: symmetric, positive definite, (n, n); its lower triangle is read, and overwritten.
-        right: right side (n,); becomes the solution.
+    The matrix (n, n) is symmetric and positive definite; its lower triangle is overwritten.
     """
     n = right.shape[0]
     for i in range(n):

@@ -72,8 +72,7 @@ class MultiViewCost:
         self.to_views: list[ToView] = [lambda states: states, *(view.states for view in views)]
         self.choose([0])
         first = self.costs[0]
-        self.parts, self.girdle = first.parts, first.girdle
-        self.place, self.view, self.body = first.place, first.view, first.body
+        self.parts, self.place, self.body = first.parts, first.place, first.body
         self.x_factor, self.yaw_unit_rad = 1.0, np.radians(config.yaw_deg)
         self._z_units_m = config.z_step_m, config.z_home_m
         self.anchor = first.anchor
@@ -85,10 +84,7 @@ class MultiViewCost:
         self.limits = state_limits(float(self.place[0]), facing_rad)
 
     def cover(self, covered: Sequence[Silhouette | None]) -> None:
-        """Set the pixels (H, W) of other people in the frames of all cameras, which do not count.
-
-        They apply from the next call of :meth:`see` on.
-        """
+        """Set the pixels (H, W) of other people, which do not count from the next :meth:`see`."""
         for cost, pixels in zip(self.costs, covered, strict=True):
             cost.covered = pixels
 
@@ -170,17 +166,11 @@ class MultiViewCost:
         """Foreground pixels that count, summed over the cameras that show the person."""
         return sum(self.costs[number].silhouette_px for number in self.seeing)
 
-    @property
-    def frontal_px(self) -> int:
-        """Pixels of the model in the front reference posture, summed over the same cameras."""
-        return sum(self.costs[number].frontal_px for number in self.seeing)
-
     def shares(self, state: FloatArray) -> list[tuple[float, float]]:
         """Return each camera's silhouette as shares of the frontal model's area.
 
-        Returns:
-            The share of the larger and of the smaller one of the areas at the measured distance and
-            at that of ``state`` (14,), for each camera.
+        They are shares of the larger and of the smaller one of the areas at the measured distance
+        and at that of ``state`` (14,).
         """
         found = []
         for cost, scale in zip(self.costs, self._scales(state), strict=True):
@@ -189,7 +179,7 @@ class MultiViewCost:
         return found
 
     def frontal_px_at(self, state: FloatArray) -> int:
-        """Return :attr:`frontal_px` for the distance of ``state`` (14,)."""
+        """Return the pixels of the frontal model at the place of a state (14,), of all cameras."""
         scales = self._scales(state)
         areas_px = (scales[number] * self.costs[number].frontal_px for number in self.seeing)
         return max(round(sum(areas_px)), 1)
@@ -214,8 +204,7 @@ class MultiViewCost:
     def arms(self, arms: FloatArray, arm: int) -> tuple[FloatArray, FloatArray]:
         """Rate arms (N, 4), 0 left or 1 right, beside the fixed torso.
 
-        Returns:
-            Ratings (N,); shoulder, elbow and hand in the torso's frame, (N, 3, 3), metres.
+        Returns ratings (N,); shoulder, elbow and hand in the torso's frame, (N, 3, 3), metres.
         """
         ratings, joints_m = self.costs[0].arms(arms, arm)
         for number in self._others:
@@ -253,20 +242,13 @@ class MultiViewCost:
         return Bodies(ratings, costs_px, areas_px, points)
 
     def ious(self, state: FloatArray, seeing: Sequence[int]) -> list[float | None]:
-        """Return the IoU of a state (14,) and the silhouette of each camera.
-
-        Cameras that are not in ``seeing`` have None.
-        """
+        """Return the IoU of a state (14,) in each camera; None for those not in ``seeing``."""
         found: list[float | None] = [None] * len(self.costs)
         for number in seeing:
             cost = self.costs[number]
             rated = cost.bodies(self.to_views[number](state)[None])
             found[number] = iou_of(cost.silhouette_px, rated.areas_px[0], rated.costs_px[0])
         return found
-
-    def keypoints(self, state: FloatArray) -> FloatArray:
-        """Return the keypoints (6, 3) of a state (14,), metres in the first optical frame."""
-        return self.costs[0].keypoints(state)
 
     def _divide(self, ratings: FloatArray) -> None:
         """Divide the sum over the cameras by their number."""

@@ -77,14 +77,10 @@ class Outline(TermObservation):
         hips: tuple[float, float],
         covered: Silhouette | None = None,
     ) -> None:
-        """Compute the distances.
+        """Compute the distances of a silhouette (H, W), 0 or 255, of the camera's size.
 
-        Args:
-            silhouette: (H, W), 0 or 255, of the camera's size.
-            camera: the working camera.
-            hips: the middle of the person's hips, y and z in the optical frame, metres; legs, which
-                the model lacks, do not count.
-            covered: pixels (H, W) of other people, not 0, at which no outline is known.
+        ``hips`` are y and z of their middle in the optical frame, metres; legs, which the model
+        lacks, do not count. At ``covered`` pixels (H, W) of other people no outline is known.
         """
         if covered is not None:
             silhouette = silhouette | covered
@@ -133,12 +129,10 @@ def signed_distances(
 ) -> tuple[int, int, NDArray[np.float32], FloatArray]:
     """Return the distances of pixels from the outline of a silhouette (H, W), negative inside.
 
-    They are limited to -``FAR_PX``..``FAR_PX``.
-
-    Returns:
-        The first column and row of the window around the foreground above ``end_row``, and the
-        distances there, px; empty without foreground, or with a single row above ``end_row``. Then
-        first and last column, first and end row of the window's part that counts, (4,), px.
+    They are limited to ``FAR_PX``. First come column and row of the window around the foreground
+    above ``end_row``, then the distances there, px; empty without foreground, or with a single row
+    above ``end_row``. Last come first and last column, first and end row of the window's part that
+    counts, (4,), px.
     """
     rows = silhouette[: int(min(max(end_row + _MARGIN_PX, 0), len(silhouette)))]
     # The interpolation between pixels needs two rows.

@@ -51,12 +51,9 @@ class SeenOutline:
     """
 
     def __init__(self, silhouette: Silhouette, camera: Camera, hips_m: FloatArray) -> None:
-        """Compute the distances of a silhouette.
+        """Compute the distances of a silhouette (H, W), 0 or 255, at any size.
 
-        Args:
-            silhouette: (H, W), 0 or 255, at any size.
-            camera: camera at the size of the comparison.
-            hips_m: middle of the hips, (3,), metres in the camera's optical frame.
+        The camera has the size of the comparison, and the middle of the hips (3,) is in its frame.
         """
         size = camera.width, camera.height
         grey = cv2.resize(np.asarray(silhouette, np.uint8), size, interpolation=cv2.INTER_AREA)

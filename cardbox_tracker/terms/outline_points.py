@@ -27,12 +27,10 @@ _COVERED_PX = 0.5
 
 @kernel
 def project_corners(corners_m: Floats, lens: Floats, corners_px: Floats) -> None:
-    """Write the projected corners of all patches.
+    """Write the projected corners of all patches, (13, 4, 3): column, row, px; 1 / depth, 1 / m.
 
-    Args:
-        corners_m: corners of all patches, (3, 52), metres in the optical frame, see ``Workspace``.
-        lens: fx, fy, cx, cy.
-        corners_px: written, (13, 4, 3): column and row, px, and inverse depth, 1 / m.
+    ``corners_m`` (3, 52), metres in the optical frame, are those of ``Workspace``; ``lens`` is fx,
+    fy, cx, cy.
     """
     for p in range(BODY_PATCHES):
         for c in range(4):
@@ -57,14 +55,11 @@ def point_on_edge(corners_px: Floats, p: int, c: int, share: float) -> tuple[flo
 
 @inlined_kernel
 def _bound(corners_px: Floats, sides_px: Floats, insides: Floats, boxes: Floats) -> None:
-    """Write edges and bounding boxes of the patches.
+    """Write edges and bounding boxes of the patches with corners (13, 4, 3).
 
-    Args:
-        corners_px: (13, 4, 3).
-        sides_px: written: length of each edge, (13, 4).
-        insides: written, (13, 4, 3): a, b, c of each edge; at least ``_COVERED_PX`` inside of it is
-            a x + b y + c >= 0.
-        boxes: written: first and last column, first and last row, (13, 4).
+    ``sides_px`` (13, 4) are lengths of edges; ``insides`` (13, 4, 3) a, b, c of each edge, inside
+    of which, by at least ``_COVERED_PX``, a x + b y + c >= 0; ``boxes`` (13, 4) first and last
+    column, first and last row.
     """
     for p in range(BODY_PATCHES):
         corners, box = corners_px[p], boxes[p]
@@ -97,8 +92,8 @@ def _covered_share(
 ) -> tuple[float, float]:
     """Return the fractions of a line between which a convex patch covers it.
 
-    The line leads from (x, y) to (x + along_x, y + along_y); ``sides`` are the patch's edges
-    (4, 3), see :func:`_bound`.
+    The line leads from (x, y) to (x + along_x, y + along_y); ``sides`` are the patch's edges (4,
+    3), see :func:`_bound`.
     """
     first, last = 0.0, 1.0
     for c in range(4):
@@ -115,16 +110,12 @@ def _covered_share(
 
 @kernel
 def find_outline(corners_px: Floats, within: Floats, edges: Ints, points: Floats) -> int:
-    """Write the points that are on the outline.
+    """Write the points that are on the outline, and return their number.
 
-    Args:
-        corners_px: (13, 4, 3), see :func:`project_corners`.
-        within: first and last column, first and end row of the part that counts, (4,), px.
-        edges: written: patch and first corner of the edge of each point, (312, 2).
-        points: written: fraction of the edge, and length of the outline at the point, px, (312, 2).
-
-    Returns:
-        Number of points.
+    ``corners_px`` is that of :func:`project_corners`; ``within`` (4,) are first and last column,
+    first and end row of the part that counts. ``edges`` (312, 2) are patch and first corner of the
+    edge of each point, ``points`` (312, 2) its fraction of the edge, and the length of the outline
+    there, px.
     """
     left, right, top, bottom = within[0], within[1], within[2], within[3]
     sides_px, insides = np.empty((BODY_PATCHES, 4)), np.empty((BODY_PATCHES, 4, 3))

@@ -77,14 +77,11 @@ def sample_bank(count: int = 3000, seed: int = 0) -> FloatArray:
 
 @inlined_kernel
 def nats_of(directions: Any, gaussians: Any, rest: float, logs: Any) -> float:
-    """Return -log(p + ``rest``), nats, of the unit vectors (6,) of an arm.
+    """Return -log(p + ``rest``), nats, of unit vectors (6,) of upper arm and forearm.
 
-    Args:
-        directions: unit vectors of upper arm and forearm, (6,).
-        gaussians: the transpose of :func:`load_gmm`, (28, K). The loop over the Gaussians has no
-            inner loops, so that it can be vectorized.
-        rest: density of postures that the mixture does not know.
-        logs: scratch, (K,).
+    ``gaussians`` (28, K) is the transpose of :func:`load_gmm`; the loop over the Gaussians has no
+    inner loops, so that it can be vectorized. ``rest`` is the density of postures that the mixture
+    does not know; ``logs`` (K,) is scratch.
     """
     g = gaussians
     d0, d1, d2 = directions[0], directions[1], directions[2]

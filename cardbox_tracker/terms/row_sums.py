@@ -37,16 +37,10 @@ def _count_on(
 def fill_row_sums(
     silhouette: NDArray[np.uint8], words: NDArray[np.uint64], row_sums: RowSums
 ) -> int:
-    """Fill ``row_sums`` for a silhouette and count its foreground.
+    """Write the row sums of a silhouette (rows, W), 0 or 255; return its foreground, px.
 
-    Args:
-        silhouette: shape (rows, W), 0 or 255.
-        words: the same memory as (rows, W / 8) of 64 bits, so that eight equal pixels are counted
-            at a time; with (rows, 0) each pixel is counted by itself.
-        row_sums: written.
-
-    Returns:
-        Foreground pixels.
+    ``words`` is the same memory as (rows, W / 8) of 64 bits, so that eight equal pixels are counted
+    at a time; with (rows, 0) each pixel is counted by itself.
     """
     rows, width = silhouette.shape
     total = 0

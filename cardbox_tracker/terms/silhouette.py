@@ -36,9 +36,7 @@ class SilhouetteObservation(ABC):
     def torsos_beside(self, arms: FloatArray | None) -> TorsoCosts:
         """Return the function that rates torsos d1..d4: torso, waist and head are drawn.
 
-        Args:
-            arms: posture (12,) whose arms are drawn at their place in the image while the torsos
-                move; None to draw no arms.
+        The arms of the posture (12,) ``arms`` stay at their place in the image; None draws none.
         """
 
     @abstractmethod
@@ -63,15 +61,10 @@ class SilhouetteTerm(ABC):
         self.rows = rows_above_hips(body, camera)
 
     def frame(self, silhouette: Silhouette, image: Image | None = None) -> Frame:
-        """Return a frame for this and all other terms.
+        """Return a frame for this and all other terms of a silhouette (H, W), 0 or 255.
 
-        Args:
-            silhouette: (H, W), 0 or 255.
-            image: (H, W) grey or (H, W, 3) bgr of the same time, or None.
-
-        Raises:
-            ValueError: the size of ``silhouette`` or ``image`` is not the camera's, or its type or
-                values are impossible.
+        The image of that time is (H, W) grey or (H, W, 3) bgr, or None. Raises ValueError if a size
+        is not the camera's, or a type or values are impossible.
         """
         size = self.camera.height, self.camera.width
         silhouette = silhouette_from(silhouette, size=size)
@@ -86,11 +79,7 @@ class SilhouetteTerm(ABC):
         """See :class:`~cardbox_tracker.terms.term.Term`."""
 
     def look(self, silhouette: Silhouette) -> SilhouetteObservation:
-        """Observe a silhouette (H, W) without further data.
-
-        Raises:
-            ValueError: its size is not the camera's.
-        """
+        """Observe a silhouette (H, W) without further data; ValueError for another size."""
         return self.observe(self.frame(silhouette))
 
 

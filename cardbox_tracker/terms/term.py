@@ -108,27 +108,19 @@ class Posed:
 
 @dataclass(frozen=True, eq=False)
 class Frame:
-    """The data of one camera at one time.
+    """The data of one camera at one time."""
 
-    Attributes:
-        camera: the working camera, upright.
-        channels: data by the names of :data:`~cardbox_tracker.tracking.observation.CHANNELS`,
-            turned upright; ``frame[name]`` is None without data. There is always a silhouette,
-            (H, W), 0 or 255, of the camera's size; do not write to it.
-        rows: number of rows of the silhouette that count, from the top to the hips.
-        foreground_px: foreground pixels in those rows.
-        before: the posture of the previous frame before this camera; None at the start of tracking.
-        interval_s: time since the previous frame, s.
-        stamp_ns: time of the frame, ns; None if it is unknown.
-    """
-
-    camera: Camera
+    camera: Camera  #: the working camera, upright
+    #: data by the names of :data:`~cardbox_tracker.tracking.observation.CHANNELS`, turned upright;
+    #: ``frame[name]`` is None without data. There is always a silhouette, (H, W), 0 or 255, of the
+    #: camera's size; do not write to it.
     channels: Mapping[str, Any]
-    rows: int
-    foreground_px: int
+    rows: int  #: number of rows of the silhouette that count, from the top to the hips
+    foreground_px: int  #: foreground pixels in those rows
+    #: the posture of the previous frame before this camera; None at the start of tracking.
     before: Posed | None = None
-    interval_s: float = USUAL_INTERVAL_S
-    stamp_ns: int | None = None
+    interval_s: float = USUAL_INTERVAL_S  #: time since the previous frame, s
+    stamp_ns: int | None = None  #: time of the frame, ns; None if it is unknown
 
     def __getitem__(self, channel: str) -> Any:
         """Return the data of a channel; None without data."""
@@ -203,9 +195,9 @@ class TermObservation:
         return None
 
     def evidence(self, posed: Posed) -> Mapping[str, FloatArray]:
-        """Return what tells that a result, one state, may be wrong, by name.
+        """Return what tells that a result, one state, may be wrong: by name, of keypoints (6,).
 
-        Each has one value for each keypoint, (6,); the doubt (:mod:`.doubt`) has its coefficients.
+        The doubt (:mod:`.doubt`) has its coefficients.
         """
         return MappingProxyType({})
 
@@ -221,8 +213,8 @@ class TermSettings(Protocol):
     """The settings of a term, an element of ``TrackerConfig.terms``."""
 
     def build(self, person: BodyModel, camera: Camera) -> Term | None:
-        """Return the term for a person before an upright working camera.
+        """Return the term for a person before an upright working camera, or None.
 
-        None if the term can say nothing about this person. With several cameras it is called once
-        for each; ``person`` is then placed before ``camera``.
+        It is None if the term can say nothing. With several cameras it is called once for each;
+        ``person`` is then placed before ``camera``.
         """

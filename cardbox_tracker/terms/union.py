@@ -208,12 +208,9 @@ def sum_union(work: Workspace, row_sums: RowSums) -> tuple[np.int64, np.int64]:
 
 @kernel
 def cover_patches(sides: Whole, extent: Counts, row_sums: RowSums, covered: RowSums) -> int:
-    """Write the row sums without the pixels under the patches to ``covered``.
+    """Write the row sums without the pixels under the patches; return their sum of (1 - 2 f).
 
     They are constant over a run, and behind it they are lower by the sum of the run.
-
-    Returns:
-        Sum of (1 - 2 f) over the pixels under the patches.
     """
     rows, columns = row_sums.shape
     last = _index(columns - 1)

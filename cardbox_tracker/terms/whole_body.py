@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from cardbox_tracker.camera.camera import Camera
 from cardbox_tracker.common.array_checks import check_array
 from cardbox_tracker.person.kinematics import pose
-from cardbox_tracker.person.model import MEASURED, BodyModel
+from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.posture import (
     TORSO_X,
     TORSO_Y,
@@ -37,11 +37,9 @@ from cardbox_tracker.terms.bit_planes import (
     new_planes,
 )
 from cardbox_tracker.terms.body_outline import BODY_PATCHES, corners_of_body
-from cardbox_tracker.terms.drawn_body import body_tuple
-from cardbox_tracker.terms.kernel_arguments import Drawn, intrinsics_of, place_of
+from cardbox_tracker.terms.kernel_arguments import Drawn, body_tuple, intrinsics_of, place_of
 from cardbox_tracker.terms.outline import Outline
 from cardbox_tracker.terms.pose_prior import load_gmm
-from cardbox_tracker.terms.rating_arguments import ObservedTuple, Points
 from cardbox_tracker.terms.term import (
     ARM,
     ARMS,
@@ -52,6 +50,7 @@ from cardbox_tracker.terms.term import (
     TermObservation,
 )
 from cardbox_tracker.terms.whole_body_config import WholeBodyCostConfig
+from cardbox_tracker.terms.whole_body_kernels import ObservedTuple, Points
 
 SIDES = tuple(ARMS)
 _NO_WORDS = np.zeros((1, 0), np.uint64)
@@ -59,23 +58,16 @@ _BOTH_ARMS = (False, True, True)
 
 
 class Bodies(NamedTuple):
-    """Rated states.
+    """Rated states."""
 
-    Attributes:
-        ratings: (N,); lower is better.
-        costs_px: pixels in which model and silhouettes differ, (N,).
-        areas_px: pixels of the model, (N,).
-        points: joints of the arms.
-    """
-
-    ratings: FloatArray
-    costs_px: FloatArray
-    areas_px: FloatArray
-    points: Points
+    ratings: FloatArray  #: (N,); lower is better
+    costs_px: FloatArray  #: pixels in which model and silhouettes differ, (N,)
+    areas_px: FloatArray  #: pixels of the model, (N,)
+    points: Points  #: joints of the arms
 
 
 class Ratings(NamedTuple):
-    """Ratings (N,) and the fields of :class:`~.rating_arguments.Points` of N states."""
+    """Ratings (N,) and the fields of :class:`~.whole_body_kernels.Points` of N states."""
 
     ratings: FloatArray
     joints_m: FloatArray
@@ -95,7 +87,6 @@ class WholeBodyCost:
         size: width and height of the image, px.
         limits: lowest and highest value of each value of a state, (14, 2).
         pitch_rad: pitch of the camera, rad, positive downwards.
-        is_measured: whether the body was measured, not estimated from proportions.
         frontal_px: pixels of the model in the front reference posture.
         counted: number of rows of the present silhouette that count, from the top, and width, px.
         silhouette_px: foreground pixels that count in the present silhouette.
@@ -113,7 +104,6 @@ class WholeBodyCost:
         self.size = camera.width, camera.height
         self.limits = state_limits(body.placement.distance_m)
         self.pitch_rad = camera.pitch_rad
-        self.is_measured = body.source == MEASURED
         self._rules = priors.rules_of(config)
         self._waist_m = float(body.size("waist_width"))
         self._gaussians = np.ascontiguousarray(load_gmm().T)
@@ -167,10 +157,7 @@ class WholeBodyCost:
         return (planes, *self.counted, base_px, self._scale), self._prior
 
     def loosen(self, x_factor: float, yaw_unit_rad: float, z_units_m: tuple[float, float]) -> None:
-        """Set the factor on the units of ``torso_x``, and the units of yaw and ``torso_z``.
-
-        The latter are those of step and home.
-        """
+        """Set the factor on the units of ``torso_x``, and the units of yaw and ``torso_z``."""
         self._rules[priors.X_STEP] = x_factor * self._config.x_step_m
         self._rules[priors.X_HOME] = x_factor * self._config.x_home_m
         self._rules[priors.YAW_UNIT] = yaw_unit_rad
@@ -234,14 +221,10 @@ class WholeBodyCost:
         return joints
 
     def arms_by_points(self, arms: FloatArray, joints: FloatArray, arm: int) -> FloatArray:
-        """Return approximate ratings (N,) of arms (N, 4), 0 left or 1 right, without priors.
+        """Return approximate ratings (N,) of arms (N, 4), rad, 0 left or 1 right, without priors.
 
-        The silhouette's part is that of :mod:`cardbox_tracker.terms.arm_points`.
-
-        Args:
-            arms: angles, (N, 4), rad.
-            joints: their :meth:`joints`.
-            arm: 0 left, 1 right.
+        The silhouette's part is that of :mod:`cardbox_tracker.terms.arm_points`; ``joints`` are the
+        arms' :meth:`joints`.
         """
         ratings = np.zeros(len(joints))
         seen = self.uncovered(arm), self.counted, self._scale
@@ -249,11 +232,7 @@ class WholeBodyCost:
         return self._with_terms_of_arms(ratings, arms, arm)
 
     def arms(self, arms: FloatArray, arm: int) -> tuple[FloatArray, FloatArray]:
-        """Rate arms (N, 4), 0 left or 1 right, beside the fixed torso.
-
-        Returns:
-            Ratings (N,); shoulder, elbow and hand in the torso's frame, (N, 3, 3), metres.
-        """
+        """Rate arms (N, 4), 0 left or 1 right, beside the torso, as ``MultiViewCost.arms``."""
         ratings, joints_m = np.empty(len(arms)), np.empty((len(arms), 3, 3))
         of_arms = 1.0 - 2.0 * arm, self._torso, self.body, *self._by_arms
         kernels.rate_arms(arms, *of_arms, ratings, joints_m)

@@ -11,8 +11,18 @@ The pixels are those of equation (2), with the outlines of
 
 from __future__ import annotations
 
-from cardbox_tracker.common.compiling import borrowing_kernel, inlined_kernel, kernel
+from typing import NamedTuple
+
+import numpy as np
+
+from cardbox_tracker.common.compiling import (
+    borrowing_kernel,
+    inlined_allocation,
+    inlined_kernel,
+    kernel,
+)
 from cardbox_tracker.person.kinematics import (
+    PosedArm,
     angles_in,
     new_arm,
     pose_arm,
@@ -20,7 +30,7 @@ from cardbox_tracker.person.kinematics import (
     state_pose,
     turn_arm,
 )
-from cardbox_tracker.terms.bit_masks import cover_masks, new_masks, sum_masks
+from cardbox_tracker.terms.bit_masks import Masks, cover_masks, new_masks, sum_masks
 from cardbox_tracker.terms.bit_planes import Planes
 from cardbox_tracker.terms.body_outline import (
     ARM_PATCHES,
@@ -37,15 +47,48 @@ from cardbox_tracker.terms.kernel_arguments import (
     Floats,
     body_of,
 )
-from cardbox_tracker.terms.rasterisation import draw, new_workspace
-from cardbox_tracker.terms.rating_arguments import (
-    Observed,
-    ObservedTuple,
-    Points,
-    PointsTuple,
-    Scratch,
-    new_scratch,
-)
+from cardbox_tracker.terms.rasterisation import Workspace, draw, new_workspace
+
+
+class Observed(NamedTuple):
+    """A silhouette, or the part of it outside of parts that are already drawn."""
+
+    planes: Planes  #: pixels that count, and foreground, (2, words, rows); see :mod:`.bit_planes`
+    rows: int  #: number of rows that count, from the top
+    width: int  #: width of the image, px
+    base_px: int  #: cost without further parts, px
+    scale: float  #: 1 / (pixels of the silhouette)
+
+
+class Points(NamedTuple):
+    """Shoulder, elbow and hand of the left, then of the right arm of N states."""
+
+    joints_m: Floats  #: in the torso's frame, (N, 6, 3), metres
+    keypoints_m: Floats  #: in the optical frame, (N, 6, 3), metres
+
+
+ObservedTuple = tuple[Planes, int, int, int, float]
+PointsTuple = tuple[Floats, Floats]
+
+
+class Scratch(NamedTuple):
+    """Scratch arrays of the ratings."""
+
+    work: Workspace  #: for the drawn patches
+    arm: PosedArm  #: for one arm
+    masks: Masks  #: for the union of the patches
+    logs: Floats  #: one value for each Gaussian of the prior, (K,)
+
+
+@inlined_allocation
+def new_scratch(patches: int, seen: Observed, given: Prior) -> Scratch:
+    """Return the scratch arrays for a number of patches."""
+    return Scratch(
+        new_workspace(patches, seen.planes.shape[2]),
+        new_arm(),
+        new_masks(patches, seen.planes),
+        np.empty(given.gaussians.shape[1]),
+    )
 
 
 @inlined_kernel
@@ -161,14 +204,9 @@ def rate_bodies(
 ) -> None:
     """Write ratings (N,) of states (N, 14), their pixels, and the points of their arms.
 
-    Args:
-        states: (N, 14).
-        body: fields of :class:`~.kernel_arguments.Body`.
-        observed: fields of :class:`Observed`.
-        prior: fields of :class:`~.body_priors.Prior`.
-        ratings: written, (N,).
-        pixels: written: pixels in which model and silhouette differ, and of the model, (N,) each.
-        points: fields of :class:`Points`, written.
+    ``body``, ``observed``, ``prior`` and ``points`` are fields of :class:`~.kernel_arguments.Body`,
+    :class:`Observed`, :class:`~.body_priors.Prior` and :class:`Points`. ``pixels`` (N,) each are
+    those in which model and silhouette differ, and of the model.
     """
     seen, given = Observed(*observed), Prior(*prior)
     scratch = new_scratch(int(BODY_PATCHES), seen, given)
@@ -211,8 +249,8 @@ def rate_pairs(
 ) -> None:
     """Write ratings (N,) and points of states (N, 14) that all have the trunk of the first one.
 
-    ``observed`` is the silhouette with that trunk drawn, so only the arms are. The other arguments
-    are those of :func:`rate_bodies`.
+    ``observed`` is the silhouette with that trunk drawn, so only the arms are; see
+    :func:`rate_bodies`.
     """
     seen, given = Observed(*observed), Prior(*prior)
     scratch = new_scratch(int(2 * ARM_PATCHES), seen, given)
@@ -250,8 +288,8 @@ def cover(
 ) -> int:
     """Write the planes outside of the ``drawn`` parts of a state; return the gain of the parts.
 
-    The gain is the sum of (1 - 2 f) under these parts; ``size`` is the number of rows that count,
-    and the width.
+    The gain is the sum of (1 - 2 f) under these parts; ``size`` is the rows that count, and the
+    width.
     """
     of = body_of(body)
     has_trunk, has_left, has_right = drawn

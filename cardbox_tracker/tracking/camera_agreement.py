@@ -61,14 +61,10 @@ class CameraAgreement:
         views: Sequence[View],
         earlier: CameraAgreement | None = None,
     ) -> None:
-        """Begin to compare.
+        """Begin to compare ``views`` of further cameras with ``first``, which includes its pitch.
 
-        Args:
-            body: the body, measured by the first camera.
-            first: the first camera, including its pitch.
-            views: views of further cameras on ``body``.
-            earlier: comparison of the same cameras with another body; tops need no body, so their
-                samples remain.
+        ``body`` was measured by the first camera. ``earlier`` is a comparison of the same cameras
+        with another body; tops need no body, so their samples remain.
         """
         self._body, self._first, self._views = body, first, tuple(views)
         self._kept = [deque[Sighting](maxlen=_WINDOW) for _ in views]
@@ -84,11 +80,9 @@ class CameraAgreement:
         )
 
     def look(self, first: Silhouette, others: Sequence[Silhouette | None]) -> None:
-        """Compare the silhouettes of a frame with a person, whether or not a posture fits them.
+        """Compare silhouettes (H, W), 0 or 255, of a person, whether or not a posture fits them.
 
-        Args:
-            first: the person's silhouette in the first camera, (H, W), 0 or 255.
-            others: upright silhouettes of the further cameras; None for a missing image.
+        Those of further cameras are upright; None for a missing image.
         """
         for direction, other in zip(self._directions, others, strict=False):
             if other is not None:
@@ -102,13 +96,7 @@ class CameraAgreement:
     def see(
         self, state: FloatArray, first: Silhouette, others: Sequence[Silhouette | None]
     ) -> None:
-        """Add a tracked frame.
-
-        Args:
-            state: state for the first camera, (14,).
-            first: the person's silhouette in the first camera, (H, W), 0 or 255.
-            others: upright silhouettes of the further cameras; None for a missing image.
-        """
+        """Add a tracked frame: state (14,) for the first camera; silhouettes as in :meth:`look`."""
         self._frames += 1
         if self._frames % _TOPS_EVERY or not np.any(first):
             return
@@ -128,9 +116,7 @@ class CameraAgreement:
     def check(self, is_last: bool = False) -> None:
         """Estimate the rotation of the cameras that have a full window.
 
-        Args:
-            is_last: no more frames follow, so cameras that were never checked are checked with the
-                available frames if these suffice.
+        If no more frames follow, cameras that were never checked are checked with fewer.
         """
         for number, view in enumerate(self._views):
             is_enough = is_last and not self._found[number] and len(self._kept[number]) >= _LEAST
@@ -154,17 +140,13 @@ class CameraAgreement:
     def rolled_deg(self) -> list[float | None]:
         """Roll of each further camera against its extrinsics, degrees, with its sign.
 
-        The median of the latest windows; None before the first check, or if the person moved too
-        little.
+        The median of the latest windows; None before the first check, or if the person hardly
+        moved.
         """
         return [float(np.median(found)) if found else None for found in self._rolls]
 
     def remarks(self, names: Sequence[str]) -> list[str]:
-        """Return a warning for each further camera with doubtful extrinsics.
-
-        Args:
-            names: names of the further cameras.
-        """
+        """Return a warning for each further camera, by ``names``, with doubtful extrinsics."""
         told = []
         measured = zip(names, self._directions, self.turned_deg, self.rolled_deg, strict=True)
         for name, direction, turned, rolled in measured:

@@ -50,21 +50,14 @@ class MovingFrame(NamedTuple):
 
 
 class CalibratedCamera(NamedTuple):
-    """The pose of a further camera and its uncertainty.
+    """The pose of a further camera and its uncertainty."""
 
-    Attributes:
-        extrinsics: transform from the first camera's optical frame to the further camera's.
-        halves_deg: angle between the poses estimated from each half of the frames, degrees.
-        halves_m: distance between the camera centres of these poses, metres.
-        iou: mean intersection over union of model and silhouettes while both cameras track.
-        frames: number of frames that were used.
-    """
-
+    #: transform from the first camera's optical frame to the further camera's.
     extrinsics: Extrinsics
-    halves_deg: float
-    halves_m: float
-    iou: float
-    frames: int
+    halves_deg: float  #: angle between the poses estimated from each half of the frames, degrees
+    halves_m: float  #: distance between the camera centres of these poses, metres
+    iou: float  #: mean intersection over union of model and silhouettes while both cameras track
+    frames: int  #: number of frames that were used
 
     def __str__(self) -> str:
         """Return the pose and its uncertainty as text."""
@@ -84,20 +77,12 @@ def calibrated_camera(
     seed: int = 0,
     progress: Callable[[float], None] | None = None,
 ) -> CalibratedCamera:
-    """Return the pose of a further camera.
+    """Return the pose of a further camera; the two ``cameras`` lack their pitch.
 
-    Args:
-        body: the person, measured by the first camera.
-        cameras: the first camera and the further one, without their pitch.
-        references: silhouettes of both cameras by the names of the reference postures.
-        moving: frames in which the person moves, starting in the front reference posture.
-        side_turn: direction in which the person turned for ``side``.
-        seed: seed of the tracker.
-        progress: called with the finished fraction.
-
-    Raises:
-        InitializationError: the silhouettes do not show the same person, or too few frames show
-            the person in both cameras.
+    ``body`` was measured by the first camera; ``references`` are silhouettes of both by the names
+    of the postures; in the frames ``moving`` the person moves, from the front posture on. Raises
+    InitializationError if the silhouettes do not show the same person, or too few frames show them
+    in both cameras.
     """
     first, other = cameras
     states = reference_states(body, side_turn)

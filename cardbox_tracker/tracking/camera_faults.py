@@ -120,10 +120,7 @@ class CameraFaults:
     def is_turned(self, camera: int, turned_rad: float) -> bool:
         """Return whether somebody has faced another way than in the first camera for some images.
 
-        Args:
-            camera: number of the further camera.
-            turned_rad: direction in its image against that in the first camera; nan if one of them
-                is not known.
+        ``turned_rad`` is the difference in this image, or nan.
         """
         found = self._turned_rad[camera]
         if np.isfinite(turned_rad):
@@ -131,12 +128,7 @@ class CameraFaults:
         return len(found) >= _JUDGED and bool(np.median(found) > _OTHER_WAY)
 
     def remarks(self, names: Sequence[str] = (), is_all: bool = False) -> list[str]:
-        """Return a warning for each camera that is left out now, with ``is_all`` also before.
-
-        Args:
-            names: names of all cameras; their numbers without them.
-            is_all: whether faults that are over are told, too.
-        """
+        """Return a warning for each camera that is left out now, with ``is_all`` also before."""
         count = len(self.left_out)
         names = names or [f"camera {number} of {count}" for number in range(1, count + 1)]
         return [
@@ -150,11 +142,7 @@ class CameraFaults:
 def facing_rad(points: ImagePoints | None, camera: Camera) -> float:
     """Return the direction from the left to the right shoulder in a camera's level frame, rad.
 
-    It is an angle about the vertical; nan if it is not known.
-
-    Args:
-        points: with ``spatial_m``, which refers to the line of sight.
-        camera: camera of the points, upright.
+    It is an angle about the vertical; nan without points in space. The camera is upright.
     """
     if points is None or points.spatial_m is None:
         return float("nan")

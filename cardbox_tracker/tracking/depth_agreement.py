@@ -32,17 +32,11 @@ _OTHER_VIEW, _SAME_VIEW = 0.25, 0.35
 
 
 def surplus_of_jumps(silhouette: Silhouette, depth_m: DepthImage) -> float | None:
-    """Return how much oftener the depth grows than shrinks across the outline, -1 to 1.
+    """Return how much oftener the depth grows than shrinks across the outline, -1 to 1, or None.
 
-    The value is a share of the pairs with a known depth. A pixel without one counts as far away,
-    because depth images may show the person alone.
-
-    Args:
-        silhouette: the person, (H, W), 0 or 255.
-        depth_m: (H, W), metres along the optical axis; unknown depths are 0 or not finite.
-
-    Returns:
-        None if there are too few pairs.
+    The value is a share of the pairs with a known depth, of which there must be some. A pixel
+    without one counts as far away, because depth images may show the person alone. The silhouette
+    is (H, W), 0 or 255; the depth (H, W), metres.
     """
     inner, outer = _pairs(silhouette)
     here, there = (
@@ -97,12 +91,7 @@ class DepthAgreement:
         self._frames = 0
 
     def accepted(self, silhouette: Silhouette, depth_m: DepthImage | None) -> DepthImage | None:
-        """Return the depth image (H, W), or None if it belongs to another view.
-
-        Args:
-            silhouette: the person, (H, W), 0 or 255.
-            depth_m: (H, W), metres along the optical axis; None without one.
-        """
+        """Return the depth image (H, W), metres; None if it belongs to another view."""
         if depth_m is None:
             return None
         self._frames += 1

@@ -32,19 +32,12 @@ PLACE_UNCERTAIN_FROM = 0.1
 
 @dataclass(frozen=True)
 class Place:
-    """What is known of the place of the middle of the hips.
+    """What is known of the place of the middle of the hips."""
 
-    Attributes:
-        stddev_m: standard deviations of distance, ``torso_y`` and height, (3,), metres.
-        chance: probability that the distance is wrong by more than 30 cm.
-        rests_on: what scale and distance rest on.
-        contradiction: what contradicts it; empty if nothing does.
-    """
-
-    stddev_m: FloatArray
-    chance: float
-    rests_on: str
-    contradiction: str = ""
+    stddev_m: FloatArray  #: standard deviations of distance, ``torso_y`` and height, (3,), metres
+    chance: float  #: probability that the distance is wrong by more than 30 cm
+    rests_on: str  #: what scale and distance rest on
+    contradiction: str = ""  #: what contradicts it; empty if nothing does
 
     @property
     def state(self) -> KeypointState:
@@ -54,25 +47,18 @@ class Place:
 
 
 class Hand(NamedTuple):
-    """A hand, from its own points (:mod:`.hands`).
+    """A hand, from its own points (:mod:`.hands`)."""
 
-    Attributes:
-        open: 1 if all fingers are open, 0 if all are closed, about 0.5 if some are: the chance that
-            it is open, plus half of the chance that it is neither. None if the hand is too small.
-        palm: normal out of the palm, unit vector (3,) in the optical frame.
-        wrist: flexion and deviation of the wrist and rotation of the forearm, (3,), rad; the
-            rotation of a straight arm is nan.
-        wrist_stddev: their standard deviations, (3,), rad; nan where the rotation is.
-        turn: turn of the hand about the forearm's frame, rad (:mod:`.person.hands`).
-        turn_stddev: its standard deviation, rad.
-    """
-
+    #: 1 if all fingers are open, 0 if all are closed, about 0.5 if some are: the chance that it is
+    #: open, plus half of the chance that it is neither. None if the hand is too small.
     open: float | None
-    palm: FloatArray
+    palm: FloatArray  #: normal out of the palm, unit vector (3,) in the optical frame
+    #: flexion and deviation of the wrist and rotation of the forearm, (3,), rad; the rotation of a
+    #: straight arm is nan.
     wrist: FloatArray
-    wrist_stddev: FloatArray
-    turn: float = 0.0
-    turn_stddev: float = 0.0
+    wrist_stddev: FloatArray  #: their standard deviations, (3,), rad; nan where the rotation is
+    turn: float = 0.0  #: turn of the hand about the forearm's frame, rad (:mod:`.person.hands`)
+    turn_stddev: float = 0.0  #: its standard deviation, rad
 
     @property
     def joints(self) -> FloatArray:
@@ -86,21 +72,15 @@ class Hand(NamedTuple):
 
 
 class Legs(NamedTuple):
-    """Both legs (:mod:`.legs`).
+    """Both legs (:mod:`.legs`)."""
 
-    Attributes:
-        angles: ``LEG_NAMES``, (8,), rad.
-        angles_stddev: their standard deviations, (8,), rad.
-        points_m: ``LEG_KEYPOINT_NAMES``, (6, 3), metres in the optical frame.
-        points_stddev_m: standard deviation of each point relative to the middle of the hips, (6,),
-            m: the root of the sum of the variances along all axes.
-        states: state of each point: ``hidden`` where the detector does not see it.
-    """
-
-    angles: FloatArray
-    angles_stddev: FloatArray
-    points_m: FloatArray
+    angles: FloatArray  #: ``LEG_NAMES``, (8,), rad
+    angles_stddev: FloatArray  #: their standard deviations, (8,), rad
+    points_m: FloatArray  #: ``LEG_KEYPOINT_NAMES``, (6, 3), metres in the optical frame
+    #: standard deviation of each point relative to the middle of the hips, (6,), m: the root of the
+    #: sum of the variances along all axes.
     points_stddev_m: FloatArray
+    #: state of each point: ``hidden`` where the detector does not see it.
     states: tuple[KeypointState, ...]
 
     def hidden(self) -> Legs:
@@ -170,10 +150,7 @@ class Estimate:
     legs: Legs | None = None
 
     def as_camera_stands(self, roll_rad: float) -> Estimate:
-        """Return the estimate in the optical frame of a camera that is rolled.
-
-        The points of the tracker are those in images that are turned upright.
-        """
+        """Return the estimate in the frame of the rolled camera, not of images turned upright."""
         if not roll_rad or self.keypoints_m is None:
             return self
         turn = roll_turn(roll_rad)

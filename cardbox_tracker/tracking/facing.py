@@ -18,8 +18,7 @@ from cardbox_tracker.person.appearance import COLOR_STEPS, HAND, HEAD, steps_of_
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.posture import PITCH, YAW
 from cardbox_tracker.person.sizes import FloatArray
-from cardbox_tracker.terms.inner_cue import chest_levels
-from cardbox_tracker.terms.inner_cue_arms import zones_of
+from cardbox_tracker.terms.inner_cue import chest_levels, zones_of
 from cardbox_tracker.terms.term import Frame, Image, Posed, Silhouette
 
 # Grid from the forehead to the cheeks, as shares of the half axes of the head's ellipse; fewest of
@@ -68,12 +67,9 @@ class Facing:
             self._brightness = self._appearance.brightness
 
     def see(self, frame: Frame, posed: Posed) -> None:
-        """Compare the head in an image with the learned colours.
+        """Compare the head of a person, one state, in a frame with the learned colours.
 
-        Args:
-            frame: the image with its silhouette. One in grey, or none, shows nothing; certain
-                points of a detector tell the back better.
-            posed: the person in it, one state.
+        A grey image, or none, shows nothing; certain points of a detector tell the back better.
         """
         state = posed.states[0]
         if frame.points is not None and frame.points.are_certain:

@@ -119,16 +119,10 @@ class HandReader:
         camera: Camera,
         time_s: float,
     ) -> Estimate:
-        """Return ``estimate`` with the hands that are known.
+        """Return the ``estimate`` of an image with the hands that are known.
 
-        Args:
-            picture: returns the image (H, W, 3), bgr, or (H, W) at any resolution; None without
-                one.
-            points: of the person in the image of ``camera``; None if nobody is found.
-            estimate: of the same image.
-            body: the person.
-            camera: working camera, with the pitch of the body model.
-            time_s: time of the image.
+        ``picture`` returns the image (H, W, 3), bgr, or (H, W) at any resolution; ``points`` are
+        those of the person for the working ``camera``, which has the pitch of the body model.
         """
         tracked = [side for side in _SIDES if is_tracked(estimate, side)]
         if tracked and points is not None and picture is not None:
@@ -191,15 +185,7 @@ def hand_square(
 def measured(
     side: str, found: HandPoints, points: ImagePoints, estimate: Estimate, camera: Camera
 ) -> Hand:
-    """Return what the points of a hand tell.
-
-    Args:
-        side: left or right.
-        found: the hand's points, px of ``camera``.
-        points: those of the person, px of ``camera``.
-        estimate: of the same image, with a posture.
-        camera: of the image.
-    """
+    """Return what the ``found`` points of a hand tell; all points are px of ``camera``."""
     assert estimate.keypoints_m is not None
     sign = 1.0 if side == "left" else -1.0
     arm = np.asarray(estimate.keypoints_m)[_KEYPOINTS[side] - 2 :][:3]
@@ -264,11 +250,9 @@ _UNUSUAL = 0.5 * ((_FLEXIONS / _FLEXED_RAD) ** 2 + (_DEVIATIONS / _DEVIATED_RAD)
 def _rated(bases: FloatArray, found: HandPoints, to_ray: FloatArray, sign: float) -> FloatArray:
     """Return the probability of each hand of the grid, (n,).
 
-    Args:
-        bases: bases of four fingers from the wrist in the image, (4, 2), in lengths of the palm.
-        found: the hand's points.
-        to_ray: (3, 3) turns the axes of :func:`directions` to those of the ray to the hand.
-        sign: 1 for a left hand, -1 for a right one.
+    ``bases`` of four fingers from the wrist in the image, (4, 2), are in lengths of the palm;
+    ``to_ray`` (3, 3) turns the axes of :func:`directions` to those of the ray to the hand; ``sign``
+    is 1 for a left hand, -1 for a right one.
     """
     ahead, aside = (np.tensordot(to_ray[:2], one, 1) for one in _RATED[1:])
     at = _PALM[:, 0, None, None] * aside + _PALM[:, 1, None, None] * ahead

@@ -34,7 +34,38 @@ from cardbox_tracker.terms.kernel_arguments import Floats
 from cardbox_tracker.terms.linear_kernels import solve
 from cardbox_tracker.terms.term import Frame
 from cardbox_tracker.tracking.estimate import Estimate
-from cardbox_tracker.tracking.low_pass import LowPass
+
+_MOST_KEPT = 0.5
+"""Share of the last output that delays a ramp by one interval."""
+
+
+class LowPass:
+    """First-order low-pass filter (exponential smoothing) over time.
+
+    The output is y = a y_before + (1 - a) x with a = exp(-dt / time constant), but at most 1/2, for
+    inputs x at intervals dt. A ramp is delayed by dt a / (1 - a): slightly less than the time
+    constant, and never more than one interval.
+    """
+
+    def __init__(self, time_constant_s: float) -> None:
+        """Begin without a value; with a time constant of 0 the output is the input."""
+        self._time_constant_s = time_constant_s
+        self.forget()
+
+    def forget(self) -> None:
+        """Forget the last output; the next output is the input."""
+        self._last: FloatArray | None = None
+
+    def __call__(self, values: FloatArray, interval_s: float) -> FloatArray:
+        """Return the filtered values, of any shape, ``interval_s`` after the previous ones."""
+        if self._time_constant_s == 0.0:
+            return values
+        if self._last is not None:
+            kept = min(exp(-max(interval_s, 0.0) / self._time_constant_s), _MOST_KEPT)
+            values = kept * self._last + (1.0 - kept) * values
+        self._last = values
+        return values
+
 
 FACE_POINTS = ("nose", "left_eye", "right_eye", "left_ear", "right_ear")
 FACE_M: FloatArray = np.array(
@@ -83,15 +114,10 @@ _DRIFT_RAD_S = 1.0
 
 
 class Neck(NamedTuple):
-    """Direction of the head relative to the torso.
+    """Direction of the head relative to the torso."""
 
-    Attributes:
-        angles: yaw and pitch, (2,), rad.
-        stddev: their standard deviations, (2,), rad.
-    """
-
-    angles: FloatArray
-    stddev: FloatArray
+    angles: FloatArray  #: yaw and pitch, (2,), rad
+    stddev: FloatArray  #: their standard deviations, (2,), rad
 
 
 def fit_neck(
@@ -99,15 +125,8 @@ def fit_neck(
 ) -> Neck | None:
     """Return the direction of the head that fits the points of the face best.
 
-    Args:
-        points: of the image of ``camera``.
-        body: the person.
-        camera: working camera, with the pitch of the body model.
-        state: d1..d12, (12,), or with ``torso_x`` and ``torso_z``, (14,), rad and metres; its torso
-            is taken as exact.
-
-    Returns:
-        The angles; None if the points are too few or too uncertain, or do not form a face.
+    The ``camera`` has the pitch of the body model, and the torso of ``state``, (12,) or (14,), rad
+    and metres, is taken as exact. None if points are too few or uncertain, or form no face.
     """
     known = points.scores[_CHOSEN] >= LEAST_SCORE
     if np.count_nonzero(known) < LEAST_POINTS:
@@ -150,16 +169,11 @@ def _residuals(
 ) -> None:
     """Write the residuals (2n + 6,) of values (6,), in standard deviations.
 
-    Args:
-        values: yaw, pitch and roll of the neck, rad; place across and up, m; logarithm of the size.
-        torso: rotation (3, 3) from the torso's to the optical frame.
-        axes: rows are the reference frame's axes X, Y and Z in the optical frame, (3, 3).
-        centre_m: where the model has the middle of the head, (3,), optical frame.
-        face_m: points of a face of this size, (n, 3).
-        px: the same points in the image, (n, 2).
-        lens: focal lengths and principal point, px.
-        sigma_px: standard deviation of a coordinate.
-        residuals: written.
+    The values are yaw, pitch and roll of the neck, rad; place across and up, m; logarithm of the
+    size. ``torso`` (3, 3) turns the torso's to the optical frame; rows of ``axes`` (3, 3) are the
+    reference frame's axes and ``centre_m`` (3,) is the middle of the head there. A face of this
+    size has the points ``face_m`` (n, 3), which are at ``px`` (n, 2) in the image, with the
+    deviation ``sigma_px``.
     """
     cy, sy = cos(values[0]), sin(values[0])
     cp, sp = cos(values[1]), sin(values[1])
@@ -246,12 +260,7 @@ class HeadTracker:
     """
 
     def __init__(self, body: BodyModel, camera: Camera) -> None:
-        """Start without a direction.
-
-        Args:
-            body: the person.
-            camera: working camera of the points, with the pitch of the body model.
-        """
+        """Start without a direction; the working camera has the pitch of the body model."""
         self._body, self._camera = body, camera
         self._smooth = LowPass(_SMOOTHING_S)
         self._last: Neck | None = None

@@ -103,23 +103,16 @@ _LEAST_M = 0.05
 
 
 class _Seen(NamedTuple):
-    """What one image shows; the rows of arrays are the left and the right leg.
+    """What one image shows; the rows of arrays are the left and the right leg."""
 
-    Attributes:
-        px: knee and ankle, (2, 2, 2).
-        sigma_px: their deviations, (2, 2).
-        slopes: components of thigh and shank along the line of sight, (2, 2); nan if unknown.
-        sigma_slopes: their deviations, (2, 2).
-        scores: of hip, knee and ankle, (2, 3).
-        shows_back: whether the tracker and the detector exchange left and right, as they do for a
-            person seen from behind, whose knees then bend to the wrong side.
-    """
-
-    px: FloatArray
-    sigma_px: FloatArray
+    px: FloatArray  #: knee and ankle, (2, 2, 2)
+    sigma_px: FloatArray  #: their deviations, (2, 2)
+    #: components of thigh and shank along the line of sight, (2, 2); nan if unknown.
     slopes: FloatArray
-    sigma_slopes: FloatArray
-    scores: FloatArray
+    sigma_slopes: FloatArray  #: their deviations, (2, 2)
+    scores: FloatArray  #: of hip, knee and ankle, (2, 3)
+    #: whether the tracker and the detector exchange left and right, as they do for a person seen
+    #: from behind, whose knees then bend to the wrong side.
     shows_back: bool
 
 
@@ -127,12 +120,7 @@ class LegReader:
     """Adds the legs to the estimates of one person, from the first camera's points."""
 
     def __init__(self, body: BodyModel, camera: Camera) -> None:
-        """Start with the usual lengths.
-
-        Args:
-            body: the person, with the height of the camera above the floor if it is known.
-            camera: working camera, with the pitch of the body model.
-        """
+        """Start with the usual lengths, and the floor if the camera's height above it is known."""
         self._body, self._camera = body, camera
         self.forget()
         stature_m = stature_of(body_parts(body.sizes))
@@ -153,12 +141,7 @@ class LegReader:
         self._last_s = 0.0
 
     def see(self, frame: Frame, estimate: Estimate) -> Estimate:
-        """Return ``estimate`` with the legs, as soon as points have shown them.
-
-        Args:
-            frame: of the first camera.
-            estimate: of the same time; without a posture it stays as it is.
-        """
+        """Return the ``estimate`` with the legs, once points of the first camera show them."""
         points, camera = frame.points, self._camera
         self._time_s += frame.interval_s
         is_shown = points is not None and points.legs is not None
@@ -293,13 +276,9 @@ class _Fit:
         shared: FloatArray,
         information: FloatArray,
     ) -> None:
-        """Set the priors.
+        """Set the priors: angles (8,) ``before`` and deviations of their change, inf for none.
 
-        Args:
-            before: angles (8,) in the image before.
-            change: deviations of their change; inf for none.
-            shared: what images share, (4,).
-            information: its information (4, 4).
+        Also what images share, (4,), and its information (4, 4).
         """
         self._before, self._change = before, change
         self._expected, self._root = shared, np.linalg.cholesky(information).T
@@ -332,8 +311,8 @@ class _Fit:
     def _folded(self, seen: _Seen) -> FloatArray:
         """Return values (16, 12) of legs whose knees and ankles are where they are seen.
 
-        A bone of a known length ends in front of or behind its beginning, so there are four legs
-        on each side. A bone that looks too long is across the line of sight.
+        A bone of a known length ends in front of or behind its beginning, so there are four legs on
+        each side. A bone that looks too long is across the line of sight.
         """
         lengths_m = self._lengths_m * np.exp(self._expected[:2])
         hips_m = self._hip_m * np.exp(self._expected[3]) + np.outer(_SIDES, self._aside)

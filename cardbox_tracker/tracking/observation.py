@@ -29,11 +29,7 @@ class Channel(NamedTuple):
 
 
 def points_from(given: Any, name: str, size: tuple[int, int]) -> ImagePoints:
-    """Return a detector's points.
-
-    Raises:
-        ValueError: they are no ImagePoints.
-    """
+    """Return a detector's points, or raise ValueError."""
     if not isinstance(given, ImagePoints):
         raise ValueError(
             f"{name} are of the type {type(given).__name__}; expected ImagePoints, such as "
@@ -43,11 +39,7 @@ def points_from(given: Any, name: str, size: tuple[int, int]) -> ImagePoints:
 
 
 def pixels_from(given: Any, name: str, size: tuple[int, int]) -> FloatArray:
-    """Return columns and rows of points, (N, 2), px; nan for unknown ones.
-
-    Raises:
-        ValueError: they are not numbers of this shape.
-    """
+    """Return columns and rows (N, 2), px, nan for unknown points, or raise ValueError."""
     pixels = np.asarray(given)
     if pixels.dtype.kind not in "iuf" or pixels.ndim != 2 or pixels.shape[1] != 2:
         raise ValueError(
@@ -58,11 +50,7 @@ def pixels_from(given: Any, name: str, size: tuple[int, int]) -> FloatArray:
 
 
 def people_from(given: Any, name: str, size: tuple[int, int]) -> tuple[ImagePoints, ...]:
-    """Return a detector's points of several people.
-
-    Raises:
-        ValueError: one of them is no ImagePoints.
-    """
+    """Return a detector's points of several people, or raise ValueError."""
     return tuple(points_from(one, name, size) for one in given)
 
 
@@ -110,23 +98,16 @@ class Observation:
         picture: Callable[[], Image] | None = None,
         **more: Any,
     ) -> None:
-        """Take the data.
+        """Take the data of one time; what there is not is None.
 
-        Args:
-            silhouette: (H, W), 0 or 255, of the camera's size, or a mask of another numeric type;
-                None if there is none.
-            image: (H, W) grey or (H, W, 3) bgr of the same time, for terms that use it.
-            depth_m: (H, W), metres along the optical axis, for the term ``Depth``; unknown depths
-                are not above 0 or not finite.
-            stamp_ns: time of the data, ns; None if it is unknown.
-            points: the person's joints in the image, from a detector; None without one.
-            picture: see the attribute.
-            more: further channels: ``people``, the joints of each of several people for a
-                :class:`~.session.Session`; ``covered``, the pixels (H, W), 0 or 255, of other
-                people, which may hide this one.
+        ``silhouette`` is (H, W), 0 or 255, of the camera's size, or a mask of another numeric type;
+        ``image`` (H, W) grey or (H, W, 3) bgr, for terms that use it; ``depth_m`` (H, W), metres
+        along the optical axis, for the term ``Depth``, in which unknown depths are not above 0 or
+        not finite. Further channels are ``people``, the joints of each of several people for a
+        :class:`~.session.Session`, and ``covered``, the pixels (H, W), 0 or 255, of other people,
+        which may hide this one.
 
-        Raises:
-            ValueError: there is no channel of a name.
+        Raises ValueError if there is no channel of a name.
         """
         given = {
             "silhouette": silhouette,
@@ -175,10 +156,7 @@ Observations = Sequence[Observation | None]
 
 
 def stamp_of(observations: Observations) -> int | None:
-    """Return the common stamp of the observations, ns; None if no stamp is known.
-
-    This is the stamp of the first camera, or else the earliest stamp of the further cameras.
-    """
+    """Return the stamp of the first camera, or else the earliest one, ns; None if none is known."""
     first, *others = (None if one is None else one.stamp_ns for one in observations)
     if first is not None:
         return first

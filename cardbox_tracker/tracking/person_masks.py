@@ -14,16 +14,45 @@ from numpy.typing import NDArray
 
 from cardbox_tracker.camera.camera import Camera
 from cardbox_tracker.common.compiling import kernel
+from cardbox_tracker.person.kinematics import pose
 from cardbox_tracker.person.model import BodyModel
+from cardbox_tracker.person.posture import N_STATE, TORSO_X
 from cardbox_tracker.person.sizes import FloatArray
-from cardbox_tracker.tracking.person_points import (
-    HEAD_CENTRE,
-    HIP,
-    LEFT,
-    NECK,
-    RIGHT,
-    PersonPoints,
+from cardbox_tracker.person.skeleton import POINT_NAMES
+
+HIP, NECK, HEAD_CENTRE, LEFT, RIGHT = (
+    POINT_NAMES.index(name) for name in ("hip", "neck", "head", "left_shoulder", "right_shoulder")
 )
+"""Rows of :meth:`PersonPoints.of`; an arm has three: shoulder, elbow, fingertips."""
+# Length of the fingers in forearm lengths.
+_FINGERS = 0.15
+_NEAREST_M = 0.2
+
+
+class PersonPoints:
+    """Projects the joints of one body into the image of one camera."""
+
+    def __init__(self, body: BodyModel, camera: Camera) -> None:
+        """Prepare for ``body`` before ``camera``, which includes the pitch."""
+        self._body, self._camera = body, camera
+
+    def of(self, posture: FloatArray) -> FloatArray:
+        """Return column and row, px, and pixels per metre of hip, neck, head and arms, (9, 3).
+
+        The posture is (12,) or (14,), rad and metres. Rows are as :data:`HIP` and the names beside
+        it. Points nearer than 0.2 m are treated as if they were 0.2 m away.
+        """
+        camera, state = self._camera, np.zeros(N_STATE)
+        state[: len(posture)] = posture
+        state[TORSO_X] = min(state[TORSO_X], self._body.placement.distance_m - _NEAREST_M)
+        points_m = pose(self._body, state, camera.pitch_rad).points_m
+        for arm in (LEFT, RIGHT):
+            points_m[arm + 2] += _FINGERS * (points_m[arm + 2] - points_m[arm + 1])
+        x, y, z = points_m.T
+        scale = camera.fx / np.maximum(z, _NEAREST_M)
+        column, row = scale * x + camera.cx, camera.fy / camera.fx * scale * y + camera.cy
+        return np.stack([column, row, scale], axis=1)
+
 
 Mask = NDArray[np.uint8]
 Point = tuple[float, float, float]
@@ -44,21 +73,13 @@ _GAP_M, _RING_M = 0.05, 0.2
 
 @dataclass(frozen=True)
 class PersonMasks:
-    """Regions of the expected person on the grid, each (h, w), 0 or 1.
+    """Regions of the expected person on the grid, each (h, w), 0 or 1."""
 
-    Attributes:
-        core: the body in the last posture.
-        near: cells that the person can occupy in the next frame.
-        reach: cells that the arms can reach.
-        hip: column and row of mid-hip, cells.
-        cells_per_m: scale at the hips.
-    """
-
-    core: Mask
-    near: Mask
-    reach: Mask
-    hip: tuple[float, float]
-    cells_per_m: float
+    core: Mask  #: the body in the last posture
+    near: Mask  #: cells that the person can occupy in the next frame
+    reach: Mask  #: cells that the arms can reach
+    hip: tuple[float, float]  #: column and row of mid-hip, cells
+    cells_per_m: float  #: scale at the hips
 
     def band(self) -> Mask:
         """Return all cells (h, w) within 10 cm of the body, 0 or 1."""
@@ -94,11 +115,9 @@ class PersonDrawer:
         self.front = body.reference_state()
 
     def masks(self, posture: FloatArray, near_m: float) -> PersonMasks:
-        """Return the masks of a person for their last posture.
+        """Return the masks of a person for their last posture, (12,) or (14,), rad and metres.
 
-        Args:
-            posture: (12,) or with ``torso_x`` and ``torso_z`` (14,), rad and metres.
-            near_m: largest movement of a body part until the next frame.
+        ``near_m`` is the largest movement of a body part until the next frame.
         """
         points = self._points(posture)
         core: Mask = np.zeros(self.shape, np.uint8)
@@ -199,7 +218,7 @@ def _reaches_of(radius: int) -> NDArray[np.uint8]:
 def _dilate(mask: Mask, reaches: NDArray[np.uint8], nearest: Mask, found: Mask) -> None:
     """Add the dilation of ``mask`` (h, w) to ``found``; ``nearest`` (h, w) is scratch memory.
 
-    ``nearest`` becomes the distance of each cell to the nearest one of its row that is 1.
+    It becomes the distance of each cell to the nearest one of its row that is 1.
     """
     height, width = mask.shape
     radius = len(reaches) // 2

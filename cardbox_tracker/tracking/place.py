@@ -53,18 +53,11 @@ _LEAST_SCORE = 0.5
 
 
 def distance_of_points(points: ImagePoints, body: BodyModel, camera: Camera) -> float | None:
-    """Return the distance along the optical axis of the middle of the shoulders, m.
+    """Return the distance along the optical axis of the middle of the shoulders, m, or None.
 
     The points in space are scaled to the lengths of the person's arms and trunk. Where they have to
-    be, so that they project to the points in the image, is a linear problem with three unknowns.
-
-    Args:
-        points: with points in space, and a scale of their own.
-        body: the person.
-        camera: of the points.
-
-    Returns:
-        None without both shoulders and an elbow, or without points in space.
+    be, so that they project to the points in the image, is a linear problem with three unknowns. It
+    needs both shoulders and an elbow.
     """
     if points.spatial_m is None:
         return None
@@ -112,12 +105,7 @@ class PlaceWatch:
     """
 
     def __init__(self, body: BodyModel, camera: Camera) -> None:
-        """Begin with what was given.
-
-        Args:
-            body: the person as given, before unknown values are fitted.
-            camera: first camera, with its pitch.
-        """
+        """Begin with the first camera and the person before unknown values are fitted."""
         self._body, self._camera = body, camera
         self._scale = MEASURED_BODY if body.source == MEASURED else STATURE
         is_found = body.is_distance_found or "distance_m" in body.unknown
@@ -132,11 +120,7 @@ class PlaceWatch:
     ) -> Place | None:
         """Return the place of an estimate; None if its filter does not estimate a place.
 
-        Args:
-            estimate: the estimate.
-            body: the tracked body.
-            frame: of the first camera.
-            is_alone: whether no further camera sees the person.
+        ``is_alone`` says that no further camera sees the person.
         """
         if estimate.offset_m is None or estimate.posture is None:
             return None

@@ -34,12 +34,8 @@ def compile_all(
 ) -> None:
     """Track a drawn person with each of ``presets``, which compiles all their kernels.
 
-    Compiled code that is damaged is made again.
-
-    Args:
-        presets: names of the presets.
-        several_cameras: also with a further camera, if the preset allows it.
-        points: also with the 2D points of a detector.
+    Compiled code that is damaged is made again. Presets that allow it are also tracked with a
+    further camera and with points of a detector.
     """
     try:
         _call_all(presets, several_cameras, points)

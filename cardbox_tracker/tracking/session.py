@@ -78,35 +78,21 @@ _PROJECTED = {
 
 
 class Shown(NamedTuple):
-    """A figure in one image.
+    """A figure in one image."""
 
-    Attributes:
-        points: joints from a detector; None for a region of the silhouette.
-        figure: place and size; None for a region.
-        pixels: (H, W), 255 at the person's pixels as far as they are known, else 0.
-    """
-
-    points: ImagePoints | None
-    figure: Figure | None
-    pixels: Silhouette
+    points: ImagePoints | None  #: joints from a detector; None for a region of the silhouette
+    figure: Figure | None  #: place and size; None for a region
+    pixels: Silhouette  #: (H, W), 255 at the person's pixels as far as they are known, else 0
 
 
 class _Share(NamedTuple):
-    """What a camera shows of a person.
+    """What a camera shows of a person."""
 
-    Attributes:
-        seen: the observation with the person's part of the silhouette.
-        is_found: whether one of the figures is the person.
-        is_missed: whether the person is where the silhouette shows nothing of them.
-        is_hidden: whether others hide the person there.
-        is_detected: whether a detector finds the figures.
-    """
-
-    seen: Observation
-    is_found: bool
-    is_missed: bool
-    is_hidden: bool
-    is_detected: bool
+    seen: Observation  #: the observation with the person's part of the silhouette
+    is_found: bool  #: whether one of the figures is the person
+    is_missed: bool  #: whether the person is where the silhouette shows nothing of them
+    is_hidden: bool  #: whether others hide the person there
+    is_detected: bool  #: whether a detector finds the figures
 
 
 class _Sight:
@@ -177,19 +163,12 @@ class Session:
         people: int | None = None,
         look: Look | None = None,
     ) -> None:
-        """Set up for people who may come.
+        """Set up for people who may come, with the body of each in the order of their numbers.
 
-        Args:
-            bodies: the body of each person in the order of their numbers; the last one is also that
-                of further people. People are numbered as they come, and from left to right if
-                they come together.
-            camera: working camera.
-            config: settings of each tracker.
-            rng: source of all noise; seeded with 0 by default.
-            others: further cameras, see :class:`~.tracker.Tracker`.
-            people: number of people, 0 for up to ``MOST_PEOPLE`` who come; None for one without a
-                number, to whom everything belongs that the cameras show.
-            look: finds the points of hands, which are then part of the estimates.
+        The last body is also that of further people; they are numbered as they come, and from left
+        to right if they come together. ``people`` is their number, 0 for up to ``MOST_PEOPLE``;
+        None for one without a number, to whom everything belongs that the cameras show. The other
+        arguments are those of :class:`~.tracker.Tracker`.
         """
         self._bodies, self._camera = tuple(bodies), camera
         self.config = config or TrackerConfig()
@@ -231,12 +210,7 @@ class Session:
             agreement.check(is_last)
 
     def remarks(self, names: Sequence[str], is_all: bool = False) -> list[str]:
-        """Return warnings about images that contradict each other.
-
-        Args:
-            names: names of all cameras.
-            is_all: whether what is over is told, too.
-        """
+        """Return warnings about images that contradict each other; ``is_all``: also past ones."""
         told = [text for one in self.trackers for text in one.remarks(names, is_all)]
         if self.agreement is not None:
             told += self.agreement.remarks(names[1:])
@@ -253,28 +227,17 @@ class Session:
         person.estimate = Estimate(NO_PERSON, person=person.estimate.person)
 
     def configure(self, config: TrackerConfig) -> bool:
-        """Use other settings from the next image on.
-
-        Returns:
-            True if tracking starts again, see :meth:`.Tracker.configure`.
-        """
+        """Use other settings from now on; return whether tracking starts again, see Tracker."""
         self.config = config
         restarted = [tracker.configure(config) for tracker in self.trackers]
         return any(restarted)
 
     def track(self, observations: Observations | Observation) -> list[Estimate]:
-        """Estimate the postures of all people at one time.
+        """Estimate the postures of all people at one time, in the order of their numbers.
 
-        Args:
-            observations: of each camera, the first camera first, as :meth:`.Tracker.track` takes
-                them. Of several people, silhouettes show all of them, and the channel ``people``
-                has the joints of each whom a detector finds; without it there is no detector.
-
-        Returns:
-            The estimate of each person, in the order of the numbers.
-
-        Raises:
-            ValueError: see :meth:`.Tracker.track`.
+        Of several people, silhouettes show all of them, and the channel ``people`` has the joints
+        of each whom a detector finds; without it there is no detector. Takes and raises what
+        :meth:`.Tracker.track` does.
         """
         if self._is_alone:
             (person,) = self._people
@@ -617,12 +580,9 @@ def _chance_of_same(before: FloatArray | None, now: FloatArray | None) -> float:
 
 
 def _cheapest(costs: FloatArray) -> dict[int, int]:
-    """Return the column of each row that has one below ``_OTHER``, with the least sum.
+    """Return the column of each row of ``costs`` (N, M) below ``_OTHER``, with the least sum.
 
     A row without a column counts ``_OTHER``. The time grows with 2 to the number of rows.
-
-    Args:
-        costs: (N, M), of few rows.
     """
     best: dict[int, tuple[float, dict[int, int]]] = {0: (0.0, {})}
     for column in range(costs.shape[1]):

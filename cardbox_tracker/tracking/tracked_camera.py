@@ -12,7 +12,7 @@ from cardbox_tracker.camera.view import OtherCamera, View
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.sizes import FloatArray
 from cardbox_tracker.search.config import TrackerConfig
-from cardbox_tracker.terms.drawn_body import body_tuple
+from cardbox_tracker.terms.kernel_arguments import body_tuple
 from cardbox_tracker.terms.silhouette import rows_above_hips
 from cardbox_tracker.terms.term import USUAL_INTERVAL_S, Frame, Posed, Silhouette, Term
 from cardbox_tracker.tracking.depth_agreement import DepthAgreement
@@ -38,18 +38,9 @@ class TrackedCamera:
         config: TrackerConfig,
         other: OtherCamera | None = None,
     ) -> None:
-        """Prepare for ``body`` in front of ``first``, with the pitch of the body model.
+        """Prepare for ``body`` before ``first``, with its pitch; ``other`` is a further camera.
 
-        Call :meth:`reset` before the first frame.
-
-        Args:
-            body: the person.
-            first: the first camera.
-            config: settings of the tracker.
-            other: this camera if it is a further one; None for the first camera.
-
-        Raises:
-            CameraError: the person is not in front of the camera.
+        Call :meth:`reset` before the first frame. Raises CameraError if the person is not in front.
         """
         self.view = None if other is None else View.of(body, first, other)
         raw = first if other is None else other.camera
@@ -96,15 +87,9 @@ class TrackedCamera:
     ) -> Frame:
         """Return the frame of an observation: upright, with the person's part of the silhouette.
 
-        Args:
-            observation: data of the camera; without a silhouette, the frame is empty.
-            before: state (14,) of the previous frame for the first camera; None at the start of
-                tracking.
-            is_sure: whether that state fitted.
-            interval_s: time since the previous frame, s.
-
-        Raises:
-            ValueError: data do not fit the camera, see :data:`~.observation.CHANNELS`.
+        It is empty without a silhouette. ``before`` is the state (14,) of the previous frame for
+        the first camera, None at first, and ``is_sure`` whether it fitted. Raises ValueError if
+        data do not fit the camera, see :data:`~.observation.CHANNELS`.
         """
         if before is not None and self.view is not None:
             before = self.view.states(before)

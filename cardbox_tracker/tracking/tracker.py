@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from functools import partial
 from itertools import zip_longest
 from types import MappingProxyType
 
@@ -21,7 +20,6 @@ from cardbox_tracker.person.kinematics import clavicles
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.posture import (
     LEFT_ARM,
-    N_STATE,
     PITCH,
     RIGHT_ARM,
     TORSO_Y,
@@ -32,9 +30,8 @@ from cardbox_tracker.person.sizes import FloatArray
 from cardbox_tracker.search.config import TrackerConfig
 from cardbox_tracker.search.cycles import Cycles
 from cardbox_tracker.search.doubt import doubted
-from cardbox_tracker.search.particles import Particles
+from cardbox_tracker.search.particles import Particles, likely_postures
 from cardbox_tracker.search.pose_filter import (
-    Corrector,
     MakeFilter,
     PoseFilter,
     Presence,
@@ -61,7 +58,6 @@ from cardbox_tracker.tracking.head import HeadTracker
 from cardbox_tracker.tracking.legs import LegReader
 from cardbox_tracker.tracking.observation import Observation, Observations, stamp_of
 from cardbox_tracker.tracking.place import PlaceWatch
-from cardbox_tracker.tracking.sampling import likely_postures
 from cardbox_tracker.tracking.tracked_camera import TrackedCamera
 
 FILTERS: MappingProxyType[str, MakeFilter] = MappingProxyType(
@@ -97,40 +93,28 @@ class Tracker:
         silhouette: SilhouetteTerm | None = None,
         make_filter: MakeFilter | None = None,
         others: Sequence[OtherCamera] = (),
-        corrector: Corrector | None = None,
         look: Look | None = None,
     ) -> None:
-        """Set up for ``body``; the camera gets the pitch of the body model.
+        """Set up for ``body``; the camera, of the silhouettes' size, gets the pitch of the model.
 
-        Args:
-            body: the person. Unknown values are measured while tracking: the attribute ``body`` has
-                a few versions, see :class:`~cardbox_tracker.measuring.seen_body.SeenBody`. Before
-                the first one, or if the camera's pitch is not known to 10 degrees, estimates are at
-                best ``uncertain``.
-            camera: working camera, of the silhouettes' size.
-            config: settings; the paper's by default.
-            rng: source of all noise; seeded with 0 by default.
-            silhouette: implementation of the silhouette's term; compiled by default.
-            make_filter: filter that replaces the one of the settings.
-            others: further cameras; they need the filter ``whole_body``.
-            corrector: changes the fitted state of each frame before it becomes the result; joints
-                are kept within their limits. It needs the filter ``whole_body``.
-            look: finds the points of hands in images of the first camera, which are then part of
-                all estimates.
+        Unknown values are measured while tracking: the attribute ``body`` has a few versions, see
+        :class:`~cardbox_tracker.measuring.seen_body.SeenBody`. Before the first one, or if the
+        camera's pitch is not known to 10 degrees, estimates are at best ``uncertain``. Settings are
+        the paper's by default, and noise is seeded with 0. ``silhouette`` and ``make_filter``
+        replace the compiled term and the filter of the settings. ``look`` finds the points of hands
+        in images of the first camera. ``others``, the further cameras, need the filter
+        ``whole_body``.
 
-        Raises:
-            CameraError: the person was not measured in front of one of ``others``.
-            ValueError: there are ``others`` or a ``corrector``, but the filter is not
-                ``whole_body``.
+        Raises CameraError if the person was not measured in front of one of ``others``, and
+        ValueError if the filter has one camera only.
         """
         self.camera = camera.with_pitch(body.camera_pose.pitch_rad)
         self.config = config or TrackerConfig()
         self._rng = rng or np.random.default_rng(0)
-        self._make_filter, self._corrector, self._look = make_filter, corrector, look
+        self._make_filter, self._look = make_filter, look
         self._others = tuple(others)
-        if (others or corrector) and (make_filter or not self.config.has_several_views):
-            what = "several cameras need" if others else "a corrector needs"
-            raise ValueError(f"{what} the filter whole_body: the preset default")
+        if others and (make_filter or not self.config.has_several_views):
+            raise ValueError("several cameras need the filter whole_body: the preset default")
         self._place = PlaceWatch(body, self.camera)
         self.agreement: CameraAgreement | None = None
         self.faults = CameraFaults(1 + len(self._others))
@@ -169,8 +153,6 @@ class Tracker:
     def reset(self) -> None:
         """Forget the posture; the next frame is tracked from the front reference posture."""
         make_filter = self._make_filter or FILTERS[self.config.filter]
-        if self._corrector is not None:
-            make_filter = partial(WholeBodyFilter, corrector=self._corrector)
         for camera in self.cameras:
             camera.reset(self.config)
         self._identities = [Identity() for _ in self.cameras]
@@ -188,15 +170,9 @@ class Tracker:
         self._particles: Particles | None = None
         # State (14,) of the previous frame for the terms.
         self._before: FloatArray | None = None
-        # IoU of the last result before any correction.
-        self._seen_iou = 0.0
 
     def configure(self, config: TrackerConfig) -> bool:
-        """Use other settings from the next frame on.
-
-        Returns:
-            True if tracking starts again, as after :meth:`reset`, because the particles change.
-        """
+        """Use other settings from the next frame on; return whether tracking starts again."""
         is_new_start = restarts(self.config, config)
         if config.terms != self.config.terms:
             for camera in self.cameras:
@@ -229,11 +205,7 @@ class Tracker:
         return {f"{name} used": f"{count} of {self.images}" for name, count in self.used.items()}
 
     def camera_ious(self) -> list[float | None]:
-        """Return the IoU of the last estimate with each camera's silhouette, the first one first.
-
-        Returns:
-            One value for each camera; None for a camera that showed no person.
-        """
+        """Return the IoU of the last estimate in each camera; None in one without a person."""
         return self._filter.ious()
 
     def track(
@@ -244,20 +216,15 @@ class Tracker:
     ) -> Estimate:
         """Estimate the posture from the observations of all cameras at one time.
 
-        Args:
-            observations: one for each camera, the first camera first. A camera without data has
-                None or an observation without a silhouette, and may be missing at the end. A single
-                observation or silhouette (H, W) belongs to the first camera. Masks of any numeric
-                type are silhouettes, see
-                :func:`~cardbox_tracker.camera.given_arrays.silhouette_from`.
-            image: (H, W) grey or (H, W, 3) bgr of the same time as a bare silhouette.
-            stamp_ns: time of a bare silhouette, ns. Without a stamp, the interval to the previous
-                frame is 1/15 s.
+        There is one for each camera, the first one first. A camera without data has None or an
+        observation without a silhouette, and may be missing at the end. A single observation or
+        silhouette (H, W) belongs to the first camera; ``image``, (H, W) grey or (H, W, 3) bgr, and
+        ``stamp_ns`` go with a bare silhouette. Masks of any numeric type are silhouettes, see
+        :func:`~cardbox_tracker.camera.given_arrays.silhouette_from`. Without a stamp, the interval
+        to the previous frame is 1/15 s.
 
-        Raises:
-            ValueError: the size of an array is not its camera's, or its type or values are
-                impossible; points are no ImagePoints; there are more observations than cameras; or
-                ``image`` or ``stamp_ns`` is given in addition to observations.
+        Raises ValueError if the size of an array is not its camera's, its type or values are
+        impossible, points are no ImagePoints, or the arguments do not go together.
         """
         if isinstance(observations, np.ndarray):
             observations = Observation(observations, image, stamp_ns=stamp_ns)
@@ -493,8 +460,7 @@ class Tracker:
                 self._before = None
                 self._filter.forget()
             return Estimate(LOST)
-        self._before, self._seen_iou = np.zeros(N_STATE), fit.seen_iou
-        self._before[: len(fit.seen)] = fit.seen
+        self._before = np.append(fit.posture, np.zeros(2) if fit.offset_m is None else fit.offset_m)
         self._poor_frames = self._poor_frames + 1 if fit.is_poor else 0
         if self._poor_frames >= self.config.lost_frames:
             if self.config.relocalize:

@@ -34,8 +34,8 @@ from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.sizes import FloatArray
 from cardbox_tracker.recordings.truth import SHOULDERS
 from cardbox_tracker.search.config import PRESETS, TrackerConfig
+from cardbox_tracker.search.particles import normal_postures
 from cardbox_tracker.tracking.estimate import Estimate
-from cardbox_tracker.tracking.sampling import normal_postures
 from cardbox_tracker.tracking.tracker import Tracker
 from lab.evaluation.angles import comparable, true_postures
 from lab.evaluation.people import torso_angles

@@ -7,8 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from cardbox_tracker.camera.camera import Calibration
-from cardbox_tracker.camera.unrectify import unrectified
+from cardbox_tracker.camera.camera import Calibration, unrectified
 from cardbox_tracker.segmentation.silhouettes import SilhouettePipeline
 
 K = np.array([(100.0, 0.0, 20.0), (0.0, 120.0, 30.0), (0.0, 0.0, 1.0)])

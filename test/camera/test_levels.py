@@ -8,8 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from cardbox_tracker.camera.encodings import SentImage, decode_as_sent, decode_compressed
-from cardbox_tracker.camera.levels import Levels
+from cardbox_tracker.camera.encodings import Levels, SentImage, decode_as_sent, decode_compressed
 
 GREY = np.random.default_rng(1).integers(0, 256, (120, 160), dtype=np.uint8)
 

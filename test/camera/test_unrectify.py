@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from cardbox_tracker.camera.camera import Calibration
-from cardbox_tracker.camera.unrectify import unrectified
+from cardbox_tracker.camera.camera import Calibration, unrectified
 
 K = np.array([(500.0, 0.0, 320.0), (0.0, 510.0, 240.0), (0.0, 0.0, 1.0)])
 SIZE = (320, 240)

@@ -239,7 +239,7 @@ def test_progress_goes_to_one() -> None:
 
 
 def test_rounds_have_a_maximum() -> None:
-    result = measure(BodyModel.of(hip_height_m=-0.51), max_rounds=4, accuracy_m=0.0)
+    result = measure(BodyModel.of(hip_height_m=-0.51), max_rounds=4)
     assert result.rounds == dict.fromkeys(SUBSETS, 8)
 
 

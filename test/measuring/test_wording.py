@@ -5,7 +5,7 @@ from __future__ import annotations
 from hypothesis import given
 from hypothesis import strategies as st
 
-from cardbox_tracker.measuring.wording import rounded_down, rounded_up
+from cardbox_tracker.measuring.references import rounded_down, rounded_up
 
 
 @given(st.integers(1, 99), st.floats(1e-6, 0.3))

@@ -43,8 +43,7 @@ from cardbox_tracker.person.skeleton import (
 from cardbox_tracker.person.urdf import ROOT_LINK, rep155_urdf, urdf_from_body
 from cardbox_tracker.recordings.outputs import joint_values, positions_of
 from cardbox_tracker.search.config import PRESETS
-from cardbox_tracker.terms.drawn_body import body_tuple
-from cardbox_tracker.terms.kernel_arguments import BodyTuple, body_of
+from cardbox_tracker.terms.kernel_arguments import BodyTuple, body_of, body_tuple
 from cardbox_tracker.tracking.estimate import TRACKING, Estimate
 
 CLAVICLE_LINKS = ("left_clavicle", "right_clavicle")

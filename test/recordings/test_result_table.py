@@ -232,7 +232,7 @@ def test_without_pyarrow_the_extra_is_named_and_nothing_is_left(
 ) -> None:
     monkeypatch.setitem(sys.modules, "pyarrow", None)
     for use in (check_table, write):
-        with pytest.raises(CardboxError, match=r"pip install '\.\[parquet\]'.*\.csv"):
+        with pytest.raises(CardboxError, match=r"pip install 'cardbox_tracker\[parquet\]'.*\.csv"):
             use(tmp_path / "a.parquet")
     check_table(tmp_path / "a.csv")
     assert list(tmp_path.iterdir()) == []

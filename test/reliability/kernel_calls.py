@@ -38,22 +38,20 @@ from cardbox_tracker.segmentation.medians import median
 from cardbox_tracker.segmentation.regions import (
     clean_silhouette,
     find_regions,
-    remove_small_regions,
 )
 from cardbox_tracker.segmentation.shadows import decide_shadows
 from cardbox_tracker.segmentation.window import Window, window_of
 from cardbox_tracker.terms.compiled import CompiledSilhouette
 from cardbox_tracker.terms.depth import Depth
-from cardbox_tracker.terms.drawn_body import body_tuple
 from cardbox_tracker.terms.inner_cue import InnerCue
+from cardbox_tracker.terms.kernel_arguments import body_tuple
 from cardbox_tracker.terms.outline import Outline, signed_distances
 from cardbox_tracker.terms.term import Frame, Posed
 from cardbox_tracker.terms.whole_body import WholeBodyCost
 from cardbox_tracker.terms.whole_body_config import WholeBodyCostConfig
 from cardbox_tracker.tracking.observation import Observation
-from cardbox_tracker.tracking.person_region import PersonRegion
+from cardbox_tracker.tracking.person_region import PersonRegion, StillThings
 from cardbox_tracker.tracking.precompile import quickest
-from cardbox_tracker.tracking.still_things import StillThings
 from cardbox_tracker.tracking.tracked_camera import TrackedCamera
 from cardbox_tracker.tracking.tracker import Tracker
 
@@ -278,9 +276,6 @@ CALLS: dict[str, Callable[[Take, Iterator[int]], Any]] = {
     "image_from": lambda take, _: image_from(take(more=(3,))),
     "depth_from": lambda take, _: depth_from(take("f4")),
     "find_regions": lambda take, _: find_regions(take()),
-    "remove_small_regions": lambda take, numbers: remove_small_regions(
-        take(), (0, 255)[next(numbers) % 2], float(next(numbers))
-    ),
     "clean_silhouette": lambda take, numbers: clean_silhouette(
         take(), 0.01, 0.01 * next(numbers), None
     ),

@@ -30,8 +30,7 @@ from cardbox_tracker.recordings.result_reader import read_results
 from cardbox_tracker.recordings.result_table import result_table
 from cardbox_tracker.recordings.silhouettes import RecordedFrame
 from cardbox_tracker.recordings.truth import load_ground_truth
-from cardbox_tracker.search.config import TrackerConfig
-from cardbox_tracker.search.settings_file import read_settings
+from cardbox_tracker.search.config import TrackerConfig, read_settings
 from cardbox_tracker.segmentation.background_file import (
     StoredBackground,
     load_background,

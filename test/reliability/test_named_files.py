@@ -23,8 +23,7 @@ from cardbox_tracker.recordings.given_camera import GivenCamera
 from cardbox_tracker.recordings.image_folder import ImageFolder
 from cardbox_tracker.recordings.truth import load_ground_truth
 from cardbox_tracker.recordings.video_reader import VideoReader
-from cardbox_tracker.search.config import TrackerConfig
-from cardbox_tracker.search.settings_file import read_settings
+from cardbox_tracker.search.config import TrackerConfig, read_settings
 from cardbox_tracker.segmentation.background_file import load_background
 
 SIZE = (320, 240)

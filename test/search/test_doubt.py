@@ -15,7 +15,7 @@ from cardbox_tracker.person.posture import TORSO_X, reference_posture
 from cardbox_tracker.person.skeleton import KeypointState
 from cardbox_tracker.search import doubt
 from cardbox_tracker.search.doubt import Doubt, Model, Models, Source
-from cardbox_tracker.terms.drawn_body import body_tuple
+from cardbox_tracker.terms.kernel_arguments import body_tuple
 
 CAMERA = Camera(320, 240, 300.0, 310.0, 159.5, 119.5)
 BODY = BodyModel.of(distance_m=2.3)

@@ -23,7 +23,7 @@ from cardbox_tracker.person.posture import (
 from cardbox_tracker.search.config import TrackerConfig, paper_preset
 from cardbox_tracker.search.hierarchy import HierarchicalFilter, SumOfTerms
 from cardbox_tracker.terms.compiled import CompiledSilhouette
-from cardbox_tracker.terms.drawn_body import body_tuple
+from cardbox_tracker.terms.kernel_arguments import body_tuple
 from cardbox_tracker.terms.term import (
     ARMS,
     ArmCosts,

@@ -10,7 +10,7 @@ from hypothesis.extra.numpy import arrays
 from cardbox_tracker.person.kinematics import pose
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.posture import N_STATE, PITCH, ROLL, TORSO_X, TORSO_Y, YAW
-from cardbox_tracker.search.arms import ARM_LIMITS
+from cardbox_tracker.search.arm_search import ARM_LIMITS
 from cardbox_tracker.search.mirroring import turned_states
 
 BODY = BodyModel.of()

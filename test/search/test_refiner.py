@@ -28,7 +28,7 @@ from cardbox_tracker.person.posture import (
     reference_posture,
     state_limits,
 )
-from cardbox_tracker.search.arms import ARM_LIMITS
+from cardbox_tracker.search.arm_search import ARM_LIMITS
 from cardbox_tracker.search.mirroring import mirrored_states
 from cardbox_tracker.search.refiner import Cue, Prior, Refiner
 from cardbox_tracker.terms import joint_points_kernels as kernels
@@ -84,7 +84,7 @@ class Seen:
         return [cue for cue in self.cost.outlines(state) if cue[0] in cameras]
 
     def error_m(self, state: np.ndarray, truth: np.ndarray = TRUTH) -> float:
-        apart = self.cost.keypoints(state) - self.cost.keypoints(truth)
+        apart = self.cost.costs[0].keypoints(state) - self.cost.costs[0].keypoints(truth)
         return float(np.linalg.norm(apart, axis=1).mean())
 
 
@@ -300,7 +300,7 @@ def test_points_show_who_squats_from_a_standing_state(
     seen = Seen(FRONT)
     seen.cost.expect(0.0, 0.0, 0.0, 0.0, is_located=True, shows_legs=True)
     hips_m = np.array(seen.cost.costs[0].hips(wanted))
-    trunk_m = seen.cost.keypoints(wanted)[[0, 3]].mean(axis=0) - hips_m
+    trunk_m = seen.cost.costs[0].keypoints(wanted)[[0, 3]].mean(axis=0) - hips_m
     spatial_m = np.zeros((len(POINT_NAMES), 3))
     for side, aside_m in (("left", 0.2), ("right", -0.2)):
         # The detector leans people forward by 0.1 of their trunk.

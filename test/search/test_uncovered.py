@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from cardbox_tracker.search.uncovered import farthest_uncovered
+from cardbox_tracker.search.arm_proposals import farthest_uncovered
 from cardbox_tracker.terms.bit_planes import Planes, fill_planes, leave_out, new_planes
 
 SIZE = ROWS, WIDTH = 60, 160

@@ -40,7 +40,7 @@ def test_a_hand_behind_the_trunk_is_hidden_and_one_before_it_is_not() -> None:
     behind[4:8] = np.radians([13.0, -60.0, -55.0, 17.0])
     before[4:8] = np.radians([-10.0, 40.0, -40.0, 40.0])
     for state, is_hidden in ((behind, True), (before, False)):
-        hand, shoulder = COST.keypoints(state)[[2, 0]]
+        hand, shoulder = COST.costs[0].keypoints(state)[[2, 0]]
         assert (hand[2] > shoulder[2]) == is_hidden and abs(hand[0]) < 0.15
         assert are_hidden(COST, state).tolist() == [False, False, is_hidden, *[False] * 3]
     # A camera on the left of the person sees the hand behind the back.

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from cardbox_tracker.search.walking import Walk
+from cardbox_tracker.search.locating import Walk
 
 INSIDE = np.zeros((24, 32), np.uint8)
 INSIDE[5:20, 10:20] = 255

@@ -265,11 +265,11 @@ def test_each_stage_adds_states_to_those_before(monkeypatch: pytest.MonkeyPatch)
 
     def noting(stage: Any) -> Any:
         def run(of: WholeBodyFilter, search: Any) -> None:
-            before = search.rated.states[:].copy() if len(search.rated.ratings) else None
+            before = of.rated.states[:].copy() if len(of.rated.ratings) else None
             stage(of, search)
-            counts.append((stage.__name__, len(search.rated.states)))
+            counts.append((stage.__name__, len(of.rated.states)))
             if before is not None:
-                np.testing.assert_array_equal(search.rated.states[: len(before)], before)
+                np.testing.assert_array_equal(of.rated.states[: len(before)], before)
 
         return run
 

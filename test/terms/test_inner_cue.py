@@ -18,19 +18,17 @@ from cardbox_tracker.person.kinematics import pose
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.posture import reference_posture
 from cardbox_tracker.search.config import default_preset
-from cardbox_tracker.terms.drawn_body import body_tuple
 from cardbox_tracker.terms.inner_cue import (
+    ArmGains,
     InnerCue,
     InnerCueObservation,
     InnerCueTerm,
-    ratios_of,
-)
-from cardbox_tracker.terms.inner_cue_arms import (
-    ArmGains,
     arms_in_image,
     forearm_of,
+    ratios_of,
     zones_of,
 )
+from cardbox_tracker.terms.kernel_arguments import body_tuple
 from cardbox_tracker.terms.term import (
     ARM,
     ARMS,

@@ -13,10 +13,8 @@ from cardbox_tracker.person.appearance import FOREARM, HAND, TORSO
 from cardbox_tracker.person.cardbox import cardbox_patches
 from cardbox_tracker.person.model import PROPORTIONS, BodyModel
 from cardbox_tracker.person.posture import reference_posture
-from cardbox_tracker.terms.drawn_body import body_tuple
-from cardbox_tracker.terms.inner_cue import InnerCue, InnerCueTerm
-from cardbox_tracker.terms.inner_cue_arms import forearm_of
-from cardbox_tracker.terms.inner_cue_sleeves import Sleeves
+from cardbox_tracker.terms.inner_cue import InnerCue, InnerCueTerm, Sleeves, forearm_of
+from cardbox_tracker.terms.kernel_arguments import body_tuple
 from cardbox_tracker.terms.term import Frame, Posed
 
 SHIRT, SKIN, WALL = (150, 60, 30), (110, 150, 210), (128, 128, 128)

@@ -9,7 +9,7 @@ from cardbox_tracker.camera.camera import Camera
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.posture import N_STATE, reference_posture
 from cardbox_tracker.terms.body_outline import BODY_PATCHES, corners_of_body
-from cardbox_tracker.terms.drawn_body import body_tuple
+from cardbox_tracker.terms.kernel_arguments import body_tuple
 from cardbox_tracker.terms.outline import INFORMATION, Outline, signed_distances
 from cardbox_tracker.terms.outline_distances import HALF_PX
 from cardbox_tracker.terms.outline_points import POINTS, find_outline

@@ -8,7 +8,7 @@ import pytest
 from cardbox_tracker.camera.camera import Camera
 from cardbox_tracker.person.kinematics import pose
 from cardbox_tracker.person.model import BodyModel
-from cardbox_tracker.terms.drawn_body import body_tuple
+from cardbox_tracker.terms.kernel_arguments import body_tuple
 from cardbox_tracker.terms.term import (
     ARM,
     TRUNK,

@@ -22,9 +22,8 @@ from cardbox_tracker.camera.view import OtherCamera
 from cardbox_tracker.person.cardbox import cardbox_patches
 from cardbox_tracker.person.kinematics import pose
 from cardbox_tracker.person.model import BodyModel
-from cardbox_tracker.person.posture import TORSO_X, reference_posture, state_limits
-from cardbox_tracker.search.config import PRESETS
-from cardbox_tracker.terms.drawn_body import body_tuple
+from cardbox_tracker.person.posture import reference_posture
+from cardbox_tracker.terms.kernel_arguments import body_tuple
 from cardbox_tracker.terms.term import ARM, TRUNK, WHOLE, Frame, Posed
 from cardbox_tracker.tracking.observation import Observation
 from cardbox_tracker.tracking.tracked_camera import TrackedCamera
@@ -32,12 +31,11 @@ from cardbox_tracker.tracking.tracker import Tracker
 
 ROOT = Path(__file__).parents[2]
 CODE = re.findall(r"```python\n(.*?)```", (ROOT / "docs" / "extending.md").read_text(), re.DOTALL)
-DETECTOR, FORMAT, CLICKED, USE, SEATED, SCHEME = CODE
+DETECTOR, FORMAT, CLICKED, USE, SCHEME = CODE
 FILES = {
     "my_detector.py": DETECTOR,
     "my_format.py": FORMAT,
     "clicked_points.py": CLICKED,
-    "seated.py": SEATED,
 }
 FRONT = reference_posture("front")
 
@@ -166,32 +164,6 @@ def test_a_new_channel_is_one_line_and_unknown_ones_are_refused(folder: Path) ->
         tracker.track(Observation(silhouette, clicked=np.zeros(6)))
 
 
-def test_a_corrector_changes_the_result_and_not_the_search(folder: Path) -> None:
-    tracker, seated = made_by(USE), module_of("seated")
-    body, camera, person = tracker.body, tracker.camera, silhouette_of(tracker)
-    farthest_m = state_limits(body.placement.distance_m)[TORSO_X, 1]
-    for corrector, wanted_m in ((seated.Seated(0.1), 0.1), (seated.Seated(99.0), farthest_m)):
-        plain = Tracker(body, camera, tracker.config)
-        corrected = Tracker(body, camera, tracker.config, corrector=corrector)
-        for _ in range(3):
-            usual, estimate = plain.track(person), corrected.track(person)
-        assert estimate.offset_m is not None and usual.offset_m is not None
-        assert estimate.offset_m[0] == pytest.approx(wanted_m)
-        assert usual.offset_m[0] != pytest.approx(wanted_m, abs=0.01)
-        assert estimate.posture is not None and usual.posture is not None
-        assert estimate.posture.tolist() == usual.posture.tolist()
-
-
-def test_a_corrector_that_cannot_be_used_is_refused(folder: Path) -> None:
-    tracker, seated = made_by(USE), module_of("seated")
-    body, camera = tracker.body, tracker.camera
-    with pytest.raises(ValueError, match=r"a corrector needs .* the preset default"):
-        Tracker(body, camera, PRESETS["paper"](), corrector=seated.Seated(0.1))
-    of = Tracker(body, camera, tracker.config, corrector=lambda frames, state: state[:12])
-    with pytest.raises(ValueError, match=r"shape \(12,\); expected \(14,\)"):
-        of.track(silhouette_of(tracker))
-
-
 def test_the_format_writes_a_line_for_each_image(folder: Path) -> None:
     motion = SimpleNamespace(stamp_ns=np.array([7, 9]), state=("tracking", "lost"))
     module_of("my_format").STATES.write(folder / "a.states", motion, None)
@@ -224,7 +196,7 @@ def test_the_examples_pass_strict_mypy_beside_and_in_the_package(
     package = shutil.copytree(
         ROOT / "cardbox_tracker", tmp_path / "cardbox_tracker", ignore=ignored
     )
-    places = "terms/clicked_points.py", "search/seated.py", "applications/exporting/my_format.py"
+    places = "terms/clicked_points.py", "applications/exporting/my_format.py"
     files = [package / place for place in places]
     (tmp_path / "ultralytics.pyi").write_text("from typing import Any\nYOLO: Any\n")
     for file in files:

@@ -14,8 +14,8 @@ from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.posture import PITCH, YAW, reference_posture
 from cardbox_tracker.person.skeleton import KeypointState
 from cardbox_tracker.search.config import PRESETS
-from cardbox_tracker.terms.drawn_body import body_tuple
-from cardbox_tracker.terms.inner_cue_arms import zones_of
+from cardbox_tracker.terms.inner_cue import zones_of
+from cardbox_tracker.terms.kernel_arguments import body_tuple
 from cardbox_tracker.terms.term import Frame, Posed
 from cardbox_tracker.tracking.estimate import UNCERTAIN
 from cardbox_tracker.tracking.facing import Facing

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from cardbox_tracker.tracking.low_pass import LowPass
+from cardbox_tracker.tracking.head import LowPass
 
 
 def test_a_step() -> None:

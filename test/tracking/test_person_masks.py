@@ -14,8 +14,15 @@ from cardbox_tracker.camera.camera import Camera
 from cardbox_tracker.person.kinematics import pose
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.posture import JOINT_LIMITS, reference_posture
-from cardbox_tracker.tracking.person_masks import PersonDrawer, grown
-from cardbox_tracker.tracking.person_points import HIP, LEFT, NECK, RIGHT, PersonPoints
+from cardbox_tracker.tracking.person_masks import (
+    HIP,
+    LEFT,
+    NECK,
+    RIGHT,
+    PersonDrawer,
+    PersonPoints,
+    grown,
+)
 
 CAMERA = Camera(160, 120, 100.0, 90.0, 79.5, 59.5).with_pitch(0.2)
 BODY = BodyModel.of(hip_height_m=-0.4, camera_pitch_rad=0.2)

@@ -12,8 +12,8 @@ from cardbox_tracker.person.cardbox import cardbox_patches
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.posture import TURNING_LIMITS, reference_posture
 from cardbox_tracker.search.config import PRESETS
+from cardbox_tracker.search.particles import normal_postures
 from cardbox_tracker.tracking.estimate import LOST, Estimate
-from cardbox_tracker.tracking.sampling import normal_postures
 from cardbox_tracker.tracking.tracker import Tracker
 
 CAMERA = Camera(160, 120, 165.0, 165.0, 79.5, 59.5)

@@ -23,7 +23,7 @@ from cardbox_tracker.measuring.scale import (
 )
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.posture import reference_posture
-from cardbox_tracker.search.arms import ARM_LIMITS
+from cardbox_tracker.search.arm_search import ARM_LIMITS
 from cardbox_tracker.search.config import default_preset, paper_preset
 from cardbox_tracker.search.whole_body import WholeBodyFilter
 from cardbox_tracker.search.whole_body_config import SEVERAL_CAMERAS

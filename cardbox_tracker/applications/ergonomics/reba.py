@@ -56,7 +56,7 @@ from cardbox_tracker.person.sizes import FloatArray
 from cardbox_tracker.person.skeleton import JOINT_NAMES, NECK_NAMES, KeypointState, arm_directions
 from cardbox_tracker.recordings.result_reader import Results, read_results
 from cardbox_tracker.recordings.result_table import LEG_POINT_COLUMNS, POINT_COLUMNS
-from cardbox_tracker.tracking.sampling import normal_postures
+from cardbox_tracker.search.particles import normal_postures
 
 TABLE_A: ScoreArray = table_of(
     """

@@ -20,12 +20,12 @@ from cardbox_tracker.camera.camera import Calibration, Camera
 from cardbox_tracker.camera.camera_checks import matrix_problem
 from cardbox_tracker.camera.encodings import (
     MOST_PIXELS,
+    Levels,
     SentImage,
     decode_as_sent,
     decode_compressed,
 )
 from cardbox_tracker.camera.given_arrays import silhouette_from
-from cardbox_tracker.camera.levels import Levels
 from cardbox_tracker.common.errors import CameraError, EncodingError, quoted
 
 ImageArray = NDArray[np.uint8]

@@ -11,7 +11,7 @@ from std_msgs.msg import Header
 
 from cardbox_tracker.camera.calibration_watch import CalibrationWatch
 from cardbox_tracker.camera.camera import Calibration
-from cardbox_tracker.camera.levels import Levels
+from cardbox_tracker.camera.encodings import Levels
 from cardbox_tracker.camera.stamps import StampOrder
 from cardbox_tracker.ros.messages import conversions
 from cardbox_tracker.ros.messages.conversions import ImageArray

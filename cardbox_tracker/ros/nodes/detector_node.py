@@ -14,9 +14,8 @@ import numpy as np
 from geometry_msgs.msg import PolygonStamped
 from std_msgs.msg import Float64, Header
 
-from cardbox_tracker.camera.camera import Calibration, Camera
+from cardbox_tracker.camera.camera import Calibration, Camera, unrectified
 from cardbox_tracker.camera.stamps import WINDOW, StampOrder
-from cardbox_tracker.camera.unrectify import unrectified
 from cardbox_tracker.detectors.detector import Detector, PersonDetector
 from cardbox_tracker.detectors.image_points import ImagePoints
 from cardbox_tracker.detectors.landmarks import image_points

@@ -28,7 +28,7 @@ from cardbox_tracker.ros.runtime.command_line import node_main
 from cardbox_tracker.ros.runtime.node import CardboxNode
 from cardbox_tracker.ros.runtime.parameter_fields import NodeParameters, at_start
 from cardbox_tracker.ros.runtime.parameters import LiveParameters
-from cardbox_tracker.tracking.sampling import normal_postures
+from cardbox_tracker.search.particles import normal_postures
 
 
 @dataclass(frozen=True)

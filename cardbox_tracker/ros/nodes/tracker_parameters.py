@@ -30,8 +30,7 @@ from cardbox_tracker.ros.runtime.parameter_fields import (
     parameter,
     shared,
 )
-from cardbox_tracker.search.config import PRESETS, TrackerConfig
-from cardbox_tracker.search.settings_file import read_settings
+from cardbox_tracker.search.config import PRESETS, TrackerConfig, read_settings
 from cardbox_tracker.search.whole_body_config import WholeBodyConfig
 from cardbox_tracker.tracking.session import MOST_PEOPLE
 
