@@ -25,7 +25,7 @@ from cardbox_tracker.tracking.estimate import Estimate
 
 # Rate of a video of a single image.
 _USUAL_HZ = 15.0
-_H264 = {"preset": "veryfast", "crf": "20"}
+_H264 = {"preset": "superfast", "crf": "23"}
 
 
 @contextmanager
