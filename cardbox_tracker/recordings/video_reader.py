@@ -150,15 +150,18 @@ def _read(capture: cv2.VideoCapture) -> Iterator[tuple[NDArray[Any] | None, floa
     An image is None if it cannot be decoded. The next ones are decoded while the caller works.
     """
     failed = 0
-    for found, image, time_ms in results_ahead(
-        lambda _: (*capture.read(), capture.get(cv2.CAP_PROP_POS_MSEC)), count()
-    ):
-        if found:
+    for image, time_ms in results_ahead(partial(_next, capture), count()):
+        if image is not None:
             yield from [(None, 0.0)] * failed
             failed = 0
             yield image, time_ms
         elif (failed := failed + 1) == MOST_DAMAGED:
             return
+
+
+def _next(capture: cv2.VideoCapture, _: int) -> tuple[NDArray[Any] | None, float]:
+    found, image = capture.read()
+    return image if found else None, capture.get(cv2.CAP_PROP_POS_MSEC)
 
 
 def _stated_s(path: Path, capture: cv2.VideoCapture) -> float:

@@ -300,8 +300,9 @@ def pixels_of(camera: Camera, points_m: FloatArray) -> FloatArray | None:
 def _polygons(camera: Camera, patches: FloatArray) -> Iterator[tuple[str, FloatArray]]:
     """Yield the side (left, right or another word) and the pixels (n, 2) of each visible patch."""
     optical = camera.reference_to_optical(patches)
-    for name, corners in zip(PATCH_NAMES, optical, strict=True):
-        polygon = clip_near(corners)
+    seen_whole = in_front(optical).all(axis=-1)
+    for name, corners, is_whole in zip(PATCH_NAMES, optical, seen_whole, strict=True):
+        polygon = corners if is_whole else clip_near(corners)
         if len(polygon) > 2:
             yield name.split("_")[0], camera.project(polygon)
 
@@ -317,7 +318,8 @@ def enlarged(image: ImageArray, scale: int) -> ImageArray:
     height, width = image.shape[:2]
     size = (scale * width, scale * height)
     bgr = image if image.ndim == 3 else cv2.cvtColor(image, cv2.COLOR_GRAY2BGR)
-    return np.array(cv2.resize(bgr, size, interpolation=cv2.INTER_LINEAR), np.uint8)
+    large = bgr if scale == 1 else cv2.resize(bgr, size, interpolation=cv2.INTER_LINEAR)
+    return np.array(large, np.uint8)
 
 
 def _subpixels(pixels: FloatArray, corner: tuple[int, int] = (0, 0)) -> NDArray[np.int32]:
