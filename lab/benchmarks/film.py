@@ -1,4 +1,7 @@
-"""Processor time of each step of ``cardbox track FILM``: ``python -m lab.benchmarks.film FILM``.
+"""Processor time of each step of ``cardbox track FILM``.
+
+``python -m lab.benchmarks.film`` measures it and replaces it in ``docs/benchmarks.json`` and
+``docs/benchmarks.md``.
 
 Every step counts the time of its thread, without that of the steps which it calls. Libraries get no
 threads of their own, so that their time counts for the step that calls them.
@@ -18,7 +21,9 @@ from threading import local
 from typing import Any
 
 import cv2
+import numpy as np
 
+from cardbox_tracker.applications import demo
 from cardbox_tracker.applications.drawing import video
 from cardbox_tracker.commands import tracking
 from cardbox_tracker.commands.main import main as cardbox
@@ -41,6 +46,8 @@ from cardbox_tracker.tracking.head import HeadTracker
 from cardbox_tracker.tracking.legs import LegReader
 from cardbox_tracker.tracking.session import Session
 from cardbox_tracker.tracking.tracker import Tracker
+from lab.benchmarks.report import write_report
+from lab.evaluation.results import commit, read_json, write_json
 
 STEPS: Mapping[str, Sequence[tuple[Any, str]]] = {
     "decoding": [(video_reader, "_next")],
@@ -73,6 +80,13 @@ STEPS: Mapping[str, Sequence[tuple[Any, str]]] = {
 # Of these steps, all that they call is part.
 _WHOLE = ("camera of the scene", "bodies of the scene", "drawing")
 REST = "everything else"
+RUNS: Mapping[str, tuple[int, Sequence[str]]] = {
+    "one person": (1, ()),
+    "with `--hands --video`": (1, ("--hands", "--video", "MP4")),
+    "two people": (2, ("--people", "2")),
+}
+"""People in the film, and options of each run."""
+_GIVEN = ("--fov", "60", "--stature", "1.72", "--detector", "mediapipe")
 
 
 class Clock:
@@ -140,38 +154,62 @@ def _timed(clock: Clock) -> Iterator[None]:
             setattr(owner, name, call)
 
 
-def measure_film(arguments: Sequence[str]) -> dict[str, float]:
-    """Return the processor time of each step of ``cardbox track ARGUMENTS``, s.
+def measure_films() -> dict[str, Any]:
+    """Return the steps of each of ``RUNS``, ms an image, and images a second of the whole run.
+
+    The film is that of ``cardbox demo``, enlarged to the size of usual films; two people are the
+    same film twice, side by side.
+    """
+    cv2.setNumThreads(1)
+    os.environ["OPENCV_FFMPEG_CAPTURE_OPTIONS"] = "threads;1"
+    video._H264["threads"] = "1"
+    found: dict[str, Any] = {"commit": commit()}
+    with TemporaryDirectory() as folder:
+        for name, (people, options) in RUNS.items():
+            film, overlay = Path(folder, f"{people}.mp4"), str(Path(folder, "overlay.mp4"))
+            images = _enlarged(Path(demo.__file__).with_name("film.mp4"), film, people)
+            given = ["track", str(film), *_GIVEN, *(overlay if o == "MP4" else o for o in options)]
+            given += ["--force", "--csv", str(Path(folder, "table.csv"))]
+            spent_s, whole_s = _measured(given)
+            steps = {step: 1e3 * value_s / images for step, value_s in spent_s.items()}
+            found[name] = {"hz": images / whole_s, "steps_ms": steps}
+    return found
+
+
+def _enlarged(source: Path, film: Path, people: int) -> int:
+    """Write the film, and return its number of images."""
+    capture, images = cv2.VideoCapture(str(source)), 0
+    with video.video_file(film, 30.0) as add:
+        while (read := capture.read())[0]:
+            wide = np.hstack([read[1]] * people)
+            add(cv2.resize(wide, (1280, 960 // people), interpolation=cv2.INTER_CUBIC))
+            images += 1
+    return images
+
+
+def _measured(arguments: Sequence[str]) -> tuple[dict[str, float], float]:
+    """Return the processor time of each step of a command, and the time that it takes, s.
 
     The second of two runs counts, since the first one loads compiled code.
-
-    Raises:
-        CardboxError: the command fails.
     """
-    with TemporaryDirectory() as folder:
-        cv2.setNumThreads(1)
-        os.environ["OPENCV_FFMPEG_CAPTURE_OPTIONS"] = "threads;1"
-        video._H264["threads"] = "1"
-        given = ["track", *arguments, "--force", "--csv", str(Path(folder, "table.csv"))]
-        for _ in range(2):
-            clock, begun_s = Clock(), time.process_time()
-            with _timed(clock):
-                if cardbox(given):
-                    raise CardboxError(f"cardbox {' '.join(given)} failed")
-    spent_s = time.process_time() - begun_s
-    return {**clock.spent_s, REST: spent_s - sum(clock.spent_s.values())}
+    for _ in range(2):
+        clock, begun_s, from_s = Clock(), time.process_time(), time.monotonic()
+        with _timed(clock):
+            if cardbox(arguments):
+                raise CardboxError(f"cardbox {' '.join(arguments)} failed")
+    whole_s, spent_s = time.monotonic() - from_s, time.process_time() - begun_s
+    return {**clock.spent_s, REST: spent_s - sum(clock.spent_s.values())}, whole_s
 
 
 def main() -> None:
-    """Print the table."""
+    """Measure, and replace the times in the files of the benchmark."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("images", type=int, help="number of images of the film")
-    given, arguments = parser.parse_known_args()
-    spent_s = measure_film(arguments)
-    total_s = sum(spent_s.values())
-    for name, value_s in spent_s.items():
-        print(f"{name:40} {1e3 * value_s / given.images:7.2f} ms {value_s / total_s:6.1%}")
-    print(f"{'all':40} {1e3 * total_s / given.images:7.2f} ms")
+    parser.add_argument("--json", type=Path, default=Path("docs/benchmarks.json"))
+    parser.add_argument("--report", type=Path, default=Path("docs/benchmarks.md"))
+    given = parser.parse_args()
+    results = read_json(given.json) | {"film": measure_films()}
+    write_json(results, given.json)
+    write_report(results, given.report)
 
 
 if __name__ == "__main__":
