@@ -78,7 +78,7 @@ STEPS: Mapping[str, Sequence[tuple[Any, str]]] = {
 }
 """Functions, generators and contexts of a function of each step, with their owner and name."""
 # Of these steps, all that they call is part.
-_WHOLE = ("camera of the scene", "bodies of the scene", "drawing")
+_WHOLE = ("camera of the scene", "bodies of the scene", "drawing", "network of hands")
 REST = "everything else"
 RUNS: Mapping[str, tuple[int, Sequence[str]]] = {
     "one person": (1, ()),
@@ -182,7 +182,8 @@ def _enlarged(source: Path, film: Path, people: int) -> int:
     with video.video_file(film, 30.0) as add:
         while (read := capture.read())[0]:
             wide = np.hstack([read[1]] * people)
-            add(cv2.resize(wide, (1280, 960 // people), interpolation=cv2.INTER_CUBIC))
+            large = cv2.resize(wide, (1280, 960 // people), interpolation=cv2.INTER_CUBIC)
+            add(np.asarray(large, np.uint8))
             images += 1
     return images
 

@@ -300,9 +300,8 @@ def pixels_of(camera: Camera, points_m: FloatArray) -> FloatArray | None:
 def _polygons(camera: Camera, patches: FloatArray) -> Iterator[tuple[str, FloatArray]]:
     """Yield the side (left, right or another word) and the pixels (n, 2) of each visible patch."""
     optical = camera.reference_to_optical(patches)
-    seen_whole = in_front(optical).all(axis=-1)
-    for name, corners, is_whole in zip(PATCH_NAMES, optical, seen_whole, strict=True):
-        polygon = corners if is_whole else clip_near(corners)
+    for name, corners in zip(PATCH_NAMES, optical, strict=True):
+        polygon = corners if in_front(corners).all() else clip_near(corners)
         if len(polygon) > 2:
             yield name.split("_")[0], camera.project(polygon)
 
