@@ -35,6 +35,9 @@ def colours_in(image: NDArray[np.uint8], mask: NDArray[np.uint8]) -> FloatArray 
     """
     if cv2.countNonZero(mask) < _LEAST_PX:
         return None
+    left, top, width, height = cv2.boundingRect(mask)
+    there = np.s_[top : top + height, left : left + width]
+    image, mask = np.ascontiguousarray(image[there]), np.ascontiguousarray(mask[there])
     if image.ndim == 2:
         found = cv2.calcHist([image], [0], mask, [16], [0, 256])
     else:

@@ -88,6 +88,7 @@ _CENTRE, _SCALE = 33, 34
 _OUTPUTS = 39
 # A point moves to the centroid of its heat map in a window of this many cells.
 _HEAT_WINDOW, _LEAST_HEAT = 7, 0.5
+_CELLS = np.indices((_HEAT_WINDOW, _HEAT_WINDOW))
 
 
 class Square(NamedTuple):
@@ -178,7 +179,7 @@ class PoseNetwork:
             image: (H, W, 3), bgr.
             stamp_ns: its time, ns; None for 1/30 s after the last image.
         """
-        rgb = np.ascontiguousarray(image[..., ::-1])
+        rgb = np.asarray(cv2.cvtColor(image, cv2.COLOR_BGR2RGB), np.uint8)
         self._images += 1
         self._now_ns = self._now_ns + _USUAL_NS if stamp_ns is None else stamp_ns
         identity, people = self._identity, None
@@ -262,7 +263,7 @@ class PoseNetwork:
             return None
         values = raw.reshape(_OUTPUTS, 5).astype(np.float64)
         points = values[:, :2] / _LANDMARK_PX
-        points = _refined(points, _chance(heat[0]))
+        points = _refined(points, heat[0])
         placed = square.to_image(points)
         visible, present = _chance(values[:POINTS, 3:5].T)
         found = Detection(
@@ -385,8 +386,8 @@ def _to_image(square: Square, size: int) -> FloatArray:
     return matrix.astype(np.float64)
 
 
-def _refined(points: FloatArray, heat: FloatArray) -> FloatArray:
-    """Move each point (N, 2) to the centroid of its heat map (H, W, N) around it."""
+def _refined(points: FloatArray, heat: NDArray[Any]) -> FloatArray:
+    """Move each point (N, 2) to the centroid of its heat map, logits (H, W, N), around it."""
     height, width = heat.shape[:2]
     refined, half = points.copy(), (_HEAT_WINDOW - 1) // 2
     for number, (x, y) in enumerate(points):
@@ -394,11 +395,11 @@ def _refined(points: FloatArray, heat: FloatArray) -> FloatArray:
         if not (0 <= column < width and 0 <= row < height):
             continue
         left, top = max(0, column - half), max(0, row - half)
-        window = heat[top : row + half + 1, left : column + half + 1, number]
+        window = _chance(heat[top : row + half + 1, left : column + half + 1, number])
         total = window.sum()
         if window.max() < _LEAST_HEAT or total <= 0.0:
             continue
-        rows, columns = np.indices(window.shape)
+        rows, columns = _CELLS[:, : window.shape[0], : window.shape[1]]
         refined[number] = (
             (left + (columns * window).sum() / total) / width,
             (top + (rows * window).sum() / total) / height,

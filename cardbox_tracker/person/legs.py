@@ -126,16 +126,21 @@ LEG_KEYPOINT_NAMES: tuple[str, ...] = (
 )
 
 
-def leg_directions(angles_rad: FloatArray, side: float) -> tuple[FloatArray, FloatArray]:
+def leg_directions(
+    angles_rad: FloatArray, side: float | FloatArray
+) -> tuple[FloatArray, FloatArray]:
     """Return unit vectors (..., 3) along thigh and shank in the frame of the hips.
 
-    The four angles of a leg are (..., 4), rad; ``side`` is +1 for the left leg, -1 for the right.
+    The four angles of a leg are (..., 4), rad; ``side`` is +1 for the left leg, -1 for the right,
+    (...) or one for all.
     """
     thigh, shank = leg_rotations(angles_rad, side)
     return -thigh[..., 2], -shank[..., 2]
 
 
-def leg_rotations(angles_rad: FloatArray, side: float) -> tuple[FloatArray, FloatArray]:
+def leg_rotations(
+    angles_rad: FloatArray, side: float | FloatArray
+) -> tuple[FloatArray, FloatArray]:
     """Return rotations (..., 3, 3) from thigh and shank to hips, see :func:`leg_directions`."""
     a = np.asarray(angles_rad, dtype=np.float64)
     thigh = rotation_y(-a[..., 0]) @ rotation_x(side * a[..., 1]) @ rotation_z(-side * a[..., 2])

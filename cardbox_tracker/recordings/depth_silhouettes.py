@@ -80,7 +80,7 @@ class DepthSilhouetteSource(SilhouetteSource):
         for seen, measured in side_by_side(streams, lambda item: int(item[0]), TOLERANCE_NS):
             if seen is None:
                 continue
-            stamp_ns, time_s, image, recorded, _ = seen
+            stamp_ns, time_s, image, recorded, *_ = seen
             if time_s > end_s:
                 break
             if time_s < start_s:
@@ -92,7 +92,7 @@ class DepthSilhouetteSource(SilhouetteSource):
             self._is_near = self._is_near or bool(silhouette.any())
             if not self._is_near:
                 self._nearest_m = min(self._nearest_m, nearest_m(measured[1]))
-            found = self._points(seen, silhouette)
+            found = self._points(self._looked_at(seen), silhouette)
             pictures = brightness_of(image), silhouette, image
             yield RecordedFrame(stamp_ns, time_s, *pictures, measured[1], found, recorded)
         self._end_points()

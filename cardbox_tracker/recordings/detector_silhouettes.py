@@ -42,13 +42,10 @@ class DetectorSilhouetteSource(SilhouetteSource):
         The detector starts anew at ``start_s``, so that a frame depends on the span alone.
         """
         self._start_points(start_s, end_s)
-        for prepared in self.images():
-            if prepared.time_s > end_s:
-                break
-            if prepared.time_s < start_s:
+        for prepared in self._images_until(end_s, start_s):
+            stamp_ns, time_s, image, recorded, _, found = prepared
+            if time_s < start_s:
                 continue
-            found = self._found(prepared)
-            stamp_ns, time_s, image, recorded, _ = prepared
             silhouette = np.zeros(image.shape[:2], np.uint8)
             for one in found:
                 silhouette |= one.silhouette()

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterator
-from itertools import islice
+import math
+from collections.abc import Callable, Collection, Iterator, Sequence
+from dataclasses import replace
+from functools import partial
+from itertools import islice, takewhile
 from pathlib import Path
 from typing import NamedTuple
 
@@ -13,6 +16,7 @@ from numpy.typing import NDArray
 from cardbox_tracker.camera.camera import OPTICAL_FRAME, Rectifier
 from cardbox_tracker.camera.depth_image import DepthImage
 from cardbox_tracker.camera.encodings import brightness_of
+from cardbox_tracker.common.beside import results_ahead
 from cardbox_tracker.common.errors import BagError, CameraError, CardboxError, EncodingError
 from cardbox_tracker.detectors.detector import Detector
 from cardbox_tracker.detectors.image_points import ImagePoints
@@ -74,6 +78,7 @@ class PreparedImage(NamedTuple):
         image: (H, W, 3) bgr, or (H, W) grey, undistorted, at the working resolution.
         recorded: the image as it was recorded.
         number: number of the image in the recording, counted from 0.
+    found: whom the detector finds in the image.
     """
 
     stamp_ns: int
@@ -81,6 +86,7 @@ class PreparedImage(NamedTuple):
     image: NDArray[np.uint8]
     recorded: RecordedImage
     number: int = 0
+    found: Sequence[Detection] = ()
 
 
 FindPoints = Callable[[PreparedImage, NDArray[np.uint8]], ImagePoints | None]
@@ -202,8 +208,7 @@ class SilhouetteSource:
             found = next((image.frame_id for image in bag.images(self.topic)), "")
             self.frame_id = found.lstrip("/") or OPTICAL_FRAME
         self.camera = self._pipeline.camera
-        self._full_size: tuple[int, int] | None = None
-        self._full_rectifier: Rectifier | None = None
+        self._full: tuple[tuple[int, int] | None, Rectifier | None] = None, None
 
     @property
     def has_points(self) -> bool:
@@ -218,7 +223,7 @@ class SilhouetteSource:
         self._given: GivenPoints | None = None
         self._points: FindPoints = lambda prepared, silhouette: None
         if self._detector is not None:
-            self._points = lambda prepared, silhouette: points_of(self._found(prepared))
+            self._points = lambda prepared, silhouette: points_of(prepared.found)
         elif isinstance(points, PointTable):
             calibration = self._pipeline.calibration
             given = points.read(camera, (calibration.width, calibration.height))
@@ -238,10 +243,21 @@ class SilhouetteSource:
         )
         return KeptDetections(detector.start(across, down), detector.people > 0)
 
-    def _found(self, prepared: PreparedImage) -> list[Detection]:
-        """Return whom the detector finds in an image."""
-        assert self._detector is not None
-        return self._detector(prepared.number, prepared.stamp_ns, prepared.image)
+    def _looked_at(self, prepared: PreparedImage, start_s: float = -math.inf) -> PreparedImage:
+        """Return an image with whom the detector finds in it, if it is not before ``start_s``."""
+        if self._detector is None or prepared.time_s < start_s:
+            return prepared
+        found = self._detector(prepared.number, prepared.stamp_ns, prepared.image)
+        return prepared._replace(found=found)
+
+    def _images_until(self, end_s: float, start_s: float) -> Iterator[PreparedImage]:
+        """Yield every image to ``end_s``, those from ``start_s`` on with whom the detector finds.
+
+        It looks at the next images while the caller works.
+        """
+        within = takewhile(lambda one: one.time_s <= end_s, self.images())
+        look = partial(self._looked_at, start_s=start_s)
+        return within if self._detector is None else results_ahead(look, within)
 
     @property
     def points_fault(self) -> str:
@@ -268,10 +284,8 @@ class SilhouetteSource:
         # The background adapts from the first image on, so frames do not depend on the span.
         self._pipeline.restart()
         self._start_points(start_s, end_s)
-        for prepared in self.images():
-            stamp_ns, time_s, image, recorded, _ = prepared
-            if time_s > end_s:
-                break
+        for prepared in self._images_until(end_s, start_s):
+            stamp_ns, time_s, image, recorded, *_ = prepared
             silhouette = self._pipeline.silhouette(image, stamp_ns)
             if time_s >= start_s:
                 seen = brightness_of(image), silhouette, image
@@ -287,7 +301,7 @@ class SilhouetteSource:
         if self._given is not None:
             image = Image(prepared.stamp_ns, prepared.number, prepared.recorded.name)
             return tuple(self._given.all_in(image))
-        return tuple(image_points(one) for one in self._found(prepared))
+        return tuple(image_points(one) for one in prepared.found)
 
     def _start_points(self, start_s: float, end_s: float) -> None:
         if self._detector is not None:
@@ -377,27 +391,24 @@ class SilhouetteSource:
         """Return an image, undistorted, at the resolution of the recording."""
         image = recorded.as_sent
         height, width = image.shape[:2]
-        if self._full_size != (width, height):
-            self._full_size = width, height
+        # The thread that draws calls this, too.
+        size, rectifier = self._full
+        if size != (width, height):
             calibration = self._pipeline.calibration
-            self._full_rectifier = calibration.rectifier(*calibration.level_size(width, height))
-        return image if self._full_rectifier is None else self._full_rectifier(image)
+            rectifier = calibration.rectifier(*calibration.level_size(width, height))
+            self._full = (width, height), rectifier
+        return image if rectifier is None else rectifier(image)
 
     def images(self) -> Iterator[PreparedImage]:
-        """Yield every image that can be decoded."""
+        """Yield every image that can be decoded; the next ones are, while the caller works."""
         used = 0
-        for number, image in enumerate(self._bag.images(self.topic), 1):
+        taken = enumerate(self._bag.images(self.topic), 1)
+        for number, image, prepared in results_ahead(self._prepared, taken):
             if number == 1:
                 late_ns = image.time_ns - image.stamp_ns
                 self._clock_ns = late_ns if abs(late_ns) > _OTHER_CLOCK_NS else 0
-            try:
-                sent = image.as_sent
-                height, width = sent.shape[:2]
-                calibration = self._pipeline.calibration
-                calibration.check_shape(width, height, self.topic, "the first image")
-                prepared = self._pipeline.prepare(sent)
-            except (CameraError, EncodingError) as error:
-                self._broken[number] = str(error)
+            if isinstance(prepared, str):
+                self._broken[number] = prepared
                 continue
             # Of several passes, the longest counts.
             used += 1
@@ -405,7 +416,21 @@ class SilhouetteSource:
             time_ns = image.stamp_ns + self._clock_ns - self._bag.start_ns
             yield PreparedImage(image.stamp_ns, time_ns / 1e9, prepared, image, number - 1)
 
+    def _prepared(
+        self, taken: tuple[int, RecordedImage]
+    ) -> tuple[int, RecordedImage, NDArray[np.uint8] | str]:
+        """Return an image with its number, decoded once, and prepared, or why it cannot be."""
+        number, image = taken
+        try:
+            sent = image.as_sent
+            height, width = sent.shape[:2]
+            self._pipeline.calibration.check_shape(width, height, self.topic, "the first image")
+            prepared = self._pipeline.prepare(sent)
+        except (CameraError, EncodingError) as error:
+            return number, image, str(error)
+        return number, replace(image, _decode=lambda: sent), prepared
 
-def points_of(found: list[Detection]) -> ImagePoints | None:
+
+def points_of(found: Sequence[Detection]) -> ImagePoints | None:
     """Return the points of the first of the people in an image; None if there is nobody."""
     return image_points(found[0]) if found else None

@@ -6,6 +6,7 @@ import os
 from collections.abc import Collection, Iterator
 from contextlib import contextmanager
 from functools import partial
+from itertools import count
 from pathlib import Path
 from typing import Any
 
@@ -23,6 +24,7 @@ from cardbox_tracker.camera.film_headers import (
     with_square_pixels,
 )
 from cardbox_tracker.camera.image_headers import check_pixels
+from cardbox_tracker.common.beside import results_ahead
 from cardbox_tracker.common.errors import BagError, EncodingError
 from cardbox_tracker.recordings.given_camera import GivenCamera
 from cardbox_tracker.recordings.image_recording import Film, RecordedImage
@@ -60,7 +62,7 @@ class VideoReader(Film):
                 check_pixels(int(size[0]), int(size[1]), MOST_PIXELS)
             except EncodingError as error:
                 raise BagError(f"cannot read the video {self.path}: {error}") from None
-            image = next((image for image in _read(capture) if image is not None), None)
+            image = next((image for image, _ in _read(capture) if image is not None), None)
             if image is None:
                 raise BagError(
                     f"the video {self.path} has no image that can be decoded"
@@ -86,11 +88,10 @@ class VideoReader(Film):
         number = damaged = 0
         with _opened(self.path) as capture:
             shape = oblong(capture)
-            for image in _read(capture):
+            for image, in_file_ms in _read(capture):
                 if image is None:
                     self._damaged = max(self._damaged, damaged := damaged + 1)
                     continue
-                in_file_ms = capture.get(cv2.CAP_PROP_POS_MSEC)
                 first_ms = in_file_ms if number == 0 else first_ms
                 there_ns = round(1e6 * (in_file_ms - first_ms))
                 # Damaged files state the same time for several images.
@@ -142,17 +143,24 @@ def _opened(path: Path) -> Iterator[cv2.VideoCapture]:
         capture.release()
 
 
-def _read(capture: cv2.VideoCapture) -> Iterator[NDArray[Any] | None]:
-    """Yield the images of an open video to its end, None for one that cannot be decoded."""
+def _read(capture: cv2.VideoCapture) -> Iterator[tuple[NDArray[Any] | None, float]]:
+    """Yield the images of an open video to its end, with their times in the file, ms.
+
+    An image is None if it cannot be decoded. The next ones are decoded while the caller works.
+    """
     failed = 0
-    while failed < MOST_DAMAGED:
-        found, image = capture.read()
-        if not found:
-            failed += 1
-            continue
-        yield from [None] * failed
-        failed = 0
-        yield image
+    for image, time_ms in results_ahead(partial(_next, capture), count()):
+        if image is not None:
+            yield from [(None, 0.0)] * failed
+            failed = 0
+            yield image, time_ms
+        elif (failed := failed + 1) == MOST_DAMAGED:
+            return
+
+
+def _next(capture: cv2.VideoCapture, _: int) -> tuple[NDArray[Any] | None, float]:
+    found, image = capture.read()
+    return image if found else None, capture.get(cv2.CAP_PROP_POS_MSEC)
 
 
 def _stated_s(path: Path, capture: cv2.VideoCapture) -> float:

@@ -22,7 +22,7 @@ A leg that the detector does not see keeps its angles, with growing deviations, 
 from __future__ import annotations
 
 from dataclasses import replace
-from itertools import product
+from itertools import chain, product
 from typing import NamedTuple
 
 import numpy as np
@@ -57,7 +57,7 @@ from cardbox_tracker.terms.term import Frame
 from cardbox_tracker.tracking.estimate import Estimate, Legs
 from cardbox_tracker.tracking.place import DEPTH, SECOND_CAMERA
 
-_SIDES = 1.0, -1.0
+_SIDES = np.array([1.0, -1.0])
 _N = len(LEG_NAMES)
 # Values of a fit: the angles, the logarithms of the lengths' factors, the floor, the distance.
 _LENGTHS, _SHARED, _DISTANCE = slice(_N, _N + 2), slice(_N, _N + 4), _N + 3
@@ -290,23 +290,25 @@ class _Fit:
             others = self._folded(seen)
             costs = np.sum(self._residuals(others, seen) ** 2, axis=1)
             starts.append(others[np.argmin(costs)])
-        best: _Solution | None = None
-        for values in starts:
-            for _ in range(_STEPS + 1):
-                moved = np.concatenate([values[None], values + _DIFFERENCE * np.eye(len(values))])
-                residuals = self._residuals(moved, seen)
-                jacobian = (residuals[1:] - residuals[0]).T / _DIFFERENCE
+        values = np.array(starts)
+        nearby = _DIFFERENCE * np.eye(values.shape[1])
+        found: list[list[_Solution]] = [[] for _ in starts]
+        for _ in range(_STEPS + 1):
+            moved = np.concatenate([values[:, None], values[:, None] + nearby], axis=1)
+            rows = self._residuals(moved.reshape(-1, values.shape[1]), seen)
+            rows = rows.reshape(*moved.shape[:2], -1)
+            steps = []
+            jacobians = (rows[:, 1:] - rows[:, :1]).swapaxes(1, 2) / _DIFFERENCE
+            for number, (residuals, jacobian) in enumerate(zip(rows[:, 0], jacobians, strict=True)):
                 information = jacobian.T @ jacobian
                 count = 1 if seen is None else 4 + 8
-                rms = float(np.sqrt(np.sum(residuals[0] ** 2) / count))
-                if best is None or rms < best.rms:
-                    best = _Solution(values, information, rms)
-                step = np.linalg.solve(information, jacobian.T @ residuals[0])
-                values = values - np.clip(step, -_LARGEST_STEP, _LARGEST_STEP)
-                values[:_N] = np.clip(values[:_N], *LEG_LIMITS.T)
-                values[_LENGTHS] = np.clip(values[_LENGTHS], -_MOST_LENGTH, _MOST_LENGTH)
-        assert best is not None
-        return best
+                rms = float(np.sqrt(np.sum(residuals**2) / count))
+                found[number].append(_Solution(values[number], information, rms))
+                steps.append(np.linalg.solve(information, jacobian.T @ residuals))
+            values = values - np.clip(steps, -_LARGEST_STEP, _LARGEST_STEP)
+            values[:, :_N] = np.clip(values[:, :_N], *LEG_LIMITS.T)
+            values[:, _LENGTHS] = np.clip(values[:, _LENGTHS], -_MOST_LENGTH, _MOST_LENGTH)
+        return min(chain.from_iterable(found), key=lambda one: one.rms)
 
     def _folded(self, seen: _Seen) -> FloatArray:
         """Return values (16, 12) of legs whose knees and ankles are where they are seen.
@@ -343,15 +345,12 @@ class _Fit:
         """Return hips, knees and ankles (..., 2, 3, 3) of values (..., 12), reference frame."""
         hip_m = self._hip_m * np.exp(values[..., _DISTANCE, None])
         lengths_m = self._lengths_m * np.exp(values[..., _N : _N + 2])
-        legs = []
-        for number, side in enumerate(_SIDES):
-            angles = values[..., 4 * number : 4 * number + 4]
-            bones = leg_directions(angles, side)
-            chain = [hip_m + side * self._aside]
-            for part, bone in enumerate(bones):
-                chain.append(chain[-1] + lengths_m[..., part, None] * (bone @ self._turn.T))
-            legs.append(np.stack(chain, axis=-2))
-        return np.stack(legs, axis=-3)
+        angles = values[..., :_N].reshape(*values.shape[:-1], 2, 4)
+        bones = np.stack(leg_directions(angles, _SIDES), axis=-2)
+        turned = (bones.reshape(-1, 3) @ self._turn.T).reshape(bones.shape)
+        hips_m = hip_m[..., None, None, :] + np.outer(_SIDES, self._aside)[:, None]
+        steps_m = lengths_m[..., None, :, None] * turned
+        return np.asarray(np.cumsum(np.concatenate([hips_m, steps_m], axis=-2), axis=-2))
 
     def _residuals(self, values: FloatArray, seen: _Seen | None) -> FloatArray:
         """Return the residuals (n, m) of values (n, 12)."""
@@ -374,7 +373,7 @@ class _Fit:
             bones = np.diff(points_m, axis=2)
             bones /= np.linalg.norm(bones, axis=-1, keepdims=True)
             slopes = (bones @ self._sight - seen.slopes) / seen.sigma_slopes
-            found.append(np.nan_to_num(slopes).reshape(len(values), -1))
+            found.append(np.where(np.isnan(slopes), 0.0, slopes).reshape(len(values), -1))
         return np.concatenate(found, axis=1)
 
     def legs(self, seen: _Seen | None, found: _Solution, covariance: FloatArray) -> Legs:

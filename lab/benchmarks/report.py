@@ -59,6 +59,7 @@ def report(results: Mapping[str, Any]) -> str:
         ),
         f"One core manages {results['particles_at_30hz']:,} particles per image at 30 Hz.",
         *_ratios(results.get("ratios")),
+        *_film(results.get("film")),
         *_nodes(results["nodes"]),
         *_way(results["way"]),
         "In the pauses of a live node the processor slows down and its caches cool. Image to "
@@ -109,6 +110,35 @@ def _ratios(ratios: Mapping[str, Any] | None) -> list[str]:
         "numpy. `python -m lab.benchmarks.silhouette RECORDING` measures a recording's "
         "silhouettes.",
         _table(("ratio", "median"), rows),
+    ]
+
+
+def _film(film: Mapping[str, Any] | None) -> list[str]:
+    if film is None:
+        return []
+    runs = [run for run in film if run != "commit"]
+    steps = [film[run]["steps_ms"] for run in runs]
+    totals = [sum(one.values()) for one in steps]
+    rows = [
+        (
+            step,
+            *(
+                f"{one[step]:.1f} ms, {one[step] / total:.0%}" if one[step] else ""
+                for one, total in zip(steps, totals, strict=True)
+            ),
+        )
+        for step in steps[0]
+    ]
+    rows.append(("all", *(f"{total:.1f} ms" for total in totals)))
+    rows.append(("images a second, all in all", *(f"{film[run]['hz']:.1f}" for run in runs)))
+    return [
+        "## A film",
+        f"`python -m lab.benchmarks.film` (commit {film['commit']}) tracks the film of `cardbox "
+        "demo`, enlarged to 1280x960, or twice side by side in 1280x480, with the detector. "
+        "Processor time an image and its share, with compiled code loaded; a thread decodes, one "
+        "resizes, one detects, and one draws and encodes, beside the one that does the rest. Each "
+        "image is read twice, to measure the scene and to track.",
+        _table(("step", *runs), rows),
     ]
 
 

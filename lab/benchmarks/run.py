@@ -9,6 +9,7 @@ from typing import Any
 from cardbox_tracker.common.errors import CardboxError
 from cardbox_tracker.common.progress import progress_bar
 from lab.benchmarks.core import measure_core
+from lab.benchmarks.film import measure_films
 from lab.benchmarks.nodes import measure_nodes
 from lab.benchmarks.ratios import measure_ratios
 from lab.benchmarks.report import PICTURE_OF_WAY, write_report
@@ -33,7 +34,8 @@ def run_benchmark(
         report_path: Markdown file to write.
         frames: images that the estimation is measured on.
         seconds: duration of the measurement of the nodes for each stream and rate.
-        session: recorded person whom the detector sees; None for the drawn one, whom it does not.
+        session: recorded person whom the detector sees, with which films are measured, too; None
+            for the drawn one, whom it does not.
 
     Raises:
         CardboxError: a node failed or a file cannot be written.
@@ -46,6 +48,7 @@ def run_benchmark(
         nodes = measure_nodes(seconds, lambda done: show(0.4 + 0.5 * done), session)
         way = measure_way(seconds) if nodes else None
         ratios = measure_ratios(nodes is not None)
+        film = measure_films() if session is not None else None
         show(1.0)
     results = {
         **{name: core.pop(name) for name in list(core) if not isinstance(core[name], dict)},
@@ -54,6 +57,7 @@ def run_benchmark(
         "measured_frames": frames,
         **core,
         "ratios": ratios,
+        "film": film,
         "nodes": nodes,
         "way": way,
     }

@@ -66,15 +66,15 @@ def test_overlapping_detections_are_averaged_by_their_scores() -> None:
 
 
 def test_a_point_moves_to_the_centroid_of_its_heat() -> None:
-    heat = np.zeros((64, 64, 1))
-    heat[20, 30], heat[20, 31] = 0.6, 0.6
+    heat = np.full((64, 64, 1), -60.0)
+    heat[20, 30:32] = np.log(0.6 / 0.4)
     refined = pose_network._refined(np.array([[29.2 / 64, 20.5 / 64]]), heat)
     np.testing.assert_allclose(refined, [[30.5 / 64, 20.0 / 64]])
 
 
 def test_a_point_without_heat_stays() -> None:
     point = np.array([[0.4, 0.6]])
-    np.testing.assert_array_equal(pose_network._refined(point, np.zeros((64, 64, 1))), point)
+    np.testing.assert_array_equal(pose_network._refined(point, np.full((64, 64, 1), -60.0)), point)
 
 
 def test_a_point_outside_of_the_heat_map_stays() -> None:

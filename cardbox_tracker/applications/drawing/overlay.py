@@ -43,6 +43,8 @@ _BONE_BGR = {
 }
 
 _SHIFT, _OUTLINE_SHIFT = 4, 1
+# Pixels beside a polygon that drawing it may change.
+_EDGE_PX = 3
 # Lines and text are readable from this size of the longer side on.
 _READABLE_PX = 640
 
@@ -96,7 +98,7 @@ def draw_camera_overlay(
     A small picture, (H, W) grey or (H, W, 3) bgr, is enlarged by a whole factor, so that lines and
     text are readable.
     """
-    scale = _readable_scale(picture)
+    scale = readable_scale(picture)
     if number == 0:
         return draw_overlay(picture, tracker.body, tracker.camera, estimate, scale)
     view = tracker.views[number - 1]
@@ -114,14 +116,14 @@ def draw_sharp_overlay(picture: ImageArray, estimate: Estimate, tracker: Tracker
 
     A small picture is enlarged by repeated pixels, which compress well under sharp lines and text.
     """
-    scale = _readable_scale(picture)
+    scale = readable_scale(picture)
     large = picture.repeat(scale, axis=0).repeat(scale, axis=1)
     return draw_overlay(large, tracker.body, tracker.camera, estimate)
 
 
 def draw_message(image: ImageArray, text: str) -> ImageArray:
     """Return a bgr image with ``text`` over ``image`` (H, W) or (H, W, 3), enlarged if small."""
-    canvas = enlarged(image, _readable_scale(image))
+    canvas = enlarged(image, readable_scale(image))
     _draw_text(canvas, text)
     return canvas
 
@@ -142,13 +144,16 @@ def draw_model(
     """
     frames = pose(body, posture)
     patches = patches_at(body, frames)
-    tint = canvas.copy()
     # The torso is drawn first, so that an arm in front of it stays visible.
     parts = sorted(_polygons(camera, patches), key=lambda part: part[0] in _PART_BGR)
-    for name, polygon in parts:
-        colour = _PART_BGR.get(name, _TORSO_BGR)
-        cv2.fillConvexPoly(tint, _subpixels(polygon), colour, cv2.LINE_AA, _SHIFT)
-    cv2.addWeighted(tint, _FILL, canvas, 1.0 - _FILL, 0.0, canvas)
+    region, corner = _region_of(parts, _EDGE_PX)
+    there = canvas[region]
+    if there.size:
+        tint = there.copy()
+        for name, polygon in parts:
+            colour = _PART_BGR.get(name, _TORSO_BGR)
+            cv2.fillConvexPoly(tint, _subpixels(polygon, corner), colour, cv2.LINE_AA, _SHIFT)
+        there[:] = cv2.addWeighted(tint, _FILL, there, 1.0 - _FILL, 0.0)
     thickness = max(1, round(camera.width / 400))
     draw_outline(canvas, camera, patches, outline_bgr, thickness)
     _draw_skeleton(canvas, frames, camera, thickness, states)
@@ -164,13 +169,17 @@ def draw_outline(
 ) -> None:
     """Draw the common outline of ``patches`` (15, 4, 3), ``thickness`` px wide, in place."""
     fine = camera.scaled(*(size << _OUTLINE_SHIFT for size in (camera.width, camera.height)))
-    model = np.zeros((fine.height, fine.width), np.uint8)
-    for _, polygon in _polygons(fine, patches):
-        cv2.fillConvexPoly(model, _subpixels(polygon), 255, cv2.LINE_8, _SHIFT)
+    parts = list(_polygons(fine, patches))
     # A patch seen edge-on is a thin line that does not show the extent of the part.
     whisker = max(3, fine.width // 128)
+    region, corner = _region_of(parts, whisker + _EDGE_PX)
+    model = np.zeros((fine.height, fine.width), np.uint8)[region]
+    if not model.size:
+        return
+    for _, polygon in parts:
+        cv2.fillConvexPoly(model, _subpixels(polygon, corner), 255, cv2.LINE_8, _SHIFT)
     opened = cv2.morphologyEx(model, cv2.MORPH_OPEN, np.ones((whisker, whisker), np.uint8))
-    found, _ = cv2.findContours(opened, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
+    found, _ = cv2.findContours(opened, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE, offset=corner)
     outlines = [np.asarray(cv2.approxPolyDP(one, 1.0, True), np.int32) for one in found]
     cv2.polylines(canvas, outlines, True, colour, thickness, cv2.LINE_AA, _OUTLINE_SHIFT)
 
@@ -278,12 +287,12 @@ def _polygons(camera: Camera, patches: FloatArray) -> Iterator[tuple[str, FloatA
     """Yield the side (left, right or another word) and the pixels (n, 2) of each visible patch."""
     optical = camera.reference_to_optical(patches)
     for name, corners in zip(PATCH_NAMES, optical, strict=True):
-        polygon = clip_near(corners)
+        polygon = corners if in_front(corners).all() else clip_near(corners)
         if len(polygon) > 2:
             yield name.split("_")[0], camera.project(polygon)
 
 
-def _readable_scale(image: ImageArray) -> int:
+def readable_scale(image: ImageArray) -> int:
     """Return the whole factor from which lines and text over ``image`` (H, W, ...) are readable."""
     longer_px = int(max(image.shape[:2]))
     return -(-_READABLE_PX // longer_px)
@@ -294,13 +303,35 @@ def enlarged(image: ImageArray, scale: int) -> ImageArray:
     height, width = image.shape[:2]
     size = (scale * width, scale * height)
     bgr = image if image.ndim == 3 else cv2.cvtColor(image, cv2.COLOR_GRAY2BGR)
-    return np.array(cv2.resize(bgr, size, interpolation=cv2.INTER_LINEAR), np.uint8)
+    large = bgr if scale == 1 else cv2.resize(bgr, size, interpolation=cv2.INTER_LINEAR)
+    return np.array(large, np.uint8)
 
 
-def _subpixels(pixels: FloatArray) -> NDArray[np.int32]:
-    """Return pixel coordinates in OpenCV's fixed-point format with ``_SHIFT`` fractional bits."""
+def _subpixels(pixels: FloatArray, corner: tuple[int, int] = (0, 0)) -> NDArray[np.int32]:
+    """Return pixel coordinates in OpenCV's fixed-point format with ``_SHIFT`` fractional bits.
+
+    They count from the pixel ``corner`` (column, row).
+    """
     clipped = np.clip(pixels, -30_000, 30_000)
-    return np.asarray(np.round(clipped * (1 << _SHIFT)), dtype=np.int32)
+    placed = np.asarray(np.round(clipped * (1 << _SHIFT)), dtype=np.int32)
+    return placed - (np.asarray(corner, np.int32) << _SHIFT)
+
+
+def _region_of(
+    parts: Sequence[tuple[str, FloatArray]], margin_px: float
+) -> tuple[tuple[slice, slice], tuple[int, int]]:
+    """Return rows and columns of polygons with a margin, and their first column and row."""
+    if not parts:
+        return np.s_[:0, :0], (0, 0)
+    return _around(np.concatenate([polygon for _, polygon in parts]), margin_px)
+
+
+def _around(pixels: FloatArray, margin_px: float) -> tuple[tuple[slice, slice], tuple[int, int]]:
+    """Return rows and columns around pixels (N, 2), and the first column and row."""
+    low = np.trunc(pixels.min(axis=0) - margin_px)
+    high = np.ceil(pixels.max(axis=0) + margin_px)
+    (left, top), (right, bottom) = np.maximum((low, high), 0).astype(int).tolist()
+    return np.s_[top:bottom, left:right], (left, top)
 
 
 def with_hidden_head(
@@ -346,6 +377,4 @@ def _head_region(
     if points is not None:
         face = points.px[_FACE]
         head = np.concatenate([head, face[np.isfinite(face).all(axis=1)]])
-    low, high = np.trunc(head.min(axis=0) - margin), np.ceil(head.max(axis=0) + margin)
-    (left, top), (right, bottom) = np.maximum((low, high), 0).astype(int).tolist()
-    return np.s_[top:bottom, left:right]
+    return _around(head, margin)[0]

@@ -11,18 +11,20 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from cardbox_tracker.applications.drawing.overlay import ImageArray, draw_camera_overlay
+from cardbox_tracker.applications.drawing.overlay import ImageArray, draw_overlay, readable_scale
+from cardbox_tracker.camera.camera import Camera
+from cardbox_tracker.common.beside import done_beside
 from cardbox_tracker.common.errors import BagError, CardboxError
 from cardbox_tracker.common.files import atomic_path
+from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.recordings.recording import Recording
 from cardbox_tracker.recordings.silhouettes import RecordedFrame
 from cardbox_tracker.recordings.track import Observer
 from cardbox_tracker.tracking.estimate import Estimate
-from cardbox_tracker.tracking.tracker import Tracker
 
 # Rate of a video of a single image.
 _USUAL_HZ = 15.0
-_H264 = {"preset": "veryfast", "crf": "20"}
+_H264 = {"preset": "superfast", "crf": "23"}
 
 
 @contextmanager
@@ -78,6 +80,8 @@ def _encoder(
 def overlay_video(path: Path, recording: Recording) -> Iterator[Observer]:
     """Context of an observer that draws each estimate over the image of the first camera.
 
+    Another thread draws and encodes, while the next images are tracked.
+
     The video has the rate, the size and the aspect ratio of the recorded images; small images are
     enlarged to at least 640 px along the longer side.
 
@@ -88,21 +92,26 @@ def overlay_video(path: Path, recording: Recording) -> Iterator[Observer]:
         rate_hz = round(1e9 / max(1, recording.first.period_ns()), 2)
     except BagError:
         rate_hz = _USUAL_HZ
+    drawn: dict[int, ImageArray] = {}
     with video_file(path, rate_hz) as add:
-        drawn: dict[int, ImageArray] = {}
 
-        def observe(frame: RecordedFrame, estimate: Estimate, tracker: Tracker) -> None:
+        def draw(frame: RecordedFrame, estimate: Estimate, body: BodyModel, camera: Camera) -> None:
             # Several people are drawn one after the other into the same picture.
             if frame.stamp_ns not in drawn:
                 finish()
                 drawn[frame.stamp_ns] = recording.first.full_picture(frame)
             picture = drawn[frame.stamp_ns]
-            drawn[frame.stamp_ns] = draw_camera_overlay(picture, 0, estimate, tracker)
+            scale = readable_scale(picture)
+            drawn[frame.stamp_ns] = draw_overlay(picture, body, camera, estimate, scale)
 
         def finish() -> None:
             for picture in drawn.values():
                 add(picture)
             drawn.clear()
 
-        yield observe
+        with done_beside(draw) as submit:
+            # The next image may change what the tracker knows of the person.
+            yield lambda frame, estimate, tracker: submit(
+                frame, estimate, tracker.body, tracker.camera
+            )
         finish()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import time
 from pathlib import Path
 from typing import Any
 
@@ -13,9 +14,9 @@ from cardbox_tracker.applications.simulation.session import SessionFormat, synth
 from cardbox_tracker.commands.main import main
 from cardbox_tracker.common.errors import CardboxError
 from lab.benchmarks import core as benchmark_core
+from lab.benchmarks import film, views
 from lab.benchmarks import report as benchmark_report
 from lab.benchmarks import run as benchmark
-from lab.benchmarks import views
 from lab.benchmarks.default_stages import WHOLE
 from lab.benchmarks.scene import make_scene, recorded_scene
 from lab.benchmarks.silhouette import WITHOUT, colored, measure_silhouettes
@@ -235,3 +236,25 @@ def test_the_committed_report_is_made_from_the_committed_numbers() -> None:
     results = read_json(ROOT / BENCHMARKS)
     assert set(PROMISED) <= set(results)
     assert (ROOT / "docs" / "benchmarks.md").read_text() == benchmark_report.report(results)
+
+
+def test_a_step_takes_the_time_that_its_inner_steps_do_not() -> None:
+    clock = film.Clock()
+
+    def busy(seconds: float) -> None:
+        end_s = time.thread_time() + seconds
+        while time.thread_time() < end_s:
+            pass
+
+    inner = clock.timing("resizing", busy)
+
+    def outer() -> None:
+        busy(0.02)
+        inner(0.04)
+
+    clock.timing("decoding", outer)()
+    clock.timing("drawing", outer)()
+    assert clock.spent_s["decoding"] == pytest.approx(0.02, abs=0.01)
+    assert clock.spent_s["resizing"] == pytest.approx(0.04, abs=0.01)
+    assert clock.spent_s["drawing"] == pytest.approx(0.06, abs=0.01)
+    assert sum(clock.spent_s.values()) == pytest.approx(0.12, abs=0.02)
