@@ -39,8 +39,6 @@ from cardbox_tracker.person.legs import (
     HIP_SHARE,
     LEG_LIMITS,
     LEG_NAMES,
-    SHANK_SHARE,
-    THIGH_SHARE,
     leg_angles,
     leg_directions,
     stature_of,
@@ -69,8 +67,9 @@ _ENDS = [
 _HIPS = [POINT_INDEX[f"{side}_hip"] for side in ("left", "right")]
 _SHOULDERS = [POINT_INDEX[f"{side}_shoulder"] for side in ("left", "right")]
 
-# Height of the ankle above the floor, as a share of the stature (Drillis & Contini).
-_ANKLE_SHARE = 0.039
+# Where detectors mark knees and ankles: lengths of thigh and shank, and height of the ankle above
+# the floor, as shares of the stature (means of two real and two rendered people).
+_MARKED, _ANKLE_SHARE = np.array([0.236, 0.228]), 0.05
 # A point with a lower score is not seen.
 LEAST_SCORE = 0.5
 # Width of the image's border, as a share of its longer side, where the detector guesses points.
@@ -124,7 +123,7 @@ class LegReader:
         self._body, self._camera = body, camera
         self.forget()
         stature_m = stature_of(body_parts(body.sizes))
-        lengths_m = (THIGH_SHARE + SHANK_SHARE + _ANKLE_SHARE) * stature_m
+        lengths_m = (_MARKED.sum() + _ANKLE_SHARE) * stature_m
         self._usual = np.array([0.0, 0.0, body.placement.hip_height_m - lengths_m, 0.0])
         self._usual_stddev = np.array([_LENGTH, _LENGTH, _FLOOR_M, _DISTANCE_SHARE])
         stands = body.camera_pose
@@ -222,7 +221,7 @@ class _Fit:
         self._hip_m = pose(placed, estimate.posture).hip
         self._turn = rotation_z(np.asarray(estimate.posture[YAW]))
         self._aside = self._turn[:, 1] * HIP_SHARE * stature_m
-        self._lengths_m = np.array([THIGH_SHARE, SHANK_SHARE]) * stature_m
+        self._lengths_m = _MARKED * stature_m
         self._ankle_m = _ANKLE_SHARE * stature_m
         self._sight = camera.optical_to_reference(np.array([0.0, 0.0, 1.0]))
         place = estimate.place
