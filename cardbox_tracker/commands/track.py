@@ -153,6 +153,7 @@ def track_one(options: argparse.Namespace, show: Callable[[float], None] | None 
         CardboxError: options are wrong, or a file cannot be read or written.
     """
     from cardbox_tracker.recordings.result_table import check_table
+    from cardbox_tracker.tracking.precompile import compile_for_films
 
     faults = _without_effect(options, _OF_MANY, "which is one recording: give --csv")
     request = tracking_request(options, faults)
@@ -179,6 +180,8 @@ def track_one(options: argparse.Namespace, show: Callable[[float], None] | None 
     written = (table, body, scene, video, options.json)
     every = (*written, *derived)
     check_outputs(every, options.force, request.inputs, results=(options.bag,))
+    if request.preset == "default":
+        compile_for_films()
     summary = track(replace(request, files=files, force=options.force), show=show)
     if options.json is not None:
         with atomic_path(options.json) as temporary:
