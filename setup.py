@@ -120,6 +120,7 @@ setup(
         f"{NAME}.ros": ["*.csv"],
         f"{NAME}.search": ["*.json"],
         f"{NAME}.terms": ["*.json"],
+        f"{NAME}.tracking": ["*.json"],
     },
     zip_safe=False,
     data_files=[

@@ -63,14 +63,15 @@ def _track_film(output: Path, seed: int) -> None:
     from cardbox_tracker.recordings.given_camera import GivenCamera
     from cardbox_tracker.recordings.result_reader import read_results
     from cardbox_tracker.search.config import PRESETS
+    from cardbox_tracker.tracking.precompile import compile_for_films
 
     try:
         output.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise CardboxError(f"cannot make the folder {output}: {error.strerror}") from None
     film = DemoFilm.load()
-    print(f"film: {SOURCE}")
-    print("compile (one to two minutes, the first time only)", flush=True)
+    print(f"film: {SOURCE}", flush=True)
+    compile_for_films()
     detector, camera = film.detector, GivenCamera(film.fov_deg)
     recording = RecordingRequest(film.path, detector, detector, (), None, None, camera)
     body = body_from_proportions(film.stature_m)

@@ -146,6 +146,7 @@ def _without_effect(options: argparse.Namespace, names: tuple[str, ...], what: s
 def track_one(options: argparse.Namespace, show: Callable[[float], None] | None = None) -> None:
     """Track one recording and write the requested files; see :func:`~.tracking.track`."""
     from cardbox_tracker.recordings.result_table import check_table
+    from cardbox_tracker.tracking.precompile import compile_for_films
 
     faults = _without_effect(options, _OF_MANY, "which is one recording: give --csv")
     request = tracking_request(options, faults)
@@ -172,6 +173,8 @@ def track_one(options: argparse.Namespace, show: Callable[[float], None] | None 
     written = (table, body, scene, video, options.json)
     every = (*written, *derived)
     check_outputs(every, options.force, request.inputs, results=(options.bag,))
+    if request.preset == "default":
+        compile_for_films()
     summary = track(replace(request, files=files, force=options.force), show=show)
     if options.json is not None:
         with atomic_path(options.json) as temporary:

@@ -151,9 +151,18 @@ def _save(save: Callable[..., None], *compiled: Any) -> None:
 _warn_once = cache(_LOG.warning)
 
 
+def _refuse(function: Callable[..., Any], *_: Any) -> None:
+    raise TypeError(f"{function.__qualname__} is for compiled functions; Python cannot call it")
+
+
 def njit(**options: Any) -> Callable[[F], F]:
-    """Return ``numba.njit`` with ``options``, a folder for its code and no interpreter lock."""
-    compiled: Any = partial(numba.njit, nogil=True, error_model="numpy", **options)
+    """Return ``numba.njit`` with ``options``, a folder for its code and no interpreter lock.
+
+    Without a wrapper for Python (``no_cpython_wrapper``), a function compiles faster, and calls
+    from Python raise TypeError. No function gets numba's wrapper for C.
+    """
+    options |= {"nogil": True, "error_model": "numpy", "no_cfunc_wrapper": True}
+    compiled: Any = partial(numba.njit, **options)
 
     def decorate(function: F) -> F:
         # numba chooses the folder of a function now, and other packages keep theirs.
@@ -167,6 +176,10 @@ def njit(**options: Any) -> Callable[[F], F]:
                 _CONFIG.CACHE_DIR = before
         kept: Any = made
         kept._cache.save_overload = partial(_save, kept._cache.save_overload)
+        if "no_cpython_wrapper" in options:
+            # numba would call a null pointer.
+            kept._insert = lambda *_: None
+            kept._compile_for_args = partial(_refuse, function)
         return made
 
     return decorate
@@ -175,17 +188,17 @@ def njit(**options: Any) -> Callable[[F], F]:
 kernel = njit()
 """Decorator that compiles a function."""
 
-borrowing_kernel = njit(_nrt=False)
-"""Decorator that compiles a function which counts no references to the arrays that it is given.
+borrowing_kernel = njit(_nrt=False, no_cpython_wrapper=True)
+"""Decorator for a function that counts no references to the arrays which compiled code gives it.
 
 Counting takes longer than a few additions, so the loops of kernels call such functions. They
 allocate and return no arrays, also not in tuples: their callers would release them.
 """
 
-inlined_kernel = njit(forceinline=True, _nrt=False)
+inlined_kernel = njit(forceinline=True, _nrt=False, no_cpython_wrapper=True)
 """Decorator as :data:`borrowing_kernel`; the function is inlined into its callers."""
 
-inlined_allocation = njit(forceinline=True)
+inlined_allocation = njit(forceinline=True, no_cpython_wrapper=True)
 """Decorator that compiles and inlines a function which allocates or returns arrays."""
 
 copied_kernel = njit(inline="always")

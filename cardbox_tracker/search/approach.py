@@ -115,7 +115,8 @@ def at_distances(
     states = np.empty((distances_m.shape[0], N_STATE))
     ahead_m = max(body_m - state[TORSO_X], 1e-3)
     for i in range(states.shape[0]):
-        states[i] = state
+        for d in range(N_STATE):
+            states[i, d] = state[d]
         states[i, TORSO_X] = body_m - distances_m[i]
         states[i, TORSO_Y] = state[TORSO_Y] * (distances_m[i] / ahead_m)
         clip_state(states[i], limits)

@@ -61,7 +61,8 @@ def combine(
     lefts, rights = least_of(left_ratings, n + 1), least_of(right_ratings, n + 1)
     states = np.empty((2 * n, N_STATE))
     for i in range(2 * n):
-        states[i] = torso
+        for d in range(N_STATE):
+            states[i, d] = torso[d]
         j = i - n
         if i < n:
             one, other = i, i
@@ -69,8 +70,9 @@ def combine(
             one, other = 0, j + 1
         else:
             one, other = j - n // 2 + 1, 0
-        states[i, _LEFT : _LEFT + ARM_ANGLES] = left[lefts[one]]
-        states[i, _RIGHT : _RIGHT + ARM_ANGLES] = right[rights[other]]
+        for d in range(ARM_ANGLES):
+            states[i, _LEFT + d] = left[lefts[one], d]
+            states[i, _RIGHT + d] = right[rights[other], d]
     return states
 
 

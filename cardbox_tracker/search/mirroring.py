@@ -51,7 +51,8 @@ def mirrored_states(state: Floats, body: BodyTuple, arm_limits: Floats) -> Float
     states = np.empty((16, state.shape[0]))
     state_pose(state, of.place, of.camera, rotation, hip)
     for i in range(16):
-        states[i] = state
+        for d in range(state.shape[0]):
+            states[i, d] = state[d]
         for arm in range(2):
             angles, side = angles_in(states[i], arm), side_of(arm)
             pose_arm(angles, side, of.parts, of.girdle, points, directions)

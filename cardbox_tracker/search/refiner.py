@@ -146,7 +146,8 @@ def _add(
                     there[i] = 0.0
                     for j in range(N_STATE):
                         there[i] += turned[i, j] * row[j]
-                row[:] = there
+                for i in range(N_STATE):
+                    row[i] = there[i]
             for i in range(N_STATE):
                 right[i] -= row[i] * values[n, r]
                 for j in range(i + 1):

@@ -74,7 +74,7 @@ def choose_apart(
     elbows and hands in the torso's frame, from ``joints_m`` (N, 6, 3), ``torso_x``, ``torso_y``,
     yaw and pitch, with a factor of 0.3 m per radian.
     """
-    order = np.argsort(ratings, kind="mergesort")
+    order = least_of(ratings, ratings.shape[0])
     chosen = np.empty(most, np.int64)
     features, one = np.empty((most, 16)), np.empty(16)
     found = 0
@@ -100,7 +100,8 @@ def choose_apart(
                     is_new = False
                     break
         if is_new:
-            features[found] = one
+            for c in range(16):
+                features[found, c] = one[c]
             chosen[found] = i
             found += 1
             if found == most:
@@ -114,7 +115,8 @@ def best_states(states: Floats, ratings: Floats, count: int) -> Floats:
     order = least_of(ratings, count)
     best = np.empty((count, N_STATE))
     for i in range(count):
-        best[i] = states[order[i]]
+        for d in range(N_STATE):
+            best[i, d] = states[order[i], d]
     return best
 
 
@@ -126,7 +128,7 @@ def mean_and_spread(
 
     The weights of the states (N, 14) are exp(-(rating - best) / ``spread``).
     """
-    order = np.argsort(ratings, kind="mergesort")
+    order = least_of(ratings, count)
     best = ratings[order[0]]
     mean, squares = np.zeros(N_STATE), np.zeros(N_STATE)
     total = 0.0

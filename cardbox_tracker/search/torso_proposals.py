@@ -123,15 +123,17 @@ def pool_of(
     m = survivors.shape[0]
     order = least_of(ratings, count)
     pool = np.empty((m + 2 * count, N_STATE))
-    pool[:m] = survivors
+    for i in range(m):
+        for d in range(N_STATE):
+            pool[i, d] = survivors[i, d]
     old, new, hip = np.empty((3, 3)), np.empty((3, 3)), np.empty(3)
     directions, turned = np.empty(6), np.empty(6)
     of = body_of(body)
     state_pose(arms_of, of.place, of.camera, old, hip)
     for i in range(count):
-        pool[m + i] = torsos[order[i]]
         state = pool[m + count + i]
-        state[:] = torsos[order[i]]
+        for d in range(N_STATE):
+            pool[m + i, d] = state[d] = torsos[order[i], d]
         state_pose(state, of.place, of.camera, new, hip)
         for arm in range(2):
             side = side_of(arm)

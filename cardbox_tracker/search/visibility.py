@@ -118,12 +118,15 @@ def _is_behind(point_m: FloatArray, patch_m: FloatArray, lens: Lens) -> bool:
     # A point is in a convex patch if it is on the same side of all edges.
     if lefts < 4 and rights < 4:
         return False
-    normal = np.cross(patch_m[1] - patch_m[0], patch_m[3] - patch_m[0])
     # Depth of the plane on the line of sight of the point.
     away, along = 0.0, 0.0
+    first, next_m, last_m = patch_m[0], patch_m[1], patch_m[3]
     for axis in range(3):
-        away += normal[axis] * patch_m[0, axis]
-        along += normal[axis] * point_m[axis]
+        i, j = (axis + 1) % 3, (axis + 2) % 3
+        normal = (next_m[i] - first[i]) * (last_m[j] - first[j])
+        normal -= (next_m[j] - first[j]) * (last_m[i] - first[i])
+        away += normal * first[axis]
+        along += normal * point_m[axis]
     return bool(point_m[2] > point_m[2] * away / along + BEHIND_M)
 
 

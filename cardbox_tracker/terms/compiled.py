@@ -34,12 +34,11 @@ class CompiledSilhouette(SilhouetteTerm):
     """The silhouette's term with compiled kernels."""
 
     def __init__(self, body: BodyModel, camera: Camera) -> None:
-        """Prepare for one body and one camera, and compile the kernels if necessary."""
+        """Prepare for one body and one camera."""
         super().__init__(body, camera)
         self._cardbox = (*shape_of(body.sizes), place_of(body), intrinsics_of(camera))
         # 16 bits suffice for images narrower than 32768 px, and less memory stays in the cache.
         self._sums = np.int16 if camera.width < 2**15 else np.int32
-        self.warm_up()
 
     def warm_up(self) -> None:
         """Run every kernel once, so that no live image waits for the compiler."""

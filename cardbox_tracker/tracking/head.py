@@ -214,7 +214,7 @@ def _solve(
     least, kept = np.inf, np.empty((6, 6))
     for start in range(_STARTS_RAD.shape[0]):
         values = np.zeros(6)
-        values[:2] = _STARTS_RAD[start]
+        values[0], values[1] = _STARTS_RAD[start, 0], _STARTS_RAD[start, 1]
         for number in range(_STEPS + 1):
             _residuals(values, torso, axes, centre_m, face_m, px, lens, sigma_px, here)
             for j in range(6):
@@ -242,10 +242,15 @@ def _solve(
             cost += here[i] ** 2
         if cost < least:
             least = cost
-            best[:], kept[:] = values, normal
+            for j in range(6):
+                best[j] = values[j]
+                for k in range(6):
+                    kept[j, k] = normal[j, k]
     covariance, matrix = np.empty((6, 6)), np.empty((6, 6))
     for j in range(6):
-        matrix[:] = kept
+        for i in range(6):
+            for k in range(6):
+                matrix[i, k] = kept[i, k]
         covariance[j] = 0.0
         covariance[j, j] = 1.0
         solve(matrix, covariance[j])

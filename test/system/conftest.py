@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
+import atexit
+import ctypes
+import functools
 import itertools
+import json
 import os
 import signal
 import subprocess
@@ -82,36 +86,82 @@ class Scene:
         return np.clip(clean + self._rng.normal(0, 2, clean.shape), 0, 255).astype(np.uint8)
 
 
+# A process that has imported the nodes and loaded their code, of which each node is a copy: a node
+# then starts at once. The parent of a copy ends, so that the tests' process inherits the copy.
+SERVER = """
+import json, os, sys
+from cardbox_tracker.start import NODES, main
+from cardbox_tracker.ros.nodes import single_process
+from cardbox_tracker.tracking import precompile
+for part in json.loads(precompile.FILM_KERNELS.read_text()).items():
+    precompile.compile_each(part)
+for line in sys.stdin:
+    words, log, environment = json.loads(line)
+    if parent_of_copy := os.fork():
+        os.waitpid(parent_of_copy, 0)
+        print("started", flush=True)
+    elif copy := os.fork():
+        print(copy, flush=True)
+        os._exit(0)
+    else:
+        for number, path in enumerate((os.devnull, log, log)):
+            os.dup2(os.open(path, os.O_RDWR | os.O_CREAT | os.O_APPEND), number)
+        os.environ.clear()
+        os.environ.update(environment)
+        sys.argv = ["", *words]
+        sys.exit(main())
+"""
+# PR_SET_CHILD_SUBREAPER of <linux/prctl.h>.
+SUBREAPER = 36
+
+
+@functools.cache
+def server() -> subprocess.Popen[str]:
+    """Start the process that nodes are copies of; it ends with its input."""
+    started = subprocess.Popen(
+        [sys.executable, "-uc", SERVER], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
+    )
+    atexit.register(started.communicate)
+    return started
+
+
 class Process:
     """A node in a separate process with a log file."""
 
     def __init__(self, name: str, arguments: tuple[str, ...], log: Path, domain: int) -> None:
         self.log = log
-        environment = {**os.environ, "ROS_DOMAIN_ID": str(domain), "PYTHONUNBUFFERED": "1"}
-        with log.open("w") as output:
-            self.process = subprocess.Popen(
-                [sys.executable, "-m", "cardbox_tracker.start", name, *arguments],
-                stdout=output,
-                stderr=subprocess.STDOUT,
-                env=environment,
-            )
+        self.code: int | None = None
+        log.touch()
+        environment = {**os.environ, "ROS_DOMAIN_ID": str(domain)}
+        of = server()
+        ctypes.CDLL(None).prctl(SUBREAPER, 1)
+        print(json.dumps([[name, *arguments], str(log), environment]), file=of.stdin, flush=True)
+        self.pid = int(of.stdout.readline())
+        assert of.stdout.readline() == "started\n"
+        ctypes.CDLL(None).prctl(SUBREAPER, 0)
+
+    def poll(self) -> int | None:
+        """Return the exit code, which is minus the number of a signal; None before the end."""
+        if self.code is None:
+            ended, status = os.waitpid(self.pid, os.WNOHANG)
+            self.code = os.waitstatus_to_exitcode(status) if ended else None
+        return self.code
 
     def text(self) -> str:
         """Return the output so far."""
         return self.log.read_text()
 
-    def stop(self) -> int:
-        """Stop the process as with Ctrl-C, and return its exit code.
+    def stop(self, number: int = signal.SIGTERM) -> int:
+        """Stop the process by a signal, and return its exit code.
 
         The code is negative if the process did not end and had to be killed.
         """
-        if self.process.poll() is None:
-            self.process.send_signal(signal.SIGTERM)
-        try:
-            return self.process.wait(timeout=STOP_S)
-        except subprocess.TimeoutExpired:
-            self.process.kill()
-            return self.process.wait()
+        end = time.monotonic() + STOP_S
+        while self.poll() is None:
+            os.kill(self.pid, number)
+            number = 0 if time.monotonic() < end else signal.SIGKILL
+            time.sleep(0.01)
+        return self.code
 
 
 class Graph:

@@ -55,8 +55,7 @@ class Camera:
     def kill(self) -> None:
         """Kill the node like a crash; its exit code is not checked."""
         self.graph.processes.remove(self.process)
-        self.process.process.send_signal(signal.SIGKILL)
-        self.process.process.wait()
+        self.process.stop(signal.SIGKILL)
 
     def show(self, posture: str | None, *, focal_px: float = 300.0) -> None:
         """Publish one image and its CameraInfo."""

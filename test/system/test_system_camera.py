@@ -109,9 +109,9 @@ def test_a_source_that_cannot_be_opened_says_what_to_do(
     graph: Any, parameters: dict[str, str], words: tuple[str, ...]
 ) -> None:
     process = graph.start("camera", **parameters)
-    graph.wait(lambda: process.process.poll() is not None, "the end of the process")
+    graph.wait(lambda: process.poll() is not None, "the end of the process")
     graph.processes.remove(process)
-    assert process.process.returncode == 1
+    assert process.code == 1
     for word in words:
         assert word in process.text()
     assert "Traceback" not in process.text()
@@ -119,25 +119,25 @@ def test_a_source_that_cannot_be_opened_says_what_to_do(
 
 def test_an_unreadable_calibration_is_named(graph: Any, video: Path) -> None:
     process = graph.start("camera", file=video, calibration_file="/nowhere.yaml")
-    graph.wait(lambda: process.process.poll() is not None, "the end of the process")
+    graph.wait(lambda: process.poll() is not None, "the end of the process")
     graph.processes.remove(process)
-    assert process.process.returncode == 1
+    assert process.code == 1
     assert "/nowhere.yaml" in process.text() and "Traceback" not in process.text()
 
 
 def test_devices_are_listed_without_a_graph(graph: Any) -> None:
     process = graph.start("camera", "--list")
-    graph.wait(lambda: process.process.poll() is not None, "the end of the process")
+    graph.wait(lambda: process.poll() is not None, "the end of the process")
     graph.processes.remove(process)
-    assert process.process.returncode == 0
+    assert process.code == 0
     assert "video" in process.text() and "Traceback" not in process.text()
 
 
 def test_an_unknown_option_is_told_without_a_traceback(graph: Any) -> None:
     for name, wrong in (("camera", "--lst"), ("play_bag", "--rate=fast"), ("cardbox_nodes", "x")):
         process = graph.start(name, wrong)
-        graph.wait(lambda process=process: process.process.poll() is not None, "the end")
+        graph.wait(lambda process=process: process.poll() is not None, "the end")
         graph.processes.remove(process)
-        assert process.process.returncode == 2
+        assert process.code == 2
         assert wrong.split("=")[-1] in process.text() and "usage:" in process.text()
         assert "Traceback" not in process.text()

@@ -59,8 +59,8 @@ def test_topics_of_the_player_itself_are_left_out(graph: Any, tmp_path: Path, sc
 
 
 def ended(graph: Any, process: Any) -> int:
-    graph.wait(lambda: process.process.poll() is not None, "the end of the bag")
-    return int(process.process.returncode)
+    graph.wait(lambda: process.poll() is not None, "the end of the bag")
+    return int(process.code)
 
 
 @pytest.mark.parametrize("storage", STORAGES)

@@ -123,8 +123,7 @@ class Live:
     def kill(self, name: str) -> None:
         process = self.processes.pop(name)
         self.graph.processes.remove(process)
-        process.process.send_signal(signal.SIGKILL)
-        process.process.wait()
+        process.stop(signal.SIGKILL)
 
     def send(self, sent: Sent) -> None:
         header = header_of(sent.stamp_ns)
@@ -174,12 +173,12 @@ class Live:
     def check_logs(self) -> None:
         for process in self.processes.values():
             text = process.text()
-            assert process.process.poll() is None, text[-2000:]
+            assert process.poll() is None, text[-2000:]
             assert "Traceback" not in text and "unexpected error" not in text, text[-2000:]
 
     def resources(self) -> dict[str, tuple[float, int, int]]:
         """Return memory in MB, open files and threads of each process."""
-        return {name: resources_of(p.process.pid) for name, p in self.processes.items()}
+        return {name: resources_of(p.pid) for name, p in self.processes.items()}
 
 
 @pytest.fixture

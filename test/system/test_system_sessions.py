@@ -104,7 +104,7 @@ def test_session_is_measured_and_tracked_to_its_end(
             assert iou >= 0.80, response.message
             graph.diagnosis(f"{name}/tracker", "")
         assert graph.call(f"{eye}/play_bag/resume").success
-    graph.wait(lambda: player.process.poll() is not None, "the end of the bag")
+    graph.wait(lambda: player.poll() is not None, "the end of the bag")
     frames = [f for f in truth["frames"] if "joints_m" in f]
     last_ns = frames[-1]["stamp_ns"]
     graph.wait(

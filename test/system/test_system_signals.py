@@ -7,6 +7,7 @@ import signal
 import subprocess
 import sys
 import time
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -83,16 +84,15 @@ def test_a_command_that_is_starting_ends(number: int, stage: str, tmp_path: Path
 
 def test_a_node_that_has_ended_has_left_the_graph(own_graph: Any) -> None:
     def listed() -> bool:
-        return "stereo_depth" in own_graph.node.get_node_names()
+        return name in own_graph.node.get_node_names()
 
     # A participant that is not taken off the network stays for its lease of 20 s. The message that
     # takes it off is sent once, and a busy machine may lose it.
-    for _ in range(3):
-        process = own_graph.start("stereo_depth")
+    for name in ("first", "second", "third"):
+        process = own_graph.start("stereo_depth", "--ros-args", "-r", f"__node:={name}")
         own_graph.wait(listed, "the node")
         assert process.stop() == 0
-        begun_s = time.monotonic()
-        own_graph.wait(lambda: not listed(), "leaving the graph", timeout_s=60.0)
-        if time.monotonic() - begun_s < 8.0:
+        with suppress(AssertionError):
+            own_graph.wait(lambda: not listed(), "leaving the graph", timeout_s=8.0)
             return
     pytest.fail("the node stayed in the graph for its lease, three times")

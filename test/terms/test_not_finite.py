@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from cardbox_tracker.camera.camera import Camera
+from cardbox_tracker.common.compiling import kernel
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.terms.compiled import CompiledSilhouette
 from cardbox_tracker.terms.outline import signed_distances
@@ -31,10 +32,11 @@ def test_nan_is_far_to_the_left_or_above(axis: int, changed: tuple[int, ...]) ->
 
 def test_a_point_that_is_nan_has_a_distance_of_the_field() -> None:
     field = np.arange(6, dtype=np.float32).reshape(2, 3)
-    assert distance_at(field, 1.0, 0.5) == 2.5
-    assert distance_at(field, np.nan, 0.0) == 0.0
-    assert distance_at(field, 1.0, np.nan) == 1.0
-    assert distance_at(field, np.nan, np.nan) == 0.0
+    distance = kernel(lambda field, x, y: distance_at(field, x, y))
+    assert distance(field, 1.0, 0.5) == 2.5
+    assert distance(field, np.nan, 0.0) == 0.0
+    assert distance(field, 1.0, np.nan) == 1.0
+    assert distance(field, np.nan, np.nan) == 0.0
 
 
 @pytest.mark.parametrize("rows", [0, 1, 2, 3])

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from cardbox_tracker.common.compiling import kernel
 from cardbox_tracker.person.kinematics import pose
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.terms import pose_prior
@@ -39,10 +40,23 @@ def directions(arms: np.ndarray) -> np.ndarray:
     return np.hstack([limb / np.linalg.norm(limb, axis=1, keepdims=True) for limb in limbs])
 
 
+def test_python_cannot_call_what_has_no_wrapper() -> None:
+    vectors, gaussians = directions(np.zeros((1, 4)))[0], np.ascontiguousarray(load_gmm().T)
+    given = vectors, gaussians, 0.1, np.empty(gaussians.shape[1])
+    assert np.isfinite(nats_of_one(*given)), "compiled code calls it"
+    with pytest.raises(TypeError, match="nats_of is for compiled functions"):
+        nats_of(*given)
+
+
+@kernel
+def nats_of_one(vectors: np.ndarray, gaussians: np.ndarray, rest: float, logs: np.ndarray) -> float:
+    return nats_of(vectors, gaussians, rest, logs)
+
+
 def nats(arms: np.ndarray, floor_nats: float = FLOOR_NATS) -> np.ndarray:
     gaussians = np.ascontiguousarray(load_gmm().T)
     rest, logs = np.exp(-floor_nats), np.empty(gaussians.shape[1])
-    return np.array([nats_of(one, gaussians, rest, logs) for one in directions(arms)])
+    return np.array([nats_of_one(one, gaussians, rest, logs) for one in directions(arms)])
 
 
 def test_the_kernel_is_the_definition() -> None:

@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 
 from cardbox_tracker.camera.camera import Camera
 from cardbox_tracker.camera.rasterisation import clip_near, fill_convex, snap
+from cardbox_tracker.common.compiling import kernel
 from cardbox_tracker.person.kinematics import angles_of_arms, pose
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.parts import (
@@ -207,7 +208,8 @@ def test_an_arms_prior_is_the_learned_one_and_what_is_inside_the_body() -> None:
         limbs = [arm.elbow - arm.shoulder, arm.hand - arm.elbow]
         directions = np.concatenate([limb / np.linalg.norm(limb) for limb in limbs])
         logs = np.empty(GAUSSIANS.shape[1])
-        return float(nats_of(directions, GAUSSIANS, np.exp(-FLOOR_NATS), logs))
+        nats = kernel(lambda vectors, rest, logs: nats_of(vectors, GAUSSIANS, rest, logs))
+        return float(nats(directions, np.exp(-FLOOR_NATS), logs))
 
     assert of_left(free) == pytest.approx(learned(free))
     assert of_left(inside) > learned(inside) + 0.5
@@ -231,9 +233,10 @@ def test_how_deep_a_point_is_inside_by_hand() -> None:
     high = parts[TORSO, BOTTOM] + parts[TORSO, HEIGHT] / 2
     half = (parts[TORSO, TOP_WIDTH] + parts[TORSO, BOTTOM_WIDTH]) / 4
     far = np.array([2.0, 0.0, high])
+    deep = kernel(lambda points, parts: penetration(points, parts))
     for aside, depth in ((0.0, 1.0), (half / 2, 0.5), (half * 1.1, 0.0)):
         points = np.array([far, far, [0.0, aside, high]])
-        assert penetration(points, parts) == pytest.approx(depth)
+        assert deep(points, parts) == pytest.approx(depth)
 
 
 def test_rows_below_the_hips_count_but_not_the_legs() -> None:

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import json
 import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -21,9 +23,15 @@ from cardbox_tracker.person.posture import reference_posture
 from cardbox_tracker.search.config import PRESETS
 from cardbox_tracker.segmentation.background import SilhouetteExtractor
 from cardbox_tracker.segmentation.empty_scene import BackgroundLearner
+from cardbox_tracker.tracking import precompile
 from cardbox_tracker.tracking.estimate import TRACKING
 from cardbox_tracker.tracking.observation import Observation
-from cardbox_tracker.tracking.precompile import compile_all
+from cardbox_tracker.tracking.precompile import (
+    FILM_KERNELS,
+    compile_all,
+    compile_each,
+    compile_for_films,
+)
 from cardbox_tracker.tracking.tracker import Tracker
 
 FRONT = reference_posture("front")
@@ -100,3 +108,23 @@ def test_nor_do_the_first_points_of_a_detector() -> None:
     for given in (points, points, None):
         assert tracker.track(Observation(person, points=given)).posture is not None
     assert compiled() == before
+
+
+def test_the_list_for_films_has_arguments_that_kernels_are_called_with() -> None:
+    compile_all()
+    before = compiled()
+    for part in json.loads(FILM_KERNELS.read_text()).items():
+        compile_each(part)
+    # The warm-up does not call all of them.
+    called = {name: count for name, count in compiled().items() if before[name]}
+    assert called.items() <= before.items(), "run lab.tools.film_kernels"
+
+
+def test_what_films_need_is_compiled_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    done: list[tuple[str, object]] = []
+    monkeypatch.setattr(precompile.compiling, "FOLDER", tmp_path)
+    monkeypatch.setattr(precompile, "cores", lambda: 1)
+    monkeypatch.setattr(precompile, "compile_each", done.append)
+    for _ in range(2):
+        compile_for_films()
+    assert done == [*json.loads(FILM_KERNELS.read_text()).items()]
