@@ -173,7 +173,7 @@ def measure_films() -> dict[str, Any]:
             spent_s, whole_s = _measured(given)
             steps = {step: 1e3 * value_s / images for step, value_s in spent_s.items()}
             found[name] = {"hz": images / whole_s, "steps_ms": steps}
-    return found
+    return found | {"load": os.getloadavg()[1]}
 
 
 def _enlarged(source: Path, film: Path, people: int) -> int:

@@ -116,7 +116,7 @@ def _ratios(ratios: Mapping[str, Any] | None) -> list[str]:
 def _film(film: Mapping[str, Any] | None) -> list[str]:
     if film is None:
         return []
-    runs = [run for run in film if run != "commit"]
+    runs = [run for run in film if run not in ("commit", "load")]
     steps = [film[run]["steps_ms"] for run in runs]
     totals = [sum(one.values()) for one in steps]
     rows = [
@@ -137,7 +137,8 @@ def _film(film: Mapping[str, Any] | None) -> list[str]:
         "demo`, enlarged to 1280x960, or twice side by side in 1280x480, with the detector. "
         "Processor time an image and its share, with compiled code loaded; a thread decodes, one "
         "resizes, one detects, and one draws and encodes, beside the one that does the rest. Each "
-        "image is read twice, to measure the scene and to track.",
+        "image is read twice, to measure the scene and to track. The load of the machine was "
+        f"{film['load']:.1f}; above the number of cores, times are longer than on a quiet one.",
         _table(("step", *runs), rows),
     ]
 
