@@ -17,7 +17,6 @@ from cardbox_tracker.commands.arguments import (
     print_remarks,
 )
 from cardbox_tracker.commands.request import Problems, add_recording, inputs_of, recording_request
-from cardbox_tracker.commands.tracking import tilt_in
 
 NAME = "initialize"
 HELP = "measure the person in a recording"
@@ -79,6 +78,8 @@ def run(options: argparse.Namespace) -> None:
     check_outputs((options.output,), options.force, inputs_of(options))
     spans = {name: getattr(options, name) for name in REFERENCES}
     if options.camera_pitch_deg is None and recording.detector is not None:
+        from cardbox_tracker.commands.scene import tilt_in
+
         pitch_rad, recording = tilt_in(recording, spans["front"])
     config = InitializationConfig(
         distance_m=distance_m,

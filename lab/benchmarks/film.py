@@ -25,7 +25,7 @@ import numpy as np
 
 from cardbox_tracker.applications import demo
 from cardbox_tracker.applications.drawing import video
-from cardbox_tracker.commands import tracking
+from cardbox_tracker.commands import scene
 from cardbox_tracker.commands.main import main as cardbox
 from cardbox_tracker.common.errors import CardboxError
 from cardbox_tracker.detectors.hand_network import HandNetwork
@@ -33,7 +33,6 @@ from cardbox_tracker.detectors.pose_network import Network, PoseNetwork
 from cardbox_tracker.recordings import (
     detector_silhouettes,
     kept_detections,
-    measured_scene,
     quality,
     result_table,
     video_reader,
@@ -58,9 +57,9 @@ STEPS: Mapping[str, Sequence[tuple[Any, str]]] = {
     "identity of the person": [(PoseNetwork, "__call__")],
     "detections kept and read": [(kept_detections.KeptDetections, "__call__")],
     "silhouette and brightness": [(detector_silhouettes.DetectorSilhouetteSource, "frames")],
-    "what is kept of the images": [(measured_scene, "watch")],
-    "camera of the scene": [(tracking, "found_camera")],
-    "bodies of the scene": [(measured_scene, "seen_person"), (measured_scene, "seen_people")],
+    "what is kept of the images": [(scene, "watch")],
+    "camera of the scene": [(scene, "found_camera")],
+    "bodies of the scene": [(scene, "seen_person"), (scene, "seen_people")],
     "assignment of people": [(Session, "track")],
     "frame": [(Tracker, "_frames_of")],
     "search": [(WholeBodyFilter, "look"), (WholeBodyFilter, "follow")],
