@@ -694,7 +694,7 @@ def _person(
 ) -> PersonRequest:
     from cardbox_tracker.person.model import MEASURED, BodyModel
     from cardbox_tracker.person.model_file import load_body_model
-    from cardbox_tracker.person.proportions import USUAL_STATURE_M
+    from cardbox_tracker.person.proportions import USUAL_STATURE_M, body_from_proportions
 
     pitch_deg, body = options.camera_pitch_deg, BodyModel()
     others: list[BodyModel] = []
@@ -715,10 +715,14 @@ def _person(
     elif None not in (options.model, options.stature):
         problems.add("--stature and --model both say who is tracked: leave one of them out")
     elif options.model is None:
-        place = options.distance, math.radians(pitch_deg or 0.0)
+        pitch_rad = math.radians(pitch_deg or 0.0)
         statures = options.stature or [USUAL_STATURE_M]
         body, *others = problems.caught(
-            lambda: [_of_stature(stature, *place) for stature in statures], [body]
+            lambda: [
+                body_from_proportions(one, options.distance, camera_pitch_rad=pitch_rad)
+                for one in statures
+            ],
+            [body],
         )
     else:
         for flag, value in (("--distance", options.distance), ("--camera-pitch-deg", pitch_deg)):
@@ -742,12 +746,6 @@ def _person(
     several = options.people, tuple(others), number, tuple(options.stature or ())
     source = options.scene if is_of_scene else options.model
     return PersonRequest(body, source, start_s, is_pitch_given, stature_m, end_s, *several)
-
-
-def _of_stature(stature_m: float, distance_m: float | None, pitch_rad: float) -> BodyModel:
-    from cardbox_tracker.person.proportions import body_from_proportions
-
-    return body_from_proportions(stature_m, distance_m, camera_pitch_rad=pitch_rad)
 
 
 def _config(options: argparse.Namespace, preset: TrackerConfig) -> TrackerConfig:

@@ -127,7 +127,6 @@ class PlayBagNode(CardboxNode):
     """Publishes the messages of a bag as they were recorded, byte for byte."""
 
     def __init__(self, **options: Any) -> None:
-        """Open the bag and advertise its topics."""
         super().__init__("play_bag", **options)
         self.parameters = LiveParameters(self, PlayBagParameters, lambda _: self._set_anchor())
         settings = self.parameters.value
