@@ -38,8 +38,7 @@ def check_pixels(width: int, height: int, most_pixels: float) -> None:
     if width * height > most_pixels:
         raise EncodingError(
             f"an image of {width}x{height} is larger than the {most_pixels / 1e6:.3g} million "
-            "pixels that are allowed; send smaller images, or raise max_megapixels of the "
-            "background node if the camera has that many"
+            "pixels that are allowed; send smaller images"
         )
 
 

@@ -15,6 +15,7 @@ from cardbox_tracker.commands.arguments import (
     check_outputs,
     span,
 )
+from cardbox_tracker.commands.initialize import measuring_config
 
 NAME = "calibrate-extrinsics"
 HELP = "find where several cameras stand, from the person in a recording, without a board"
@@ -73,20 +74,11 @@ def run(options: argparse.Namespace) -> None:
     """Estimate the extrinsics, write them and print their uncertainty."""
     from cardbox_tracker.camera.extrinsics_files import save_camchain
     from cardbox_tracker.common.progress import progress_bar
-    from cardbox_tracker.measuring.config import InitializationConfig
-    from cardbox_tracker.person.model import BodyModel
     from cardbox_tracker.recordings.calibrate import calibrate_recording
 
     check_outputs((options.output,), options.force, inputs=(options.recording,))
     pitch_rad = math.radians(options.camera_pitch_deg)
-    # The body model refuses an impossible distance or pitch by name.
-    BodyModel.of(distance_m=options.distance, camera_pitch_rad=pitch_rad)
-    config = InitializationConfig(
-        distance_m=options.distance,
-        camera_pitch_rad=pitch_rad,
-        side_turn=options.side_turn,
-        seed=options.seed,
-    )
+    config = measuring_config(options, options.distance, pitch_rad)
     references = {name: getattr(options, name) for name in REFERENCES}
     with progress_bar("calibrate") as show:
         result = calibrate_recording(

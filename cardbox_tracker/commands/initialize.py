@@ -6,6 +6,7 @@ import argparse
 import math
 from dataclasses import replace
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from cardbox_tracker.commands.arguments import (
     REFERENCES,
@@ -17,6 +18,9 @@ from cardbox_tracker.commands.arguments import (
     print_remarks,
 )
 from cardbox_tracker.commands.request import Problems, add_recording, inputs_of, recording_request
+
+if TYPE_CHECKING:
+    from cardbox_tracker.measuring.config import InitializationConfig
 
 NAME = "initialize"
 HELP = "measure the person in a recording"
@@ -44,11 +48,22 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_force(parser)
 
 
+def measuring_config(
+    options: argparse.Namespace, distance_m: float, pitch_rad: float
+) -> InitializationConfig:
+    """Return the settings of a measurement."""
+    from cardbox_tracker.measuring.config import InitializationConfig
+    from cardbox_tracker.person.model import BodyModel
+
+    # The body model refuses an impossible distance or pitch by name.
+    BodyModel.of(distance_m=distance_m, camera_pitch_rad=pitch_rad)
+    return InitializationConfig(distance_m, pitch_rad, options.side_turn, seed=options.seed)
+
+
 def run(options: argparse.Namespace) -> None:
     """Measure the person, write the body model and print its sizes."""
     from cardbox_tracker.common.progress import progress_bar
     from cardbox_tracker.measuring.config import InitializationConfig
-    from cardbox_tracker.person.model import BodyModel
     from cardbox_tracker.person.model_file import save_body_model
     from cardbox_tracker.recordings.initialize import (
         describe,
@@ -70,9 +85,8 @@ def run(options: argparse.Namespace) -> None:
         )
     distance_m = options.distance if is_given else _GUESSED_M
     pitch_rad = math.radians(options.camera_pitch_deg or 0.0)
-    # The body model refuses an impossible distance or pitch by name.
-    problems.caught(
-        lambda: BodyModel.of(distance_m=distance_m, camera_pitch_rad=pitch_rad), BodyModel()
+    config = problems.caught(
+        lambda: measuring_config(options, distance_m, pitch_rad), InitializationConfig()
     )
     problems.check()
     check_outputs((options.output,), options.force, inputs_of(options))
@@ -81,12 +95,7 @@ def run(options: argparse.Namespace) -> None:
         from cardbox_tracker.commands.scene import tilt_in
 
         pitch_rad, recording = tilt_in(recording, spans["front"])
-    config = InitializationConfig(
-        distance_m=distance_m,
-        camera_pitch_rad=pitch_rad,
-        side_turn=options.side_turn,
-        seed=options.seed,
-    )
+        config = replace(config, camera_pitch_rad=pitch_rad)
     if is_given:
         recording = replace(recording, depth=None)
     with recording.open() as source, progress_bar("initialize") as show:

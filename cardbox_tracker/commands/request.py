@@ -255,14 +255,14 @@ def add_recording(parser: argparse.ArgumentParser, required: bool = True) -> Non
         default=[],
         metavar="NAMESPACE",
         help="cameras of the recording that see the person, such as cam0 cam1, the one that the "
-        "person faced first; with one name, that camera alone; not needed if there is only one",
+        "person faced first; with one name, that camera alone",
     )
     add(
         "--extrinsics",
         type=Path,
         metavar="FILE",
-        help="where further cameras stand, from Kalibr (YAML) or aniposelib (TOML); not needed "
-        "for a rectified pair or with /tf_static in the recording",
+        help="where further cameras stand, from Kalibr (YAML) or aniposelib (TOML), if the "
+        "recording does not tell",
     )
     add(
         "--depth",
@@ -281,26 +281,23 @@ def add_recording(parser: argparse.ArgumentParser, required: bool = True) -> Non
         "--silhouettes",
         choices=("background", "detector", "person_in_view"),
         help="what tells the person from the scene: the empty scene of --background; the mask of a "
-        "person detector; or a scene that is learned around the person, who must step aside at "
-        "some time. With neither --background nor --within, the mask is the default with "
-        "--detector mediapipe, and person_in_view for videos and images",
+        "person detector, the default with --detector mediapipe; or a scene that is learned around "
+        "the person, who must step aside at some time, the default for other films",
     )
     detector = parser.add_mutually_exclusive_group()
     detector.add_argument(
         "--detector",
         metavar="mediapipe|FILE|FOLDER",
         help="also use 2D points of the person's joints: those of MediaPipe's networks ('cardbox "
-        "detector --install'), those that any detector has written: a table FILE.csv, a file of "
-        "COCO FILE.json, or a folder of OpenPose's files (docs/detectors.md), or those of a "
-        "detector that another package adds (docs/extending.md)",
+        "detector --install'), or those that any detector has written: a table FILE.csv, FILE.json "
+        "of COCO, or a folder of OpenPose's files (docs/detectors.md)",
     )
     detector.add_argument(
         "--detector-class",
         dest="detector",
         type=ClassName,
         metavar="MODULE:CLASS",
-        help="the same of a class of your own, which has a function detect(image) "
-        "(docs/extending.md); the module may be in the current folder",
+        help="the same of a class of your own with a function detect(image) (docs/extending.md)",
     )
     add(
         "--person",
@@ -315,9 +312,8 @@ def add_recording(parser: argparse.ArgumentParser, required: bool = True) -> Non
         type=float,
         metavar="DEG",
         help="field of view across the width of the image as it is shown: webcams 60 to 78, phones "
-        "60 to 75 held sideways and 36 to 46 upright; not for bags with CameraInfo. Without it, "
-        "what a phone wrote into the file, or else, with --detector, 65 degrees along the longer "
-        "side",
+        "60 to 75 held sideways and 36 to 46 upright. Without it, what a phone wrote into the "
+        "file, or else, with --detector, 65 degrees along the longer side",
     )
     add(
         "--calibration",
@@ -694,7 +690,7 @@ def _person(
 ) -> PersonRequest:
     from cardbox_tracker.person.model import MEASURED, BodyModel
     from cardbox_tracker.person.model_file import load_body_model
-    from cardbox_tracker.person.proportions import USUAL_STATURE_M
+    from cardbox_tracker.person.proportions import USUAL_STATURE_M, body_from_proportions
 
     pitch_deg, body = options.camera_pitch_deg, BodyModel()
     others: list[BodyModel] = []
@@ -715,10 +711,14 @@ def _person(
     elif None not in (options.model, options.stature):
         problems.add("--stature and --model both say who is tracked: leave one of them out")
     elif options.model is None:
-        place = options.distance, math.radians(pitch_deg or 0.0)
+        pitch_rad = math.radians(pitch_deg or 0.0)
         statures = options.stature or [USUAL_STATURE_M]
         body, *others = problems.caught(
-            lambda: [_of_stature(stature, *place) for stature in statures], [body]
+            lambda: [
+                body_from_proportions(one, options.distance, camera_pitch_rad=pitch_rad)
+                for one in statures
+            ],
+            [body],
         )
     else:
         for flag, value in (("--distance", options.distance), ("--camera-pitch-deg", pitch_deg)):
@@ -742,12 +742,6 @@ def _person(
     several = options.people, tuple(others), number, tuple(options.stature or ())
     source = options.scene if is_of_scene else options.model
     return PersonRequest(body, source, start_s, is_pitch_given, stature_m, end_s, *several)
-
-
-def _of_stature(stature_m: float, distance_m: float | None, pitch_rad: float) -> BodyModel:
-    from cardbox_tracker.person.proportions import body_from_proportions
-
-    return body_from_proportions(stature_m, distance_m, camera_pitch_rad=pitch_rad)
 
 
 def _config(options: argparse.Namespace, preset: TrackerConfig) -> TrackerConfig:

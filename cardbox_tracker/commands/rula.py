@@ -13,6 +13,7 @@ from cardbox_tracker.commands.arguments import add_force, add_settings, check_ou
 from cardbox_tracker.commands.request import add_tracking, tracking_request
 from cardbox_tracker.commands.tracking import track
 from cardbox_tracker.common.errors import CardboxError
+from cardbox_tracker.common.files import atomic_path
 
 if TYPE_CHECKING:
     from cardbox_tracker.applications.ergonomics.recording import MomentImages, RulaRow
@@ -97,7 +98,8 @@ def write_scores(options: argparse.Namespace, content: PageContent) -> None:
     if options.csv is not None:
         recording.write_csv(rows, options.csv, method)
     if options.plot is not None:
-        report.plot_scores(rows, options.plot, method)
+        with atomic_path(options.plot) as temporary:
+            temporary.write_bytes(report.score_plot(rows, (), method))
     if options.shares is not None:
         recording.write_shares(shares, options.shares)
     if options.html is not None:

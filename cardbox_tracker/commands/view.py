@@ -48,8 +48,7 @@ def run(options: argparse.Namespace) -> None:
     check_outputs((options.save,), options.force, inputs=(results, options.truth))
     # A wrong input is reported before a missing library or display.
     truth = None if results is None else _truth_of(results, options.truth, options.person)
-    from cardbox_tracker.applications.viewing.scene import Scene, layout
-    from cardbox_tracker.applications.viewing.sources import show_results
+    from cardbox_tracker.applications.viewing.scene import Scene, layout, show_results
     from cardbox_tracker.applications.viewing.viewer import recording
     from cardbox_tracker.common.progress import progress_bar
 

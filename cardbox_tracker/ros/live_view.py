@@ -10,8 +10,7 @@ from geometry_msgs.msg import PoseArray
 from sensor_msgs.msg import Image, JointState
 from std_msgs.msg import String
 
-from cardbox_tracker.applications.viewing.scene import Scene
-from cardbox_tracker.applications.viewing.sources import Handler, handlers_of
+from cardbox_tracker.applications.viewing.scene import Handler, Scene, handlers_of
 from cardbox_tracker.ros.messages import conversions, results
 from cardbox_tracker.ros.runtime import qos
 from cardbox_tracker.ros.runtime.node import CardboxNode, run_node
@@ -32,7 +31,6 @@ class LiveView(CardboxNode):
     """Passes the results of the tracker and of the node ``retarget`` to the viewer."""
 
     def __init__(self, scene: Scene) -> None:
-        """Subscribe."""
         super().__init__("cardbox_view")
         self._scene = scene
         self._latest_ns: int | None = None

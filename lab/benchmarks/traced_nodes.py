@@ -18,8 +18,7 @@ from typing import Any
 
 from cardbox_tracker.ros.messages.conversions import stamp_ns
 from cardbox_tracker.ros.nodes.background_node import BackgroundNode
-from cardbox_tracker.ros.nodes.camera_images import CameraImages
-from cardbox_tracker.ros.nodes.silhouette_outputs import SilhouetteOutputs
+from cardbox_tracker.ros.nodes.camera_images import CameraImages, SilhouetteOutputs
 from cardbox_tracker.ros.nodes.tracker_node import TrackerNode
 from cardbox_tracker.ros.nodes.tracker_outputs import TrackerOutputs
 from cardbox_tracker.start import NODES

@@ -27,6 +27,7 @@ SHARED = {
     "main",
     "arguments",
     "request",
+    "scene",
     "tracking",
     "track_folder",
     "checkout",

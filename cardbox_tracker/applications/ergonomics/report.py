@@ -28,7 +28,6 @@ from cardbox_tracker.applications.ergonomics.rula import (
     declared,
     expected,
 )
-from cardbox_tracker.common.files import atomic_path
 from cardbox_tracker.person.sizes import FloatArray
 from cardbox_tracker.tracking.estimate import UNCERTAIN
 
@@ -120,16 +119,6 @@ def write_page(content: PageContent, path: Path) -> None:
         bar=_bar,
         words=_share_words,
     )
-
-
-def plot_scores(rows: Sequence[RulaRow], path: Path, method: Method = RULA) -> None:
-    """Write the plot of :func:`score_plot`.
-
-    Raises:
-        CardboxError: the file cannot be written.
-    """
-    with atomic_path(path) as temporary:
-        temporary.write_bytes(score_plot(rows, (), method))
 
 
 def score_plot(

@@ -230,7 +230,8 @@ def images_of_body(motion: Motion, body: BodyModel) -> Motion:
     """
     keypoints_m = in_reference(motion.keypoints_m, body)
     frames = frames_of(motion, body)
-    apart_m = _largest(frames.keypoints_m - keypoints_m)
+    apart_m = np.linalg.norm(frames.keypoints_m - keypoints_m, axis=-1)
+    apart_m = np.nan_to_num(apart_m).max(axis=1)
     rise_m = np.nan_to_num(np.abs(frames.clavicles_m)).max(axis=1)
     is_other = motion.is_seen & ((apart_m > _MOST_APART_M) | (rise_m > _MOST_RISE_M))
     if 2 * is_other.sum() > motion.is_seen.sum():
@@ -240,9 +241,3 @@ def images_of_body(motion: Motion, body: BodyModel) -> Motion:
             "which 'cardbox track' writes beside the table OUT.csv as OUT.body.yaml"
         )
     return motion.without(is_other)
-
-
-def _largest(differences_m: FloatArray) -> FloatArray:
-    """Return the largest length of the vectors (n, k, 3) of each image, (n,); 0 in gaps."""
-    lengths: FloatArray = np.nan_to_num(np.linalg.norm(differences_m, axis=-1))
-    return np.asarray(lengths.max(axis=1))

@@ -114,7 +114,6 @@ class FullBodies:
     """Makes the full body of image after image; what is not measured keeps its last angles."""
 
     def __init__(self) -> None:
-        """Begin before the first image."""
         self._angles = dict.fromkeys((*JOINT_NAMES, *NECK_NAMES, *LEG_NAMES, *HAND_NAMES), 0.0)
         self._before: FullBody | None = None
 

@@ -77,7 +77,6 @@ class Client:
     """
 
     def __init__(self, nodes: Nodes, bag: BagWriter, cameras: Sequence[str] = ()) -> None:
-        """Subscribe to the topics of nodes for one camera, or for several camera namespaces."""
         self._silhouettes = silhouettes_of(cameras or [""])
         self.has_body = False
         self.initialization_iou: float | None = None

@@ -64,12 +64,12 @@ def image_of(
     return decode_as_sent(SentImage.of(message), most_pixels, levels)
 
 
-def most_pixels_of(calibration: Calibration, most_megapixels: float) -> float:
+def most_pixels_of(calibration: Calibration) -> float:
     """Return the largest number of pixels to decode for a camera.
 
-    It is sixteen times the size of the calibration at most.
+    It is sixteen times the size of the calibration at most; a few bytes can expand to gigabytes.
     """
-    return min(1e6 * most_megapixels, 16.0 * calibration.width * calibration.height)
+    return min(MOST_PIXELS, 16.0 * calibration.width * calibration.height)
 
 
 def image_behind(silhouette: ImageArray, message: Image | None) -> ImageArray | None:

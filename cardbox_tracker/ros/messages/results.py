@@ -101,11 +101,6 @@ def points_message(header: Header, points: Points) -> PoseArray:
     )
 
 
-def points_of(message: PoseArray) -> Points:
-    """Return the positions of a message."""
-    return Points(np.array([(p.position.x, p.position.y, p.position.z) for p in message.poses]))
-
-
 def markers_message(header: Header, markers: Markers) -> MarkerArray:
     """Return shapes in the frame of ``header``; without shapes, remove the earlier ones.
 
@@ -186,8 +181,6 @@ def _color(rgba: Rgba) -> ColorRGBA:
     return ColorRGBA(r=r, g=g, b=b, a=a)
 
 
-_NAME = "initialization"
-_HARDWARE_ID = "cardbox_tracker"
 _MEAN_IOU = "mean iou"
 
 
@@ -195,20 +188,16 @@ def measured_message(result: InitializationResult, text: str) -> DiagnosticStatu
     """Return level OK, ``text``, and the fit: ``mean iou``, and ``iou`` of each reference."""
     values = {_MEAN_IOU: result.mean_iou}
     values |= {f"iou {name}": iou for name, iou in result.iou.items()}
-    return DiagnosticStatus(
-        level=DiagnosticStatus.OK,
-        name=_NAME,
-        message=text,
-        hardware_id=_HARDWARE_ID,
-        values=[KeyValue(key=key, value=f"{value:.4f}") for key, value in values.items()],
-    )
+    message = refused_message(text)
+    message.level = DiagnosticStatus.OK
+    message.values = [KeyValue(key=key, value=f"{value:.4f}") for key, value in values.items()]
+    return message
 
 
 def refused_message(text: str) -> DiagnosticStatus:
     """Return level ERROR and ``text``, the reason."""
-    return DiagnosticStatus(
-        level=DiagnosticStatus.ERROR, name=_NAME, message=text, hardware_id=_HARDWARE_ID
-    )
+    named = {"name": "initialization", "hardware_id": "cardbox_tracker"}
+    return DiagnosticStatus(level=DiagnosticStatus.ERROR, message=text, **named)
 
 
 def mean_iou_of(message: DiagnosticStatus) -> float:

@@ -25,14 +25,14 @@ def message_class(topic: str, kind: str) -> Any:
             "sensor_msgs/msg/Image: play other topics with --topics"
         )
     package, name = parts.groups()
-    try:
-        return getattr(importlib.import_module(f"{package}.msg"), name)
-    except (ImportError, AttributeError):
+    found = optional_class(package, name)
+    if found is None:
         raise BagError(
             f"topic {topic} has the type {kind}, which is not installed; install the package "
             f"'{package}' (ros-jazzy-{package.replace('_', '-')}), or play other topics with "
             "--topics"
-        ) from None
+        )
+    return found
 
 
 def optional_class(package: str, name: str) -> Any:

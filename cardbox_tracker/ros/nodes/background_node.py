@@ -14,15 +14,13 @@ from cardbox_tracker.camera.stamps import StampOrder
 from cardbox_tracker.common.errors import BackgroundFileError, CameraError
 from cardbox_tracker.common.progress import told
 from cardbox_tracker.ros.messages import conversions
-from cardbox_tracker.ros.nodes.camera_images import CameraImages
+from cardbox_tracker.ros.nodes.camera_images import CameraImages, SilhouetteOutputs
 from cardbox_tracker.ros.nodes.depth_input import DepthCut
 from cardbox_tracker.ros.nodes.shared_parameters import (
     camera_roll_parameter,
     depth_parameter,
     image_transport_parameter,
-    max_megapixels_parameter,
 )
-from cardbox_tracker.ros.nodes.silhouette_outputs import SilhouetteOutputs
 from cardbox_tracker.ros.runtime import qos
 from cardbox_tracker.ros.runtime.command_line import node_main
 from cardbox_tracker.ros.runtime.node import CardboxNode
@@ -78,7 +76,6 @@ class BackgroundParameters(NodeParameters, BackgroundConfig):
         effect=_NEXT_LEARNING,
     )
     camera_roll_deg: float = camera_roll_parameter()
-    max_megapixels: float = max_megapixels_parameter()
 
     def check(self) -> None:
         """Raise ValueError if values contradict each other."""
@@ -98,7 +95,6 @@ class BackgroundNode(CardboxNode):
     """Learns the empty scene and cuts out the person who enters it."""
 
     def __init__(self, **options: Any) -> None:
-        """Subscribe to the camera and wait for its images."""
         super().__init__("background", **options)
         self.parameters = LiveParameters(self, BackgroundParameters, self._changed)
         settings = self.parameters.value
@@ -116,7 +112,6 @@ class BackgroundNode(CardboxNode):
         self.camera_images = CameraImages(
             self,
             settings.image_transport,
-            lambda: self.parameters.value.max_megapixels,
             self._on_calibration,
             self._on_image,
             roll_deg=settings.camera_roll_deg,

@@ -1,4 +1,4 @@
-"""The images of one camera with their calibration, for the nodes that process them first."""
+"""Images of one camera and silhouettes of them, for the nodes that make the one of the other."""
 
 from __future__ import annotations
 
@@ -6,11 +6,12 @@ import math
 from collections.abc import Callable
 from typing import Any
 
+import numpy as np
 from sensor_msgs.msg import CameraInfo, CompressedImage, Image
 from std_msgs.msg import Header
 
 from cardbox_tracker.camera.calibration_watch import CalibrationWatch
-from cardbox_tracker.camera.camera import Calibration
+from cardbox_tracker.camera.camera import Calibration, Camera
 from cardbox_tracker.camera.encodings import Levels
 from cardbox_tracker.camera.stamps import StampOrder
 from cardbox_tracker.ros.messages import conversions
@@ -46,7 +47,6 @@ class CameraImages:
         self,
         node: CardboxNode,
         transport: str,
-        most_megapixels: Callable[[], float],
         changed: Callable[[Calibration], None],
         deliver: Deliver,
         roll_deg: float = 0.0,
@@ -56,13 +56,12 @@ class CameraImages:
         Args:
             node: the node.
             transport: ``raw`` or ``compressed``.
-            most_megapixels: returns the limit for images, in millions of pixels.
             changed: called with the first calibration, and with another one that lasts.
             deliver: called with each image once the calibration is known.
             roll_deg: roll of the camera, degrees.
         """
         self._node = node
-        self._most_megapixels, self._changed, self._deliver = most_megapixels, changed, deliver
+        self._changed, self._deliver = changed, deliver
         self.topic, kind = image_topic(node, "image_raw", transport)
         self.info_topic = node.resolve("camera_info")
         self.watch = CalibrationWatch(self.info_topic, self.topic, math.radians(roll_deg))
@@ -123,7 +122,7 @@ class CameraImages:
     def _use(
         self, message: Image | CompressedImage, sent_ns: int, calibration: Calibration
     ) -> None:
-        most = conversions.most_pixels_of(calibration, self._most_megapixels())
+        most = conversions.most_pixels_of(calibration)
         changes = self._levels.changes
         image = conversions.image_of(message, most, self._levels)
         if self._levels.changes > changes:
@@ -142,3 +141,32 @@ class CameraImages:
         """Return warnings about the publishers and the calibration, by kind."""
         found = {"": self.watch.remark, "calibration": self.watch.doubt}
         return self._single.remarks() | {kind: text for kind, text in found.items() if text}
+
+
+class SilhouetteOutputs:
+    """Publishes silhouettes with the image behind each and the camera of both.
+
+    Attributes:
+        covered: fraction of the last silhouette that is foreground.
+    """
+
+    def __init__(self, node: CardboxNode) -> None:
+        """Advertise the topics for ``node``."""
+        self.covered = 0.0
+        self._node = node
+        self._silhouettes = node.advertise_inside(Image, "silhouette", qos.SILHOUETTE)
+        self._images = node.advertise_inside(Image, "silhouette/image", qos.SILHOUETTE)
+        self._infos = node.advertise_inside(CameraInfo, "silhouette/camera_info", qos.SILHOUETTE)
+
+    def send_image(self, header: Header, image: ImageArray) -> None:
+        """Publish an image (H, W) or (H, W, 3) before its silhouette; the tracker pairs both."""
+        if self._images.get_subscription_count():
+            self._images.publish(conversions.image_message(header, image))
+
+    def send(
+        self, header: Header, silhouette: ImageArray, camera: Camera, info: CameraInfo | None
+    ) -> None:
+        """Publish a silhouette (H, W), 0 or 255, and then its calibration."""
+        self._silhouettes.publish(conversions.image_message(header, silhouette, "mono8"))
+        self._infos.publish(conversions.camera_info_message(header, camera, info))
+        self.covered = np.count_nonzero(silhouette) / silhouette.size

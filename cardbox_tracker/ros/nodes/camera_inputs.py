@@ -17,15 +17,14 @@ from cardbox_tracker.camera.pairing import TOLERANCE_NS, Arrivals
 from cardbox_tracker.camera.view import OtherCamera
 from cardbox_tracker.common.errors import CameraError, CardboxError
 from cardbox_tracker.ros.messages import conversions
-from cardbox_tracker.ros.messages.conversions import ImageArray, stamp_ns
+from cardbox_tracker.ros.messages.conversions import ImageArray
 from cardbox_tracker.ros.nodes.camera_poses import CameraPoses, silhouettes_of
 from cardbox_tracker.ros.nodes.depth_input import DepthInput
-from cardbox_tracker.ros.nodes.input_stream import ClockDifference, InputStream
+from cardbox_tracker.ros.nodes.input_stream import ClockDifference, InputStream, RecentImages
 from cardbox_tracker.ros.nodes.keypoint_inputs import KeypointInputs
 from cardbox_tracker.ros.nodes.tracker_parameters import TrackerParameters
 from cardbox_tracker.ros.runtime import qos
 from cardbox_tracker.ros.runtime.node import CardboxNode
-from cardbox_tracker.ros.runtime.recent import RecentImages
 from cardbox_tracker.tracking.observation import Observation
 
 Deliver = Callable[[Image, Image | None, int], None]
@@ -59,7 +58,7 @@ class ImagePairing:
         """Add an image, and deliver the silhouette that waits for it."""
         self._images.append(image)
         self._patience = _PATIENCE
-        if self._waiting is not None and _stamp(self._waiting[0]) == _stamp(image):
+        if self._waiting is not None and _stamp_ns(self._waiting[0]) == _stamp_ns(image):
             self._hand_on(image)
 
     def add_silhouette(self, silhouette: Image, sent_ns: int) -> None:
@@ -70,13 +69,13 @@ class ImagePairing:
                 self._hand_on(None)
         finally:
             self._waiting = silhouette, sent_ns
-            image = self._image_of(_stamp(silhouette))
+            image = self._image_of(_stamp_ns(silhouette))
             if image is not None or not self.waits or self._patience <= 0:
                 self._hand_on(image)
 
     def _image_of(self, stamp: int) -> Image | None:
         """Return the latest image of a stamp; after a repetition, earlier ones are used up."""
-        return next((image for image in reversed(self._images) if _stamp(image) == stamp), None)
+        return next((image for image in reversed(self._images) if _stamp_ns(image) == stamp), None)
 
     def _hand_on(self, image: Image | None) -> None:
         if self._waiting is not None:
@@ -86,10 +85,6 @@ class ImagePairing:
                 while len(self._images) and self._images.popleft() is not image:
                     pass
             self._deliver(silhouette, image, sent_ns)
-
-
-def _stamp(message: Image) -> int:
-    return stamp_ns(message.header.stamp)
 
 
 _SILENT_S = 3.0
@@ -283,14 +278,14 @@ class CameraInputs:
         self, number: int, received: Received | None, seen: Observation, camera: Camera
     ) -> Observation:
         """Return an observation with the points that have arrived; it does not wait for points."""
-        if received is None or seen.silhouette is None:
+        if received is None or seen.silhouette is None or not self._keypoints.cameras:
             return seen
-        header = received.message.header
+        header, source = received.message.header, self._keypoints.cameras[number]
         if self._tracks_people:
-            return seen.having(people=self._keypoints.people(number, header, camera))
+            return seen.having(people=source.people(header, camera))
         period_ns = self._streams[number].statistics.period_ns
         half_ns = period_ns // 2 or TOLERANCE_NS
-        points = self._keypoints.points(number, header, camera, seen.silhouette, half_ns)
+        points = source.points(header, camera, seen.silhouette, half_ns)
         return seen.having(points=points)
 
     def _depth(self, received: Sequence[Received | None], camera: Camera) -> DepthImage | None:
@@ -339,9 +334,8 @@ class CameraInputs:
             elif stream.problem:
                 texts[f"{stream.name} cannot be read"] = f"{stream.topic}: {stream.problem}"
         for stream, clock in zip(others, self._clocks, strict=True):
-            apart_s = abs(clock.apart_s)
+            apart_s, others_s = map(abs, clock.medians_s)
             if apart_s > max(_OTHER_CLOCK_S, first.statistics.period_ns / 2e9):
-                others_s = abs(clock.of_computers_s)
                 remedy = (
                     f"the clocks of the computers that send them are {others_s:.2f} s apart: "
                     "synchronize them, for example with chrony"

@@ -99,7 +99,6 @@ class CameraNode(CardboxNode):
     """Reads images in a separate thread and publishes each with its calibration."""
 
     def __init__(self, **options: Any) -> None:
-        """Open the device or file and start reading."""
         super().__init__("camera", **options)
         self.parameters = LiveParameters(self, CameraParameters)
         settings = self.parameters.value
@@ -110,7 +109,9 @@ class CameraNode(CardboxNode):
         if settings.file:
             if not settings.rate_hz:
                 check_times(Path(settings.file).expanduser(), "set the parameter rate_hz")
-            self._period_s, self._oblong = self._period(settings), oblong(self._capture)
+            rate_hz = settings.rate_hz or self._capture.get(cv2.CAP_PROP_FPS)
+            self._period_s = 1.0 / (rate_hz if 0 < rate_hz < 1000 else _USUAL_HZ)
+            self._oblong = oblong(self._capture)
         self._calibration = (
             load_calibration(user_path(settings.calibration_file))
             if settings.calibration_file
@@ -134,10 +135,6 @@ class CameraNode(CardboxNode):
         capture.set(cv2.CAP_PROP_FRAME_HEIGHT, settings.height)
         capture.set(cv2.CAP_PROP_FPS, settings.rate_hz or _USUAL_HZ)
         return capture
-
-    def _period(self, settings: CameraParameters) -> float:
-        rate_hz = settings.rate_hz or self._capture.get(cv2.CAP_PROP_FPS)
-        return 1.0 / rate_hz if 0 < rate_hz < 1000 else 1.0 / _USUAL_HZ
 
     def _read(self) -> None:
         """Read and publish images at the rate; a file stops or starts over at its end."""

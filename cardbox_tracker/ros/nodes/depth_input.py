@@ -89,15 +89,13 @@ class DepthCut:
 
     def add(self, header: Header, camera: Camera, within_m: float, sent_ns: int) -> None:
         """Add an image of ``camera``, in which pixels nearer than ``within_m`` are the person."""
-        stamp_ns = conversions.stamp_ns(header.stamp)
-        self._add(0, stamp_ns, Taken(header, camera, within_m, sent_ns))
+        self._add(0, header, Taken(header, camera, within_m, sent_ns))
 
     def _on_depth(self, message: Any, sent_ns: int) -> None:
-        stamp_ns = conversions.stamp_ns(message.header.stamp)
-        self._add(1, stamp_ns, Taken(message, None, 0.0, sent_ns))
+        self._add(1, message.header, Taken(message, None, 0.0, sent_ns))
 
-    def _add(self, number: int, stamp_ns: int, taken: Taken) -> None:
-        self._arrivals.add(number, stamp_ns, taken)
+    def _add(self, number: int, header: Header, taken: Taken) -> None:
+        self._arrivals.add(number, conversions.stamp_ns(header.stamp), taken)
         for seen, measured in self._arrivals.sets():
             if seen is None:
                 continue

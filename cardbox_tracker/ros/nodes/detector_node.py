@@ -27,16 +27,14 @@ from cardbox_tracker.ros.messages.keypoints import (
     skeleton_class,
     skeleton_message,
 )
-from cardbox_tracker.ros.nodes.camera_images import CameraImages
+from cardbox_tracker.ros.nodes.camera_images import CameraImages, SilhouetteOutputs
 from cardbox_tracker.ros.nodes.shared_parameters import (
     camera_roll_parameter,
     image_transport_parameter,
-    max_megapixels_parameter,
 )
-from cardbox_tracker.ros.nodes.silhouette_outputs import SilhouetteOutputs
 from cardbox_tracker.ros.runtime import qos
-from cardbox_tracker.ros.runtime.command_line import plain_command_line
-from cardbox_tracker.ros.runtime.node import CardboxNode, run_node
+from cardbox_tracker.ros.runtime.command_line import node_main
+from cardbox_tracker.ros.runtime.node import CardboxNode
 from cardbox_tracker.ros.runtime.parameter_fields import AT_START, NodeParameters, parameter
 from cardbox_tracker.ros.runtime.parameters import LiveParameters
 from cardbox_tracker.ros.runtime.publishers import SinglePublisher
@@ -87,12 +85,11 @@ class CameraPitch:
 
 
 _NICE = 5
-_DOES = "Find the person in a camera's images: images in, 2D points and silhouettes out."
 
 
 @dataclass(frozen=True)
 class DetectorParameters(NodeParameters):
-    """Find the person's joints and outline in the camera's images with a neural network."""
+    """Find a person with a neural network: images in, 2D points and silhouettes out."""
 
     image_transport: str = image_transport_parameter()
     width: int = parameter(
@@ -121,7 +118,6 @@ class DetectorParameters(NodeParameters):
         limits=(0.0, 240.0),
     )
     camera_roll_deg: float = camera_roll_parameter()
-    max_megapixels: float = max_megapixels_parameter()
 
 
 class DetectorNode(CardboxNode):
@@ -160,7 +156,6 @@ class DetectorNode(CardboxNode):
         self._images = CameraImages(
             self,
             settings.image_transport,
-            lambda: self.parameters.value.max_megapixels,
             self._on_calibration,
             self._on_image,
             settings.camera_roll_deg,
@@ -249,6 +244,4 @@ class DetectorNode(CardboxNode):
         return values
 
 
-def main(args: list[str] | None = None) -> int:
-    """Run the node; the exit code is 0 unless it could not start."""
-    return run_node(DetectorNode, plain_command_line("detector", _DOES, DetectorParameters, args))
+main = node_main("detector", DetectorNode, DetectorParameters)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import os
 import threading
 import time
 from functools import partial
@@ -38,11 +37,10 @@ from cardbox_tracker.ros.nodes.reference_capture import (
     measured,
 )
 from cardbox_tracker.ros.runtime import qos
-from cardbox_tracker.ros.runtime.command_line import plain_command_line
-from cardbox_tracker.ros.runtime.node import CardboxNode, run_node
+from cardbox_tracker.ros.runtime.command_line import node_main
+from cardbox_tracker.ros.runtime.node import CardboxNode
 from cardbox_tracker.ros.runtime.parameters import LiveParameters
 
-_DOES = "Measure a person from the silhouettes of three reference postures."
 # Longest waits for a silhouette that a node advertises, and for a node that does.
 _ANNOUNCED_S, _FIND_S, _STEP_S = 60.0, 10.0, 0.1
 
@@ -153,7 +151,7 @@ class InitializerNode(CardboxNode):
             distance.check()
         before = dict(references.captured), dict(references.images)
         try:
-            Guidance(self._show, self._capture, self._cancellation.wait).run(
+            Guidance(self._guide.show, self._capture, self._cancellation.wait).run(
                 references.missing, settings.side_turn, settings.count_down_s, settings.attempts
             )
             if (camera := self._camera) is None:
@@ -189,12 +187,9 @@ class InitializerNode(CardboxNode):
         self.get_logger().info(text)
         self._guide.tell(text)
 
-    def _show(self, prompt: Prompt) -> None:
-        self._guide.show(prompt)
-
     def _progress(self, fraction: float) -> None:
         self._cancellation.wait(0.0)
-        self._show(measuring(fraction))
+        self._guide.show(measuring(fraction))
 
     def _publish(self, body: BodyModel) -> None:
         settings = self.parameters.value
@@ -289,9 +284,5 @@ class GuideOutputs:
         self._overlay.publish(conversions.image_message(message.header, picture, "bgr8"))
 
 
-def main(args: list[str] | None = None) -> int:
-    """Run the node; the exit code is 0 unless it could not start."""
-    command_line = plain_command_line("initializer", _DOES, InitializerParameters, args)
-    # The tracker, which gets the same silhouettes, has priority.
-    os.nice(5)
-    return run_node(InitializerNode, command_line)
+# The tracker, which gets the same silhouettes, has priority.
+main = node_main("initializer", InitializerNode, InitializerParameters, nice=5)

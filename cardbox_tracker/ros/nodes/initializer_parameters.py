@@ -21,7 +21,7 @@ _NEXT_GUIDANCE, _NEXT_MEASUREMENT = "next guidance", "next measurement"
 
 @dataclass(frozen=True)
 class InitializerParameters(NodeParameters):
-    """Measure the person from three reference postures."""
+    """Measure a person from the silhouettes of three reference postures."""
 
     person_distance_m: float = shared(InitializationConfig, "distance_m", effect=_NEXT_MEASUREMENT)
     camera_pitch_deg: float = shared(

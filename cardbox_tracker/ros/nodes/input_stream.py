@@ -1,11 +1,13 @@
-"""Statistics and faults of one stream of messages that a node receives."""
+"""Statistics and faults of one stream of messages that a node receives, and its latest images."""
 
 from __future__ import annotations
 
 import time
 from collections import deque
+from collections.abc import Iterator
 
 import numpy as np
+from sensor_msgs.msg import Image
 
 from cardbox_tracker.camera.stamps import StampOrder, StreamStatistics
 
@@ -27,7 +29,6 @@ class InputStream:
     """
 
     def __init__(self, name: str, topic: str) -> None:
-        """Begin without messages."""
         self.name, self.topic = name, topic
         self.statistics = StreamStatistics()
         self.problem = ""
@@ -84,19 +85,50 @@ class ClockDifference:
             self._found.append((first.delay_s - other.delay_s, transit_s))
 
     @property
-    def apart_s(self) -> float:
-        """Difference of the stamps of images that arrive together, seconds; 0 while unknown.
+    def medians_s(self) -> tuple[float, float]:
+        """Differences of the stamps and of the computers' clocks, seconds; 0 while unknown.
 
-        It is positive if the clock of the other stream is ahead.
+        The stamps are those of images that arrive together. Both are positive if the clock of the
+        other stream is ahead.
         """
-        return self._median()[0]
-
-    @property
-    def of_computers_s(self) -> float:
-        """Difference of the clocks of the sending computers, seconds; 0 while unknown."""
-        return self._median()[1]
-
-    def _median(self) -> tuple[float, float]:
         is_known = len(self._found) >= _LEAST and self._other.age_s < _RECENT_S
         stamps_s, computers_s = np.median(self._found, axis=0) if is_known else (0.0, 0.0)
         return float(stamps_s), float(computers_s)
+
+
+MOST_BYTES = 64_000_000
+"""Memory for the images of one topic; it suffices for grey images of up to 1920x1080."""
+
+
+class RecentImages:
+    """Queue of the latest images, the oldest first, which drops old images for new ones."""
+
+    def __init__(self, count: int, most_bytes: int = MOST_BYTES) -> None:
+        """Keep at most ``count`` images of ``most_bytes`` in total, and always the latest."""
+        self._count, self._most_bytes = count, most_bytes
+        self._images: deque[Image] = deque()
+        self._bytes = 0
+
+    def append(self, image: Image) -> None:
+        """Add the latest image."""
+        self._images.append(image)
+        self._bytes += len(image.data)
+        while len(self._images) > 1 and (
+            len(self._images) > self._count or self._bytes > self._most_bytes
+        ):
+            self.popleft()
+
+    def popleft(self) -> Image:
+        """Remove the oldest image and return it."""
+        image = self._images.popleft()
+        self._bytes -= len(image.data)
+        return image
+
+    def __len__(self) -> int:
+        return len(self._images)
+
+    def __iter__(self) -> Iterator[Image]:
+        return iter(self._images)
+
+    def __reversed__(self) -> Iterator[Image]:
+        yield from reversed(self._images)

@@ -215,7 +215,11 @@ _BESIDE = 10
 
 
 class KeypointInputs:
-    """The points of all cameras; the tracker never waits for them."""
+    """The points of all cameras; the tracker never waits for them.
+
+    Attributes:
+        cameras: those of each camera; empty without a source of points.
+    """
 
     def __init__(self, node: CardboxNode, settings: TrackerParameters) -> None:
         """Subscribe with ``node``, the tracker, if its parameter ``keypoints`` is given.
@@ -224,41 +228,16 @@ class KeypointInputs:
             CardboxError: the table cannot be read, or the topic's name is not allowed.
         """
         cameras = (settings.cameras or [""]) if settings.keypoints else []
-        self._cameras = [_CameraKeypoints(node, settings, name) for name in cameras]
-        self._topics = [one.topic for one in self._cameras if one.topic is not None]
-
-    def points(
-        self,
-        number: int,
-        header: Header,
-        camera: Camera,
-        silhouette: ImageArray,
-        tolerance_ns: int = TOLERANCE_NS,
-    ) -> ImagePoints | None:
-        """Return the points for a silhouette of a camera, px of the silhouette, if there are any.
-
-        Args:
-            number: which camera.
-            header: header of the silhouette.
-            camera: camera of the silhouette.
-            silhouette: (H, W), 0 or 255, in which the person is looked for among several.
-            tolerance_ns: half the time between images, within which points of a table join.
-        """
-        if not self._cameras:
-            return None
-        return self._cameras[number].points(header, camera, silhouette, tolerance_ns)
-
-    def people(self, number: int, header: Header, camera: Camera) -> list[ImagePoints] | None:
-        """Return the points of all people in a camera's image; None without a detector."""
-        return self._cameras[number].people(header, camera) if self._cameras else None
+        self.cameras = [CameraKeypoints(node, settings, name) for name in cameras]
+        self._topics = [one.topic for one in self.cameras if one.topic is not None]
 
     def values(self) -> dict[str, str]:
         """Return rate, age and use of each camera's points for the diagnostics."""
-        return {name: text for one in self._cameras for name, text in one.values().items()}
+        return {name: text for one in self.cameras for name, text in one.values().items()}
 
     def warnings(self) -> dict[str, str]:
         """Return warnings about the points, by kind."""
-        texts = {kind: text for one in self._cameras for kind, text in one.warnings().items()}
+        texts = {kind: text for one in self.cameras for kind, text in one.warnings().items()}
         waits = [one.stream for one in self._topics if not one.stream.statistics.received]
         # One camera of several may be without a detector.
         is_silent = waits and len(waits) == len(self._topics) and waits[0].age_s > _PATIENCE_S
@@ -271,10 +250,11 @@ class KeypointInputs:
         return texts
 
 
-class _CameraKeypoints:
+class CameraKeypoints:
     """The points of one camera, and the calibration that leads from its image to silhouettes."""
 
     def __init__(self, node: CardboxNode, settings: TrackerParameters, camera: str) -> None:
+        """Subscribe with ``node`` for a ``camera`` by its namespace."""
         source, below = settings.keypoints, f"{camera.rstrip('/')}/" if camera else ""
         self.topic: KeypointTopic | None = None
         self._name = f"{camera.strip('/')} keypoints".lstrip()
@@ -304,8 +284,20 @@ class _CameraKeypoints:
             self.topic.size = self._watch.current.width, self._watch.current.height
 
     def points(
-        self, header: Header, camera: Camera, silhouette: ImageArray, tolerance_ns: int
+        self,
+        header: Header,
+        camera: Camera,
+        silhouette: ImageArray,
+        tolerance_ns: int = TOLERANCE_NS,
     ) -> ImagePoints | None:
+        """Return the points for a silhouette, px of the silhouette, if there are any.
+
+        Args:
+            header: header of the silhouette.
+            camera: camera of the silhouette.
+            silhouette: (H, W), 0 or 255, in which the person is looked for among several.
+            tolerance_ns: half the time between images, within which points of a table join.
+        """
         calibration, at_ns = self._watch.current, stamp_ns(header.stamp)
         taken = self._taken(at_ns, header.frame_id, tolerance_ns)
         self._images += 1
@@ -323,6 +315,7 @@ class _CameraKeypoints:
         return ImagePoints(person.px, person.scores, min(taken.stamp_ns, at_ns))
 
     def people(self, header: Header, camera: Camera) -> list[ImagePoints] | None:
+        """Return the points of all people in the image; None before a detector has found any."""
         calibration, at_ns = self._watch.current, stamp_ns(header.stamp)
         taken = self._taken(at_ns, header.frame_id, TOLERANCE_NS)
         self._images += 1
@@ -349,11 +342,13 @@ class _CameraKeypoints:
         return Taken(at_ns, "", found) if found else None
 
     def values(self) -> dict[str, str]:
+        """Return rate, age and use of the points for the diagnostics."""
         return ({} if self.topic is None else self.topic.values()) | {
             f"{self._name} in images": f"{self._used} of {self._images}"
         }
 
     def warnings(self) -> dict[str, str]:
+        """Return warnings about the points, by kind."""
         texts = {} if self.topic is None else self.topic.warnings()
         if self._fault:
             texts[f"{self._name} cannot be used"] = self._fault

@@ -1,7 +1,5 @@
 """The node ``play_bag``: play a rosbag2 recording with its original stamps.
 
-    play_bag BAG [--rate 2] [--loop] [--topics /image_raw] [--pause-at 4.5 9] ...
-
 It pauses at the times of ``--pause-at`` and on the service ``play_bag/pause``, and continues on
 ``play_bag/resume``. The latched topic ``play_bag/status`` is ``waiting``, ``playing``,
 ``paused at 4.500 s`` or ``finished``. A script can thus pause the recording at a reference posture,
@@ -127,7 +125,6 @@ class PlayBagNode(CardboxNode):
     """Publishes the messages of a bag as they were recorded, byte for byte."""
 
     def __init__(self, **options: Any) -> None:
-        """Open the bag and advertise its topics."""
         super().__init__("play_bag", **options)
         self.parameters = LiveParameters(self, PlayBagParameters, lambda _: self._set_anchor())
         settings = self.parameters.value

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import NamedTuple
+from functools import partial
+from typing import Any, NamedTuple
 
 from diagnostic_msgs.msg import DiagnosticArray
 from sensor_msgs.msg import JointState
@@ -50,13 +51,13 @@ class PostureInput:
         self._node, self._take = node, take
         self._body: BodyModel | None = None
         self._state, self._stamp_ns = "", 0
-        self._joints, self._hands, self._points = JointState(), JointState(), DiagnosticArray()
+        self._latest: dict[str, Any] = {}
         node.subscribe(String, "body_model", self._on_model, qos.LATCHED)
         if has_states:
             node.subscribe(String, "tracking_state", self._on_state, qos.RESULT)
-            node.subscribe(DiagnosticArray, "keypoint_states", self._on_points, qos.RESULT)
-            node.subscribe(JointState, "hands", self._on_hands, qos.RESULT)
-        node.subscribe(JointState, "joint_states", self._on_joints, qos.RESULT)
+        kept = {"keypoint_states": DiagnosticArray, "hands": JointState} if has_states else {}
+        for topic, kind in (kept | {"joint_states": JointState}).items():
+            node.subscribe(kind, topic, partial(self._keep, topic), qos.RESULT)
         node.subscribe(JointState, "joint_states_stddev", self._on_stddev, qos.RESULT)
         postures = f"postures on {node.resolve('joint_states')}"
         node.diagnostics.source = postures
@@ -71,27 +72,22 @@ class PostureInput:
         if message.data not in (TRACKING, UNCERTAIN):
             self._take(Tracked(self._stamp_ns, message.data, self._body))
 
-    def _on_points(self, message: DiagnosticArray, _: int) -> None:
-        self._points = message
-
-    def _on_joints(self, message: JointState, _: int) -> None:
-        self._joints = message
-
-    def _on_hands(self, message: JointState, _: int) -> None:
-        self._hands = message
+    def _keep(self, topic: str, message: Any, _: int) -> None:
+        self._latest[topic] = message
 
     def _on_stddev(self, message: JointState, sent_ns: int) -> None:
         """Take the image; the deviations come after the joints, with the same stamp."""
         stamp = message.header.stamp
-        if self._joints.header.stamp != stamp:
+        here = {topic: one for topic, one in self._latest.items() if one.header.stamp == stamp}
+        if "joint_states" not in here:
             return
         stamp_ns = conversions.stamp_ns(stamp)
         if not self._node.diagnostics.input.add(stamp_ns).is_usable:
             return
         self._stamp_ns = stamp_ns
-        hands = self._hands if self._hands.header.stamp == stamp else None
-        points = chances_of(self._points) if self._points.header.stamp == stamp else None
-        found = self._joints, message, hands, points
+        states = here.get("keypoint_states")
+        points = None if states is None else chances_of(states)
+        found = here["joint_states"], message, here.get("hands"), points
         self._take(Tracked(stamp_ns, self._state, self._body, *found))
         if self._body is None:
             self._node.diagnostics.wait_for(

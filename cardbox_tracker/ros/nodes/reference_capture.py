@@ -30,9 +30,9 @@ from cardbox_tracker.ros.messages.conversions import ImageArray, image_of, silho
 from cardbox_tracker.ros.nodes.camera_poses import CameraPoses, silhouettes_of
 from cardbox_tracker.ros.nodes.depth_input import DepthInput
 from cardbox_tracker.ros.nodes.initializer_parameters import InitializerParameters
+from cardbox_tracker.ros.nodes.input_stream import RecentImages
 from cardbox_tracker.ros.runtime import qos
 from cardbox_tracker.ros.runtime.node import CardboxNode
-from cardbox_tracker.ros.runtime.recent import RecentImages
 
 KEPT = 5
 """Silhouettes that a capture combines: more have less noise, but need longer standing still."""

@@ -63,7 +63,6 @@ class RetargetNode(CardboxNode):
     """Commands a robot while it is enabled and the posture is sure."""
 
     def __init__(self, **options: Any) -> None:
-        """Read the robot and subscribe to what the tracker publishes."""
         super().__init__("retarget", **options)
         settings = LiveParameters(self, RetargetParameters).value
         if not settings.robot_file:

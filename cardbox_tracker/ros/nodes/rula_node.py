@@ -42,7 +42,6 @@ class RulaNode(CardboxNode):
     """Scores each posture of the tracker."""
 
     def __init__(self, **options: Any) -> None:
-        """Subscribe to what the tracker publishes and wait for a body model."""
         super().__init__("rula", **options)
         self.parameters = LiveParameters(self, RulaParameters)
         self._rng = np.random.default_rng(self.parameters.value.seed)

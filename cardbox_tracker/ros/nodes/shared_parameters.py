@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from functools import partial
 
-from cardbox_tracker.camera.encodings import MOST_PIXELS
-from cardbox_tracker.ros.runtime.parameter_fields import at_start, parameter
+from cardbox_tracker.ros.runtime.parameter_fields import at_start
 
 cameras_parameter = partial(
     at_start,
@@ -52,12 +51,4 @@ image_transport_parameter = partial(
     "raw",
     "raw subscribes to image_raw, compressed to image_raw/compressed",
     choices=("raw", "compressed"),
-)
-
-max_megapixels_parameter = partial(
-    parameter,
-    round(MOST_PIXELS / 1e6, 1),
-    "larger images, in millions of pixels, are refused before they are decoded, as are images "
-    "with sixteen times the pixels of their CameraInfo; a few bytes can expand to gigabytes",
-    limits=(0.01, round(MOST_PIXELS / 1e6, 1)),
 )

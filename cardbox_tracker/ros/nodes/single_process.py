@@ -3,10 +3,7 @@
     cardbox_nodes [--with camera | --with play_bag] --ros-args --params-file NODES.yaml
 
 Names, topics and services are the same as with separate processes. Silhouettes are passed inside
-the process, which is faster than DDS, but the nodes share one core. Give parameters by node in a
-YAML file like ``config/cardbox_nodes.yaml``, or, without a namespace, as
-``-p tracker:preset:=paper``. Give remappings by node as
-``-r background:image_raw:=/camera/image_raw``.
+the process, which is faster than DDS, but the nodes share one core.
 """
 
 from __future__ import annotations

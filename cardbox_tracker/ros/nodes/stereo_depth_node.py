@@ -17,16 +17,13 @@ from cardbox_tracker.camera.stereo import NEAREST_M, StereoDepth, stereo_of_pair
 from cardbox_tracker.common.errors import CameraError
 from cardbox_tracker.ros.messages import conversions
 from cardbox_tracker.ros.nodes.camera_images import image_topic
-from cardbox_tracker.ros.nodes.shared_parameters import (
-    image_transport_parameter,
-    max_megapixels_parameter,
-)
+from cardbox_tracker.ros.nodes.input_stream import RecentImages
+from cardbox_tracker.ros.nodes.shared_parameters import image_transport_parameter
 from cardbox_tracker.ros.runtime import qos
 from cardbox_tracker.ros.runtime.command_line import node_main
 from cardbox_tracker.ros.runtime.node import CardboxNode
 from cardbox_tracker.ros.runtime.parameter_fields import NodeParameters, at_start, parameter
 from cardbox_tracker.ros.runtime.parameters import LiveParameters
-from cardbox_tracker.ros.runtime.recent import RecentImages
 
 # Largest number of images of one side that wait for the other side.
 _KEPT = 4
@@ -52,7 +49,6 @@ class StereoDepthParameters(NodeParameters):
         unit="s",
         limits=(0.0, 1.0),
     )
-    max_megapixels: float = max_megapixels_parameter()
 
 
 class _Pair(NamedTuple):
@@ -68,7 +64,6 @@ class StereoDepthNode(CardboxNode):
     """Pairs left and right images by their stamps and measures depth in the left one."""
 
     def __init__(self, **options: Any) -> None:
-        """Subscribe to both cameras and wait for their images."""
         super().__init__("stereo_depth", **options)
         self.parameters = LiveParameters(self, StereoDepthParameters, self._changed)
         settings = self.parameters.value
@@ -141,12 +136,11 @@ class StereoDepthNode(CardboxNode):
             return
         if self._pair is None:
             self._pair = self._pair_of_infos()
-        pair, settings = self._pair, self.parameters.value
-        images = []
+        pair, images = self._pair, []
         for message, calibration, rectifier in zip(
             (left, right), pair.calibrations, pair.rectifiers, strict=True
         ):
-            most = conversions.most_pixels_of(calibration, settings.max_megapixels)
+            most = conversions.most_pixels_of(calibration)
             image = conversions.image_of(message, most)
             image = to_working_size(image, pair.camera.width, pair.camera.height)
             images.append(image if rectifier is None else rectifier(image))

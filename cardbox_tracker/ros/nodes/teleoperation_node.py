@@ -46,7 +46,6 @@ class TeleoperationNode(CardboxNode):
     """Streams the full body at a constant rate, one image late: between it and the one before."""
 
     def __init__(self, **options: Any) -> None:
-        """Subscribe to what the tracker publishes."""
         super().__init__("teleoperation", **options)
         self._settings = LiveParameters(self, TeleoperationParameters).value
         to, address = self._settings.to, self._settings.address

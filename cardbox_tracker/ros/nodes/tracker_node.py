@@ -27,12 +27,11 @@ from cardbox_tracker.person.urdf import urdf_from_body
 from cardbox_tracker.recordings.outputs import METRICS, place_of
 from cardbox_tracker.ros.messages import conversions
 from cardbox_tracker.ros.nodes.camera_inputs import CameraInputs, Received
-from cardbox_tracker.ros.nodes.rep155_outputs import TrackedBodies
-from cardbox_tracker.ros.nodes.tracker_outputs import TrackerOutputs
+from cardbox_tracker.ros.nodes.tracker_outputs import TrackedBodies, TrackerOutputs
 from cardbox_tracker.ros.nodes.tracker_parameters import NOT_GIVEN_DEG, TrackerParameters
 from cardbox_tracker.ros.runtime import qos
-from cardbox_tracker.ros.runtime.command_line import plain_command_line
-from cardbox_tracker.ros.runtime.node import CardboxNode, run_node
+from cardbox_tracker.ros.runtime.command_line import node_main
+from cardbox_tracker.ros.runtime.node import CardboxNode
 from cardbox_tracker.ros.runtime.parameters import LiveParameters
 from cardbox_tracker.tracking.agreement_watch import AgreementWatch
 from cardbox_tracker.tracking.estimate import LOST, NO_PERSON, UNCERTAIN, Estimate
@@ -56,7 +55,6 @@ class TrackingReport:
     """Collects the estimates of a tracker, and describes its state in words and numbers."""
 
     def __init__(self) -> None:
-        """Begin without an estimate."""
         self._body: BodyModel | None = None
         self._state = ""
         self._counts: dict[str, int] = {}
@@ -133,7 +131,6 @@ class FoundBody:
         settings: TrackerParameters,
         use: Callable[[Sequence[BodyModel]], None],
     ) -> None:
-        """Use the settings' guesses now, and with the camera's pitch when the detector finds it."""
         self.text = ""
         self._node, self._settings, self._use = node, settings, use
         self._is_measured = False
@@ -181,7 +178,6 @@ class FoundBody:
 
 
 _SAME_ROLL_RAD = math.radians(0.1)
-_DOES = "Follow the measured person: silhouettes in, joint states out."
 _PREPARING = "preparing (the very first start compiles for one to two minutes)"
 
 
@@ -189,7 +185,6 @@ class TrackerNode(CardboxNode):
     """Tracks people with one or several cameras."""
 
     def __init__(self, **options: Any) -> None:
-        """Subscribe to silhouettes and wait for a body model."""
         super().__init__("tracker", **options)
         self.parameters = LiveParameters(self, TrackerParameters, self._changed)
         # Calls that come while the code is compiled are answered afterwards.
@@ -398,6 +393,4 @@ def _named(person: int | None) -> str:
     return "" if person is None else f"person {person} "
 
 
-def main(args: list[str] | None = None) -> int:
-    """Run the node; the exit code is 0 unless it could not start."""
-    return run_node(TrackerNode, plain_command_line("tracker", _DOES, TrackerParameters, args))
+main = node_main("tracker", TrackerNode, TrackerParameters)

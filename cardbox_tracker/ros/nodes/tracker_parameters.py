@@ -47,7 +47,7 @@ other image, service or signal, so an image must not take much longer than 0.2 s
 
 @dataclass(frozen=True)
 class TrackerParameters(NodeParameters):
-    """Follow the person's posture."""
+    """Follow the measured person: silhouettes in, joint states out."""
 
     preset: str = parameter(
         "default",

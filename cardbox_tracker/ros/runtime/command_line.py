@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import csv
+import os
 import re
 import sys
 import textwrap
@@ -57,34 +58,25 @@ _WIDTH = 96
 _LINK = re.compile(r"\[([^\]]*)\]\([^)]*\)")
 
 
-def plain_command_line(
-    name: str, does: str, parameters: type[NodeParameters], args: list[str] | None
-) -> list[str]:
-    """Return the complete command line of the node ``name``, which has only ROS arguments.
-
-    Raises:
-        SystemExit: there are other arguments (code 2), or help was requested (code 0).
-    """
-    command_line = list(sys.argv) if args is None else [name, *args]
-    words = f"Everything else is a ROS argument: {name} --ros-args -p PARAMETER:=VALUE."
-    parser = argparse.ArgumentParser(
-        prog=name, description=does, **node_help(name, parameters, words)
-    )
-    parser.parse_args(own_arguments(command_line))
-    return command_line
-
-
 def node_main(
-    name: str, node: Callable[[], CardboxNode], parameters: type[NodeParameters]
+    name: str, node: Callable[[], CardboxNode], parameters: type[NodeParameters], nice: int = 0
 ) -> Callable[[list[str] | None], int]:
     """Return the function ``main`` of a node, whose exit code is 0 unless it could not start.
 
-    Its help begins with the docstring of the parameters.
+    It takes ROS arguments only, and its help begins with the docstring of the parameters. ``nice``
+    lowers the priority of the process.
     """
 
     def main(args: list[str] | None = None) -> int:
+        command_line = list(sys.argv) if args is None else [name, *args]
+        words = f"Everything else is a ROS argument: {name} --ros-args -p PARAMETER:=VALUE."
         does = (parameters.__doc__ or "").partition("\n")[0]
-        return run_node(node, plain_command_line(name, does, parameters, args))
+        parser = argparse.ArgumentParser(
+            prog=name, description=does, **node_help(name, parameters, words)
+        )
+        parser.parse_args(own_arguments(command_line))
+        os.nice(nice)
+        return run_node(node, command_line)
 
     return main
 

@@ -36,7 +36,6 @@ class IntraProcess:
     """The subscribers of this process by topic; one object for all its nodes."""
 
     def __init__(self) -> None:
-        """Begin without topics."""
         self._subscribers: dict[str, list[Subscriber]] = {}
 
     def advertise(self, publisher: Publisher) -> IntraProcessPublisher:

@@ -92,7 +92,7 @@ class Nodes:
         """
         for name, process in self._processes.items():
             if process.poll() not in (None, 0):
-                words = (self._logs / f"{name}.log").read_text(errors="replace")[-_SHOWN:]
+                words = self.text(name)[-_SHOWN:]
                 raise CardboxError(f"the node {name} ended with {process.returncode}:\n{words}")
 
     def pid(self, name: str) -> int:

@@ -7,7 +7,6 @@ describe a state (models, background) are latched: a late subscriber gets the la
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import partial
 from typing import Any
 
 from rclpy.event_handler import PublisherEventCallbacks, SubscriptionEventCallbacks
@@ -49,9 +48,10 @@ STATIC_TRANSFORMS = QoSProfile(
     depth=100, reliability=ReliabilityPolicy.RELIABLE, durability=DurabilityPolicy.TRANSIENT_LOCAL
 )
 
+# Words for a weak and a strong policy, and the values of their parameters.
 _MEANING = {
-    "RELIABILITY": ("best effort", "reliable", "reliability"),
-    "DURABILITY": ("volatile", "latched (transient local)", "durability"),
+    "RELIABILITY": ("best effort", "reliable", "best_effort", "reliable"),
+    "DURABILITY": ("volatile", "latched (transient local)", "volatile", "transient_local"),
 }
 
 
@@ -85,21 +85,23 @@ def mismatch_text(topic: str, kind: QoSPolicyKind, *, subscribing: bool) -> str:
         subscribing: True if this node is the subscriber, False if it publishes.
     """
     name = qos_policy_name_from_kind(kind)
-    weak, strong, policy = _MEANING.get(name, ("less", "more", name.lower()))
-    ours = "subscription" if subscribing else "publisher"
-    wanted = "best_effort" if policy == "reliability" else "volatile"
-    offered = "reliable" if policy == "reliability" else "transient_local"
-    override = f"qos_overrides.{topic}.{ours}.{policy}"
+    weak, strong, low, high = _MEANING.get(name, ("less", "more", "volatile", "transient_local"))
+    policy = name.lower()
     if subscribing:
-        return (
-            f"incompatible QoS on {topic}: a publisher offers {weak} {policy} but this node asks "
-            f"for {strong}, so nothing arrives from it; make that publisher {strong}, or start "
-            f"this node with the parameter {override}:={wanted}"
+        ours, value = "subscription", low
+        cause = (
+            f"a publisher offers {weak} {policy} but this node asks for {strong}, so nothing "
+            f"arrives from it; make that publisher {strong}"
+        )
+    else:
+        ours, value = "publisher", high
+        cause = (
+            f"a subscriber asks for {strong} {policy} but this node offers {weak}, so it receives "
+            f"nothing; make that subscriber {weak}"
         )
     return (
-        f"incompatible QoS on {topic}: a subscriber asks for {strong} {policy} but this node "
-        f"offers {weak}, so it receives nothing; make that subscriber {weak}, or start this node "
-        f"with the parameter {override}:={offered}"
+        f"incompatible QoS on {topic}: {cause}, or start this node with the parameter "
+        f"qos_overrides.{topic}.{ours}.{policy}:={value}"
     )
 
 
@@ -107,19 +109,20 @@ def subscription_events(topic: str, report: Callable[[str], None]) -> Subscripti
     """Return callbacks that pass a mismatch of QoS on ``topic`` to ``report``."""
     # The default callbacks wait for other events, which lengthens every wait of the executor.
     return SubscriptionEventCallbacks(
-        incompatible_qos=partial(_report_mismatch, topic, report, True), use_default_callbacks=False
+        incompatible_qos=_reports(topic, report, subscribing=True), use_default_callbacks=False
     )
 
 
 def publisher_events(topic: str, report: Callable[[str], None]) -> PublisherEventCallbacks:
     """Return callbacks that pass a mismatch of QoS on ``topic`` to ``report``."""
     return PublisherEventCallbacks(
-        incompatible_qos=partial(_report_mismatch, topic, report, False),
-        use_default_callbacks=False,
+        incompatible_qos=_reports(topic, report, subscribing=False), use_default_callbacks=False
     )
 
 
-def _report_mismatch(
-    topic: str, report: Callable[[str], None], subscribing: bool, event: Any
-) -> None:
-    report(mismatch_text(topic, event.last_policy_kind, subscribing=subscribing))
+def _reports(
+    topic: str, report: Callable[[str], None], *, subscribing: bool
+) -> Callable[[Any], None]:
+    return lambda event: report(
+        mismatch_text(topic, event.last_policy_kind, subscribing=subscribing)
+    )

@@ -28,7 +28,6 @@ from cardbox_tracker.applications.ergonomics.recording import (
 )
 from cardbox_tracker.applications.ergonomics.report import (
     PageContent,
-    plot_scores,
     report_lines,
     score_plot,
     write_page,
@@ -321,8 +320,6 @@ def test_the_line_breaks_where_no_posture_is_known(tmp_path: Path) -> None:
     assert line[lost] < nothing.min() and nothing.max() <= line[lost + 1]
     uncertain = shown([row(n, 3, "uncertain" if n > 4 else "tracking") for n in range(10)])
     assert columns_of(uncertain, UNCERTAIN_BGR).min() > 500
-    plot_scores(rows, tmp_path / "r.png")
-    assert (tmp_path / "r.png").read_bytes() == score_plot(rows)
 
 
 def test_an_hour_is_a_page_of_bounded_size(tmp_path: Path) -> None:

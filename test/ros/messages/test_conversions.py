@@ -51,9 +51,9 @@ def test_the_camera_of_a_silhouette_is_no_larger_than_can_be_worked_on(
 
 
 def test_an_image_is_not_much_larger_than_its_camera_info_says() -> None:
-    calibration = Calibration(640, 480, np.eye(3), np.zeros(5))
-    assert conversions.most_pixels_of(calibration, 100.0) == 16 * 640 * 480
-    assert conversions.most_pixels_of(calibration, 1.0) == 1e6
+    small, large = (Calibration(width, 480, np.eye(3), np.zeros(5)) for width in (640, 64_000))
+    assert conversions.most_pixels_of(small) == 16 * 640 * 480
+    assert conversions.most_pixels_of(large) == 2**25
     data = cv2.imencode(".png", np.zeros((48, 64), np.uint8))[1].tobytes()
     with pytest.raises(EncodingError, match=r"64x48 .*0\.002 million"):
         conversions.image_of(CompressedImage(format="png", data=data), 2000)
@@ -258,7 +258,6 @@ def test_keypoints_are_poses_of_the_optical_frame() -> None:
     got = [(p.position.x, p.position.y, p.position.z) for p in message.poses]
     np.testing.assert_array_equal(got, points)
     assert all(pose.orientation.w == 1.0 for pose in message.poses)
-    np.testing.assert_array_equal(results.points_of(message).points_m, points)
 
 
 def test_no_markers_remove_those_before() -> None:

@@ -87,7 +87,6 @@ def test_only_the_image_of_the_first_camera_info_is_kept_for_it(
     CameraImages(
         node,
         "raw",
-        lambda: 1.0,
         lambda _: None,
         lambda header, *_: delivered.append(header.stamp.sec),
     )
@@ -118,7 +117,7 @@ def test_a_camera_info_that_was_latched_before_the_node_is_used(
     publisher.publish(camera_info_message(Header(), CAMERA))
     found: list[Any] = []
     node = CardboxNode("tested", context=driver.context, enable_rosout=False)
-    CameraImages(node, "raw", lambda: 1.0, found.append, lambda *_: None)
+    CameraImages(node, "raw", found.append, lambda *_: None)
     executor = SingleThreadedExecutor(context=driver.context)
     for one in (driver, node):
         executor.add_node(one)

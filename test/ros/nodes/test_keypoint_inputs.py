@@ -67,7 +67,7 @@ class Tracker:
         return self
 
     def ask(self, at_ns: int, number: int = 0, frame: str = "eye") -> ImagePoints | None:
-        return self.inputs.points(number, header(at_ns, frame), CAMERA, SILHOUETTE)
+        return self.inputs.cameras[number].points(header(at_ns, frame), CAMERA, SILHOUETTE)
 
     def warning(self) -> str:
         return "; ".join(self.inputs.warnings().values())
@@ -270,7 +270,7 @@ def test_points_beside_the_silhouette_are_not_used(bus: Any) -> None:
     for image in range(12):
         at_ns = T + image * 33 * MS
         tracker.bus.send("/points", keypoints(at_ns))
-        assert tracker.inputs.points(0, header(at_ns), CAMERA, silhouette) is None
+        assert tracker.inputs.cameras[0].points(header(at_ns), CAMERA, silhouette) is None
     assert "the points of the last 12 images are not used: they lie beside" in tracker.warning()
     assert tracker.inputs.values()["keypoints in images"] == "0 of 12"
 

@@ -74,7 +74,6 @@ def live(
     CameraImages(
         node,
         "raw",
-        lambda: 10.0,
         found.append,
         lambda _, seen, __: images.append(seen.copy()),
         roll_deg=roll_deg,

@@ -17,7 +17,7 @@ from std_msgs.msg import Header
 
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.posture import reference_posture
-from cardbox_tracker.ros.nodes.rep155_outputs import Rep155Outputs, TrackedBodies
+from cardbox_tracker.ros.nodes.tracker_outputs import Rep155Outputs, TrackedBodies
 from cardbox_tracker.tracking.estimate import LOST, TRACKING, Estimate
 
 PLACE = "/humans/bodies/p1"

@@ -14,8 +14,8 @@ from std_msgs.msg import Header
 from cardbox_tracker.common.errors import EncodingError
 from cardbox_tracker.ros.messages.conversions import image_message
 from cardbox_tracker.ros.nodes.camera_inputs import ImagePairing
+from cardbox_tracker.ros.nodes.input_stream import MOST_BYTES, RecentImages
 from cardbox_tracker.ros.nodes.reference_capture import ReferenceCapture
-from cardbox_tracker.ros.runtime.recent import MOST_BYTES, RecentImages
 
 
 def message(number: int, size: int = 4) -> Image:

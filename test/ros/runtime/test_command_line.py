@@ -8,7 +8,8 @@ import pytest
 
 pytest.importorskip("rclpy", reason="rclpy is not installed")
 
-from cardbox_tracker.ros.runtime.command_line import entries, plain_command_line
+from cardbox_tracker.ros.runtime import command_line
+from cardbox_tracker.ros.runtime.command_line import entries
 from lab.tools.parameter_docs import NODES as PARAMETERS
 
 NODES = ("background", "initializer", "tracker")
@@ -62,6 +63,9 @@ def test_the_help_of_the_tracker_in_words(capsys: pytest.CaptureFixture[str]) ->
     assert "  tracker/reset (std_srvs/Trigger)\n      start again from" in text
 
 
-def test_arguments_of_ros_are_passed_on() -> None:
-    given, kind = ["--ros-args", "-p", "seed:=1"], PARAMETERS["tracker"]
-    assert plain_command_line("tracker", "It tracks.", kind, given) == ["tracker", *given]
+def test_arguments_of_ros_are_passed_on(monkeypatch: pytest.MonkeyPatch) -> None:
+    given, ran = ["--ros-args", "-p", "seed:=1"], []
+    module = importlib.import_module("cardbox_tracker.ros.nodes.tracker_node")
+    monkeypatch.setattr(command_line, "run_node", lambda _, words: ran.append(words) or 0)
+    assert module.main(given) == 0
+    assert ran == [["tracker", *given]]
