@@ -25,6 +25,12 @@ from numpy.typing import NDArray
 from cardbox_tracker.common.errors import CardboxError
 from cardbox_tracker.detectors.figure import Figure
 from cardbox_tracker.detectors.identity import Identity, colours_in
+from cardbox_tracker.detectors.image_points import (
+    LEG_POINT_NAMES,
+    POINT_NAMES,
+    ImagePoints,
+    LegPoints,
+)
 
 FloatArray = NDArray[np.float64]
 ColorImage = NDArray[np.uint8]
@@ -429,3 +435,20 @@ def _chance(logits: NDArray[Any]) -> FloatArray:
     """Logistic function, without overflow."""
     chances: FloatArray = 1.0 / (1.0 + np.exp(-np.clip(logits.astype(np.float64), -60.0, 60.0)))
     return chances
+
+
+_USED = np.array([LANDMARKS.index(name) for name in POINT_NAMES])
+_LEGS = np.array([LANDMARKS.index(name) for name in LEG_POINT_NAMES])
+
+
+def image_points(found: Detection) -> ImagePoints:
+    """Return the points of a detection that the tracker uses."""
+    (pixels, scores, spatial_m), legs = (
+        (
+            found.points_px[used],
+            found.scores[used],
+            None if found.spatial_m is None else found.spatial_m[used],
+        )
+        for used in (_USED, _LEGS)
+    )
+    return ImagePoints(pixels, scores, spatial_m=spatial_m, legs=LegPoints(*legs))

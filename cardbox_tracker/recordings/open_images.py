@@ -8,8 +8,7 @@ from pathlib import Path
 from cardbox_tracker.common.errors import BagError
 from cardbox_tracker.recordings.bag_files import FILE_ENDINGS, is_bag_file
 from cardbox_tracker.recordings.bag_reader import REPAIR_ROS1, BagReader
-from cardbox_tracker.recordings.focal_length import equivalent_mm
-from cardbox_tracker.recordings.given_camera import GivenCamera
+from cardbox_tracker.recordings.given_camera import GivenCamera, equivalent_mm
 from cardbox_tracker.recordings.image_folder import SUFFIXES, ImageFolder, image_files
 from cardbox_tracker.recordings.image_recording import ImageRecording
 from cardbox_tracker.recordings.video_reader import FORMATS, VideoReader

@@ -16,10 +16,10 @@ from numpy.typing import NDArray
 from cardbox_tracker.camera.camera import Camera
 from cardbox_tracker.camera.depth_image import DepthImage
 from cardbox_tracker.camera.extrinsics import Extrinsics
-from cardbox_tracker.camera.extrinsics_files import load_extrinsics
 from cardbox_tracker.camera.extrinsics_sources import (
     FrameTransform,
     extrinsics_between,
+    load_extrinsics,
     transforms_of,
 )
 from cardbox_tracker.camera.pairing import camera_names, side_by_side
@@ -29,12 +29,17 @@ from cardbox_tracker.common.errors import BagError, CameraError, CardboxError
 from cardbox_tracker.detectors.detector import Detector
 from cardbox_tracker.detectors.point_table import PointTable
 from cardbox_tracker.recordings.bag_reader import BagReader
-from cardbox_tracker.recordings.depth_silhouettes import DepthSilhouetteSource, Within, depth_images
-from cardbox_tracker.recordings.detector_silhouettes import DetectorSilhouetteSource
 from cardbox_tracker.recordings.given_camera import GivenCamera
 from cardbox_tracker.recordings.image_recording import ImageRecording, working_size
 from cardbox_tracker.recordings.open_images import is_bag, open_images
-from cardbox_tracker.recordings.person_in_view import PersonInView, PersonInViewSource
+from cardbox_tracker.recordings.other_silhouettes import (
+    DepthSilhouetteSource,
+    DetectorSilhouetteSource,
+    PersonInView,
+    PersonInViewSource,
+    Within,
+    depth_images,
+)
 from cardbox_tracker.recordings.silhouettes import RecordedFrame, SilhouetteSource, TimeSpan
 from cardbox_tracker.tracking.observation import Observation
 

@@ -18,13 +18,11 @@ from cardbox_tracker.camera.depth_image import DepthImage
 from cardbox_tracker.camera.encodings import brightness_of
 from cardbox_tracker.common.beside import results_ahead
 from cardbox_tracker.common.errors import BagError, CameraError, CardboxError, EncodingError
-from cardbox_tracker.detectors.detector import Detector
+from cardbox_tracker.detectors.detector import Detector, KeptDetections
 from cardbox_tracker.detectors.image_points import ImagePoints
-from cardbox_tracker.detectors.landmarks import image_points
 from cardbox_tracker.detectors.point_table import GivenPoints, Image, PointTable
-from cardbox_tracker.detectors.pose_network import Detection
+from cardbox_tracker.detectors.pose_network import Detection, image_points
 from cardbox_tracker.recordings.image_recording import ImageRecording, RecordedImage
-from cardbox_tracker.recordings.kept_detections import KeptDetections
 from cardbox_tracker.segmentation.background_config import BackgroundConfig
 from cardbox_tracker.segmentation.learning import Learning
 from cardbox_tracker.segmentation.silhouettes import SilhouettePipeline

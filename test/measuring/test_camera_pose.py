@@ -20,8 +20,12 @@ from cardbox_tracker.measuring.camera_pose import (
     moved_by,
     turned_by,
 )
-from cardbox_tracker.measuring.pose_direction import PoseDirection, PoseFault
-from cardbox_tracker.measuring.silhouette_tangents import TopTangents, roll_of
+from cardbox_tracker.measuring.silhouette_tangents import (
+    PoseDirection,
+    PoseFault,
+    TopTangents,
+    roll_of,
+)
 from cardbox_tracker.person.model import PROPORTIONS, BodyModel
 from cardbox_tracker.person.posture import reference_posture
 from cardbox_tracker.person.skeleton import KeypointState
