@@ -24,26 +24,18 @@ MEDIAPIPE = "mediapipe"
 
 
 class Detector(NamedTuple):
-    """The installed detector, or one of the user's own.
+    """The installed detector, or one of the user's own."""
 
-    Attributes:
-        models: its network files, or the class of one's own.
-        person: whom to follow, px of the camera's own image; None for the most certain person.
-        people: number of people whom it finds at most, see :meth:`PersonDetector.all_in`; 0 for the
-            one whom it follows.
-    """
-
-    models: ModelFiles | OwnModel
+    models: ModelFiles | OwnModel  #: its network files, or the class of one's own
+    #: whom to follow, px of the camera's own image; None for the most certain person.
     person: PersonChoice | None = None
+    #: number of people whom it finds at most, see :meth:`PersonDetector.all_in`; 0 for the one whom
+    #: it follows.
     people: int = 0
 
     @classmethod
     def installed(cls) -> Detector:
-        """Return the installed detector.
-
-        Raises:
-            CardboxError: it is not installed.
-        """
+        """Return the installed detector; raise CardboxError if it is not installed."""
         return cls(installed_models())
 
     def start(self, across: float = 1.0, down: float = 1.0) -> PersonDetector:

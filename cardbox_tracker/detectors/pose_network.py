@@ -98,19 +98,12 @@ _CELLS = np.indices((_HEAT_WINDOW, _HEAT_WINDOW))
 
 
 class Square(NamedTuple):
-    """A turned square of the image.
+    """A turned square of the image."""
 
-    Attributes:
-        u: column of its centre, px.
-        v: row of its centre, px.
-        side: px.
-        angle_rad: by which it is turned clockwise in the image.
-    """
-
-    u: float
-    v: float
-    side: float
-    angle_rad: float
+    u: float  #: column of its centre, px
+    v: float  #: row of its centre, px
+    side: float  #: px
+    angle_rad: float  #: by which it is turned clockwise in the image
 
     def to_image(self, points: FloatArray) -> FloatArray:
         """Return points (N, 2) of the square, 0 to 1, in pixels of the image."""
@@ -120,20 +113,13 @@ class Square(NamedTuple):
 
 
 class Detection(NamedTuple):
-    """One person in one image.
+    """One person in one image."""
 
-    Attributes:
-        points_px: (33, 2), column and row; (0, 0) is the centre of the first pixel.
-        scores: (33,), chance that the point is in the image and visible, 0 to 1.
-        mask: (H, W) uint8, 255 times the chance that a pixel shows the person.
-        spatial_m: the points in space relative to the hips, (33, 3), metres for an average person:
-            x right, y down, z away from the camera; None if it is unknown. The network takes the
-            camera for level.
-    """
-
-    points_px: FloatArray
-    scores: FloatArray
-    mask: NDArray[np.uint8]
+    points_px: FloatArray  #: (33, 2), column and row; (0, 0) is the centre of the first pixel
+    scores: FloatArray  #: (33,), chance that the point is in the image and visible, 0 to 1
+    mask: NDArray[np.uint8]  #: (H, W) uint8, 255 times the chance that a pixel shows the person
+    #: the points in space relative to the hips, (33, 3), metres for an average person: x right, y
+    #: down, z away from the camera; None if it is unknown. The network takes the camera for level.
     spatial_m: FloatArray | None = None
 
     def silhouette(self) -> NDArray[np.uint8]:
@@ -162,8 +148,7 @@ class PoseNetwork:
     def __init__(self, detector: Path, landmarks: Path) -> None:
         """Load both networks.
 
-        Raises:
-            CardboxError: LiteRT is not installed, or a file is missing or damaged.
+        Raises CardboxError if LiteRT is not installed, or a file is missing or damaged.
         """
         self._detect = Network(detector)
         self._locate = Network(landmarks)
@@ -287,8 +272,7 @@ class Network:
     def __init__(self, path: Path) -> None:
         """Load it.
 
-        Raises:
-            CardboxError: LiteRT is not installed, or the file is missing or damaged.
+        Raises CardboxError if LiteRT is not installed, or the file is missing or damaged.
         """
         try:
             from ai_edge_litert.interpreter import Interpreter

@@ -57,31 +57,19 @@ _STEP_LENGTHS = (1.0, 0.5, 0.2, 0.0)
 
 
 class Sighting(NamedTuple):
-    """The person at one time.
+    """The person at one time."""
 
-    Attributes:
-        state: state for the first camera, (14,): d1..d12, ``torso_x``, ``torso_z``.
-        first: silhouette of the first camera, (H, W), 0 or 255.
-        other: silhouette of the further camera.
-        stddev: standard deviations of the state, (14,).
-    """
-
-    state: FloatArray
-    first: Silhouette
-    other: Silhouette
-    stddev: FloatArray = STATE_STDDEV
+    state: FloatArray  #: state for the first camera, (14,): d1..d12, ``torso_x``, ``torso_z``
+    first: Silhouette  #: silhouette of the first camera, (H, W), 0 or 255
+    other: Silhouette  #: silhouette of the further camera
+    stddev: FloatArray = STATE_STDDEV  #: standard deviations of the state, (14,)
 
 
 class PoseUpdate(NamedTuple):
-    """The result of one Gauss-Newton step.
+    """The result of one Gauss-Newton step."""
 
-    Attributes:
-        extrinsics: updated pose.
-        cost: mean of the sightings' weighted squared distances before the step.
-    """
-
-    extrinsics: Extrinsics
-    cost: float
+    extrinsics: Extrinsics  #: updated pose
+    cost: float  #: mean of the sightings' weighted squared distances before the step
 
 
 class _Equations(NamedTuple):

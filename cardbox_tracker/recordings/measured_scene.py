@@ -54,16 +54,11 @@ class Spread(Generic[T]):
 
 
 class Watched(NamedTuple):
-    """What the first camera of a recording shows in all of it.
+    """What the first camera of a recording shows in all of it."""
 
-    Attributes:
-        frames: some with a whole upper body, for the sizes of one person.
-        pictures: times, s, and some images as they were recorded, undistorted.
-        people: times, s, and points of each person whom a detector finds.
-    """
-
-    frames: Sequence[RecordedFrame]
-    pictures: Sequence[Picture]
+    frames: Sequence[RecordedFrame]  #: some with a whole upper body, for the sizes of one person
+    pictures: Sequence[Picture]  #: times, s, and some images as they were recorded, undistorted
+    #: times, s, and points of each person whom a detector finds.
     people: Sequence[Sequence[tuple[float, ImagePoints]]]
 
 

@@ -42,11 +42,7 @@ class TimeSpan(NamedTuple):
 
     @classmethod
     def parse(cls, text: str) -> TimeSpan:
-        """Read ``T0:T1``.
-
-        Raises:
-            ValueError: the text does not have this form.
-        """
+        """Read ``T0:T1``; raise ValueError if the text does not have this form."""
         start, colon, end = text.partition(":")
         try:
             span = cls(float(start), float(end))
@@ -92,29 +88,21 @@ FindPoints = Callable[[PreparedImage, NDArray[np.uint8]], ImagePoints | None]
 
 
 class RecordedFrame(NamedTuple):
-    """One image of a recording and the silhouette in it.
+    """One image of a recording and the silhouette in it."""
 
-    Attributes:
-        stamp_ns: stamp of the image.
-        time_s: seconds from the recording's start.
-        brightness: (H, W) uint8, undistorted, at the working resolution.
-        silhouette: (H, W) uint8, 0 or 255.
-        image: (H, W, 3) bgr, or (H, W) grey, undistorted, at the working resolution; None if it
-            was not requested.
-        depth_m: (H, W), metres, from which the silhouette was cut out; None without depth.
-        points: joints of the person in the image, from a detector; None without one.
-        recorded: the image as it was recorded; None if it was not kept.
-        people: joints of each person, from a detector of several; None without one.
-    """
-
-    stamp_ns: int
-    time_s: float
-    brightness: NDArray[np.uint8]
-    silhouette: NDArray[np.uint8]
+    stamp_ns: int  #: stamp of the image
+    time_s: float  #: seconds from the recording's start
+    brightness: NDArray[np.uint8]  #: (H, W) uint8, undistorted, at the working resolution
+    silhouette: NDArray[np.uint8]  #: (H, W) uint8, 0 or 255
+    #: (H, W, 3) bgr, or (H, W) grey, undistorted, at the working resolution; None if it was not
+    #: requested.
     image: NDArray[np.uint8] | None = None
+    #: (H, W), metres, from which the silhouette was cut out; None without depth.
     depth_m: DepthImage | None = None
+    #: joints of the person in the image, from a detector; None without one.
     points: ImagePoints | None = None
-    recorded: RecordedImage | None = None
+    recorded: RecordedImage | None = None  #: the image as it was recorded; None if it was not kept
+    #: joints of each person, from a detector of several; None without one.
     people: tuple[ImagePoints, ...] | None = None
 
     @property
@@ -314,8 +302,7 @@ class SilhouetteSource:
     def held(self, span: TimeSpan, what: str) -> list[RecordedFrame]:
         """Return the frames of a span in which a posture is held.
 
-        Raises:
-            CardboxError: no image lies in the span; the text names ``what``.
+        Raises CardboxError if no image lies in the span; the text names ``what``.
         """
         # Full images of a whole span would take hundreds of megabytes.
         found = [frame._replace(recorded=None) for frame in self.frames(*span)]
@@ -329,8 +316,7 @@ class SilhouetteSource:
     def period_ns(self) -> int:
         """Return the median time between images, ns.
 
-        Raises:
-            BagError: there are fewer than two images.
+        Raises BagError if there are fewer than two images.
         """
         images = islice(self._bag.images(self.topic), _PERIOD_IMAGES)
         stamps_ns = [image.stamp_ns for image in images]

@@ -27,34 +27,23 @@ Observer = Callable[[RecordedFrame, Estimate, Tracker], None]
 
 @dataclass(frozen=True)
 class TrackSummary:
-    """Summary of a run.
+    """Summary of a run."""
 
-    Attributes:
-        frames: number of images.
-        frames_tracked: number of images with a posture.
-        mean_cost_px: mean cost over the tracked images; nan without any.
-        mean_iou: mean overlap (IoU) over the tracked images; nan without any.
-        frames_uncertain: number of tracked images whose posture may be wrong.
-        remarks: warnings about extrinsics or depth that seem to be wrong.
-        body: the body at the end, whose unknown values were fitted.
-        scene: mean, deviation and origin of the camera's numbers by name.
-        used: in how many images each optional input was used, by its name.
-        accounts: for each camera, what was used of it and what was left out.
-        assumptions: what the results rest on, with its numbers and where they are from.
-        people: the same for each of several people by number; the numbers above are of all of them.
-    """
-
-    frames: int
-    frames_tracked: int
-    mean_cost_px: float
-    mean_iou: float
-    frames_uncertain: int = 0
-    remarks: tuple[str, ...] = ()
-    body: BodyModel | None = None
-    accounts: tuple[str, ...] = ()
+    frames: int  #: number of images
+    frames_tracked: int  #: number of images with a posture
+    mean_cost_px: float  #: mean cost over the tracked images; nan without any
+    mean_iou: float  #: mean overlap (IoU) over the tracked images; nan without any
+    frames_uncertain: int = 0  #: number of tracked images whose posture may be wrong
+    remarks: tuple[str, ...] = ()  #: warnings about extrinsics or depth that seem to be wrong
+    body: BodyModel | None = None  #: the body at the end, whose unknown values were fitted
+    accounts: tuple[str, ...] = ()  #: for each camera, what was used of it and what was left out
+    #: what the results rest on, with its numbers and where they are from.
     assumptions: tuple[str, ...] = ()
+    #: mean, deviation and origin of the camera's numbers by name.
     scene: Mapping[str, Mapping[str, float | str]] = field(default_factory=dict)
+    #: in how many images each optional input was used, by its name.
     used: Mapping[str, int] = field(default_factory=dict)
+    #: the same for each of several people by number; the numbers above are of all of them.
     people: Mapping[int, TrackSummary] = field(default_factory=dict)
 
     @property
