@@ -41,12 +41,8 @@ class Detector(NamedTuple):
     def start(self, across: float = 1.0, down: float = 1.0) -> PersonDetector:
         """Return a detector for the images of one camera.
 
-        Args:
-            across: width of the images that it gets, as a share of that of the camera's own image.
-            down: the same for their height.
-
-        Raises:
-            CardboxError: the networks cannot be loaded.
+        Their width and height are the shares ``across`` and ``down`` of the camera's own image.
+        Raises CardboxError if the networks cannot be loaded.
         """
         if isinstance(self.models, OwnModel):
             network: PoseNetwork = OwnNetwork(self.models.make())

@@ -37,38 +37,17 @@ ColorImage = NDArray[np.uint8]
 
 LANDMARKS = (
     "nose",
-    "left_eye_inner",
-    "left_eye",
-    "left_eye_outer",
-    "right_eye_inner",
-    "right_eye",
-    "right_eye_outer",
-    "left_ear",
-    "right_ear",
-    "mouth_left",
-    "mouth_right",
-    "left_shoulder",
-    "right_shoulder",
-    "left_elbow",
-    "right_elbow",
-    "left_wrist",
-    "right_wrist",
-    "left_little_finger",
-    "right_little_finger",
-    "left_index",
-    "right_index",
-    "left_thumb",
-    "right_thumb",
-    "left_hip",
-    "right_hip",
-    "left_knee",
-    "right_knee",
-    "left_ankle",
-    "right_ankle",
-    "left_heel",
-    "right_heel",
-    "left_foot",
-    "right_foot",
+    *("left_eye_inner", "left_eye", "left_eye_outer"),
+    *("right_eye_inner", "right_eye", "right_eye_outer"),
+    *("left_ear", "right_ear", "mouth_left", "mouth_right"),
+    *(
+        f"{side}_{name}"
+        for name in (
+            *("shoulder", "elbow", "wrist", "little_finger", "index", "thumb"),
+            *("hip", "knee", "ankle", "heel", "foot"),
+        )
+        for side in ("left", "right")
+    ),
 )
 """``left`` is the person's left; fingers are their knuckles at the base."""
 POINTS = len(LANDMARKS)

@@ -19,14 +19,14 @@ from cardbox_tracker.detectors.detector import Detector
 from cardbox_tracker.detectors.point_table import PointTable
 from cardbox_tracker.detectors.pose_network import image_points
 from cardbox_tracker.recordings.bag_reader import IMAGE_TYPES, BagReader
-from cardbox_tracker.recordings.image_recording import ImageRecording
+from cardbox_tracker.recordings.open_images import ImageRecording
 from cardbox_tracker.recordings.silhouettes import RecordedFrame, SilhouetteSource
-from cardbox_tracker.segmentation.depth_silhouette import (
+from cardbox_tracker.segmentation.learning import Learning, PersonInViewLearning
+from cardbox_tracker.segmentation.silhouettes import (
     WITHIN_LIMITS_M,
     nearest_m,
     silhouette_within,
 )
-from cardbox_tracker.segmentation.learning import Learning, PersonInViewLearning
 
 
 def depth_images(
@@ -142,7 +142,7 @@ class DetectorSilhouetteSource(SilhouetteSource):
         self._open(bag, bag.working_size, camera)
         self._find_points(None if isinstance(points, Detector) else points, camera)
         self._has_own_points = isinstance(points, Detector)
-        self._has_points = points is not None
+        self.has_points = points is not None
         self._detector = self._started(detector)
         self._finds_people = detector.people > 0
 

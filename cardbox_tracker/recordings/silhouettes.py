@@ -22,7 +22,8 @@ from cardbox_tracker.detectors.detector import Detector, KeptDetections
 from cardbox_tracker.detectors.image_points import ImagePoints
 from cardbox_tracker.detectors.point_table import GivenPoints, Image, PointTable
 from cardbox_tracker.detectors.pose_network import Detection, image_points
-from cardbox_tracker.recordings.image_recording import ImageRecording, RecordedImage
+from cardbox_tracker.recordings.image_recording import RecordedImage
+from cardbox_tracker.recordings.open_images import ImageRecording
 from cardbox_tracker.segmentation.background_config import BackgroundConfig
 from cardbox_tracker.segmentation.learning import Learning
 from cardbox_tracker.segmentation.silhouettes import SilhouettePipeline
@@ -120,6 +121,7 @@ class SilhouetteSource:
         camera: camera of the frames at the working resolution.
         depth_topic: topic of the depth images that cut out the silhouettes; None if a background
             model does.
+        has_points: whether the frames can have points of the person.
         used_beside: topics of other images of the recording that are used, too.
     """
 
@@ -138,20 +140,11 @@ class SilhouetteSource:
     ) -> None:
         """Learn the empty scene from the first images of the span ``background``.
 
-        It learns from at most ``config.learn_images`` images, like the background node.
-
-        Args:
-            bag: an open recording.
-            background: span without a person in the image.
-            config: settings of the background model.
-            size: working resolution (width, height), px; None for that of the recording.
-            camera: namespace of the camera; without it, the recording has only one.
-            points: source of the person's points in the images.
-
-        Raises:
-            BagError: the span has too few images.
-            CameraError: the recording's camera is not calibrated.
-            CardboxError: ``points`` cannot be read.
+        It learns from at most ``config.learn_images`` images, like the background node. ``size``
+        is the working resolution (width, height), px, None for that of the recording; without
+        ``camera``, its namespace, the recording has only one; ``points`` is the source of the
+        person's points. Raises BagError if the span has too few images, CameraError if the camera
+        is not calibrated, and CardboxError if ``points`` cannot be read.
         """
         self._open(bag, size or bag.working_size, camera, config)
         self._find_points(points, camera)
@@ -159,11 +152,11 @@ class SilhouetteSource:
         is_readable = False
         for _, time_s, image, *_ in self.images():
             is_readable = True
-            if time_s > background.end_s or self._pipeline.has_enough:
+            if time_s > background.end_s or self._pipeline.learning.has_enough():
                 break
             if background.contains(time_s):
-                self._pipeline.learn(image)
-        count = self._pipeline.learned_images
+                self._pipeline.learning.add(image)
+        count = self._pipeline.learning.count
         if not is_readable and self._broken:
             raise BagError(f"{self.path} has no image to learn from: {self._brokenness()}")
         if count < 2:
@@ -196,14 +189,9 @@ class SilhouetteSource:
         self.camera = self._pipeline.camera
         self._full: tuple[tuple[int, int] | None, Rectifier | None] = None, None
 
-    @property
-    def has_points(self) -> bool:
-        """Whether the frames can have points of the person."""
-        return self._has_points
-
     def _find_points(self, points: Detector | PointTable | None, camera: str | None) -> None:
         """Use a source of points."""
-        self._has_points = points is not None
+        self.has_points = points is not None
         self._finds_people = points is not None and points.people > 0
         self._detector = self._started(points) if isinstance(points, Detector) else None
         self._given: GivenPoints | None = None

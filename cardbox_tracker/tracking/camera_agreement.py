@@ -188,7 +188,7 @@ class CameraAgreement:
             problem = PoseProblem(self._body, self._first, view.camera, upright, sightings)
             found = upright
             for _ in range(_STEPS):
-                found = problem.step(found, ROTATION).extrinsics
+                found, _ = problem.step(found, ROTATION)
         except (CameraError, np.linalg.LinAlgError):
             return float("inf")
         return float(np.degrees(np.linalg.norm(turned_by(upright, found)[:2])))

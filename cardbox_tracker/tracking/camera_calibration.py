@@ -147,5 +147,5 @@ def _improved(
 ) -> Extrinsics:
     problem = PoseProblem(body, first, other, pose, sightings, tangents)
     for _ in range(steps):
-        pose = problem.step(pose).extrinsics
+        pose, _ = problem.step(pose)
     return pose

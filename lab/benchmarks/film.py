@@ -31,8 +31,9 @@ from cardbox_tracker.common.errors import CardboxError
 from cardbox_tracker.detectors.detector import KeptDetections
 from cardbox_tracker.detectors.hand_network import HandNetwork
 from cardbox_tracker.detectors.pose_network import Network, PoseNetwork
-from cardbox_tracker.recordings import quality, result_table, video_reader
+from cardbox_tracker.recordings import result_table, video_reader
 from cardbox_tracker.recordings.other_silhouettes import DetectorSilhouetteSource
+from cardbox_tracker.recordings.track import Quality
 from cardbox_tracker.search.doubt import Doubt
 from cardbox_tracker.search.whole_body import WholeBodyFilter
 from cardbox_tracker.segmentation.silhouettes import SilhouettePipeline
@@ -67,7 +68,7 @@ STEPS: Mapping[str, Sequence[tuple[Any, str]]] = {
     "squares and angles of hands": [(HandReader, "see")],
     "network of hands": [(HandNetwork, "__call__")],
     "table": [(result_table, "row_of"), (result_table, "_text")],
-    "summary": [(quality.Quality, "__call__")],
+    "summary": [(Quality, "__call__")],
     "drawing": [(video, "draw_overlay")],
     "encoding": [(video, "_encoder")],
 }
