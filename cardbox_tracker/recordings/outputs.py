@@ -169,8 +169,10 @@ def joint_values(estimate: Estimate, torso_place: bool = True) -> JointValues | 
     """
     if estimate.posture is None or not torso_place:
         return _joints(JOINT_NAMES, estimate.posture)
-    names = JOINT_STATE_NAMES
-    known = [_or_zeros(x) for x in (estimate.offset_m, estimate.neck, estimate.clavicles_m)]
+    names, known = (
+        JOINT_STATE_NAMES,
+        [place_of(estimate), neck_of(estimate), clavicles_of(estimate)],
+    )
     if estimate.hands is not None:
         names = *names, *HAND_NAMES
         known += [np.zeros(3) if hand is None else hand.joints for hand in estimate.hands]
@@ -217,6 +219,16 @@ def open_hands(estimate: Estimate) -> JointValues | None:
 def place_of(estimate: Estimate) -> FloatArray:
     """Return ``torso_x`` and ``torso_z`` (2,), metres; 0 if the filter keeps them constant."""
     return _or_zeros(estimate.offset_m)
+
+
+def neck_of(estimate: Estimate) -> FloatArray:
+    """Return ``neck_yaw`` and ``neck_pitch`` (2,), rad; 0 if the face was not seen."""
+    return _or_zeros(estimate.neck)
+
+
+def clavicles_of(estimate: Estimate) -> FloatArray:
+    """Return the rise of both shoulders, (2,), metres; 0 if it is not known."""
+    return _or_zeros(estimate.clavicles_m)
 
 
 def _or_zeros(pair: FloatArray | None) -> FloatArray:
