@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from cardbox_tracker.camera.calibration_file import load_calibration
     from cardbox_tracker.camera.camera import Calibration, Camera
     from cardbox_tracker.camera.extrinsics import Extrinsics
-    from cardbox_tracker.camera.extrinsics_sources import load_extrinsics
+    from cardbox_tracker.camera.extrinsics_files import load_extrinsics
     from cardbox_tracker.camera.view import OtherCamera
     from cardbox_tracker.commands.python import track
     from cardbox_tracker.common.errors import (
@@ -125,7 +125,7 @@ _MODULES = {
     "camera.camera": ("Calibration", "Camera"),
     "segmentation.empty_scene": ("BackgroundLearner", "BackgroundModel"),
     "camera.extrinsics": ("Extrinsics",),
-    "camera.extrinsics_sources": ("load_extrinsics",),
+    "camera.extrinsics_files": ("load_extrinsics",),
     "applications.exporting.formats": ("Result", "read_result"),
     "commands.python": ("track",),
 }

@@ -71,7 +71,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> None:
     """Estimate the extrinsics, write them and print their uncertainty."""
-    from cardbox_tracker.camera.extrinsics_sources import save_camchain
+    from cardbox_tracker.camera.extrinsics_files import save_camchain
     from cardbox_tracker.common.progress import progress_bar
     from cardbox_tracker.measuring.config import InitializationConfig
     from cardbox_tracker.person.model import BodyModel

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from cardbox_tracker.camera.depth_image import DepthImage
 from cardbox_tracker.camera.extrinsics import Extrinsics
-from cardbox_tracker.camera.extrinsics_sources import (
+from cardbox_tracker.camera.extrinsics_files import (
     extrinsics_between,
     load_extrinsics,
     transforms_of,

@@ -14,7 +14,7 @@ import yaml
 
 from cardbox_tracker.camera.camera import Camera
 from cardbox_tracker.camera.extrinsics import Extrinsics
-from cardbox_tracker.camera.extrinsics_sources import (
+from cardbox_tracker.camera.extrinsics_files import (
     choose,
     load_extrinsics,
     of_rectified_pair,

@@ -33,7 +33,7 @@ from cardbox_tracker.camera.encodings import (
     decode_compressed,
     decode_grey,
 )
-from cardbox_tracker.camera.extrinsics_sources import load_extrinsics
+from cardbox_tracker.camera.extrinsics_files import load_extrinsics
 from cardbox_tracker.commands import arguments
 from cardbox_tracker.common.errors import CardboxError
 from cardbox_tracker.common.small_yaml import parse_small_yaml

@@ -20,7 +20,7 @@ from cardbox_tracker.applications.retargeting.robot import load_robot
 from cardbox_tracker.applications.simulation.session import SessionFormat, synthesize_session
 from cardbox_tracker.camera.calibration_file import load_calibration
 from cardbox_tracker.camera.camera import Calibration
-from cardbox_tracker.camera.extrinsics_sources import load_extrinsics
+from cardbox_tracker.camera.extrinsics_files import load_extrinsics
 from cardbox_tracker.common.errors import CardboxError
 from cardbox_tracker.detectors.point_table import PointTable
 from cardbox_tracker.measuring.scene import Scene, SceneCamera, Value, dumps_scene, load_scene

@@ -14,7 +14,7 @@ from cardbox_tracker.applications.retargeting.joint_map import load_joint_map
 from cardbox_tracker.applications.retargeting.robot import load_robot
 from cardbox_tracker.camera.calibration_file import load_calibration
 from cardbox_tracker.camera.camera import Calibration
-from cardbox_tracker.camera.extrinsics_sources import load_extrinsics
+from cardbox_tracker.camera.extrinsics_files import load_extrinsics
 from cardbox_tracker.common.errors import CardboxError
 from cardbox_tracker.detectors.model_files import install_models
 from cardbox_tracker.detectors.point_table import PointTable

@@ -21,7 +21,7 @@ from cardbox_tracker.applications.simulation.person import person_frames
 from cardbox_tracker.applications.simulation.renderer import Renderer
 from cardbox_tracker.camera.camera import OPTICAL_FRAME, Camera
 from cardbox_tracker.camera.extrinsics import Extrinsics
-from cardbox_tracker.camera.extrinsics_sources import save_camchain
+from cardbox_tracker.camera.extrinsics_files import save_camchain
 from cardbox_tracker.camera.pairing import MOST_CAMERAS
 from cardbox_tracker.camera.view import OtherCamera, View
 from cardbox_tracker.common.errors import CardboxError, EncodingError

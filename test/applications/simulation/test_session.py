@@ -17,7 +17,7 @@ from cardbox_tracker.applications.simulation.session import (
     SessionFormat,
     synthesize_session,
 )
-from cardbox_tracker.camera.extrinsics_sources import load_extrinsics
+from cardbox_tracker.camera.extrinsics_files import load_extrinsics
 from cardbox_tracker.common.errors import CardboxError
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.skeleton import JOINT_NAMES
