@@ -39,7 +39,7 @@ def track(recording: str | os.PathLike[str], **options: Any) -> Result:
         CardboxError: options are wrong, or a file cannot be read or written.
     """
     from cardbox_tracker.applications.exporting.formats import read_result
-    from cardbox_tracker.recordings.folder import is_one_recording
+    from cardbox_tracker.recordings.open_images import is_one_recording
 
     own = options.get("detector")
     is_own = own is not None and not isinstance(own, str | os.PathLike)

@@ -590,9 +590,8 @@ def _silhouettes(
 ) -> Segmentation:
     """Return the source of the silhouettes that is given, or that fits the recording."""
     from cardbox_tracker.detectors.detector import MEDIAPIPE, Detector
-    from cardbox_tracker.recordings.depth_silhouettes import Within
     from cardbox_tracker.recordings.open_images import is_bag
-    from cardbox_tracker.recordings.person_in_view import PersonInView
+    from cardbox_tracker.recordings.other_silhouettes import PersonInView, Within
     from cardbox_tracker.recordings.recording import STEREO
 
     chosen, within = options.silhouettes, options.within

@@ -111,7 +111,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> None:
     """Track the person and write the requested files."""
-    from cardbox_tracker.recordings.folder import is_one_recording, recordings_in
+    from cardbox_tracker.recordings.open_images import is_one_recording, recordings_in
 
     path = options.recording
     if not is_one_recording(path) and recordings_in(path, options.output):

@@ -48,7 +48,7 @@ from cardbox_tracker.common.files import (
 from cardbox_tracker.common.processes import cores, results_of
 from cardbox_tracker.common.progress import progress_bar
 from cardbox_tracker.detectors.point_table import PointTable
-from cardbox_tracker.recordings.folder import FORMULA, SUMMARY, recordings_in
+from cardbox_tracker.recordings.open_images import FORMULA, SUMMARY, recordings_in
 from cardbox_tracker.recordings.result_table import check_table
 from cardbox_tracker.recordings.track import TrackSummary
 from cardbox_tracker.tracking.precompile import compile_all
@@ -124,7 +124,7 @@ class Job(NamedTuple):
     """A recording to track.
 
     Attributes:
-        name: see :func:`~.recordings.folder.recordings_in`.
+        name: see :func:`~.recordings.open_images.recordings_in`.
         request: what is tracked; its results are in a folder of the job's own.
         inputs: see :func:`digest_of_inputs`.
         folder: folder in which relative paths begin; None for that of the process.

@@ -42,8 +42,7 @@ def track(
     from cardbox_tracker.detectors.hand_network import HandNetwork
     from cardbox_tracker.measuring.scene import save_scene
     from cardbox_tracker.person.model_file import save_body_model
-    from cardbox_tracker.recordings.quality import Quality
-    from cardbox_tracker.recordings.track import track_recording
+    from cardbox_tracker.recordings.track import Quality, track_recording
 
     qualities: dict[int, Quality] = {}
     recording, person = request.recording, request.person

@@ -14,8 +14,7 @@ DETECTORS, EXPORTERS = "detectors", "exporters"
 def extensions(kind: str, taken: Container[str]) -> dict[str, EntryPoint]:
     """Return the entry points of ``DETECTORS`` or ``EXPORTERS`` by name, without importing them.
 
-    Raises:
-        CardboxError: a name comes from two distributions, or is one of those ``taken``.
+    Raises CardboxError if a name comes from two distributions, or is one of those ``taken``.
     """
     found: dict[str, EntryPoint] = {}
     for entry in entry_points(group=f"cardbox_tracker.{kind}"):
@@ -32,8 +31,7 @@ def extensions(kind: str, taken: Container[str]) -> dict[str, EntryPoint]:
 def loaded(entry: EntryPoint) -> Any:
     """Return what an entry point names.
 
-    Raises:
-        CardboxError: it cannot be imported; the text names its distribution.
+    Raises CardboxError if it cannot be imported; the text names its distribution.
     """
     try:
         return entry.load()

@@ -36,10 +36,8 @@ def foreign(
 ) -> Iterator[None]:
     """Turn any error of a reader of files that others wrote into the package's own.
 
-    Parsers of foreign formats can raise errors of any type.
-
-    Raises:
-        CardboxError: reading failed; one that names the file stays as it is.
+    Parsers of foreign formats can raise errors of any type. Raises CardboxError if reading failed;
+    one that names the file stays as it is.
     """
     name = os.fspath(path)
     try:
@@ -61,10 +59,8 @@ def atomic_path(path: str | os.PathLike[str]) -> Iterator[Path]:
 
     If ``path`` is a link, its target is replaced. If it is a pipe or a device, such as
     ``/dev/stdout``, the content is copied to it at the end. Temporary files for the same ``path``
-    are removed if their writer was killed. After an exception ``path`` is unchanged.
-
-    Raises:
-        CardboxError: ``path`` or its folder cannot be written.
+    are removed if their writer was killed. After an exception ``path`` is unchanged. Raises
+    CardboxError if ``path`` or its folder cannot be written.
     """
     if is_written_in_place(path):
         with _copied_to(Path(path)) as temporary:
@@ -91,10 +87,8 @@ def claimed_name(target: Path, *, is_folder: bool) -> Iterator[Path]:
     """Yield a new empty file or folder beside ``target``, and remove it at the end if it exists.
 
     Its name is unpredictable, and no existing file is opened. It is locked while this process
-    lives, so that the next run can recognize files of killed processes.
-
-    Raises:
-        CardboxError: the folder of ``target`` cannot be written.
+    lives, so that the next run can recognize files of killed processes. Raises CardboxError if the
+    folder of ``target`` cannot be written.
     """
     _remove_leftovers(target)
     name = f".{target.stem[:_STEM_LENGTH]}{_MARK}{secrets.token_hex(8)}{target.suffix}"
@@ -119,8 +113,7 @@ def claimed_name(target: Path, *, is_folder: bool) -> Iterator[Path]:
 def resolved(path: str | os.PathLike[str]) -> Path:
     """Return the file to write for ``path``, which is the target if ``path`` is a link.
 
-    Raises:
-        CardboxError: ``path`` is a folder or a circular link.
+    Raises CardboxError if ``path`` is a folder or a circular link.
     """
     target = Path(path)
     if target.is_dir():
@@ -136,8 +129,7 @@ def resolved(path: str | os.PathLike[str]) -> Path:
 def user_path(name: str) -> Path:
     """Return the path of a user's text, with ``~`` replaced by a home folder.
 
-    Raises:
-        CardboxError: the user after ``~`` does not exist.
+    Raises CardboxError if the user after ``~`` does not exist.
     """
     try:
         return Path(name).expanduser()
@@ -149,8 +141,7 @@ def user_path(name: str) -> Path:
 def regular_file(path: str | os.PathLike[str], most_bytes: int) -> Iterator[BinaryIO]:
     """Open a regular file of at most ``most_bytes`` for reading; it never waits for a pipe.
 
-    Raises:
-        UnreadableFileError: the file cannot be opened, is not a regular file, or is larger.
+    Raises UnreadableFileError if the file cannot be opened, is not a regular file, or is larger.
     """
     try:
         # Without O_NONBLOCK, opening a pipe waits for a writer.
@@ -172,8 +163,7 @@ def regular_file(path: str | os.PathLike[str], most_bytes: int) -> Iterator[Bina
 def read_regular(path: str | os.PathLike[str], most_bytes: int) -> bytes:
     """Return the content of a regular file of at most ``most_bytes``.
 
-    Raises:
-        UnreadableFileError: see :func:`regular_file`.
+    Raises the errors of :func:`regular_file`.
     """
     with regular_file(path, most_bytes) as file:
         try:
@@ -195,8 +185,7 @@ def _check_size(found: int, most_bytes: int) -> None:
 def check_writable(path: str | os.PathLike[str]) -> None:
     """Check before a long computation that :func:`atomic_path` can write ``path``.
 
-    Raises:
-        CardboxError: ``path`` or its folder cannot be written.
+    Raises CardboxError if ``path`` or its folder cannot be written.
     """
     if is_written_in_place(path):
         return
@@ -212,8 +201,7 @@ def check_writable(path: str | os.PathLike[str]) -> None:
 def is_written_in_place(path: str | os.PathLike[str]) -> bool:
     """Return whether ``path`` cannot be replaced, as a pipe, a terminal or ``/dev/null``.
 
-    Raises:
-        CardboxError: ``path`` is a disk or a socket.
+    Raises CardboxError if ``path`` is a disk or a socket.
     """
     try:
         mode = os.stat(path).st_mode
@@ -299,11 +287,7 @@ def _refused(target: Path, error: OSError) -> CardboxError:
 
 
 def write_table(path: Path, header: Sequence[str], rows: Iterable[Sequence[str]]) -> None:
-    """Write a CSV file atomically.
-
-    Raises:
-        CardboxError: the file cannot be written.
-    """
+    """Write a CSV file atomically; raise CardboxError if the file cannot be written."""
     with atomic_path(path) as temporary, temporary.open("w", newline="", encoding="utf-8") as file:
         table = csv.writer(file, lineterminator="\n")
         table.writerow(header)

@@ -21,17 +21,13 @@ from typing import Literal, NoReturn
 
 @dataclass
 class _State:
-    """The response to signals.
+    """The response to signals."""
 
-    Attributes:
-        response: end the process, raise KeyboardInterrupt, or only note the signal.
-        code: exit code of an ended process; None for 128 plus the signal's number, as in a shell.
-        received: number of the first signal; 0 before it.
-    """
-
+    #: end the process, raise KeyboardInterrupt, or only note the signal.
     response: Literal["end", "raise", "note"] = "end"
+    #: exit code of an ended process; None for 128 plus the signal's number, as in a shell.
     code: int | None = None
-    received: int = 0
+    received: int = 0  #: number of the first signal; 0 before it
 
 
 _state = _State()

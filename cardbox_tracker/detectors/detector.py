@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+import pickle
+import weakref
+import zlib
+from tempfile import SpooledTemporaryFile
 from typing import NamedTuple
 
 import numpy as np
@@ -20,37 +24,25 @@ MEDIAPIPE = "mediapipe"
 
 
 class Detector(NamedTuple):
-    """The installed detector, or one of the user's own.
+    """The installed detector, or one of the user's own."""
 
-    Attributes:
-        models: its network files, or the class of one's own.
-        person: whom to follow, px of the camera's own image; None for the most certain person.
-        people: number of people whom it finds at most, see :meth:`PersonDetector.all_in`; 0 for the
-            one whom it follows.
-    """
-
-    models: ModelFiles | OwnModel
+    models: ModelFiles | OwnModel  #: its network files, or the class of one's own
+    #: whom to follow, px of the camera's own image; None for the most certain person.
     person: PersonChoice | None = None
+    #: number of people whom it finds at most, see :meth:`PersonDetector.all_in`; 0 for the one whom
+    #: it follows.
     people: int = 0
 
     @classmethod
     def installed(cls) -> Detector:
-        """Return the installed detector.
-
-        Raises:
-            CardboxError: it is not installed.
-        """
+        """Return the installed detector; raise CardboxError if it is not installed."""
         return cls(installed_models())
 
     def start(self, across: float = 1.0, down: float = 1.0) -> PersonDetector:
         """Return a detector for the images of one camera.
 
-        Args:
-            across: width of the images that it gets, as a share of that of the camera's own image.
-            down: the same for their height.
-
-        Raises:
-            CardboxError: the networks cannot be loaded.
+        Their width and height are the shares ``across`` and ``down`` of the camera's own image.
+        Raises CardboxError if the networks cannot be loaded.
         """
         if isinstance(self.models, OwnModel):
             network: PoseNetwork = OwnNetwork(self.models.make())
@@ -109,3 +101,64 @@ class PersonDetector:
 def color(image: Image) -> Image:
     """Return an image (H, W) or (H, W, 3) as (H, W, 3)."""
     return image if image.ndim == 3 else np.repeat(image[..., None], 3, axis=2)
+
+
+# Bytes that are kept in memory: some ten minutes of a film.
+_IN_MEMORY = 64 * 1024 * 1024
+
+
+class KeptDetections:
+    """The detector of one camera, whose results a second pass over a recording need not find again.
+
+    The scene is measured before the first image is tracked, and networks take most of the time. A
+    temporary file keeps what they find, masks with one bit a pixel.
+    """
+
+    def __init__(self, detector: PersonDetector, finds_people: bool) -> None:
+        """Use a detector for the images of a recording, of one person or of all people."""
+        self.detector, self._finds_people = detector, finds_people
+        self._span: tuple[float, float] | None = None
+        self._is_whole = False
+        self._places: dict[int, int] = {}
+        self._file = SpooledTemporaryFile(_IN_MEMORY)  # noqa: SIM115
+        weakref.finalize(self, self._file.close)
+
+    def start(self, start_s: float, end_s: float) -> None:
+        """Begin a pass over the images of a span, seconds from the start of the recording."""
+        if self._is_whole and self._span == (start_s, end_s):
+            return
+        # Detections depend on the images before, so those of another span do not count.
+        self.detector.restart()
+        self._span, self._is_whole = (start_s, end_s), False
+        self._places.clear()
+        self._file.seek(0)
+        self._file.truncate()
+
+    def end(self) -> None:
+        """End a pass in which all images of the span were seen."""
+        self._is_whole = True
+
+    def __call__(self, number: int, stamp_ns: int, image: NDArray[np.uint8]) -> list[Detection]:
+        """Return the people in an image (H, W) or (H, W, 3), bgr, of a number in the recording."""
+        if number in self._places:
+            self._file.seek(self._places[number])
+            return [_unpacked(*one) for one in pickle.load(self._file)]
+        if self._finds_people:
+            found = self.detector.all_in(stamp_ns, image)
+        else:
+            person = self.detector(image, stamp_ns)
+            found = [] if person is None else [person]
+        self._file.seek(0, 2)
+        self._places[number] = self._file.tell()
+        pickle.dump([_packed(one) for one in found], self._file)
+        return found
+
+
+def _packed(found: Detection) -> tuple[Detection, tuple[int, ...], bytes]:
+    bits = zlib.compress(np.packbits(found.silhouette() > 0).tobytes(), 1)
+    return found._replace(mask=np.zeros(0, np.uint8)), found.mask.shape, bits
+
+
+def _unpacked(found: Detection, shape: tuple[int, ...], bits: bytes) -> Detection:
+    flat = np.unpackbits(np.frombuffer(zlib.decompress(bits), np.uint8), count=int(np.prod(shape)))
+    return found._replace(mask=255 * flat.reshape(shape))

@@ -30,15 +30,11 @@ _LEAST_PRESENCE = 0.3
 
 
 class HandPoints(NamedTuple):
-    """The points of one hand.
+    """The points of one hand."""
 
-    Attributes:
-        px: column and row of each, (21, 2); (0, 0) is the centre of the first pixel.
-        spatial_m: the points relative to the middle of an average hand, (21, 3), metres, as seen
-            along the ray to it: x right, y down, z away from the camera.
-    """
-
-    px: FloatArray
+    px: FloatArray  #: column and row of each, (21, 2); (0, 0) is the centre of the first pixel
+    #: the points relative to the middle of an average hand, (21, 3), metres, as seen along the ray
+    #: to it: x right, y down, z away from the camera.
     spatial_m: FloatArray
 
     @property

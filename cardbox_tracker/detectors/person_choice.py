@@ -22,14 +22,10 @@ LEAST_INSIDE = 0.25
 
 @dataclass(frozen=True)
 class PersonChoice:
-    """Which of several people to follow.
+    """Which of several people to follow."""
 
-    Attributes:
-        which: ``left`` or ``right`` in the image, ``largest``, or ``place``.
-        place: column and row of the person's hips or chest, px, for ``place``.
-    """
-
-    which: str
+    which: str  #: ``left`` or ``right`` in the image, ``largest``, or ``place``
+    #: column and row of the person's hips or chest, px, for ``place``.
     place: tuple[float, float] = (0.0, 0.0)
 
     @classmethod

@@ -25,44 +25,29 @@ from numpy.typing import NDArray
 from cardbox_tracker.common.errors import CardboxError
 from cardbox_tracker.detectors.figure import Figure
 from cardbox_tracker.detectors.identity import Identity, colours_in
+from cardbox_tracker.detectors.image_points import (
+    LEG_POINT_NAMES,
+    POINT_NAMES,
+    ImagePoints,
+    LegPoints,
+)
 
 FloatArray = NDArray[np.float64]
 ColorImage = NDArray[np.uint8]
 
 LANDMARKS = (
     "nose",
-    "left_eye_inner",
-    "left_eye",
-    "left_eye_outer",
-    "right_eye_inner",
-    "right_eye",
-    "right_eye_outer",
-    "left_ear",
-    "right_ear",
-    "mouth_left",
-    "mouth_right",
-    "left_shoulder",
-    "right_shoulder",
-    "left_elbow",
-    "right_elbow",
-    "left_wrist",
-    "right_wrist",
-    "left_little_finger",
-    "right_little_finger",
-    "left_index",
-    "right_index",
-    "left_thumb",
-    "right_thumb",
-    "left_hip",
-    "right_hip",
-    "left_knee",
-    "right_knee",
-    "left_ankle",
-    "right_ankle",
-    "left_heel",
-    "right_heel",
-    "left_foot",
-    "right_foot",
+    *("left_eye_inner", "left_eye", "left_eye_outer"),
+    *("right_eye_inner", "right_eye", "right_eye_outer"),
+    *("left_ear", "right_ear", "mouth_left", "mouth_right"),
+    *(
+        f"{side}_{name}"
+        for name in (
+            *("shoulder", "elbow", "wrist", "little_finger", "index", "thumb"),
+            *("hip", "knee", "ankle", "heel", "foot"),
+        )
+        for side in ("left", "right")
+    ),
 )
 """``left`` is the person's left; fingers are their knuckles at the base."""
 POINTS = len(LANDMARKS)
@@ -92,19 +77,12 @@ _CELLS = np.indices((_HEAT_WINDOW, _HEAT_WINDOW))
 
 
 class Square(NamedTuple):
-    """A turned square of the image.
+    """A turned square of the image."""
 
-    Attributes:
-        u: column of its centre, px.
-        v: row of its centre, px.
-        side: px.
-        angle_rad: by which it is turned clockwise in the image.
-    """
-
-    u: float
-    v: float
-    side: float
-    angle_rad: float
+    u: float  #: column of its centre, px
+    v: float  #: row of its centre, px
+    side: float  #: px
+    angle_rad: float  #: by which it is turned clockwise in the image
 
     def to_image(self, points: FloatArray) -> FloatArray:
         """Return points (N, 2) of the square, 0 to 1, in pixels of the image."""
@@ -114,20 +92,13 @@ class Square(NamedTuple):
 
 
 class Detection(NamedTuple):
-    """One person in one image.
+    """One person in one image."""
 
-    Attributes:
-        points_px: (33, 2), column and row; (0, 0) is the centre of the first pixel.
-        scores: (33,), chance that the point is in the image and visible, 0 to 1.
-        mask: (H, W) uint8, 255 times the chance that a pixel shows the person.
-        spatial_m: the points in space relative to the hips, (33, 3), metres for an average person:
-            x right, y down, z away from the camera; None if it is unknown. The network takes the
-            camera for level.
-    """
-
-    points_px: FloatArray
-    scores: FloatArray
-    mask: NDArray[np.uint8]
+    points_px: FloatArray  #: (33, 2), column and row; (0, 0) is the centre of the first pixel
+    scores: FloatArray  #: (33,), chance that the point is in the image and visible, 0 to 1
+    mask: NDArray[np.uint8]  #: (H, W) uint8, 255 times the chance that a pixel shows the person
+    #: the points in space relative to the hips, (33, 3), metres for an average person: x right, y
+    #: down, z away from the camera; None if it is unknown. The network takes the camera for level.
     spatial_m: FloatArray | None = None
 
     def silhouette(self) -> NDArray[np.uint8]:
@@ -156,8 +127,7 @@ class PoseNetwork:
     def __init__(self, detector: Path, landmarks: Path) -> None:
         """Load both networks.
 
-        Raises:
-            CardboxError: LiteRT is not installed, or a file is missing or damaged.
+        Raises CardboxError if LiteRT is not installed, or a file is missing or damaged.
         """
         self._detect = Network(detector)
         self._locate = Network(landmarks)
@@ -281,8 +251,7 @@ class Network:
     def __init__(self, path: Path) -> None:
         """Load it.
 
-        Raises:
-            CardboxError: LiteRT is not installed, or the file is missing or damaged.
+        Raises CardboxError if LiteRT is not installed, or the file is missing or damaged.
         """
         try:
             from ai_edge_litert.interpreter import Interpreter
@@ -429,3 +398,20 @@ def _chance(logits: NDArray[Any]) -> FloatArray:
     """Logistic function, without overflow."""
     chances: FloatArray = 1.0 / (1.0 + np.exp(-np.clip(logits.astype(np.float64), -60.0, 60.0)))
     return chances
+
+
+_USED = np.array([LANDMARKS.index(name) for name in POINT_NAMES])
+_LEGS = np.array([LANDMARKS.index(name) for name in LEG_POINT_NAMES])
+
+
+def image_points(found: Detection) -> ImagePoints:
+    """Return the points of a detection that the tracker uses."""
+    (pixels, scores, spatial_m), legs = (
+        (
+            found.points_px[used],
+            found.scores[used],
+            None if found.spatial_m is None else found.spatial_m[used],
+        )
+        for used in (_USED, _LEGS)
+    )
+    return ImagePoints(pixels, scores, spatial_m=spatial_m, legs=LegPoints(*legs))

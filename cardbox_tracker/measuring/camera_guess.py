@@ -58,17 +58,11 @@ def guessed_extrinsics(
     references: Mapping[str, tuple[Silhouette, Silhouette]],
     side_turn: str = "left",
 ) -> Extrinsics:
-    """Return the initial pose of a further camera.
+    """Return the initial pose of a further camera, ``other``, which lacks its pitch.
 
-    Args:
-        body: the person, measured by the first camera.
-        first: the first camera.
-        other: the further camera, without its pitch.
-        references: silhouettes (H, W), 0 or 255, of both cameras by the names of the postures.
-        side_turn: direction in which the person turned for ``side``.
-
-    Raises:
-        InitializationError: no pose fits the further camera's silhouettes.
+    The ``first`` camera measured the person. ``references`` are silhouettes (H, W), 0 or 255, of
+    both by the names of the postures; the person turned to ``side_turn`` for ``side``. Raises
+    InitializationError if no pose fits the further camera's silhouettes.
     """
     first = first.with_pitch(body.camera_pose.pitch_rad)
     states = reference_states(body, side_turn)

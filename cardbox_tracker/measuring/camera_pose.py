@@ -13,7 +13,7 @@ translation along them, metres.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 import cv2
@@ -57,31 +57,16 @@ _STEP_LENGTHS = (1.0, 0.5, 0.2, 0.0)
 
 
 class Sighting(NamedTuple):
-    """The person at one time.
+    """The person at one time."""
 
-    Attributes:
-        state: state for the first camera, (14,): d1..d12, ``torso_x``, ``torso_z``.
-        first: silhouette of the first camera, (H, W), 0 or 255.
-        other: silhouette of the further camera.
-        stddev: standard deviations of the state, (14,).
-    """
-
-    state: FloatArray
-    first: Silhouette
-    other: Silhouette
-    stddev: FloatArray = STATE_STDDEV
+    state: FloatArray  #: state for the first camera, (14,): d1..d12, ``torso_x``, ``torso_z``
+    first: Silhouette  #: silhouette of the first camera, (H, W), 0 or 255
+    other: Silhouette  #: silhouette of the further camera
+    stddev: FloatArray = STATE_STDDEV  #: standard deviations of the state, (14,)
 
 
-class PoseUpdate(NamedTuple):
-    """The result of one Gauss-Newton step.
-
-    Attributes:
-        extrinsics: updated pose.
-        cost: mean of the sightings' weighted squared distances before the step.
-    """
-
-    extrinsics: Extrinsics
-    cost: float
+_Drawer = Callable[[FloatArray], FloatArray]
+"""Takes a state (14,); returns the patches (13, 4, 3), m in the camera's optical frame."""
 
 
 class _Equations(NamedTuple):
@@ -113,18 +98,12 @@ class PoseProblem:
         sightings: Sequence[Sighting],
         tangents: TopTangents | None = None,
     ) -> None:
-        """Begin at the states of ``sightings``.
+        """Begin at the states of ``sightings``; those with an empty silhouette are ignored.
 
-        Args:
-            body: the person as measured by the first camera; the distance is kept.
-            first: the first camera.
-            other: the further camera, without its pitch.
-            extrinsics: initial pose of the further camera.
-            sightings: sightings of both cameras; those with an empty silhouette are ignored.
-            tangents: tangent planes of both cameras, which also constrain the roll.
-
-        Raises:
-            CameraError: the person is not in front of the further camera.
+        ``body`` is the person as measured by the first camera, whose distance is kept. The
+        ``other`` camera lacks its pitch, and has the initial pose ``extrinsics``. ``tangents`` of
+        both cameras also constrain the roll. Raises CameraError if the person is not in front of
+        the further camera.
         """
         self._body, self._tangents = body, tangents
         self._first = comparing(first.with_pitch(body.camera_pose.pitch_rad))
@@ -146,8 +125,12 @@ class PoseProblem:
                 self._seen.append(pair)
         self._tracked = [state.copy() for state in self.states]
 
-    def step(self, extrinsics: Extrinsics, free: Sequence[int] | None = None) -> PoseUpdate:
-        """Update pose and states by one Gauss-Newton step.
+    def step(
+        self, extrinsics: Extrinsics, free: Sequence[int] | None = None
+    ) -> tuple[Extrinsics, float]:
+        """Return the pose after one Gauss-Newton step, which also updates the states.
+
+        The number is the mean of the sightings' weighted squared distances before the step.
 
         Args:
             extrinsics: current pose.
@@ -189,8 +172,7 @@ class PoseProblem:
             tried = [self.states[number] - length * moved for length in _STEP_LENGTHS]
             costs = [self._robust_cost(number, state, there) for state in tried]
             self.states[number] = tried[int(np.argmin(costs))]
-        cost = float(np.mean([one.cost for one in equations]))
-        return PoseUpdate(better, cost)
+        return better, float(np.mean([one.cost for one in equations]))
 
     def _equations(
         self, number: int, here: _Drawer, beside: dict[int, tuple[_Drawer, _Drawer]]
@@ -243,24 +225,17 @@ class PoseProblem:
         return fit + float(np.sum(((state - self._tracked[number]) / self._stddevs[number]) ** 2))
 
     def _drawer(self, extrinsics: Extrinsics) -> _Drawer:
+        """Return what places the body before the further camera, including the camera's roll."""
         view = View.of(self._body, self._first, OtherCamera(self._other, extrinsics))
         axes = extrinsics.rotation @ self._first.reference_to_optical_rotation()
-        return _Drawer(self._cost, view, axes)
+        roll = axes @ view.level_axes().T
 
+        def drawn(state: FloatArray) -> FloatArray:
+            there_m = self._cost.corners_before(view.states(state), view.body, view.camera)
+            turned: FloatArray = there_m @ roll.T
+            return turned
 
-class _Drawer:
-    """Places the body in the frame of the further camera, including the camera's roll."""
-
-    def __init__(self, cost: WholeBodyCost, view: View, axes: FloatArray) -> None:
-        self._cost, self._view = cost, view
-        self._roll = axes @ view.level_axes().T
-
-    def __call__(self, state: FloatArray) -> FloatArray:
-        """Return the patches (13, 4, 3) of a state (14,), metres in the camera's optical frame."""
-        view = self._view
-        corners_m = self._cost.corners_before(view.states(state), view.body, view.camera)
-        turned: FloatArray = corners_m @ self._roll.T
-        return turned
+        return drawn
 
 
 def moved_by(extrinsics: Extrinsics, change: FloatArray) -> Extrinsics:

@@ -79,16 +79,11 @@ def upper_body(silhouette: Silhouette, is_detected: bool = False) -> Silhouette 
 
 @dataclass(frozen=True)
 class FirstSight:
-    """Result of a fit.
+    """Result of a fit."""
 
-    Attributes:
-        body: fitted body without unknown values; all are still unknown if the IoU is below
-            ``MIN_IOU``.
-        iou: IoU of the fitted body and the silhouette.
-    """
-
+    #: fitted body without unknown values; all are still unknown if the IoU is below ``MIN_IOU``.
     body: BodyModel
-    iou: float
+    iou: float  #: IoU of the fitted body and the silhouette
 
 
 def fit_first_sight(

@@ -17,10 +17,6 @@ ASK, GOOD, BAD = "ask", "good", "bad"
 HOLD_STILL = "Hold still"
 FINISHED, FAILED, CANCELLED = "Thank you. Done.", "That did not work. Sorry.", "Stopped."
 
-_TURN = {
-    "left": "turn a quarter to your left",
-    "right": "turn a quarter to your right",
-}
 _HOLD_S = 1.0
 _READ_S = 2.0
 # The last seconds are counted aloud for a person who stands sideways and cannot see them.
@@ -31,7 +27,7 @@ def instruction(name: str, side_turn: str) -> str:
     """Return the instruction for the reference ``front``, ``side`` or ``arms``."""
     return {
         "front": "face the camera, arms hanging a little away from the body",
-        "side": f"{_TURN[side_turn]}, arms hanging a little away from the body",
+        "side": f"turn a quarter to your {side_turn}, arms hanging a little away from the body",
         "arms": "face the camera, arms stretched sideways, just below the shoulders, hands open",
     }[name]
 

@@ -90,20 +90,6 @@ def learn_appearance(
 
     All images are (H, W, 3) bgr or (H, W). The camera has the pitch of the body model.
     """
-    return Appearance.of(*learn_histograms(images, references, body, camera, seed))
-
-
-def learn_histograms(
-    images: Mapping[str, Sequence[Image]],
-    references: Mapping[str, Silhouette],
-    body: BodyModel,
-    camera: Camera,
-    seed: int = 0,
-) -> tuple[FloatArray, FloatArray]:
-    """Return histograms (5, bins) and brightness (channels,) of :func:`learn_appearance`.
-
-    They lack the rounding of an :class:`~cardbox_tracker.person.appearance.Appearance`.
-    """
     labels = {}
     for name in LEARNED_FROM:
         posture = fit_posture(body, camera, references[name], name, seed)
@@ -122,7 +108,7 @@ def learn_histograms(
             for part in range(len(counts)):
                 if name == "arms" or part not in (HAND, FOREARM):
                     counts[part] += np.bincount(bins[labels[name] == part], minlength=len(counts.T))
-    return _histograms(counts, channels), brightness
+    return Appearance.of(_histograms(counts, channels), brightness)
 
 
 def seen_appearance(

@@ -109,34 +109,22 @@ class _Arms(NamedTuple):
     shoulder_m: float
 
 
-def posture_problems(
-    references: Mapping[str, Silhouette], camera: Camera, distance_m: float
-) -> list[str]:
-    """Return the problems of the references as sentences; an empty list if there are none.
+def check_postures(references: Mapping[str, Silhouette], camera: Camera, distance_m: float) -> None:
+    """Raise InitializationError, with the mistake, for references in wrong postures.
 
     Silhouettes (H, W) of ``front``, ``side`` and ``arms`` are as ``outline.filled`` returns them;
     the camera includes the pitch.
     """
     view = _View(references, camera, distance_m)
-    mixed_up = _mixed_up(view.widths())
-    if mixed_up:
-        return [mixed_up]
+    if mixed_up := _mixed_up(view.widths()):
+        raise InitializationError(mixed_up)
     arms = _arms(view)
     if arms is None:
-        return [f"reference 'arms': no arms are seen; {_again('arms')}"]
+        raise InitializationError(f"reference 'arms': no arms are seen; {_again('arms')}")
     # The checks of `front` and `side` use the span of `arms`, so `arms` is checked first.
     for problem in (_problem_of_arms, _problem_of_front, _problem_of_side, _problem_of_height):
-        found = problem(view, arms)
-        if found:
-            return [found]
-    return []
-
-
-def check_postures(references: Mapping[str, Silhouette], camera: Camera, distance_m: float) -> None:
-    """Raise InitializationError, with the mistake, for references in wrong postures."""
-    problems = posture_problems(references, camera, distance_m)
-    if problems:
-        raise InitializationError("; ".join(problems))
+        if found := problem(view, arms):
+            raise InitializationError(found)
 
 
 def _again(name: str) -> str:

@@ -25,33 +25,20 @@ ORIGINS = GIVEN, FOUND, USUAL = "given", "found", "usual"
 
 
 class Value(NamedTuple):
-    """A number of a scene.
+    """A number of a scene."""
 
-    Attributes:
-        mean: its value.
-        stddev: its standard deviation.
-        origin: one of ``ORIGINS``.
-    """
-
-    mean: float
-    stddev: float
-    origin: str = FOUND
+    mean: float  #: its value
+    stddev: float  #: its standard deviation
+    origin: str = FOUND  #: one of ``ORIGINS``
 
 
 class SceneCamera(NamedTuple):
-    """The camera of a scene.
+    """The camera of a scene."""
 
-    Attributes:
-        fov_rad: field of view across the width of the image as it is shown.
-        pitch_rad: downward pitch.
-        roll_rad: clockwise turn about the axis, seen from behind the camera.
-        height_m: height above the floor; None if nothing shows it.
-    """
-
-    fov_rad: Value
-    pitch_rad: Value
-    roll_rad: Value
-    height_m: Value | None = None
+    fov_rad: Value  #: field of view across the width of the image as it is shown
+    pitch_rad: Value  #: downward pitch
+    roll_rad: Value  #: clockwise turn about the axis, seen from behind the camera
+    height_m: Value | None = None  #: height above the floor; None if nothing shows it
 
 
 _NUMBERS = {
@@ -64,15 +51,10 @@ _NUMBERS = {
 
 @dataclass(frozen=True)
 class Scene:
-    """What does not change in a film.
+    """What does not change in a film."""
 
-    Attributes:
-        camera: the camera.
-        people: the body of each person, by number.
-    """
-
-    camera: SceneCamera
-    people: tuple[BodyModel, ...] = ()
+    camera: SceneCamera  #: the camera
+    people: tuple[BodyModel, ...] = ()  #: the body of each person, by number
 
     def words(self) -> Iterator[str]:
         """Yield each number of the camera with its deviation and origin."""
@@ -110,11 +92,7 @@ def dumps_scene(scene: Scene) -> str:
 
 
 def save_scene(scene: Scene, path: str | os.PathLike[str]) -> None:
-    """Write a scene atomically.
-
-    Raises:
-        CardboxError: the file cannot be written.
-    """
+    """Write a scene atomically; raise CardboxError if the file cannot be written."""
     with atomic_path(path) as temporary:
         temporary.write_text(dumps_scene(scene), encoding="utf-8")
 
@@ -122,8 +100,7 @@ def save_scene(scene: Scene, path: str | os.PathLike[str]) -> None:
 def load_scene(path: str | os.PathLike[str]) -> Scene:
     """Read a scene.
 
-    Raises:
-        CardboxError: the file cannot be read or is no scene; the text names what is wrong.
+    Raises CardboxError if the file cannot be read or is no scene; the text names what is wrong.
     """
     with foreign(path, CardboxError, "a file OUT.scene.yaml that 'cardbox track' has written"):
         return _scene_of(parse_small_yaml(read_small_text(path)))

@@ -40,15 +40,10 @@ class SeenBody:
         rng: np.random.Generator,
         pause_s: float = 1.0,
     ) -> None:
-        """Prepare for a person.
+        """Prepare for a person of whom ``guess`` has ``unknown`` values, before a working camera.
 
-        Args:
-            guess: body with ``unknown`` values.
-            camera: working camera.
-            config: settings of the tracker.
-            rng: random numbers of the fits.
-            pause_s: time between the first two images that are used; each further pause is twice
-                as long.
+        ``pause_s`` is the time between the first two images that are used; each further pause is
+        twice as long.
         """
         self._camera, self._config, self._rng = camera, config, rng
         self._guess, self._pause_s = guess, pause_s
@@ -67,13 +62,9 @@ class SeenBody:
         time_s: float,
         is_detected: bool = False,
     ) -> bool:
-        """Use an image if it is time to; return whether ``body`` has changed.
+        """Use an image, for the colours, if it is time to; return whether ``body`` has changed.
 
-        Args:
-            silhouette: (H, W), 0 or 255.
-            image: of the same time, for the colours; None without one.
-            time_s: time of the image.
-            is_detected: whether a detector finds the person, who may then be small.
+        The silhouette is (H, W), 0 or 255. A person whom a detector finds may be small.
         """
         if time_s < self._next_s or len(self._fits) == MOST_SIGHTS:
             return False

@@ -28,10 +28,11 @@ from cardbox_tracker.camera.encodings import (
 )
 from cardbox_tracker.camera.stamps import RecordedStamps, StampOrder
 from cardbox_tracker.common.errors import BagError, CameraError, EncodingError, cut
-from cardbox_tracker.recordings.bag_files import check_parts, paths_to_open
-from cardbox_tracker.recordings.bag_limits import (
+from cardbox_tracker.recordings.bag_files import (
+    check_parts,
     check_recording,
     limit_decompression,
+    paths_to_open,
     read_other_channels,
 )
 from cardbox_tracker.recordings.given_camera import GivenCamera

@@ -95,7 +95,7 @@ class ImageFolder(Film):
         return self
 
     def left_out(self, topic: str, used: Collection[str] = ()) -> list[str]:
-        """Return the files that are no images; see ``ImageRecording``."""
+        """Return the files that are no images."""
         names = sorted(path.name for path in self.path.iterdir() if path.is_file())
         hidden = [name for name in names if name.startswith(".")]
         others = [name for name in names if name not in {path.name for path in self._files}]

@@ -1,13 +1,11 @@
-"""A recording as a source of images: a bag, a video or a folder of images."""
+"""One image of a recording, and what videos and folders of images share."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterator, Sequence
+from collections.abc import Callable, Collection
 from dataclasses import dataclass
 from math import sqrt
 from pathlib import Path
-from types import TracebackType
-from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -50,57 +48,6 @@ class RecordedImage:
         return self._decode()
 
 
-class ImageRecording(Protocol):
-    """Context of an open recording of one or several cameras.
-
-    Methods raise BagError if the recording cannot be read, or has no such camera. A camera is
-    named by its namespace; None is the only one.
-    """
-
-    @property
-    def path(self) -> Path:
-        """The file or folder."""
-
-    @property
-    def start_ns(self) -> int:
-        """Time of the first message or image."""
-
-    @property
-    def duration_s(self) -> float:
-        """Seconds from the first to the last message or image."""
-
-    @property
-    def working_size(self) -> tuple[int, int]:
-        """Size (width, height), px, at which the images are used."""
-
-    @property
-    def remarks(self) -> Sequence[str]:
-        """Warnings about what was read so far."""
-
-    def left_out(self, topic: str, used: Collection[str] = ()) -> list[str]:
-        """Return what of these images was not used, and why; topics in ``used`` are no reason."""
-
-    def __enter__(self) -> ImageRecording:
-        """Open the recording."""
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        """Close the recording."""
-
-    def image_topic(self, camera: str | None = None) -> str:
-        """Return the name of a camera's images."""
-
-    def images(self, topic: str | None = None) -> Iterator[RecordedImage]:
-        """Yield the images of that name, in order."""
-
-    def calibration(self, camera: str | None = None) -> Calibration:
-        """Return the calibration of a camera; raise CameraError if there is none."""
-
-
 class Film:
     """Base of videos and folders of images: one camera that the user describes.
 
@@ -108,7 +55,7 @@ class Film:
 
     Attributes:
         path: the file or folder.
-        working_size: see ``ImageRecording``.
+        working_size: size (width, height), px, at which the images are used.
         duration_s: seconds from the first to the last image.
     """
 
@@ -144,7 +91,7 @@ class Film:
         return self._given.calibrated(self.path, *self._size, stored=self._stored, file=self._file)
 
     def left_out(self, topic: str, used: Collection[str] = ()) -> list[str]:
-        """Return what is no image; see ``ImageRecording``."""
+        """Return what of these images was not used, and why; topics in ``used`` are no reason."""
         return []
 
     @property

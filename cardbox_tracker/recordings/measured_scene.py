@@ -54,16 +54,11 @@ class Spread(Generic[T]):
 
 
 class Watched(NamedTuple):
-    """What the first camera of a recording shows in all of it.
+    """What the first camera of a recording shows in all of it."""
 
-    Attributes:
-        frames: some with a whole upper body, for the sizes of one person.
-        pictures: times, s, and some images as they were recorded, undistorted.
-        people: times, s, and points of each person whom a detector finds.
-    """
-
-    frames: Sequence[RecordedFrame]
-    pictures: Sequence[Picture]
+    frames: Sequence[RecordedFrame]  #: some with a whole upper body, for the sizes of one person
+    pictures: Sequence[Picture]  #: times, s, and some images as they were recorded, undistorted
+    #: times, s, and points of each person whom a detector finds.
     people: Sequence[Sequence[tuple[float, ImagePoints]]]
 
 
@@ -110,14 +105,9 @@ def _track_of(
 def seen_person(
     watched: Watched, guess: BodyModel, camera: Camera, config: TrackerConfig, seed: int
 ) -> BodyModel:
-    """Return the body of the person who was watched.
+    """Return the body of the person who was watched by the working ``camera`` of the frames.
 
-    Args:
-        watched: see :func:`watch`.
-        guess: body with ``unknown`` values; without any it is returned.
-        camera: working camera of the frames.
-        config: settings of the tracker.
-        seed: random seed of the fits.
+    A ``guess`` without ``unknown`` values is returned; ``seed`` is that of the fits.
     """
     if not guess.unknown:
         return guess
@@ -143,14 +133,9 @@ def seen_people(
 ) -> list[BodyModel]:
     """Return the bodies of several people, who are tracked once to tell them apart.
 
-    Args:
-        recording: an open recording.
-        guesses: see :class:`~cardbox_tracker.tracking.session.Session`.
-        config: settings of the trackers.
-        most: number of people; 0 for all who come.
-        seed: random seed.
-        start_s: seconds from the start of the recording from which on they are tracked.
-        end_s: the same until when.
+    ``guesses`` are those of a :class:`~cardbox_tracker.tracking.session.Session`, and ``most`` is
+    the number of people, 0 for all who come. They are tracked from ``start_s`` to ``end_s``,
+    seconds from the start of the recording.
     """
     rng = np.random.default_rng(seed)
     session = Session(guesses, recording.first.camera, config, rng, recording.others, most)

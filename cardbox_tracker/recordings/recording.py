@@ -13,13 +13,11 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from cardbox_tracker.camera.camera import Camera
 from cardbox_tracker.camera.depth_image import DepthImage
 from cardbox_tracker.camera.extrinsics import Extrinsics
-from cardbox_tracker.camera.extrinsics_files import load_extrinsics
-from cardbox_tracker.camera.extrinsics_sources import (
-    FrameTransform,
+from cardbox_tracker.camera.extrinsics_files import (
     extrinsics_between,
+    load_extrinsics,
     transforms_of,
 )
 from cardbox_tracker.camera.pairing import camera_names, side_by_side
@@ -29,12 +27,17 @@ from cardbox_tracker.common.errors import BagError, CameraError, CardboxError
 from cardbox_tracker.detectors.detector import Detector
 from cardbox_tracker.detectors.point_table import PointTable
 from cardbox_tracker.recordings.bag_reader import BagReader
-from cardbox_tracker.recordings.depth_silhouettes import DepthSilhouetteSource, Within, depth_images
-from cardbox_tracker.recordings.detector_silhouettes import DetectorSilhouetteSource
 from cardbox_tracker.recordings.given_camera import GivenCamera
-from cardbox_tracker.recordings.image_recording import ImageRecording, working_size
-from cardbox_tracker.recordings.open_images import is_bag, open_images
-from cardbox_tracker.recordings.person_in_view import PersonInView, PersonInViewSource
+from cardbox_tracker.recordings.image_recording import working_size
+from cardbox_tracker.recordings.open_images import ImageRecording, is_bag, open_images
+from cardbox_tracker.recordings.other_silhouettes import (
+    DepthSilhouetteSource,
+    DetectorSilhouetteSource,
+    PersonInView,
+    PersonInViewSource,
+    Within,
+    depth_images,
+)
 from cardbox_tracker.recordings.silhouettes import RecordedFrame, SilhouetteSource, TimeSpan
 from cardbox_tracker.tracking.observation import Observation
 
@@ -115,7 +118,14 @@ class Recording:
         # The silhouettes' source already reads these depth images.
         self._cuts_by_depth = depth is not None and depth == self.first.depth_topic
         self._depth = None if self._cuts_by_depth else depth
-        self._stereo = stereo_of(self.first.camera, self.others) if depth == STEREO else None
+        self._stereo: StereoDepth | None = None
+        if depth == STEREO:
+            if not self.others:
+                raise CameraError(
+                    "depth from stereo needs two cameras: give both to --cameras, left first"
+                )
+            other = self.others[0]
+            self._stereo = stereo_of_pair(self.first.camera, other.camera, other.extrinsics)
         is_alone = len(self.sources) == 1 and self._depth is None
         self._tolerance_ns = 0 if is_alone else self.first.period_ns() // 2
 
@@ -191,8 +201,10 @@ def open_recording(
         raise CardboxError(fault)
     with ExitStack() as stack:
         # A reader has one position, and the cameras are read in parallel.
-        bags = [stack.enter_context(open_images(path, camera)) for _ in names or ("",)]
-        found = [] if len(names) < 2 else _extrinsics_in(bags[0], names, extrinsics)
+        bags = [open_images(path, camera) for _ in names or ("",)]
+        for bag in bags:
+            stack.enter_context(bag)
+        found = _extrinsics_of(bags[0], names, extrinsics)
         sources = [
             _source(bag, background, name, points)
             for bag, name in zip(bags, names or (None,), strict=True)
@@ -228,14 +240,6 @@ def input_faults(
         yield f"depth images are read from a rosbag2, which {os.fspath(path)} is not"
 
 
-def _extrinsics_in(
-    bag: ImageRecording, names: Sequence[str], file: Path | None
-) -> list[Extrinsics]:
-    if not isinstance(bag, BagReader):
-        raise BagError(f"{bag.path} is of one camera; omit --cameras, or give a rosbag2 of several")
-    return extrinsics_of(bag, names, file)
-
-
 def _source(
     bag: ImageRecording,
     background: Segmentation,
@@ -256,17 +260,9 @@ def _source(
     return SilhouetteSource(bag, background, camera=camera, points=points)
 
 
-def stereo_of(left: Camera, others: Sequence[OtherCamera]) -> StereoDepth:
-    """Return stereo depth for the rectified pair of ``left`` and the first of ``others``.
-
-    Raises CameraError if they are none with the left camera first.
-    """
-    if not others:
-        raise CameraError("depth from stereo needs two cameras: give both to --cameras, left first")
-    return stereo_of_pair(left, others[0].camera, others[0].extrinsics)
-
-
-def extrinsics_of(bag: BagReader, cameras: Sequence[str], file: Path | None) -> list[Extrinsics]:
+def _extrinsics_of(
+    bag: ImageRecording, cameras: Sequence[str], file: Path | None
+) -> list[Extrinsics]:
     """Return the pose of each further camera relative to the first one.
 
     The sources are the projection matrices of a rectified pair, ``/tf_static``, and ``file``.
@@ -275,17 +271,10 @@ def extrinsics_of(bag: BagReader, cameras: Sequence[str], file: Path | None) -> 
     """
     if len(cameras) < 2:
         return []
+    if not isinstance(bag, BagReader):
+        raise BagError(f"{bag.path} is of one camera; omit --cameras, or give a rosbag2 of several")
     infos = [bag.camera_info(camera) for camera in cameras]
-    transforms = _static_transforms(bag)
+    messages = bag.messages([_STATIC_TOPIC]) if _STATIC_TOPIC in bag.topics else ()
+    transforms = [one for message in messages for one in transforms_of(bag.deserialize(message))]
     of_file = load_extrinsics(file, cameras) if file is not None else {}
     return extrinsics_between(infos, cameras, transforms, of_file)
-
-
-def _static_transforms(bag: BagReader) -> list[FrameTransform]:
-    if _STATIC_TOPIC not in bag.topics:
-        return []
-    return [
-        transform
-        for message in bag.messages([_STATIC_TOPIC])
-        for transform in transforms_of(bag.deserialize(message))
-    ]

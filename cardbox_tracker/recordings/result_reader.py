@@ -309,11 +309,6 @@ def _check(path: Path, names: Sequence[str]) -> None:
             )
 
 
-def has_results(bag: BagReader) -> bool:
-    """Return whether a recording has results of the tracker."""
-    return any(topic.endswith(MODEL) for topic in bag.topics)
-
-
 def namespace_of(bag: BagReader, person: int | None = None) -> str:
     """Return the first namespace with the tracker's topics, such as "" or "/left".
 

@@ -18,13 +18,12 @@ from cardbox_tracker.camera.depth_image import DepthImage
 from cardbox_tracker.camera.encodings import brightness_of
 from cardbox_tracker.common.beside import results_ahead
 from cardbox_tracker.common.errors import BagError, CameraError, CardboxError, EncodingError
-from cardbox_tracker.detectors.detector import Detector
+from cardbox_tracker.detectors.detector import Detector, KeptDetections
 from cardbox_tracker.detectors.image_points import ImagePoints
-from cardbox_tracker.detectors.landmarks import image_points
 from cardbox_tracker.detectors.point_table import GivenPoints, Image, PointTable
-from cardbox_tracker.detectors.pose_network import Detection
-from cardbox_tracker.recordings.image_recording import ImageRecording, RecordedImage
-from cardbox_tracker.recordings.kept_detections import KeptDetections
+from cardbox_tracker.detectors.pose_network import Detection, image_points
+from cardbox_tracker.recordings.image_recording import RecordedImage
+from cardbox_tracker.recordings.open_images import ImageRecording
 from cardbox_tracker.segmentation.background_config import BackgroundConfig
 from cardbox_tracker.segmentation.learning import Learning
 from cardbox_tracker.segmentation.silhouettes import SilhouettePipeline
@@ -44,11 +43,7 @@ class TimeSpan(NamedTuple):
 
     @classmethod
     def parse(cls, text: str) -> TimeSpan:
-        """Read ``T0:T1``.
-
-        Raises:
-            ValueError: the text does not have this form.
-        """
+        """Read ``T0:T1``; raise ValueError if the text does not have this form."""
         start, colon, end = text.partition(":")
         try:
             span = cls(float(start), float(end))
@@ -94,29 +89,21 @@ FindPoints = Callable[[PreparedImage, NDArray[np.uint8]], ImagePoints | None]
 
 
 class RecordedFrame(NamedTuple):
-    """One image of a recording and the silhouette in it.
+    """One image of a recording and the silhouette in it."""
 
-    Attributes:
-        stamp_ns: stamp of the image.
-        time_s: seconds from the recording's start.
-        brightness: (H, W) uint8, undistorted, at the working resolution.
-        silhouette: (H, W) uint8, 0 or 255.
-        image: (H, W, 3) bgr, or (H, W) grey, undistorted, at the working resolution; None if it
-            was not requested.
-        depth_m: (H, W), metres, from which the silhouette was cut out; None without depth.
-        points: joints of the person in the image, from a detector; None without one.
-        recorded: the image as it was recorded; None if it was not kept.
-        people: joints of each person, from a detector of several; None without one.
-    """
-
-    stamp_ns: int
-    time_s: float
-    brightness: NDArray[np.uint8]
-    silhouette: NDArray[np.uint8]
+    stamp_ns: int  #: stamp of the image
+    time_s: float  #: seconds from the recording's start
+    brightness: NDArray[np.uint8]  #: (H, W) uint8, undistorted, at the working resolution
+    silhouette: NDArray[np.uint8]  #: (H, W) uint8, 0 or 255
+    #: (H, W, 3) bgr, or (H, W) grey, undistorted, at the working resolution; None if it was not
+    #: requested.
     image: NDArray[np.uint8] | None = None
+    #: (H, W), metres, from which the silhouette was cut out; None without depth.
     depth_m: DepthImage | None = None
+    #: joints of the person in the image, from a detector; None without one.
     points: ImagePoints | None = None
-    recorded: RecordedImage | None = None
+    recorded: RecordedImage | None = None  #: the image as it was recorded; None if it was not kept
+    #: joints of each person, from a detector of several; None without one.
     people: tuple[ImagePoints, ...] | None = None
 
     @property
@@ -134,6 +121,7 @@ class SilhouetteSource:
         camera: camera of the frames at the working resolution.
         depth_topic: topic of the depth images that cut out the silhouettes; None if a background
             model does.
+        has_points: whether the frames can have points of the person.
         used_beside: topics of other images of the recording that are used, too.
     """
 
@@ -152,20 +140,11 @@ class SilhouetteSource:
     ) -> None:
         """Learn the empty scene from the first images of the span ``background``.
 
-        It learns from at most ``config.learn_images`` images, like the background node.
-
-        Args:
-            bag: an open recording.
-            background: span without a person in the image.
-            config: settings of the background model.
-            size: working resolution (width, height), px; None for that of the recording.
-            camera: namespace of the camera; without it, the recording has only one.
-            points: source of the person's points in the images.
-
-        Raises:
-            BagError: the span has too few images.
-            CameraError: the recording's camera is not calibrated.
-            CardboxError: ``points`` cannot be read.
+        It learns from at most ``config.learn_images`` images, like the background node. ``size``
+        is the working resolution (width, height), px, None for that of the recording; without
+        ``camera``, its namespace, the recording has only one; ``points`` is the source of the
+        person's points. Raises BagError if the span has too few images, CameraError if the camera
+        is not calibrated, and CardboxError if ``points`` cannot be read.
         """
         self._open(bag, size or bag.working_size, camera, config)
         self._find_points(points, camera)
@@ -173,11 +152,11 @@ class SilhouetteSource:
         is_readable = False
         for _, time_s, image, *_ in self.images():
             is_readable = True
-            if time_s > background.end_s or self._pipeline.has_enough:
+            if time_s > background.end_s or self._pipeline.learning.has_enough():
                 break
             if background.contains(time_s):
-                self._pipeline.learn(image)
-        count = self._pipeline.learned_images
+                self._pipeline.learning.add(image)
+        count = self._pipeline.learning.count
         if not is_readable and self._broken:
             raise BagError(f"{self.path} has no image to learn from: {self._brokenness()}")
         if count < 2:
@@ -210,14 +189,9 @@ class SilhouetteSource:
         self.camera = self._pipeline.camera
         self._full: tuple[tuple[int, int] | None, Rectifier | None] = None, None
 
-    @property
-    def has_points(self) -> bool:
-        """Whether the frames can have points of the person."""
-        return self._has_points
-
     def _find_points(self, points: Detector | PointTable | None, camera: str | None) -> None:
         """Use a source of points."""
-        self._has_points = points is not None
+        self.has_points = points is not None
         self._finds_people = points is not None and points.people > 0
         self._detector = self._started(points) if isinstance(points, Detector) else None
         self._given: GivenPoints | None = None
@@ -316,8 +290,7 @@ class SilhouetteSource:
     def held(self, span: TimeSpan, what: str) -> list[RecordedFrame]:
         """Return the frames of a span in which a posture is held.
 
-        Raises:
-            CardboxError: no image lies in the span; the text names ``what``.
+        Raises CardboxError if no image lies in the span; the text names ``what``.
         """
         # Full images of a whole span would take hundreds of megabytes.
         found = [frame._replace(recorded=None) for frame in self.frames(*span)]
@@ -331,8 +304,7 @@ class SilhouetteSource:
     def period_ns(self) -> int:
         """Return the median time between images, ns.
 
-        Raises:
-            BagError: there are fewer than two images.
+        Raises BagError if there are fewer than two images.
         """
         images = islice(self._bag.images(self.topic), _PERIOD_IMAGES)
         stamps_ns = [image.stamp_ns for image in images]

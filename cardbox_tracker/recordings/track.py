@@ -3,20 +3,23 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import nullcontext
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
 from cardbox_tracker.common.errors import CardboxError
+from cardbox_tracker.person.kinematics import pose
 from cardbox_tracker.person.model import BodyModel
+from cardbox_tracker.person.skeleton import JOINT_NAMES, KEYPOINT_NAMES, UNITS, KeypointState
 from cardbox_tracker.recordings.recording import Recording
 from cardbox_tracker.recordings.result_table import result_table
 from cardbox_tracker.recordings.silhouettes import RecordedFrame
 from cardbox_tracker.search.config import TrackerConfig
-from cardbox_tracker.tracking.estimate import UNCERTAIN, Estimate
+from cardbox_tracker.tracking.estimate import LOST, TRACKING, UNCERTAIN, Estimate
 from cardbox_tracker.tracking.hands import Look
 from cardbox_tracker.tracking.session import Session
 from cardbox_tracker.tracking.tracker import Tracker
@@ -27,34 +30,23 @@ Observer = Callable[[RecordedFrame, Estimate, Tracker], None]
 
 @dataclass(frozen=True)
 class TrackSummary:
-    """Summary of a run.
+    """Summary of a run."""
 
-    Attributes:
-        frames: number of images.
-        frames_tracked: number of images with a posture.
-        mean_cost_px: mean cost over the tracked images; nan without any.
-        mean_iou: mean overlap (IoU) over the tracked images; nan without any.
-        frames_uncertain: number of tracked images whose posture may be wrong.
-        remarks: warnings about extrinsics or depth that seem to be wrong.
-        body: the body at the end, whose unknown values were fitted.
-        scene: mean, deviation and origin of the camera's numbers by name.
-        used: in how many images each optional input was used, by its name.
-        accounts: for each camera, what was used of it and what was left out.
-        assumptions: what the results rest on, with its numbers and where they are from.
-        people: the same for each of several people by number; the numbers above are of all of them.
-    """
-
-    frames: int
-    frames_tracked: int
-    mean_cost_px: float
-    mean_iou: float
-    frames_uncertain: int = 0
-    remarks: tuple[str, ...] = ()
-    body: BodyModel | None = None
-    accounts: tuple[str, ...] = ()
+    frames: int  #: number of images
+    frames_tracked: int  #: number of images with a posture
+    mean_cost_px: float  #: mean cost over the tracked images; nan without any
+    mean_iou: float  #: mean overlap (IoU) over the tracked images; nan without any
+    frames_uncertain: int = 0  #: number of tracked images whose posture may be wrong
+    remarks: tuple[str, ...] = ()  #: warnings about extrinsics or depth that seem to be wrong
+    body: BodyModel | None = None  #: the body at the end, whose unknown values were fitted
+    accounts: tuple[str, ...] = ()  #: for each camera, what was used of it and what was left out
+    #: what the results rest on, with its numbers and where they are from.
     assumptions: tuple[str, ...] = ()
+    #: mean, deviation and origin of the camera's numbers by name.
     scene: Mapping[str, Mapping[str, float | str]] = field(default_factory=dict)
+    #: in how many images each optional input was used, by its name.
     used: Mapping[str, int] = field(default_factory=dict)
+    #: the same for each of several people by number; the numbers above are of all of them.
     people: Mapping[int, TrackSummary] = field(default_factory=dict)
 
     @property
@@ -101,22 +93,12 @@ def track_recording(
 ) -> TrackSummary:
     """Track every image from ``start_s`` to ``end_s``.
 
-    Args:
-        recording: an open recording.
-        bodies: see :class:`~cardbox_tracker.tracking.session.Session`.
-        config: settings of the tracker.
-        seed: random seed; the same recording and seed give the same bytes.
-        start_s: seconds from the recording's start at which the person stands in the front
-            reference posture.
-        table: file to write with a row for each image, see :func:`~.result_table.result_table`.
-        observers: called after each image, and for each of several people, such as a progress bar
-            or a bag writer.
-        end_s: seconds from the recording's start after which no image is tracked.
-        people: see the session.
-        look: see the session.
-
-    Raises:
-        CardboxError: no image lies after ``start_s``, or a file cannot be written.
+    Both count in seconds from the recording's start; at ``start_s`` the person stands in the front
+    reference posture. The same recording and ``seed`` give the same bytes. ``table`` is a file of
+    :func:`~.result_table.result_table`. ``observers``, such as a progress bar or a bag writer, are
+    called after each image, and for each of several people. The other arguments are those of
+    :class:`~cardbox_tracker.tracking.session.Session`. Raises CardboxError if no image lies after
+    ``start_s``, or a file cannot be written.
     """
     first, rng = recording.first, np.random.default_rng(seed)
     given = recording.others, people, look
@@ -163,3 +145,100 @@ def track_recording(
         bodies[0] if bodies else None, session.remarks(recording.names, is_all=True)
     )
     return replace(summary, used=used, people=each)
+
+
+MOST_MOMENTS, GAP_S = 5, 3.0
+"""Number of worst moments that are named, and the least time between two of them, s."""
+
+_HANDS = [KEYPOINT_NAMES.index(f"{side}_hand") for side in ("left", "right")]
+_SHOULDERS = [KEYPOINT_NAMES.index(f"{side}_shoulder") for side in ("left", "right")]
+_ANGLES = [number for number, name in enumerate(JOINT_NAMES) if UNITS[name] == "rad"]
+
+
+class _Moment(NamedTuple):
+    """An image whose posture may be wrong: its chance, its time, and what is doubtful."""
+
+    chance: float
+    time_s: float
+    what: str
+
+
+class Quality:
+    """Observer of :func:`~cardbox_tracker.recordings.track.track_recording`; see :meth:`lines`."""
+
+    def __init__(self) -> None:
+        """Begin without an image."""
+        self._images = self._sure = self._sure_hands = self._sure_places = 0
+        self._moments: list[_Moment] = []
+        self._angles_rad: list[float] = []
+        self._hands_m: list[float] = []
+        self._distances_m: list[float] = []
+
+    def __call__(self, frame: RecordedFrame, estimate: Estimate, tracker: Tracker) -> None:
+        """Count one image."""
+        self._images += 1
+        self._sure += estimate.state == TRACKING
+        states = estimate.keypoint_states or ()
+        sure = [states[hand] == KeypointState.TRACKED for hand in _HANDS] if states else []
+        self._sure_hands += sum(sure)
+        place = estimate.place
+        self._sure_places += place is not None and place.state == KeypointState.TRACKED
+        if estimate.state in (UNCERTAIN, LOST):
+            self._moments.append(_moment(frame.time_s, estimate))
+        if estimate.posture is None or estimate.posture_stddev is None:
+            return
+        self._angles_rad += estimate.posture_stddev[_ANGLES].tolist()
+        moved = estimate.posture + np.diag(estimate.posture_stddev)
+        points_m = pose(tracker.body, np.vstack([estimate.posture, moved])).keypoints_m
+        hands_m = points_m[:, _HANDS] - points_m[:, _SHOULDERS].mean(axis=1, keepdims=True)
+        self._hands_m += np.linalg.norm(hands_m[1:] - hands_m[0], axis=(0, 2)).tolist()
+        if place is not None:
+            self._distances_m.append(float(place.stddev_m[0]))
+
+    def lines(self) -> Iterator[str]:
+        """Yield shares of sure images and hands, typical deviations, and the worst moments.
+
+        Hands and distances are sure in the state ``tracked``. Typical is the median over images
+        with a posture; a hand moves beside the shoulders with the deviations of all joints.
+        """
+        if not self._images:
+            return
+        yield (
+            f"sure: {self._sure / self._images:.0%} of {self._images} images, "
+            f"{self._sure_hands / (2 * self._images):.0%} of the hands in them, "
+            f"{self._sure_places / self._images:.0%} of the distances (to 0.3 m)"
+        )
+        if self._angles_rad:
+            typical = [
+                f"{np.degrees(np.median(self._angles_rad)):.0f} degrees of an angle",
+                f"{100 * np.median(self._hands_m):.0f} cm of a hand beside the shoulders",
+            ]
+            if self._distances_m:
+                typical.append(f"{100 * np.median(self._distances_m):.0f} cm of the distance")
+            yield f"typical standard deviation: {', '.join(typical)}"
+        if worst := self._worst():
+            moments = (f"{one.time_s:.1f} s ({one.what})" for one in worst)
+            yield f"least sure, look at them: {', '.join(moments)}"
+
+    def _worst(self) -> list[_Moment]:
+        """Return up to ``MOST_MOMENTS`` moments of the highest chances, in the order of time."""
+        found: list[_Moment] = []
+        for one in sorted(self._moments, key=lambda one: (-one.chance, one.time_s)):
+            if all(abs(one.time_s - other.time_s) >= GAP_S for other in found):
+                found.append(one)
+            if len(found) == MOST_MOMENTS:
+                break
+        return sorted(found, key=lambda one: one.time_s)
+
+
+def _moment(time_s: float, estimate: Estimate) -> _Moment:
+    states, chances = estimate.keypoint_states, estimate.keypoint_chances
+    if states is None or chances is None:
+        return _Moment(1.0, time_s, estimate.state)
+    doubtful = [
+        KEYPOINT_NAMES[hand].replace("_", " ")
+        for hand in _HANDS
+        if states[hand] in (KeypointState.UNCERTAIN, KeypointState.LOST)
+    ]
+    what = " and ".join(doubtful) or "whole posture"
+    return _Moment(float(np.max(chances)), time_s, what)

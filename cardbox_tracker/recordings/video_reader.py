@@ -107,7 +107,7 @@ class VideoReader(Film):
         self.duration_s = max(0, stamp_ns) / 1e9
 
     def left_out(self, topic: str, used: Collection[str] = ()) -> list[str]:
-        """Return which images could not be read; see ``ImageRecording``."""
+        """Return which images could not be read."""
         damaged = [f"{self._damaged} that cannot be decoded"] if self._damaged else []
         return damaged + (["the rest of the video, which is missing"] if self._end else [])
 

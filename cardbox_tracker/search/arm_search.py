@@ -11,7 +11,7 @@ from cardbox_tracker.person.kinematics import angles_of_arms
 from cardbox_tracker.person.posture import JOINT_LIMITS, LEFT_ARM
 from cardbox_tracker.person.sizes import FloatArray
 from cardbox_tracker.search import arm_proposals, state_choice
-from cardbox_tracker.search.draws import Draws
+from cardbox_tracker.search.rated_states import Draws
 from cardbox_tracker.search.whole_body_config import SearchProfile
 from cardbox_tracker.terms.multi_view import MultiViewCost
 from cardbox_tracker.terms.pose_prior import sample_bank

@@ -33,13 +33,11 @@ from cardbox_tracker.search import doubt, joint_moves, state_choice, torso_propo
 from cardbox_tracker.search.approach import Approach
 from cardbox_tracker.search.arm_search import ARM_LIMITS, ArmSearch
 from cardbox_tracker.search.config import TrackerConfig
-from cardbox_tracker.search.draws import Draws
 from cardbox_tracker.search.locating import Location, Locator
 from cardbox_tracker.search.mirroring import mirrored_states, turned_states
 from cardbox_tracker.search.particles import Particles
-from cardbox_tracker.search.pose_filter import Fit, Presence
-from cardbox_tracker.search.presence import PersonPresence
-from cardbox_tracker.search.rated_states import RatedStates
+from cardbox_tracker.search.pose_filter import Fit, PersonPresence, Presence
+from cardbox_tracker.search.rated_states import Draws, RatedStates
 from cardbox_tracker.search.refiner import Prior, Refiner
 from cardbox_tracker.search.visibility import are_hidden, is_trackable
 from cardbox_tracker.search.whole_body_config import SearchProfile

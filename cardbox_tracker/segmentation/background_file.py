@@ -10,9 +10,7 @@ from __future__ import annotations
 import math
 import os
 import re
-import stat
 import struct
-import tempfile
 import zipfile
 from pathlib import Path
 from typing import IO, Any, BinaryIO, Literal, NamedTuple
@@ -22,7 +20,13 @@ from numpy.typing import NDArray
 
 from cardbox_tracker.camera.camera import Calibration
 from cardbox_tracker.common.errors import BackgroundFileError, CardboxError, quoted
-from cardbox_tracker.common.files import atomic_path, foreign, regular_file
+from cardbox_tracker.common.files import (
+    atomic_path,
+    check_writable,
+    foreign,
+    regular_file,
+    user_path,
+)
 from cardbox_tracker.segmentation.chroma import ChromaModel
 from cardbox_tracker.segmentation.empty_scene import BackgroundModel
 
@@ -71,21 +75,13 @@ def background_path(name: str) -> Path | None:
     if not name:
         return None
     try:
-        path = Path(name).expanduser()
-        if path.exists() and not stat.S_ISREG(path.stat().st_mode):
+        path = user_path(name)
+        if path.exists() and not path.is_file():
             kind = "a folder" if path.is_dir() else "no ordinary file"
-            raise BackgroundFileError(
-                f"background_file {path} is {kind}; give the name of a file, such as "
-                "~/background.npz"
-            )
-        with tempfile.TemporaryFile(dir=path.parent):
-            pass
-    except (OSError, RuntimeError, ValueError) as error:
-        reason = error.strerror if isinstance(error, OSError) else str(error)
-        raise BackgroundFileError(
-            f"background_file {name} cannot be written: {reason}; choose a folder that exists and "
-            "is writable"
-        ) from None
+            raise CardboxError(f"{path} is {kind}; give the name of a file")
+        check_writable(path)
+    except (CardboxError, ValueError) as error:
+        raise BackgroundFileError(f"background_file: {error}") from None
     return path
 
 

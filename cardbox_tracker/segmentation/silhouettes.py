@@ -6,15 +6,18 @@ silhouette of the person is extracted.
 
 from __future__ import annotations
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from cardbox_tracker.camera.camera import Calibration
+from cardbox_tracker.camera.depth_image import DepthImage
 from cardbox_tracker.camera.encodings import brightness_of, to_working_size
 from cardbox_tracker.segmentation.background import SilhouetteExtractor
 from cardbox_tracker.segmentation.background_config import BackgroundConfig
 from cardbox_tracker.segmentation.empty_scene import BackgroundModel
 from cardbox_tracker.segmentation.learning import Learning
+from cardbox_tracker.segmentation.regions import LEAST_AREA, MOST_HOLE, clean_silhouette
 
 ImageArray = NDArray[np.uint8]
 
@@ -75,24 +78,10 @@ class SilhouettePipeline:
         """Whether a background is learned, so that silhouettes can be extracted."""
         return self._extractor is not None
 
-    @property
-    def learned_images(self) -> int:
-        """Number of images of the empty scene added so far."""
-        return self.learning.count
-
-    @property
-    def has_enough(self) -> bool:
-        """Whether enough is learned for :meth:`finish_learning`."""
-        return self.learning.has_enough()
-
     def prepare(self, image: ImageArray) -> ImageArray:
         """Return ``image`` (H, W) or (H, W, 3) at the working size, without lens distortion."""
         small = to_working_size(image, *self._size)
         return small if self._rectifier is None else self._rectifier(small)
-
-    def learn(self, image: ImageArray) -> None:
-        """Add a prepared image, grey (H, W) or bgr (H, W, 3), of the empty scene."""
-        self.learning.add(image)
 
     def finish_learning(self) -> BackgroundModel:
         """Make a background from the added images; ValueError if there are fewer than two."""
@@ -148,3 +137,35 @@ class SilhouettePipeline:
         if self._extractor is None:
             return 0.0
         return float(np.median(brightness_of(image) - self._extractor.model.mean))
+
+
+WITHIN_LIMITS_M = 0.3, 20.0
+"""Range of the limit, metres."""
+
+# Unknown pixels between near ones belong to the person: a depth camera measures nothing at edges
+# and where only one of its eyes sees.
+_GAP = 1 / 64
+
+# A share of the pixels below which they are specks.
+_NEAREST = 0.01
+
+
+def nearest_m(depth_m: DepthImage) -> float:
+    """Return the distance of the nearest hundredth of a depth image, metres; infinite without."""
+    known = depth_m[np.isfinite(depth_m) & (depth_m > 0)]
+    return float(np.quantile(known, _NEAREST)) if known.size else np.inf
+
+
+def silhouette_within(depth_m: DepthImage, within_m: float) -> NDArray[np.uint8]:
+    """Return the silhouette (H, W), 0 or 255, of the pixels nearer than ``within_m``.
+
+    The depth is (H, W), metres along the optical axis; not finite or 0 where it is unknown. The
+    person has to stand free of the wall, with nothing else nearer than the limit but the floor
+    below the hips, which does not count.
+    """
+    is_known = np.isfinite(depth_m) & (depth_m > 0)
+    near = np.where(is_known & (depth_m < within_m), 255, 0).astype(np.uint8)
+    width = max(3, round(_GAP * depth_m.shape[1]) | 1)
+    closed = cv2.morphologyEx(near, cv2.MORPH_CLOSE, np.ones((width, width), np.uint8))
+    near[~is_known & (np.asarray(closed) > 0)] = 255
+    return clean_silhouette(near, LEAST_AREA, MOST_HOLE)

@@ -7,13 +7,14 @@ degree in pitch or yaw from the extrinsics is reported.
 
 A roll of the camera hardly changes the fit, because the model leans with it. It is estimated from
 the planes through both cameras that touch the person
-(:mod:`cardbox_tracker.measuring.silhouette_tangents`). The same planes show an inverted pose and
-exchanged images within seconds (:mod:`cardbox_tracker.measuring.pose_direction`).
+(:mod:`cardbox_tracker.measuring.silhouette_tangents`), which show an inverted pose and exchanged
+images within seconds.
 ``docs/research.md#several-cameras`` has detection rates.
 """
 
 from __future__ import annotations
 
+import threading
 from collections import deque
 from collections.abc import Sequence
 
@@ -24,8 +25,12 @@ from cardbox_tracker.camera.extrinsics import Extrinsics
 from cardbox_tracker.camera.view import View
 from cardbox_tracker.common.errors import CameraError
 from cardbox_tracker.measuring.camera_pose import ROTATION, PoseProblem, Sighting, turned_by
-from cardbox_tracker.measuring.pose_direction import PoseDirection, PoseFault
-from cardbox_tracker.measuring.silhouette_tangents import TopTangents, roll_of
+from cardbox_tracker.measuring.silhouette_tangents import (
+    PoseDirection,
+    PoseFault,
+    TopTangents,
+    roll_of,
+)
 from cardbox_tracker.person.model import MEASURED, BodyModel
 from cardbox_tracker.person.sizes import FloatArray
 from cardbox_tracker.terms.term import Silhouette
@@ -183,7 +188,7 @@ class CameraAgreement:
             problem = PoseProblem(self._body, self._first, view.camera, upright, sightings)
             found = upright
             for _ in range(_STEPS):
-                found = problem.step(found, ROTATION).extrinsics
+                found, _ = problem.step(found, ROTATION)
         except (CameraError, np.linalg.LinAlgError):
             return float("inf")
         return float(np.degrees(np.linalg.norm(turned_by(upright, found)[:2])))
@@ -213,3 +218,40 @@ def _gross(name: str, direction: PoseDirection) -> str:
 
 def _shown(degrees: float) -> str:
     return f"about {degrees:.1f}" if np.isfinite(degrees) else "many"
+
+
+class AgreementWatch:
+    """Checks the extrinsics in a separate thread, one window of images after the other."""
+
+    def __init__(self, cameras: Sequence[str]) -> None:
+        """Prepare for the names of all ``cameras``, of which the first one is the reference."""
+        self._names = list(cameras)[1:]
+        self._thread: threading.Thread | None = None
+        self._agreement: CameraAgreement | None = None
+
+    def see(self, agreement: CameraAgreement | None) -> None:
+        """Start a check if one is due and none is running."""
+        self._agreement = agreement
+        if agreement is None or not agreement.is_due:
+            return
+        if self._thread is None or not self._thread.is_alive():
+            # No daemon thread: one that runs compiled code while Python ends aborts the process.
+            # interrupts.py limits the wait at the end.
+            self._thread = threading.Thread(target=agreement.check, name="agreement", daemon=False)
+            self._thread.start()
+
+    def wait(self) -> None:
+        """Wait for a check that is running."""
+        if self._thread is not None:
+            self._thread.join()
+
+    def values(self) -> dict[str, str]:
+        """Return the estimated rotation error of each further camera, for the diagnostics."""
+        if self._agreement is None:
+            return {}
+        errors = {"turned": self._agreement.turned_deg, "rolled": self._agreement.rolled_deg}
+        return {
+            f"{name} {how} (deg)": "not yet known" if degrees is None else f"{degrees:.1f}"
+            for how, found in errors.items()
+            for name, degrees in zip(self._names, found, strict=True)
+        }

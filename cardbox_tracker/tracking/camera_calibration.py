@@ -38,14 +38,10 @@ Pair = tuple[Silhouette, Silhouette]
 
 
 class MovingFrame(NamedTuple):
-    """The silhouettes and images of both cameras at one time.
+    """The silhouettes and images of both cameras at one time."""
 
-    Attributes:
-        silhouettes: (H, W), 0 or 255, of the first and of the further camera.
-        images: (H, W) or (H, W, 3) of the first and of the further camera; None if missing.
-    """
-
-    silhouettes: Pair
+    silhouettes: Pair  #: (H, W), 0 or 255, of the first and of the further camera
+    #: (H, W) or (H, W, 3) of the first and of the further camera; None if missing.
     images: tuple[Image | None, Image | None]
 
 
@@ -151,5 +147,5 @@ def _improved(
 ) -> Extrinsics:
     problem = PoseProblem(body, first, other, pose, sightings, tangents)
     for _ in range(steps):
-        pose = problem.step(pose).extrinsics
+        pose, _ = problem.step(pose)
     return pose

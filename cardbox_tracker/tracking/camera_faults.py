@@ -4,8 +4,8 @@ Sensors are noisy, so equal images come from a driver or a network that repeats 
 do no harm while the person stands still, and none if every second image is a repetition. A
 silhouette that fills the image shows a change of the light. In a mirrored image the person faces
 another way than in the first camera; only a detector's points in space tell that, and nothing does
-if the person faces that very camera. :mod:`cardbox_tracker.measuring.pose_direction` finds images
-that contradict the pose or the focal length.
+if the person faces that very camera. :mod:`cardbox_tracker.measuring.silhouette_tangents` finds
+images that contradict the pose or the focal length.
 """
 
 from __future__ import annotations

@@ -16,15 +16,12 @@ from cardbox_tracker.terms.term import DepthImage, Image, Silhouette
 
 
 class Channel(NamedTuple):
-    """How the data of one kind gets from an :class:`Observation` into a frame.
+    """How the data of one kind gets from an :class:`Observation` into a frame."""
 
-    Attributes:
-        checked: takes the data, its name in errors, and height and width of the camera; returns
-            data that terms can use, or raises ValueError.
-        upright: takes the view of a camera and the data; returns the data of the upright image.
-    """
-
+    #: takes the data, its name in errors, and height and width of the camera; returns data that
+    #: terms can use, or raises ValueError.
     checked: Callable[[Any, str, tuple[int, int]], Any]
+    #: takes the view of a camera and the data; returns the data of the upright image.
     upright: Callable[[View, Any], Any]
 
 

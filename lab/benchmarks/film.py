@@ -28,15 +28,12 @@ from cardbox_tracker.applications.drawing import video
 from cardbox_tracker.commands import scene
 from cardbox_tracker.commands.main import main as cardbox
 from cardbox_tracker.common.errors import CardboxError
+from cardbox_tracker.detectors.detector import KeptDetections
 from cardbox_tracker.detectors.hand_network import HandNetwork
 from cardbox_tracker.detectors.pose_network import Network, PoseNetwork
-from cardbox_tracker.recordings import (
-    detector_silhouettes,
-    kept_detections,
-    quality,
-    result_table,
-    video_reader,
-)
+from cardbox_tracker.recordings import result_table, video_reader
+from cardbox_tracker.recordings.other_silhouettes import DetectorSilhouetteSource
+from cardbox_tracker.recordings.track import Quality
 from cardbox_tracker.search.doubt import Doubt
 from cardbox_tracker.search.whole_body import WholeBodyFilter
 from cardbox_tracker.segmentation.silhouettes import SilhouettePipeline
@@ -55,8 +52,8 @@ STEPS: Mapping[str, Sequence[tuple[Any, str]]] = {
     "points and mask, beside the network": [(PoseNetwork, "located")],
     "networks of people": [(Network, "__call__")],
     "identity of the person": [(PoseNetwork, "__call__")],
-    "detections kept and read": [(kept_detections.KeptDetections, "__call__")],
-    "silhouette and brightness": [(detector_silhouettes.DetectorSilhouetteSource, "frames")],
+    "detections kept and read": [(KeptDetections, "__call__")],
+    "silhouette and brightness": [(DetectorSilhouetteSource, "frames")],
     "what is kept of the images": [(scene, "watch")],
     "camera of the scene": [(scene, "found_camera")],
     "bodies of the scene": [(scene, "seen_person"), (scene, "seen_people")],
@@ -71,7 +68,7 @@ STEPS: Mapping[str, Sequence[tuple[Any, str]]] = {
     "squares and angles of hands": [(HandReader, "see")],
     "network of hands": [(HandNetwork, "__call__")],
     "table": [(result_table, "row_of"), (result_table, "_text")],
-    "summary": [(quality.Quality, "__call__")],
+    "summary": [(Quality, "__call__")],
     "drawing": [(video, "draw_overlay")],
     "encoding": [(video, "_encoder")],
 }

@@ -15,7 +15,7 @@ from cardbox_tracker.common.errors import CardboxError
 from cardbox_tracker.detectors.detector import Detector
 from cardbox_tracker.detectors.image_points import ImagePoints
 from cardbox_tracker.recordings.bag_reader import BagReader
-from cardbox_tracker.recordings.detector_silhouettes import DetectorSilhouetteSource
+from cardbox_tracker.recordings.other_silhouettes import DetectorSilhouetteSource
 from cardbox_tracker.recordings.silhouettes import SilhouetteSource, TimeSpan
 from lab.tools.silhouette_report import read_masks
 

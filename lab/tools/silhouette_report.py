@@ -136,8 +136,8 @@ def rows_of(folder: Path, light: Light | None = None) -> list[Row]:
         prepared = pipeline.prepare(image)
         if not pipeline.is_ready:
             if empty["start_s"] + _MARGIN_S <= time_s <= empty["end_s"] - _MARGIN_S:
-                pipeline.learn(prepared)
-            if pipeline.has_enough or time_s > empty["end_s"] - _MARGIN_S:
+                pipeline.learning.add(prepared)
+            if pipeline.learning.has_enough() or time_s > empty["end_s"] - _MARGIN_S:
                 pipeline.finish_learning()
             continue
         frame = truth["frames"][number]

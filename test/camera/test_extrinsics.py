@@ -14,11 +14,12 @@ import yaml
 
 from cardbox_tracker.camera.camera import Camera
 from cardbox_tracker.camera.extrinsics import Extrinsics
-from cardbox_tracker.camera.extrinsics_files import load_extrinsics, save_camchain
-from cardbox_tracker.camera.extrinsics_sources import (
+from cardbox_tracker.camera.extrinsics_files import (
     choose,
+    load_extrinsics,
     of_rectified_pair,
     of_transforms,
+    save_camchain,
     transforms_of,
 )
 from cardbox_tracker.common.errors import CameraError

@@ -27,7 +27,7 @@ from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.model_file import save_body_model
 from cardbox_tracker.person.proportions import body_from_proportions
 from cardbox_tracker.recordings.given_camera import GivenCamera
-from cardbox_tracker.recordings.person_in_view import PersonInView
+from cardbox_tracker.recordings.other_silhouettes import PersonInView
 from cardbox_tracker.recordings.silhouettes import TimeSpan
 from cardbox_tracker.tracking.session import MOST_PEOPLE
 

@@ -26,7 +26,7 @@ from cardbox_tracker.commands.request import (
 from cardbox_tracker.commands.track_folder import digest_of_inputs
 from cardbox_tracker.common import processes
 from cardbox_tracker.common.errors import CardboxError
-from cardbox_tracker.recordings.folder import SUMMARY
+from cardbox_tracker.recordings.open_images import SUMMARY
 from cardbox_tracker.recordings.track import TrackSummary
 
 GIVEN = ("--model", "PERSON", "--background=0:3.9", "--start=15.6")

@@ -11,8 +11,7 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from cardbox_tracker.detectors.image_points import COCO_NAMES, POINT_INDEX, POINT_NAMES, ImagePoints
-from cardbox_tracker.detectors.landmarks import image_points
-from cardbox_tracker.detectors.pose_network import Detection
+from cardbox_tracker.detectors.pose_network import Detection, image_points
 
 COUNT = len(POINT_NAMES)
 PX, SCORES = np.full((COUNT, 2), 7.0), np.full(COUNT, 0.5)

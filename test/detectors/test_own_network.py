@@ -10,10 +10,9 @@ import pytest
 
 from cardbox_tracker.common.errors import CardboxError
 from cardbox_tracker.detectors.detector import Detector
-from cardbox_tracker.detectors.landmarks import image_points
 from cardbox_tracker.detectors.own_network import OwnModel
 from cardbox_tracker.detectors.person_choice import PersonChoice
-from cardbox_tracker.detectors.pose_network import LANDMARKS
+from cardbox_tracker.detectors.pose_network import LANDMARKS, image_points
 
 IMAGE = np.random.default_rng(0).integers(0, 255, (120, 160, 3), np.uint8)
 FRAME_NS = 40_000_000

@@ -20,8 +20,12 @@ from cardbox_tracker.measuring.camera_pose import (
     moved_by,
     turned_by,
 )
-from cardbox_tracker.measuring.pose_direction import PoseDirection, PoseFault
-from cardbox_tracker.measuring.silhouette_tangents import TopTangents, roll_of
+from cardbox_tracker.measuring.silhouette_tangents import (
+    PoseDirection,
+    PoseFault,
+    TopTangents,
+    roll_of,
+)
 from cardbox_tracker.person.model import PROPORTIONS, BodyModel
 from cardbox_tracker.person.posture import reference_posture
 from cardbox_tracker.person.skeleton import KeypointState
@@ -83,7 +87,7 @@ def test_a_turn_of_the_camera_is_found(axis: int) -> None:
     problem = PoseProblem(BODY, CAMERA, OTHER, wrong, sightings(waving(6)))
     found = wrong
     for _ in range(5):
-        found = problem.step(found, ROTATION).extrinsics
+        found = problem.step(found, ROTATION)[0]
     left = np.degrees(turned_by(TRUE, found))
     assert abs(left[axis]) < 1.5
     assert np.linalg.norm(left[:2]) < 1.8
@@ -120,7 +124,7 @@ def test_with_tangents_a_roll_is_found() -> None:
     problem = PoseProblem(BODY, CAMERA, OTHER, wrong, frames, tangents_of(frames))
     found = wrong
     for _ in range(6):
-        found = problem.step(found).extrinsics
+        found = problem.step(found)[0]
     assert abs(np.degrees(turned_by(TRUE, found))[2]) < 2.0
 
 

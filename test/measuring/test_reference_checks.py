@@ -16,7 +16,6 @@ from cardbox_tracker.measuring.asked_outline import check_asked
 from cardbox_tracker.measuring.config import InitializationConfig
 from cardbox_tracker.measuring.reference_checks import (
     check_postures,
-    posture_problems,
 )
 from cardbox_tracker.person.cardbox import cardbox_patches
 from cardbox_tracker.person.model import BodyModel
@@ -54,7 +53,11 @@ def all_seen(body: BodyModel = BODY, **replaced: np.ndarray) -> dict[str, np.nda
 
 def problems(references: dict[str, np.ndarray], body: BodyModel = BODY) -> list[str]:
     camera = CAMERA.with_pitch(body.camera_pose.pitch_rad)
-    return posture_problems(references, camera, body.placement.distance_m)
+    try:
+        check_postures(references, camera, body.placement.distance_m)
+    except InitializationError as error:
+        return [str(error)]
+    return []
 
 
 def both(**angles_deg: float) -> dict[str, float]:

@@ -20,7 +20,7 @@ from cardbox_tracker.recordings.given_camera import GivenCamera
 from cardbox_tracker.recordings.image_folder import _numbered
 from cardbox_tracker.recordings.image_recording import working_size
 from cardbox_tracker.recordings.open_images import open_images
-from cardbox_tracker.recordings.person_in_view import PersonInView
+from cardbox_tracker.recordings.other_silhouettes import PersonInView
 from cardbox_tracker.recordings.recording import open_recording
 from cardbox_tracker.recordings.silhouettes import TimeSpan
 

@@ -18,8 +18,8 @@ from rosbags.rosbag2 import storage_mcap
 
 from cardbox_tracker.camera.camera import Camera
 from cardbox_tracker.common.errors import BagError, CardboxError
-from cardbox_tracker.recordings import bag_limits
-from cardbox_tracker.recordings.bag_limits import LimitedFile, unpack_lz4, unpack_zstd
+from cardbox_tracker.recordings import bag_files
+from cardbox_tracker.recordings.bag_files import LimitedFile, unpack_lz4, unpack_zstd
 from cardbox_tracker.recordings.bag_reader import BagReader
 from cardbox_tracker.recordings.bag_writer import BagWriter
 from cardbox_tracker.recordings.silhouettes import SilhouetteSource, TimeSpan
@@ -87,7 +87,7 @@ def test_a_chunk_that_holds_more_than_it_says_is_not_unpacked(name: str) -> None
 
 
 @pytest.mark.promise("No input fills memory, disk or log, or holds up a program")
-@pytest.mark.parametrize("size", [2 * bag_limits.MOST_BYTES, 2**63])
+@pytest.mark.parametrize("size", [2 * bag_files.MOST_BYTES, 2**63])
 def test_a_chunk_that_says_it_holds_gigabytes_is_refused(size: int, tmp_path: Path) -> None:
     file = mcap_of(record(tmp_path / "bag"))
     data = bytearray(file.read_bytes())
@@ -118,7 +118,7 @@ def test_the_stated_size_is_the_limit_while_messages_are_read(tmp_path: Path) ->
 
 @pytest.mark.promise("No input fills memory, disk or log, or holds up a program")
 def test_many_chunks_that_are_large_together_are_refused(tmp_path: Path) -> None:
-    chunk = struct.pack("<BQQQQIIQ", 0x06, 40, 0, 0, bag_limits.MOST_BYTES // 3, 0, 0, 0)
+    chunk = struct.pack("<BQQQQIIQ", 0x06, 40, 0, 0, bag_files.MOST_BYTES // 3, 0, 0, 0)
     (tmp_path / "bag.mcap").write_bytes(b"\x89MCAP0\r\n" + chunk * 4)
     with pytest.raises(BagError, match="unpack"), BagReader(tmp_path / "bag.mcap"):
         pytest.fail("it was opened")
@@ -127,7 +127,7 @@ def test_many_chunks_that_are_large_together_are_refused(tmp_path: Path) -> None
 def test_messages_and_files_that_are_compressed_each_are_bounded(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(bag_limits, "MOST_BYTES", 10 * MB)
+    monkeypatch.setattr(bag_files, "MOST_BYTES", 10 * MB)
     packed = tmp_path / "bag.zstd"
     packed.write_bytes(zstd.compress(bytes(100 * MB)))
     with (
@@ -142,7 +142,7 @@ def test_messages_and_files_that_are_compressed_each_are_bounded(
 
 
 @pytest.mark.parametrize(
-    "metadata", ["a: &a [x]\nb: [*a, *a]\n", "#" * (bag_limits.MOST_METADATA_BYTES + 1)]
+    "metadata", ["a: &a [x]\nb: [*a, *a]\n", "#" * (bag_files.MOST_METADATA_BYTES + 1)]
 )
 def test_metadata_that_no_recorder_wrote_are_refused(metadata: str, tmp_path: Path) -> None:
     bag = record(tmp_path / "bag")

@@ -12,8 +12,7 @@ import pytest
 from PIL import Image
 
 from cardbox_tracker.camera.film_headers import shown_s
-from cardbox_tracker.recordings.focal_length import equivalent_mm
-from cardbox_tracker.recordings.given_camera import GivenCamera
+from cardbox_tracker.recordings.given_camera import GivenCamera, equivalent_mm
 from cardbox_tracker.recordings.open_images import open_images, tells_lens
 
 KEYS = ("com.apple.quicktime.make", "com.apple.quicktime.camera.focal_length.35mm_equivalent")

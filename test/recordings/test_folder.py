@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from cardbox_tracker.common.errors import CardboxError
-from cardbox_tracker.recordings.folder import SUMMARY, is_one_recording, recordings_in
+from cardbox_tracker.recordings.open_images import SUMMARY, is_one_recording, recordings_in
 
 
 def make(folder: Path, *names: str) -> None:

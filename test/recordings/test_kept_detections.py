@@ -6,8 +6,8 @@ from unittest.mock import Mock
 
 import numpy as np
 
+from cardbox_tracker.detectors.detector import KeptDetections
 from cardbox_tracker.detectors.pose_network import Detection
-from cardbox_tracker.recordings.kept_detections import KeptDetections
 
 IMAGES = np.zeros((3, 5, 7, 3), np.uint8)
 

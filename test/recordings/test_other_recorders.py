@@ -17,9 +17,8 @@ from rosbags.typesys import Stores, get_typestore
 from cardbox_tracker.common.errors import BagError, CameraError, CardboxError
 from cardbox_tracker.recordings.bag_reader import BagReader
 from cardbox_tracker.recordings.bag_writer import BagWriter
-from cardbox_tracker.recordings.folder import is_one_recording, recordings_in
 from cardbox_tracker.recordings.given_camera import GivenCamera
-from cardbox_tracker.recordings.open_images import open_images
+from cardbox_tracker.recordings.open_images import is_one_recording, open_images, recordings_in
 from cardbox_tracker.recordings.recording import open_recording
 from cardbox_tracker.recordings.silhouettes import SilhouetteSource, TimeSpan
 

@@ -10,7 +10,7 @@ import pytest
 
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.skeleton import JOINT_NAMES, KeypointState
-from cardbox_tracker.recordings.quality import Quality
+from cardbox_tracker.recordings.track import Quality
 from cardbox_tracker.tracking.estimate import (
     LOST,
     NO_PERSON,

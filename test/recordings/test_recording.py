@@ -20,7 +20,7 @@ from cardbox_tracker.detectors.point_table import PointTable
 from cardbox_tracker.detectors.pose_network import Detection
 from cardbox_tracker.recordings.bag_reader import BagReader
 from cardbox_tracker.recordings.bag_writer import BagWriter
-from cardbox_tracker.recordings.depth_silhouettes import Within
+from cardbox_tracker.recordings.other_silhouettes import Within
 from cardbox_tracker.recordings.recording import Recording, open_recording
 from cardbox_tracker.recordings.silhouettes import SilhouetteSource, TimeSpan
 

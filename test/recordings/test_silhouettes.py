@@ -18,9 +18,9 @@ from cardbox_tracker.detectors.model_files import ModelFiles
 from cardbox_tracker.detectors.point_table import PointTable
 from cardbox_tracker.recordings.bag_reader import BagReader
 from cardbox_tracker.recordings.bag_writer import BagWriter
-from cardbox_tracker.recordings.detector_silhouettes import DetectorSilhouetteSource
 from cardbox_tracker.recordings.given_camera import GivenCamera
 from cardbox_tracker.recordings.image_folder import ImageFolder
+from cardbox_tracker.recordings.other_silhouettes import DetectorSilhouetteSource
 from cardbox_tracker.recordings.silhouettes import SilhouetteSource, TimeSpan
 from cardbox_tracker.segmentation.background_config import BackgroundConfig
 

@@ -6,7 +6,7 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from cardbox_tracker.segmentation.depth_silhouette import silhouette_within
+from cardbox_tracker.segmentation.silhouettes import silhouette_within
 
 H, W = 240, 320
 

@@ -26,8 +26,8 @@ def pipeline(focal_px: float = 160.0) -> SilhouettePipeline:
 
 def learned(room: Any) -> SilhouettePipeline:
     made = pipeline()
-    while not made.has_enough:
-        made.learn(room.image())
+    while not made.learning.has_enough():
+        made.learning.add(room.image())
     made.finish_learning()
     return made
 

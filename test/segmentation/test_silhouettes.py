@@ -61,9 +61,10 @@ def test_a_camera_without_calibration_is_refused() -> None:
 def test_it_learns_then_cuts_out_by_hand() -> None:
     made = pipeline()
     for count, value in enumerate((96, 100, 104)):
-        assert (made.learned_images, made.has_enough, made.is_ready) == (count, False, False)
-        made.learn(level(value))
-    assert made.has_enough and not made.is_ready and made.model is None
+        assert made.learning.count == count
+        assert not made.learning.has_enough() and not made.is_ready
+        made.learning.add(level(value))
+    assert made.learning.has_enough() and not made.is_ready and made.model is None
     with pytest.raises(RuntimeError, match="background"):
         made.silhouette(level(100))
     assert made.drift(level(100)) == 0.0
@@ -80,7 +81,7 @@ def test_it_learns_then_cuts_out_by_hand() -> None:
 def test_other_settings_keep_what_was_learned() -> None:
     made = pipeline()
     for value in (96, 100, 104):
-        made.learn(level(value))
+        made.learning.add(level(value))
     model = made.finish_learning()
     made.config = BackgroundConfig(clean_up=False, threshold=3.0)
     assert made.model is model
@@ -90,10 +91,10 @@ def test_other_settings_keep_what_was_learned() -> None:
 
 def test_settings_changed_while_learning_hold_afterwards() -> None:
     made = pipeline()
-    made.learn(level(96))
-    made.learn(level(104))
+    made.learning.add(level(96))
+    made.learning.add(level(104))
     made.config = BackgroundConfig(learn_images=2, clean_up=False, threshold=0.5)
-    assert made.has_enough
+    assert made.learning.has_enough()
     made.finish_learning()
     # Mean 100, standard deviation sqrt(32): foreground from 2.83 grey levels on.
     assert not made.silhouette(level(102)).any()
@@ -103,12 +104,12 @@ def test_settings_changed_while_learning_hold_afterwards() -> None:
 def test_relearning_forgets() -> None:
     made = pipeline()
     for value in (96, 100, 104):
-        made.learn(level(value))
+        made.learning.add(level(value))
     made.finish_learning()
     made.relearn()
-    assert (made.learned_images, made.is_ready) == (0, False)
+    assert (made.learning.count, made.is_ready) == (0, False)
     for _ in range(3):
-        made.learn(level(200))
+        made.learning.add(level(200))
     made.finish_learning()
     assert not made.silhouette(level(200)).any()
     assert made.silhouette(level(100)).all()
@@ -118,7 +119,7 @@ def test_relearning_forgets() -> None:
 def test_too_few_images_are_no_background(count: int) -> None:
     made = pipeline()
     for _ in range(count):
-        made.learn(level(100))
+        made.learning.add(level(100))
     with pytest.raises(ValueError, match=f"{count} images"):
         made.finish_learning()
     assert not made.is_ready
@@ -130,7 +131,7 @@ def test_it_is_the_background_model_of_the_prepared_images(
 ) -> None:
     made, learner = pipeline(BackgroundConfig()), BackgroundLearner()
     for one in scene:
-        made.learn(made.prepare(one))
+        made.learning.add(made.prepare(one))
         learner.add(one)
     made.finish_learning()
     expected = SilhouetteExtractor(learner.model())(image)

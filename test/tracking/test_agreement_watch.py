@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import threading
 
-from cardbox_tracker.tracking.agreement_watch import AgreementWatch
+from cardbox_tracker.tracking.camera_agreement import AgreementWatch
 
 
 class Agreement:

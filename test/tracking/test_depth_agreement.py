@@ -11,9 +11,9 @@ from cardbox_tracker.person.cardbox import cardbox_patches
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.posture import reference_posture
 from cardbox_tracker.search.config import PRESETS
-from cardbox_tracker.tracking.depth_agreement import DepthAgreement, surplus_of_jumps
 from cardbox_tracker.tracking.observation import Observation
 from cardbox_tracker.tracking.precompile import quickest
+from cardbox_tracker.tracking.tracked_camera import DepthAgreement, surplus_of_jumps
 from cardbox_tracker.tracking.tracker import Tracker
 
 BODY, CAMERA = BodyModel(), Camera(96, 72, 99.0, 99.0, 47.5, 35.5)

@@ -29,10 +29,9 @@ from cardbox_tracker.ros.runtime.parameters import LiveParameters
 from cardbox_tracker.segmentation.background import warm_up
 from cardbox_tracker.segmentation.background_config import BackgroundConfig
 from cardbox_tracker.segmentation.background_file import background_path
-from cardbox_tracker.segmentation.depth_silhouette import WITHIN_LIMITS_M, nearest_m
 from cardbox_tracker.segmentation.kept_background import KeptBackground
 from cardbox_tracker.segmentation.learning import WAYS
-from cardbox_tracker.segmentation.silhouettes import SilhouettePipeline
+from cardbox_tracker.segmentation.silhouettes import WITHIN_LIMITS_M, SilhouettePipeline, nearest_m
 
 # The default shared-memory segment of Fast DDS holds half a megabyte, less its own data.
 _LARGE_IMAGE_BYTES = 400_000
@@ -177,11 +176,11 @@ class BackgroundNode(CardboxNode):
         done = self._kept.resume(pipeline, image)
         if not done:
             pipeline.learning.add(image)
-            if not pipeline.has_enough:
+            if not pipeline.learning.has_enough():
                 self.diagnostics.wait_for(pipeline.learning.waits_for(self.camera_images.topic))
                 return
             pipeline.finish_learning()
-            done = f"background learned from {pipeline.learned_images} images"
+            done = f"background learned from {pipeline.learning.count} images"
             try:
                 done += self._kept.keep(pipeline)
             except BackgroundFileError as error:

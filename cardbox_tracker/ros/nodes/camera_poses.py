@@ -13,10 +13,10 @@ from sensor_msgs.msg import CameraInfo
 
 from cardbox_tracker.camera.camera import Camera
 from cardbox_tracker.camera.extrinsics import Extrinsics
-from cardbox_tracker.camera.extrinsics_files import load_extrinsics
-from cardbox_tracker.camera.extrinsics_sources import (
+from cardbox_tracker.camera.extrinsics_files import (
     FrameTransform,
     extrinsics_between,
+    load_extrinsics,
     transforms_of,
 )
 from cardbox_tracker.camera.view import OtherCamera

@@ -17,7 +17,7 @@ from cardbox_tracker.ros.messages import conversions
 from cardbox_tracker.ros.messages.conversions import ImageArray
 from cardbox_tracker.ros.runtime import qos
 from cardbox_tracker.ros.runtime.node import CardboxNode
-from cardbox_tracker.segmentation.depth_silhouette import silhouette_within
+from cardbox_tracker.segmentation.silhouettes import silhouette_within
 
 _PACKED = "/compressedDepth"
 

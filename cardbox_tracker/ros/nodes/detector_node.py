@@ -18,8 +18,7 @@ from cardbox_tracker.camera.camera import Calibration, Camera, unrectified
 from cardbox_tracker.camera.stamps import WINDOW, StampOrder
 from cardbox_tracker.detectors.detector import Detector, PersonDetector
 from cardbox_tracker.detectors.image_points import ImagePoints
-from cardbox_tracker.detectors.landmarks import image_points
-from cardbox_tracker.detectors.pose_network import LANDMARKS, Detection
+from cardbox_tracker.detectors.pose_network import LANDMARKS, Detection, image_points
 from cardbox_tracker.measuring.people_camera import FOUND_STDDEV, people_camera
 from cardbox_tracker.ros.messages.conversions import ImageArray, stamp_ns
 from cardbox_tracker.ros.messages.keypoints import (

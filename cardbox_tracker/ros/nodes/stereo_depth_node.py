@@ -12,7 +12,7 @@ from sensor_msgs.msg import CameraInfo, CompressedImage, Image
 from cardbox_tracker.camera.camera import Calibration, Camera, Rectifier
 from cardbox_tracker.camera.camera_info import calibration_from_info
 from cardbox_tracker.camera.encodings import to_working_size
-from cardbox_tracker.camera.extrinsics_sources import of_rectified_pair
+from cardbox_tracker.camera.extrinsics_files import of_rectified_pair
 from cardbox_tracker.camera.stereo import NEAREST_M, StereoDepth, stereo_of_pair
 from cardbox_tracker.common.errors import CameraError
 from cardbox_tracker.ros.messages import conversions

@@ -1,11 +1,14 @@
-"""Silhouettes of a recording, cut out by depth images without a background model."""
+"""Silhouettes of a recording without an empty scene: of depth, a detector, or a person in view."""
 
 from __future__ import annotations
 
 import math
 import os
 from collections.abc import Iterator
+from dataclasses import dataclass
 from typing import Any, NamedTuple
+
+import numpy as np
 
 from cardbox_tracker.camera.camera import Camera
 from cardbox_tracker.camera.depth_image import DepthImage, at_size, depth_from_image
@@ -14,10 +17,12 @@ from cardbox_tracker.camera.pairing import TOLERANCE_NS, side_by_side
 from cardbox_tracker.common.errors import BagError, CardboxError
 from cardbox_tracker.detectors.detector import Detector
 from cardbox_tracker.detectors.point_table import PointTable
+from cardbox_tracker.detectors.pose_network import image_points
 from cardbox_tracker.recordings.bag_reader import IMAGE_TYPES, BagReader
-from cardbox_tracker.recordings.image_recording import ImageRecording
+from cardbox_tracker.recordings.open_images import ImageRecording
 from cardbox_tracker.recordings.silhouettes import RecordedFrame, SilhouetteSource
-from cardbox_tracker.segmentation.depth_silhouette import (
+from cardbox_tracker.segmentation.learning import Learning, PersonInViewLearning
+from cardbox_tracker.segmentation.silhouettes import (
     WITHIN_LIMITS_M,
     nearest_m,
     silhouette_within,
@@ -117,3 +122,103 @@ class DepthSilhouetteSource(SilhouetteSource):
         elif self._used > self._without:
             found.append(f"{topic} has no depth: all values are 0 or below, or not finite")
         return found
+
+
+class DetectorSilhouetteSource(SilhouetteSource):
+    """One camera of a recording whose silhouettes are the masks of a person detector."""
+
+    def __init__(
+        self,
+        bag: ImageRecording,
+        detector: Detector,
+        camera: str | None = None,
+        points: Detector | PointTable | None = None,
+    ) -> None:
+        """Load the networks and prepare to read; see :class:`SilhouetteSource`.
+
+        A detector as ``points`` finds points and mask at once. Raises CardboxError if the networks
+        cannot be loaded.
+        """
+        self._open(bag, bag.working_size, camera)
+        self._find_points(None if isinstance(points, Detector) else points, camera)
+        self._has_own_points = isinstance(points, Detector)
+        self.has_points = points is not None
+        self._detector = self._started(detector)
+        self._finds_people = detector.people > 0
+
+    def frames(self, start_s: float = 0.0, end_s: float = float("inf")) -> Iterator[RecordedFrame]:
+        """Yield every image from ``start_s`` to ``end_s``, in order, with the person's mask.
+
+        The detector starts anew at ``start_s``, so that a frame depends on the span alone.
+        """
+        self._start_points(start_s, end_s)
+        for prepared in self._images_until(end_s, start_s):
+            stamp_ns, time_s, image, recorded, _, found = prepared
+            if time_s < start_s:
+                continue
+            silhouette = np.zeros(image.shape[:2], np.uint8)
+            for one in found:
+                silhouette |= one.silhouette()
+            seen = brightness_of(image), silhouette, image
+            frame = RecordedFrame(stamp_ns, time_s, *seen, recorded=recorded)
+            if self._finds_people:
+                own = tuple(image_points(one) for one in found)
+                people = own if self._given is None else self._people(prepared)
+                yield frame._replace(people=people)
+            elif found and self._has_own_points:
+                yield frame._replace(points=image_points(found[0]))
+            else:
+                yield frame._replace(points=self._points(prepared, silhouette))
+        self._end_points()
+
+
+# A standing person sways too slowly to be seen in images at a higher rate than the live nodes'.
+_LEARNING_HZ = 15.0
+
+
+@dataclass(frozen=True)
+class PersonInView:
+    """Segmentation against the scene around the person, learned from the whole recording."""
+
+
+class PersonInViewSource(SilhouetteSource):
+    """One camera of a recording without an empty scene, whose person steps aside at some time."""
+
+    def __init__(
+        self,
+        bag: ImageRecording,
+        camera: str | None = None,
+        points: Detector | PointTable | None = None,
+    ) -> None:
+        """Learn the scene from the first images that show all of it, each part at its own time.
+
+        See :class:`SilhouetteSource`. Raises CardboxError if the person hides a part of the scene
+        in all images.
+        """
+        self._open(bag, bag.working_size, camera, learning=PersonInViewLearning)
+        self._find_points(points, camera)
+        learning = self._pipeline.learning
+        every = max(1, round(1e9 / (_LEARNING_HZ * self.period_ns())))
+        for number, prepared in enumerate(self.images()):
+            if number % every == 0:
+                learning.add(prepared.image)
+            if learning.has_enough():
+                break
+        if not learning.has_enough():
+            raise CardboxError(self._missing(learning))
+        self._pipeline.finish_learning()
+
+    def _missing(self, learning: Learning) -> str:
+        """Return which part of the scene was not seen, and the remedy."""
+        needed_s = learning.images / _LEARNING_HZ
+        if learning.count < learning.images:
+            what = f"{self.path} has less than {needed_s:.0f} s"
+        else:
+            hidden = learning.values()["hidden by the person (% of the image)"]
+            what = f"the person hides {hidden} % of {self.path} all the time"
+        return (
+            f"{what}, so the scene behind them is unknown. Film someone who steps aside by twice "
+            f"their width for {2 * needed_s:.0f} s, or leaves the image; for this recording give "
+            "--detector mediapipe, which needs no scene, or --background T0:T1 if nobody is in "
+            "view for a while"
+        )
