@@ -21,6 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cardbox_tracker.commands.arguments import at_least
+from cardbox_tracker.common.compiling import kernel
 from cardbox_tracker.person.kinematics import jacobian
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.posture import ARM_ANGLES, FIRST_ANGLES
@@ -71,6 +72,11 @@ class Compared(NamedTuple):
     missed_m: float
 
 
+@kernel
+def _depth_inside(points: FloatArray, parts: FloatArray) -> float:
+    return penetration(points, parts)
+
+
 def terms_of(cost: WholeBodyCost, state: FloatArray) -> FloatArray:
     """Return the ``TERMS`` of the rating of a state (14,), (6,), as shares of the silhouette."""
     rated = cost.bodies(state[None])
@@ -82,7 +88,7 @@ def terms_of(cost: WholeBodyCost, state: FloatArray) -> FloatArray:
     inside = np.zeros(len(FIRST_ANGLES))
     for arm, first in enumerate(FIRST_ANGLES):
         joints = cost.joints(state[None, first : first + ARM_ANGLES], arm)[0]
-        inside[arm] = rules[WEIGHT] * rules[PENETRATION] * penetration(joints, cost.parts)
+        inside[arm] = rules[WEIGHT] * rules[PENETRATION] * _depth_inside(joints, cost.parts)
     arms = by_part[1:] - inside
     rest = rating - pixels - by_part.sum()
     return np.array([pixels, by_part[0], *arms, inside.sum(), rest])

@@ -308,7 +308,7 @@ def test_the_cameras_pitch_is_found_from_the_recording(
     tilt = SceneCamera(Value(1.0, 0.01), pitch, roll)
     remarks = ("it moves",) if pitch_deg < 0.0 else ()
     found = FoundCamera(tilt, sources, remarks, (2.0 / 1.72,))
-    monkeypatch.setattr("cardbox_tracker.measuring.scene_camera.scene_camera", found_in)
+    monkeypatch.setattr("cardbox_tracker.commands.scene.scene_camera", found_in)
 
     def opened(bag: Any, detector: Any, camera: Any, points: Any) -> SilhouetteSource:
         rolls.append(bag.calibration().roll_rad)

@@ -16,7 +16,7 @@ from numba.core.runtime.nrt import rtsys
 
 from cardbox_tracker.camera.camera import Camera
 from cardbox_tracker.camera.rasterisation import render
-from cardbox_tracker.common.compiling import borrowing_kernel
+from cardbox_tracker.common.compiling import borrowing_kernel, kernel
 from cardbox_tracker.person.cardbox import cardbox_patches
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.posture import reference_posture
@@ -44,12 +44,12 @@ def has_arrays(kind: types.Type) -> bool:
 def test_borrowing_kernels_return_no_arrays() -> None:
     kernels = set(borrowing_kernels())
     assert len(kernels) > 50
-    for kernel in kernels:
+    for one in kernels:
         # Kernels that only others call have no signatures of their own if their code was kept.
-        words = re.findall(r"\w+(?:\.\w+)*", str(kernel.py_func.__annotations__["return"]))
-        assert set(words) <= SCALARS, kernel
-        returned = [signature.return_type for signature in kernel.nopython_signatures]
-        assert not any(map(has_arrays, returned)), kernel
+        words = re.findall(r"\w+(?:\.\w+)*", str(one.py_func.__annotations__["return"]))
+        assert set(words) <= SCALARS, one
+        returned = [signature.return_type for signature in one.nopython_signatures]
+        assert not any(map(has_arrays, returned)), one
 
 
 def test_arrays_in_a_tuple_are_found() -> None:
@@ -64,8 +64,9 @@ def test_numba_refuses_an_allocation() -> None:
         total: float = np.empty(count)[0]
         return total
 
+    call = kernel(lambda count: allocate(count))
     with pytest.raises(Exception, match=r"(?s)passed into the function|NRT"):
-        allocate(3)
+        call(3)
 
 
 @pytest.mark.parametrize("preset", PRESETS)

@@ -87,21 +87,16 @@ def mismatch_text(topic: str, kind: QoSPolicyKind, *, subscribing: bool) -> str:
     name = qos_policy_name_from_kind(kind)
     weak, strong, low, high = _MEANING.get(name, ("less", "more", "volatile", "transient_local"))
     policy = name.lower()
+    ours, value = ("subscription", low) if subscribing else ("publisher", high)
+    remedy = f"start this node with the parameter qos_overrides.{topic}.{ours}.{policy}:={value}"
     if subscribing:
-        ours, value = "subscription", low
-        cause = (
-            f"a publisher offers {weak} {policy} but this node asks for {strong}, so nothing "
-            f"arrives from it; make that publisher {strong}"
-        )
-    else:
-        ours, value = "publisher", high
-        cause = (
-            f"a subscriber asks for {strong} {policy} but this node offers {weak}, so it receives "
-            f"nothing; make that subscriber {weak}"
+        return (
+            f"incompatible QoS on {topic}: a publisher offers {weak} {policy} but this node asks "
+            f"for {strong}, so nothing arrives from it; make that publisher {strong}, or {remedy}"
         )
     return (
-        f"incompatible QoS on {topic}: {cause}, or start this node with the parameter "
-        f"qos_overrides.{topic}.{ours}.{policy}:={value}"
+        f"incompatible QoS on {topic}: a subscriber asks for {strong} {policy} but this node "
+        f"offers {weak}, so it receives nothing; make that subscriber {weak}, or {remedy}"
     )
 
 
