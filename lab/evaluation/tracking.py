@@ -79,7 +79,7 @@ class SessionRun:
         keypoint_states: states of the keypoints, (n, 6); empty without an estimate or states.
         chances: probabilities of keypoints to be off by more than 30 cm relative to the middle of
             the shoulders, (n, 6); nan likewise.
-        milliseconds: processor time of each tracked image from silhouette to posture, (m,).
+        milliseconds: time of the thread that tracks each image from silhouette to posture, (m,).
         input_ms: median processor time of an image before that: decoding, silhouettes and points
             of all cameras; nan if it was not measured.
     """
@@ -205,11 +205,11 @@ def track_session(
 
 def _timed(frames: Iterable[FrameSet], milliseconds: list[float]) -> Iterator[FrameSet]:
     """Yield frames, and append the processor time in which each was made."""
-    start = time.process_time()
+    start = time.thread_time()
     for taken in frames:
-        milliseconds.append(1e3 * (time.process_time() - start))
+        milliseconds.append(1e3 * (time.thread_time() - start))
         yield taken
-        start = time.process_time()
+        start = time.thread_time()
 
 
 def _seen(observation: Observation, inputs: InputSelection, is_open: bool) -> Observation:
