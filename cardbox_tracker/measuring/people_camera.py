@@ -175,12 +175,12 @@ def people_camera(
             last[:, None] + np.arange(_OF_IMAGE),
         ]
     )
-    found, information = _fitted(seen, distance, own, mean, precision)
+    found, _ = _fitted(seen, distance, own, mean, precision, mean)
     # Most images show the floor; only who stands on something else may do so in the second fit.
     high = found[last + _OF_IMAGE - 1]
     on_floor = np.abs(high - np.median(high)) < _ON_FLOOR
     precision[last[on_floor] + _OF_IMAGE - 1] *= (_STEP_UP / _FLOOR) ** 2
-    found, information = _fitted(seen, distance, own, mean, precision)
+    found, information = _fitted(seen, distance, own, mean, precision, found)
     if not np.isfinite(found).all():
         return None
     covariance: FloatArray = np.linalg.inv(information)[:_SHARED, :_SHARED].astype(np.float64)
@@ -202,6 +202,7 @@ def _fitted(
     own: NDArray[np.int64],
     mean: FloatArray,
     precision: FloatArray,
+    start: FloatArray,
 ) -> tuple[FloatArray, FloatArray]:
     """Return the unknowns and their information matrix by damped Gauss-Newton steps.
 
@@ -211,6 +212,7 @@ def _fitted(
         own: numbers of the unknowns that each image depends on, (n, k).
         mean: of the unknowns before anything is seen.
         precision: inverse of their variances.
+        start: values to begin with.
     """
     scale = distance[:, None, None] / seen.stddevs
 
@@ -222,7 +224,7 @@ def _fitted(
         prior = precision @ (values - mean) ** 2 / 2
         return float((robust.sum(axis=1) * seen.weight).sum() + prior)
 
-    values, damping, information = mean.copy(), 1e-3, np.diag(precision)
+    values, damping, information = start, 1e-3, np.diag(precision)
     before = cost(values)
     eye = np.eye(own.shape[1])
     for _ in range(_ROUNDS):
