@@ -92,7 +92,7 @@ $(VENV)/extras: setup.py | $(VENV)/package
 	-XDG_DATA_HOME=$(CURDIR)/$(VENV)/data $(BIN)/cardbox detector --install
 	@touch $@
 
-# The tests run the tree, whose kernels compile on one core while the other one checks the types.
+# The tests run the tree, whose kernels compile while the types are checked.
 .PHONY: kernels
 kernels: $(VENV)/package
 	$(BIN)/python -m cardbox_tracker.tracking.precompile

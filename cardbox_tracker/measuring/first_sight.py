@@ -66,8 +66,8 @@ _PRIOR = 0.003
 def upper_body(silhouette: Silhouette, is_detected: bool = False) -> Silhouette | None:
     """Return the person of a silhouette (H, W), 0 or 255, which is its largest region, or None.
 
-    The region is not too small, unless a detector finds the person, nor too large, nor is the head
-    cut off.
+    It is None if the head is cut off, or the region is too large, or too small; whom a detector
+    finds may be smaller.
     """
     seen = filled(silhouette)
     share = np.count_nonzero(seen) / seen.size

@@ -89,7 +89,7 @@ class Guidance:
         self._show, self._capture, self._wait = show, capture, wait
 
     def run(self, missing: Sequence[str], side_turn: str, count_down_s: int, attempts: int) -> None:
-        """Capture each missing reference, or raise InitializationError after some ``attempts``."""
+        """Capture each missing reference; raise InitializationError if all ``attempts`` fail."""
         for name in missing:
             words, detail = short_words(name, side_turn), instruction(name, side_turn)
             for attempt in range(1, attempts + 1):
@@ -143,7 +143,7 @@ class Cancellation:
         return CANCELLED if is_cancelled else FAILED
 
     def cancel(self) -> str:
-        """End the running initialization at its next wait, or raise InitializationError."""
+        """End the running initialization; return the answer, or raise InitializationError."""
         if not self.is_running:
             raise InitializationError("nothing to cancel: no initialization is running")
         self._why = "the initialization was cancelled; call initialize to start again"

@@ -92,7 +92,7 @@ def filled(silhouette: Silhouette) -> Silhouette:
 def level_arm(
     silhouette: Silhouette, camera: Camera, distance_m: float, side: int
 ) -> LevelArm | None:
-    """Trace one arm of the silhouette of ``arms`` from the fingertips to the trunk, or None.
+    """Trace one arm of the silhouette (H, W) of ``arms`` from fingertips to trunk, or return None.
 
     ``side`` is 1 for the arm at the image's right, -1 for the other arm.
     """

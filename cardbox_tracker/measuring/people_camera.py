@@ -53,10 +53,10 @@ _LEAN_STDDEVS, _LEAN_CHANGES = np.radians((3.0, 4.0, 2.0)), np.radians((3.0, 4.0
 _SITTING_LEAN = np.radians(8.0)
 # How far the hips of an image are lowered: legs that are seen straight, others, and who sits.
 _STRAIGHT, _OTHER_LEGS, _SEAT = 0.008, 0.08, 0.4
-# Deviations of the height of what a person stands on, such as a box, and of a floor; who differs
-# less from most images stands on the floor.
+# Deviations of the height of what a person stands on, such as a box, and of a floor; images whose
+# height differs less than the last value from that of most images show the floor.
 _STEP_UP, _FLOOR, _ON_FLOOR = 0.1, 0.01, 0.045
-# Hips and knees of an image that counts bend at most this much more, rad, than in this share.
+# An image counts if hips and knees bend at most this much more, rad, than in this share of all.
 _BENT_MORE, _STRAIGHTEST = np.radians(20.0), 0.1
 # Deviations of a level in an image, aside and along the body; of the ankles of bent legs.
 _SIDE, _ALONG, _STEPPING = 0.02, 0.012, 0.03
@@ -176,7 +176,7 @@ def people_camera(
         ]
     )
     found, _ = _fitted(seen, distance, own, mean, precision, mean)
-    # Most images show the floor; only who stands on something else may do so in the second fit.
+    # Most images show the floor, so in the second fit only the others may show something higher.
     high = found[last + _OF_IMAGE - 1]
     on_floor = np.abs(high - np.median(high)) < _ON_FLOOR
     precision[last[on_floor] + _OF_IMAGE - 1] *= (_STEP_UP / _FLOOR) ** 2
@@ -298,10 +298,10 @@ def _upright(sights: Sightings, number: int, camera: Camera) -> _Seen | None:
             rows.append((time_s, px, known, facing, is_straight, sits, bend))
     if not rows:
         return None
-    bends = np.array([row[-1] for row in rows])
-    if np.isfinite(bends).any():
-        most = np.nanquantile(bends, _STRAIGHTEST) + _BENT_MORE
-        rows = [row for row, bend in zip(rows, bends, strict=True) if not bend > most]
+    bends = [bend for *_, bend in rows if math.isfinite(bend)]
+    if bends:
+        most = np.quantile(bends, _STRAIGHTEST) + _BENT_MORE
+        rows = [row for row in rows if not row[-1] > most]
     rows = [rows[i] for i in np.unique(np.linspace(0, len(rows) - 1, _MOST_IMAGES).astype(int))]
     times_s, px, known, faces, straight, sitting, _ = (
         np.array(one) for one in zip(*rows, strict=True)
@@ -353,9 +353,9 @@ def _levels(points: ImagePoints) -> tuple[FloatArray, NDArray[np.bool_]]:
 
 
 def _posture(points: ImagePoints) -> tuple[tuple[float, float], bool, float, bool, bool]:
-    """Return where a person faces, if they bow, a bend, and if legs are straight, or they sit.
+    """Return where a person faces, if they bow, the bend, if legs are straight, and if they sit.
 
-    The bend is that of hips and knees in all, rad; nan if the legs are unknown.
+    The bend is that of the hips plus the mean one of the knees, rad; nan if legs are unknown.
     """
     if points.spatial_m is None:
         return (0.0, 1.0), False, math.nan, True, False

@@ -51,7 +51,7 @@ POSTURE_TEXT = {
 
 
 def average_silhouette(silhouettes: Sequence[Silhouette]) -> Silhouette:
-    """Return the pixelwise majority (H, W) of silhouettes of one posture; there must be some."""
+    """Return the majority (H, W) of silhouettes; raise InitializationError if there are none."""
     if not silhouettes:
         raise InitializationError(
             "no silhouette was captured; check the times, or that the background node runs"

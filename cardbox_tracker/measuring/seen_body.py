@@ -62,9 +62,9 @@ class SeenBody:
         time_s: float,
         is_detected: bool = False,
     ) -> bool:
-        """Use an image, for the colours, if it is time to; return whether ``body`` has changed.
+        """Fit a silhouette (H, W), 0 or 255, if it is time to; return whether ``body`` has changed.
 
-        The silhouette is (H, W), 0 or 255. A person whom a detector finds may be small.
+        The image of that time teaches the colours. A person whom a detector finds may be small.
         """
         if time_s < self._next_s or len(self._fits) == MOST_SIGHTS:
             return False

@@ -96,7 +96,7 @@ def shoulders_forward_m(
 ) -> float:
     """Return how far the shoulders are before the hips; 0 if ``side`` does not show the hips.
 
-    ``height_m`` is that of the shoulder joints.
+    ``side`` is a silhouette (H, W), and ``height_m`` the height of the shoulder joints.
     """
     below = (height_m - row_heights_m(side, camera, distance_m)) / span_m
     middles = []

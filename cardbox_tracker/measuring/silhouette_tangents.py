@@ -215,7 +215,7 @@ class PoseDirection:
     """
 
     def __init__(self, first: Camera, other: Camera, given: Extrinsics, roll_rad: float) -> None:
-        """Begin without samples; ``other``, of the pose ``given``, was turned upright by a roll."""
+        """Begin without samples; ``given`` is the pose of ``other``, turned upright by the roll."""
         self._tangents = TopTangents(first, other, most=1)
         # The images have been turned by the roll of the given pose, even if that pose is inverted.
         c, s = np.cos(roll_rad), np.sin(roll_rad)

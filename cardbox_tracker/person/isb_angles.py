@@ -94,8 +94,8 @@ def thorax_angles(postures: FloatArray) -> FloatArray:
 def arm_angles(upper_arm: FloatArray, forearm: FloatArray, side: float) -> FloatArray:
     """Return the angles of ``ARM``, (n, 4), rad; nan where they are not determined.
 
-    Unit vectors (n, 3) lead from shoulder to elbow and to the hand in the torso's frame; ``side``
-    is +1 for the left arm, -1 for the right.
+    Unit vectors (n, 3) in the torso's frame lead from shoulder to elbow, and from there to the
+    hand; ``side`` is +1 for the left arm, -1 for the right.
     """
     mirror = _MIRROR if side > 0 else np.ones(3)
     upper, lower = (v @ LABORATORY.T * mirror for v in (upper_arm, forearm))

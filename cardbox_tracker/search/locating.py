@@ -1,4 +1,4 @@
-"""Estimation of the person's place in a frame before the search of the posture."""
+"""The person's place in a frame, and the yaw of who walks, before the search of the posture."""
 
 from __future__ import annotations
 

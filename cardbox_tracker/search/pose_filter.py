@@ -1,4 +1,4 @@
-"""Interface between the tracker and its particle filter."""
+"""Interface between the tracker and its particle filter, and a person's presence in images."""
 
 from __future__ import annotations
 

@@ -22,7 +22,7 @@ A leg that the detector does not see keeps its angles, with growing deviations, 
 from __future__ import annotations
 
 from dataclasses import replace
-from itertools import chain, product
+from itertools import product
 from typing import NamedTuple
 
 import numpy as np
@@ -291,23 +291,23 @@ class _Fit:
             starts.append(others[np.argmin(costs)])
         values = np.array(starts)
         nearby = _DIFFERENCE * np.eye(values.shape[1])
-        found: list[list[_Solution]] = [[] for _ in starts]
+        found: list[_Solution] = []
+        count = 1 if seen is None else 4 + 8
         for _ in range(_STEPS + 1):
             moved = np.concatenate([values[:, None], values[:, None] + nearby], axis=1)
             rows = self._residuals(moved.reshape(-1, values.shape[1]), seen)
             rows = rows.reshape(*moved.shape[:2], -1)
             steps = []
             jacobians = (rows[:, 1:] - rows[:, :1]).swapaxes(1, 2) / _DIFFERENCE
-            for number, (residuals, jacobian) in enumerate(zip(rows[:, 0], jacobians, strict=True)):
+            for at, residuals, jacobian in zip(values, rows[:, 0], jacobians, strict=True):
                 information = jacobian.T @ jacobian
-                count = 1 if seen is None else 4 + 8
                 rms = float(np.sqrt(np.sum(residuals**2) / count))
-                found[number].append(_Solution(values[number], information, rms))
+                found.append(_Solution(at, information, rms))
                 steps.append(np.linalg.solve(information, jacobian.T @ residuals))
             values = values - np.clip(steps, -_LARGEST_STEP, _LARGEST_STEP)
             values[:, :_N] = np.clip(values[:, :_N], *LEG_LIMITS.T)
             values[:, _LENGTHS] = np.clip(values[:, _LENGTHS], -_MOST_LENGTH, _MOST_LENGTH)
-        return min(chain.from_iterable(found), key=lambda one: one.rms)
+        return min(found, key=lambda one: one.rms)
 
     def _folded(self, seen: _Seen) -> FloatArray:
         """Return values (16, 12) of legs whose knees and ankles are where they are seen.

@@ -92,8 +92,8 @@ def compile_all(
 ) -> None:
     """Track a drawn person with each of ``presets``, which compiles all their kernels.
 
-    Compiled code that is damaged is made again. Presets that allow it are also tracked with a
-    further camera and with points of a detector.
+    Compiled code that is damaged is made again. ``several_cameras`` and ``points`` say whether a
+    further camera, where a preset allows it, and points of a detector are tracked, too.
     """
     try:
         if "default" in presets:

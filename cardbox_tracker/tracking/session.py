@@ -210,7 +210,7 @@ class Session:
             agreement.check(is_last)
 
     def remarks(self, names: Sequence[str], is_all: bool = False) -> list[str]:
-        """Return warnings about images that contradict each other; ``is_all``: also past ones."""
+        """Return warnings about images that contradict each other; ``is_all`` adds past ones."""
         told = [text for one in self.trackers for text in one.remarks(names, is_all)]
         if self.agreement is not None:
             told += self.agreement.remarks(names[1:])

@@ -1,4 +1,4 @@
-"""One camera of a tracker: view of the body, selection of the person, terms of the cost."""
+"""One camera of a tracker: view of the body, selection of the person, check of depth, terms."""
 
 from __future__ import annotations
 
@@ -85,8 +85,8 @@ def _pairs(silhouette: Silhouette) -> tuple[NDArray[np.int64], NDArray[np.int64]
 class DepthAgreement:
     """Says over about a second whether depth images show the view of the silhouettes.
 
-    Another camera's may have the same size. In the own view, the depth grows at the outline of a
-    person; anywhere else it shrinks as often (figures: ``docs/research.md#several-cameras``).
+    Those of another camera may have the same size. In the same view, the depth grows outwards at
+    the outline of a person; elsewhere it shrinks as often (``docs/research.md#several-cameras``).
     ``is_other_view`` says that the depth belongs to another view and must not be used.
     """
 

@@ -106,7 +106,7 @@ class Tracker:
         ``whole_body``.
 
         Raises CameraError if the person was not measured in front of one of ``others``, and
-        ValueError if the filter has one camera only.
+        ValueError if there are others, but the filter takes one camera.
         """
         self.camera = camera.with_pitch(body.camera_pose.pitch_rad)
         self.config = config or TrackerConfig()
@@ -499,7 +499,8 @@ class Tracker:
 
 
 def _are_whole(frames: Sequence[Frame]) -> bool:
-    """Return whether nobody hides a part of the person, whom networks then mix with others, too."""
+    """Return whether no other person hides pixels of this one."""
+    # What others hide is missing in the outline, and networks mix people.
     return all(frame["covered"] is None for frame in frames)
 
 

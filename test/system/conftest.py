@@ -90,7 +90,7 @@ class Scene:
 # then starts at once. The parent of a copy ends, so that the tests' process inherits the copy.
 SERVER = """
 import json, os, sys
-from cardbox_tracker.start import NODES, main
+from cardbox_tracker.start import main
 from cardbox_tracker.ros.nodes import single_process
 from cardbox_tracker.tracking import precompile
 for part in json.loads(precompile.FILM_KERNELS.read_text()).items():
