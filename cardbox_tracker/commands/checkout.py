@@ -20,7 +20,7 @@ class LabCommand:
 
     Attributes:
         module: full name of the module.
-        targets: words of ``make`` that do the same.
+        targets: quoted commands of ``make`` that do the same.
     """
 
     NAME: str
@@ -41,13 +41,13 @@ BENCHMARK = LabCommand(
     "benchmark",
     "measure how fast the tracker is on this machine (in a checkout)",
     "lab.benchmarks.command",
-    "make benchmark",
+    "'make benchmark'",
 )
 EVALUATE = LabCommand(
     "evaluate",
     "in a checkout: compare recorded sessions with their truth, or repeat the paper's experiments",
     "lab.evaluation.command",
-    "make experiments, make sessions, make people",
+    "'make experiments', 'make sessions' or 'make people'",
 )
 
 

@@ -22,7 +22,7 @@ HELP = "score the strain on the whole body in a table of 'cardbox track --legs' 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of ``cardbox reba``."""
-    from cardbox_tracker.applications.ergonomics.rula import RebaConfig
+    from cardbox_tracker.applications.ergonomics.reba import RebaConfig
 
     add = parser.add_argument
     add("table", type=Path, metavar="TABLE.csv", help="table of 'cardbox track --legs --csv'")
@@ -30,14 +30,18 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add("--person", type=at_least(1), default=1, metavar="K", help="whom of several people")
     add_seed(parser, "the samples of the postures")
     add_force(parser)
-    add_settings(parser, RebaConfig, "the task and the limits that the paper leaves open")
+    add_settings(parser, RebaConfig, "what no image shows")
 
 
 def run(options: argparse.Namespace) -> None:
     """Score every image, and print times, part scores and declared inputs."""
-    from cardbox_tracker.applications.ergonomics.reba import REBA, read_table, score_table
+    from cardbox_tracker.applications.ergonomics.reba import (
+        REBA,
+        RebaConfig,
+        read_table,
+        score_table,
+    )
     from cardbox_tracker.applications.ergonomics.report import PageContent
-    from cardbox_tracker.applications.ergonomics.rula import RebaConfig
 
     check_outputs(outputs_of(options), options.force, inputs=(options.table,))
     config = settings_from(options, RebaConfig)

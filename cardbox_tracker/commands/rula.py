@@ -49,7 +49,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="with --detector mediapipe: also measure the wrists, which are declared otherwise",
     )
     add_force(parser)
-    add_settings(parser, RulaConfig, "the task and the limits that the paper leaves open")
+    add_settings(parser, RulaConfig, "what no image shows")
 
 
 def run(options: argparse.Namespace) -> None:

@@ -6,6 +6,7 @@ import argparse
 import json
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
+from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -180,11 +181,11 @@ def track_one(options: argparse.Namespace, show: Callable[[float], None] | None 
         with atomic_path(options.json) as temporary:
             temporary.write_text(json.dumps(_account(summary), indent=1) + "\n", encoding="utf-8")
     lines = [f"wrote {path}" for path in (*written, options.bag) if path is not None]
-    lines += summary.accounts
-    if any(derived):
-        lines += _derived(options, summary, table, video, exports)
-    if show is None:
-        print(*lines, sep="\n")
+    more = _derived(options, summary, table, video, exports) if any(derived) else ()
+    # If an export fails, what was written before it is told.
+    for line in chain(lines, summary.accounts, more):
+        if show is None:
+            print(line)
 
 
 def _check_derived(options: argparse.Namespace, is_piped: bool) -> None:

@@ -85,9 +85,12 @@ def _truth_of(
 ) -> Mapping[int, TrueFrame] | None:
     """Check the results; return their true frames by stamp, None if there are none."""
     from cardbox_tracker.recordings.bag_reader import BagReader
+    from cardbox_tracker.recordings.open_images import is_bag
     from cardbox_tracker.recordings.result_reader import results_in
     from cardbox_tracker.recordings.truth import load_ground_truth
 
+    if results.exists() and not is_bag(results):
+        raise CardboxError(f"{results} is no bag; give one that 'cardbox track --bag' has written")
     with BagReader(results) as bag:
         stamps = results_in(bag, person).stamp_ns.tolist()
     path = given or _truth_beside(results)

@@ -21,6 +21,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import NamedTuple
 
@@ -31,11 +32,12 @@ from cardbox_tracker.applications.ergonomics.rula import (
     INDEPENDENT,
     NECK_EXTENDED_DEG,
     NECK_TWISTED_DEG,
+    NOT_MEASURED,
     SAMPLES,
     WRISTS,
+    ErgonomicConfig,
     Method,
     Part,
-    RebaConfig,
     ScoreArray,
     ScoreDistribution,
     distribution_of,
@@ -49,6 +51,7 @@ from cardbox_tracker.applications.ergonomics.rula import (
     wrist_scores,
 )
 from cardbox_tracker.common.errors import CardboxError
+from cardbox_tracker.common.settings import setting
 from cardbox_tracker.person.hands import WRIST_NAMES
 from cardbox_tracker.person.legs import LEG_KEYPOINT_NAMES, LEG_NAMES, leg_directions
 from cardbox_tracker.person.posture import LEFT_ARM, PITCH, RIGHT_ARM
@@ -57,6 +60,49 @@ from cardbox_tracker.person.skeleton import JOINT_NAMES, NECK_NAMES, KeypointSta
 from cardbox_tracker.recordings.result_reader import Results, read_results
 from cardbox_tracker.recordings.result_table import LEG_POINT_COLUMNS, POINT_COLUMNS
 from cardbox_tracker.search.particles import normal_postures
+
+
+@dataclass(frozen=True)
+class RebaConfig(ErgonomicConfig):
+    """Settings of REBA."""
+
+    inputs = (
+        *("neck", "legs", "wrist", "load", "coupling", "activity"),
+        *("shoulders_raised", "arms_supported", "trunk_twisted"),
+    )
+    neck: int = setting(
+        1,
+        "score of the neck: 1 for 0 to 20 degrees of flexion, 2 beyond or in extension; 1 more if "
+        "twisted or bent aside; declared for images without points of the face",
+        limits=(1, 3),
+    )
+    legs: int = setting(
+        1,
+        "score of the legs: 1 if both feet carry weight, walking or sitting, 2 if one does or the "
+        "posture is unstable; 1 more with knees bent by 30 to 60 degrees, 2 beyond; declared for "
+        "images that do not show both legs",
+        limits=(1, 4),
+    )
+    wrist: int = setting(
+        1,
+        "score of the wrists: 1 to 15 degrees, 2 beyond; 1 more if bent aside or twisted; declared "
+        "for images in which a hand is not measured",
+        limits=(1, 3),
+    )
+    load: int = setting(
+        0, "0 below 5 kg, 1 for 5 to 10 kg, 2 above; 1 more with shocks", limits=(0, 3)
+    )
+    coupling: int = setting(0, "handles: 0 good, 1 fair, 2 poor, 3 unacceptable", limits=(0, 3))
+    activity: int = setting(
+        0,
+        "1 each if a part of the body is held for longer than a minute, if a small motion is "
+        "repeated more than 4 times in one, if the posture changes widely and fast",
+        limits=(0, 3),
+    )
+    arms_supported: bool = setting(
+        False, f"the arms are supported, the person leans, or gravity helps; {NOT_MEASURED}"
+    )
+
 
 TABLE_A: ScoreArray = table_of(
     """

@@ -41,7 +41,7 @@ NOT_SEEN = "declared, not seen"
 WRISTS = "left_wrist", "right_wrist"
 """Parts that share the declared input ``wrist``."""
 
-_DECLARED = "declared, since it is not measured"
+NOT_MEASURED = "declared, since it is not measured"
 
 
 @dataclass(frozen=True)
@@ -56,9 +56,9 @@ class ErgonomicConfig(Settings):
     """
 
     inputs: ClassVar[tuple[str, ...]]
-    shoulders_raised: bool = setting(False, f"the shoulders are raised; {_DECLARED}")
+    shoulders_raised: bool = setting(False, f"the shoulders are raised; {NOT_MEASURED}")
     arms_supported: bool = setting(
-        False, f"the arms are supported, or the person leans; {_DECLARED}"
+        False, f"the arms are supported, or the person leans; {NOT_MEASURED}"
     )
     trunk_twisted: bool = setting(
         False,
@@ -88,10 +88,10 @@ class RulaConfig(ErgonomicConfig):
         limits=(1, 4),
     )
     wrist_twist: int = setting(
-        1, f"1 in the middle of the range, 2 at or near its end; {_DECLARED}", limits=(1, 2)
+        1, f"1 in the middle of the range, 2 at or near its end; {NOT_MEASURED}", limits=(1, 2)
     )
     legs: int = setting(
-        1, f"1 if legs and feet are supported and balanced, else 2; {_DECLARED}", limits=(1, 2)
+        1, f"1 if legs and feet are supported and balanced, else 2; {NOT_MEASURED}", limits=(1, 2)
     )
     arm_muscle_use: int = setting(
         0, "1 if the arms' posture is held for a minute or repeated 4 times in one", limits=(0, 1)
@@ -104,48 +104,6 @@ class RulaConfig(ErgonomicConfig):
     )
     body_muscle_use: int = setting(0, "as arm_muscle_use, of neck, trunk and legs", limits=(0, 1))
     body_load: int = setting(0, "as arm_load, of neck, trunk and legs", limits=(0, 3))
-
-
-@dataclass(frozen=True)
-class RebaConfig(ErgonomicConfig):
-    """Settings of REBA."""
-
-    inputs = (
-        *("neck", "legs", "wrist", "load", "coupling", "activity"),
-        *("shoulders_raised", "arms_supported", "trunk_twisted"),
-    )
-    neck: int = setting(
-        1,
-        "score of the neck: 1 for 0 to 20 degrees of flexion, 2 beyond or in extension; 1 more if "
-        "twisted or bent aside; declared for images without points of the face",
-        limits=(1, 3),
-    )
-    legs: int = setting(
-        1,
-        "score of the legs: 1 if both feet carry weight, walking or sitting, 2 if one does or the "
-        "posture is unstable; 1 more with knees bent by 30 to 60 degrees, 2 beyond; declared for "
-        "images that do not show both legs",
-        limits=(1, 4),
-    )
-    wrist: int = setting(
-        1,
-        "score of the wrists: 1 to 15 degrees, 2 beyond; 1 more if bent aside or twisted; declared "
-        "for images in which a hand is not measured",
-        limits=(1, 3),
-    )
-    load: int = setting(
-        0, "0 below 5 kg, 1 for 5 to 10 kg, 2 above; 1 more with shocks", limits=(0, 3)
-    )
-    coupling: int = setting(0, "handles: 0 good, 1 fair, 2 poor, 3 unacceptable", limits=(0, 3))
-    activity: int = setting(
-        0,
-        "1 each if a part of the body is held for longer than a minute, if a small motion is "
-        "repeated more than 4 times in one, if the posture changes widely and fast",
-        limits=(0, 3),
-    )
-    arms_supported: bool = setting(
-        False, f"the arms are supported, the person leans, or gravity helps; {_DECLARED}"
-    )
 
 
 class Declared(NamedTuple):

@@ -1,4 +1,4 @@
-"""The formats of ``cardbox export`` by name, and those that other packages add."""
+"""The formats of ``cardbox export`` by name, and results for programs, which save in them."""
 
 from __future__ import annotations
 

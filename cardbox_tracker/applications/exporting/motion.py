@@ -1,4 +1,4 @@
-"""A tracked motion: the results for all images of a recording as arrays."""
+"""A tracked motion: the results for all images as arrays, and their body in the level frame."""
 
 from __future__ import annotations
 

@@ -48,7 +48,7 @@ class Renderer:
             person, cover = self._draw(body, posture)
             clean = clean * (1.0 - cover) + person
             mask = np.where(cover >= 0.5, 255, 0).astype(np.uint8)
-        # Without this number, a seed would not give the images of committed figures.
+        # One number is left out, so that a seed gives the same images as in former versions.
         self._rng.standard_normal()
         noise = self._rng.standard_normal(clean.shape, dtype=np.float32) * self._noise
         return np.clip(np.rint(clean + noise), 0, 255).astype(np.uint8), mask

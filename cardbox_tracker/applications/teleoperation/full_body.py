@@ -8,13 +8,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator, Mapping
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from cardbox_tracker.applications.exporting.motion import in_reference
 from cardbox_tracker.person.hands import HAND_NAMES, WRIST_SHARE, turn_of
 from cardbox_tracker.person.kinematics import pose
 from cardbox_tracker.person.legs import (
@@ -40,9 +39,10 @@ from cardbox_tracker.person.skeleton import (
     rotation_y,
     rotation_z,
 )
-from cardbox_tracker.recordings.result_reader import Results
-from cardbox_tracker.recordings.result_table import PALM_COLUMNS
 from cardbox_tracker.tracking.estimate import TRACKING, UNCERTAIN
+
+if TYPE_CHECKING:
+    from cardbox_tracker.recordings.result_reader import Results
 
 NAMES: tuple[str, ...] = (
     *("pelvis", "left_hip", "right_hip", "spine1", "left_knee", "right_knee", "spine2"),
@@ -249,6 +249,10 @@ _LONGEST_S, _LONGEST_GAP_S = 0.5, 1.0
 
 def bodies_of(results: Results) -> Iterator[FullBody]:
     """Yield the full body of each image, from the first one with a person on."""
+    # Without these, nodes start faster.
+    from cardbox_tracker.applications.exporting.motion import in_reference
+    from cardbox_tracker.recordings.result_table import PALM_COLUMNS
+
     make = FullBodies()
     values, deviations = results.of(_NAMES), results.deviations_of(_NAMES)
     palms, turns = results.of(PALM_COLUMNS).reshape(-1, 2, 3), [HAND_NAMES[0], HAND_NAMES[3]]

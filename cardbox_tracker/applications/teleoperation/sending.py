@@ -1,4 +1,4 @@
-"""What streams of people and of robots share: lines of JSON, their pace, and ZMQ."""
+"""Packets of full bodies (JSON, SONIC's protocol v3, Isaac's msgpack) and of robots, and ZMQ."""
 
 from __future__ import annotations
 

@@ -123,7 +123,10 @@ def silhouette_of(message: Image) -> ImageArray:
 
 
 def image_message(header: Header, image: NDArray[Any], encoding: str = "") -> Image:
-    """Return a message of ``image`` (H, W) or (H, W, 3), uint8 or float32."""
+    """Return a message of ``image`` (H, W) or (H, W, 3), uint8 or float32.
+
+    Without an ``encoding`` it is mono8 or bgr8.
+    """
     contiguous = np.ascontiguousarray(image)
     message = Image(
         header=header,

@@ -1,4 +1,4 @@
-"""Conversion of the tracker's outputs to messages, and of some messages back."""
+"""Conversion of results, of tracking and of a measurement, to messages, and of some back."""
 
 from __future__ import annotations
 

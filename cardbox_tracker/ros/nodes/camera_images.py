@@ -1,4 +1,4 @@
-"""Images of one camera and silhouettes of them, for the nodes that make the one of the other."""
+"""The images that a node receives from a camera, and the silhouettes of them that it sends."""
 
 from __future__ import annotations
 

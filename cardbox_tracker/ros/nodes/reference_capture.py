@@ -1,4 +1,4 @@
-"""Capture of reference silhouettes from the latest silhouettes and images."""
+"""Capture of the reference postures, in silhouettes and for the distance, and the measurement."""
 
 from __future__ import annotations
 

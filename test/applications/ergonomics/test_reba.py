@@ -14,13 +14,14 @@ from cardbox_tracker.applications.ergonomics.reba import (
     TABLE_A,
     TABLE_B,
     TABLE_C,
+    RebaConfig,
     read_table,
     reba_scores,
     score_table,
 )
 from cardbox_tracker.applications.ergonomics.recording import score_shares, summarize, write_csv
 from cardbox_tracker.applications.ergonomics.report import PageContent, report_lines, write_page
-from cardbox_tracker.applications.ergonomics.rula import RebaConfig, declared
+from cardbox_tracker.applications.ergonomics.rula import declared
 from cardbox_tracker.common.errors import CardboxError
 from cardbox_tracker.person.posture import PITCH, ROLL
 from cardbox_tracker.person.sizes import FloatArray

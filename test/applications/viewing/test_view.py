@@ -165,6 +165,7 @@ Refusal = tuple[tuple[str, ...], str]
 REFUSALS: list[Refusal] = [
     ((), "expected either BAG or --live"),
     (("BAG", "--live"), "expected either BAG or --live"),
+    (("FOLDER",), "is no bag; give one that 'cardbox track --bag' has written"),
     (("BAG", "--save", "FOLDER/missing/v.rrd"), "No such file or directory"),
 ]
 
