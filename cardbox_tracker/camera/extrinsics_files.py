@@ -1,4 +1,4 @@
-"""Reads extrinsics from CameraInfo and ``/tf_static`` and chooses between several sources.
+"""Reads extrinsics from CameraInfo, ``/tf_static`` and files, chooses one, and writes camchains.
 
 The projection matrices of a rectified pair come first, then the transforms on ``/tf_static``, then
 a file: a camchain of Kalibr (YAML) or a camera group of aniposelib (TOML). All sources that are

@@ -1,4 +1,4 @@
-"""Finds the files of a bag, also without the metadata that its recorder writes last.
+"""Finds the files of a bag, also without its metadata, and limits what they unpack to.
 
 rosbags decompresses each chunk, message or file whole, without a limit. `check_recording` adds
 up the sizes that a recording states; `limit_decompression` replaces the functions that rosbags

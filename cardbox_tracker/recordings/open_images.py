@@ -13,7 +13,6 @@ from cardbox_tracker.recordings.bag_reader import REPAIR_ROS1, BagReader
 from cardbox_tracker.recordings.given_camera import GivenCamera, equivalent_mm
 from cardbox_tracker.recordings.image_folder import SUFFIXES, ImageFolder, image_files
 from cardbox_tracker.recordings.video_reader import FORMATS, VideoReader
-from cardbox_tracker.recordings.video_reader import SUFFIXES as VIDEO_ENDINGS
 from cardbox_tracker.recordings.video_reader import SUFFIXES as VIDEO_SUFFIXES
 
 ImageRecording = BagReader | ImageFolder | VideoReader
@@ -155,7 +154,7 @@ def _found(folder: Path, left_out: Path | None, depth: int) -> Iterator[Path]:
             return
         for path in (folder / name for name in names):
             if path.is_file():
-                if is_bag_file(path) or path.suffix.lower() in VIDEO_ENDINGS:
+                if is_bag_file(path) or path.suffix.lower() in VIDEO_SUFFIXES:
                     yield path
             elif path.is_dir() and path.resolve() != left_out:
                 if is_one_recording(path):

@@ -17,7 +17,6 @@ from cardbox_tracker.camera.pairing import TOLERANCE_NS, side_by_side
 from cardbox_tracker.common.errors import BagError, CardboxError
 from cardbox_tracker.detectors.detector import Detector
 from cardbox_tracker.detectors.point_table import PointTable
-from cardbox_tracker.detectors.pose_network import image_points
 from cardbox_tracker.recordings.bag_reader import IMAGE_TYPES, BagReader
 from cardbox_tracker.recordings.open_images import ImageRecording
 from cardbox_tracker.recordings.silhouettes import RecordedFrame, SilhouetteSource
@@ -140,10 +139,8 @@ class DetectorSilhouetteSource(SilhouetteSource):
         cannot be loaded.
         """
         self._open(bag, bag.working_size, camera)
-        self._find_points(None if isinstance(points, Detector) else points, camera)
-        self._has_own_points = isinstance(points, Detector)
-        self.has_points = points is not None
-        self._detector = self._started(detector)
+        self._find_points(detector if isinstance(points, Detector) else points, camera)
+        self._detector = self._detector or self._started(detector)
         self._finds_people = detector.people > 0
 
     def frames(self, start_s: float = 0.0, end_s: float = float("inf")) -> Iterator[RecordedFrame]:
@@ -162,11 +159,7 @@ class DetectorSilhouetteSource(SilhouetteSource):
             seen = brightness_of(image), silhouette, image
             frame = RecordedFrame(stamp_ns, time_s, *seen, recorded=recorded)
             if self._finds_people:
-                own = tuple(image_points(one) for one in found)
-                people = own if self._given is None else self._people(prepared)
-                yield frame._replace(people=people)
-            elif found and self._has_own_points:
-                yield frame._replace(points=image_points(found[0]))
+                yield frame._replace(people=self._people(prepared))
             else:
                 yield frame._replace(points=self._points(prepared, silhouette))
         self._end_points()

@@ -65,23 +65,15 @@ class TimeSpan(NamedTuple):
 
 
 class PreparedImage(NamedTuple):
-    """One image of a recording, ready to be segmented.
+    """One image of a recording, ready to be segmented."""
 
-    Attributes:
-        stamp_ns: stamp of the image.
-        time_s: seconds from the recording's start.
-        image: (H, W, 3) bgr, or (H, W) grey, undistorted, at the working resolution.
-        recorded: the image as it was recorded.
-        number: number of the image in the recording, counted from 0.
-    found: whom the detector finds in the image.
-    """
-
-    stamp_ns: int
-    time_s: float
+    stamp_ns: int  #: stamp of the image
+    time_s: float  #: seconds from the recording's start
+    #: (H, W, 3) bgr, or (H, W) grey, undistorted, at the working resolution.
     image: NDArray[np.uint8]
-    recorded: RecordedImage
-    number: int = 0
-    found: Sequence[Detection] = ()
+    recorded: RecordedImage  #: the image as it was recorded
+    number: int = 0  #: number of the image in the recording, counted from 0
+    found: Sequence[Detection] = ()  #: whom the detector finds in the image
 
 
 FindPoints = Callable[[PreparedImage, NDArray[np.uint8]], ImagePoints | None]

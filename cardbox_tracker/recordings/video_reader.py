@@ -62,7 +62,9 @@ class VideoReader(Film):
                 check_pixels(int(size[0]), int(size[1]), MOST_PIXELS)
             except EncodingError as error:
                 raise BagError(f"cannot read the video {self.path}: {error}") from None
-            image = next((image for image, _ in _read(capture) if image is not None), None)
+            # One image after the other: the position in the file is that of the first one then.
+            tried = (_next(capture, number)[0] for number in range(MOST_DAMAGED))
+            image = next((image for image in tried if image is not None), None)
             if image is None:
                 raise BagError(
                     f"the video {self.path} has no image that can be decoded"

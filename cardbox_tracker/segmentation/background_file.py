@@ -24,6 +24,7 @@ from cardbox_tracker.common.files import (
     atomic_path,
     check_writable,
     foreign,
+    is_written_in_place,
     regular_file,
     user_path,
 )
@@ -76,10 +77,9 @@ def background_path(name: str) -> Path | None:
         return None
     try:
         path = user_path(name)
-        if path.exists() and not path.is_file():
-            kind = "a folder" if path.is_dir() else "no ordinary file"
-            raise CardboxError(f"{path} is {kind}; give the name of a file")
         check_writable(path)
+        if is_written_in_place(path):
+            raise CardboxError(f"{path} is no ordinary file; give the name of a file")
     except (CardboxError, ValueError) as error:
         raise BackgroundFileError(f"background_file: {error}") from None
     return path

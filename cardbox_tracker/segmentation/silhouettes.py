@@ -1,7 +1,7 @@
 """Turns camera images into silhouettes, with the same steps live and in a recording.
 
 An image is resized and rectified. The first images teach the empty scene; from every later one the
-silhouette of the person is extracted.
+silhouette of the person is extracted. In depth images a limit of the distance takes its place.
 """
 
 from __future__ import annotations
@@ -140,7 +140,7 @@ class SilhouettePipeline:
 
 
 WITHIN_LIMITS_M = 0.3, 20.0
-"""Range of the limit, metres."""
+"""Range of the limit of the depth, metres."""
 
 # Unknown pixels between near ones belong to the person: a depth camera measures nothing at edges
 # and where only one of its eyes sees.

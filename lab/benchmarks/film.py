@@ -72,7 +72,7 @@ STEPS: Mapping[str, Sequence[tuple[Any, str]]] = {
     "drawing": [(video, "draw_overlay")],
     "encoding": [(video, "_encoder")],
 }
-"""Functions, generators and contexts of a function of each step, with their owner and name."""
+"""Functions, generators and contexts that yield a function, of each step: owner and name."""
 # Of these steps, all that they call is part.
 _WHOLE = ("camera of the scene", "bodies of the scene", "drawing", "network of hands")
 REST = "everything else"

@@ -34,8 +34,8 @@ def run_benchmark(
         report_path: Markdown file to write.
         frames: images that the estimation is measured on.
         seconds: duration of the measurement of the nodes for each stream and rate.
-        session: recorded person whom the detector sees, with which films are measured, too; None
-            for the drawn one, whom it does not.
+        session: recorded person whom the detector sees; None for the drawn one, whom it does not,
+            and to leave out the film.
 
     Raises:
         CardboxError: a node failed or a file cannot be written.

@@ -109,9 +109,8 @@ def section(
     )
     text = (
         f"One camera and the detector call {_tracking(points)}; without a detector, one camera "
-        f"calls {_tracking(silhouettes)} (place included). From "
-        f"silhouette to posture an image takes {_mean(recordings, 'ms'):.1f} ms on one core, "
-        f"{_mean(points, 'ms'):.1f} ms with points."
+        f"calls {_tracking(silhouettes)}. From silhouette to posture an image takes "
+        f"{_mean(recordings, 'ms'):.1f} ms on one core, {_mean(points, 'ms'):.1f} ms with points."
     )
     lines = [f"| {' | '.join(row)} |" for row in (titles, ("---",) * len(titles), *cells)]
     return "\n".join([*lines, "", *textwrap.wrap(text, 100)])
@@ -122,10 +121,12 @@ def _tracking(sessions: Sequence[Session]) -> str:
     runs = [run for one in sessions for run in one["runs"]]
     tracking = sum(run["tracking"] for run in runs)
     wrong = sum(run["tracking_beyond_30"] for run in runs)
+    if not tracking:
+        return "none of the images of real people `tracking`"
     share = 100.0 * tracking / sum(run["frames"] for run in runs)
     return (
         f"{share:.0f} % of the images of real people `tracking`, of which "
-        f"{100.0 * wrong / max(tracking, 1):.1f} % have a joint beyond 30 cm"
+        f"{100.0 * wrong / tracking:.1f} % have a joint beyond 30 cm, place included"
     )
 
 

@@ -49,6 +49,12 @@ def test_the_length_of_a_film_is_what_it_shows(tmp_path: Path, share: float) -> 
         assert video.remarks == []
 
 
+@pytest.mark.parametrize("suffix", ["avi", "mkv"])
+def test_the_stated_length_counts_from_the_first_image(tmp_path: Path, suffix: str) -> None:
+    with open_images(film(tmp_path / f"a.{suffix}"), FOV) as video:
+        assert video.duration_s == pytest.approx(29 / 15, abs=1e-3)
+
+
 @pytest.mark.parametrize(
     "start", [b"\0\0\0\1\x67\x64", b"\0\0\1\x67\x64", b"\0\0\0\1\x40\x01", b"\xff\xd8\xff\xe0"]
 )

@@ -255,6 +255,7 @@ def test_what_cannot_be_a_file_is_refused_at_once(tmp_path: Path) -> None:
         ("/proc/b.npz", "/proc/b.npz"),
         ("/dev/null", "ordinary file"),
         ("~nobody_of_that_name/b.npz", "nobody_of_that_name"),
+        ("b" * 300, "too long"),
     ):
         with pytest.raises(BackgroundFileError, match=words):
             background_path(name)

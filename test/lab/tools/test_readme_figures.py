@@ -13,6 +13,7 @@ from lab.tools.readme_figures import (
     END,
     RESULTS,
     ROWS,
+    _tracking,
     current,
     main,
     section,
@@ -84,3 +85,5 @@ def test_section_by_hand() -> None:
     assert "call 50 % of the images of real people `tracking`, of which" in words
     assert "2.0 % have a joint beyond 30 cm" in words
     assert "2.5 ms on one core, 3.0 ms with points" in words
+    never = {"runs": [{"frames": 9, "tracking": 0, "tracking_beyond_30": 0}]}
+    assert _tracking([never]) == "none of the images of real people `tracking`"
