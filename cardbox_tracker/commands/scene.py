@@ -63,7 +63,12 @@ def measured_scene(
         stands = {"camera_roll_rad": better.camera.stands_rad}
         bodies = [body.with_values(**stands) for body in _bodies(bodies, person, found)]
         if person.people is None:
-            bodies = [seen_person(watched, bodies[0], first.camera, config, seed)]
+            shown = [one for one in found.distances if one is not None]
+            # One person whom the detector lost is several; the longest is surely who is tracked.
+            longest = max(shown, key=lambda one: len(one.times_s), default=None)
+            stature_m = person.stature_m or USUAL_STATURE_M
+            far = longest and longest._replace(distances=longest.distances * stature_m)
+            bodies = [seen_person(watched, bodies[0], first.camera, config, seed, far)]
         else:
             bodies = seen_people(source, bodies, config, person.people, seed, *span)
         yield source, Scene(found.camera, tuple(bodies))
@@ -79,11 +84,10 @@ def _bodies(
         if (height := found.camera.height_m) is not None:
             above = {"camera_height_m": height.mean, "height_stddev_m": height.stddev}
             body = body.with_values(**above)
-        distance = found.distances[0] if found.distances else math.nan
-        is_alone = person.people is None and math.isfinite(distance)
-        if is_alone and "distance_m" in body.unknown:
+        far = found.distances[0] if found.distances else None
+        if person.people is None and far is not None and "distance_m" in body.unknown:
             lowest_m, highest_m, *_ = PLACEMENT["distance_m"]
-            distance_m = distance * (person.stature_m or USUAL_STATURE_M)
+            distance_m = float(far.distances[0]) * (person.stature_m or USUAL_STATURE_M)
             body = body.with_values(distance_m=min(max(distance_m, lowest_m), highest_m))
         if person.stature_m is None and person.model is None:
             body = body.with_values(stature_stddev=USUAL_STDDEV_M / USUAL_STATURE_M)

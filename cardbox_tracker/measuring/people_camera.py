@@ -73,6 +73,20 @@ _NEAREST, _FARTHEST = np.log((0.3, 30.0))
 _SHARED, _OF_PERSON, _OF_IMAGE = 4, 2 * len(LEVELS) + 4, 7
 
 
+class Distances(NamedTuple):
+    """Where a person is seen upright.
+
+    Attributes:
+        times_s: times of the images, (n,).
+        distances: level distance from the camera in each, statures, (n,).
+        stddev: standard deviation of the logarithm of all distances.
+    """
+
+    times_s: FloatArray
+    distances: FloatArray
+    stddev: float
+
+
 class PeopleCamera(NamedTuple):
     """What people show of a camera.
 
@@ -81,14 +95,13 @@ class PeopleCamera(NamedTuple):
             factor; (4,).
         covariance: of ``values``, (4, 4).
         shows_feet: whether feet are seen.
-        distances: level distance of each person in the first image that counts, statures; nan
-            for who is never upright.
+        distances: of each person; None for who is never upright.
     """
 
     values: FloatArray
     covariance: FloatArray
     shows_feet: bool
-    distances: tuple[float, ...]
+    distances: tuple[Distances | None, ...]
 
 
 class _Seen(NamedTuple):
@@ -101,6 +114,7 @@ class _Seen(NamedTuple):
         lowered: deviation of how far the hips are lowered, (n,).
         weight: how many images one counts for, (n,).
         person: number of the person, (n,).
+        times_s: times of the images, (n,).
     """
 
     rays: FloatArray
@@ -109,6 +123,7 @@ class _Seen(NamedTuple):
     lowered: FloatArray
     weight: FloatArray
     person: FloatArray
+    times_s: FloatArray
 
 
 def people_camera(
@@ -183,12 +198,15 @@ def people_camera(
     found, information = _fitted(seen, distance, own, mean, precision, found)
     if not np.isfinite(found).all():
         return None
-    covariance: FloatArray = np.linalg.inv(information)[:_SHARED, :_SHARED].astype(np.float64)
-    at = np.exp(found[last + 1])
+    covariance: FloatArray = np.linalg.inv(information).astype(np.float64)
+    variances = np.diag(covariance)[last + 1]
     distances = [
-        float(at[np.argmax(person == number)]) if (person == number).any() else float("nan")
+        Distances(seen.times_s[its], np.exp(found[last + 1])[its], math.sqrt(variances[its].mean()))
+        if (its := person == number).any()
+        else None
         for number in range(len(statures))
     ]
+    covariance = covariance[:_SHARED, :_SHARED]
     return PeopleCamera(found[:_SHARED], covariance, bool(known[:, _ANKLE].any()), tuple(distances))
 
 
@@ -318,6 +336,7 @@ def _upright(sights: Sightings, number: int, camera: Camera) -> _Seen | None:
         np.where(sitting, _SEAT, np.where(straight, _STRAIGHT, _OTHER_LEGS)),
         np.full(len(rows), independent / len(rows)),
         np.full(len(rows), float(number)),
+        times_s,
     )
 
 

@@ -23,6 +23,7 @@ from cardbox_tracker.measuring.people_camera import (
     PITCH_PRIOR,
     ROLL_PRIOR,
     USUAL_PITCH,
+    Distances,
     Sightings,
     people_camera,
 )
@@ -68,13 +69,13 @@ class FoundCamera(NamedTuple):
         camera: its values. Lengths are in metres; the height is None without people.
         sources: what the pitch is found from, in words.
         remarks: sources that contradict each other, and a camera that moves, in words.
-        distances: level distance of each person at first, statures; nan where it is not known.
+        distances: of each person; None where they are not known.
     """
 
     camera: SceneCamera
     sources: tuple[str, ...] = ()
     remarks: tuple[str, ...] = ()
-    distances: tuple[float, ...] = ()
+    distances: tuple[Distances | None, ...] = ()
 
 
 def scene_camera(
@@ -167,7 +168,8 @@ def scene_camera(
     if roll_rad is not None:
         turned = Value(roll_rad, GIVEN_STDDEV, GIVEN)
     lens = lens_of(camera)
-    height, distances = None, tuple(float("nan") for _ in people)
+    height: Value | None = None
+    distances: tuple[Distances | None, ...] = tuple(None for _ in people)
     if shown is not None:
         # What follows from the pitch and the roll that are known now.
         gain = shown.covariance[2:, :2] @ np.linalg.inv(shown.covariance[:2, :2])

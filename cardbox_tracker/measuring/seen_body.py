@@ -2,7 +2,8 @@
 
 The fit to one silhouette (:mod:`.first_sight`) errs with the posture that the person happens to
 have. So it is repeated in further images, and of each size the median of all fits counts. A fit
-takes as long as tracking about a hundred images.
+takes as long as tracking about a hundred images. One outline hardly shows the scale, so what all
+images of a film show of the distance (:mod:`.people_camera`) corrects it.
 """
 
 from __future__ import annotations
@@ -12,14 +13,18 @@ from dataclasses import replace
 import numpy as np
 
 from cardbox_tracker.camera.camera import Camera
-from cardbox_tracker.common.errors import InitializationError
+from cardbox_tracker.common.errors import BodyModelError, InitializationError
 from cardbox_tracker.measuring.first_sight import FirstSight, fit_first_sight, upper_body
+from cardbox_tracker.measuring.people_camera import Distances
+from cardbox_tracker.measuring.scale import scaled
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.search.config import TrackerConfig
 from cardbox_tracker.terms.term import Image, Silhouette
 
 MOST_SIGHTS = 7
 """Images to which a body is fitted."""
+# Deviation of the logarithm of a fitted body's scale; images that show the same place, s.
+_SCALE, _SAME_IMAGE_S = 0.05, 0.3
 # Time until another image is tried after one to which no body fits, s.
 _AGAIN_S = 1.0
 
@@ -54,6 +59,7 @@ class SeenBody:
         self.body, self._next_s, self._poor_iou = self._guess, float("-inf"), 0.0
         self._wait_s = self._pause_s
         self._fits: list[FirstSight] = []
+        self._times_s: list[float] = []
 
     def see(
         self,
@@ -78,6 +84,7 @@ class SeenBody:
             return False
         if not fit.body.unknown:
             self._fits.append(fit)
+            self._times_s.append(time_s)
             self._next_s = time_s + self._wait_s
             self._wait_s *= 2.0
             self.body = self._median()
@@ -87,6 +94,23 @@ class SeenBody:
         else:
             return False
         return True
+
+    def at(self, far: Distances) -> BodyModel:
+        """Return the body whose scale is the mean of the fits' and that by ``far``, distances in m.
+
+        Both are weighted by their variances. A distance that is given stays.
+        """
+        away = np.abs(np.subtract.outer(self._times_s, far.times_s))
+        near = away.min(axis=1) < _SAME_IMAGE_S if len(self._fits) else np.zeros(0, bool)
+        if not near.any() or "distance_m" not in self._guess.unknown:
+            return self.body
+        fitted = np.array([fit.body.placement.distance_m for fit in self._fits])
+        ratios = np.log(far.distances[away.argmin(axis=1)] / fitted)[near]
+        share = _SCALE**2 / (_SCALE**2 + far.stddev**2)
+        try:
+            return scaled(self.body, float(np.exp(share * np.median(ratios))))
+        except BodyModelError:
+            return self.body
 
     def _median(self) -> BodyModel:
         """Return the median sizes, at the first place, with the colours of the best fit."""

@@ -14,6 +14,7 @@ from cardbox_tracker.camera.camera import Camera
 from cardbox_tracker.detectors.figure import figure_of_points
 from cardbox_tracker.detectors.image_points import ImagePoints
 from cardbox_tracker.measuring.first_sight import upper_body
+from cardbox_tracker.measuring.people_camera import Distances
 from cardbox_tracker.measuring.scene_camera import Picture
 from cardbox_tracker.measuring.seen_body import MOST_SIGHTS, SeenBody
 from cardbox_tracker.person.model import BodyModel
@@ -103,11 +104,17 @@ def _track_of(
 
 
 def seen_person(
-    watched: Watched, guess: BodyModel, camera: Camera, config: TrackerConfig, seed: int
+    watched: Watched,
+    guess: BodyModel,
+    camera: Camera,
+    config: TrackerConfig,
+    seed: int,
+    far: Distances | None = None,
 ) -> BodyModel:
     """Return the body of the person who was watched by the working ``camera`` of the frames.
 
-    A ``guess`` without ``unknown`` values is returned; ``seed`` is that of the fits.
+    A ``guess`` without ``unknown`` values is returned; ``seed`` is that of the fits. Where the
+    person is by all images, ``far``, m, corrects the scale of the body.
     """
     if not guess.unknown:
         return guess
@@ -115,7 +122,7 @@ def seen_person(
     seen = SeenBody(guess, camera, config, np.random.default_rng(seed), pause_s=0.0)
     for frame in watched.frames:
         seen.see(frame.silhouette, frame.image, frame.time_s, _is_detected(frame))
-    return seen.body
+    return seen.body if far is None else seen.at(far)
 
 
 def _is_detected(frame: RecordedFrame) -> bool:

@@ -96,7 +96,10 @@ def test_who_walks_shows_pitch_and_height_with_any_focal_length(pitch_deg: float
     assert stddevs[3] < (0.17 if pitch_deg == 25.0 else 0.2)
     known = people_camera([film(places, pitch_deg)], [STATURE_M], CAMERA)
     assert known is not None
-    assert known.distances[0] * STATURE_M == pytest.approx(places[0][0], rel=0.05)
+    (far,) = known.distances
+    assert far is not None
+    assert far.distances * STATURE_M == pytest.approx([at_m for at_m, _ in places], rel=0.05)
+    assert far.times_s == pytest.approx(10.0 * np.arange(len(places)))
 
 
 def test_who_stays_in_one_place_shows_little() -> None:

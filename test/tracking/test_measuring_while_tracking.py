@@ -10,6 +10,7 @@ from cardbox_tracker.camera.camera import Camera
 from cardbox_tracker.common.errors import InitializationError
 from cardbox_tracker.measuring import first_sight, seen_body
 from cardbox_tracker.measuring.first_sight import FirstSight
+from cardbox_tracker.measuring.people_camera import Distances
 from cardbox_tracker.measuring.seen_body import MOST_SIGHTS, SeenBody
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.posture import reference_posture
@@ -142,6 +143,24 @@ def test_a_body_is_the_median_of_a_few_images_at_growing_pauses(
     assert used_s == [0.0, 1.0, 3.0, 7.0, 15.0, 31.0, 63.0]
     assert seen.body.size("waist_width") == pytest.approx(usual.size("waist_width"))
     assert seen.body.placement == usual.placement
+
+
+@pytest.mark.parametrize(
+    ("stddev", "at_s", "scale"), [(0.05, 0.0, 0.9), (0.15, 0.0, 0.979), (0.05, 9.0, 1.0)]
+)
+def test_a_body_is_as_large_as_the_person_is_far(
+    monkeypatch: pytest.MonkeyPatch, stddev: float, at_s: float, scale: float
+) -> None:
+    """Two measures of a scale, 1 and 0.81, are weighted by their variances: 0.9 for equal ones."""
+    fitted = person(1.75, -0.62)
+    seen = sights(monkeypatch, [(fitted, 0.9)])
+    seen.see(silhouette(fitted), None, 0.0)
+    far = Distances(np.array([at_s]), np.array([0.81 * fitted.placement.distance_m]), stddev)
+    found = seen.at(far)
+    assert found.sizes == pytest.approx(scale * fitted.sizes, rel=1e-3)
+    assert found.placement.distance_m == pytest.approx(
+        scale * fitted.placement.distance_m, rel=1e-3
+    )
 
 
 def test_a_new_version_of_the_body_goes_on_with_the_posture(
