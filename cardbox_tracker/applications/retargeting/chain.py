@@ -49,21 +49,12 @@ class Arm:
 
     def table(self, robot: Robot, max_speed: float) -> str:
         """Return a text with a row for each joint: name, what it does, limits, speed."""
-        roles = dict.fromkeys(self.joints, "arm") | {self.gripper: "gripper"}
+        roles = dict.fromkeys(self.joints, "arm")
+        if self.gripper:
+            roles[self.gripper] = "gripper"
         roles |= dict.fromkeys(self.stays, "stays")
-        rows = [("joint", "role", "limits", "speed")]
-        for name in dict.fromkeys((*_names(self.path), *roles)):
-            if not name:
-                continue
-            one = robot.joints[name]
-            unit = "m" if one.kind == "prismatic" else "rad"
-            speed = min(one.speed, max_speed)
-            given = "" if np.isfinite(one.speed) else ", the URDF gives none"
-            limits = f"{one.lower:.2f} to {one.upper:.2f} {unit}"
-            rows.append((name, roles[name], limits, f"{speed:g} {unit}/s{given}"))
-        widths = [max(len(row[column]) for row in rows) for column in range(4)]
-        lines = ("  ".join(map(str.ljust, row, widths)).rstrip() for row in rows)
-        return "\n".join((*lines, f"hand: {self.tip}"))
+        of_path = dict.fromkeys(_names(self.path), "")
+        return f"{robot.table(of_path | roles, max_speed)}\nhand: {self.tip}"
 
 
 def find_arm(robot: Robot, side: str, base: str = "", hand: str = "", gripper: str = "") -> Arm:

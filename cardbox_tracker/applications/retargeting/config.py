@@ -17,7 +17,7 @@ class RetargetConfig(Settings):
 
     side: str = setting(
         "right",
-        "arm of the person that is followed; both: one robot with two arms",
+        "arm of the person that is followed; both: one robot with two arms, and its head",
         choices=("left", "right", "both"),
     )
     base: str = setting("", "link at which the robot's arm begins; empty: it is found")

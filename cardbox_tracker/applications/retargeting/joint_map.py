@@ -18,10 +18,12 @@ from __future__ import annotations
 
 import math
 import os
+import re
 from dataclasses import dataclass
 
 import numpy as np
 
+from cardbox_tracker.applications.retargeting.robot import Robot
 from cardbox_tracker.common.errors import CardboxError, quoted
 from cardbox_tracker.common.files import foreign
 from cardbox_tracker.common.small_yaml import parse_small_yaml, read_small_text
@@ -50,6 +52,8 @@ ANGLES: tuple[str, ...] = (*WITH_HEAD_AND_HANDS, *_ELBOW)
 """Names that a joint map may have."""
 # The direction of a nearly stretched arm says nothing about its turn.
 _LEAST_BEND = math.radians(10.0)
+# The head of a robot by names, and the cosine from which on a joint turns about an axis.
+_HEAD, _ALONG = re.compile("head|neck", re.IGNORECASE), 0.9
 _KEYS = {"from", "to", "scale", "offset_deg"}
 
 
@@ -105,6 +109,13 @@ class JointMap:
     offset_rad: FloatArray
 
     @property
+    def roles(self) -> dict[str, str]:
+        """What each of the joints follows."""
+        return {
+            joint: angle or "stays" for joint, angle in zip(self.joints, self.angles, strict=True)
+        }
+
+    @property
     def sources(self) -> tuple[tuple[str, ...], ...]:
         """For each joint, those of the posture behind its angle; none for the neck and hands."""
         behind = (_ELBOW.get(angle, (angle,)) if angle else () for angle in self.angles)
@@ -119,6 +130,24 @@ class JointMap:
     def clear(self, positions: FloatArray) -> FloatArray:
         """See :class:`~.retargeter.Method`; nothing is known of the robot's shape."""
         return positions
+
+
+def head_map(robot: Robot) -> JointMap | None:
+    """Return a map of the robot's head: its first joints about Z and Y; None without any.
+
+    They have ``head`` or ``neck`` in their names or those of their links.
+    """
+    found: dict[str, tuple[str, float]] = {}
+    for one in robot.joints.values():
+        if one.kind == "prismatic" or not _HEAD.search(f"{one.name} {one.child}"):
+            continue
+        for name, along in zip(NECK_NAMES, robot.axis_of(one)[[2, 1]].tolist(), strict=True):
+            if abs(along) > _ALONG:
+                found.setdefault(name, (one.name, math.copysign(1.0, along)))
+    if not found:
+        return None
+    joints, signs = zip(*found.values(), strict=True)
+    return JointMap(tuple(found), joints, np.array(signs), np.zeros(len(found)))
 
 
 def load_joint_map(path: str | os.PathLike[str]) -> JointMap:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import NamedTuple, Protocol
 
 import numpy as np
@@ -12,7 +12,11 @@ from numpy.typing import NDArray
 
 from cardbox_tracker.applications.retargeting.arm import ArmFollower
 from cardbox_tracker.applications.retargeting.config import RetargetConfig
-from cardbox_tracker.applications.retargeting.joint_map import load_joint_map, with_head_and_hands
+from cardbox_tracker.applications.retargeting.joint_map import (
+    head_map,
+    load_joint_map,
+    with_head_and_hands,
+)
 from cardbox_tracker.applications.retargeting.robot import Robot, load_robot
 from cardbox_tracker.common.errors import CardboxError, quoted
 from cardbox_tracker.person.model import BodyModel
@@ -346,27 +350,26 @@ def _start(text: str, joints: tuple[str, ...], limits: Limits) -> FloatArray:
     return positions
 
 
-class _Both:
-    """A :class:`Method` of two arms of one robot."""
+class _Together:
+    """A :class:`Method` of several parts of one robot."""
 
-    def __init__(self, parts: tuple[ArmFollower, ArmFollower]) -> None:
+    def __init__(self, parts: Sequence[Method]) -> None:
         self._parts = parts
-        if set(parts[0].joints) & set(parts[1].joints):
+        self.joints = tuple(name for one in parts for name in one.joints)
+        self.sources = tuple(names for one in parts for names in one.sources)
+        if len(set(self.joints)) < len(self.joints):
             raise CardboxError(
                 "the robot has one arm, or one hand was given; expected two arms for the "
                 "side 'both'"
             )
-        self.joints = (*parts[0].joints, *parts[1].joints)
-        self.sources = (*parts[0].sources, *parts[1].sources)
+        self._ends = np.cumsum([len(one.joints) for one in parts])[:-1]
 
     def target(self, body: BodyModel, posture: FloatArray, now: FloatArray) -> FloatArray:
-        first = len(self._parts[0].joints)
-        parts = zip(self._parts, (now[:first], now[first:]), strict=True)
+        parts = zip(self._parts, np.split(now, self._ends), strict=True)
         return np.concatenate([one.target(body, posture, part) for one, part in parts])
 
     def clear(self, positions: FloatArray) -> FloatArray:
-        first = len(self._parts[0].joints)
-        parts = zip(self._parts, (positions[:first], positions[first:]), strict=True)
+        parts = zip(self._parts, np.split(positions, self._ends), strict=True)
         return np.concatenate([one.clear(part) for one, part in parts])
 
 
@@ -377,7 +380,7 @@ def make_retargeter(
 ) -> tuple[Robot, Retargeter, str]:
     """Return a robot, its retargeter, and a table of the joints that were found.
 
-    Without a joint map, the robot's arm is found and follows.
+    Without a joint map, the robot's arm is found and follows, or both and the head.
 
     Raises:
         CardboxError: a file cannot be read, the robot lacks a joint or link, its arm is not clear,
@@ -395,9 +398,12 @@ def make_retargeter(
         return robot, Retargeter(robot, method, config), ""
     sides = ("left", "right") if config.side == "both" else (config.side,)
     arms = [ArmFollower(robot, config, side) for side in sides]
-    method = arms[0] if len(arms) == 1 else _Both((arms[0], arms[1]))
+    head = head_map(robot) if config.side == "both" else None
     tables = [
         f"{side} arm\n{one.arm.table(robot, config.max_speed)}"
         for side, one in zip(sides, arms, strict=True)
     ]
+    if head is not None:
+        tables.append(f"head\n{robot.table(head.roles, config.max_speed)}")
+    method = _Together([*arms, head] if head is not None else arms)
     return robot, Retargeter(robot, method, config), "\n".join(tables)

@@ -122,6 +122,26 @@ class Robot:
         lower, upper, speed = rows.reshape(-1, 3).T
         return lower, upper, speed
 
+    def axis_of(self, joint: Joint) -> FloatArray:
+        """Return the axis (3,) of a joint in the frame of the root while all joints are at 0."""
+        axis = joint.axis
+        for one in reversed(self.path(joint.child)):
+            axis = one.turn @ axis
+        return axis
+
+    def table(self, roles: Mapping[str, str], max_speed: float) -> str:
+        """Return a text with a row for each joint of ``roles``: name, role, limits, speed."""
+        rows = [("joint", "role", "limits", "speed")]
+        for name, role in roles.items():
+            one = self.joints[name]
+            unit = "m" if one.kind == "prismatic" else "rad"
+            speed = min(one.speed, max_speed)
+            given = "" if np.isfinite(one.speed) else ", the URDF gives none"
+            limits = f"{one.lower:.2f} to {one.upper:.2f} {unit}"
+            rows.append((name, role, limits, f"{speed:g} {unit}/s{given}"))
+        widths = [max(len(row[column]) for row in rows) for column in range(4)]
+        return "\n".join("  ".join(map(str.ljust, row, widths)).rstrip() for row in rows)
+
 
 def load_robot(path: str | os.PathLike[str]) -> Robot:
     """Read a URDF file.

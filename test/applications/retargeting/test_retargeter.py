@@ -208,11 +208,22 @@ def test_two_arms_of_one_robot_follow_at_once(tmp_path: Path) -> None:
             part = part.replace(name, f'"{side}_{name[1:]}')
         arms.append(part)
     path = tmp_path / "two.urdf"
-    path.write_text(f'<robot name="two"><link name="base_link"/>{"".join(arms)}</robot>')
-    _, robot, table = make_retargeter(path, None, RetargetConfig(side="both"))
-    assert robot.joints == tuple(
-        f"{side}_{name}" for side in ("left", "right") for name in ROBOT.joints
+    joint = (
+        '<link name="{link}"/><joint name="{name}" type="revolute"><parent link="{parent}"/>'
+        '<child link="{link}"/><origin rpy="0 0 {yaw}"/><axis xyz="{axis}"/>'
+        '<limit lower="-1" upper="1" velocity="9" effort="1"/></joint>'
     )
+    # Turned by half a turn, the second joint lifts the face by positive angles.
+    head = joint.format(link="neck", name="pan", parent="base_link", yaw=0, axis="0 0 1")
+    head += joint.format(link="head", name="tilt", parent="neck", yaw=np.pi, axis="0 1 0")
+    path.write_text(f'<robot name="two"><link name="base_link"/>{"".join(arms)}{head}</robot>')
+    _, robot, table = make_retargeter(path, None, RetargetConfig(side="both"))
+    arm_joints = (f"{side}_{name}" for side in ("left", "right") for name in ROBOT.joints)
+    assert robot.joints == (*arm_joints, "pan", "tilt")
+    nods = robot._method.target(
+        BODY, np.array([*np.zeros(12), 0.3, 0.2, np.nan, np.nan]), np.zeros(16)
+    )  # type: ignore[attr-defined]
+    assert nods[-2:].tolist() == [0.3, -0.2]
     assert "left_shoulder_roll" in table and "right_shoulder_roll" in table
     follow(robot, 10)
     assert robot.at(9 * 10**8).velocities[[0, 7]].all()
