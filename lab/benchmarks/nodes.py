@@ -34,8 +34,12 @@ SEPARATE = ("background", "initializer", "tracker")
 TOGETHER = ("cardbox_nodes",)
 WITH_DETECTOR = (*SEPARATE, "detector")
 OF_DETECTOR = ("detector", "tracker")
+ROBOT = "retarget"
+"""Executable that is enabled by a grip with each image, where it is one of the processes."""
 PERCENTILES = (50, 95, 99)
 
+_ARM = Path(__file__).parents[2] / "config" / "example_arm.urdf"
+_START = "shoulder_roll=0.2"
 _START_S = 30.0
 _LAST_S = 0.5
 
@@ -48,7 +52,8 @@ def measure_nodes(
     ``single_process`` in the result holds the same figures for all nodes in one process, and
     ``with_detector`` those beside the node ``detector``, None where it is not installed. If a
     ``session`` is given, the detector sees its person, and ``of_detector`` holds the figures with
-    the detector's silhouettes.
+    the detector's silhouettes. ``with_robot`` and ``detector_with_robot`` have the time until the
+    command to a robot, too, at 30 Hz.
     """
     try:
         import rclpy  # noqa: F401
@@ -56,13 +61,16 @@ def measure_nodes(
         return None
     isolate()
     drawn = {stream: make_scene(*stream[1:], 60) for stream in STREAMS}
+    ways: dict[str, tuple[tuple[str, ...], dict[Any, BenchmarkScene]]]
     ways = {"": (SEPARATE, drawn), "single_process": (TOGETHER, drawn)}
+    ways["with_robot"] = (*SEPARATE, ROBOT), {STREAMS[1]: drawn[STREAMS[1]]}
     if _has_detector():
         ways["with_detector"] = WITH_DETECTOR, drawn
         if session is not None:
             scene = recorded_scene(session, 60)
             seen = {("bgr8", scene.camera.width, scene.camera.height): scene}
             ways |= {"with_detector": (WITH_DETECTOR, seen), "of_detector": (OF_DETECTOR, seen)}
+            ways["detector_with_robot"] = (*OF_DETECTOR, "initializer", ROBOT), seen
     measured: dict[str, Any] = {"with_detector": None}
     for number, (way, of) in enumerate(ways.items()):
         measured[way] = _measure(*of, seconds, partial(_part, report, number, ways))
@@ -95,12 +103,13 @@ def _measure(
             save_body_model(next(iter(scenes.values())).body, model)
             ready_s = {name: camera.start(name, model) for name in processes}
             streams = {}
+            rates = (30,) if ROBOT in processes else RATES_HZ
             for i, (stream, scene) in enumerate(scenes.items()):
                 camera.learn(scene, stream[0])
-                for j, rate in enumerate(RATES_HZ):
+                for j, rate in enumerate(rates):
                     name = f"{stream[0]} {stream[1]}x{stream[2]} at {rate} Hz"
                     streams[name] = camera.measure(scene, stream[0], rate, seconds)
-                    report((i * len(RATES_HZ) + j + 1) / (len(scenes) * len(RATES_HZ)))
+                    report((i * len(rates) + j + 1) / (len(scenes) * len(rates)))
             memory = {name: _rss_mb(nodes.pid(name)) for name in processes}
         finally:
             camera.close()
@@ -122,6 +131,7 @@ class CameraAndListener:
         from geometry_msgs.msg import PolygonStamped
         from rclpy.executors import SingleThreadedExecutor
         from sensor_msgs.msg import CameraInfo, Image, JointState
+        from std_msgs.msg import Bool
 
         from cardbox_tracker.ros.runtime import qos
 
@@ -133,6 +143,7 @@ class CameraAndListener:
         self._executor.add_node(self._node)
         self._image = self._node.create_publisher(Image, "image_raw", qos.CAMERA)
         self._info = self._node.create_publisher(CameraInfo, "camera_info", qos.CAMERA)
+        self._grip = self._node.create_publisher(Bool, "retarget/grip", qos.RESULT)
         self._node.create_subscription(
             JointState,
             "joint_states",
@@ -152,6 +163,7 @@ class CameraAndListener:
             qos.RESULT,
         )
         self._ready: set[str] = set()
+        self._told_ms: dict[str, float] = {}
         self.arrivals_ns: dict[int, tuple[int, int]] = {}
         self.points_ns: dict[int, int] = {}
         self._listening = threading.Thread(target=partial(_listen, self._executor), daemon=True)
@@ -176,6 +188,9 @@ class CameraAndListener:
             values = {entry.key: entry.value for entry in status.values}
             if values.get(STATUS) in (WAITING, WORKING):
                 self._ready.add(status.name.rpartition(": ")[2])
+            for name in ("p50", "p95"):
+                if value := values.get(f"image to command {name} (ms)"):
+                    self._told_ms[f"command_{name}_ms"] = float(value)
 
     def start(self, name: str, model: Path) -> float:
         """Start a process; return the time until its nodes report that they are ready, s.
@@ -190,6 +205,10 @@ class CameraAndListener:
             arguments += ["-p", "keypoints:=detector/keypoints"]
         if name == "detector" and "background" not in self._processes:
             arguments = ["--ros-args", "-p", "publish_silhouette:=true"]
+        if name == "initializer" and ROBOT in self._processes:
+            arguments = ["--ros-args", "-p", parameter]
+        if name == ROBOT:
+            arguments = ["--ros-args", "-p", f"robot_file:={_ARM}", "-p", f"start:={_START}"]
         self._nodes.start(name, *arguments)
         expected = set(SEPARATE) if together else {name}
         while not expected <= self._ready:
@@ -243,6 +262,7 @@ class CameraAndListener:
         return {
             **{f"p{p}_ms": float(np.percentile(called_ms, p)) for p in PERCENTILES},
             **{f"received_p{p}_ms": float(np.percentile(received_ms, p)) for p in PERCENTILES},
+            **self._told_ms,
             "sent": count,
             "received": len(arrived),
             "points": early,
@@ -253,7 +273,7 @@ class CameraAndListener:
     def _publish(self, scene: BenchmarkScene, pixels: NDArray[np.uint8], encoding: str) -> int:
         """Publish an image and its calibration, stamped now; return the stamp in ns."""
         from builtin_interfaces.msg import Time
-        from std_msgs.msg import Header
+        from std_msgs.msg import Bool, Header
 
         from cardbox_tracker.ros.messages.conversions import camera_info_message, image_message
 
@@ -265,6 +285,8 @@ class CameraAndListener:
         image.header.stamp = Time(sec=now_ns // 10**9, nanosec=now_ns % 10**9)
         self._image.publish(image)
         self._info.publish(info)
+        if ROBOT in self._processes:
+            self._grip.publish(Bool(data=True))
         return now_ns
 
     def close(self) -> None:

@@ -157,6 +157,7 @@ def _nodes(nodes: Mapping[str, Any] | None) -> list[str]:
         *_streams(nodes["single_process"]),
         *_beside_detector(nodes.get("with_detector"), "of_detector" in nodes),
         *_of_detector(nodes.get("of_detector")),
+        *_with_robot(nodes),
     ]
 
 
@@ -205,6 +206,30 @@ def _of_detector(measured: Mapping[str, Any] | None) -> list[str]:
         "### With the silhouettes of the node `detector`",
         "An image waits for its own points; images that come meanwhile are left out.",
         *_streams(measured),
+    ]
+
+
+def _with_robot(nodes: Mapping[str, Any]) -> list[str]:
+    ways = {"background": nodes.get("with_robot"), "detector": nodes.get("detector_with_robot")}
+    rows = [
+        (
+            way,
+            name,
+            *(f"{stream[f'{what}p{p}_ms']:.1f} ms" for what in ("", "command_") for p in (50, 95)),
+            f"{stream['received']}/{stream['sent']}",
+        )
+        for way, measured in ways.items()
+        if measured is not None
+        for name, stream in measured["streams"].items()
+    ]
+    if not rows:
+        return []
+    titles = "silhouettes", "stream", "joint states p50", "p95", "command p50", "p95", "arrived"
+    return [
+        "### Up to the command to a robot",
+        "The node `retarget` moves the [example arm](retargeting.md); time from the image's stamp "
+        "until it has sent its command.",
+        _table(titles, rows),
     ]
 
 

@@ -181,6 +181,17 @@ def test_the_detector_is_measured_with_a_recorded_person() -> None:
     assert " ".join(seen).count("| 299/300 | 41 |") == 2
 
 
+def test_the_time_up_to_a_robots_command_is_told() -> None:
+    robot = {**STREAM, "command_p50_ms": 21.0, "command_p95_ms": 42.0}
+    measured = {**NODES, "streams": {"bgr8 320x240 at 30 Hz": robot}}
+    text = " ".join(benchmark_report._nodes({**NODES, "detector_with_robot": measured}))
+    assert (
+        "| detector | bgr8 320x240 at 30 Hz | 5.0 ms | 7.0 ms | 21.0 ms | 42.0 ms | 299/300 |"
+        in text
+    )
+    assert "Up to the command" not in " ".join(benchmark_report._nodes(NODES))
+
+
 def test_a_recorded_scene_has_its_camera_its_body_and_the_motions(tmp_path: Path) -> None:
     synthesize_session(tmp_path / "bag", "wave", 1, SessionFormat(5, 80, 60))
     truth = json.loads((tmp_path / "bag" / "ground_truth.json").read_text())
