@@ -63,7 +63,7 @@ def measure_nodes(
     drawn = {stream: make_scene(*stream[1:], 60) for stream in STREAMS}
     ways: dict[str, tuple[tuple[str, ...], dict[Any, BenchmarkScene]]]
     ways = {"": (SEPARATE, drawn), "single_process": (TOGETHER, drawn)}
-    ways["with_robot"] = (*SEPARATE, ROBOT), {STREAMS[1]: drawn[STREAMS[1]]}
+    ways["with_robot"] = (*SEPARATE, ROBOT), {STREAMS[-1]: drawn[STREAMS[-1]]}
     if _has_detector():
         ways["with_detector"] = WITH_DETECTOR, drawn
         if session is not None:

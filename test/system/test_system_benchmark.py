@@ -24,7 +24,9 @@ def test_the_nodes_are_measured(monkeypatch: pytest.MonkeyPatch, ros_domain: int
     done: list[float] = []
     measured = benchmark_nodes.measure_nodes(2.0, done.append)
     assert measured is not None and measured["with_detector"] is None
-    assert done == [0.5, 1.0]
+    assert done == pytest.approx([1 / 3, 2 / 3, 1.0])
+    (robot,) = measured["with_robot"]["streams"].values()
+    assert 0 < robot["command_p50_ms"] <= robot["command_p95_ms"]
     for processes, part in (
         (benchmark_nodes.SEPARATE, measured),
         (benchmark_nodes.TOGETHER, measured["single_process"]),
