@@ -19,6 +19,13 @@ have 0.8 to 1, those of one person 0.1 to 0.4."""
 GONE_NS = 1_500_000_000
 """Time after which the last place of somebody who was not seen means nothing, ns."""
 
+OTHER = 16.0
+"""Sum of squared deviations above which a figure is somebody else, see :func:`unlike`."""
+
+# Deviation of a figure's place, in lengths of the trunk, and its growth a second.
+_PLACE, _PLACE_PER_S = 0.5, 2.0
+# Deviation of the colours of one person: Bhattacharyya distance of the trunk's histograms.
+_COLOURS = 0.3
 # Length of a trunk, m; speed of a person who runs, m/s, and error of a place, m.
 _TRUNK_M, _RUN_M_PER_S, _ERROR_M = 0.5, 4.0, 0.2
 # Weight of an image in the colours, images after which they are known, and those in a row with
@@ -53,6 +60,46 @@ def apart(one: FloatArray, other: FloatArray) -> float:
     if len(one) != len(other):
         return 1.0
     return float(np.sqrt(max(1.0 - np.sqrt(one * other).sum(), 0.0)))
+
+
+def learned(known: FloatArray | None, colours: FloatArray) -> FloatArray:
+    """Return the ``known`` colours of a person, if any, moved towards those in another image."""
+    before = colours if known is None or len(known) != len(colours) else known
+    return (1 - _LEARN_RATE) * before + _LEARN_RATE * colours
+
+
+def unlike(
+    before: Figure | None,
+    known: FloatArray | None,
+    figure: Figure | None,
+    colours: FloatArray | None,
+    away_ns: int,
+) -> float:
+    """Return how far a figure of these colours is from a person: sum of squared deviations.
+
+    The person had the figure ``before``, ``away_ns`` ago, and has ``known`` colours. Unknown ones,
+    such as those in a grey image, agree with all.
+    """
+    other = ALIKE / 2 if colours is None or known is None else apart(known, colours)
+    if away_ns > GONE_NS or figure is None or before is None:
+        return OTHER * (other / ALIKE) ** 2
+    deviation = _PLACE + _PLACE_PER_S * away_ns / 1e9
+    return (other / _COLOURS) ** 2 + (before.apart(figure) / deviation) ** 2
+
+
+def cheapest(costs: FloatArray) -> dict[int, int]:
+    """Return the column of each row of ``costs`` (N, M) below ``OTHER``, with the least sum.
+
+    A row without a column counts ``OTHER``. The time grows with 2 to the number of rows.
+    """
+    best: dict[int, tuple[float, dict[int, int]]] = {0: (0.0, {})}
+    for column in range(costs.shape[1]):
+        for taken, (total, pairs) in list(best.items()):
+            for row in np.flatnonzero(costs[:, column] < OTHER).tolist():
+                key, now = taken | 1 << row, total + float(costs[row, column]) - OTHER
+                if not taken >> row & 1 and (key not in best or now < best[key][0]):
+                    best[key] = now, {**pairs, row: column}
+    return min(best.values(), key=lambda one: one[0])[1]
 
 
 class Identity:
@@ -125,10 +172,7 @@ class Identity:
         self._others = self._others + 1 if self.is_other(colours) else 0
         self.is_doubtful = self._others >= _OTHER_IMAGES
         if colours is not None and not self._others:
-            before = self._colours
-            if before is None or len(before) != len(colours):
-                before = colours
-            self._colours = (1 - _LEARN_RATE) * before + _LEARN_RATE * colours
+            self._colours = learned(self._colours, colours)
         return True
 
     def _can_be(self, figure: Figure, colours: FloatArray | None, away_ns: int) -> bool:

@@ -12,6 +12,7 @@ from dataclasses import replace
 import numpy as np
 
 from cardbox_tracker.camera.camera import Camera
+from cardbox_tracker.camera.tilt import tilted_body
 from cardbox_tracker.common.errors import InitializationError
 from cardbox_tracker.measuring.first_sight import FirstSight, fit_first_sight, upper_body
 from cardbox_tracker.person.model import BodyModel
@@ -54,6 +55,14 @@ class SeenBody:
         self.body, self._next_s, self._poor_iou = self._guess, float("-inf"), 0.0
         self._wait_s = self._pause_s
         self._fits: list[FirstSight] = []
+
+    def tilt(self, guess: BodyModel) -> None:
+        """Go on with all fits before the camera of another ``guess``, with another pitch."""
+        pose = guess.camera_pose
+        self._camera = self._camera.with_pitch(pose.pitch_rad)
+        self.body = guess if self.body is self._guess else tilted_body(self.body, pose)
+        self._guess = guess
+        self._fits = [replace(fit, body=tilted_body(fit.body, pose)) for fit in self._fits]
 
     def see(
         self,

@@ -20,11 +20,22 @@ import cv2
 import numpy as np
 
 from cardbox_tracker.camera.camera import Camera
+from cardbox_tracker.camera.tilt import tilted_states
 from cardbox_tracker.camera.view import OtherCamera
 from cardbox_tracker.detectors.figure import Figure, figure_of_points
-from cardbox_tracker.detectors.identity import ALIKE, GONE_NS, apart, colours_in
+from cardbox_tracker.detectors.identity import (
+    ALIKE,
+    GONE_NS,
+    OTHER,
+    apart,
+    cheapest,
+    colours_in,
+    learned,
+    unlike,
+)
 from cardbox_tracker.detectors.image_points import ImagePoints
 from cardbox_tracker.person.model import BodyModel
+from cardbox_tracker.person.posture import PLACE, POSTURE
 from cardbox_tracker.person.sizes import FloatArray
 from cardbox_tracker.person.skeleton import KeypointState
 from cardbox_tracker.search.config import TrackerConfig
@@ -41,18 +52,12 @@ from cardbox_tracker.tracking.tracker import Tracker
 MOST_PEOPLE = 6
 """People that are tracked if their number is not given."""
 
-# Deviation of a figure's place, in lengths of the trunk, and its growth a second.
-_PLACE, _PLACE_PER_S = 0.5, 2.0
-# Deviation of the colours of one person: Bhattacharyya distance of the trunk's histograms.
-_COLOURS = 0.3
 # Change of that distance that changes the odds of being the same person by a factor of e.
 _ALIKE_SPREAD = 0.07
-# Squared deviations above which a figure is somebody else.
-_OTHER = 16.0
 # Images in a row with the colours of somebody else after which a person is given up.
 _OTHERS_IMAGES = 3
-# Share of a figure that others may cover when its colours are learned, and its weight.
-_LEARNS, _LEARN_RATE = 0.1, 0.1
+# Share of a figure that others may cover when its colours are learned.
+_LEARNS = 0.1
 # Share of a figure in those of others from which it is hidden, and from which it is a mere mixture.
 _HIDDEN, _MIXED = 0.15, 0.5
 # Least share of a figure in the silhouette by which somebody is tracked whom the detector misses.
@@ -226,6 +231,21 @@ class Session:
         person.tracker.reset()
         person.estimate = Estimate(NO_PERSON, person=person.estimate.person)
 
+    def tilt(self, bodies: Sequence[BodyModel], stamp_ns: int) -> None:
+        """Go on before the same camera with the pitch of ``bodies``, from the image of a stamp on.
+
+        Each person keeps number, sizes and place in the image, see :meth:`.Tracker.tilt`.
+        ``bodies`` are those that were given, with the other pitch.
+        """
+        self._bodies = tuple(bodies)
+        for person in self._people:
+            before, last, state = person.tracker.body, person.estimate, person.state()
+            person.tracker.tilt(bodies[min(person.number, len(bodies)) - 1], stamp_ns)
+            if state is not None:
+                (state,) = tilted_states(state[None], before, person.tracker.body)
+                offset_m = None if last.offset_m is None else state[PLACE]
+                person.estimate = replace(last, posture=state[POSTURE], offset_m=offset_m)
+
     def configure(self, config: TrackerConfig) -> bool:
         """Use other settings from now on; return whether tracking starts again, see Tracker."""
         self.config = config
@@ -309,32 +329,26 @@ class Session:
     ) -> dict[int, int]:
         """Return which figure each known person is, by number."""
         known = [person for person in self._people if person.seen_ns is not None]
-        costs = np.full((len(known), len(shown)), _OTHER)
+        costs = np.full((len(known), len(shown)), OTHER)
         for row, person in enumerate(known):
             for column, one in enumerate(shown):
                 costs[row, column] = self._cost(person, camera, one, colours[column])
-        return {known[row].number: column for row, column in _cheapest(costs).items()}
+        return {known[row].number: column for row, column in cheapest(costs).items()}
 
     def _cost(self, person: _Person, camera: int, one: Shown, colours: FloatArray | None) -> float:
         """Return how far a figure is from a person: sum of squared deviations."""
         assert person.seen_ns is not None and self._last_ns is not None
         if one.figure is None and person.estimate.posture is not None:
             # Free regions are not those of people who are tracked.
-            return _OTHER
+            return OTHER
         sight = person.sights[camera]
         before, seen_ns = sight.figure, sight.seen_ns
         if seen_ns != person.seen_ns and (seen_ns is None or self._last_ns - seen_ns > _DROPPED_NS):
             # Another camera has seen the person since.
             before, seen_ns = person.expected(camera), person.fitted_ns
-        # Unknown colours, such as those of a person in a grey image, agree with all.
-        other, gap = ALIKE / 2, self._gap(person, camera, one)
-        if colours is not None and sight.colours is not None:
-            other = apart(sight.colours, colours)
         away_ns = abs(self._last_ns - (seen_ns or 0))
-        if away_ns > GONE_NS or one.figure is None or before is None:
-            return _OTHER * (other / ALIKE) ** 2 + gap
-        deviation = _PLACE + _PLACE_PER_S * away_ns / 1e9
-        return (other / _COLOURS) ** 2 + (before.apart(one.figure) / deviation) ** 2 + gap
+        away = unlike(before, sight.colours, one.figure, colours, away_ns)
+        return away + self._gap(person, camera, one)
 
     def _gap(self, person: _Person, camera: int, one: Shown) -> float:
         """Return how far a figure is from those in other cameras: sum of squared deviations."""
@@ -418,9 +432,7 @@ class Session:
         assert sight.pixels is not None
         if colours is None or self._share_of_others(person, camera, sight.pixels) > _LEARNS:
             return
-        if sight.colours is None or len(sight.colours) != len(colours):
-            sight.colours = colours
-        sight.colours = (1 - _LEARN_RATE) * sight.colours + _LEARN_RATE * colours
+        sight.colours = learned(sight.colours, colours)
 
     def _share_of_others(self, person: _Person, camera: int, pixels: Silhouette) -> float:
         """Return the share of a person's pixels that are also those of others."""
@@ -577,18 +589,3 @@ def _chance_of_same(before: FloatArray | None, now: FloatArray | None) -> float:
     """Return the probability that colours are those of one person; without them, it is even."""
     away = ALIKE if before is None or now is None else apart(before, now)
     return float(1.0 / (1.0 + np.exp((away - ALIKE) / _ALIKE_SPREAD)))
-
-
-def _cheapest(costs: FloatArray) -> dict[int, int]:
-    """Return the column of each row of ``costs`` (N, M) below ``_OTHER``, with the least sum.
-
-    A row without a column counts ``_OTHER``. The time grows with 2 to the number of rows.
-    """
-    best: dict[int, tuple[float, dict[int, int]]] = {0: (0.0, {})}
-    for column in range(costs.shape[1]):
-        for taken, (total, pairs) in list(best.items()):
-            for row in np.flatnonzero(costs[:, column] < _OTHER).tolist():
-                key, now = taken | 1 << row, total + float(costs[row, column]) - _OTHER
-                if not taken >> row & 1 and (key not in best or now < best[key][0]):
-                    best[key] = now, {**pairs, row: column}
-    return min(best.values(), key=lambda one: one[0])[1]

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import partial
 from itertools import zip_longest
 from types import MappingProxyType
 
 import numpy as np
 
 from cardbox_tracker.camera.camera import Camera
+from cardbox_tracker.camera.tilt import tilted_body, tilted_states
 from cardbox_tracker.camera.view import OtherCamera, View
 from cardbox_tracker.common.settings import restarts
 from cardbox_tracker.detectors.figure import Figure, figure_of_points
@@ -149,6 +151,26 @@ class Tracker:
             camera.reset(self.config)
         self._filter.use(silhouette, views)
         self._head = HeadTracker(self.body, self.camera)
+
+    def tilt(self, guess: BodyModel, stamp_ns: int = 0) -> None:
+        """Go on before the same camera with the pitch of ``guess``, from the image of a stamp on.
+
+        The person stays in the same place of the image, as a new version of the body; values that
+        are still unknown are those of ``guess``.
+        """
+        before, pose = self.body, guess.camera_pose
+        body = tilted_body(before, pose)
+        body = replace(body, version=before.version + 1, stamp_ns=stamp_ns)
+        moved = partial(tilted_states, before=before, after=body)
+        self.camera = self.camera.with_pitch(pose.pitch_rad)
+        self._place = PlaceWatch(body, self.camera)
+        if self._measuring is not None:
+            self._measuring.tilt(guess)
+        if self._before is not None:
+            self._before = moved(self._before[None])[0]
+        self._use(body, CompiledSilhouette(body, self.camera), is_new_start=False)
+        if isinstance(self._filter, WholeBodyFilter):
+            self._filter.move(moved)
 
     def reset(self) -> None:
         """Forget the posture; the next frame is tracked from the front reference posture."""

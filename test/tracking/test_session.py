@@ -14,6 +14,7 @@ from cardbox_tracker.camera.camera import Camera
 from cardbox_tracker.camera.extrinsics import Extrinsics
 from cardbox_tracker.camera.rasterisation import render
 from cardbox_tracker.camera.view import OtherCamera, View
+from cardbox_tracker.detectors.identity import OTHER, cheapest
 from cardbox_tracker.detectors.image_points import ImagePoints
 from cardbox_tracker.person.cardbox import cardbox_patches
 from cardbox_tracker.person.model import BodyModel
@@ -226,11 +227,11 @@ def test_the_outline_of_others_does_not_pull() -> None:
 )
 def test_figures_are_assigned_with_the_least_sum(costs: list[list[float]]) -> None:
     table = np.array(costs)
-    found = session._cheapest(table)
+    found = cheapest(table)
     assert len(set(found.values())) == len(found)
-    assert all(table[row, column] < session._OTHER for row, column in found.items())
+    assert all(table[row, column] < OTHER for row, column in found.items())
     rows = np.arange(len(table))
-    clipped = np.minimum(table, session._OTHER)
+    clipped = np.minimum(table, OTHER)
     least = min(clipped[rows, list(chosen)].sum() for chosen in permutations(range(4), len(rows)))
-    unassigned = session._OTHER * (len(table) - len(found))
+    unassigned = OTHER * (len(table) - len(found))
     assert sum(table[pair] for pair in found.items()) + unassigned == pytest.approx(least)
