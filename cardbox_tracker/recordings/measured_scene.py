@@ -11,12 +11,23 @@ from typing import Generic, NamedTuple, TypeVar
 import numpy as np
 
 from cardbox_tracker.camera.camera import Camera
-from cardbox_tracker.detectors.figure import figure_of_points
+from cardbox_tracker.detectors.figure import Figure, figure_of_points
+from cardbox_tracker.detectors.identity import (
+    ALIKE,
+    GONE_NS,
+    OTHER,
+    apart,
+    cheapest,
+    colours_in,
+    learned,
+    unlike,
+)
 from cardbox_tracker.detectors.image_points import ImagePoints
 from cardbox_tracker.measuring.first_sight import upper_body
 from cardbox_tracker.measuring.scene_camera import Picture
 from cardbox_tracker.measuring.seen_body import MOST_SIGHTS, SeenBody
 from cardbox_tracker.person.model import BodyModel
+from cardbox_tracker.person.sizes import FloatArray
 from cardbox_tracker.recordings.recording import FrameSet, Recording
 from cardbox_tracker.recordings.silhouettes import RecordedFrame
 from cardbox_tracker.search.config import TrackerConfig
@@ -27,8 +38,6 @@ T = TypeVar("T")
 
 # Images in which edges of the room are sought.
 _MOST_PICTURES = 12
-# A person moves less between images, in lengths of the trunk, and is forgotten after this time.
-_SAME, _FORGOTTEN_S = 1.0, 2.0
 
 
 class Spread(Generic[T]):
@@ -65,17 +74,14 @@ class Watched(NamedTuple):
 def watch(recording: Recording, start_s: float = 0.0, end_s: float = math.inf) -> Watched:
     """Read a recording from ``start_s`` to ``end_s``, seconds from its start."""
     frames, pictures = Spread[RecordedFrame](MOST_SIGHTS), Spread[Picture](_MOST_PICTURES)
-    people: list[list[tuple[float, ImagePoints]]] = []
+    people: list[_Person] = []
     for taken in recording.frames(start_s, end_s):
         frame = taken.first
         if upper_body(frame.silhouette, _is_detected(frame)) is not None:
             frames.add(partial(frame._replace, recorded=None))
         pictures.add(partial(_picture, taken))
-        seen = frame.people if frame.people is not None else (frame.points,)
-        for points in seen:
-            if points is not None:
-                _track_of(people, points, taken.time_s).append((taken.time_s, points))
-    return Watched(frames.items, pictures.items, people)
+        _assign(people, frame, taken.time_s)
+    return Watched(frames.items, pictures.items, [one.seen for one in people])
 
 
 def _picture(taken: FrameSet) -> Picture:
@@ -83,23 +89,47 @@ def _picture(taken: FrameSet) -> Picture:
     return taken.time_s, taken.picture()
 
 
-def _track_of(
-    people: list[list[tuple[float, ImagePoints]]], points: ImagePoints, time_s: float
-) -> list[tuple[float, ImagePoints]]:
-    """Return the person among ``people`` who is nearest, or a new one."""
-    figure, near = figure_of_points(points), _SAME
-    found: list[tuple[float, ImagePoints]] | None = None
-    for person in people:
-        last_s, last = person[-1]
-        if (
-            0.0 < time_s - last_s <= _FORGOTTEN_S
-            and (away := figure.apart(figure_of_points(last))) < near
-        ):
-            found, near = person, away
-    if found is None:
-        found = []
-        people.append(found)
-    return found
+class _Person:
+    """Somebody whom a detector sees in a recording: points so far, last figure, colours."""
+
+    def __init__(self) -> None:
+        self.seen: list[tuple[float, ImagePoints]] = []
+        self.figure: Figure | None = None
+        self.colours: FloatArray | None = None
+
+    def add(
+        self, time_s: float, points: ImagePoints, figure: Figure, colours: FloatArray | None
+    ) -> None:
+        self.seen.append((time_s, points))
+        self.figure = figure
+        # Those of somebody who stands before the person are not learned.
+        if colours is not None and (self.colours is None or apart(self.colours, colours) <= ALIKE):
+            self.colours = learned(self.colours, colours)
+
+
+def _assign(people: list[_Person], frame: RecordedFrame, time_s: float) -> None:
+    """Add the points in a frame to the people who they are by place and colours, or to new ones."""
+    seen = frame.people if frame.people is not None else (frame.points,)
+    shown = [one for one in seen if one is not None]
+    figures = [figure_of_points(one) for one in shown]
+    colours = [_colours_of(one, frame) for one in figures]
+    # Who was away for longer may be somebody else with the same clothes.
+    known = [one for one in people if 0.0 < 1e9 * (time_s - one.seen[-1][0]) <= GONE_NS]
+    costs = np.full((len(known), len(shown)), OTHER)
+    for row, person in enumerate(known):
+        away_ns = round(1e9 * (time_s - person.seen[-1][0]))
+        for column, (figure, their) in enumerate(zip(figures, colours, strict=True)):
+            costs[row, column] = unlike(person.figure, person.colours, figure, their, away_ns)
+    found = {column: known[row] for row, column in cheapest(costs).items()}
+    for column, given in enumerate(zip(shown, figures, colours, strict=True)):
+        if column not in found:
+            people.append(_Person())
+        found.get(column, people[-1]).add(time_s, *given)
+
+
+def _colours_of(figure: Figure, frame: RecordedFrame) -> FloatArray | None:
+    trunk = figure.trunk(frame.silhouette.shape) & frame.silhouette
+    return None if frame.image is None else colours_in(frame.image, trunk)
 
 
 def seen_person(
