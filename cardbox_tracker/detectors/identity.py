@@ -19,6 +19,8 @@ have 0.8 to 1, those of one person 0.1 to 0.4."""
 GONE_NS = 1_500_000_000
 """Time after which the last place of somebody who was not seen means nothing, ns."""
 
+DROPPED_NS = 300_000_000
+"""Time for which somebody whom a detector misses stays where they were, ns."""
 OTHER = 16.0
 """Sum of squared deviations above which a figure is somebody else, see :func:`unlike`."""
 
@@ -77,14 +79,19 @@ def unlike(
 ) -> float:
     """Return how far a figure of these colours is from a person: sum of squared deviations.
 
-    The person had the figure ``before``, ``away_ns`` ago, and has ``known`` colours. Unknown ones,
-    such as those in a grey image, agree with all.
+    The person had the figure ``before``, ``away_ns`` ago, and has ``known`` colours; without any,
+    as without images, all agree. A figure in others, or whose trunk is outside of the image, can
+    only be the person where they just were: perhaps something is before the trunk.
     """
-    other = ALIKE / 2 if colours is None or known is None else apart(known, colours)
+    other = ALIKE / 2
+    if known is not None:
+        other = 1.0 if colours is None else apart(known, colours)
     if away_ns > GONE_NS or figure is None or before is None:
         return OTHER * (other / ALIKE) ** 2
-    deviation = _PLACE + _PLACE_PER_S * away_ns / 1e9
-    return (other / _COLOURS) ** 2 + (before.apart(figure) / deviation) ** 2
+    moved, deviation = before.apart(figure), _PLACE + _PLACE_PER_S * away_ns / 1e9
+    if other > ALIKE and (moved > _PLACE or away_ns > DROPPED_NS):
+        return OTHER
+    return (other / _COLOURS) ** 2 + (moved / deviation) ** 2
 
 
 def cheapest(costs: FloatArray) -> dict[int, int]:

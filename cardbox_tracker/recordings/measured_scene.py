@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import Generic, NamedTuple, TypeVar
 
@@ -13,10 +13,8 @@ import numpy as np
 from cardbox_tracker.camera.camera import Camera
 from cardbox_tracker.detectors.figure import Figure, figure_of_points
 from cardbox_tracker.detectors.identity import (
-    ALIKE,
     GONE_NS,
     OTHER,
-    apart,
     cheapest,
     colours_in,
     learned,
@@ -89,42 +87,36 @@ def _picture(taken: FrameSet) -> Picture:
     return taken.time_s, taken.picture()
 
 
+@dataclass
 class _Person:
     """Somebody whom a detector sees in a recording: points so far, last figure, colours."""
 
-    def __init__(self) -> None:
-        self.seen: list[tuple[float, ImagePoints]] = []
-        self.figure: Figure | None = None
-        self.colours: FloatArray | None = None
-
-    def add(
-        self, time_s: float, points: ImagePoints, figure: Figure, colours: FloatArray | None
-    ) -> None:
-        self.seen.append((time_s, points))
-        self.figure = figure
-        # Those of somebody who stands before the person are not learned.
-        if colours is not None and (self.colours is None or apart(self.colours, colours) <= ALIKE):
-            self.colours = learned(self.colours, colours)
+    figure: Figure
+    colours: FloatArray | None
+    seen: list[tuple[float, ImagePoints]] = field(default_factory=list)
 
 
 def _assign(people: list[_Person], frame: RecordedFrame, time_s: float) -> None:
     """Add the points in a frame to the people who they are by place and colours, or to new ones."""
     seen = frame.people if frame.people is not None else (frame.points,)
-    shown = [one for one in seen if one is not None]
-    figures = [figure_of_points(one) for one in shown]
-    colours = [_colours_of(one, frame) for one in figures]
+    figures = [(one, figure_of_points(one)) for one in seen if one is not None]
+    shown = [(points, figure, _colours_of(figure, frame)) for points, figure in figures]
     # Who was away for longer may be somebody else with the same clothes.
     known = [one for one in people if 0.0 < 1e9 * (time_s - one.seen[-1][0]) <= GONE_NS]
     costs = np.full((len(known), len(shown)), OTHER)
     for row, person in enumerate(known):
         away_ns = round(1e9 * (time_s - person.seen[-1][0]))
-        for column, (figure, their) in enumerate(zip(figures, colours, strict=True)):
-            costs[row, column] = unlike(person.figure, person.colours, figure, their, away_ns)
+        for column, (_, *now) in enumerate(shown):
+            costs[row, column] = unlike(person.figure, person.colours, *now, away_ns)
     found = {column: known[row] for row, column in cheapest(costs).items()}
-    for column, given in enumerate(zip(shown, figures, colours, strict=True)):
+    for column, (points, figure, colours) in enumerate(shown):
         if column not in found:
-            people.append(_Person())
-        found.get(column, people[-1]).add(time_s, *given)
+            people.append(_Person(figure, colours))
+        person = found.get(column, people[-1])
+        person.seen.append((time_s, points))
+        person.figure = figure
+        if colours is not None:
+            person.colours = learned(person.colours, colours)
 
 
 def _colours_of(figure: Figure, frame: RecordedFrame) -> FloatArray | None:

@@ -25,6 +25,7 @@ from cardbox_tracker.camera.view import OtherCamera
 from cardbox_tracker.detectors.figure import Figure, figure_of_points
 from cardbox_tracker.detectors.identity import (
     ALIKE,
+    DROPPED_NS,
     GONE_NS,
     OTHER,
     apart,
@@ -62,8 +63,6 @@ _LEARNS = 0.1
 _HIDDEN, _MIXED = 0.15, 0.5
 # Least share of a figure in the silhouette by which somebody is tracked whom the detector misses.
 _SEEN = 0.4
-# Time for which somebody whom the detector misses stays where they were if nobody hides them, ns.
-_DROPPED_NS = 300_000_000
 # Time for which a hidden person stays where they were, ns.
 _HELD_NS = 3_000_000_000
 # Images in a row in which somebody new is seen before they are tracked, after the first images.
@@ -343,7 +342,7 @@ class Session:
             return OTHER
         sight = person.sights[camera]
         before, seen_ns = sight.figure, sight.seen_ns
-        if seen_ns != person.seen_ns and (seen_ns is None or self._last_ns - seen_ns > _DROPPED_NS):
+        if seen_ns != person.seen_ns and (seen_ns is None or self._last_ns - seen_ns > DROPPED_NS):
             # Another camera has seen the person since.
             before, seen_ns = person.expected(camera), person.fitted_ns
         away_ns = abs(self._last_ns - (seen_ns or 0))
@@ -399,7 +398,10 @@ class Session:
         for number, one in enumerate(shown):
             is_clear = taken is None or _share(one.pixels, taken) < _MIXED
             is_certain = one.points is None or one.points.are_certain
-            if number not in found.values() and is_clear and is_certain:
+            # Who comes in at an edge is new once most of the trunk is in the image.
+            middle_px = np.zeros(2) if one.figure is None else one.figure.middle_px
+            is_in = ((middle_px >= 0) & (middle_px < one.pixels.shape[::-1])).all()
+            if number not in found.values() and is_clear and is_certain and is_in:
                 free.append(number)
         waiting = [person for person in self._people if person.seen_ns is None]
         room = self._most - (len(self._people) - len(waiting))
@@ -509,10 +511,11 @@ class Session:
         if all(one.is_missed for one in there):
             if any(one.is_hidden for one in there):
                 return _held(last, hidden=True)
-            if now_ns - seen_ns <= _DROPPED_NS:
+            if now_ns - seen_ns <= DROPPED_NS:
                 return _held(last)
         is_detected = any(one.is_detected for one in there)
-        if is_detected and now_ns - seen_ns > GONE_NS:
+        is_gone = last.posture is None or now_ns - seen_ns > GONE_NS
+        if is_detected and is_gone and not any(one.is_found for one in there):
             # The rest of the silhouette is that of others: only an image of them brings them back.
             gone = Estimate(NO_PERSON if last.state == NO_PERSON else LOST)
             return replace(gone, person=person.number, person_chance=person.chance)
@@ -534,7 +537,7 @@ class Session:
                 if self._is_somebody_else(person, there[0].seen):
                     person.tracker.reset()
                     return Estimate(NO_PERSON, person=person.number)
-        elif any(one.is_found for one in there) and now_ns - person.fitted_ns <= _DROPPED_NS:
+        elif any(one.is_found for one in there) and now_ns - person.fitted_ns <= DROPPED_NS:
             return _held(last)
         return found
 
