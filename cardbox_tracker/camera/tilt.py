@@ -26,12 +26,9 @@ def tilted_body(body: BodyModel, pose: CameraPose) -> BodyModel:
     """Return a body at the same place in the image of a camera with another pitch."""
     place = body.placement
     x_m, _, z_m = _turn(body.camera_pose, pose) @ (-place.distance_m, 0.0, place.hip_height_m)
-    (nearest_m, farthest_m, *_), (lowest_m, highest_m, *_) = list(PLACEMENT.values())[:2]
-    there = replace(
-        place,
-        distance_m=float(np.clip(-x_m, nearest_m, farthest_m)),
-        hip_height_m=float(np.clip(z_m, lowest_m, highest_m)),
-    )
+    limits = np.array([PLACEMENT[name][:2] for name in ("distance_m", "hip_height_m")])
+    x_m, z_m = np.clip((-x_m, z_m), *limits.T).tolist()
+    there = replace(place, distance_m=x_m, hip_height_m=z_m)
     return replace(body, camera_pose=pose, placement=there)
 
 

@@ -6,6 +6,8 @@ away for longer is known by the colours of the trunk alone.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import cv2
 import numpy as np
 from numpy.typing import NDArray
@@ -37,12 +39,12 @@ _LEARN_RATE, _KNOWN_IMAGES, _OTHER_IMAGES = 0.1, 5, 3
 _LEAST_PX, _EMPTY_NS = 20, 60_000_000_000
 
 
-def colours_in(image: NDArray[np.uint8], mask: NDArray[np.uint8]) -> FloatArray | None:
+def colours_in(image: NDArray[np.uint8] | None, mask: NDArray[np.uint8]) -> FloatArray | None:
     """Return the histogram of colours, or of brightness, where ``mask`` (H, W) is not 0.
 
-    The image is (H, W) or (H, W, 3), bgr. None if too few pixels count.
+    The image is (H, W) or (H, W, 3), bgr. None without one, or if too few pixels count.
     """
-    if cv2.countNonZero(mask) < _LEAST_PX:
+    if image is None or cv2.countNonZero(mask) < _LEAST_PX:
         return None
     left, top, width, height = cv2.boundingRect(mask)
     there = np.s_[top : top + height, left : left + width]
@@ -94,17 +96,18 @@ def unlike(
     return (other / _COLOURS) ** 2 + (moved / deviation) ** 2
 
 
-def cheapest(costs: FloatArray) -> dict[int, int]:
+def cheapest(costs: Sequence[Sequence[float]]) -> dict[int, int]:
     """Return the column of each row of ``costs`` (N, M) below ``OTHER``, with the least sum.
 
     A row without a column counts ``OTHER``. The time grows with 2 to the number of rows.
     """
     best: dict[int, tuple[float, dict[int, int]]] = {0: (0.0, {})}
-    for column in range(costs.shape[1]):
+    for column, of_rows in enumerate(zip(*costs, strict=True)):
         for taken, (total, pairs) in list(best.items()):
-            for row in np.flatnonzero(costs[:, column] < OTHER).tolist():
-                key, now = taken | 1 << row, total + float(costs[row, column]) - OTHER
-                if not taken >> row & 1 and (key not in best or now < best[key][0]):
+            for row, cost in enumerate(of_rows):
+                key, now = taken | 1 << row, total + cost - OTHER
+                is_free = cost < OTHER and not taken >> row & 1
+                if is_free and (key not in best or now < best[key][0]):
                     best[key] = now, {**pairs, row: column}
     return min(best.values(), key=lambda one: one[0])[1]
 

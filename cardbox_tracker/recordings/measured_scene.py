@@ -14,7 +14,6 @@ from cardbox_tracker.camera.camera import Camera
 from cardbox_tracker.detectors.figure import Figure, figure_of_points
 from cardbox_tracker.detectors.identity import (
     GONE_NS,
-    OTHER,
     cheapest,
     colours_in,
     learned,
@@ -91,37 +90,32 @@ def _picture(taken: FrameSet) -> Picture:
 class _Person:
     """Somebody whom a detector sees in a recording: points so far, last figure, colours."""
 
-    figure: Figure
-    colours: FloatArray | None
+    figure: Figure | None = None
+    colours: FloatArray | None = None
     seen: list[tuple[float, ImagePoints]] = field(default_factory=list)
 
 
 def _assign(people: list[_Person], frame: RecordedFrame, time_s: float) -> None:
     """Add the points in a frame to the people who they are by place and colours, or to new ones."""
-    seen = frame.people if frame.people is not None else (frame.points,)
-    figures = [(one, figure_of_points(one)) for one in seen if one is not None]
-    shown = [(points, figure, _colours_of(figure, frame)) for points, figure in figures]
+    shown = []
+    for points in frame.people if frame.people is not None else (frame.points,):
+        if points is not None:
+            figure = figure_of_points(points)
+            trunk = figure.trunk(frame.silhouette.shape) & frame.silhouette
+            shown.append((points, figure, colours_in(frame.image, trunk)))
     # Who was away for longer may be somebody else with the same clothes.
-    known = [one for one in people if 0.0 < 1e9 * (time_s - one.seen[-1][0]) <= GONE_NS]
-    costs = np.full((len(known), len(shown)), OTHER)
-    for row, person in enumerate(known):
-        away_ns = round(1e9 * (time_s - person.seen[-1][0]))
-        for column, (_, *now) in enumerate(shown):
-            costs[row, column] = unlike(person.figure, person.colours, *now, away_ns)
-    found = {column: known[row] for row, column in cheapest(costs).items()}
+    known = [(one, round(1e9 * (time_s - one.seen[-1][0]))) for one in people]
+    known = [(one, away_ns) for one, away_ns in known if 0 < away_ns <= GONE_NS]
+    costs = [[unlike(one.figure, one.colours, *now, ns) for _, *now in shown] for one, ns in known]
+    found = {column: known[row][0] for row, column in cheapest(costs).items()}
     for column, (points, figure, colours) in enumerate(shown):
         if column not in found:
-            people.append(_Person(figure, colours))
+            people.append(_Person())
         person = found.get(column, people[-1])
         person.seen.append((time_s, points))
         person.figure = figure
         if colours is not None:
             person.colours = learned(person.colours, colours)
-
-
-def _colours_of(figure: Figure, frame: RecordedFrame) -> FloatArray | None:
-    trunk = figure.trunk(frame.silhouette.shape) & frame.silhouette
-    return None if frame.image is None else colours_in(frame.image, trunk)
 
 
 def seen_person(

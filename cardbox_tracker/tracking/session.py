@@ -328,10 +328,8 @@ class Session:
     ) -> dict[int, int]:
         """Return which figure each known person is, by number."""
         known = [person for person in self._people if person.seen_ns is not None]
-        costs = np.full((len(known), len(shown)), OTHER)
-        for row, person in enumerate(known):
-            for column, one in enumerate(shown):
-                costs[row, column] = self._cost(person, camera, one, colours[column])
+        pairs = list(zip(shown, colours, strict=True))
+        costs = [[self._cost(person, camera, *pair) for pair in pairs] for person in known]
         return {known[row].number: column for row, column in cheapest(costs).items()}
 
     def _cost(self, person: _Person, camera: int, one: Shown, colours: FloatArray | None) -> float:
@@ -398,9 +396,9 @@ class Session:
         for number, one in enumerate(shown):
             is_clear = taken is None or _share(one.pixels, taken) < _MIXED
             is_certain = one.points is None or one.points.are_certain
-            # Who comes in at an edge is new once most of the trunk is in the image.
-            middle_px = np.zeros(2) if one.figure is None else one.figure.middle_px
-            is_in = ((middle_px >= 0) & (middle_px < one.pixels.shape[::-1])).all()
+            # Who comes in at a side is new once half of the trunk is in the image.
+            column_px = 0.0 if one.figure is None else one.figure.middle_px[0]
+            is_in = 0.0 <= column_px < one.pixels.shape[1]
             if number not in found.values() and is_clear and is_certain and is_in:
                 free.append(number)
         waiting = [person for person in self._people if person.seen_ns is None]
@@ -575,8 +573,6 @@ def _middle(pixels: Silhouette) -> float:
 
 def _colours_of(one: Shown, image: Image | None, silhouette: Silhouette) -> FloatArray | None:
     """Return the histogram of the trunk's colours, or brightness; None if it is not seen."""
-    if image is None:
-        return None
     if one.figure is None:
         rows = np.nonzero(one.pixels.any(axis=1))[0]
         trunk = one.pixels.copy()

@@ -155,14 +155,12 @@ class Tracker:
     def tilt(self, guess: BodyModel, stamp_ns: int = 0) -> None:
         """Go on before the same camera with the pitch of ``guess``, from the image of a stamp on.
 
-        The person stays in the same place of the image, as a new version of the body; values that
-        are still unknown are those of ``guess``.
+        The person stays in the same place of the image, as a new version of the body.
         """
-        before, pose = self.body, guess.camera_pose
-        body = tilted_body(before, pose)
-        body = replace(body, version=before.version + 1, stamp_ns=stamp_ns)
-        moved = partial(tilted_states, before=before, after=body)
-        self.camera = self.camera.with_pitch(pose.pitch_rad)
+        body = tilted_body(self.body, guess.camera_pose)
+        body = replace(body, version=self.body.version + 1, stamp_ns=stamp_ns)
+        moved = partial(tilted_states, before=self.body, after=body)
+        self.camera = self.camera.with_pitch(body.camera_pose.pitch_rad)
         self._place = PlaceWatch(body, self.camera)
         if self._measuring is not None:
             self._measuring.tilt(guess)
@@ -391,7 +389,9 @@ class Tracker:
             return frame
         seen_ns = self._now_ns if points.stamp_ns is None else points.stamp_ns
         figure = figure_of_points(points)
-        if identity.is_same(figure, _colours_of(figure, frame), seen_ns):
+        # The silhouette lacks whoever is far from the last posture.
+        colours = colours_in(frame.image, figure.trunk(frame.silhouette.shape))
+        if identity.is_same(figure, colours, seen_ns):
             return frame
         self._sees_other |= camera == 0
         return frame.changed(channels={**frame.channels, "points": None})
@@ -413,8 +413,8 @@ class Tracker:
             joints = {"left_shoulder": there[SHOULDER], "left_hip": there[HIPS]}
             joints |= {"right_shoulder": there[POINTS_OF_ARM + SHOULDER], "right_hip": there[HIPS]}
             figure, silhouette = Figure(joints), frame.silhouette
-            is_seen = (figure.trunk(silhouette.shape) & silhouette).any()
-            colours = _colours_of(figure, frame)
+            trunk = figure.trunk(silhouette.shape)
+            is_seen, colours = (trunk & silhouette).any(), colours_in(frame.image, trunk)
             if not is_seen or not identity.is_same(figure, colours, self._now_ns):
                 self._before = None
                 self._filter.forget()
@@ -541,14 +541,6 @@ def is_at_two_limits(posture: FloatArray) -> bool:
     """
     is_at = (np.abs(posture[:, None] - TURNING_LIMITS) < _AT_LIMIT_RAD).any(axis=1)
     return any(np.count_nonzero(is_at[part]) >= 2 for part in (TURNS, LEFT_ARM, RIGHT_ARM))
-
-
-def _colours_of(figure: Figure, frame: Frame) -> FloatArray | None:
-    """Return the colours of the trunk of a figure in a frame; None if they are not seen."""
-    if frame.image is None:
-        return None
-    # The silhouette lacks whoever is far from the last posture.
-    return colours_in(frame.image, figure.trunk(frame.silhouette.shape))
 
 
 def _silhouettes(frames: Sequence[Frame]) -> tuple[Silhouette, list[Silhouette]]:
