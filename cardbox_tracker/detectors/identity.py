@@ -6,6 +6,8 @@ away for longer is known by the colours of the trunk alone.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import cv2
 import numpy as np
 from numpy.typing import NDArray
@@ -19,6 +21,15 @@ have 0.8 to 1, those of one person 0.1 to 0.4."""
 GONE_NS = 1_500_000_000
 """Time after which the last place of somebody who was not seen means nothing, ns."""
 
+DROPPED_NS = 300_000_000
+"""Time for which somebody whom a detector misses stays where they were, ns."""
+OTHER = 16.0
+"""Sum of squared deviations above which a figure is somebody else, see :func:`unlike`."""
+
+# Deviation of a figure's place, in lengths of the trunk, and its growth a second.
+_PLACE, _PLACE_PER_S = 0.5, 2.0
+# Deviation of the colours of one person: Bhattacharyya distance of the trunk's histograms.
+_COLOURS = 0.3
 # Length of a trunk, m; speed of a person who runs, m/s, and error of a place, m.
 _TRUNK_M, _RUN_M_PER_S, _ERROR_M = 0.5, 4.0, 0.2
 # Weight of an image in the colours, images after which they are known, and those in a row with
@@ -28,12 +39,12 @@ _LEARN_RATE, _KNOWN_IMAGES, _OTHER_IMAGES = 0.1, 5, 3
 _LEAST_PX, _EMPTY_NS = 20, 60_000_000_000
 
 
-def colours_in(image: NDArray[np.uint8], mask: NDArray[np.uint8]) -> FloatArray | None:
+def colours_in(image: NDArray[np.uint8] | None, mask: NDArray[np.uint8]) -> FloatArray | None:
     """Return the histogram of colours, or of brightness, where ``mask`` (H, W) is not 0.
 
-    The image is (H, W) or (H, W, 3), bgr. None if too few pixels count.
+    The image is (H, W) or (H, W, 3), bgr. None without one, or if too few pixels count.
     """
-    if cv2.countNonZero(mask) < _LEAST_PX:
+    if image is None or cv2.countNonZero(mask) < _LEAST_PX:
         return None
     left, top, width, height = cv2.boundingRect(mask)
     there = np.s_[top : top + height, left : left + width]
@@ -53,6 +64,52 @@ def apart(one: FloatArray, other: FloatArray) -> float:
     if len(one) != len(other):
         return 1.0
     return float(np.sqrt(max(1.0 - np.sqrt(one * other).sum(), 0.0)))
+
+
+def learned(known: FloatArray | None, colours: FloatArray) -> FloatArray:
+    """Return the ``known`` colours of a person, if any, moved towards those in another image."""
+    before = colours if known is None or len(known) != len(colours) else known
+    return (1 - _LEARN_RATE) * before + _LEARN_RATE * colours
+
+
+def unlike(
+    before: Figure | None,
+    known: FloatArray | None,
+    figure: Figure | None,
+    colours: FloatArray | None,
+    away_ns: int,
+) -> float:
+    """Return how far a figure of these colours is from a person: sum of squared deviations.
+
+    The person had the figure ``before``, ``away_ns`` ago, and has ``known`` colours; without any,
+    as without images, all agree. A figure in others, or whose trunk is outside of the image, can
+    only be the person where they just were: perhaps something is before the trunk.
+    """
+    other = ALIKE / 2
+    if known is not None:
+        other = 1.0 if colours is None else apart(known, colours)
+    if away_ns > GONE_NS or figure is None or before is None:
+        return OTHER * (other / ALIKE) ** 2
+    moved, deviation = before.apart(figure), _PLACE + _PLACE_PER_S * away_ns / 1e9
+    if other > ALIKE and (moved > _PLACE or away_ns > DROPPED_NS):
+        return OTHER
+    return (other / _COLOURS) ** 2 + (moved / deviation) ** 2
+
+
+def cheapest(costs: Sequence[Sequence[float]]) -> dict[int, int]:
+    """Return the column of each row of ``costs`` (N, M) below ``OTHER``, with the least sum.
+
+    A row without a column counts ``OTHER``. The time grows with 2 to the number of rows.
+    """
+    best: dict[int, tuple[float, dict[int, int]]] = {0: (0.0, {})}
+    for column, of_rows in enumerate(zip(*costs, strict=True)):
+        for taken, (total, pairs) in list(best.items()):
+            for row, cost in enumerate(of_rows):
+                key, now = taken | 1 << row, total + cost - OTHER
+                is_free = cost < OTHER and not taken >> row & 1
+                if is_free and (key not in best or now < best[key][0]):
+                    best[key] = now, {**pairs, row: column}
+    return min(best.values(), key=lambda one: one[0])[1]
 
 
 class Identity:
@@ -125,10 +182,7 @@ class Identity:
         self._others = self._others + 1 if self.is_other(colours) else 0
         self.is_doubtful = self._others >= _OTHER_IMAGES
         if colours is not None and not self._others:
-            before = self._colours
-            if before is None or len(before) != len(colours):
-                before = colours
-            self._colours = (1 - _LEARN_RATE) * before + _LEARN_RATE * colours
+            self._colours = learned(self._colours, colours)
         return True
 
     def _can_be(self, figure: Figure, colours: FloatArray | None, away_ns: int) -> bool:

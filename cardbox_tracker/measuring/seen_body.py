@@ -13,6 +13,7 @@ from dataclasses import replace
 import numpy as np
 
 from cardbox_tracker.camera.camera import Camera
+from cardbox_tracker.camera.tilt import tilted_body
 from cardbox_tracker.common.errors import BodyModelError, InitializationError
 from cardbox_tracker.measuring.first_sight import FirstSight, fit_first_sight, upper_body
 from cardbox_tracker.measuring.people_camera import Distances
@@ -60,6 +61,14 @@ class SeenBody:
         self._wait_s = self._pause_s
         self._fits: list[FirstSight] = []
         self._times_s: list[float] = []
+
+    def tilt(self, guess: BodyModel) -> None:
+        """Go on with all fits before the camera of another ``guess``, with another pitch."""
+        pose = guess.camera_pose
+        self._camera = self._camera.with_pitch(pose.pitch_rad)
+        self.body = guess if self.body is self._guess else tilted_body(self.body, pose)
+        self._guess = guess
+        self._fits = [replace(fit, body=tilted_body(fit.body, pose)) for fit in self._fits]
 
     def see(
         self,

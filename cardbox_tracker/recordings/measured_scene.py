@@ -4,20 +4,28 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import Generic, NamedTuple, TypeVar
 
 import numpy as np
 
 from cardbox_tracker.camera.camera import Camera
-from cardbox_tracker.detectors.figure import figure_of_points
+from cardbox_tracker.detectors.figure import Figure, figure_of_points
+from cardbox_tracker.detectors.identity import (
+    GONE_NS,
+    cheapest,
+    colours_in,
+    learned,
+    unlike,
+)
 from cardbox_tracker.detectors.image_points import ImagePoints
 from cardbox_tracker.measuring.first_sight import upper_body
 from cardbox_tracker.measuring.people_camera import Distances
 from cardbox_tracker.measuring.scene_camera import Picture
 from cardbox_tracker.measuring.seen_body import MOST_SIGHTS, SeenBody
 from cardbox_tracker.person.model import BodyModel
+from cardbox_tracker.person.sizes import FloatArray
 from cardbox_tracker.recordings.recording import FrameSet, Recording
 from cardbox_tracker.recordings.silhouettes import RecordedFrame
 from cardbox_tracker.search.config import TrackerConfig
@@ -28,8 +36,6 @@ T = TypeVar("T")
 
 # Images in which edges of the room are sought.
 _MOST_PICTURES = 12
-# A person moves less between images, in lengths of the trunk, and is forgotten after this time.
-_SAME, _FORGOTTEN_S = 1.0, 2.0
 
 
 class Spread(Generic[T]):
@@ -66,17 +72,14 @@ class Watched(NamedTuple):
 def watch(recording: Recording, start_s: float = 0.0, end_s: float = math.inf) -> Watched:
     """Read a recording from ``start_s`` to ``end_s``, seconds from its start."""
     frames, pictures = Spread[RecordedFrame](MOST_SIGHTS), Spread[Picture](_MOST_PICTURES)
-    people: list[list[tuple[float, ImagePoints]]] = []
+    people: list[_Person] = []
     for taken in recording.frames(start_s, end_s):
         frame = taken.first
         if upper_body(frame.silhouette, _is_detected(frame)) is not None:
             frames.add(partial(frame._replace, recorded=None))
         pictures.add(partial(_picture, taken))
-        seen = frame.people if frame.people is not None else (frame.points,)
-        for points in seen:
-            if points is not None:
-                _track_of(people, points, taken.time_s).append((taken.time_s, points))
-    return Watched(frames.items, pictures.items, people)
+        _assign(people, frame, taken.time_s)
+    return Watched(frames.items, pictures.items, [one.seen for one in people])
 
 
 def _picture(taken: FrameSet) -> Picture:
@@ -84,23 +87,36 @@ def _picture(taken: FrameSet) -> Picture:
     return taken.time_s, taken.picture()
 
 
-def _track_of(
-    people: list[list[tuple[float, ImagePoints]]], points: ImagePoints, time_s: float
-) -> list[tuple[float, ImagePoints]]:
-    """Return the person among ``people`` who is nearest, or a new one."""
-    figure, near = figure_of_points(points), _SAME
-    found: list[tuple[float, ImagePoints]] | None = None
-    for person in people:
-        last_s, last = person[-1]
-        if (
-            0.0 < time_s - last_s <= _FORGOTTEN_S
-            and (away := figure.apart(figure_of_points(last))) < near
-        ):
-            found, near = person, away
-    if found is None:
-        found = []
-        people.append(found)
-    return found
+@dataclass
+class _Person:
+    """Somebody whom a detector sees in a recording: points so far, last figure, colours."""
+
+    figure: Figure | None = None
+    colours: FloatArray | None = None
+    seen: list[tuple[float, ImagePoints]] = field(default_factory=list)
+
+
+def _assign(people: list[_Person], frame: RecordedFrame, time_s: float) -> None:
+    """Add the points in a frame to the people who they are by place and colours, or to new ones."""
+    shown = []
+    for points in frame.people if frame.people is not None else (frame.points,):
+        if points is not None:
+            figure = figure_of_points(points)
+            trunk = figure.trunk(frame.silhouette.shape) & frame.silhouette
+            shown.append((points, figure, colours_in(frame.image, trunk)))
+    # Who was away for longer may be somebody else with the same clothes.
+    known = [(one, round(1e9 * (time_s - one.seen[-1][0]))) for one in people]
+    known = [(one, away_ns) for one, away_ns in known if 0 < away_ns <= GONE_NS]
+    costs = [[unlike(one.figure, one.colours, *now, ns) for _, *now in shown] for one, ns in known]
+    found = {column: known[row][0] for row, column in cheapest(costs).items()}
+    for column, (points, figure, colours) in enumerate(shown):
+        if column not in found:
+            people.append(_Person())
+        person = found.get(column, people[-1])
+        person.seen.append((time_s, points))
+        person.figure = figure
+        if colours is not None:
+            person.colours = learned(person.colours, colours)
 
 
 def seen_person(

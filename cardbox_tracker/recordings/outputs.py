@@ -17,6 +17,7 @@ import numpy as np
 
 from cardbox_tracker.person.hands import HAND_NAMES, HAND_OPEN_NAMES, WRIST_NAMES
 from cardbox_tracker.person.legs import LEG_LIMITS, LEG_NAMES
+from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.sizes import FloatArray
 from cardbox_tracker.person.skeleton import (
     CLAVICLE_NAMES,
@@ -381,20 +382,20 @@ class _Motion:
     """Velocities of the joints, from the results of two images that follow each other."""
 
     def __init__(self) -> None:
-        self._last: tuple[int, FloatArray, tuple[bool, bool], Tracker] | None = None
+        self._last: tuple[int, FloatArray, tuple[bool, bool], Tracker, BodyModel] | None = None
 
     def velocities(self, stamp_ns: int, estimate: Estimate, tracker: Tracker) -> FloatArray | None:
         """Return those of :func:`joint_values`, rad/s and m/s; None without an image before.
 
-        It has a posture of the same tracker and is at most ``_LONGEST_NS`` old.
+        It has a posture of the same version of the same body and is at most ``_LONGEST_NS`` old.
         """
         before, self._last = self._last, None
         joints = joint_values(estimate)
         if joints is None:
             return None
         has = estimate.neck is not None, estimate.legs is not None
-        self._last = stamp_ns, joints.values, has, tracker
-        if before is None or before[3] is not tracker:
+        self._last = stamp_ns, joints.values, has, tracker, tracker.body
+        if before is None or before[3] is not tracker or before[4] is not tracker.body:
             return None
         step_ns = stamp_ns - before[0]
         if not 0 < step_ns <= _LONGEST_NS:

@@ -103,8 +103,8 @@ class WholeBodyFilter:
         self._profile = settings.profile_for(1 + len(views)).scaled(settings.effort)
         self._located = self._profile.scaled(_LOCATED_EFFORT)
         self._rng, self._lost_iou = rng, config.lost_iou
+        self._reference = silhouette.body.reference_state()
         self.use(silhouette, views)
-        self._reference = self._body.reference_state()
         self.approach = Approach(self._profile.home_rate)
         self.forget()
 
@@ -112,6 +112,8 @@ class WholeBodyFilter:
         """Rate and fit the body of ``silhouette`` from now on; states keep their place."""
         self._views, self._body = tuple(views), silhouette.body
         self._cost = cost = MultiViewCost(self._body, silhouette.camera, views, self._config.cost)
+        # The person keeps facing as before.
+        cost.face(float(self._reference[YAW]))
         self._presence = PersonPresence(cost, self._config)
         self._arm = ArmSearch(cost)
         crosses = self._profile.crosses
@@ -120,6 +122,12 @@ class WholeBodyFilter:
         self._doubt = doubt.Doubt()
         is_measured = self._body.source == MEASURED
         self._outline = doubt.Source.MEASURED if is_measured else doubt.Source.OUTLINE
+
+    def move(self, moved: Callable[[FloatArray], FloatArray]) -> None:
+        """Go on from the states (N, 14) that ``moved`` makes of the present ones."""
+        self._survivors = np.clip(moved(self._survivors), *self._cost.limits.T)
+        self._output = self._correction = None
+        self.approach.begin(float(self._survivors[0, TORSO_X]))
 
     def forget(self) -> None:
         """See :class:`~.pose_filter.PoseFilter`."""

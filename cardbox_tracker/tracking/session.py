@@ -20,11 +20,23 @@ import cv2
 import numpy as np
 
 from cardbox_tracker.camera.camera import Camera
+from cardbox_tracker.camera.tilt import tilted_states
 from cardbox_tracker.camera.view import OtherCamera
 from cardbox_tracker.detectors.figure import Figure, figure_of_points
-from cardbox_tracker.detectors.identity import ALIKE, GONE_NS, apart, colours_in
+from cardbox_tracker.detectors.identity import (
+    ALIKE,
+    DROPPED_NS,
+    GONE_NS,
+    OTHER,
+    apart,
+    cheapest,
+    colours_in,
+    learned,
+    unlike,
+)
 from cardbox_tracker.detectors.image_points import ImagePoints
 from cardbox_tracker.person.model import BodyModel
+from cardbox_tracker.person.posture import PLACE, POSTURE
 from cardbox_tracker.person.sizes import FloatArray
 from cardbox_tracker.person.skeleton import KeypointState
 from cardbox_tracker.search.config import TrackerConfig
@@ -41,24 +53,16 @@ from cardbox_tracker.tracking.tracker import Tracker
 MOST_PEOPLE = 6
 """People that are tracked if their number is not given."""
 
-# Deviation of a figure's place, in lengths of the trunk, and its growth a second.
-_PLACE, _PLACE_PER_S = 0.5, 2.0
-# Deviation of the colours of one person: Bhattacharyya distance of the trunk's histograms.
-_COLOURS = 0.3
 # Change of that distance that changes the odds of being the same person by a factor of e.
 _ALIKE_SPREAD = 0.07
-# Squared deviations above which a figure is somebody else.
-_OTHER = 16.0
 # Images in a row with the colours of somebody else after which a person is given up.
 _OTHERS_IMAGES = 3
-# Share of a figure that others may cover when its colours are learned, and its weight.
-_LEARNS, _LEARN_RATE = 0.1, 0.1
+# Share of a figure that others may cover when its colours are learned.
+_LEARNS = 0.1
 # Share of a figure in those of others from which it is hidden, and from which it is a mere mixture.
 _HIDDEN, _MIXED = 0.15, 0.5
 # Least share of a figure in the silhouette by which somebody is tracked whom the detector misses.
 _SEEN = 0.4
-# Time for which somebody whom the detector misses stays where they were if nobody hides them, ns.
-_DROPPED_NS = 300_000_000
 # Time for which a hidden person stays where they were, ns.
 _HELD_NS = 3_000_000_000
 # Images in a row in which somebody new is seen before they are tracked, after the first images.
@@ -226,6 +230,21 @@ class Session:
         person.tracker.reset()
         person.estimate = Estimate(NO_PERSON, person=person.estimate.person)
 
+    def tilt(self, bodies: Sequence[BodyModel], stamp_ns: int) -> None:
+        """Go on before the same camera with the pitch of ``bodies``, from the image of a stamp on.
+
+        Each person keeps number, sizes and place in the image, see :meth:`.Tracker.tilt`.
+        ``bodies`` are those that were given, with the other pitch.
+        """
+        self._bodies = tuple(bodies)
+        for person in self._people:
+            before, last, state = person.tracker.body, person.estimate, person.state()
+            person.tracker.tilt(bodies[min(person.number, len(bodies)) - 1], stamp_ns)
+            if state is not None:
+                (state,) = tilted_states(state[None], before, person.tracker.body)
+                offset_m = None if last.offset_m is None else state[PLACE]
+                person.estimate = replace(last, posture=state[POSTURE], offset_m=offset_m)
+
     def configure(self, config: TrackerConfig) -> bool:
         """Use other settings from now on; return whether tracking starts again, see Tracker."""
         self.config = config
@@ -309,32 +328,24 @@ class Session:
     ) -> dict[int, int]:
         """Return which figure each known person is, by number."""
         known = [person for person in self._people if person.seen_ns is not None]
-        costs = np.full((len(known), len(shown)), _OTHER)
-        for row, person in enumerate(known):
-            for column, one in enumerate(shown):
-                costs[row, column] = self._cost(person, camera, one, colours[column])
-        return {known[row].number: column for row, column in _cheapest(costs).items()}
+        pairs = list(zip(shown, colours, strict=True))
+        costs = [[self._cost(person, camera, *pair) for pair in pairs] for person in known]
+        return {known[row].number: column for row, column in cheapest(costs).items()}
 
     def _cost(self, person: _Person, camera: int, one: Shown, colours: FloatArray | None) -> float:
         """Return how far a figure is from a person: sum of squared deviations."""
         assert person.seen_ns is not None and self._last_ns is not None
         if one.figure is None and person.estimate.posture is not None:
             # Free regions are not those of people who are tracked.
-            return _OTHER
+            return OTHER
         sight = person.sights[camera]
         before, seen_ns = sight.figure, sight.seen_ns
-        if seen_ns != person.seen_ns and (seen_ns is None or self._last_ns - seen_ns > _DROPPED_NS):
+        if seen_ns != person.seen_ns and (seen_ns is None or self._last_ns - seen_ns > DROPPED_NS):
             # Another camera has seen the person since.
             before, seen_ns = person.expected(camera), person.fitted_ns
-        # Unknown colours, such as those of a person in a grey image, agree with all.
-        other, gap = ALIKE / 2, self._gap(person, camera, one)
-        if colours is not None and sight.colours is not None:
-            other = apart(sight.colours, colours)
         away_ns = abs(self._last_ns - (seen_ns or 0))
-        if away_ns > GONE_NS or one.figure is None or before is None:
-            return _OTHER * (other / ALIKE) ** 2 + gap
-        deviation = _PLACE + _PLACE_PER_S * away_ns / 1e9
-        return (other / _COLOURS) ** 2 + (before.apart(one.figure) / deviation) ** 2 + gap
+        away = unlike(before, sight.colours, one.figure, colours, away_ns)
+        return away + self._gap(person, camera, one)
 
     def _gap(self, person: _Person, camera: int, one: Shown) -> float:
         """Return how far a figure is from those in other cameras: sum of squared deviations."""
@@ -385,7 +396,10 @@ class Session:
         for number, one in enumerate(shown):
             is_clear = taken is None or _share(one.pixels, taken) < _MIXED
             is_certain = one.points is None or one.points.are_certain
-            if number not in found.values() and is_clear and is_certain:
+            # Who comes in at a side is new once half of the trunk is in the image.
+            column_px = 0.0 if one.figure is None else one.figure.middle_px[0]
+            is_in = 0.0 <= column_px < one.pixels.shape[1]
+            if number not in found.values() and is_clear and is_certain and is_in:
                 free.append(number)
         waiting = [person for person in self._people if person.seen_ns is None]
         room = self._most - (len(self._people) - len(waiting))
@@ -418,9 +432,7 @@ class Session:
         assert sight.pixels is not None
         if colours is None or self._share_of_others(person, camera, sight.pixels) > _LEARNS:
             return
-        if sight.colours is None or len(sight.colours) != len(colours):
-            sight.colours = colours
-        sight.colours = (1 - _LEARN_RATE) * sight.colours + _LEARN_RATE * colours
+        sight.colours = learned(sight.colours, colours)
 
     def _share_of_others(self, person: _Person, camera: int, pixels: Silhouette) -> float:
         """Return the share of a person's pixels that are also those of others."""
@@ -497,10 +509,11 @@ class Session:
         if all(one.is_missed for one in there):
             if any(one.is_hidden for one in there):
                 return _held(last, hidden=True)
-            if now_ns - seen_ns <= _DROPPED_NS:
+            if now_ns - seen_ns <= DROPPED_NS:
                 return _held(last)
         is_detected = any(one.is_detected for one in there)
-        if is_detected and now_ns - seen_ns > GONE_NS:
+        is_gone = last.posture is None or now_ns - seen_ns > GONE_NS
+        if is_detected and is_gone and not any(one.is_found for one in there):
             # The rest of the silhouette is that of others: only an image of them brings them back.
             gone = Estimate(NO_PERSON if last.state == NO_PERSON else LOST)
             return replace(gone, person=person.number, person_chance=person.chance)
@@ -522,7 +535,7 @@ class Session:
                 if self._is_somebody_else(person, there[0].seen):
                     person.tracker.reset()
                     return Estimate(NO_PERSON, person=person.number)
-        elif any(one.is_found for one in there) and now_ns - person.fitted_ns <= _DROPPED_NS:
+        elif any(one.is_found for one in there) and now_ns - person.fitted_ns <= DROPPED_NS:
             return _held(last)
         return found
 
@@ -560,8 +573,6 @@ def _middle(pixels: Silhouette) -> float:
 
 def _colours_of(one: Shown, image: Image | None, silhouette: Silhouette) -> FloatArray | None:
     """Return the histogram of the trunk's colours, or brightness; None if it is not seen."""
-    if image is None:
-        return None
     if one.figure is None:
         rows = np.nonzero(one.pixels.any(axis=1))[0]
         trunk = one.pixels.copy()
@@ -577,18 +588,3 @@ def _chance_of_same(before: FloatArray | None, now: FloatArray | None) -> float:
     """Return the probability that colours are those of one person; without them, it is even."""
     away = ALIKE if before is None or now is None else apart(before, now)
     return float(1.0 / (1.0 + np.exp((away - ALIKE) / _ALIKE_SPREAD)))
-
-
-def _cheapest(costs: FloatArray) -> dict[int, int]:
-    """Return the column of each row of ``costs`` (N, M) below ``_OTHER``, with the least sum.
-
-    A row without a column counts ``_OTHER``. The time grows with 2 to the number of rows.
-    """
-    best: dict[int, tuple[float, dict[int, int]]] = {0: (0.0, {})}
-    for column in range(costs.shape[1]):
-        for taken, (total, pairs) in list(best.items()):
-            for row in np.flatnonzero(costs[:, column] < _OTHER).tolist():
-                key, now = taken | 1 << row, total + float(costs[row, column]) - _OTHER
-                if not taken >> row & 1 and (key not in best or now < best[key][0]):
-                    best[key] = now, {**pairs, row: column}
-    return min(best.values(), key=lambda one: one[0])[1]

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import partial
 from itertools import zip_longest
 from types import MappingProxyType
 
 import numpy as np
 
 from cardbox_tracker.camera.camera import Camera
+from cardbox_tracker.camera.tilt import tilted_body, tilted_states
 from cardbox_tracker.camera.view import OtherCamera, View
 from cardbox_tracker.common.settings import restarts
 from cardbox_tracker.detectors.figure import Figure, figure_of_points
@@ -149,6 +151,24 @@ class Tracker:
             camera.reset(self.config)
         self._filter.use(silhouette, views)
         self._head = HeadTracker(self.body, self.camera)
+
+    def tilt(self, guess: BodyModel, stamp_ns: int = 0) -> None:
+        """Go on before the same camera with the pitch of ``guess``, from the image of a stamp on.
+
+        The person stays in the same place of the image, as a new version of the body.
+        """
+        body = tilted_body(self.body, guess.camera_pose)
+        body = replace(body, version=self.body.version + 1, stamp_ns=stamp_ns)
+        moved = partial(tilted_states, before=self.body, after=body)
+        self.camera = self.camera.with_pitch(body.camera_pose.pitch_rad)
+        self._place = PlaceWatch(body, self.camera)
+        if self._measuring is not None:
+            self._measuring.tilt(guess)
+        if self._before is not None:
+            self._before = moved(self._before[None])[0]
+        self._use(body, CompiledSilhouette(body, self.camera), is_new_start=False)
+        if isinstance(self._filter, WholeBodyFilter):
+            self._filter.move(moved)
 
     def reset(self) -> None:
         """Forget the posture; the next frame is tracked from the front reference posture."""
@@ -369,7 +389,9 @@ class Tracker:
             return frame
         seen_ns = self._now_ns if points.stamp_ns is None else points.stamp_ns
         figure = figure_of_points(points)
-        if identity.is_same(figure, _colours_of(figure, frame), seen_ns):
+        # The silhouette lacks whoever is far from the last posture.
+        colours = colours_in(frame.image, figure.trunk(frame.silhouette.shape))
+        if identity.is_same(figure, colours, seen_ns):
             return frame
         self._sees_other |= camera == 0
         return frame.changed(channels={**frame.channels, "points": None})
@@ -391,8 +413,8 @@ class Tracker:
             joints = {"left_shoulder": there[SHOULDER], "left_hip": there[HIPS]}
             joints |= {"right_shoulder": there[POINTS_OF_ARM + SHOULDER], "right_hip": there[HIPS]}
             figure, silhouette = Figure(joints), frame.silhouette
-            is_seen = (figure.trunk(silhouette.shape) & silhouette).any()
-            colours = _colours_of(figure, frame)
+            trunk = figure.trunk(silhouette.shape)
+            is_seen, colours = (trunk & silhouette).any(), colours_in(frame.image, trunk)
             if not is_seen or not identity.is_same(figure, colours, self._now_ns):
                 self._before = None
                 self._filter.forget()
@@ -519,14 +541,6 @@ def is_at_two_limits(posture: FloatArray) -> bool:
     """
     is_at = (np.abs(posture[:, None] - TURNING_LIMITS) < _AT_LIMIT_RAD).any(axis=1)
     return any(np.count_nonzero(is_at[part]) >= 2 for part in (TURNS, LEFT_ARM, RIGHT_ARM))
-
-
-def _colours_of(figure: Figure, frame: Frame) -> FloatArray | None:
-    """Return the colours of the trunk of a figure in a frame; None if they are not seen."""
-    if frame.image is None:
-        return None
-    # The silhouette lacks whoever is far from the last posture.
-    return colours_in(frame.image, figure.trunk(frame.silhouette.shape))
 
 
 def _silhouettes(frames: Sequence[Frame]) -> tuple[Silhouette, list[Silhouette]]:

@@ -58,10 +58,11 @@ def rows(folder: Path, detector: Detector) -> Iterator[Row]:
     people = truth.get("people") or [truth["person"]]
     for camera in cameras:
         name = camera["name"] if len(cameras) > 1 else None
-        # Of several people one is followed, and nothing says which.
+        # Nothing says which of several people is who.
         stature_m = people[0].get("height") if len(people) == 1 else None
+        finder = detector._replace(people=len(people) if len(people) > 1 else 0)
         names = () if name is None else (name,)
-        with open_recording(folder / "bag", detector, names, points=detector) as recording:
+        with open_recording(folder / "bag", finder, names, points=finder) as recording:
             watched = watch(recording)
             statures_m = [stature_m] * len(watched.people)
             seen = watched.people, watched.pictures, recording.first.camera, statures_m

@@ -14,6 +14,7 @@ from cardbox_tracker.camera.camera import Camera
 from cardbox_tracker.camera.extrinsics import Extrinsics
 from cardbox_tracker.camera.rasterisation import render
 from cardbox_tracker.camera.view import OtherCamera, View
+from cardbox_tracker.detectors.identity import OTHER, cheapest
 from cardbox_tracker.detectors.image_points import ImagePoints
 from cardbox_tracker.person.cardbox import cardbox_patches
 from cardbox_tracker.person.model import BodyModel
@@ -25,13 +26,13 @@ from cardbox_tracker.terms.term import Posed
 from cardbox_tracker.terms.whole_body import WholeBodyCost
 from cardbox_tracker.terms.whole_body_config import WholeBodyCostConfig
 from cardbox_tracker.tracking import session
-from cardbox_tracker.tracking.estimate import NO_PERSON, UNCERTAIN, Estimate
+from cardbox_tracker.tracking.estimate import LOST, NO_PERSON, TRACKING, UNCERTAIN, Estimate
 from cardbox_tracker.tracking.observation import Observation
 from cardbox_tracker.tracking.session import Session
 
 CAMERA = Camera(320, 240, 260.0, 260.0, 159.5, 119.5)
 BODY = BodyModel.of(distance_m=2.6, hip_height_m=-0.25)
-RED, BLUE = (40, 40, 220), (220, 60, 40)
+RED, BLUE, GREY = (40, 40, 220), (220, 60, 40), (90, 90, 90)
 STEP_NS = 66_666_667
 Detect = Callable[..., ImagePoints]
 
@@ -155,6 +156,38 @@ def test_somebody_else_in_the_place_of_one_who_left_is_not_that_person(detected:
     assert [one.person for one in found if one.posture is not None] == [2]
 
 
+@pytest.mark.parametrize("aside_m", [0.35, -0.5])
+def test_after_a_cut_a_number_is_not_that_of_somebody_else(
+    aside_m: float, detected: Detect
+) -> None:
+    """The next image has another person nearby, whose clothes are others."""
+    show = scene(detected, 0)
+    for _ in range(6):
+        show((0.0, RED))
+    # One may hide the other where they overlap.
+    for _ in range(60):
+        first, *others = show((aside_m, BLUE))
+        assert first.state != TRACKING
+        assert places([first]) in ([None], [pytest.approx(0.0, abs=0.1)])
+    assert first.state == LOST
+    assert places(others) == [pytest.approx(aside_m, abs=0.1)]
+
+
+def test_only_an_image_of_them_brings_somebody_back(detected: Detect) -> None:
+    """The silhouette in their last place is a shadow; figures beyond the border are none."""
+    show = scene(detected)
+    for _ in range(6):
+        show((-0.7, RED), (0.5, BLUE))
+    for _ in range(8):
+        found = show((0.5, BLUE))
+    assert places(found) == [None, pytest.approx(0.5, abs=0.1)]
+    for people in ([(-0.7, GREY)], [(-0.8, BLUE)], [(-2.0, RED)]):
+        for _ in range(3):
+            found = show((0.5, BLUE), *people, found=[0] if people[0][1] == GREY else None)
+            assert places(found) == [None, pytest.approx(0.5, abs=0.1)]
+    assert places(show((0.5, BLUE), (-0.7, RED))) == pytest.approx([-0.7, 0.5], abs=0.1)
+
+
 def test_a_reset_forgets_one_person(detected: Detect) -> None:
     show = scene(detected)
     show((-0.6, RED), (0.6, BLUE))
@@ -226,11 +259,11 @@ def test_the_outline_of_others_does_not_pull() -> None:
 )
 def test_figures_are_assigned_with_the_least_sum(costs: list[list[float]]) -> None:
     table = np.array(costs)
-    found = session._cheapest(table)
+    found = cheapest(table)
     assert len(set(found.values())) == len(found)
-    assert all(table[row, column] < session._OTHER for row, column in found.items())
+    assert all(table[row, column] < OTHER for row, column in found.items())
     rows = np.arange(len(table))
-    clipped = np.minimum(table, session._OTHER)
+    clipped = np.minimum(table, OTHER)
     least = min(clipped[rows, list(chosen)].sum() for chosen in permutations(range(4), len(rows)))
-    unassigned = session._OTHER * (len(table) - len(found))
+    unassigned = OTHER * (len(table) - len(found))
     assert sum(table[pair] for pair in found.items()) + unassigned == pytest.approx(least)

@@ -204,9 +204,10 @@ REBA = Method(
 _LIFTED_M = 0.10
 # Masses of head, arms and trunk, of both thighs, and of both shanks with the feet, and how far from
 # hips to shoulders, hips to knees, and knees to ankles their centres are (Winter, "Biomechanics and
-# Motor Control of Human Movement"); heel behind the ankle, m, and margin of the centre of mass, m.
+# Motor Control of Human Movement"); heel behind the ankle, m, and margin of the centre of mass, m:
+# two deviations where hips, knees and trunk are wrong by 9 degrees.
 _MASSES, _CENTRES = (0.678, 0.2, 0.122), (0.626, 0.433, 0.606)
-_HEEL_M, _MARGIN_M = 0.05, 0.05
+_HEEL_M, _MARGIN_M = 0.05, 0.17
 # Slope up to which thighs are level, rad; time after which somebody like that sits, ns.
 _LEVEL_RAD, _SITS_NS = math.radians(30.0), 1_000_000_000
 

@@ -129,10 +129,10 @@ class FoundBody:
         self,
         node: CardboxNode,
         settings: TrackerParameters,
-        use: Callable[[Sequence[BodyModel]], None],
+        tilt: Callable[[Sequence[BodyModel]], None],
     ) -> None:
         self.text = ""
-        self._node, self._settings, self._use = node, settings, use
+        self._node, self._settings, self._tilt = node, settings, tilt
         self._is_measured = False
         self._model = node.advertise(String, "body_model", qos.LATCHED)
         self._description = node.advertise(String, "robot_description", qos.LATCHED)
@@ -147,7 +147,6 @@ class FoundBody:
         node.get_logger().info(
             f"nobody is measured: the person in the image is tracked with {stature}"
         )
-        use(settings.guesses)
 
     def _on_pitch(self, message: Float64, _: int) -> None:
         if not self._is_measured:
@@ -156,7 +155,7 @@ class FoundBody:
             bodies = [body.with_values(**tilt) for body in self._settings.guesses]
             degrees = math.degrees(message.data)
             self._node.diagnostics.say("pitch", f"the detector found a pitch of {degrees:.0f} deg")
-            self._use(bodies)
+            self._tilt(bodies)
 
     def replace(self, text: str) -> None:
         """Latch the text of a measured body, too, so that late subscribers get one body."""
@@ -197,6 +196,7 @@ class TrackerNode(CardboxNode):
         self._camera: Camera | None = None
         self._others: Sequence[OtherCamera] = ()
         self._session: Session | None = None
+        self._is_tilted = False
         numbers = [None, *range(1, settings.people + 1)][settings.people > 0 :]
         self._reports = [TrackingReport() for _ in numbers]
         bodies = TrackedBodies(self, len(numbers)) if settings.rep155_id else None
@@ -217,7 +217,8 @@ class TrackerNode(CardboxNode):
         if settings.model_file:
             self._use([load_body_model(user_path(settings.model_file))])
         elif settings.guesses:
-            self._found = FoundBody(self, settings, self._use)
+            self._found = FoundBody(self, settings, self._tilt)
+            self._use(settings.guesses)
         self._wait()
 
     def _prepare(self, settings: TrackerParameters) -> None:
@@ -262,6 +263,14 @@ class TrackerNode(CardboxNode):
         self._build("new body model")
         self._wait()
 
+    def _tilt(self, bodies: Sequence[BodyModel]) -> None:
+        """Use the other pitch of ``bodies``, from the next image on and without a new start."""
+        if self._session is None:
+            self._use(bodies)
+            return
+        self._bodies = [self._rolled(body) for body in bodies]
+        self._is_tilted = True
+
     def _on_cameras(self, first: Camera | None, others: Sequence[OtherCamera]) -> None:
         """Use the cameras when all are known or one has changed."""
         if not (others or self._others) and first == self._camera:
@@ -288,6 +297,7 @@ class TrackerNode(CardboxNode):
         """
         if not self._bodies or self._camera is None:
             return
+        self._is_tilted = False
         settings = self.parameters.value
         rng = np.random.default_rng(settings.seed)
         people = settings.people or None
@@ -341,6 +351,9 @@ class TrackerNode(CardboxNode):
             self._outputs[0].waiting(lead.message, lead.image, text)
             return
         seen = self._inputs.observed(received)
+        if self._is_tilted:
+            self._is_tilted = False
+            self._session.tilt(self._bodies, conversions.stamp_ns(seen.header.stamp))
         estimates, trackers = self._session.track(seen.observations), self._session.trackers
         for outputs, report, estimate, tracker in zip(
             self._outputs, self._reports, estimates, trackers, strict=True

@@ -12,6 +12,8 @@ from std_msgs.msg import Bool, Header, String
 from cardbox_tracker.applications.drawing.overlay import draw_camera_overlay, draw_message
 from cardbox_tracker.camera.camera import OPTICAL_FRAME
 from cardbox_tracker.common.errors import CardboxError
+from cardbox_tracker.person.model import BodyModel
+from cardbox_tracker.person.model_file import dumps_body_model
 from cardbox_tracker.person.rep155 import Rep155Joints, head_joints, joint_names
 from cardbox_tracker.person.urdf import LinkTransform, LinkTransforms, rep155_urdf, urdf_from_body
 from cardbox_tracker.recordings.outputs import (
@@ -203,6 +205,9 @@ class TrackerOutputs:
             )
             for output in topics
         }
+        # With people, body_model is that of the first one, or the given one of all.
+        self._model = space and node.advertise(String, f"{space}body_model", qos.LATCHED)
+        self._body: BodyModel | None = None
         self._stream = OutputStream(topics)
         self._overlay = node.advertise(Image, f"{space}overlay", qos.SENSOR_DATA)
         self._camera_overlays = [
@@ -227,6 +232,10 @@ class TrackerOutputs:
         """Publish the outputs of an image; a lost posture is not repeated."""
         header = seen.header
         stamp_ns = conversions.stamp_ns(header.stamp)
+        if self._model and tracker.body is not self._body:
+            # Joint states of a version of the body follow it.
+            self._body = tracker.body
+            self._model.publish(String(data=dumps_body_model(self._body)))
         for output, value in self._stream.values(stamp_ns, estimate, tracker, self._is_wanted):
             self._publishers[output.topic].publish(results.message_of(header, value))
         if self._human is not None:

@@ -18,6 +18,7 @@ from cardbox_tracker.applications.ergonomics.reba import (
     read_table,
     reba_scores,
     score_table,
+    sits,
 )
 from cardbox_tracker.applications.ergonomics.recording import score_shares, summarize, write_csv
 from cardbox_tracker.applications.ergonomics.report import PageContent, report_lines, write_page
@@ -114,6 +115,23 @@ def test_knees_do_not_count_for_who_sits(tmp_path: Path) -> None:
     assert legs_in(SEATED, 0.2) == [3.0] * 4
     # Thighs that slope by 45 degrees: a squat whose trunk was found too upright.
     assert legs_in(np.radians([45.0, 0.0, 0.0, 85.0] * 2), 0.5) == [3.0] * 4
+
+
+@pytest.mark.parametrize(("hip", "knee", "lean"), [(95, 115, 35), (80, 95, 40), (100, 125, 35)])
+@pytest.mark.parametrize("error", [-9, 0, 9])
+def test_a_squat_that_is_found_too_upright_is_none_who_sits(
+    hip: float, knee: float, lean: float, error: float
+) -> None:
+    """Knees or trunk off by what is usual: the centre of mass of these is above the feet."""
+    for legs, trunk in (((hip, knee + error), lean), ((hip, knee), lean - abs(error) - 6)):
+        angles = np.radians([legs[0], 0.0, 0.0, legs[1]] * 2)
+        assert not sits(angles, np.radians(trunk), LENGTHS_M)
+
+
+@pytest.mark.parametrize("lean", [-20, 0, 15])
+@pytest.mark.parametrize(("hip", "knee"), [(90, 90), (80, 80), (95, 70)])
+def test_who_sits_is_found(hip: float, knee: float, lean: float) -> None:
+    assert sits(np.radians([hip, 0.0, 0.0, knee] * 2), np.radians(lean), LENGTHS_M)
 
 
 def test_what_is_not_measured_counts_as_declared() -> None:

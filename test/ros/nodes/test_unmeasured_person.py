@@ -147,3 +147,42 @@ def test_a_standing_person_shows_the_detector_the_pitch(bus: Any, shown: bool) -
         pitch.see(Detection(px, scores, np.zeros((120, 160), np.uint8)), CAMERA)
     found = bus.texts("/detector/camera_pitch")
     assert found == ([pytest.approx(0.2, abs=0.06)] if shown else [])
+
+
+def test_a_pitch_that_is_found_late_changes_nothing_of_who_is_tracked(bus: Any, start: Any) -> None:
+    """Two people; the version that a message announces has the sizes and places of the last one."""
+    outline, low = np.zeros_like(OUTLINE), PERSON.with_values(hip_height_m=-0.7)
+    for aside_m in (-0.5, 0.5):
+        posture = reference_posture("front")
+        posture[0] = aside_m
+        outline |= render(cardbox_patches(low, posture), CAMERA)
+
+    def shown(tenth: int) -> list[np.ndarray]:
+        header = Header(frame_id="eye", stamp=Time(sec=1, nanosec=tenth * 10**8))
+        bus.send("/silhouette", image_message(header, outline, "mono8"))
+        poses = (bus.sent[f"/person_{person}/keypoints"][-1].poses for person in (1, 2))
+        at = [[(p.position.x, p.position.y, p.position.z) for p in one] for one in poses]
+        return [np.array(one) for one in at]
+
+    node = start(people=2, statures=[1.8, 1.8], use_image=False)
+    for tenth in range(5):
+        before = shown(tenth)
+    trackers = node._session.trackers
+    ages = [(one.filter, one.filter._age + 1) for one in trackers]
+    bodies = [loads_body_model(bus.texts(f"/person_{n}/body_model")[-1]) for n in (1, 2)]
+    counts = [len(bus.texts(f"/person_{n}/body_model")) for n in (1, 2)]
+    bus.send("/detector/camera_pitch", Float64(data=0.15))
+    after = shown(5)
+    assert node._session.trackers == trackers
+    assert [(one.filter, one.filter._age) for one in trackers] == ages
+    for person in (1, 2):
+        texts = bus.texts(f"/person_{person}/body_model")
+        body, last = loads_body_model(texts[-1]), bodies[person - 1]
+        assert len(texts) == counts[person - 1] + 1
+        assert (body.version, body.stamp_ns) == (last.version + 1, 1_500_000_000)
+        assert body.camera_pose.pitch_rad == pytest.approx(0.15)
+        assert body.person == last.person
+        assert after[person - 1] == pytest.approx(before[person - 1], abs=0.1)
+        assert len(bus.sent[f"/person_{person}/joint_states"][-1].velocity) == 0
+    # What comes later has the pitch, too.
+    assert [one.camera_pose.pitch_rad for one in node._session._bodies] == [0.15, 0.15]

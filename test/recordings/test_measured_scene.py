@@ -1,0 +1,61 @@
+"""Whose points are whose in a recording, before its scene is measured."""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+import pytest
+
+from cardbox_tracker.detectors.figure import figure_of_points
+from cardbox_tracker.detectors.image_points import POINT_NAMES, ImagePoints
+from cardbox_tracker.recordings.measured_scene import _assign, _Person
+from cardbox_tracker.recordings.silhouettes import RecordedFrame
+
+RED, BLUE = (40, 40, 220), (220, 60, 40)
+SHAPE = 240, 320
+# Places of joints beside the middle of the shoulders, px.
+BESIDE = {"shoulder": (18, 0), "elbow": (24, 30), "wrist": (24, 55), "hip": (12, 60)}
+
+
+def standing(column: float) -> ImagePoints:
+    px = np.full((len(POINT_NAMES), 2), (column, 60.0))
+    for number, name in enumerate(POINT_NAMES):
+        side, _, joint = name.partition("_")
+        if joint in BESIDE:
+            aside, down = BESIDE[joint]
+            px[number] += (aside if side == "left" else -aside, down)
+    return ImagePoints(px, np.ones(len(POINT_NAMES)))
+
+
+def frame(*people: tuple[float, tuple[int, int, int]], found: int) -> RecordedFrame:
+    """Return an image of people at columns in a colour, of whom the first ``found`` are found."""
+    image = np.full((*SHAPE, 3), 128, np.uint8)
+    for column, colour in reversed(people):
+        cv2.rectangle(image, (round(column) - 20, 60), (round(column) + 20, 120), colour, -1)
+    points = tuple(standing(column) for column, _ in people[:found])
+    silhouette = np.full(SHAPE, 255, np.uint8)
+    return RecordedFrame(0, 0.0, image[..., 0], silhouette, image, people=points)
+
+
+@pytest.mark.parametrize("step", [6.0, -6.0])
+def test_who_walks_past_another_is_not_mixed_with_them(step: float) -> None:
+    """While one hides the other, the detector finds only the former, at the other's place."""
+    people: list[_Person] = []
+    walked = [160.0 + step * (k - 20) for k in range(41)]
+    for k, column in enumerate(walked):
+        both = abs(column - 160.0) > 25.0
+        _assign(people, frame((column, RED), (160.0, BLUE), found=1 + both), k / 15)
+    columns = [
+        [float(figure_of_points(points).middle_px[0]) for _, points in person.seen]
+        for person in people
+    ]
+    assert len(columns) == 2
+    assert columns[0] == pytest.approx(walked)
+    assert set(columns[1]) == {160.0}
+
+
+def test_who_comes_after_two_seconds_is_a_new_person() -> None:
+    people: list[_Person] = []
+    for time_s in (0.0, 0.1, 2.1):
+        _assign(people, frame((160.0, RED), found=1), time_s)
+    assert [[time_s for time_s, _ in person.seen] for person in people] == [[0.0, 0.1], [2.1]]
