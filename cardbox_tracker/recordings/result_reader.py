@@ -321,10 +321,9 @@ def namespace_of(bag: BagReader, person: int | None = None) -> str:
             "'cardbox track BAG ... --bag RESULTS'"
         )
     spaces = [topic.removesuffix(MODEL) for topic in models]
-    # Beside several people, who have results, there is the body that was given for all.
-    spaces = [space for space in spaces if space + _JOINTS in bag.topics] or spaces
     if person is None:
-        return spaces[0]
+        # Beside several people, there may be the body that was given for all.
+        return next((space for space in spaces if space + _JOINTS in bag.topics), spaces[0])
     chosen = [space for space in spaces if space.endswith(person_space(person))]
     if not chosen:
         raise BagError(
