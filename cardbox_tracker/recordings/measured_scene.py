@@ -98,7 +98,7 @@ class _Person:
 
 def _assign(people: list[_Person], frame: RecordedFrame, time_s: float) -> None:
     """Add the points in a frame to the people who they are by place and colours, or to new ones."""
-    shown = []
+    shown = list[tuple[ImagePoints, Figure, FloatArray | None]]()
     for points in frame.people if frame.people is not None else (frame.points,):
         if points is not None:
             figure = figure_of_points(points)
@@ -107,7 +107,10 @@ def _assign(people: list[_Person], frame: RecordedFrame, time_s: float) -> None:
     # Who was away for longer may be somebody else with the same clothes.
     known = [(one, round(1e9 * (time_s - one.seen[-1][0]))) for one in people]
     known = [(one, away_ns) for one, away_ns in known if 0 < away_ns <= GONE_NS]
-    costs = [[unlike(one.figure, one.colours, *now, ns) for _, *now in shown] for one, ns in known]
+    costs = [
+        [unlike(one.figure, one.colours, figure, their, ns) for _, figure, their in shown]
+        for one, ns in known
+    ]
     found = {column: known[row][0] for row, column in cheapest(costs).items()}
     for column, (points, figure, colours) in enumerate(shown):
         if column not in found:

@@ -322,7 +322,8 @@ def namespace_of(bag: BagReader, person: int | None = None) -> str:
         )
     spaces = [topic.removesuffix(MODEL) for topic in models]
     if person is None:
-        return spaces[0]
+        # Beside several people, there may be the body that was given for all.
+        return next((space for space in spaces if space + _JOINTS in bag.topics), spaces[0])
     chosen = [space for space in spaces if space.endswith(person_space(person))]
     if not chosen:
         raise BagError(

@@ -123,12 +123,6 @@ class WholeBodyFilter:
         is_measured = self._body.source == MEASURED
         self._outline = doubt.Source.MEASURED if is_measured else doubt.Source.OUTLINE
 
-    def move(self, moved: Callable[[FloatArray], FloatArray]) -> None:
-        """Go on from the states (N, 14) that ``moved`` makes of the present ones."""
-        self._survivors = np.clip(moved(self._survivors), *self._cost.limits.T)
-        self._output = self._correction = None
-        self.approach.begin(float(self._survivors[0, TORSO_X]))
-
     def forget(self) -> None:
         """See :class:`~.pose_filter.PoseFilter`."""
         self._survivors = self._reference[None].copy()
@@ -143,6 +137,12 @@ class WholeBodyFilter:
         self._correction: FloatArray | None = None
         self._arm.forget()
         self._doubt.forget()
+
+    def move(self, moved: Callable[[FloatArray], FloatArray]) -> None:
+        """Go on from the states (N, 14) that ``moved`` makes of the present ones."""
+        self._survivors = np.clip(moved(self._survivors), *self._cost.limits.T)
+        self._output = self._correction = None
+        self.approach.begin(float(self._survivors[0, TORSO_X]))
 
     def recover(self) -> None:
         """See :class:`~.pose_filter.PoseFilter`; an upright state is added to the search.

@@ -152,24 +152,6 @@ class Tracker:
         self._filter.use(silhouette, views)
         self._head = HeadTracker(self.body, self.camera)
 
-    def tilt(self, guess: BodyModel, stamp_ns: int = 0) -> None:
-        """Go on before the same camera with the pitch of ``guess``, from the image of a stamp on.
-
-        The person stays in the same place of the image, as a new version of the body.
-        """
-        body = tilted_body(self.body, guess.camera_pose)
-        body = replace(body, version=self.body.version + 1, stamp_ns=stamp_ns)
-        moved = partial(tilted_states, before=self.body, after=body)
-        self.camera = self.camera.with_pitch(body.camera_pose.pitch_rad)
-        self._place = PlaceWatch(body, self.camera)
-        if self._measuring is not None:
-            self._measuring.tilt(guess)
-        if self._before is not None:
-            self._before = moved(self._before[None])[0]
-        self._use(body, CompiledSilhouette(body, self.camera), is_new_start=False)
-        if isinstance(self._filter, WholeBodyFilter):
-            self._filter.move(moved)
-
     def reset(self) -> None:
         """Forget the posture; the next frame is tracked from the front reference posture."""
         make_filter = self._make_filter or FILTERS[self.config.filter]
@@ -190,6 +172,24 @@ class Tracker:
         self._particles: Particles | None = None
         # State (14,) of the previous frame for the terms.
         self._before: FloatArray | None = None
+
+    def tilt(self, guess: BodyModel, stamp_ns: int = 0) -> None:
+        """Go on before the same camera with the pitch of ``guess``, from the image of a stamp on.
+
+        The person stays in the same place of the image, as a new version of the body.
+        """
+        body = tilted_body(self.body, guess.camera_pose)
+        body = replace(body, version=self.body.version + 1, stamp_ns=stamp_ns)
+        moved = partial(tilted_states, before=self.body, after=body)
+        self.camera = self.camera.with_pitch(body.camera_pose.pitch_rad)
+        self._place = PlaceWatch(body, self.camera)
+        if self._measuring is not None:
+            self._measuring.tilt(guess)
+        if self._before is not None:
+            self._before = moved(self._before[None])[0]
+        self._use(body, CompiledSilhouette(body, self.camera), is_new_start=False)
+        if isinstance(self._filter, WholeBodyFilter):
+            self._filter.move(moved)
 
     def configure(self, config: TrackerConfig) -> bool:
         """Use other settings from the next frame on; return whether tracking starts again."""

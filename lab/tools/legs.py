@@ -117,7 +117,9 @@ def _seen(stamp_ns: int, estimate: Estimate, joints_m: Any, pitch_rad: float) ->
     lengths_m = np.linalg.norm(bones, axis=-1)
     trunk = (level_m[6:].mean(axis=0) - level_m[[0, 3]].mean(axis=0)) @ hips
     units = bones / lengths_m[..., None]
-    angles = [leg_angles(*one, side) for one, side in zip(units, (1.0, -1.0), strict=True)]
+    angles = [
+        leg_angles(one[0], one[1], side) for one, side in zip(units, (1.0, -1.0), strict=True)
+    ]
     posture = np.zeros((2, len(estimate.posture)))
     posture[0, PITCH] = np.arctan2(trunk[0], trunk[2])
     true = np.stack([np.concatenate(angles), np.zeros(8)])

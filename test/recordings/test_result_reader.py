@@ -132,6 +132,17 @@ def test_a_bag_of_one_stamp_is_refused(tmp_path: Path) -> None:
         read_results(tmp_path / "bag")
 
 
+def test_a_live_recording_of_people_beside_the_body_that_was_given(tmp_path: Path) -> None:
+    with BagReader(write_bag(tmp_path / "one")) as bag, BagWriter(tmp_path / "live") as writer:
+        for one in bag.messages(list(bag.topics)):
+            message = bag.deserialize(one)
+            writer.write(f"/person_2{one.topic}", message, one.time_ns)
+            if one.topic == "/body_model":
+                writer.write(one.topic, message, one.time_ns)
+    assert len(read_results(tmp_path / "live").state) == 5
+    assert read_results(tmp_path / "live", 2).state == read_results(tmp_path / "one").state
+
+
 STAMP_NS = columns().index("stamp_ns")
 
 
