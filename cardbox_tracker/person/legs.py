@@ -147,14 +147,15 @@ def leg_rotations(
     return thigh, thigh @ rotation_y(a[..., 3])
 
 
-def leg_angles(thigh: FloatArray, shank: FloatArray, side: float) -> FloatArray:
-    """Return angles (4,) of a leg with these directions (3,), see :func:`leg_directions`.
+def leg_angles(thigh: FloatArray, shank: FloatArray, side: float | FloatArray) -> FloatArray:
+    """Return angles (..., 4) of legs with directions (..., 3), see :func:`leg_directions`.
 
-    The knee bends backwards, within a quarter of a turn.
+    Knees bend backwards, within a quarter of a turn.
     """
-    flexion = np.arctan2(thigh[0], -thigh[2])
-    abduction = side * np.arcsin(np.clip(thigh[1], -1.0, 1.0))
-    turned = (rotation_y(-flexion) @ rotation_x(side * abduction)).T @ shank
-    bend = np.arccos(np.clip(-turned[2], -1.0, 1.0))
-    rotation = side * np.arctan2(turned[1], max(-turned[0], 1e-3)) if bend > 0.05 else 0.0
-    return np.array([flexion, abduction, rotation, bend])
+    flexion = np.arctan2(thigh[..., 0], -thigh[..., 2])
+    abduction = side * np.arcsin(np.clip(thigh[..., 1], -1.0, 1.0))
+    turn = rotation_y(-flexion) @ rotation_x(side * abduction)
+    turned = (shank[..., None, :] @ turn)[..., 0, :]
+    bend = np.arccos(np.clip(-turned[..., 2], -1.0, 1.0))
+    rotation = side * np.arctan2(turned[..., 1], np.maximum(-turned[..., 0], 1e-3))
+    return np.stack([flexion, abduction, np.where(bend > 0.05, rotation, 0.0), bend], axis=-1)

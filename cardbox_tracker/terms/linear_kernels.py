@@ -29,3 +29,18 @@ def solve(matrix: Floats, right: Floats) -> None:
         for k in range(i + 1, n):
             right[i] -= matrix[k, i] * right[k]
         right[i] /= matrix[i, i]
+
+
+@kernel
+def write_normal(jacobian: Floats, residuals: Floats, matrix: Floats, right: Floats) -> None:
+    """Write the normal equations, (m, m) and (m,), of residuals (n,) with a Jacobian (n, m)."""
+    count, size = jacobian.shape
+    for j in range(size):
+        right[j] = 0.0
+        for i in range(count):
+            right[j] += jacobian[i, j] * residuals[i]
+        for k in range(j + 1):
+            matrix[j, k] = 0.0
+            for i in range(count):
+                matrix[j, k] += jacobian[i, j] * jacobian[i, k]
+            matrix[k, j] = matrix[j, k]

@@ -7,6 +7,7 @@ depend on the last place of the hips.
 
 from __future__ import annotations
 
+from functools import cached_property
 from math import ceil
 from typing import NamedTuple
 
@@ -87,7 +88,6 @@ class WholeBodyCost:
         size: width and height of the image, px.
         limits: lowest and highest value of each value of a state, (14, 2).
         pitch_rad: pitch of the camera, rad, positive downwards.
-        frontal_px: pixels of the model in the front reference posture.
         counted: number of rows of the present silhouette that count, from the top, and width, px.
         silhouette_px: foreground pixels that count in the present silhouette.
         anchor: x and z of the last frame, the home of x, metres, and the expected yaw, rad; (4,).
@@ -116,9 +116,15 @@ class WholeBodyCost:
         self._outline: Outline | None = None
         self.anchor = np.zeros(4)
         self._prior: priors.PriorTuple = self.anchor, self._rules, self._gaussians
-        front = body.reference_state()[None]
-        self.see(np.zeros((camera.height, camera.width), np.uint8), front[0])
-        self.frontal_px = max(1, int(self.bodies(front).areas_px[0]))
+        self.see_nothing()
+
+    @cached_property
+    def frontal_px(self) -> int:
+        """Pixels of the model in the front reference posture."""
+        front = self.person.reference_state()[None]
+        alone = WholeBodyCost(self.person, self._camera, self._config)
+        alone.see(np.zeros(self.size[::-1], np.uint8), front[0])
+        return max(1, int(alone.bodies(front).areas_px[0]))
 
     def see(self, silhouette: Silhouette, state: FloatArray) -> None:
         """Set the silhouette (H, W) of a person whose hips are near those of ``state`` (14,)."""

@@ -129,8 +129,7 @@ def _tracked(
         estimate = tracker.track(list(map(Observation, silhouettes, images)))
         if estimate.posture is None or estimate.offset_m is None or estimate.iou is None:
             continue
-        state = np.concatenate([estimate.posture, estimate.offset_m])
-        found.append(Sighting(state, *silhouettes))
+        found.append(Sighting(estimate.placed_posture, *silhouettes))
         ious.append(estimate.iou)
     every = max(1, len(found) // _SIGHTINGS)
     return found[every - 1 :: every], float(np.mean(ious)) if ious else float("nan")

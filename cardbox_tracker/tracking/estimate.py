@@ -162,6 +162,14 @@ class Estimate:
             legs = legs._replace(points_m=legs.points_m @ turn)
         return replace(self, keypoints_m=self.keypoints_m @ turn, hands=hands, legs=legs)
 
+    @property
+    def placed_posture(self) -> FloatArray:
+        """Posture and place of the hips, (14,), or the posture (12,) alone if that is constant."""
+        assert self.posture is not None
+        if self.offset_m is None:
+            return self.posture
+        return np.concatenate([self.posture, self.offset_m])
+
     def placed(self, body: BodyModel) -> BodyModel:
         """Return ``body`` at the place of this estimate."""
         if self.offset_m is None:

@@ -31,7 +31,7 @@ from cardbox_tracker.person.posture import PITCH, YAW
 from cardbox_tracker.person.sizes import FloatArray
 from cardbox_tracker.person.skeleton import NECK_LIMITS
 from cardbox_tracker.terms.kernel_arguments import Floats
-from cardbox_tracker.terms.linear_kernels import solve
+from cardbox_tracker.terms.linear_kernels import solve, write_normal
 from cardbox_tracker.terms.term import Frame
 from cardbox_tracker.tracking.estimate import Estimate
 
@@ -137,7 +137,7 @@ def fit_neck(
     if depth_m <= _FARTHEST_M:
         return None
     size = body_parts(body.sizes).head.height_m / HEAD_HEIGHT_M
-    values, rms, covariance = _solve(
+    values, rms, information = _solve(
         np.ascontiguousarray(axes @ frames.torso_rotation),
         np.ascontiguousarray(axes.T),
         head_m,
@@ -148,7 +148,7 @@ def fit_neck(
     )
     angles = values[:2]
     beyond = np.maximum(NECK_LIMITS[:, 0] - angles, angles - NECK_LIMITS[:, 1])
-    stddev = np.sqrt(np.diag(covariance)[:2]) * max(1.0, rms)
+    stddev = np.sqrt(np.diag(np.linalg.inv(information))[:2]) * max(1.0, rms)
     is_face = rms <= LARGEST_RMS and np.hypot(*values[3:5]) <= _FARTHEST_M
     if not is_face or (beyond > _BEYOND_LIMITS_RAD).any() or (stddev > LARGEST_STDDEV_RAD).any():
         return None
@@ -207,7 +207,7 @@ def _solve(
     lens: tuple[float, float, float, float],
     sigma_px: float,
 ) -> tuple[Floats, float, Floats]:
-    """Return the best values (6,), the residuals' RMS and the covariance (6, 6); see above."""
+    """Return the best values (6,), the residuals' RMS and the information (6, 6); see above."""
     count = 2 * face_m.shape[0] + 6
     here, above, jacobian = np.empty(count), np.empty(count), np.empty((count, 6))
     normal, step, best = np.empty((6, 6)), np.empty(6), np.empty(6)
@@ -224,14 +224,7 @@ def _solve(
                 values[j] = before
                 for i in range(count):
                     jacobian[i, j] = (above[i] - here[i]) / _DIFFERENCE
-            for j in range(6):
-                step[j] = 0.0
-                for i in range(count):
-                    step[j] += jacobian[i, j] * here[i]
-                for k in range(6):
-                    normal[j, k] = 0.0
-                    for i in range(count):
-                        normal[j, k] += jacobian[i, j] * jacobian[i, k]
+            write_normal(jacobian, here, normal, step)
             if number == _STEPS:
                 break
             solve(normal, step)
@@ -242,20 +235,9 @@ def _solve(
             cost += here[i] ** 2
         if cost < least:
             least = cost
-            for j in range(6):
-                best[j] = values[j]
-                for k in range(6):
-                    kept[j, k] = normal[j, k]
-    covariance, matrix = np.empty((6, 6)), np.empty((6, 6))
-    for j in range(6):
-        for i in range(6):
-            for k in range(6):
-                matrix[i, k] = kept[i, k]
-        covariance[j] = 0.0
-        covariance[j, j] = 1.0
-        solve(matrix, covariance[j])
+            best[:], kept[:] = values, normal
     # Priors add as many residuals as there are unknowns, so the points are the degrees of freedom.
-    return best, sqrt(least / (2 * face_m.shape[0])), covariance
+    return best, sqrt(least / (2 * face_m.shape[0])), kept
 
 
 class HeadTracker:
@@ -289,10 +271,7 @@ class HeadTracker:
     def _fit(self, points: ImagePoints | None, found: Estimate) -> Neck | None:
         if points is None or found.posture is None:
             return None
-        state = found.posture
-        if found.offset_m is not None:
-            state = np.concatenate([state, found.offset_m])
-        neck = fit_neck(points, self._body, self._camera, state)
+        neck = fit_neck(points, self._body, self._camera, found.placed_posture)
         if neck is None or found.posture_stddev is None:
             return neck
         return neck._replace(stddev=np.hypot(neck.stddev, found.posture_stddev[[YAW, PITCH]]))

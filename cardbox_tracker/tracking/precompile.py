@@ -24,7 +24,7 @@ from cardbox_tracker.common import compiling
 from cardbox_tracker.common.errors import CardboxError
 from cardbox_tracker.common.processes import cores, results_of
 from cardbox_tracker.common.progress import progress_bar
-from cardbox_tracker.detectors.image_points import POINT_NAMES, ImagePoints
+from cardbox_tracker.detectors.image_points import POINT_NAMES, ImagePoints, LegPoints
 from cardbox_tracker.person.appearance import PARTS, Appearance, bins_of
 from cardbox_tracker.person.cardbox import cardbox_patches
 from cardbox_tracker.person.model import BodyModel
@@ -112,7 +112,8 @@ def _call_all(presets: Sequence[str], several_cameras: bool, points: bool) -> No
     beside = OtherCamera(camera, Extrinsics(np.eye(3), np.array([0.1, 0.0, 0.0])))
     silhouette = render(cardbox_patches(body, reference_posture("front")), camera)
     CompiledSilhouette(body, camera).warm_up()
-    some = ImagePoints(np.full((len(POINT_NAMES), 2), 36.0), np.ones(len(POINT_NAMES)))
+    px, scores = np.full((len(POINT_NAMES), 2), 36.0), np.ones(len(POINT_NAMES))
+    some = ImagePoints(px, scores, legs=LegPoints(px[:8], scores[:8]))
     found = (None, None, some, some) if points else (None, None)
     for name in presets:
         # Images with and without colour, since terms that use them are compiled for both.

@@ -164,9 +164,7 @@ def _placed(body: BodyModel, silhouette: Image, camera: Camera) -> BodyModel:
 
 def _iou(cost: WholeBodyCost, estimate: Estimate, mask: Image) -> float:
     """Return the overlap of the drawn model and a mask in the rows that the tracker uses."""
-    assert estimate.posture is not None
-    assert estimate.offset_m is not None
-    state = np.concatenate([estimate.posture, estimate.offset_m])
+    state = estimate.placed_posture
     cost.see(mask, state)
     rated = cost.bodies(state[None])
     return iou_of(cost.silhouette_px, rated.areas_px[0], rated.costs_px[0])

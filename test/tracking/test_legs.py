@@ -18,6 +18,7 @@ from cardbox_tracker.detectors.image_points import (
 from cardbox_tracker.person.kinematics import pose
 from cardbox_tracker.person.legs import (
     HIP_SHARE,
+    LEG_LIMITS,
     leg_directions,
     stature_of,
 )
@@ -27,9 +28,11 @@ from cardbox_tracker.person.proportions import body_from_proportions
 from cardbox_tracker.person.sizes import FloatArray
 from cardbox_tracker.person.skeleton import (
     KeypointState,
+    rotation_z,
 )
 from cardbox_tracker.terms.term import Frame
 from cardbox_tracker.tracking.estimate import Estimate, Place
+from cardbox_tracker.tracking.leg_fit import points_of
 from cardbox_tracker.tracking.legs import LegReader
 from cardbox_tracker.tracking.place import SECOND_CAMERA
 
@@ -106,6 +109,21 @@ def read(angles: FloatArray, found: Estimate, images: int = 10) -> Estimate:
     for _ in range(images):
         result = reader.see(frame(points), found)
     return result
+
+
+def test_the_compiled_legs_are_those_of_the_skeleton() -> None:
+    rng = np.random.default_rng(3)
+    angles, hip, aside = rng.uniform(*LEG_LIMITS.T, (20, 8)), rng.random(3), rng.random(3)
+    turn, lengths = rotation_z(np.asarray(0.7)), np.array([0.4, 0.5])
+    scaled = np.log([0.9, 1.1]).tolist()
+    values = np.column_stack([angles, *np.tile([*scaled, 0.0, np.log(1.2)], (20, 1)).T])
+    found = points_of(values, (hip, aside, turn, lengths, 0.1)).reshape(20, 2, 3, 3)
+    for leg, side in enumerate((1.0, -1.0)):
+        bones = leg_directions(angles[:, 4 * leg : 4 * leg + 4], side)
+        assert found[:, leg, 0] == pytest.approx(np.tile(1.2 * hip + side * aside, (20, 1)))
+        for part, length in enumerate((0.9 * 0.4, 1.1 * 0.5)):
+            step = found[:, leg, part + 1] - found[:, leg, part]
+            assert step == pytest.approx(length * bones[part] @ turn.T)
 
 
 @pytest.mark.parametrize(

@@ -1,0 +1,157 @@
+"""Compiled Gauss-Newton fit of both legs to what one image shows; :mod:`.legs` has the cost.
+
+Values (12,) are the angles of the left and of the right leg, the logarithms of the factors of
+thigh and shank, the height of the floor, and the logarithm of the factor of the distance.
+"""
+
+from __future__ import annotations
+
+from math import cos, exp, inf, isnan, sin, sqrt
+
+import numpy as np
+
+from cardbox_tracker.common.compiling import inlined_kernel, kernel
+from cardbox_tracker.person.legs import LEG_LIMITS
+from cardbox_tracker.terms.kernel_arguments import Floats
+from cardbox_tracker.terms.linear_kernels import solve, write_normal
+
+N_ANGLES, N_VALUES = 8, 12
+LENGTHS, FLOOR, DISTANCE = 8, 10, 11
+DIFFERENCE = 1e-5
+"""Change of a value for its derivatives."""
+REST = np.tile(np.radians([60.0, 15.0, 15.0, 60.0]), 2)
+"""Deviations of the angles from those of hanging legs, (8,), rad."""
+# Of each leg: two points in the image, two slopes, and the foot; then the priors.
+_OF_LEG, _N_RESIDUALS = 7, 2 * 7 + 2 * N_ANGLES + 4
+_STEPS, _LARGEST_STEP, _NEAREST_M = 8, 0.6, 0.1
+# Deviation of a foot on the floor, m, and height above it from which a foot is lifted rather.
+_CONTACT_M, _LIFTED_M = 0.02, 0.06
+# Lowest and highest values; the lengths of people are within 12 %, floor and distance are free.
+_LOWEST = np.array([*LEG_LIMITS[:, 0], -0.12, -0.12, -inf, -inf])
+_HIGHEST = np.array([*LEG_LIMITS[:, 1], 0.12, 0.12, inf, inf])
+
+Person = tuple[Floats, Floats, Floats, Floats, float]
+"""The hips (3,) and the left one from their middle (3,), metres in the reference frame; the
+rotation (3, 3) from the hips' frame; lengths of thigh and shank (2,), and height of the ankle."""
+View = tuple[Floats, tuple[float, float, float, float]]
+"""The rotation (3, 3) from reference to optical frame, focal lengths and principal point, px."""
+Prior = tuple[Floats, Floats, Floats, Floats]
+"""Angles of the image before (8,) and deviations of their change; what images share (4,), and the
+lower root (4, 4) of its information."""
+Shown = tuple[Floats, Floats, Floats, Floats]
+"""Knees and ankles in the image (2, 2, 2), their deviations (2, 2), px, inf for unknown ones;
+slopes of thighs and shanks (2, 2), nan for unknown ones, and their deviations (2, 2)."""
+Given = tuple[Person, View, Prior, Shown]
+
+
+@inlined_kernel
+def _place(values: Floats, of: Person, points_m: Floats) -> None:
+    """Write hips, knees and ankles of both legs, (6, 3), reference frame."""
+    hip_m, aside, turn, lengths_m, _ = of
+    scale = exp(values[DISTANCE])
+    for leg in range(2):
+        side, at = 1.0 - 2.0 * leg, 4 * leg
+        cf, sf = cos(values[at]), sin(values[at])
+        ca, sa = cos(values[at + 1]), sin(values[at + 1])
+        cr, sr = cos(values[at + 2]), sin(values[at + 2])
+        cb, sb = cos(values[at + 3]), sin(values[at + 3])
+        # The shank turns about the thigh's axis, then outwards, then forwards.
+        x, y, z = sb * cr, sb * sr * ca + cb * sa, cb * ca - sb * sr * sa
+        bones = (sf * ca, side * sa, -cf * ca), (sf * z - cf * x, side * y, -sf * x - cf * z)
+        for c in range(3):
+            points_m[3 * leg, c] = scale * hip_m[c] + side * aside[c]
+        for part in range(2):
+            x, y, z = bones[part]
+            length_m = lengths_m[part] * exp(values[LENGTHS + part])
+            for c in range(3):
+                along = turn[c, 0] * x + turn[c, 1] * y + turn[c, 2] * z
+                points_m[3 * leg + part + 1, c] = points_m[3 * leg + part, c] + length_m * along
+
+
+@kernel
+def points_of(values: Floats, of: Person) -> Floats:
+    """Return hips, knees and ankles (n, 6, 3) of values (n, 12), reference frame."""
+    points_m = np.empty((values.shape[0], 6, 3))
+    for row in range(values.shape[0]):
+        _place(values[row], of, points_m[row])
+    return points_m
+
+
+@inlined_kernel
+def _write_residuals(values: Floats, given: Given, points_m: Floats, residuals: Floats) -> float:
+    """Write the residuals (34,) of values (12,), and return the sum of their squares."""
+    of, (axes, (fx, fy, cx, cy)), (before, change, expected, root), shown = given
+    px, sigma_px, slopes, sigma_slopes = shown
+    _place(values, of, points_m)
+    for leg in range(2):
+        at = _OF_LEG * leg
+        for part in range(2):
+            start, end = points_m[3 * leg + part], points_m[3 * leg + part + 1]
+            x, y, z, along, length2 = 0.0, 0.0, 0.0, 0.0, 0.0
+            for c in range(3):
+                x += axes[0, c] * end[c]
+                y += axes[1, c] * end[c]
+                z += axes[2, c] * end[c]
+                along += axes[2, c] * (end[c] - start[c])
+                length2 += (end[c] - start[c]) ** 2
+            z, sigma = max(z, _NEAREST_M), sigma_px[leg, part]
+            residuals[at + 3 * part] = (fx * x / z + cx - px[leg, part, 0]) / sigma
+            residuals[at + 3 * part + 1] = (fy * y / z + cy - px[leg, part, 1]) / sigma
+            slope = (along / sqrt(length2) - slopes[leg, part]) / sigma_slopes[leg, part]
+            residuals[at + 3 * part + 2] = 0.0 if isnan(slope) else slope
+        # A foot may not be below the floor; from some height on, it is lifted.
+        height_m = points_m[3 * leg + 2, 2] - values[FLOOR] - of[4]
+        lifted = max(height_m / _LIFTED_M, 0.0)
+        residuals[at + 6] = height_m / sqrt(1.0 + lifted**2) / _CONTACT_M
+    at = 2 * _OF_LEG
+    for j in range(N_ANGLES):
+        residuals[at + j] = values[j] / REST[j]
+        residuals[at + N_ANGLES + j] = (values[j] - before[j]) / change[j]
+    at += 2 * N_ANGLES
+    for i in range(4):
+        residuals[at + i] = 0.0
+        for j in range(i, 4):
+            residuals[at + i] += root[j, i] * (values[LENGTHS + j] - expected[j])
+    total = 0.0
+    for i in range(_N_RESIDUALS):
+        total += residuals[i] ** 2
+    return total
+
+
+@kernel
+def fit(first: Floats, others: Floats, given: Given) -> tuple[Floats, Floats, float]:
+    """Return the best values (12,), their information (12, 12), and the residuals' sum of squares.
+
+    The fit begins at ``first`` (12,) and at the best of the ``others`` (n, 12).
+    """
+    points_m, jacobian = np.empty((6, 3)), np.empty((_N_RESIDUALS, N_VALUES))
+    here, above, step = np.empty(_N_RESIDUALS), np.empty(_N_RESIDUALS), np.empty(N_VALUES)
+    normal, information = np.empty((N_VALUES, N_VALUES)), np.empty((N_VALUES, N_VALUES))
+    values, best, start, least = first.copy(), first.copy(), first, inf
+    for row in range(others.shape[0]):
+        cost = _write_residuals(others[row], given, points_m, here)
+        if cost < least:
+            least, start = cost, others[row]
+    least = inf
+    for begun in range(2 if others.shape[0] else 1):
+        if begun:
+            values[:] = start
+        for number in range(_STEPS + 1):
+            cost = _write_residuals(values, given, points_m, here)
+            for j in range(N_VALUES):
+                before = values[j]
+                values[j] = before + DIFFERENCE
+                _write_residuals(values, given, points_m, above)
+                values[j] = before
+                jacobian[:, j] = (above - here) / DIFFERENCE
+            write_normal(jacobian, here, normal, step)
+            if cost < least:
+                least = cost
+                best[:], information[:] = values, normal
+            if number == _STEPS:
+                break
+            solve(normal, step)
+            for j in range(N_VALUES):
+                value = values[j] - min(max(step[j], -_LARGEST_STEP), _LARGEST_STEP)
+                values[j] = min(max(value, _LOWEST[j]), _HIGHEST[j])
+    return best, information, least
