@@ -47,7 +47,6 @@ def header_of(method: Method) -> tuple[str, ...]:
 
 MEAN_POSTURE = "mean_posture"
 """Name of the grand score of the mean posture among the shares."""
-SHARES_HEADER = ("part", "source", "score", "time_s", "share")
 
 MOST_MOMENTS, GAP_S = 6, 3.0
 """Number of worst moments, and the least time between two of them, s."""
@@ -280,20 +279,6 @@ def _time_at(rows: Sequence[RulaRow], part: str, highest: int) -> FloatArray:
         elif row.scores is not None:
             chances[:] = row.scores.grand if part == "grand" else row.scores.parts[part]
     return np.asarray(durations_of(rows) @ found)
-
-
-def write_shares(shares: Sequence[ScoreShares], path: Path) -> None:
-    """Write ``SHARES_HEADER`` and a row for each score of each part; unknown shares are empty.
-
-    Raises:
-        CardboxError: the file cannot be written.
-    """
-    rows = (
-        (one.name, one.source, str(score), f"{time_s:.3f}", "" if np.isnan(x) else f"{x:.4f}")
-        for one in shares
-        for score, (time_s, x) in enumerate(zip(one.time_s, one.shares, strict=True), 1)
-    )
-    write_table(path, SHARES_HEADER, rows)
 
 
 def write_csv(rows: Sequence[RulaRow], path: Path, method: Method = RULA) -> None:

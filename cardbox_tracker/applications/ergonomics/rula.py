@@ -20,8 +20,9 @@ count from 1, so an index into a table or into chances is the score less one.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, fields
+from operator import attrgetter
 from types import MappingProxyType
 from typing import Any, ClassVar, NamedTuple
 
@@ -107,14 +108,7 @@ class RulaConfig(ErgonomicConfig):
 
 
 class Declared(NamedTuple):
-    """A declared input.
-
-    Attributes:
-        name: of the setting.
-        value: a score, or ``yes`` or ``no``.
-        is_default: whether it is the value that holds without a declaration.
-        description: its meaning.
-    """
+    """A declared setting, its value or ``yes`` or ``no``, and whether this is the default."""
 
     name: str
     value: str
@@ -244,12 +238,29 @@ class RulaScores(NamedTuple):
 
 
 class Part(NamedTuple):
-    """A part score: column of the tables, words, highest score, place among all scores."""
+    """A part score: column of the tables and place among all scores, words, highest score."""
 
     name: str
     words: str
     highest: int
-    of: Callable[[Any], ScoreArray]
+    place: str
+
+    def of(self, scores: Any) -> ScoreArray:
+        """Return the part's scores among all."""
+        return np.asarray(attrgetter(self.place)(scores))
+
+
+def part(words: str, highest: int, side: str = "") -> Part:
+    """Return a part of the body, or of the arm of a ``side``, by its words."""
+    name = words.lower().replace(" ", "_")
+    if not side:
+        return Part(name, words, highest, name)
+    return Part(f"{side}_{name}", f"{words}, {side}", highest, f"{side}.{name}")
+
+
+def of_both_arms(words: str, highest: int) -> tuple[Part, Part]:
+    """Return a part of the left and of the right arm."""
+    return part(words, highest, "left"), part(words, highest, "right")
 
 
 class Method(NamedTuple):
@@ -285,17 +296,12 @@ RULA = Method(
         (7, 7, "investigate and change immediately"),
     ),
     (
-        Part("left_upper_arm", "upper arm, left", 6, lambda scores: scores.left.upper_arm),
-        Part("right_upper_arm", "upper arm, right", 6, lambda scores: scores.right.upper_arm),
-        Part("left_lower_arm", "lower arm, left", 3, lambda scores: scores.left.lower_arm),
-        Part("right_lower_arm", "lower arm, right", 3, lambda scores: scores.right.lower_arm),
-        Part("trunk", "trunk", 6, lambda scores: scores.trunk),
-        Part("neck", "neck", 6, lambda scores: scores.neck),
-        Part("left_table_a", "table A, left", 9, lambda scores: scores.left.table_a),
-        Part("right_table_a", "table A, right", 9, lambda scores: scores.right.table_a),
-        Part("table_b", "table B", 9, lambda scores: scores.table_b),
-        Part("left_wrist", "wrist, left", 4, lambda scores: scores.left.wrist),
-        Part("right_wrist", "wrist, right", 4, lambda scores: scores.right.wrist),
+        *of_both_arms("upper arm", 6),
+        *of_both_arms("lower arm", 3),
+        *(part("trunk", 6), part("neck", 6)),
+        *of_both_arms("table A", 9),
+        part("table B", 9),
+        *of_both_arms("wrist", 4),
     ),
     {"wrist_twist": 2, "legs": 2},
     ("neck", *WRISTS),
@@ -414,10 +420,7 @@ def score_distribution(
     necks: FloatArray | None = None,
     wrists: FloatArray | None = None,
 ) -> ScoreDistribution:
-    """Return the distribution of the scores, given equally likely postures (n, 12) of ``body``.
-
-    ``necks`` and ``wrists`` are as in :func:`rula_scores`.
-    """
+    """Return the distribution of :func:`rula_scores` of equally likely postures (n, 12)."""
     return distribution_of(rula_scores(body, postures, config, necks, wrists), RULA)
 
 

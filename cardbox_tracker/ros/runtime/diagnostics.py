@@ -101,8 +101,7 @@ class NodeDiagnostics:
             ceased.
         advice: called once a second; returns temporary warnings, such as lost images, text by kind.
             Warnings of the kind "" are not logged here, because the node logs them.
-        remarks: called once a second; returns warnings of common checks, such as the types of the
-            topics, which write their own log messages.
+        remarks: as ``advice``, for what all nodes check, such as the types of their topics.
         remedy: what to do if results take longer than the period of the images; empty if that is
             no fault of this node, which then reports nothing.
     """
@@ -113,7 +112,7 @@ class NodeDiagnostics:
         self.extra: Callable[[], dict[str, str]] = dict
         self.advice: Callable[[], dict[str, str]] = dict
         self.source = ""
-        self.remarks: Callable[[], list[str]] = list
+        self.remarks: Callable[[], dict[str, str]] = dict
         self.remedy = ""
         self._node = node
         self._waiting = ""
@@ -236,12 +235,12 @@ class NodeDiagnostics:
 
     def _remarks(self) -> list[str]:
         """Return all current warnings, and log each new kind."""
-        found = self.input.remarks() | self._slowness() | self.advice()
+        found = self.remarks() | self.input.remarks() | self._slowness() | self.advice()
         found = {kind: plain(text) for kind, text in found.items()}
         for kind, text in found.items():
             if kind and self._log.allows(kind, kind):
                 self._node.get_logger().warning(text)
-        return [*self._warnings, *self.remarks(), *found.values()]
+        return [*self._warnings, *found.values()]
 
     def publish(self) -> None:
         """Publish the status and log its changes; a timer calls this once a second."""

@@ -28,8 +28,6 @@ SILHOUETTE = QoSProfile(depth=1, reliability=ReliabilityPolicy.RELIABLE)
 # With a queue of five, a subscriber may fall behind by some images.
 SILHOUETTE_INPUT = QoSProfile(depth=5, reliability=ReliabilityPolicy.RELIABLE)
 RESULT = QoSProfile(depth=10, reliability=ReliabilityPolicy.RELIABLE)
-# tf2's broadcasters and listeners use the same profile.
-TF = QoSProfile(depth=100, reliability=ReliabilityPolicy.RELIABLE)
 # A player can wait for a slow subscriber, and the queue holds 100 images.
 PLAYED = QoSProfile(depth=100, reliability=ReliabilityPolicy.RELIABLE)
 # Calls wait while a node is busy, and a queue of ten, ROS's default, loses the others.
