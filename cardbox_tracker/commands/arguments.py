@@ -153,10 +153,7 @@ def add_camera_pitch(parser: argparse.ArgumentParser, found: str = "") -> None:
 
 
 def add_settings(parser: argparse.ArgumentParser, kind: Any, title: str) -> None:
-    """Add an option for each setting of the dataclass ``kind``, below the heading ``title``.
-
-    A switch is off by default.
-    """
+    """Add an option, a switch for a bool, for each setting of ``kind``, below ``title``."""
     group = parser.add_argument_group(title)
     defaults = {entry.name: entry.default for entry in fields(kind)}
     for name, setting in settings_of(kind).items():

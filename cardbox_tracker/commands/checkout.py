@@ -52,10 +52,7 @@ EVALUATE = LabCommand(
 
 
 def from_checkout(module: str, targets: str) -> Any:
-    """Import a module of a folder at the top of a checkout.
-
-    The checkout is the current directory, one above it, or the parent of this package.
-    """
+    """Import from a checkout: the current directory, one above it, or this package's parent."""
     folder = module.partition(".")[0]
     for root in (Path.cwd(), *Path.cwd().parents, _PACKAGE.parent):
         if (root / folder / "__init__.py").is_file() and (root / _PACKAGE.name).is_dir():

@@ -196,10 +196,7 @@ class ClassName(str):
 
 
 class Problems:
-    """What is wrong with the options of a recording, collected for one error.
-
-    A function that finds a problem returns any value of its type, because the error follows.
-    """
+    """What is wrong with options, collected for one error; values of wrong ones do not matter."""
 
     def __init__(self, recording: Path, faults: Iterable[str] = ()) -> None:
         """Begin with the ``faults`` that are known."""

@@ -359,10 +359,7 @@ def _table(rows: Sequence[Row]) -> Iterator[str]:
 
 
 def _reasons(rows: Iterable[Row], paths: Mapping[str, Path]) -> Iterator[tuple[str, str]]:
-    """Yield the recordings that failed for one reason, and the reason.
-
-    Reasons that differ only in the path of the recording are one, and it has the first one's.
-    """
+    """Yield recordings that failed for one reason but for their path, and the first one's text."""
     reasons: dict[str, list[Row]] = {}
     for row in sorted(rows):
         if row.status == FAILED:
@@ -375,10 +372,7 @@ def _reasons(rows: Iterable[Row], paths: Mapping[str, Path]) -> Iterator[tuple[s
 
 
 def digest_of_inputs(request: TrackingRequest, formats: Sequence[str], program: str) -> str:
-    """Return a digest of all that determines the results of a recording.
-
-    The recording counts by the names, sizes and times of its files, other files by their content.
-    """
+    """Return a digest of what determines results: content, but name, size, time of recordings."""
     path = request.recording.path
     asked = replace(request, recording=replace(request.recording, path=Path()), inputs=())
     digest = hashlib.sha256(f"{program} {formats}".encode())

@@ -73,10 +73,7 @@ class _Loader(yaml.SafeLoader):
 
 
 def read_small_text(path: str | os.PathLike[str]) -> str:
-    """Return the text of a regular file of at most 64 kB, without waiting for pipes.
-
-    Raises SmallYamlError if the file cannot be read, is too large, or is not a text file.
-    """
+    """Return the text of a regular file of at most 64 kB; SmallYamlError if it is none."""
     try:
         data = read_regular(path, MOST_BYTES)
     except UnreadableFileError as error:

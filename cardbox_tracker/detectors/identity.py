@@ -29,10 +29,7 @@ _LEAST_PX, _EMPTY_NS = 20, 60_000_000_000
 
 
 def colours_in(image: NDArray[np.uint8], mask: NDArray[np.uint8]) -> FloatArray | None:
-    """Return the histogram of colours, or of brightness, where ``mask`` (H, W) is not 0.
-
-    The image is (H, W) or (H, W, 3), bgr. None if too few pixels count.
-    """
+    """Return the histogram of (H, W) or bgr where ``mask`` is not 0; None of too few pixels."""
     if cv2.countNonZero(mask) < _LEAST_PX:
         return None
     left, top, width, height = cv2.boundingRect(mask)
@@ -104,10 +101,7 @@ class Identity:
             self.forget()
 
     def is_same(self, figure: Figure, colours: FloatArray | None, now_ns: int) -> bool:
-        """Return whether somebody in an image is the person; the first one is.
-
-        ``colours`` are those of the trunk, see :func:`colours_in`, or None.
-        """
+        """Return whether this is the person, by place and trunk ``colours``, or the first one."""
         self.nobody(now_ns)
         self._anybody_ns = now_ns
         away_ns = abs(now_ns - self._seen_ns)

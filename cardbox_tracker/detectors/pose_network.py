@@ -125,10 +125,7 @@ class PoseNetwork:
     """
 
     def __init__(self, detector: Path, landmarks: Path) -> None:
-        """Load both networks.
-
-        Raises CardboxError if LiteRT is not installed, or a file is missing or damaged.
-        """
+        """Load both networks; CardboxError without LiteRT, or if a file is missing or damaged."""
         self._detect = Network(detector)
         self._locate = Network(landmarks)
         self.choose: Choose | None = None
@@ -249,10 +246,7 @@ class Network:
     """One network file on one thread."""
 
     def __init__(self, path: Path) -> None:
-        """Load it.
-
-        Raises CardboxError if LiteRT is not installed, or the file is missing or damaged.
-        """
+        """Load it; CardboxError without LiteRT, or if the file is missing or damaged."""
         try:
             from ai_edge_litert.interpreter import Interpreter
         except ImportError as error:

@@ -48,10 +48,7 @@ def stature_of(parts: BodyParts[float]) -> float:
 
 
 def floor_m(body: BodyModel) -> float | None:
-    """Return the height of the floor above the camera, m; None if nothing is known of it.
-
-    It is that of the scene, or that on which the measured person stood.
-    """
+    """Return the floor's height above the camera, m, by scene or measured person, or None."""
     if body.camera_pose.height_m is not None:
         return -body.camera_pose.height_m
     if "hip_height_m" in body.unknown:
@@ -148,10 +145,7 @@ def leg_rotations(
 
 
 def leg_angles(thigh: FloatArray, shank: FloatArray, side: float) -> FloatArray:
-    """Return angles (4,) of a leg with these directions (3,), see :func:`leg_directions`.
-
-    The knee bends backwards, within a quarter of a turn.
-    """
+    """Return angles (4,) of a leg with these directions (3,); the knee bends backwards."""
     flexion = np.arctan2(thigh[0], -thigh[2])
     abduction = side * np.arcsin(np.clip(thigh[1], -1.0, 1.0))
     turned = (rotation_y(-flexion) @ rotation_x(side * abduction)).T @ shank

@@ -82,10 +82,7 @@ def _yaml_number(value: float) -> str:
 
 
 def loads_body_model(text: str, source: str = "body model") -> BodyModel:
-    """Parse YAML as :func:`dumps_body_model` writes it; ``source`` names the text in errors.
-
-    Raises BodyModelError, with the wrong key, if it is no body model.
-    """
+    """Parse YAML of :func:`dumps_body_model`; BodyModelError names ``source`` and the wrong key."""
     try:
         data = parse_small_yaml(text)
     except SmallYamlError as error:

@@ -144,10 +144,7 @@ class DetectorSilhouetteSource(SilhouetteSource):
         self._finds_people = detector.people > 0
 
     def frames(self, start_s: float = 0.0, end_s: float = float("inf")) -> Iterator[RecordedFrame]:
-        """Yield every image from ``start_s`` to ``end_s``, in order, with the person's mask.
-
-        The detector starts anew at ``start_s``, so that a frame depends on the span alone.
-        """
+        """Yield every image with the person's mask; the detector starts anew at ``start_s``."""
         self._start_points(start_s, end_s)
         for prepared in self._images_until(end_s, start_s):
             stamp_ns, time_s, image, recorded, _, found = prepared

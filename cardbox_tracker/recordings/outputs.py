@@ -82,10 +82,7 @@ def place_state(estimate: Estimate) -> KeypointStates | None:
 
 
 class JointValues(NamedTuple):
-    """Values (n,) of the joints ``names``, rad and metres.
-
-    ``velocities`` (n,) are their changes, rad/s and m/s; None if unknown.
-    """
+    """Values (n,) of the joints ``names``, rad and m, and velocities, rad/s and m/s, if known."""
 
     names: tuple[str, ...]
     values: FloatArray
@@ -384,10 +381,7 @@ class _Motion:
         self._last: tuple[int, FloatArray, tuple[bool, bool], Tracker] | None = None
 
     def velocities(self, stamp_ns: int, estimate: Estimate, tracker: Tracker) -> FloatArray | None:
-        """Return those of :func:`joint_values`, rad/s and m/s; None without an image before.
-
-        It has a posture of the same tracker and is at most ``_LONGEST_NS`` old.
-        """
+        """Return the velocities of :func:`joint_values`, rad/s and m/s; None after a pause."""
         before, self._last = self._last, None
         joints = joint_values(estimate)
         if joints is None:

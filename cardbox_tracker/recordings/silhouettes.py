@@ -217,10 +217,7 @@ class SilhouetteSource:
         return prepared._replace(found=found)
 
     def _images_until(self, end_s: float, start_s: float) -> Iterator[PreparedImage]:
-        """Yield every image to ``end_s``, those from ``start_s`` on with whom the detector finds.
-
-        It looks at the next images while the caller works.
-        """
+        """Yield images to ``end_s``, from ``start_s`` on with whom the detector finds meanwhile."""
         within = takewhile(lambda one: one.time_s <= end_s, self.images())
         look = partial(self._looked_at, start_s=start_s)
         return within if self._detector is None else results_ahead(look, within)
@@ -294,10 +291,7 @@ class SilhouetteSource:
         return found
 
     def period_ns(self) -> int:
-        """Return the median time between images, ns.
-
-        Raises BagError if there are fewer than two images.
-        """
+        """Return the median time between images, ns; raise BagError if there are fewer than two."""
         images = islice(self._bag.images(self.topic), _PERIOD_IMAGES)
         stamps_ns = [image.stamp_ns for image in images]
         if len(stamps_ns) < 2:

@@ -69,10 +69,7 @@ class StoredBackground(NamedTuple):
 
 
 def background_path(name: str) -> Path | None:
-    """Return the path that ``name`` stands for, ``~`` expanded; None for an empty name.
-
-    Raises BackgroundFileError if no file can be read or written there.
-    """
+    """Return the path of ``name``; None if empty, BackgroundFileError if it cannot be."""
     if not name:
         return None
     try:
@@ -114,10 +111,7 @@ def save_background(stored: StoredBackground, path: str | os.PathLike[str]) -> N
 
 
 def load_background(path: str | os.PathLike[str], size: tuple[int, int]) -> StoredBackground:
-    """Read a background of the working size (width, height), px.
-
-    Raises BackgroundFileError if it cannot be read, is no background, or is of another size.
-    """
+    """Read a background of size (width, height), px; BackgroundFileError if it is none."""
     expected = (
         "a background that can be used: the file that the background node wrote. Delete it, or "
         "give another name, and let the node learn with nobody in view"

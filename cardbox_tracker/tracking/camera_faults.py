@@ -140,10 +140,7 @@ class CameraFaults:
 
 
 def facing_rad(points: ImagePoints | None, camera: Camera) -> float:
-    """Return the direction from the left to the right shoulder in a camera's level frame, rad.
-
-    It is an angle about the vertical; nan without points in space. The camera is upright.
-    """
+    """Return the angle from left to right shoulder in the level frame, rad; nan without points."""
     if points is None or points.spatial_m is None:
         return float("nan")
     across, _, away = np.subtract(*points.spatial_m[_SHOULDERS[::-1]])

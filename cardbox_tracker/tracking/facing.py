@@ -128,10 +128,7 @@ class Facing:
 
 
 def _is_low(zones: FloatArray, silhouette: Silhouette) -> bool:
-    """Return whether the head is lower than the model's: a person who leans shows the hair.
-
-    The lean itself is often missed, as an outline hardly shows it.
-    """
+    """Return whether the head is lower than the model's, as of a lean, which is often missed."""
     u, v, _, half_height = zones[:4].tolist()
     row, column = round(v - _TOP * half_height), round(u)
     height, width = silhouette.shape

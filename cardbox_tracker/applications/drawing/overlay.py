@@ -112,10 +112,7 @@ def draw_camera_overlay(
 
 
 def draw_sharp_overlay(picture: ImageArray, estimate: Estimate, tracker: Tracker) -> ImageArray:
-    """Return the first camera's picture with the model over it, for a bag.
-
-    A small picture is enlarged by repeated pixels, which compress well under sharp lines and text.
-    """
+    """Return the first camera's picture with the model, enlarged in pixels, which compress well."""
     scale = readable_scale(picture)
     large = picture.repeat(scale, axis=0).repeat(scale, axis=1)
     return draw_overlay(large, tracker.body, tracker.camera, estimate)
@@ -308,10 +305,7 @@ def enlarged(image: ImageArray, scale: int) -> ImageArray:
 
 
 def _subpixels(pixels: FloatArray, corner: tuple[int, int] = (0, 0)) -> NDArray[np.int32]:
-    """Return pixel coordinates in OpenCV's fixed-point format with ``_SHIFT`` fractional bits.
-
-    They count from the pixel ``corner`` (column, row).
-    """
+    """Return pixels from ``corner`` (column, row) on in OpenCV's format of ``_SHIFT`` bits."""
     clipped = np.clip(pixels, -30_000, 30_000)
     placed = np.asarray(np.round(clipped * (1 << _SHIFT)), dtype=np.int32)
     return placed - (np.asarray(corner, np.int32) << _SHIFT)

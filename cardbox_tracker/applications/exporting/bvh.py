@@ -102,11 +102,7 @@ def _clavicle_m(body: BodyModel) -> float:
 
 
 def channel_values(motion: Motion, body: BodyModel) -> dict[str, FloatArray]:
-    """Return the values of the channels of each joint that moves, by its name.
-
-    Each has the shape (n, number of channels), metres and degrees. A gap repeats the posture
-    before it, or the first one.
-    """
+    """Return values (n, channels), m and deg, of joints that move; a gap repeats the last."""
     frames = frames_of(motion, body)
     parts = body_parts(body.sizes)
     states, hip = held(motion.states), held(frames.hip - floor_below(body))

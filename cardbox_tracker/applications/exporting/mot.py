@@ -52,10 +52,7 @@ def coordinates_of(states: FloatArray) -> dict[str, FloatArray]:
 
 
 def _limbs(motion: Motion) -> dict[str, FloatArray]:
-    """Return the rotations of legs and hands, (n,), rad, as far as an image has them.
-
-    A hand or leg that is not known keeps its last rotation, or is at rest before the first.
-    """
+    """Return rotations (n,), rad, of legs and hands; unknown ones stay, or rest at first."""
     found: dict[str, FloatArray] = {}
     rest = 0.0, 0.0, np.pi / 2
     for number, suffix in enumerate("lr"):

@@ -168,10 +168,7 @@ class Motion:
 
 
 def held(values: FloatArray) -> FloatArray:
-    """Return values (n, k) with unknown rows replaced by the last known ones, or the first.
-
-    They are 0 if none is known.
-    """
+    """Return values (n, k) with the last known row, or the first, in gaps; 0 if none is known."""
     known = np.isfinite(values).all(1)
     if not known.any():
         return np.zeros_like(values)
@@ -202,10 +199,7 @@ def in_reference(optical: FloatArray, body: BodyModel | None) -> FloatArray:
 
 
 def floor_below(body: BodyModel | None) -> FloatArray:
-    """Return the origin of exports, (3,), m in the reference frame: on the floor, if it is known.
-
-    The floor is that on which the measured person stands; otherwise it is the camera.
-    """
+    """Return the origin, (3,), m in the reference frame: on the floor, if known, or the camera."""
     height_m = None if body is None else floor_m(body)
     return np.array([0.0, 0.0, height_m or 0.0])
 

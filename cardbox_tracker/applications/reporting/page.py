@@ -82,10 +82,7 @@ def _words(joint: str, group: str) -> str:
 
 
 def doubtful_spans(results: Results) -> list[tuple[float, float, str]]:
-    """Return start and end, s, of each time whose posture may be wrong or is missing.
-
-    The third value is ``uncertain``, or "" without a posture.
-    """
+    """Yield start, end, s, and ``uncertain``, or "" without a posture, of doubtful times."""
     step_s = float(np.median(np.diff(results.time_s))) if len(results.time_s) > 1 else 0.0
     spans: list[tuple[float, float, str]] = []
     before = None

@@ -222,10 +222,7 @@ class Scene:
         self._states = stamp_ns, states
 
     def keypoints(self, stamp_ns: int, points_m: FloatArray) -> None:
-        """Show keypoints (6, 3), metres in the optical frame, and plot their errors.
-
-        Uncertain joints are yellow, lost ones red and hidden ones grey. Other shapes are ignored.
-        """
+        """Show keypoints (6, 3), m in the optical frame, coloured by state; plot the errors."""
         if points_m.shape != (6, 3) or not np.isfinite(points_m).all():
             return
         self._at(stamp_ns)

@@ -143,10 +143,7 @@ def web_page(program: Sequence[str], port: int = PORT) -> Iterator[str]:
 
 @contextmanager
 def _files(program: Sequence[str], port: int) -> Iterator[None]:
-    """Context of Rerun's server of the viewer's files, for this computer alone.
-
-    The server within a Python process would listen to all computers.
-    """
+    """Context of Rerun's server for this computer; its server in Python listens to all."""
     words = "--serve-web", "--bind", THIS_COMPUTER
     numbers = "--web-viewer-port", str(port), "--port", str(_free_port())
     # Rerun reports its use to its maker, but not from tests.

@@ -65,10 +65,7 @@ def image_of(
 
 
 def most_pixels_of(calibration: Calibration) -> float:
-    """Return the largest number of pixels to decode for a camera.
-
-    It is sixteen times the size of the calibration at most; a few bytes can expand to gigabytes.
-    """
+    """Return the most pixels to decode, 16 times those calibrated; few bytes can be gigabytes."""
     return min(MOST_PIXELS, 16.0 * calibration.width * calibration.height)
 
 
@@ -123,10 +120,7 @@ def silhouette_of(message: Image) -> ImageArray:
 
 
 def image_message(header: Header, image: NDArray[Any], encoding: str = "") -> Image:
-    """Return a message of ``image`` (H, W) or (H, W, 3), uint8 or float32.
-
-    Without an ``encoding`` it is mono8 or bgr8.
-    """
+    """Return a message of (H, W) or (H, W, 3), uint8 or float32, mono8 or bgr8 by default."""
     contiguous = np.ascontiguousarray(image)
     message = Image(
         header=header,
@@ -145,10 +139,7 @@ def image_message(header: Header, image: NDArray[Any], encoding: str = "") -> Im
 def camera_info_message(
     header: Header, camera: Camera, source: CameraInfo | None = None
 ) -> CameraInfo:
-    """Return the CameraInfo of an ideal pinhole camera without distortion.
-
-    R, and the baseline in P, are copied from ``source``, the CameraInfo of the original image.
-    """
+    """Return a pinhole camera's CameraInfo, with R and the baseline in P of ``source``."""
     k = [camera.fx, 0.0, camera.cx, 0.0, camera.fy, camera.cy, 0.0, 0.0, 1.0]
     message = _info(header, camera.width, camera.height, "plumb_bob", [0.0] * 5, k)
     if source is not None:

@@ -213,10 +213,7 @@ class DetectorNode(CardboxNode):
     def _send_points(
         self, header: Header, found: Sequence[Detection], pipeline: SilhouettePipeline
     ) -> None:
-        """Publish the points, all with the score 0 if nobody is there; of several as skeleton one.
-
-        The skeleton is that of the first person.
-        """
+        """Publish all points, with the score 0 if nobody is there, and the first skeleton."""
         calibration, camera = pipeline.calibration, pipeline.camera
         size = camera.width, camera.height
         people = [

@@ -264,10 +264,7 @@ class GuideOutputs:
         camera: Camera | None,
         settings: InitializerParameters,
     ) -> None:
-        """Draw the current prompt over an image if there is a prompt and a subscriber.
-
-        ``message`` is the silhouette, and ``seen`` its image, if that came in time.
-        """
+        """Draw a prompt over ``seen``, the image of the silhouette ``message``, if it is wanted."""
         prompt = self._prompt
         if prompt is None or camera is None or not self._overlay.get_subscription_count():
             return

@@ -233,11 +233,7 @@ class PlayBagNode(CardboxNode):
             self._executor.spin_once(timeout_sec=0.1 if self._paused else min(left_s, 0.1))
 
     def _settle(self, delay_s: float) -> None:
-        """Serve calls until no subscriber has come or gone for ``delay_s``.
-
-        DDS matches a subscriber topic by topic. The nodes of several cameras start one after the
-        other, so the player waits longer while images of one camera have no subscriber.
-        """
+        """Serve calls until subscribers rest for ``delay_s``, longer while a camera has none."""
         subscribers, since_s = list[int](), time.monotonic()
         others_s = _OTHER_CAMERAS_S if delay_s and self.parameters.value.wait_for_subscribers else 0
         while True:

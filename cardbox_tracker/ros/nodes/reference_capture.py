@@ -161,11 +161,7 @@ class DepthDistance:
         references: ReferenceCapture,
         camera: Callable[[], Camera | None],
     ) -> None:
-        """Subscribe with ``node``, the initializer, to depth images on ``topic``.
-
-        ``camera`` returns the camera of the silhouettes in ``references``, or None until it is
-        known.
-        """
+        """Subscribe to depth on ``topic``; ``camera`` returns that of the silhouettes, if known."""
         self._topic, self._references, self._camera = node.resolve(topic), references, camera
         self._recent: deque[tuple[int, DepthImage]] = deque(maxlen=_KEPT_DEPTHS)
         self._captured: dict[str, DepthImage] = {}

@@ -1,7 +1,4 @@
-"""``cardbox call``: call a service of the running nodes without the command ``ros2``.
-
-The packages on PyPI contain rclpy but not ROS's command line.
-"""
+"""``cardbox call``: call a service of the nodes; PyPI has rclpy but not the command ``ros2``."""
 
 from __future__ import annotations
 

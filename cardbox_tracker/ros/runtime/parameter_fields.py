@@ -62,11 +62,7 @@ at_start = partial(parameter, effect=AT_START)
 
 
 def shared(kind: Any, name: str, **changes: Any) -> Any:
-    """Return a field for the setting ``name`` of the core dataclass ``kind``.
-
-    Default, description, unit, range and choices are those of the core; ``changes`` are arguments
-    of :func:`parameter` that differ, such as a default.
-    """
+    """Return a field like a core setting; ``changes`` are arguments of :func:`parameter`."""
     core = settings_of(kind)[name]
     given = {
         "default": getattr(kind, name),

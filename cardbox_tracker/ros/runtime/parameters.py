@@ -40,10 +40,7 @@ _TYPE_TEXTS = {
 
 
 class NotDeclared(ParameterNotDeclaredException):
-    """A name that is not declared; rclpy answers a request to set it with this text.
-
-    The text of its own exception contains no name.
-    """
+    """A name that is not declared, with a text, which the exception of rclpy lacks."""
 
     def __init__(self, text: str) -> None:
         """Keep ``text`` as it is, without the words of the base class."""
@@ -125,10 +122,7 @@ class LiveParameters(Generic[T]):
         return value
 
     def _warn_of_unknown(self) -> None:
-        """Warn of unknown names given at the start, which ROS ignores silently.
-
-        They are not errors, because a file may serve several nodes.
-        """
+        """Warn of unknown names at the start, no errors since a file may serve several nodes."""
         # rclpy has no public interface to the given values.
         given = getattr(self._node, "_parameter_overrides", {})
         for name in given:

@@ -22,10 +22,7 @@ _OF_PACKAGE = (sys.executable, "-P", "-m")
 
 
 def isolate() -> None:
-    """Set a separate DDS domain and a profile for large images for this process and its children.
-
-    A domain or profile that is already set is kept.
-    """
+    """Give this process and its children, unless set, a domain and a profile for large images."""
     os.environ.setdefault("ROS_DOMAIN_ID", str(random.SystemRandom().randint(1, 100)))
     os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
     profile = share_file("config/fastdds_large_images.xml")
@@ -71,10 +68,7 @@ class Nodes:
         self._processes: dict[str, subprocess.Popen[bytes]] = {}
 
     def start(self, name: str, *arguments: str, called: str = "") -> None:
-        """Start the executable ``name`` of this package, see ``start.NODES``.
-
-        ``called`` distinguishes several processes of one executable.
-        """
+        """Start the executable ``name`` of ``start.NODES``, as ``called`` if there are several."""
         called = called or name
         with (self._logs / f"{called}.log").open("wb") as log:
             self._processes[called] = subprocess.Popen(

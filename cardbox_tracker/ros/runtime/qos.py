@@ -54,10 +54,7 @@ _MEANING = {
 
 
 def overridable(profile: QoSProfile) -> QoSOverridingOptions:
-    """Return options that declare ``qos_overrides.<topic>...`` parameters.
-
-    Durability can be overridden except on latched topics, which depend on it.
-    """
+    """Return options that declare ``qos_overrides.<topic>...``, if latched without durability."""
     kinds = [QoSPolicyKind.HISTORY, QoSPolicyKind.DEPTH, QoSPolicyKind.RELIABILITY]
     if profile.durability != DurabilityPolicy.TRANSIENT_LOCAL:
         kinds.append(QoSPolicyKind.DURABILITY)
