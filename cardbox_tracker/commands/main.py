@@ -50,11 +50,7 @@ class Command(Protocol):
         """Add the arguments of the subcommand to its ``parser``."""
 
     def run(self, options: argparse.Namespace) -> None:
-        """Do the work and print the result.
-
-        Raises:
-            CardboxError: the user can correct the cause; ``cardbox`` prints the text and returns 1.
-        """
+        """Do the work and print the result; CardboxError if the user can correct the cause."""
 
 
 # The order is that of 'cardbox --help'.

@@ -282,11 +282,7 @@ def _time_at(rows: Sequence[RulaRow], part: str, highest: int) -> FloatArray:
 
 
 def write_csv(rows: Sequence[RulaRow], path: Path, method: Method = RULA) -> None:
-    """Write the columns of :func:`header_of` and a row per image; unknown values are left empty.
-
-    Raises:
-        CardboxError: the file cannot be written.
-    """
+    """Write the columns of :func:`header_of`, unknown values empty, or raise CardboxError."""
     header = header_of(method)
     write_table(path, header, (_fields(row, method) for row in rows))
 

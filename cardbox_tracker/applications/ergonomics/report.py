@@ -92,11 +92,7 @@ class PageContent:
 
 
 def write_page(content: PageContent, path: Path) -> None:
-    """Write the page, a single file of HTML without scripts, see ``page.html``.
-
-    Raises:
-        CardboxError: the file cannot be written.
-    """
+    """Write the page, one file of HTML without scripts (``page.html``), or raise CardboxError."""
     rows, config, method = content.rows, content.config, content.method
     summary = summarize(rows, method)
     shares, moments = score_shares(rows, config, method), worst_moments(rows)

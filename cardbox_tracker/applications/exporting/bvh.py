@@ -137,11 +137,7 @@ def channel_values(motion: Motion, body: BodyModel) -> dict[str, FloatArray]:
 
 
 def write_bvh(path: Path, motion: Motion, body: BodyModel | None) -> None:
-    """Write the skeleton and its motion at a constant rate.
-
-    Raises:
-        CardboxError: the body is not known, or the file cannot be written.
-    """
+    """Write skeleton and motion at a constant rate; raise CardboxError without body or file."""
     if body is None:
         raise CardboxError(
             "BVH needs the bones of the person: give --model MODEL.yaml, with which the results "

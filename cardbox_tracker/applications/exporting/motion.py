@@ -70,11 +70,7 @@ class Motion:
 
     @classmethod
     def of(cls, results: Results) -> Motion:
-        """Return the motion of results.
-
-        Raises:
-            CardboxError: no image has a posture.
-        """
+        """Return the motion of results; raise CardboxError if no image has a posture."""
         n = len(results.state)
         hidden = np.array(
             [
@@ -137,11 +133,8 @@ class Motion:
     def evenly(self) -> Motion:
         """Return the motion at moments of equal distance, for formats with a constant rate.
 
-        Each moment has the nearest image, at most half a step away; without one it is a gap. Images
-        of a constant rate stay as they are.
-
-        Raises:
-            CardboxError: most moments have no image, because the stamps jump.
+        Each moment has the nearest image, at most half a step away; without one it is a gap. Raises
+        CardboxError if most are gaps, because the stamps jump.
         """
         since_ns = self.stamp_ns - self.stamp_ns[0]
         step_ns = 1e9 / self.rate_hz
@@ -215,12 +208,9 @@ def frames_of(motion: Motion, body: BodyModel) -> PosedBodies:
 
 
 def images_of_body(motion: Motion, body: BodyModel) -> Motion:
-    """Return the motion with gaps where an image was tracked with another body.
+    """Return the motion with gaps where a running tracker got another body.
 
-    A running tracker may get another body from the initializer.
-
-    Raises:
-        CardboxError: most images were tracked with another body.
+    Raises CardboxError if most images were tracked with another one.
     """
     keypoints_m = in_reference(motion.keypoints_m, body)
     frames = frames_of(motion, body)

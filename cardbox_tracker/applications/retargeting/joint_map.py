@@ -122,11 +122,7 @@ class JointMap:
 
 
 def load_joint_map(path: str | os.PathLike[str]) -> JointMap:
-    """Read a joint map from a YAML file.
-
-    Raises:
-        CardboxError: the file cannot be read, or is not a valid joint map.
-    """
+    """Read a joint map from YAML; raise CardboxError if it cannot be read, or is none."""
     with foreign(path, CardboxError, "a joint map, as the example config/example_joint_map.yaml"):
         rows = parse_small_yaml(read_small_text(path))["joints"]
         if not isinstance(rows, list) or not rows:

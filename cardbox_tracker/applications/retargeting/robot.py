@@ -90,11 +90,7 @@ class Robot:
         return (*sorted(roots), *self.all_joints)
 
     def path(self, link: str) -> tuple[Joint, ...]:
-        """Return all joints from the root to ``link``.
-
-        Raises:
-            CardboxError: there is no such link.
-        """
+        """Return all joints from the root to ``link``; raise CardboxError if there is none."""
         if link not in self.links:
             raise CardboxError(
                 f"the robot has no link {quoted(link)}; it has {cut(', '.join(self.links))}"
@@ -124,22 +120,17 @@ class Robot:
 
 
 def load_robot(path: str | os.PathLike[str]) -> Robot:
-    """Read a URDF file.
-
-    Raises:
-        CardboxError: the file cannot be read, or is not a URDF with movable joints.
-    """
+    """Read a URDF file; raise CardboxError if it cannot be read, or has no movable joints."""
     with foreign(path, CardboxError, "a URDF file"):
         content = read_regular(path, _LARGEST_BYTES)
     return parse_robot(content, str(path))
 
 
 def parse_robot(content: str | bytes, source: str = "the description") -> Robot:
-    """Parse a URDF; ``source`` names it in errors. Bytes have the encoding that they declare.
+    """Parse a URDF, in bytes of the encoding that they declare; ``source`` names it in errors.
 
-    Raises:
-        CardboxError: see :func:`load_robot`; or it is unprocessed xacro, defines entities, or has
-            too many levels, elements or joints.
+    Raises CardboxError as :func:`load_robot`, and for xacro, entities, or too many levels, elements
+    or joints.
     """
     encoding = "utf-8" if isinstance(content, str) else None
     data = content.encode("utf-8", "replace") if isinstance(content, str) else content

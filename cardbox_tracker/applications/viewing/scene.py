@@ -77,11 +77,7 @@ _JPEG_QUALITY = 92
 
 
 def layout(has_truth: bool = False, is_live: bool = False) -> Any:
-    """Return the blueprint of the views.
-
-    Raises:
-        CardboxError: rerun-sdk is not installed.
-    """
+    """Return the blueprint of the views; raise CardboxError if rerun-sdk is not installed."""
     views = rerun().blueprint
     # The heights of plots with joints, errors and states.
     error, shares = ([_plot(_ERROR, "error [cm]")], [2]) if has_truth else ([], [])
@@ -141,11 +137,7 @@ class Scene:
         self._states: tuple[int, Sequence[str]] | None = None
 
     def model(self, text: str, source: str) -> None:
-        """Show the person of a body model, YAML text, from now on; ``source`` names it in errors.
-
-        Raises:
-            CardboxError: the text is no body model.
-        """
+        """Show the person of a body model, YAML, from now on; CardboxError names ``source``."""
         body = loads_body_model(text, source=source)
         if body != self._body:
             self._body = body
@@ -156,11 +148,7 @@ class Scene:
         self._robot("person", urdf_from_body(self._body, hands=self._has_hands))
 
     def robot(self, name: str, urdf: str) -> None:
-        """Show a robot beside the person; it faces the camera.
-
-        Raises:
-            CardboxError: the description cannot be read.
-        """
+        """Show a robot beside the person, facing the camera, or raise CardboxError."""
         root = self._robot(name, urdf)
         put = self._rr.Transform3D(
             translation=_ROBOT_PLACE_M,
@@ -340,11 +328,7 @@ _ROBOT_TOPIC, _JOINTS_TOPIC = "/robot_description", "/joint_states"
 def show_results(
     path: Path, scene: Scene, progress: Callable[[float], None], person: int | None = None
 ) -> int:
-    """Show a bag of results; return the number of images with joints.
-
-    Raises:
-        BagError: the bag has no results of the tracker, or is damaged.
-    """
+    """Show a bag; return the number of images with joints, or raise BagError without any."""
     count = 0
     with BagReader(path) as bag:
         space = namespace_of(bag, person)

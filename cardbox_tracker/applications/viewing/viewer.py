@@ -36,11 +36,7 @@ _TIMEOUT_S = 10.0
 
 
 def rerun() -> Any:
-    """Return the module rerun.
-
-    Raises:
-        CardboxError: the library is not installed; the text gives the command.
-    """
+    """Return the module rerun, or raise CardboxError with the command that installs it."""
     try:
         import rerun as module
         import rerun.blueprint
@@ -114,14 +110,9 @@ def _has_display() -> bool:
 
 @contextmanager
 def web_page(program: Sequence[str], port: int = PORT) -> Iterator[str]:
-    """Context of the viewer's page; gives its address.
+    """Context of the page of the command ``program`` on ``port``, 0 for any; gives its address.
 
-    Args:
-        program: command of Rerun.
-        port: port of this computer; 0 takes any free one.
-
-    Raises:
-        OSError: the port is in use.
+    Raises OSError if the port is in use.
     """
     files_port = _free_port()
     try:

@@ -199,11 +199,7 @@ def is_same_info(one: CameraInfo, other: CameraInfo) -> bool:
 
 
 def camera_of(message: CameraInfo) -> Camera:
-    """Return the pinhole camera of a ``silhouette/camera_info``.
-
-    Raises:
-        CameraError: the size or the matrix is invalid, or the image is distorted.
-    """
+    """Return the pinhole camera of a ``silhouette/camera_info``, or raise CameraError."""
     k = message.k
     pixels = message.width * message.height
     if pixels > _MOST_WORKING_PIXELS:

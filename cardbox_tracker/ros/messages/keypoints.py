@@ -116,11 +116,7 @@ def persons_of_polygon(message: Any, size: Size) -> list[ImagePoints]:
 
 
 def persons_of_skeleton(message: Any, size: Size) -> list[ImagePoints]:
-    """Return the person of a Skeleton2D.
-
-    Raises:
-        CardboxError: the number of points is wrong, or a point is impossible.
-    """
+    """Return the person of a Skeleton2D, or raise CardboxError for wrong points."""
     points, (width, height) = message.skeleton, size
     if len(points) != len(SKELETON_NAMES):
         raise CardboxError(
@@ -132,11 +128,7 @@ def persons_of_skeleton(message: Any, size: Size) -> list[ImagePoints]:
 
 
 def persons_of_detections(message: Any, size: Size) -> list[ImagePoints]:
-    """Return the persons of a DetectionArray of yolo_msgs that have keypoints.
-
-    Raises:
-        CardboxError: there are too many persons, a point has an unknown number, or is impossible.
-    """
+    """Return the persons with keypoints of yolo_msgs' DetectionArray, or raise CardboxError."""
     found = message.detections
     if len(found) > _MOST_PERSONS:
         raise CardboxError(f"{len(found)} detections; expected at most {_MOST_PERSONS}")

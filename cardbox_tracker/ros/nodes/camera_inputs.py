@@ -236,12 +236,9 @@ class CameraInputs:
         return first or min(there, key=lambda one: _stamp_ns(one.message))
 
     def observed(self, received: Sequence[Received | None]) -> ObservationSet:
-        """Convert delivered messages to arrays, once the cameras are known.
+        """Convert delivered messages to arrays, without unreadable ones, which are reported.
 
-        A message that cannot be read is dropped and reported.
-
-        Raises:
-            CameraError: no silhouette can be read.
+        Raises CameraError if no silhouette can be read.
         """
         first = self._poses.first
         assert first is not None

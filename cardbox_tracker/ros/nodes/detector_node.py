@@ -123,14 +123,9 @@ class DetectorNode(CardboxNode):
     """Looks at the newest image; images that come in the meantime are left out."""
 
     def __init__(self, person: PersonDetector | None = None, **options: Any) -> None:
-        """Load the networks, subscribe to the camera and wait for its images.
+        """Load the networks, unless a ``person`` is given that finds people, and subscribe.
 
-        Args:
-            person: finds the person in images; the installed detector without one.
-            options: options of :class:`CardboxNode`.
-
-        Raises:
-            CardboxError: the detector is not installed.
+        Raises CardboxError if the detector is not installed.
         """
         super().__init__("detector", **options)
         self.parameters = LiveParameters(self, DetectorParameters)

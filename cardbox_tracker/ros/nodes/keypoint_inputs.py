@@ -84,12 +84,7 @@ class KeypointTopic:
         self._timer = node.create_timer(_LOOK_S, self._look, clock=steady)
 
     def take(self, at_ns: int, frame_id: str) -> Taken | None:
-        """Return the newest points for a silhouette, once; None if there are none in time.
-
-        Args:
-            at_ns: stamp of the silhouette.
-            frame_id: frame of the silhouette.
-        """
+        """Return the newest points for a silhouette of this stamp and frame, once, or None."""
         self._asked_ns, newest = at_ns, None
         while self._kept and self._kept[0].stamp_ns <= at_ns + SAME_TIME_NS:
             newest = self._kept.popleft()
@@ -222,11 +217,7 @@ class KeypointInputs:
     """
 
     def __init__(self, node: CardboxNode, settings: TrackerParameters) -> None:
-        """Subscribe with ``node``, the tracker, if its parameter ``keypoints`` is given.
-
-        Raises:
-            CardboxError: the table cannot be read, or the topic's name is not allowed.
-        """
+        """Subscribe with ``node`` if ``keypoints`` is given; raise CardboxError if it is wrong."""
         cameras = (settings.cameras or [""]) if settings.keypoints else []
         self.cameras = [CameraKeypoints(node, settings, name) for name in cameras]
         self._topics = [one.topic for one in self.cameras if one.topic is not None]
@@ -290,13 +281,10 @@ class CameraKeypoints:
         silhouette: ImageArray,
         tolerance_ns: int = TOLERANCE_NS,
     ) -> ImagePoints | None:
-        """Return the points for a silhouette, px of the silhouette, if there are any.
+        """Return the points for a silhouette (H, W), 0 or 255, px of it, if there are any.
 
-        Args:
-            header: header of the silhouette.
-            camera: camera of the silhouette.
-            silhouette: (H, W), 0 or 255, in which the person is looked for among several.
-            tolerance_ns: half the time between images, within which points of a table join.
+        Of several people it chooses the one in the silhouette; points of a table join within
+        ``tolerance_ns``.
         """
         calibration, at_ns = self._watch.current, stamp_ns(header.stamp)
         taken = self._taken(at_ns, header.frame_id, tolerance_ns)

@@ -112,12 +112,9 @@ class ReferenceCapture:
             )
 
     def capture(self, name: str, camera: Camera | None, config: InitializationConfig) -> str:
-        """Keep the majority of the latest silhouettes as the reference ``name``.
+        """Keep most of the latest silhouettes as reference ``name``; return words on the rest.
 
         If the working camera is known, the posture is compared with the requested one.
-
-        Returns:
-            Text with the result and the missing references, for a person.
         """
         self.check_running()
         alike = alike_of(self._recent)

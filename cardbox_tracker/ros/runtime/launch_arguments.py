@@ -85,11 +85,7 @@ class Argument:
 
 
 def values(arguments: Mapping[str, Argument], given: Mapping[str, str]) -> dict[str, Value | None]:
-    """Return the value of each of ``arguments`` from the texts ``given`` by name.
-
-    Raises:
-        CardboxError: values are wrong; the text has each of them and the expectation.
-    """
+    """Return the value of each of ``arguments``, or raise CardboxError with all that are wrong."""
     found: dict[str, Value | None] = {}
     wrong = []
     for name, argument in arguments.items():
@@ -103,11 +99,10 @@ def values(arguments: Mapping[str, Argument], given: Mapping[str, str]) -> dict[
 
 
 def shares_process(given: Mapping[str, str]) -> bool:
-    """Return whether background, initializer, tracker and the source of images share a process.
+    """Return whether background, initializer, tracker and source share a process.
 
-    Args:
-        given: arguments of a launch file; ``single_process`` is ``auto`` if it is missing. Then
-            they do, unless there are several cameras or the detector makes the silhouettes.
+    With ``single_process:=auto``, the default, they do, unless there are several cameras or the
+    detector makes the silhouettes.
     """
     text = given.get("single_process", "auto").strip().lower()
     if text != "auto":
@@ -117,15 +112,10 @@ def shares_process(given: Mapping[str, str]) -> bool:
 
 
 def parameters_in(sections: object, node: str) -> dict[str, object]:
-    """Return the parameters of a node in the content of a parameter file of ROS.
+    """Return the parameters of a node, by its full name, in the content of a parameter file.
 
-    Args:
-        sections: the parsed YAML: a mapping from names of nodes, with wildcards, to
-            ``ros__parameters``.
-        node: full name of the node, with its namespace.
-
-    Raises:
-        ValueError: the content has another form; the error's text is the expectation.
+    The parsed YAML maps names of nodes, with wildcards, to ``ros__parameters``. Raises ValueError,
+    with the expectation, if it has another form.
     """
     if not isinstance(sections, Mapping):
         raise ValueError("a mapping from names of nodes to ros__parameters")
@@ -142,19 +132,10 @@ def parameters_in(sections: object, node: str) -> dict[str, object]:
 
 
 def check_names(file: str, known: Iterable[str], command_line: Sequence[str]) -> None:
-    """Refuse unknown arguments of the launch file ``file``.
+    """Raise CardboxError for arguments of the launch file ``file`` that are not ``known``.
 
     ``ros2 launch`` accepts any name and ignores a misspelt one. If another launch file includes
     this one, the command line belongs to the other file, and nothing is checked.
-
-    Args:
-        file: path of the launch file.
-        known: names of the arguments of this launch file and of those that it includes.
-        command_line: command line of the process, such as
-            ros2 launch cardbox_tracker live.launch.py loop:=true.
-
-    Raises:
-        CardboxError: arguments are unknown; the text names them and the known ones.
     """
     names = sorted(known)
     given = [word.partition(":=")[0] for word in _arguments_of(file, command_line) if ":=" in word]

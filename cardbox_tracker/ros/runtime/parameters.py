@@ -48,11 +48,7 @@ class NotDeclared(ParameterNotDeclaredException):
 
 
 class LiveParameters(Generic[T]):
-    """The declared parameters of one node; :attr:`value` is always a valid set.
-
-    Raises:
-        CardboxError: a value given at the start is refused; the text has its name and the reason.
-    """
+    """The declared parameters of a node, always valid; a wrong value raises CardboxError."""
 
     def __init__(
         self, node: Node, kind: type[T], on_change: Callable[[T], None] | None = None

@@ -40,11 +40,7 @@ def share_file(name: str) -> Path | None:
 
 
 def compile_kernels() -> None:
-    """Compile the code that the nodes will run, unless its cache has it; takes minutes at most.
-
-    Raises:
-        CardboxError: the process failed; the text has the end of its output.
-    """
+    """Compile what the nodes run, unless it is kept; raise CardboxError if that fails."""
     done = subprocess.run(
         [*_OF_PACKAGE, "cardbox_tracker.tracking.precompile"],
         stdout=subprocess.PIPE,
@@ -79,11 +75,7 @@ class Nodes:
         return [*_OF_PACKAGE, "cardbox_tracker.start"]
 
     def check(self) -> None:
-        """Raise if a node died.
-
-        Raises:
-            CardboxError: a node died; the text has the end of its log.
-        """
+        """Raise CardboxError, with the end of its log, if a node died."""
         for name, process in self._processes.items():
             if process.poll() not in (None, 0):
                 words = self.text(name)[-_SHOWN:]
