@@ -83,6 +83,23 @@ def atomic_path(path: str | os.PathLike[str]) -> Iterator[Path]:
 
 
 @contextmanager
+def saved_file(path: str | os.PathLike[str], kind: type[CardboxError]) -> Iterator[BinaryIO]:
+    """Yield a file that replaces ``path`` when it is on the disk; raise ``kind`` if that fails."""
+    try:
+        with atomic_path(path) as temporary, temporary.open("wb") as file:
+            yield file
+            file.flush()
+            os.fsync(file.fileno())
+    except CardboxError as error:
+        raise kind(str(error)) from None
+    except OSError as error:
+        raise kind(
+            f"cannot write {os.fspath(path)}: {error.strerror}; choose a folder that exists and is "
+            "writable, on a disk with space"
+        ) from None
+
+
+@contextmanager
 def claimed_name(target: Path, *, is_folder: bool) -> Iterator[Path]:
     """Yield a new empty file or folder beside ``target``, and remove it at the end if it exists.
 

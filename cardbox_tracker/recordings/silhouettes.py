@@ -249,7 +249,7 @@ class SilhouetteSource:
         self._start_points(start_s, end_s)
         for prepared in self._images_until(end_s, start_s):
             stamp_ns, time_s, image, recorded, *_ = prepared
-            silhouette = self._pipeline.silhouette(image, stamp_ns)
+            silhouette = self._silhouette(prepared)
             if time_s >= start_s:
                 seen = brightness_of(image), silhouette, image
                 frame = RecordedFrame(stamp_ns, time_s, *seen, recorded=recorded)
@@ -258,6 +258,9 @@ class SilhouetteSource:
                 else:
                     yield frame._replace(points=self._points(prepared, silhouette))
         self._end_points()
+
+    def _silhouette(self, prepared: PreparedImage) -> NDArray[np.uint8]:
+        return self._pipeline.silhouette(prepared.image, prepared.stamp_ns)
 
     def _people(self, prepared: PreparedImage) -> tuple[ImagePoints, ...]:
         """Return the points of all people in an image."""

@@ -21,11 +21,11 @@ from numpy.typing import NDArray
 from cardbox_tracker.camera.camera import Calibration
 from cardbox_tracker.common.errors import BackgroundFileError, CardboxError, quoted
 from cardbox_tracker.common.files import (
-    atomic_path,
     check_writable,
     foreign,
     is_written_in_place,
     regular_file,
+    saved_file,
     user_path,
 )
 from cardbox_tracker.segmentation.chroma import ChromaModel
@@ -96,18 +96,8 @@ def save_background(stored: StoredBackground, path: str | os.PathLike[str]) -> N
     }
     if model.chroma is not None:
         arrays |= {_CHROMA_MEAN: model.chroma.mean, _CHROMA_STDDEV: model.chroma.stddev}
-    try:
-        with atomic_path(path) as temporary, temporary.open("wb") as file:
-            np.savez(file, allow_pickle=False, **arrays)
-            file.flush()
-            os.fsync(file.fileno())
-    except CardboxError as error:
-        raise BackgroundFileError(str(error)) from None
-    except OSError as error:
-        raise BackgroundFileError(
-            f"cannot write the background {os.fspath(path)}: {error.strerror}; choose a folder "
-            "that exists and is writable, on a disk with space"
-        ) from None
+    with saved_file(path, BackgroundFileError) as file:
+        np.savez(file, allow_pickle=False, **arrays)
 
 
 def load_background(path: str | os.PathLike[str], size: tuple[int, int]) -> StoredBackground:
