@@ -43,10 +43,7 @@ class Extrinsics:
 
     @classmethod
     def of(cls, matrix: object, source: str = "") -> Extrinsics:
-        """Create extrinsics from a matrix (4, 4) or (3, 4).
-
-        Raises CameraError, which names ``source``, if it is no rigid transform.
-        """
+        """Create from a matrix (4, 4) or (3, 4), or raise CameraError with ``source``."""
         try:
             values = np.array(matrix, dtype=np.float64)
         except (TypeError, ValueError, OverflowError):
@@ -73,10 +70,7 @@ class Extrinsics:
 
     @classmethod
     def of_vectors(cls, rotation: object, translation_m: object, source: str = "") -> Extrinsics:
-        """Create extrinsics from a rotation vector (3,), rad, and a translation (3,), metres.
-
-        Raises CameraError, which names ``source``, without three finite numbers each.
-        """
+        """Create from a rotation vector, rad, and translation, m, (3,), or raise CameraError."""
         try:
             vectors = np.array([rotation, translation_m], dtype=np.float64).reshape(2, 3)
         except (TypeError, ValueError, OverflowError):

@@ -48,10 +48,7 @@ MEASURED, PROPORTIONS = SOURCES = ("measured", "proportions")
 
 
 def check_range(name: str, value: float, lowest: float, highest: float, unit: str) -> None:
-    """Raise BodyModelError if a value is not finite or outside of ``lowest`` to ``highest``.
-
-    The text gives name, value, unit, range and a likely wrong unit.
-    """
+    """Raise BodyModelError, with unit and range, if a value is not finite or out of range."""
     if not math.isfinite(value):
         raise BodyModelError(f"{name} is {value}; expected a finite number of {unit}")
     if not lowest <= value <= highest:

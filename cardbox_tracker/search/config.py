@@ -180,10 +180,7 @@ class TrackerConfig(Settings):
             raise NoEffectError(name, "of arms, which have no place", "arm.rotation_noise_rad")
 
     def with_particles(self, particles: int) -> TrackerConfig:
-        """Return these settings with N = ``particles`` in each of the three filters.
-
-        Raises NoEffectError if the filter is not ``hierarchical``, ValueError if N is out of range.
-        """
+        """Return these settings with N = ``particles`` in each of the paper's three filters."""
         number = {"particles": particles}
         fewer = {"average": particles} if particles < self.average else {}
         return self.changed({"torso": number, "arm": number, **fewer})

@@ -58,11 +58,7 @@ class BackgroundLearner:
         return self._brightness.count
 
     def add(self, image: NDArray[np.uint8] | FloatImage) -> None:
-        """Learn from one image: brightness (H, W), or bgr (H, W, 3), of any type of ``image_from``.
-
-        Raises ValueError if its size differs from the earlier ones', or type or values are
-        impossible.
-        """
+        """Learn from brightness (H, W) or bgr (H, W, 3), or raise ValueError."""
         image = image_from(image)
         self._brightness.add(brightness_of(image) if image.ndim == 3 else image)
         # A single grey image makes the comparison by colour impossible.
