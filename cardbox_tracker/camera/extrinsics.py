@@ -30,16 +30,11 @@ class Extrinsics:
     """Rigid transform from the first camera's optical frame into another camera's.
 
     A point p of that frame is ``rotation @ p + translation_m`` in the other's optical frame.
-
-    Attributes:
-        rotation: (3, 3).
-        translation_m: (3,), metres.
-        source: description of the origin, for messages.
     """
 
-    rotation: FloatArray
-    translation_m: FloatArray
-    source: str = ""
+    rotation: FloatArray  #: (3, 3)
+    translation_m: FloatArray  #: (3,), metres
+    source: str = ""  #: description of the origin, for messages
 
     @classmethod
     def of(cls, matrix: object, source: str = "") -> Extrinsics:

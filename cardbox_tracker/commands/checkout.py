@@ -16,17 +16,12 @@ _PACKAGE = Path(__file__).parents[1]
 
 @dataclass
 class LabCommand:
-    """A subcommand whose arguments and work are in a module of ``lab/``.
-
-    Attributes:
-        module: full name of the module.
-        targets: quoted commands of ``make`` that do the same.
-    """
+    """A subcommand whose arguments and work are in a module of ``lab/``."""
 
     NAME: str
     HELP: str
-    module: str
-    targets: str
+    module: str  #: full name of the module
+    targets: str  #: quoted commands of ``make`` that do the same
 
     def add_arguments(self, parser: argparse.ArgumentParser) -> None:
         """Add the arguments."""

@@ -37,14 +37,10 @@ class Command(Protocol):
     """A subcommand: a module of this folder, or an object, with these four names.
 
     Slow imports are inside ``add_arguments`` and ``run``, so that ``cardbox --help`` is fast.
-
-    Attributes:
-        NAME: name that is typed after ``cardbox``.
-        HELP: one line for ``cardbox --help``, without a capital letter or a full stop.
     """
 
-    NAME: str
-    HELP: str
+    NAME: str  #: name that is typed after ``cardbox``
+    HELP: str  #: one line for ``cardbox --help``, without a capital letter or a full stop
 
     def add_arguments(self, parser: argparse.ArgumentParser) -> None:
         """Add the arguments of the subcommand to its ``parser``."""

@@ -23,23 +23,14 @@ _TYPE_TEXTS = {bool: "true or false", int: "a whole number", float: "a number", 
 
 @dataclass(frozen=True)
 class Setting:
-    """Properties of a setting in addition to name, type and default.
+    """Properties of a setting in addition to name, type and default."""
 
-    Attributes:
-        description: its effect, in one sentence or phrase.
-        unit: its unit; empty for a plain number or a text.
-        minimum: smallest allowed value; None without a limit.
-        maximum: largest allowed value; None without a limit.
-        choices: the allowed texts; empty if any text is allowed.
-        restarts: True if tracking has to start again when it changes.
-    """
-
-    description: str
-    unit: str = ""
-    minimum: float | None = None
-    maximum: float | None = None
-    choices: tuple[str, ...] = ()
-    restarts: bool = False
+    description: str  #: its effect, in one sentence or phrase
+    unit: str = ""  #: its unit; empty for a plain number or a text
+    minimum: float | None = None  #: smallest allowed value; None without a limit
+    maximum: float | None = None  #: largest allowed value; None without a limit
+    choices: tuple[str, ...] = ()  #: the allowed texts; empty if any text is allowed
+    restarts: bool = False  #: True if tracking has to start again when it changes
 
     @property
     def limits(self) -> tuple[float, float] | None:

@@ -66,13 +66,11 @@ def check_range(name: str, value: float, lowest: float, highest: float, unit: st
 class Person:
     """Sizes of one person, independent of place and camera.
 
-    Attributes:
-        sizes: shape (18,), metres, ordered as ``SIZE_NAMES``; kept read-only.
-
     Raises:
         BodyModelError: a size is not finite or outside of its range; the text names it.
     """
 
+    #: shape (18,), metres, ordered as ``SIZE_NAMES``; kept read-only
     sizes: FloatArray = field(default_factory=lambda: DEFAULT_SIZES.copy())
 
     def __post_init__(self) -> None:
@@ -156,40 +154,32 @@ class CameraPose:
 class BodyModel:
     """One person in one place before one camera.
 
-    Attributes:
-        person: the 18 sizes.
-        placement: position of mid-hip.
-        camera_pose: pose of the camera.
-        side_turn: turn of the person for the side reference, ``left`` or ``right``.
-        appearance: the colours of the person's parts; None if they were not learned.
-        source: one of ``SOURCES``; sizes from proportions are less exact.
-        unknown: names of sizes and of ``PLACEMENT`` whose values are guesses; a tracker fits them
-            to the first silhouette of a person.
-        stature_stddev: relative standard deviation of a stature that is only that of most people;
-            it is no part of a model file.
-        shoulder_rise: rise of a shoulder joint per radian of elevation of its arm, in shoulder
-            breadths (:mod:`.skeleton`); it is no part of a model file.
-        is_distance_found: whether the images show the distance, and nobody has given it; it is no
-            part of a model file.
-        version: number of a body that is measured while it is tracked live, from 1 on; 0 for
-            others. Equal bodies may have different ones.
-        stamp_ns: stamp of the first image to which this version belongs, ns; 0 without one.
-
     Raises:
         BodyModelError: ``side_turn``, ``source`` or a name in ``unknown`` is not valid.
     """
 
-    person: Person = field(default_factory=Person)
-    placement: Placement = Placement()
-    camera_pose: CameraPose = CameraPose()
-    side_turn: str = "left"
+    person: Person = field(default_factory=Person)  #: the 18 sizes
+    placement: Placement = Placement()  #: position of mid-hip
+    camera_pose: CameraPose = CameraPose()  #: pose of the camera
+    side_turn: str = "left"  #: turn of the person for the side reference, ``left`` or ``right``
+    #: the colours of the person's parts; None if they were not learned
     appearance: Appearance | None = None
-    source: str = MEASURED
+    source: str = MEASURED  #: one of ``SOURCES``; sizes from proportions are less exact
+    #: names of sizes and of ``PLACEMENT`` whose values are guesses; a tracker fits them to the
+    #: first silhouette of a person
     unknown: tuple[str, ...] = ()
+    #: relative standard deviation of a stature that is only that of most people; it is no part of a
+    #: model file
     stature_stddev: float = 0.0
+    #: rise of a shoulder joint per radian of elevation of its arm, in shoulder breadths
+    #: (:mod:`.skeleton`); it is no part of a model file
     shoulder_rise: float = SHOULDER_RISE
+    #: whether the images show the distance, and nobody has given it; it is no part of a model file
     is_distance_found: bool = field(default=False, compare=False)
+    #: number of a body that is measured while it is tracked live, from 1 on; 0 for others. Equal
+    #: bodies may have different ones.
     version: int = field(default=0, compare=False)
+    #: stamp of the first image to which this version belongs, ns; 0 without one
     stamp_ns: int = field(default=0, compare=False)
 
     def __post_init__(self) -> None:

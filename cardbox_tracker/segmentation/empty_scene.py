@@ -21,17 +21,13 @@ ImageArray = NDArray[np.uint8]
 class BackgroundModel:
     """Mean and standard deviation of the empty scene's brightness, each (H, W) float32.
 
-    Attributes:
-        mean: mean brightness.
-        stddev: standard deviation of the brightness.
-        chroma: mean and standard deviation of the colours; None if the images were grey.
-
     Raises:
         ValueError: an array has another shape or type.
     """
 
-    mean: FloatImage
-    stddev: FloatImage
+    mean: FloatImage  #: mean brightness
+    stddev: FloatImage  #: standard deviation of the brightness
+    #: mean and standard deviation of the colours; None if the images were grey
     chroma: ChromaModel | None = None
 
     def __post_init__(self) -> None:

@@ -55,22 +55,15 @@ class _Replay(PersonDetector):
 
 
 class DemoFilm(NamedTuple):
-    """The film of n images.
+    """The film of n images."""
 
-    Attributes:
-        path: the video.
-        fov_deg: field of view across its width.
-        stature_m: of the woman.
-        true_m: reference of shoulders, elbows and hands, (n, 6, 3), metres in the optical frame;
-            nan where there is none.
-        found: what the detector found.
-    """
-
-    path: Path
-    fov_deg: float
-    stature_m: float
+    path: Path  #: the video
+    fov_deg: float  #: field of view across its width
+    stature_m: float  #: of the woman
+    #: reference of shoulders, elbows and hands, (n, 6, 3), metres in the optical frame; nan where
+    #: there is none
     true_m: FloatArray
-    found: tuple[Detection, ...]
+    found: tuple[Detection, ...]  #: what the detector found
 
     @classmethod
     def load(cls) -> DemoFilm:

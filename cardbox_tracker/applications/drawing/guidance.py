@@ -51,19 +51,12 @@ _DARKER = 2
 
 
 class Asked(NamedTuple):
-    """The posture that a person is asked to take.
+    """The posture that a person is asked to take."""
 
-    Attributes:
-        body: a body of about the person's size, at their place.
-        camera: camera at the working resolution, with the pitch of the body model.
-        posture: (12,), rad and metres.
-        fit: fit of the person to the posture: ``far``, ``nearly`` or ``fits``.
-    """
-
-    body: BodyModel
-    camera: Camera
-    posture: FloatArray
-    fit: str = "far"
+    body: BodyModel  #: a body of about the person's size, at their place
+    camera: Camera  #: camera at the working resolution, with the pitch of the body model
+    posture: FloatArray  #: (12,), rad and metres
+    fit: str = "far"  #: fit of the person to the posture: ``far``, ``nearly`` or ``fits``
 
 
 class Guide:

@@ -207,26 +207,19 @@ _LEVEL_RAD, _SITS_NS = math.radians(30.0), 1_000_000_000
 
 
 class Seen(NamedTuple):
-    """One image of a table.
+    """One image of a table."""
 
-    Attributes:
-        stamp_ns: its stamp.
-        time_s: seconds from the recording's start.
-        state: of the tracker.
-        posture: d1..d12 and their standard deviations, (2, 12); None without a posture.
-        neck: ``neck_yaw`` and ``neck_pitch`` and their deviations, (2, 2); None if unknown.
-        wrists: see :func:`.rula.wrist_samples`.
-        legs: ``LEG_NAMES`` and their deviations, (2, 8); None unless both legs are ``tracked``.
-        lengths_m: hips to shoulders, then thigh and shank of the left and the right leg, (5,).
-    """
-
-    stamp_ns: int
-    time_s: float
-    state: str
+    stamp_ns: int  #: its stamp
+    time_s: float  #: seconds from the recording's start
+    state: str  #: of the tracker
+    #: d1..d12 and their standard deviations, (2, 12); None without a posture
     posture: FloatArray | None
+    #: ``neck_yaw`` and ``neck_pitch`` and their deviations, (2, 2); None if unknown
     neck: FloatArray | None
-    wrists: FloatArray
+    wrists: FloatArray  #: see :func:`.rula.wrist_samples`
+    #: ``LEG_NAMES`` and their deviations, (2, 8); None unless both legs are ``tracked``
     legs: FloatArray | None
+    #: hips to shoulders, then thigh and shank of the left and the right leg, (5,)
     lengths_m: FloatArray
 
 

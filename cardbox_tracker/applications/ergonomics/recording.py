@@ -63,20 +63,13 @@ _WIDTH_PX, _QUALITY = 640, 80
 
 @dataclass(frozen=True)
 class RulaRow:
-    """One image.
+    """One image."""
 
-    Attributes:
-        stamp_ns: stamp of the image.
-        state: of the tracker.
-        scores: its scores; None without a posture.
-        time_s: seconds from the recording's start.
-        measured: which of the method's ``measurable`` parts are measured; others are declared.
-    """
-
-    stamp_ns: int
-    state: str
-    scores: ScoreDistribution | None
-    time_s: float
+    stamp_ns: int  #: stamp of the image
+    state: str  #: of the tracker
+    scores: ScoreDistribution | None  #: its scores; None without a posture
+    time_s: float  #: seconds from the recording's start
+    #: which of the method's ``measurable`` parts are measured; others are declared
     measured: frozenset[str] = frozenset()
 
     @property
@@ -164,24 +157,15 @@ def worst_moments(
 
 @dataclass(frozen=True)
 class RulaSummary:
-    """Expected times, s.
+    """Expected times, s."""
 
-    Attributes:
-        measured_s: time with a posture.
-        above_s: time with a score above ``above`` of the method.
-        by_level_s: time at each action level.
-        mean: expected score over the measured time; nan without any.
-        of_mean: mean score of the mean postures over the same time.
-        uncertain_s: part of the measured time whose postures may be wrong.
-        measured_parts_s: part of the measured time in which each measurable part was measured.
-    """
-
-    measured_s: float
-    above_s: float
-    by_level_s: tuple[float, ...]
-    mean: float
-    of_mean: float
-    uncertain_s: float
+    measured_s: float  #: time with a posture
+    above_s: float  #: time with a score above ``above`` of the method
+    by_level_s: tuple[float, ...]  #: time at each action level
+    mean: float  #: expected score over the measured time; nan without any
+    of_mean: float  #: mean score of the mean postures over the same time
+    uncertain_s: float  #: part of the measured time whose postures may be wrong
+    #: part of the measured time in which each measurable part was measured
     measured_parts_s: Mapping[str, float]
 
     @property
@@ -212,19 +196,12 @@ def summarize(rows: Sequence[RulaRow], method: Method = RULA) -> RulaSummary:
 
 
 class ScoreShares(NamedTuple):
-    """Expected time at each score of a part.
+    """Expected time at each score of a part."""
 
-    Attributes:
-        name: of the part, as in the tables.
-        words: the same for people.
-        source: ``MEASURED``, ``DECLARED`` or ``MIXED``.
-        time_s: time (n,) at the scores 1 to n, s.
-    """
-
-    name: str
-    words: str
-    source: str
-    time_s: FloatArray
+    name: str  #: of the part, as in the tables
+    words: str  #: the same for people
+    source: str  #: ``MEASURED``, ``DECLARED`` or ``MIXED``
+    time_s: FloatArray  #: time (n,) at the scores 1 to n, s
 
     @property
     def shares(self) -> FloatArray:

@@ -70,25 +70,16 @@ def report_lines(
 
 @dataclass(frozen=True)
 class PageContent:
-    """Content of the page.
+    """Content of the page."""
 
-    Attributes:
-        title: heading of the page.
-        facts: lines about recording, person and settings, by name.
-        config: settings of the score.
-        rows: one image each, in order.
-        images: JPEG of images by stamp; None if no images are wanted or given.
-        are_heads_hidden: whether heads in the images were made unrecognizable.
-        method: of the scores.
-    """
-
-    title: str
-    facts: Mapping[str, str]
-    config: ErgonomicConfig
-    rows: Sequence[RulaRow]
+    title: str  #: heading of the page
+    facts: Mapping[str, str]  #: lines about recording, person and settings, by name
+    config: ErgonomicConfig  #: settings of the score
+    rows: Sequence[RulaRow]  #: one image each, in order
+    #: JPEG of images by stamp; None if no images are wanted or given
     images: Mapping[int, bytes] | None = None
-    are_heads_hidden: bool = True
-    method: Method = RULA
+    are_heads_hidden: bool = True  #: whether heads in the images were made unrecognizable
+    method: Method = RULA  #: of the scores
 
 
 def write_page(content: PageContent, path: Path) -> None:

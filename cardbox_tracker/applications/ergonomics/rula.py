@@ -49,14 +49,11 @@ NOT_MEASURED = "declared, since it is not measured"
 class ErgonomicConfig(Settings):
     """What no image shows, of both methods.
 
-    Attributes:
-        inputs: names of the settings in their order on the page.
-
     Raises:
         ValueError: a value is out of its range; the text names it.
     """
 
-    inputs: ClassVar[tuple[str, ...]]
+    inputs: ClassVar[tuple[str, ...]]  #: names of the settings in their order on the page
     shoulders_raised: bool = setting(False, f"the shoulders are raised; {NOT_MEASURED}")
     arms_supported: bool = setting(
         False, f"the arms are supported, or the person leans; {NOT_MEASURED}"
@@ -264,24 +261,16 @@ def of_both_arms(words: str, highest: int) -> tuple[Part, Part]:
 
 
 class Method(NamedTuple):
-    """What tables and pages of scores need to know of a method.
+    """What tables and pages of scores need to know of a method."""
 
-    Attributes:
-        name: its name.
-        highest: highest grand score.
-        above: grand score above which work has to be changed soon or at once.
-        levels: lowest and highest grand score of each action level, and its meaning.
-        parts: parts and tables whose scores are shown.
-        declared_parts: highest score of each part that no image shows.
-        measurable: names of the parts that are measured in some images and declared in others.
-    """
-
-    name: str
-    highest: int
-    above: int
+    name: str  #: its name
+    highest: int  #: highest grand score
+    above: int  #: grand score above which work has to be changed soon or at once
+    #: lowest and highest grand score of each action level, and its meaning
     levels: tuple[tuple[int, int, str], ...]
-    parts: tuple[Part, ...]
-    declared_parts: Mapping[str, int]
+    parts: tuple[Part, ...]  #: parts and tables whose scores are shown
+    declared_parts: Mapping[str, int]  #: highest score of each part that no image shows
+    #: names of the parts that are measured in some images and declared in others
     measurable: tuple[str, ...]
 
 
@@ -311,20 +300,14 @@ muscle use."""
 
 
 class ScoreDistribution(NamedTuple):
-    """Chances (n,) of the grand scores 1 to n, which is 7 in RULA; each array adds up to 1.
+    """Chances (n,) of the grand scores 1 to n, which is 7 in RULA; each array adds up to 1."""
 
-    Attributes:
-        grand: chances for the worse arm.
-        left: chances for the left arm.
-        right: chances for the right arm.
-        parts: the same of the scores of each part, by its name; empty if they are not known.
-        of_mean: score of the mean posture, from which the samples deviate; 0 if it is not known.
-    """
-
-    grand: FloatArray
-    left: FloatArray
-    right: FloatArray
+    grand: FloatArray  #: chances for the worse arm
+    left: FloatArray  #: chances for the left arm
+    right: FloatArray  #: chances for the right arm
+    #: the same of the scores of each part, by its name; empty if they are not known
     parts: Mapping[str, FloatArray] = MappingProxyType({})
+    #: score of the mean posture, from which the samples deviate; 0 if it is not known
     of_mean: int = 0
 
     @property

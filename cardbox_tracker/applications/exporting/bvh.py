@@ -48,19 +48,13 @@ _SIDES = (("Left", 1.0), ("Right", -1.0))
 
 
 class Bone(NamedTuple):
-    """A joint of the skeleton and what hangs on it.
+    """A joint of the skeleton and what hangs on it."""
 
-    Attributes:
-        name: name of the joint; empty for the end of a chain.
-        offset_m: place in the parent's frame at rest, metres in the axes of the file.
-        channels: values per frame in their order.
-        children: the next joints.
-    """
-
-    name: str
+    name: str  #: name of the joint; empty for the end of a chain
+    #: place in the parent's frame at rest, metres in the axes of the file
     offset_m: tuple[float, float, float]
-    channels: tuple[str, ...] = ()
-    children: tuple[Bone, ...] = ()
+    channels: tuple[str, ...] = ()  #: values per frame in their order
+    children: tuple[Bone, ...] = ()  #: the next joints
 
 
 def skeleton(body: BodyModel) -> Bone:

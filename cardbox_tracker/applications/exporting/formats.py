@@ -44,19 +44,13 @@ def write_isb(path: Path, motion: Motion, body: BodyModel | None = None) -> None
 
 
 class Format(NamedTuple):
-    """One format.
+    """One format."""
 
-    Attributes:
-        suffix: end of the names of its files.
-        write: writes a motion of a body to a file; the body may be unknown.
-        check: raises CardboxError if a library is missing.
-        has_places: whether it depends on the pitch of the camera.
-    """
-
-    suffix: str
+    suffix: str  #: end of the names of its files
+    #: writes a motion of a body to a file; the body may be unknown
     write: Callable[[Path, Motion, BodyModel | None], None]
-    check: Callable[[], object] = lambda: None
-    has_places: bool = True
+    check: Callable[[], object] = lambda: None  #: raises CardboxError if a library is missing
+    has_places: bool = True  #: whether it depends on the pitch of the camera
 
 
 FORMATS: dict[str, Format] = {

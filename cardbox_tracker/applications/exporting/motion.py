@@ -37,36 +37,26 @@ MISSING = "missing"
 
 @dataclass(frozen=True)
 class Motion:
-    """Results for n images in order of time; gaps are images without a posture.
+    """Results for n images in order of time; gaps are images without a posture."""
 
-    Attributes:
-        stamp_ns: stamps of the images, (n,), rising.
-        time_s: seconds from the start of the recording, (n,).
-        state: tracking state of each image, n texts.
-        states: d1..d12, ``torso_x`` and ``torso_z``, (n, 14), rad and metres; nan in gaps.
-        neck: ``neck_yaw`` and ``neck_pitch``, (n, 2), rad; nan while the face is not seen.
-        keypoints_m: (n, 6, 3), ordered as ``KEYPOINT_NAMES``, metres in the optical frame of the
-            first camera; nan in gaps.
-        wrists: flexion, deviation and rotation of the forearm of both hands, (n, 2, 3), rad; nan
-            where they are unknown, as all that follows.
-        palms: normals out of the palms, (n, 2, 3), unit vectors in the optical frame.
-        legs: ``LEG_NAMES``, (n, 8), rad.
-        leg_points_m: (n, 6, 3), ordered as ``LEG_KEYPOINT_NAMES``, in the optical frame; nan where
-            they are hidden.
-        leg_stddev_m: their standard deviations, (n, 6).
-    """
-
-    stamp_ns: NDArray[np.int64]
-    time_s: FloatArray
-    state: tuple[str, ...]
+    stamp_ns: NDArray[np.int64]  #: stamps of the images, (n,), rising
+    time_s: FloatArray  #: seconds from the start of the recording, (n,)
+    state: tuple[str, ...]  #: tracking state of each image, n texts
+    #: d1..d12, ``torso_x`` and ``torso_z``, (n, 14), rad and metres; nan in gaps
     states: FloatArray
+    #: ``neck_yaw`` and ``neck_pitch``, (n, 2), rad; nan while the face is not seen
     neck: FloatArray
+    #: (n, 6, 3), ordered as ``KEYPOINT_NAMES``, metres in the optical frame of the first camera;
+    #: nan in gaps
     keypoints_m: FloatArray
+    #: flexion, deviation and rotation of the forearm of both hands, (n, 2, 3), rad; nan where they
+    #: are unknown, as all that follows
     wrists: FloatArray
-    palms: FloatArray
-    legs: FloatArray
+    palms: FloatArray  #: normals out of the palms, (n, 2, 3), unit vectors in the optical frame
+    legs: FloatArray  #: ``LEG_NAMES``, (n, 8), rad
+    #: (n, 6, 3), ordered as ``LEG_KEYPOINT_NAMES``, in the optical frame; nan where they are hidden
     leg_points_m: FloatArray
-    leg_stddev_m: FloatArray
+    leg_stddev_m: FloatArray  #: their standard deviations, (n, 6)
 
     @classmethod
     def of(cls, results: Results) -> Motion:

@@ -31,20 +31,13 @@ _LONGEST_FINGER_M = 0.25
 
 @dataclass(frozen=True)
 class Arm:
-    """A robot's arm.
+    """A robot's arm."""
 
-    Attributes:
-        path: all joints from the robot's root to the tip.
-        joints: names of those that follow the person's arm, in this order.
-        tip: link of the hand.
-        gripper: name of the joint that opens the hand; empty for none.
-        stays: names of the movable joints before the arm and beyond it that do not move.
-    """
-
-    path: tuple[Joint, ...]
-    joints: tuple[str, ...]
-    tip: str
-    gripper: str
+    path: tuple[Joint, ...]  #: all joints from the robot's root to the tip
+    joints: tuple[str, ...]  #: names of those that follow the person's arm, in this order
+    tip: str  #: link of the hand
+    gripper: str  #: name of the joint that opens the hand; empty for none
+    #: names of the movable joints before the arm and beyond it that do not move
     stays: tuple[str, ...]
 
     def table(self, robot: Robot, max_speed: float) -> str:

@@ -90,19 +90,12 @@ def angles_of(posture: FloatArray) -> dict[str, float]:
 
 @dataclass(frozen=True)
 class JointMap:
-    """A :class:`~.retargeter.Method`: each of ``joints`` follows an angle of the person.
+    """A :class:`~.retargeter.Method`: each of ``joints`` follows an angle of the person."""
 
-    Attributes:
-        angles: one of ``ANGLES`` for each joint; None for a joint that stays.
-        joints: the robot's joints without repetition.
-        scale: (n,).
-        offset_rad: (n,).
-    """
-
-    angles: tuple[str | None, ...]
-    joints: tuple[str, ...]
-    scale: FloatArray
-    offset_rad: FloatArray
+    angles: tuple[str | None, ...]  #: one of ``ANGLES`` for each joint; None for a joint that stays
+    joints: tuple[str, ...]  #: the robot's joints without repetition
+    scale: FloatArray  #: (n,)
+    offset_rad: FloatArray  #: (n,)
 
     @property
     def sources(self) -> tuple[tuple[str, ...], ...]:

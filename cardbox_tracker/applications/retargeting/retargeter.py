@@ -175,17 +175,11 @@ class SafeMotion:
 
 
 class Command(NamedTuple):
-    """Command for the robot at one image.
+    """Command for the robot at one image."""
 
-    Attributes:
-        positions: positions (n,) of ``Retargeter.joints``, rad or m.
-        status: ``moving``, or ``frozen:`` with the reason.
-        duration_s: time in which the robot reaches the positions, s.
-    """
-
-    positions: FloatArray
-    status: str
-    duration_s: float
+    positions: FloatArray  #: positions (n,) of ``Retargeter.joints``, rad or m
+    status: str  #: ``moving``, or ``frozen:`` with the reason
+    duration_s: float  #: time in which the robot reaches the positions, s
 
     @property
     def is_moving(self) -> bool:

@@ -31,31 +31,19 @@ _FREEDOMS = {"fixed": 0, "planar": 3, "floating": 6}
 
 @dataclass(frozen=True)
 class Joint:
-    """One joint between two links.
-
-    Attributes:
-        kind: ``revolute``, ``continuous``, ``prismatic`` or any that stays, such as ``fixed``.
-        parent: name of a link.
-        child: name of a link.
-        origin_m: (3,), in the frame of ``parent``.
-        turn: rotation matrix (3, 3) from the child at 0 to ``parent``.
-        axis: unit vector (3,) in the frame of ``child``.
-        lower: lowest position, rad or m; half a turn back for a ``continuous`` joint.
-        upper: highest position, rad or m.
-        speed: highest speed, rad/s or m/s; inf if the description gives none, or 0.
-        mimics: the joint that it copies, ``multiplier * position + offset``; empty for none.
-    """
+    """One joint between two links."""
 
     name: str
-    kind: str
-    parent: str
-    child: str
-    origin_m: FloatArray
-    turn: FloatArray
-    axis: FloatArray
-    lower: float = 0.0
-    upper: float = 0.0
-    speed: float = math.inf
+    kind: str  #: ``revolute``, ``continuous``, ``prismatic`` or any that stays, such as ``fixed``
+    parent: str  #: name of a link
+    child: str  #: name of a link
+    origin_m: FloatArray  #: (3,), in the frame of ``parent``
+    turn: FloatArray  #: rotation matrix (3, 3) from the child at 0 to ``parent``
+    axis: FloatArray  #: unit vector (3,) in the frame of ``child``
+    lower: float = 0.0  #: lowest position, rad or m; half a turn back for a ``continuous`` joint
+    upper: float = 0.0  #: highest position, rad or m
+    speed: float = math.inf  #: highest speed, rad/s or m/s; inf if the description gives none, or 0
+    #: the joint that it copies, ``multiplier * position + offset``; empty for none
     mimics: str = ""
     multiplier: float = 1.0
     offset: float = 0.0
@@ -68,15 +56,10 @@ class Joint:
 
 @dataclass(frozen=True)
 class Robot:
-    """A robot.
+    """A robot."""
 
-    Attributes:
-        urdf: description.
-        all_joints: every joint by the name of its child link.
-    """
-
-    urdf: str
-    all_joints: dict[str, Joint]
+    urdf: str  #: description
+    all_joints: dict[str, Joint]  #: every joint by the name of its child link
 
     @property
     def joints(self) -> dict[str, Joint]:

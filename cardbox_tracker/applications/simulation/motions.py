@@ -31,18 +31,12 @@ _ENTER_FROM_M = 1.6
 
 @dataclass(frozen=True)
 class Segment:
-    """Part of the timeline.
+    """Part of the timeline."""
 
-    Attributes:
-        name: name of the motion or reference posture.
-        start_s: start, seconds from the session's start.
-        end_s: end, seconds from the session's start.
-        pose: posture (12,) at a time in seconds from ``start_s``; None in the empty scene.
-    """
-
-    name: str
-    start_s: float
-    end_s: float
+    name: str  #: name of the motion or reference posture
+    start_s: float  #: start, seconds from the session's start
+    end_s: float  #: end, seconds from the session's start
+    #: posture (12,) at a time in seconds from ``start_s``; None in the empty scene
     pose: Callable[[float], FloatArray] | None
 
 

@@ -39,18 +39,12 @@ _ROUND_DEG = (0.0, 65.0, -55.0, 110.0)
 
 @dataclass(frozen=True)
 class SyntheticCamera:
-    """One camera of a session.
+    """One camera of a session."""
 
-    Attributes:
-        name: namespace of its topics.
-        camera: intrinsics and pitch.
-        extrinsics: transform from the optical frame of the first camera to this one's.
-        view: transform of body states to a further camera; None for the first camera.
-    """
-
-    name: str
-    camera: Camera
-    extrinsics: Extrinsics
+    name: str  #: namespace of its topics
+    camera: Camera  #: intrinsics and pitch
+    extrinsics: Extrinsics  #: transform from the optical frame of the first camera to this one's
+    #: transform of body states to a further camera; None for the first camera
     view: View | None = None
 
     @property
@@ -138,26 +132,17 @@ _FOCAL_OF_WIDTH = 330.0 / 320.0
 
 @dataclass(frozen=True)
 class SessionFormat:
-    """Format of a synthetic recording.
+    """Format of a synthetic recording."""
 
-    Attributes:
-        fps: images per second.
-        width: image width, px.
-        height: image height, px.
-        cameras: number of cameras, 1 to 4. Several have the namespaces ``cam0``, ``cam1``, ...;
-            ``extrinsics.yaml`` in the folder has their poses.
-        compressed: JPEG images on ``/camera/image_raw/compressed`` instead of raw ones.
-        encoding: encoding of raw images: ``mono8``, ``rgb8`` or ``bgr8``.
-        storage: ``mcap`` or ``sqlite3``.
-    """
-
-    fps: float = 15.0
-    width: int = 320
-    height: int = 240
+    fps: float = 15.0  #: images per second
+    width: int = 320  #: image width, px
+    height: int = 240  #: image height, px
+    #: number of cameras, 1 to 4. Several have the namespaces ``cam0``, ``cam1``, ...;
+    #: ``extrinsics.yaml`` in the folder has their poses.
     cameras: int = 1
-    compressed: bool = False
-    encoding: str = "mono8"
-    storage: str = "mcap"
+    compressed: bool = False  #: JPEG images on ``/camera/image_raw/compressed`` instead of raw ones
+    encoding: str = "mono8"  #: encoding of raw images: ``mono8``, ``rgb8`` or ``bgr8``
+    storage: str = "mcap"  #: ``mcap`` or ``sqlite3``
 
 
 DEFAULT_FORMAT = SessionFormat()

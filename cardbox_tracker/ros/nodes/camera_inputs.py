@@ -103,22 +103,15 @@ class Received(NamedTuple):
 
 @dataclass(frozen=True)
 class ObservationSet:
-    """Observations of all cameras at one time.
+    """Observations of all cameras at one time."""
 
-    Attributes:
-        header: header in the first camera's frame, with the stamp of its silhouette, or of the
-            earliest one.
-        headers: header of each camera's silhouette, the first camera's first; None without one.
-        observations: observation of each camera, as a tracker takes them.
-        sent_ns: send time of the last silhouette, ns since the epoch.
-        nothing: black image (H, W) of the first camera.
-    """
-
+    #: header in the first camera's frame, with the stamp of its silhouette, or of the earliest one
     header: Header
+    #: header of each camera's silhouette, the first camera's first; None without one
     headers: list[Header | None]
-    observations: list[Observation]
-    sent_ns: int
-    nothing: ImageArray
+    observations: list[Observation]  #: observation of each camera, as a tracker takes them
+    sent_ns: int  #: send time of the last silhouette, ns since the epoch
+    nothing: ImageArray  #: black image (H, W) of the first camera
 
     def picture(self, number: int = 0) -> ImageArray:
         """Return a camera's image, or its silhouette, or a black image."""

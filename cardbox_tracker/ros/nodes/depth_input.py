@@ -53,19 +53,12 @@ class DepthInput:
 
 
 class Taken(NamedTuple):
-    """An image or a depth image that waits for its counterpart.
+    """An image or a depth image that waits for its counterpart."""
 
-    Attributes:
-        message: header of the image, or the depth image.
-        camera: camera of the image; None for a depth image.
-        within_m: depth limit at the time of the image, metres.
-        sent_ns: send time, ns since the epoch.
-    """
-
-    message: Any
-    camera: Camera | None
-    within_m: float
-    sent_ns: int
+    message: Any  #: header of the image, or the depth image
+    camera: Camera | None  #: camera of the image; None for a depth image
+    within_m: float  #: depth limit at the time of the image, metres
+    sent_ns: int  #: send time, ns since the epoch
 
 
 Send = Callable[[Header, ImageArray, Camera, int], None]

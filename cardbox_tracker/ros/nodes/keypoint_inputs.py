@@ -45,17 +45,11 @@ _IN_DOUBT = 5
 
 
 class Taken(NamedTuple):
-    """Points of all persons in one image, in pixels of the camera's own image.
+    """Points of all persons in one image, in pixels of the camera's own image."""
 
-    Attributes:
-        stamp_ns: stamp of the image.
-        frame_id: frame of the image; empty if it is not known.
-        persons: points of each person.
-    """
-
-    stamp_ns: int
-    frame_id: str
-    persons: list[ImagePoints]
+    stamp_ns: int  #: stamp of the image
+    frame_id: str  #: frame of the image; empty if it is not known
+    persons: list[ImagePoints]  #: points of each person
 
 
 class KeypointTopic:

@@ -33,24 +33,18 @@ _EXPECTED = {
 
 @dataclass(frozen=True)
 class Argument:
-    """One argument of a launch file.
+    """One argument of a launch file."""
 
-    Attributes:
-        default: default as text; None if the argument is required. A number whose default is
-            empty may be left out.
-        meaning: one line for ``--show-args``.
-        kind: type of its value; ``list`` is a list of numbers, ``Path`` the name of a file to read.
-        choices: allowed texts; empty if any text is allowed.
-        limits: lowest and highest allowed number.
-        name: True if the value must be empty, or a letter followed by letters, digits and
-            underscores. In a list, this holds for each item, and all must differ.
-    """
-
+    #: default as text; None if the argument is required. A number whose default is empty may be
+    #: left out.
     default: str | None
-    meaning: str
+    meaning: str  #: one line for ``--show-args``
+    #: type of its value; ``list`` is a list of numbers, ``Path`` the name of a file to read
     kind: type = str
-    choices: tuple[str, ...] = ()
-    limits: tuple[float, float] | None = None
+    choices: tuple[str, ...] = ()  #: allowed texts; empty if any text is allowed
+    limits: tuple[float, float] | None = None  #: lowest and highest allowed number
+    #: True if the value must be empty, or a letter followed by letters, digits and underscores. In
+    #: a list, this holds for each item, and all must differ.
     name: bool = False
 
     def value(self, text: str) -> Value | None:

@@ -24,13 +24,9 @@ AT_START = "only at the start"
 
 @dataclass(frozen=True)
 class ParameterSpec(Setting):
-    """Description, range and behaviour of one parameter.
+    """Description, range and behaviour of one parameter."""
 
-    Attributes:
-        effect: when a change takes effect.
-    """
-
-    effect: str = NEXT_IMAGE
+    effect: str = NEXT_IMAGE  #: when a change takes effect
 
     @property
     def read_only(self) -> bool:
@@ -84,11 +80,9 @@ class NodeParameters:
     """Base of the parameter dataclasses; every own field is made by :func:`parameter`.
 
     A class may also inherit settings of the core, all of which are parameters then.
-
-    Attributes:
-        effects: effect of a change of inherited settings that is not that of the core, by name.
     """
 
+    #: effect of a change of inherited settings that is not that of the core, by name
     effects: ClassVar[Mapping[str, str]] = MappingProxyType({})
 
     def check(self) -> None:
