@@ -58,8 +58,7 @@ def level_to_optical(pitch_rad: float, roll_rad: float = 0.0) -> FloatArray:
 class Camera:
     """An ideal pinhole camera at a working resolution.
 
-    Raises:
-        CameraError: a value is impossible; the text names it.
+    Raises CameraError if a value is impossible; the text names it.
     """
 
     width: int  #: image width, px

@@ -139,8 +139,7 @@ def settings_below(instance: Any, before: str = "") -> Iterator[tuple[str, Any, 
 def check(instance: Any) -> None:
     """Check every setting of a dataclass instance.
 
-    Raises:
-        ValueError: a value is not allowed; the text names it.
+    Raises ValueError if a value is not allowed; the text names it.
     """
     for name, one in settings_of(instance).items():
         one.check(name, getattr(instance, name))
@@ -149,8 +148,7 @@ def check(instance: Any) -> None:
 class Settings:
     """Base of settings dataclasses: the ranges are checked when one is made.
 
-    Raises:
-        ValueError: a value is not allowed; the text names it.
+    Raises ValueError if a value is not allowed; the text names it.
     """
 
     def __post_init__(self) -> None:
@@ -197,8 +195,7 @@ def changed(instance: T, given: Mapping[str, Any], where: str = "") -> T:
 def nested(values: Mapping[str, Any]) -> dict[str, Any]:
     """Return values by dotted names, such as ``whole_body.effort``, as nested mappings.
 
-    Raises:
-        ValueError: a name is given a value, and settings below it, too.
+    Raises ValueError if a name is given a value, and settings below it, too.
     """
     result: dict[str, Any] = {}
     for dotted, value in values.items():

@@ -25,10 +25,8 @@ class SmallYamlError(CardboxError):
 def parse_small_yaml(text: str) -> Any:
     """Return the mapping, list or value of a YAML text.
 
-    Aliases, tags, repeated keys, more than 64 kB, and more than 8 levels are refused.
-
-    Raises:
-        SmallYamlError: the text is refused or not valid YAML. The message does not name the source.
+    Aliases, tags, repeated keys, more than 64 kB, and more than 8 levels are refused. Raises
+    SmallYamlError if the text is refused or not valid YAML. The message does not name the source.
     """
     # The first comparison avoids encoding a long text, because a character has at least one byte.
     if len(text) > MOST_BYTES or len(text.encode("utf-8", "replace")) > MOST_BYTES:

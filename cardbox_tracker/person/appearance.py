@@ -53,8 +53,7 @@ def steps_of_levels(brightness: FloatArray, learned: FloatArray) -> NDArray[np.i
 class Appearance:
     """The colours of one person's parts in one light.
 
-    Raises:
-        BodyModelError: the shapes do not fit.
+    Raises BodyModelError if the shapes do not fit.
     """
 
     #: stored probability of each part of ``PARTS`` and each bin, (5, bins), uint8, see the module;

@@ -66,8 +66,7 @@ def check_range(name: str, value: float, lowest: float, highest: float, unit: st
 class Person:
     """Sizes of one person, independent of place and camera.
 
-    Raises:
-        BodyModelError: a size is not finite or outside of its range; the text names it.
+    Raises BodyModelError if a size is not finite or outside of its range; the text names it.
     """
 
     #: shape (18,), metres, ordered as ``SIZE_NAMES``; kept read-only
@@ -109,8 +108,7 @@ class Person:
 class Placement:
     """Position of mid-hip in the front reference posture, metres in the reference frame.
 
-    Raises:
-        BodyModelError: a value is not finite or outside of its range; the text names it.
+    Raises BodyModelError if a value is not finite or outside of its range; the text names it.
     """
 
     distance_m: float = 2.0  #: level distance from the camera: X is ``-distance_m``
@@ -128,8 +126,7 @@ class Placement:
 class CameraPose:
     """Pose of the camera in the reference frame, whose origin is the camera's centre.
 
-    Raises:
-        BodyModelError: a value is not finite or outside of its range.
+    Raises BodyModelError if a value is not finite or outside of its range.
     """
 
     pitch_rad: float = 0.0  #: downward pitch, rad
@@ -154,8 +151,7 @@ class CameraPose:
 class BodyModel:
     """One person in one place before one camera.
 
-    Raises:
-        BodyModelError: ``side_turn``, ``source`` or a name in ``unknown`` is not valid.
+    Raises BodyModelError if ``side_turn``, ``source`` or a name in ``unknown`` is not valid.
     """
 
     person: Person = field(default_factory=Person)  #: the 18 sizes

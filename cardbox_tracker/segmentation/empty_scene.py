@@ -21,8 +21,7 @@ ImageArray = NDArray[np.uint8]
 class BackgroundModel:
     """Mean and standard deviation of the empty scene's brightness, each (H, W) float32.
 
-    Raises:
-        ValueError: an array has another shape or type.
+    Raises ValueError if an array has another shape or type.
     """
 
     mean: FloatImage  #: mean brightness

@@ -226,8 +226,7 @@ class Seen(NamedTuple):
 def read_table(path: Path, person: int = 1) -> list[Seen]:
     """Return the images of a table of ``cardbox track --legs``; of several people, of one.
 
-    Raises:
-        CardboxError: the file cannot be read, or lacks columns of the legs.
+    Raises CardboxError if the file cannot be read, or lacks columns of the legs.
     """
     results = read_results(path, None if person == 1 else person)
     missing = [name for name in LEG_NAMES if name not in results.numbers]

@@ -49,8 +49,7 @@ NOT_MEASURED = "declared, since it is not measured"
 class ErgonomicConfig(Settings):
     """What no image shows, of both methods.
 
-    Raises:
-        ValueError: a value is out of its range; the text names it.
+    Raises ValueError if a value is out of its range; the text names it.
     """
 
     inputs: ClassVar[tuple[str, ...]]  #: names of the settings in their order on the page

@@ -371,11 +371,9 @@ def make_retargeter(
 ) -> tuple[Robot, Retargeter, str]:
     """Return a robot, its retargeter, and a table of the joints that were found.
 
-    Without a joint map, the robot's arm is found and follows.
-
-    Raises:
-        CardboxError: a file cannot be read, the robot lacks a joint or link, its arm is not clear,
-            or a setting is given that a joint map does not need.
+    Without a joint map, the robot's arm is found and follows. Raises CardboxError if a file cannot
+    be read, the robot lacks a joint or link, its arm is not clear, or a setting is given that a
+    joint map does not need.
     """
     robot = load_robot(robot_file)
     if joint_map:

@@ -87,8 +87,7 @@ class Robot:
     def limits_of(self, names: Sequence[str]) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Return lower limits, upper limits and highest speeds, each (n,), of joints.
 
-        Raises:
-            CardboxError: there is no movable joint of that name.
+        Raises CardboxError if there is no movable joint of that name.
         """
         unknown = [name for name in names if name not in self.joints]
         if unknown:

@@ -96,10 +96,8 @@ class SyntheticCamera:
 def synthetic_cameras(body: BodyModel, first: Camera, count: int) -> list[SyntheticCamera]:
     """Return ``count`` cameras like ``first``; the person, placed as in ``body``, faces the first.
 
-    All have the height of the first camera and look at the person.
-
-    Raises:
-        CardboxError: ``count`` is out of range.
+    All have the height of the first camera and look at the person. Raises CardboxError if ``count``
+    is out of range.
     """
     if not 1 <= count <= MOST_CAMERAS:
         raise CardboxError(f"{count} cameras were requested; expected 1 to {MOST_CAMERAS}")

@@ -72,9 +72,8 @@ def most_pixels_of(calibration: Calibration) -> float:
 def image_behind(silhouette: ImageArray, message: Image | None) -> ImageArray | None:
     """Return the image (H, W, 3) or (H, W) of a silhouette (H, W); None without a message.
 
-    Raises:
-        CameraError: image and silhouette differ in size.
-        EncodingError: the encoding is not supported or the bytes do not match it.
+    Raises CameraError if image and silhouette differ in size, and EncodingError if the encoding is
+    not supported or the bytes do not match it.
     """
     if message is None:
         return None
@@ -93,10 +92,8 @@ def silhouette_of(message: Image) -> ImageArray:
     """Return the silhouette (H, W), 0 or 255, of a mask with one number for each pixel.
 
     :func:`~cardbox_tracker.camera.given_arrays.silhouette_from` says which pixels are the person.
-
-    Raises:
-        EncodingError: the encoding is not that of a mask, the bytes do not match the size, or the
-            values are impossible.
+    Raises EncodingError if the encoding is not that of a mask, the bytes do not match the size, or
+    the values are impossible.
     """
     if message.encoding not in _MASKS:
         raise EncodingError(

@@ -88,10 +88,8 @@ def skeleton_message(
 def persons_of_polygon(message: Any, size: Size) -> list[ImagePoints]:
     """Return the people of a PolygonStamped, each with all points of ``MESSAGE_NAMES``.
 
-    One person may lack the knuckles.
-
-    Raises:
-        CardboxError: the number of points is wrong, or a point is impossible.
+    One person may lack the knuckles. Raises CardboxError if the number of points is wrong, or a
+    point is impossible.
     """
     points = message.polygon.points
     if not points:

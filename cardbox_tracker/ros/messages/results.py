@@ -52,9 +52,8 @@ def joint_values_of(message: JointState) -> JointValues:
 def posture_of(message: JointState) -> FloatArray:
     """Return the posture (12,), or its deviations, of a message of the tracker.
 
-    Raises:
-        NotFiniteError: a value is not a finite number.
-        CardboxError: a joint is missing, or the numbers of names and values differ.
+    Raises NotFiniteError if a value is not a finite number, and CardboxError if a joint is missing,
+    or the numbers of names and values differ.
     """
     try:
         found = posture_from(joint_values_of(message))
@@ -75,9 +74,8 @@ def neck_of(message: JointState) -> FloatArray | None:
 def posture_and_neck_of(message: JointState) -> FloatArray:
     """Return the posture, and the neck if it is there, or their deviations; (12,) or (14,).
 
-    Raises:
-        NotFiniteError: a value is not a finite number.
-        CardboxError: a joint is missing, or the numbers of names and values differ.
+    Raises NotFiniteError if a value is not a finite number, and CardboxError if a joint is missing,
+    or the numbers of names and values differ.
     """
     posture, neck = posture_of(message), neck_of(message)
     return posture if neck is None else np.concatenate([posture, neck])

@@ -50,8 +50,7 @@ class Argument:
     def value(self, text: str) -> Value | None:
         """Return the value of ``text``; None for a number that is left out.
 
-        Raises:
-            ValueError: ``text`` is not valid; the error's text is the expectation.
+        Raises ValueError if ``text`` is not valid; the error's text is the expectation.
         """
         expected = " or ".join(self.choices) if self.choices else _EXPECTED.get(self.kind, "")
         lowest, highest = self.limits or (-math.inf, math.inf)
