@@ -83,11 +83,7 @@ class _Equations(NamedTuple):
 
 
 class PoseProblem:
-    """The bundle adjustment of one further camera.
-
-    Attributes:
-        states: current estimate (14,) for each sighting.
-    """
+    """The bundle adjustment of a further camera; ``states`` (14,) are those of each sighting."""
 
     def __init__(
         self,

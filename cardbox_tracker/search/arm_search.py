@@ -59,11 +59,7 @@ _AGAIN_NOISE = 0.45
 
 
 class ArmSearch:
-    """Searches arms (N, 4) with all cameras of a cost, beside its fixed torso.
-
-    Attributes:
-        spreads_m: deviations of left elbow and hand, right elbow and hand, in the last frame, m.
-    """
+    """Searches arms (N, 4) beside a cost's torso; ``spreads_m`` are those of elbows and hands."""
 
     def __init__(self, cost: MultiViewCost) -> None:
         """Prepare for searches with ``cost``."""

@@ -52,11 +52,7 @@ _SHOULDERS = [POINT_INDEX["left_shoulder"], POINT_INDEX["right_shoulder"]]
 
 
 class CameraFaults:
-    """Compares each camera's images with those before, and with those of the first camera.
-
-    Attributes:
-        left_out: number of images of each camera that were not used, by the reason.
-    """
+    """Compares each camera's images with others; ``left_out`` counts unused ones by the reason."""
 
     def __init__(self, count: int) -> None:
         """Begin without images of ``count`` cameras."""

@@ -43,11 +43,7 @@ _LONGEST_S = 1.0
 
 
 class Facing:
-    """Doubt about one person before one camera.
-
-    Attributes:
-        shows_back: whether there is hair where the face was.
-    """
+    """Doubt about one person before a camera; ``shows_back`` says if hair is where the face was."""
 
     def __init__(self, body: BodyModel) -> None:
         """Prepare for a person, whose appearance may be missing."""

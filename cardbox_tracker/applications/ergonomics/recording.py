@@ -109,11 +109,7 @@ class MomentImages:
 
 
 class RulaObserver:
-    """Observer of :func:`~cardbox_tracker.recordings.track.track_recording` that scores each image.
-
-    Attributes:
-        rows: one row an image, in order.
-    """
+    """Observer of :func:`~.recordings.track.track_recording` that scores each image in ``rows``."""
 
     def __init__(self, config: RulaConfig, seed: int, images: MomentImages | None = None) -> None:
         """Seed the random numbers; the same images and ``seed`` give the same rows."""

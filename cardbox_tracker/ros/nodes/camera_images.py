@@ -144,11 +144,7 @@ class CameraImages:
 
 
 class SilhouetteOutputs:
-    """Publishes silhouettes with the image behind each and the camera of both.
-
-    Attributes:
-        covered: fraction of the last silhouette that is foreground.
-    """
+    """Publishes silhouettes, images and camera; ``covered`` is the last one's foreground share."""
 
     def __init__(self, node: CardboxNode) -> None:
         """Advertise the topics for ``node``."""

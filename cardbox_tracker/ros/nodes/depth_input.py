@@ -66,11 +66,7 @@ Send = Callable[[Header, ImageArray, Camera, int], None]
 
 
 class DepthCut:
-    """Pairs images with depth images and cuts out the pixels nearer than a limit.
-
-    Attributes:
-        depth_m: last depth image, metres, as the camera sees it; empty before it.
-    """
+    """Pairs images with depth, the last ``depth_m``, and cuts out pixels nearer than a limit."""
 
     def __init__(self, node: CardboxNode, topic: str, send: Send) -> None:
         """Subscribe with ``node`` to depth images on ``topic``; ``send`` receives silhouettes."""

@@ -204,11 +204,7 @@ _BESIDE = 10
 
 
 class KeypointInputs:
-    """The points of all cameras; the tracker never waits for them.
-
-    Attributes:
-        cameras: those of each camera; empty without a source of points.
-    """
+    """The points of all ``cameras``, none without a source; the tracker never waits for them."""
 
     def __init__(self, node: CardboxNode, settings: TrackerParameters) -> None:
         """Subscribe with ``node`` if ``keypoints`` is given; raise CardboxError if it is wrong."""
