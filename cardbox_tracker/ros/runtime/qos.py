@@ -7,7 +7,6 @@ describe a state (models, background) are latched: a late subscriber gets the la
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any
 
 from rclpy.event_handler import PublisherEventCallbacks, SubscriptionEventCallbacks
 from rclpy.qos import (
@@ -71,14 +70,8 @@ def copy_of(profile: QoSProfile) -> QoSProfile:
     )
 
 
-def mismatch_text(topic: str, kind: QoSPolicyKind, *, subscribing: bool) -> str:
-    """Return an explanation of a QoS mismatch between publisher and subscriber of ``topic``.
-
-    Args:
-        topic: the resolved topic name.
-        kind: the policy that does not match.
-        subscribing: True if this node is the subscriber, False if it publishes.
-    """
+def mismatch_text(topic: str, kind: QoSPolicyKind, subscribing: bool) -> str:
+    """Return an explanation of a mismatch of QoS; ``subscribing`` is False if this node publishes."""
     name = qos_policy_name_from_kind(kind)
     weak, strong, low, high = _MEANING.get(name, ("less", "more", "volatile", "transient_local"))
     policy = name.lower()
@@ -99,20 +92,14 @@ def subscription_events(topic: str, report: Callable[[str], None]) -> Subscripti
     """Return callbacks that pass a mismatch of QoS on ``topic`` to ``report``."""
     # The default callbacks wait for other events, which lengthens every wait of the executor.
     return SubscriptionEventCallbacks(
-        incompatible_qos=_reports(topic, report, subscribing=True), use_default_callbacks=False
+        incompatible_qos=lambda event: report(mismatch_text(topic, event.last_policy_kind, True)),
+        use_default_callbacks=False,
     )
 
 
 def publisher_events(topic: str, report: Callable[[str], None]) -> PublisherEventCallbacks:
     """Return callbacks that pass a mismatch of QoS on ``topic`` to ``report``."""
     return PublisherEventCallbacks(
-        incompatible_qos=_reports(topic, report, subscribing=False), use_default_callbacks=False
-    )
-
-
-def _reports(
-    topic: str, report: Callable[[str], None], *, subscribing: bool
-) -> Callable[[Any], None]:
-    return lambda event: report(
-        mismatch_text(topic, event.last_policy_kind, subscribing=subscribing)
+        incompatible_qos=lambda event: report(mismatch_text(topic, event.last_policy_kind, False)),
+        use_default_callbacks=False,
     )
