@@ -71,7 +71,7 @@ def copy_of(profile: QoSProfile) -> QoSProfile:
 
 
 def mismatch_text(topic: str, kind: QoSPolicyKind, subscribing: bool) -> str:
-    """Return an explanation of a mismatch of QoS; ``subscribing`` is False if this node publishes."""
+    """Return an explanation of a QoS mismatch; ``subscribing`` is False if this node publishes."""
     name = qos_policy_name_from_kind(kind)
     weak, strong, low, high = _MEANING.get(name, ("less", "more", "volatile", "transient_local"))
     policy = name.lower()
