@@ -196,12 +196,8 @@ def check_outputs(
 ) -> None:
     """Refuse outputs that cannot be written or would overwrite something, before any work is done.
 
-    Args:
-        outputs: files to write; None is ignored, here and below.
-        force: whether files that exist may be replaced.
-        inputs: files and recordings that are read, which are never replaced.
-        results: files and folders that other code writes; only ``force`` and ``inputs`` are
-            checked.
+    None is ignored everywhere. ``inputs`` are read, so they are never replaced; ``outputs`` and
+    ``results`` only with ``force``. ``results`` are files and folders that other code writes.
     """
     files = [path for path in outputs if path is not None]
     every = [*files, *(path for path in results if path is not None)]

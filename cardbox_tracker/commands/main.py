@@ -139,9 +139,8 @@ def _interrupted(name: str) -> int:
 def build_parser(words: Container[str] = _EVERY_COMMAND) -> argparse.ArgumentParser:
     """Return the parser of ``cardbox``.
 
-    Args:
-        words: arguments of the command line. Only the subcommand among them gets its arguments,
-            since their choices may need slow imports; by default all get theirs.
+    Only the subcommand in the words of a command line gets its arguments, since their choices may
+    need slow imports; by default all do.
     """
     parser = argparse.ArgumentParser(
         prog="cardbox", formatter_class=_Formatter, description=_DESCRIPTION, epilog=_EPILOG

@@ -589,11 +589,7 @@ def _silhouettes(
 
 
 def points_named(given: object) -> Detector | PointTable:
-    """Return the source of 2D points.
-
-    Args:
-        given: the name of a detector, the path of points, a class, or a detector of one's own.
-    """
+    """Return the source of 2D points: a detector's name, a path, a class, or one's own detector."""
     from cardbox_tracker.common.extensions import DETECTORS, extensions, loaded
     from cardbox_tracker.detectors.detector import MEDIAPIPE, Detector
     from cardbox_tracker.detectors.own_network import OwnModel

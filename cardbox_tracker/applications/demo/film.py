@@ -91,10 +91,7 @@ class DemoFilm(NamedTuple):
         """Return the detector's own points in space, (n, 6, 3), m relative to the hips.
 
         A hand is where the reference has it: from the wrist towards the knuckles. The detector
-        takes the camera for level.
-
-        Args:
-            pitch_rad: downward pitch of the camera, by which the points are turned.
+        takes the camera for level, so points are turned by its downward pitch ``pitch_rad``.
         """
         points = np.array([one.spatial_m for one in self.found])
         at = {name: points[:, number] for number, name in enumerate(LANDMARKS)}
@@ -109,11 +106,10 @@ class DemoFilm(NamedTuple):
         return np.asarray(np.stack(joints, axis=1) @ turn.T)
 
     def errors_m(self, keypoints_m: FloatArray, *, is_placed: bool = False) -> FloatArray:
-        """Return the mean distance of keypoints (n, 6, 3) to the reference in each image, (n,).
+        """Return the mean distance of keypoints (n, 6, 3), m, to the reference in each image, (n,).
 
-        Args:
-            keypoints_m: metres in the optical frame.
-            is_placed: whether the place counts; else the middle of the shoulders is the same.
+        They are in the optical frame; unless ``is_placed``, the middle of the shoulders is made
+        equal.
         """
         difference = keypoints_m - self.true_m
         moved = difference if is_placed else beside_shoulders(difference)

@@ -109,19 +109,12 @@ def draw_guidance(
     scale: int = 1,
     mirror: bool = False,
 ) -> ImageArray:
-    """Return a colour image with instructions for a person and the words in a band above it.
+    """Return (1.3 scale H, scale W, 3) bgr with words in a band above the image of a person.
 
-    Args:
-        image: (H, W) grey or silhouette, or (H, W, 3) bgr, of the camera's size.
-        words: a few words, which are written in at most two lines.
-        mood: colour of the band: ``ask``, ``good`` or ``bad``.
-        number: seconds left, beside the head; None for no number.
-        asked: outline to stand in, with nose and arrow if it looks aside; None for no outline.
-        scale: enlargement of the result.
-        mirror: mirror the image, but not words and number.
-
-    Returns:
-        (1.3 scale H, scale W, 3) bgr.
+    The image is (H, W) grey or silhouette, or (H, W, 3) bgr, of the camera's size. The words take
+    at most two lines, and the ``mood`` colours the band: ``ask``, ``good`` or ``bad``. ``number``
+    are seconds left, beside the head. ``asked`` is an outline to stand in, with nose and arrow if
+    it looks aside. ``mirror`` mirrors the image, but not words and number.
     """
     canvas = enlarged(image, scale)
     if asked is not None:

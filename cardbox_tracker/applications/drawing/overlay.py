@@ -59,18 +59,11 @@ _BLOCKS = 6
 def draw_overlay(
     image: ImageArray, body: BodyModel, camera: Camera, estimate: Estimate, scale: int = 1
 ) -> ImageArray:
-    """Return a colour image with the model of ``estimate`` drawn over it.
+    """Return (scale H, scale W, 3) bgr with the model of ``estimate`` drawn over an image.
 
-    Args:
-        image: (H, W) grey or silhouette, or (H, W, 3) bgr, of the camera's size.
-        body: the measured person.
-        camera: camera at the working resolution, with the pitch of the body model.
-        estimate: the estimate to draw; without a posture only its state is written, and if the
-            posture may be wrong, outline and state are amber.
-        scale: enlargement of the result, so that thin lines and text stay readable.
-
-    Returns:
-        (scale H, scale W, 3) bgr.
+    The image is (H, W) grey or silhouette, or (H, W, 3) bgr, of the size of the working camera,
+    which has the pitch of the body model. Without a posture only the state is written; outline and
+    state are amber if the posture may be wrong.
     """
     canvas = enlarged(image, scale)
     text = estimate.state.replace("_", " ")
@@ -335,15 +328,11 @@ def with_hidden_head(
     estimate: Estimate,
     points: ImagePoints | None = None,
 ) -> ImageArray:
-    """Return a copy of ``image`` in which coarse pixels make the head unrecognizable.
+    """Return a copy of an image in which coarse pixels make the head unrecognizable.
 
-    Args:
-        image: (H, W) or (H, W, 3), of the camera's size.
-        body: the measured person.
-        camera: with the pitch of the body model.
-        estimate: an estimate; without a posture, or with the head behind the camera, the whole
-            image becomes coarse.
-        points: of a detector in this image; those of the face are covered, too.
+    The image is (H, W) or (H, W, 3), of the size of the camera, which has the pitch of the body
+    model. Without a posture, or with the head behind the camera, all of it becomes coarse. A face
+    that the ``points`` of a detector show is covered, too.
     """
     hidden = image.copy()
     part = hidden[_head_region(body, camera, estimate, points)]

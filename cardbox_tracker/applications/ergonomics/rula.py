@@ -340,14 +340,9 @@ def neck_samples(
 def wrist_samples(wrists: FloatArray, count: int, rng: np.random.Generator) -> FloatArray | None:
     """Return normal samples (count, 2, 2) of the wrists, rad; None if both are unknown.
 
-    A wrist is drawn with its whole deviation, because so little of it is measured: a quarter would
-    make nearly every wrist straight.
-
-    Args:
-        wrists: flexion and deviation of both wrists, and their standard deviations, (2, 2, 2), rad;
-            the deviations of an unknown wrist are nan.
-        count: number of samples.
-        rng: random numbers.
+    ``wrists`` (2, 2, 2) are flexion and deviation of both, and standard deviations, rad, nan if
+    unknown. A wrist is drawn with its whole deviation, because so little of it is measured: a
+    quarter would make nearly every wrist straight.
     """
     mean, stddev = wrists
     if np.isnan(stddev).all():
@@ -372,14 +367,9 @@ def sampled_scores(
 ) -> tuple[ScoreDistribution, frozenset[str]]:
     """Return the scores of an uncertain posture, and which of the measurable parts are measured.
 
-    Args:
-        body: the person.
-        posture: mean, (12,), rad and metres.
-        drawn: samples of the posture with its whole deviation, (n, 12).
-        neck: angles of the neck and their standard deviations, (2,) each, rad; None if unknown.
-        wrists: see :func:`wrist_samples`.
-        config: settings.
-        rng: random numbers for neck and wrists.
+    ``posture`` (12,) is the mean, ``drawn`` (n, 12) are samples with its whole deviation, rad and
+    m; ``neck`` are its angles and their standard deviations, (2,) each, rad, or None. ``wrists``
+    are as in :func:`wrist_samples`.
     """
     angles, stddev = neck
     necks, measured = None, measured_wrists(wrists)
@@ -424,15 +414,10 @@ def rula_scores(
     necks: FloatArray | None = None,
     wrists: FloatArray | None = None,
 ) -> RulaScores:
-    """Return the scores of postures of ``body``.
+    """Return the scores of postures (..., 12), rad and metres, of ``body``.
 
-    Args:
-        body: the person.
-        postures: shape (..., 12), rad and metres.
-        config: settings.
-        necks: ``neck_yaw`` and ``neck_pitch`` of each posture, (..., 2), rad; None if unknown.
-        wrists: flexion and deviation of the left and the right wrist in each posture,
-            (..., 2, 2), rad; nan or None if unknown.
+    ``necks`` (..., 2) are ``neck_yaw`` and ``neck_pitch``, rad, or None; ``wrists`` (..., 2, 2)
+    flexion and deviation of the left and the right wrist, rad, nan or None if unknown.
     """
     d = np.asarray(postures, dtype=np.float64)
     if wrists is None:

@@ -171,11 +171,9 @@ _MOST_RISE_M = 0.15
 
 
 def in_reference(optical: FloatArray, body: BodyModel | None) -> FloatArray:
-    """Return points or directions (..., 3) of the optical frame in the reference frame.
+    """Return points, m, or directions (..., 3) of the optical frame in the reference frame.
 
-    Args:
-        optical: points, metres, or directions.
-        body: has pitch and roll of the camera; without it the camera is level.
+    The body has pitch and roll of the camera; without it the camera is level.
     """
     tilt = CameraPose() if body is None else body.camera_pose
     return np.asarray(optical @ level_to_optical(tilt.pitch_rad, tilt.roll_rad))

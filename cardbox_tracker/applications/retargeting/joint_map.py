@@ -58,11 +58,8 @@ def with_head_and_hands(
 ) -> FloatArray:
     """Return a posture with head and hands, (16,), nan where they are not known.
 
-    Args:
-        posture: d1..d12, with ``neck_yaw`` and ``neck_pitch`` if they are known, (12,) or (14,).
-        stddev: standard deviations in the same order, (12,) or (14,).
-        most_stddev_rad: largest deviation of a known angle, rad.
-        hands: ``HAND_OPEN_NAMES``, (2,), nan for one that is not known; None without any.
+    Posture and deviations are (12,), or (14,) with the neck, rad and m; angles with a deviation
+    above ``most_stddev_rad`` are not known. ``hands`` are ``HAND_OPEN_NAMES``, (2,), or nan.
     """
     whole = np.full(len(WITH_HEAD_AND_HANDS), np.nan)
     whole[:N_JOINTS] = posture[:N_JOINTS]

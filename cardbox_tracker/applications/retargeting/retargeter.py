@@ -247,19 +247,14 @@ class Retargeter:
         hands: FloatArray | None = None,
         keypoints: Mapping[str, tuple[str, float]] | None = None,
     ) -> Command:
-        """Return the command for an image.
+        """Return the command for an image of a stamp, ns.
 
-        Args:
-            stamp_ns: stamp of the image.
-            state: tracking state; the robot moves in the state ``tracking``, and those of its
-                joints whose keypoints are ``tracked`` also in the state ``uncertain``.
-            body: the person.
-            posture: d1..d12, rad and metres, and the angles of the neck if known; (12,) or (14,).
-            stddev: their standard deviations, (12,) or (14,).
-            now_ns: time of the robot's clock; None if that is the stamp. The robot moves for no
-                longer than since the command before, whatever the stamps say.
-            hands: how open both hands are, (2,), 0 to 1, nan for one that is not known.
-            keypoints: state and chance to be wrong of each keypoint by name; None if not known.
+        The robot moves in the state ``tracking``, and those of its joints whose keypoints are
+        ``tracked`` also in the state ``uncertain``; ``keypoints`` are states and chances to be
+        wrong by name. Posture and deviations are (12,), or (14,) with the neck, rad and metres.
+        ``now_ns`` is the robot's clock, None if that is the stamp: the robot moves for no longer
+        than since the command before, whatever the stamps say. ``hands`` are how open both are,
+        (2,), 0 to 1, nan if not known.
         """
         now_ns = stamp_ns if now_ns is None else now_ns
         now_ns = max(now_ns, self._commanded_ns or now_ns)

@@ -105,14 +105,10 @@ MOTIONS: dict[str, tuple[float, Callable[[float], FloatArray]]] = {
 
 
 def timeline(motion: str, side_turn: str = "left") -> list[Segment]:
-    """Return the segments of a session.
+    """Return the segments of a session with a motion of ``MOTIONS``, or ``all`` in turn.
 
-    Args:
-        motion: a name of ``MOTIONS``, or ``all`` for each of them in turn.
-        side_turn: direction in which the person turns for the side reference.
-
-    Raises:
-        CardboxError: the motion is unknown.
+    For the side reference the person turns to ``side_turn``. Raises CardboxError if the motion is
+    unknown.
     """
     if motion != "all" and motion not in MOTIONS:
         raise CardboxError(f"motion '{motion}' is unknown; expected {', '.join(MOTIONS)} or all")

@@ -76,14 +76,9 @@ def person_parts(body: BodyModel, posture: FloatArray) -> list[VolumePart]:
 
 
 def person_frames(body: BodyModel, postures: FloatArray) -> PosedBodies:
-    """Return the frames of a person whose shoulders rise with the arms.
+    """Return frames (...) of a person in postures (..., 12), whose shoulders rise with the arms.
 
-    Args:
-        body: the person.
-        postures: shape (..., 12), rad and metres.
-
-    Returns:
-        Frames in the reference frame, with the leading shape of ``postures``.
+    They are in the reference frame; postures are in rad and metres.
     """
     frames = pose(body.rigid, postures)
     up = frames.torso_rotation[..., 2]
@@ -99,9 +94,8 @@ def person_frames(body: BodyModel, postures: FloatArray) -> PosedBodies:
 def girdle_lift_m(breadth_m: float, elevation_rad: FloatArray) -> FloatArray:
     """Return the lift (...) of a shoulder joint along the torso's axis, metres.
 
-    Args:
-        breadth_m: distance of the shoulder joints while the arms hang.
-        elevation_rad: angle (...) between the upper arm and the downward axis of the torso.
+    ``breadth_m`` is that of shoulders with hanging arms, ``elevation_rad`` (...) the angle between
+    the upper arm and the downward axis of the torso.
     """
     rise_rad = _CLAVICLE_RISE * np.maximum(0.0, np.asarray(elevation_rad) - _SETTING_RAD)
     lift: FloatArray = _CLAVICLE_OF_BREADTH * breadth_m * np.sin(rise_rad)

@@ -161,19 +161,11 @@ def synthesize_session(
     overwrite: bool = False,
     progress: Callable[[float], None] | None = None,
 ) -> dict[str, Any]:
-    """Write a session and return its ground truth.
+    """Write a session to the folder ``output``, which appears complete; return its truth.
 
-    Args:
-        output: folder of the recording; it appears when it is complete.
-        motion: ``wave``, ``bend``, ``bow`` or ``all``.
-        seed: seed of noise and sway.
-        form: format of the recording.
-        body: the person, and the pitch of the camera; None for the default person.
-        overwrite: replace an existing recording of that name.
-        progress: called with the finished fraction.
-
-    Raises:
-        CardboxError: the motion or the encoding is unknown, or the folder cannot be written.
+    The motion is ``wave``, ``bend``, ``bow`` or ``all``. The body has the pitch of the camera; by
+    default it is the usual person. Raises CardboxError if motion or encoding is unknown, or the
+    folder cannot be written.
     """
     if form.encoding not in _ENCODINGS:
         raise EncodingError(

@@ -121,13 +121,8 @@ class FullBodies:
     ) -> FullBody | None:
         """Return the body of an image; None before the first one with a person.
 
-        Args:
-            stamp_ns: stamp of the image.
-            state: tracking state of the image.
-            body: the person.
-            values: positions of joints by name, rad and metres.
-            stddev: their standard deviations; a joint without one is not known.
-            keypoints: state and chance to be wrong of each keypoint by name; empty: all tracked.
+        ``values`` are joints by name, rad and m. A joint without a deviation in ``stddev`` is not
+        known. ``keypoints`` are states and chances to be wrong by name; if empty, all are tracked.
         """
         known = {
             name: values[name]

@@ -300,12 +300,9 @@ def errors_cm(points_m: FloatArray, truth_m: FloatArray) -> dict[str, float]:
 
 
 def level_points(points_m: FloatArray, pitch_rad: float, roll_rad: float = 0.0) -> FloatArray:
-    """Transform optical points (n, 3) to the level frame of the URDF's root: X ahead, Y left, Z up.
+    """Return optical points (n, 3), m, in the level frame of the root: X ahead, Y left, Z up.
 
-    Args:
-        points_m: points in the optical frame, metres: x to the right, y down, z ahead.
-        pitch_rad: downward pitch of the camera.
-        roll_rad: its roll.
+    The camera looks down by ``pitch_rad`` and is turned by ``roll_rad``.
     """
     return np.asarray(points_m @ level_to_optical(pitch_rad, roll_rad) * (-1.0, -1.0, 1.0))
 

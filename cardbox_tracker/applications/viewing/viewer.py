@@ -58,19 +58,11 @@ def rerun_program() -> tuple[str, ...]:
 
 @contextmanager
 def recording(blueprint: Any, save: Path | None, web: bool) -> Iterator[tuple[Any, str]]:
-    """Context of a stream to a file, to a browser, or by default to a window.
+    """Context of a stream and its address: to a ``save`` .rrd file, a ``web`` browser or a window.
 
-    Args:
-        blueprint: arrangement of the views.
-        save: .rrd file, which is written atomically at the end.
-        web: serve the viewer to a browser while the context lasts.
-
-    Yields:
-        The stream, and the address for a browser, which is empty without ``web``.
-
-    Raises:
-        CardboxError: rerun-sdk is not installed, the file cannot be written, or neither a port nor
-            a window can be opened.
+    The file is written atomically at the end; the address is empty without ``web``. Raises
+    CardboxError if rerun-sdk is not installed, the file cannot be written, or neither a port nor a
+    window can be opened.
     """
     rr = rerun()
     if save is None and not web and not _has_display():

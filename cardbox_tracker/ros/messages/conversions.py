@@ -50,14 +50,8 @@ def image_of(
 ) -> ImageArray:
     """Return an image message as (H, W, 3) bgr, or as (H, W) if it has no colours.
 
-    Args:
-        message: the message.
-        most_pixels: limit of the pixels.
-        levels: what scales 16 bits, see :func:`.decode_grey`.
-
-    Raises:
-        EncodingError: the encoding is not supported, the bytes do not match it, or the image has
-            more than ``most_pixels``.
+    ``levels`` scales 16 bits, see :func:`.decode_grey`. Raises EncodingError if the encoding is not
+    supported, the bytes do not match it, or there are more than ``most_pixels``.
     """
     if isinstance(message, CompressedImage):
         return decode_compressed(message.data, most_pixels, levels)

@@ -43,13 +43,7 @@ Convert = Callable[[Any, Size], list[ImagePoints]]
 
 
 def keypoints_message(header: Header, px: FloatArray, scores: FloatArray) -> PolygonStamped:
-    """Return the message of the landmarks of one person.
-
-    Args:
-        header: header of the image.
-        px: column and row of each of ``LANDMARKS``, (33, 2).
-        scores: chance that each is right, (33,); all zero if nobody is there.
-    """
+    """Return the message of one person's ``LANDMARKS``, (33, 2), px, and scores, (33,)."""
     points = [
         Point32(x=float(px[i, 0]), y=float(px[i, 1]), z=float(scores[i]))
         for i in map(LANDMARKS.index, MESSAGE_NAMES)

@@ -135,18 +135,12 @@ class CameraInputs:
         changed: Callable[[Camera | None, Sequence[OtherCamera]], None],
         deliver: Callable[[Received, Sequence[Received | None]], None],
     ) -> None:
-        """Subscribe with ``node``.
+        """Subscribe with ``node``, the tracker.
 
-        Args:
-            node: the tracker.
-            settings: its parameters.
-            changed: called with the first and the further cameras when all are known or one has
-                changed; called with None if their poses are no longer known.
-            deliver: called with the silhouette whose stamp represents the set, and with the
-                messages of one time, for :meth:`observed`.
-
-        Raises:
-            CardboxError: the file of the extrinsics cannot be read, or a name is not allowed.
+        ``changed`` is called with the first and the further cameras when all are known or one has
+        changed, and with None if their poses are no longer known; ``deliver`` with the silhouette
+        whose stamp represents the set, and the messages of one time, for :meth:`observed`. Raises
+        CardboxError if the file of the extrinsics cannot be read, or a name is not allowed.
         """
         cameras = settings.cameras or [""]
         self._changed, self._deliver = changed, deliver
