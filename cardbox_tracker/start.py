@@ -1,9 +1,8 @@
 """Start a program of the package: ``python -m cardbox_tracker.start NAME ARGUMENTS``.
 
-All installed executables (``cardbox``, ``background`` and others) begin here, before any slow
-import, so that a signal during the imports ends them without a traceback. ``colcon build`` outside
-the virtual environment makes executables for the system's Python, which lacks numba and rosbags;
-the error names the missing package.
+All executables begin here, before any slow import, so that a signal meanwhile ends them without a
+traceback. ``colcon build`` outside the virtual environment makes executables for the system's
+Python, which lacks numba and rosbags; the error names the missing package.
 """
 
 from __future__ import annotations

@@ -1,8 +1,7 @@
 """The options of ``cardbox track`` and its relatives, read once into a frozen request.
 
-:func:`add_recording` and :func:`add_tracking` declare the options. :func:`recording_request` and
-:func:`tracking_request` read them; one error names all that are missing or contradict each other.
-Nothing below this folder knows options, only the request and its parts.
+One error names all that are missing or contradict each other. Nothing below this folder knows
+options, only the request and its parts.
 """
 
 from __future__ import annotations

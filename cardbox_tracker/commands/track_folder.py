@@ -1,7 +1,7 @@
 """``cardbox track FOLDER``: all recordings of a folder, in parallel processes.
 
-The summary of the results, ``_summary.csv``, has a row for each recording, with a digest of all
-that determines its results. By it an interrupted run goes on, and only what changed is done again.
+The summary, ``_summary.csv``, has a row for each with a digest of what determines its results. By
+it an interrupted run goes on, and only what changed is done again.
 """
 
 from __future__ import annotations

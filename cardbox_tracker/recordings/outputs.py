@@ -180,8 +180,8 @@ def joint_values(estimate: Estimate, torso_place: bool = True) -> JointValues | 
 def joint_deviations(estimate: Estimate, torso_place: bool = True) -> JointValues | None:
     """Return the standard deviation of each joint; None if unknown.
 
-    The joints of the neck, or of a hand, are among them only if it was seen. Legs that are not
-    known may be anywhere in their range.
+    Neck and hands are among them only if they were seen; unknown legs may be anywhere in their
+    range.
     """
     if estimate.posture_stddev is None or not torso_place:
         return _joints(JOINT_NAMES, estimate.posture_stddev)

@@ -201,8 +201,7 @@ class Retargeter:
     def __init__(self, robot: Robot, method: Method, config: RetargetConfig) -> None:
         """Begin at ``config.start``, at 0, or at the limit nearest to 0, for each joint.
 
-        Raises:
-            CardboxError: the robot lacks a joint of ``method``, or ``config.start`` does not fit.
+        Raises CardboxError if the robot lacks a joint of ``method``, or the start does not fit.
         """
         self.joints = method.joints
         limits = Limits(*robot.limits_of(method.joints))

@@ -1,10 +1,8 @@
-"""A synthetic person with rounded body parts.
+"""A synthetic person with rounded body parts; :func:`person_frames` gives the true skeleton.
 
-Each part is a stack of elliptical rings; the part is the convex hull of each two neighbouring
-rings. The rings roughly follow the sizes of a :class:`BodyModel`: limbs taper, the torso narrows at
-waist and shoulders, and there are a neck, open hands and legs. The shoulder joints rise with the
-arms. Therefore the cardbox model never matches exactly. :func:`person_frames` gives the true
-skeleton.
+Each part is the convex hull of neighbouring elliptical rings, which roughly follow the sizes of a
+:class:`BodyModel`: limbs taper, the torso narrows at waist and shoulders, and there are a neck,
+open hands and legs. Shoulders rise with the arms. So the cardbox model never matches exactly.
 """
 
 from __future__ import annotations

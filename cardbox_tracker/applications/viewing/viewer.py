@@ -1,7 +1,7 @@
 """Opens recordings of the optional library rerun-sdk: to a file, in a window or in a browser.
 
-The page of Rerun reports its use to its maker and loads fonts and news. A content security policy
-restricts the browser to this computer, so nothing of a session is sent out.
+A content security policy restricts the browser to this computer, since the page of Rerun reports
+its use to its maker and loads fonts and news.
 """
 
 from __future__ import annotations

@@ -219,10 +219,9 @@ class InitializerNode(CardboxNode):
 
 
 class GuideOutputs:
-    """Outputs of the guidance: drawings on ``overlay`` and words to say aloud on ``~/say``.
+    """Outputs of the guidance: drawings on ``overlay``, words on ``~/say``, more on ``~/status``.
 
-    ``~/status`` has the details for the operator. While ``~/guiding`` is true, the tracker does not
-    publish ``overlay``.
+    While ``~/guiding`` is true, the tracker does not publish ``overlay``.
     """
 
     def __init__(self, node: CardboxNode) -> None:

@@ -67,9 +67,8 @@ class InputStream:
 class ClockDifference:
     """How far the clocks of two streams are apart, by when their images arrive.
 
-    Images of the same moment arrive at almost the same time, so that a steady difference of their
-    stamps is one of the clocks, or of the time that the images take to arrive. The median is not
-    disturbed by single images that are late.
+    Images of the same moment arrive at almost the same time, so a steady difference of their stamps
+    is one of the clocks, or of the time on the way. Late images do not change the median.
     """
 
     def __init__(self, first: InputStream, other: InputStream) -> None:

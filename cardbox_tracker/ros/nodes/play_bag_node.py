@@ -38,10 +38,9 @@ _COMPRESSED = "/compressed"
 
 
 def find_topics(bag: str, wanted: Iterable[str], cameras: Sequence[str] = ()) -> dict[str, str]:
-    """Return the topics of a bag as values of the launch arguments of the same names.
+    """Return the topics of a bag as launch arguments: ``image``, its transport, ``camera_info``.
 
-    Wanted are ``image``, with ``image_transport``, and ``camera_info``; those of several
-    ``cameras`` are relative to each namespace.
+    Those of several ``cameras`` are relative to each namespace.
     """
     with BagReader(bag) as reader:
         images = reader.image_topics

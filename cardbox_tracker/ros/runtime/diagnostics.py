@@ -1,8 +1,6 @@
 """The state of a node on ``/diagnostics`` once a second, and in its log when it changes.
 
-A node reports when it waits for input and when its input has ceased. Lost images are counted by the
-spacing of their stamps, because the middleware does not report them. :class:`LogLimit` limits
-repeated log messages.
+Lost images are counted by their stamps, because the middleware does not report them.
 """
 
 from __future__ import annotations
@@ -41,9 +39,8 @@ class _Spell:
 class LogLimit:
     """Allows the first texts of a kind, then one text after each of growing pauses.
 
-    The kind is the fault without the numbers and names of its text, because a sender of always
-    different nonsense would otherwise fill log and memory. A kind that was quiet for longer than
-    its pause starts anew.
+    A sender of always different nonsense would otherwise fill log and memory. A kind that was quiet
+    for longer than its pause starts anew.
     """
 
     def __init__(self, now_s: Callable[[], float] = time.monotonic) -> None:

@@ -48,10 +48,7 @@ class Argument:
     name: bool = False
 
     def value(self, text: str) -> Value | None:
-        """Return the value of ``text``; None for a number that is left out.
-
-        Raises ValueError if ``text`` is not valid; the error's text is the expectation.
-        """
+        """Return the value of ``text``, None if left out, or raise ValueError: the expectation."""
         expected = " or ".join(self.choices) if self.choices else _EXPECTED.get(self.kind, "")
         lowest, highest = self.limits or (-math.inf, math.inf)
         if self.limits is not None:

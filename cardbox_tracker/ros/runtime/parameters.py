@@ -1,7 +1,6 @@
-"""Parameters of a node, declared from a dataclass that defines types and defaults.
+"""Parameters of a node, declared from the fields of :mod:`.parameter_fields`.
 
-:class:`LiveParameters` declares the fields of :mod:`.parameter_fields` on a node and keeps a
-validated instance. A wrong value is refused with the reason, and the old value stays.
+A wrong value is refused with the reason, and the old value stays.
 """
 
 from __future__ import annotations
