@@ -85,10 +85,9 @@ class ClockDifference:
 
     @property
     def medians_s(self) -> tuple[float, float]:
-        """Differences of the stamps and of the computers' clocks, seconds; 0 while unknown.
+        """Differences of stamps that arrive together, and of clocks, s; 0 while unknown.
 
-        The stamps are those of images that arrive together. Both are positive if the clock of the
-        other stream is ahead.
+        Both are positive if the clock of the other stream is ahead.
         """
         is_known = len(self._found) >= _LEAST and self._other.age_s < _RECENT_S
         stamps_s, computers_s = np.median(self._found, axis=0) if is_known else (0.0, 0.0)

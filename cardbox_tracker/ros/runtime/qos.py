@@ -7,6 +7,7 @@ describe a state (models, background) are latched: a late subscriber gets the la
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Any
 
 from rclpy.event_handler import PublisherEventCallbacks, SubscriptionEventCallbacks
 from rclpy.qos import (
@@ -88,18 +89,20 @@ def mismatch_text(topic: str, kind: QoSPolicyKind, subscribing: bool) -> str:
     )
 
 
+def _reports(topic: str, report: Callable[[str], None], subscribing: bool) -> Callable[[Any], None]:
+    return lambda event: report(mismatch_text(topic, event.last_policy_kind, subscribing))
+
+
 def subscription_events(topic: str, report: Callable[[str], None]) -> SubscriptionEventCallbacks:
     """Return callbacks that pass a mismatch of QoS on ``topic`` to ``report``."""
     # The default callbacks wait for other events, which lengthens every wait of the executor.
     return SubscriptionEventCallbacks(
-        incompatible_qos=lambda event: report(mismatch_text(topic, event.last_policy_kind, True)),
-        use_default_callbacks=False,
+        incompatible_qos=_reports(topic, report, True), use_default_callbacks=False
     )
 
 
 def publisher_events(topic: str, report: Callable[[str], None]) -> PublisherEventCallbacks:
     """Return callbacks that pass a mismatch of QoS on ``topic`` to ``report``."""
     return PublisherEventCallbacks(
-        incompatible_qos=lambda event: report(mismatch_text(topic, event.last_policy_kind, False)),
-        use_default_callbacks=False,
+        incompatible_qos=_reports(topic, report, False), use_default_callbacks=False
     )
