@@ -1,9 +1,8 @@
 """Start a program of the package: ``python -m cardbox_tracker.start NAME ARGUMENTS``.
 
-All installed executables (``cardbox``, ``background`` and others) begin here, before any slow
-import, so that a signal during the imports ends them without a traceback. ``colcon build`` outside
-the virtual environment makes executables for the system's Python, which lacks numba and rosbags;
-the error names the missing package.
+All executables begin here, before any slow import, so that a signal meanwhile ends them without a
+traceback. ``colcon build`` outside the virtual environment makes executables for the system's
+Python, which lacks numba and rosbags; the error names the missing package.
 """
 
 from __future__ import annotations
@@ -54,11 +53,7 @@ NODES: dict[str, str] = {
 
 
 def start(name: str, main: Callable[[], int]) -> int:
-    """Run ``main`` of the program ``name``; a missing package or damaged code is told in words.
-
-    Returns:
-        The exit code; 1 if a package is missing or compiled code is damaged.
-    """
+    """Run ``main`` of a program; tell a missing package or damaged code in words and return 1."""
     try:
         return main()
     except ModuleNotFoundError as error:
@@ -83,15 +78,10 @@ def start(name: str, main: Callable[[], int]) -> int:
 
 
 def other_package(script: str, package: str, environment: str) -> bool:
-    """Return whether an executable of an environment runs another package from elsewhere.
+    """Return whether an executable ``script`` runs another ``package`` than its environment has.
 
-    A sourced colcon workspace does this, because ``PYTHONPATH`` precedes the environment. Where it
-    was built from the same sources, as in the tutorial, nothing is wrong.
-
-    Args:
-        script: path of the executable.
-        package: folder of the package that runs.
-        environment: folder ``site-packages`` of the environment with its own copy.
+    A sourced colcon workspace does this, because ``PYTHONPATH`` precedes the environment, the
+    folder ``site-packages``. Where it was built from the same sources, nothing is wrong.
     """
     own = os.path.join(environment, os.path.basename(package))
     scripts = os.path.realpath(sysconfig.get_path("scripts"))

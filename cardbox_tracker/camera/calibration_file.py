@@ -42,7 +42,8 @@ def load_calibration(path: str | os.PathLike[str]) -> Calibration:
         data = _parsed(read_small_text(path))
         if not isinstance(data, Mapping):
             raise CameraError("it is no mapping")
-        calibration = _of_kalibr(data) if _is_camchain(data) else _of_matrix(data)
+        is_camchain = all(isinstance(one, Mapping) and "intrinsics" in one for one in data.values())
+        calibration = _of_kalibr(data) if is_camchain else _of_matrix(data)
         calibration.camera(calibration.width, calibration.height)
     return calibration
 
@@ -88,10 +89,6 @@ def _of_matrix(data: Mapping[Any, Any]) -> Calibration:
         np.array(value("distortion_coefficients"), dtype=np.float64).ravel(),
         "fisheye" if is_fisheye else str(value("distortion_model")),
     )
-
-
-def _is_camchain(data: Mapping[Any, Any]) -> bool:
-    return all(isinstance(camera, Mapping) and "intrinsics" in camera for camera in data.values())
 
 
 def _of_kalibr(data: Mapping[Any, Any]) -> Calibration:

@@ -58,28 +58,17 @@ def level_to_optical(pitch_rad: float, roll_rad: float = 0.0) -> FloatArray:
 class Camera:
     """An ideal pinhole camera at a working resolution.
 
-    Attributes:
-        width: image width, px.
-        height: image height, px.
-        fx: horizontal focal length, px.
-        fy: vertical focal length, px.
-        cx: principal point, px; (0, 0) is the centre of the first pixel.
-        cy: principal point, px.
-        pitch_rad: downward pitch of the camera, rad; the reference frame stays level.
-        focal_stddev: relative standard deviation of the focal lengths.
-
-    Raises:
-        CameraError: a value is impossible; the text names it.
+    Raises CameraError if a value is impossible; the text names it.
     """
 
-    width: int
-    height: int
-    fx: float
-    fy: float
-    cx: float
-    cy: float
-    pitch_rad: float = 0.0
-    focal_stddev: float = CALIBRATED
+    width: int  #: image width, px
+    height: int  #: image height, px
+    fx: float  #: horizontal focal length, px
+    fy: float  #: vertical focal length, px
+    cx: float  #: principal point, px; (0, 0) is the centre of the first pixel
+    cy: float  #: principal point, px
+    pitch_rad: float = 0.0  #: downward pitch of the camera, rad; the reference frame stays level
+    focal_stddev: float = CALIBRATED  #: relative standard deviation of the focal lengths
 
     def __post_init__(self) -> None:
         """Check the values; whole numbers of another type become ``int``."""
@@ -154,32 +143,22 @@ class Camera:
 
 @dataclass(frozen=True)
 class Calibration:
-    """Calibration of a real camera, from a CameraInfo message or a camera_calibration file.
+    """Calibration of a real camera, from a CameraInfo message or a camera_calibration file."""
 
-    Attributes:
-        width: calibrated image width, px.
-        height: calibrated image height, px.
-        k: intrinsic matrix (3, 3).
-        distortion: coefficients (n,) of ``distortion_model``; all zero without distortion.
-        distortion_model: ``plumb_bob``, ``rational_polynomial`` or ``equidistant``; other names and
-            numbers of coefficients become those of :func:`~.lens.normal_lens`.
-        frame_id: name of the optical frame, which has no leading slash.
-        roll_rad: how far the camera is turned clockwise about its axis, seen from behind it;
-            working images are turned back, so that they are level. Near a quarter turn, width and
-            height are exchanged.
-        is_mirrored: whether the images are mirrored; working images are turned back.
-        focal_stddev: relative standard deviation of the focal lengths.
-    """
-
-    width: int
-    height: int
-    k: FloatArray
+    width: int  #: calibrated image width, px
+    height: int  #: calibrated image height, px
+    k: FloatArray  #: intrinsic matrix (3, 3)
+    #: coefficients (n,) of ``distortion_model``; all zero without distortion
     distortion: FloatArray
+    #: ``plumb_bob``, ``rational_polynomial`` or ``equidistant``; other names and numbers of
+    #: coefficients become those of :func:`~.lens.normal_lens`
     distortion_model: str = "plumb_bob"
-    frame_id: str = OPTICAL_FRAME
+    frame_id: str = OPTICAL_FRAME  #: name of the optical frame, which has no leading slash
+    #: how far the camera is turned clockwise about its axis, seen from behind it; working images
+    #: are turned back, so that they are level. Near a quarter turn, width and height are exchanged.
     roll_rad: float = 0.0
-    focal_stddev: float = CALIBRATED
-    is_mirrored: bool = False
+    focal_stddev: float = CALIBRATED  #: relative standard deviation of the focal lengths
+    is_mirrored: bool = False  #: whether the images are mirrored; working images are turned back
 
     def __post_init__(self) -> None:
         """Bring the lens and the name of the frame into their usual form."""

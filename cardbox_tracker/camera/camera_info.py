@@ -23,10 +23,7 @@ _STEADY = 0.02
 
 
 def unusual(k: NDArray[np.float64], width: int, height: int) -> str:
-    """Return what no usual camera has in a matrix K (3, 3) of full images; empty if all is usual.
-
-    K, width and height, px, are those before regions of interest and binning.
-    """
+    """Return what no usual camera has in K (3, 3) before regions and binning, px; else empty."""
     focal, middle = k.diagonal()[:2], 2 * k[:2, 2] + 1
     size = np.array([width, height])
     fov_deg = 2 * math.degrees(math.atan(width / 2 / focal[0]))

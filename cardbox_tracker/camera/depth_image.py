@@ -1,7 +1,4 @@
-"""Decodes the depth images of REP 118: 16UC1 in millimetres, 32FC1 in metres.
-
-Both may be packed by the plugin ``compressedDepth`` of image_transport.
-"""
+"""Decodes depth images of REP 118, 16UC1 in mm and 32FC1 in m, also as ``compressedDepth``."""
 
 from __future__ import annotations
 
@@ -33,11 +30,7 @@ _KINDS = {"16UC1": ("u2", 0.001), "mono16": ("u2", 0.001), "32FC1": ("f4", 1.0)}
 
 
 def decode_depth(sent: SentImage) -> DepthImage:
-    """Return a depth image (H, W), metres along the optical axis; 0 where nothing was measured.
-
-    Raises EncodingError if the encoding is not one of depth, the bytes do not fit it, or the image
-    is too large.
-    """
+    """Return depth (H, W), m along the optical axis, 0 if unknown; EncodingError if it is none."""
     data, height, width, step, encoding, is_bigendian = sent
     if encoding not in _KINDS:
         raise EncodingError(
@@ -111,10 +104,7 @@ def depth_from_image(message: Any) -> DepthImage:
 
 
 def at_size(depth_m: DepthImage, width: int, height: int) -> DepthImage:
-    """Resize a depth image by picking pixels, so that each value is measured and no mean.
-
-    Raises EncodingError if the aspect ratio is another one, so that the image has another view.
-    """
+    """Resize by picking pixels, whose depth is measured; EncodingError for another aspect ratio."""
     rows, columns = depth_m.shape
     if (rows, columns) == (height, width):
         return depth_m

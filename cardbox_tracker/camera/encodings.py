@@ -27,10 +27,7 @@ _ALL = 1 << 16
 
 
 def to_working_size(image: NDArray[np.uint8], width: int, height: int) -> NDArray[np.uint8]:
-    """Resize ``image`` (H, W) or (H, W, 3) to (height, width); return the same array if it fits.
-
-    Shrinking averages over area, which also averages the sensor's noise.
-    """
+    """Resize (H, W) or (H, W, 3) to (height, width) by means over areas; the same if it fits."""
     if image.shape[:2] == (height, width):
         return image
     shrinks = image.shape[0] >= height and image.shape[1] >= width
@@ -141,10 +138,7 @@ def decode_bgr(sent: SentImage, levels: Levels | None = None) -> ImageArray:
 def decode_as_sent(
     sent: SentImage, most_pixels: float = MOST_PIXELS, levels: Levels | None = None
 ) -> ImageArray:
-    """Return bgr (H, W, 3) uint8 of a colour image, brightness (H, W) uint8 of a grey one.
-
-    Raises EncodingError as :func:`decode_grey`, or if it has more than ``most_pixels``.
-    """
+    """Return bgr (H, W, 3) or brightness (H, W), uint8; raise EncodingError, also if too large."""
     check_pixels(sent.width, sent.height, most_pixels)
     is_grey = sent.encoding.startswith("mono") or sent.encoding in ("8UC1", "16UC1")
     return (decode_grey if is_grey else decode_bgr)(sent, levels)
@@ -153,10 +147,7 @@ def decode_as_sent(
 def decode_compressed(
     data: Any, most_pixels: float = MOST_PIXELS, levels: Levels | None = None
 ) -> ImageArray:
-    """Return a JPEG or PNG image as (H, W) grey or (H, W, 3) bgr, uint8; see :func:`decode_grey`.
-
-    Raises EncodingError if it cannot be decoded, or has more than ``most_pixels``.
-    """
+    """Return JPEG or PNG as (H, W) or (H, W, 3) bgr, uint8, or raise EncodingError."""
     raw = np.frombuffer(data, np.uint8)
     check_pixels(*compressed_size(raw.tobytes()), most_pixels)
     try:

@@ -30,23 +30,15 @@ class Extrinsics:
     """Rigid transform from the first camera's optical frame into another camera's.
 
     A point p of that frame is ``rotation @ p + translation_m`` in the other's optical frame.
-
-    Attributes:
-        rotation: (3, 3).
-        translation_m: (3,), metres.
-        source: description of the origin, for messages.
     """
 
-    rotation: FloatArray
-    translation_m: FloatArray
-    source: str = ""
+    rotation: FloatArray  #: (3, 3)
+    translation_m: FloatArray  #: (3,), metres
+    source: str = ""  #: description of the origin, for messages
 
     @classmethod
     def of(cls, matrix: object, source: str = "") -> Extrinsics:
-        """Create extrinsics from a matrix (4, 4) or (3, 4).
-
-        Raises CameraError, which names ``source``, if it is no rigid transform.
-        """
+        """Create from a matrix (4, 4) or (3, 4), or raise CameraError with ``source``."""
         try:
             values = np.array(matrix, dtype=np.float64)
         except (TypeError, ValueError, OverflowError):
@@ -73,10 +65,7 @@ class Extrinsics:
 
     @classmethod
     def of_vectors(cls, rotation: object, translation_m: object, source: str = "") -> Extrinsics:
-        """Create extrinsics from a rotation vector (3,), rad, and a translation (3,), metres.
-
-        Raises CameraError, which names ``source``, without three finite numbers each.
-        """
+        """Create from a rotation vector, rad, and translation, m, (3,), or raise CameraError."""
         try:
             vectors = np.array([rotation, translation_m], dtype=np.float64).reshape(2, 3)
         except (TypeError, ValueError, OverflowError):

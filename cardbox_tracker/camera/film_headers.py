@@ -78,10 +78,7 @@ def with_square_pixels(image: NDArray[Any], shape: float) -> NDArray[np.uint8]:
 
 
 def shown_s(path: Path) -> float | None:
-    """Return for how long the images of an MP4 or MOV are shown, seconds, as its edit list says.
-
-    Films trimmed on a phone keep the images before and after. None if a film does not state it.
-    """
+    """Return how long an MP4 or MOV is shown, s, by its edit list, as after trimming, or None."""
     timescale, times = 0, [0]
     try:
         with path.open("rb") as file:
@@ -101,10 +98,7 @@ def shown_s(path: Path) -> float | None:
 
 
 def boxes(file: BinaryIO, inside: Container[bytes] = ()) -> Iterator[tuple[bytes, int, int]]:
-    """Return kind, and begin and end of the content, of the first boxes of an MP4 or MOV.
-
-    Boxes follow in those of the kinds ``inside``, too.
-    """
+    """Return kind, begin and end of the first boxes of an MP4 or MOV, and of those ``inside``."""
     return islice(_boxes(file, inside, 0, file.seek(0, os.SEEK_END)), _MOST_BOXES)
 
 

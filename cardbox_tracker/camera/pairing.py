@@ -46,10 +46,7 @@ def camera_names(cameras: Sequence[str]) -> list[str]:
 def side_by_side(
     streams: Sequence[Iterator[T]], stamp_ns: Callable[[T], int], tolerance_ns: int
 ) -> Iterator[tuple[T | None, ...]]:
-    """Group the items of several streams by time; each item is used once, in order.
-
-    An item that is more than ``tolerance_ns`` after the earliest one waits for the next group.
-    """
+    """Group items by time, each once, in order, to ``tolerance_ns`` after the group's first."""
     heads = [next(stream, None) for stream in streams]
     while any(head is not None for head in heads):
         chosen = _together([None if h is None else stamp_ns(h) for h in heads], tolerance_ns)

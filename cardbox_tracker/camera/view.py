@@ -36,15 +36,10 @@ _UPRIGHT_RAD = 0.001
 
 @dataclass(frozen=True)
 class OtherCamera:
-    """A further camera.
+    """A further camera."""
 
-    Attributes:
-        camera: at the working resolution, without its pitch.
-        extrinsics: its pose relative to the first camera.
-    """
-
-    camera: Camera
-    extrinsics: Extrinsics
+    camera: Camera  #: at the working resolution, without its pitch
+    extrinsics: Extrinsics  #: its pose relative to the first camera
 
 
 @dataclass(frozen=True, eq=False)

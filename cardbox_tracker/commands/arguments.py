@@ -153,10 +153,7 @@ def add_camera_pitch(parser: argparse.ArgumentParser, found: str = "") -> None:
 
 
 def add_settings(parser: argparse.ArgumentParser, kind: Any, title: str) -> None:
-    """Add an option for each setting of the dataclass ``kind``, below the heading ``title``.
-
-    A switch is off by default.
-    """
+    """Add an option, a switch for a bool, for each setting of ``kind``, below ``title``."""
     group = parser.add_argument_group(title)
     defaults = {entry.name: entry.default for entry in fields(kind)}
     for name, setting in settings_of(kind).items():
@@ -199,12 +196,8 @@ def check_outputs(
 ) -> None:
     """Refuse outputs that cannot be written or would overwrite something, before any work is done.
 
-    Args:
-        outputs: files to write; None is ignored, here and below.
-        force: whether files that exist may be replaced.
-        inputs: files and recordings that are read, which are never replaced.
-        results: files and folders that other code writes; only ``force`` and ``inputs`` are
-            checked.
+    None is ignored everywhere. ``inputs`` are read, so they are never replaced; ``outputs`` and
+    ``results`` only with ``force``. ``results`` are files and folders that other code writes.
     """
     files = [path for path in outputs if path is not None]
     every = [*files, *(path for path in results if path is not None)]

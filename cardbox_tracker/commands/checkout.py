@@ -16,17 +16,12 @@ _PACKAGE = Path(__file__).parents[1]
 
 @dataclass
 class LabCommand:
-    """A subcommand whose arguments and work are in a module of ``lab/``.
-
-    Attributes:
-        module: full name of the module.
-        targets: quoted commands of ``make`` that do the same.
-    """
+    """A subcommand whose arguments and work are in a module of ``lab/``."""
 
     NAME: str
     HELP: str
-    module: str
-    targets: str
+    module: str  #: full name of the module
+    targets: str  #: quoted commands of ``make`` that do the same
 
     def add_arguments(self, parser: argparse.ArgumentParser) -> None:
         """Add the arguments."""
@@ -52,10 +47,7 @@ EVALUATE = LabCommand(
 
 
 def from_checkout(module: str, targets: str) -> Any:
-    """Import a module of a folder at the top of a checkout.
-
-    The checkout is the current directory, one above it, or the parent of this package.
-    """
+    """Import from a checkout: the current directory, one above it, or this package's parent."""
     folder = module.partition(".")[0]
     for root in (Path.cwd(), *Path.cwd().parents, _PACKAGE.parent):
         if (root / folder / "__init__.py").is_file() and (root / _PACKAGE.name).is_dir():

@@ -37,24 +37,16 @@ class Command(Protocol):
     """A subcommand: a module of this folder, or an object, with these four names.
 
     Slow imports are inside ``add_arguments`` and ``run``, so that ``cardbox --help`` is fast.
-
-    Attributes:
-        NAME: name that is typed after ``cardbox``.
-        HELP: one line for ``cardbox --help``, without a capital letter or a full stop.
     """
 
-    NAME: str
-    HELP: str
+    NAME: str  #: name that is typed after ``cardbox``
+    HELP: str  #: one line for ``cardbox --help``, without a capital letter or a full stop
 
     def add_arguments(self, parser: argparse.ArgumentParser) -> None:
         """Add the arguments of the subcommand to its ``parser``."""
 
     def run(self, options: argparse.Namespace) -> None:
-        """Do the work and print the result.
-
-        Raises:
-            CardboxError: the user can correct the cause; ``cardbox`` prints the text and returns 1.
-        """
+        """Do the work and print the result; CardboxError if the user can correct the cause."""
 
 
 # The order is that of 'cardbox --help'.
@@ -147,9 +139,8 @@ def _interrupted(name: str) -> int:
 def build_parser(words: Container[str] = _EVERY_COMMAND) -> argparse.ArgumentParser:
     """Return the parser of ``cardbox``.
 
-    Args:
-        words: arguments of the command line. Only the subcommand among them gets its arguments,
-            since their choices may need slow imports; by default all get theirs.
+    Only the subcommand in the words of a command line gets its arguments, since their choices may
+    need slow imports; by default all do.
     """
     parser = argparse.ArgumentParser(
         prog="cardbox", formatter_class=_Formatter, description=_DESCRIPTION, epilog=_EPILOG

@@ -25,18 +25,11 @@ class _Parser(argparse.ArgumentParser):
 
 
 def track(recording: str | os.PathLike[str], **options: Any) -> Result:
-    """Track the posture in a recording, as ``cardbox track`` does.
+    """Track a recording as ``cardbox track`` does; return the results, of ``person`` or the first.
 
-    Args:
-        recording: bag, video, or folder of images.
-        options: options of ``cardbox track``, see ``docs/python.md``; ``detector`` may also be an
-            object with ``detect(image)``. Without ``csv`` no table is kept.
-
-    Returns:
-        The results; of several people, those of ``person``, by default the first.
-
-    Raises:
-        CardboxError: options are wrong, or a file cannot be read or written.
+    The ``options`` are those of the command, see ``docs/python.md``; ``detector`` may also be an
+    object with ``detect(image)``. Without ``csv`` no table is kept. Raises CardboxError if options
+    are wrong, or a file cannot be read or written.
     """
     from cardbox_tracker.applications.exporting.formats import read_result
     from cardbox_tracker.recordings.open_images import is_one_recording

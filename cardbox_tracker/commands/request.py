@@ -1,8 +1,7 @@
 """The options of ``cardbox track`` and its relatives, read once into a frozen request.
 
-:func:`add_recording` and :func:`add_tracking` declare the options. :func:`recording_request` and
-:func:`tracking_request` read them; one error names all that are missing or contradict each other.
-Nothing below this folder knows options, only the request and its parts.
+One error names all that are missing or contradict each other. Nothing below this folder knows
+options, only the request and its parts.
 """
 
 from __future__ import annotations
@@ -69,25 +68,16 @@ _REPLACED = MappingProxyType(
 
 @dataclass(frozen=True)
 class RecordingRequest:
-    """A recording to read.
+    """A recording to read."""
 
-    Attributes:
-        path: bag, video, or folder of images.
-        silhouettes: what tells the person from the scene.
-        points: source of the person's 2D points; None for no points.
-        cameras: namespaces, the first camera's first; empty if the recording has one camera.
-        extrinsics: file of the poses of further cameras.
-        depth: topic of depth images, or ``stereo``; None without depth.
-        camera: what the recording itself does not say about its camera.
-    """
-
-    path: Path
-    silhouettes: Segmentation
-    points: Detector | PointTable | None
+    path: Path  #: bag, video, or folder of images
+    silhouettes: Segmentation  #: what tells the person from the scene
+    points: Detector | PointTable | None  #: source of the person's 2D points; None for no points
+    #: namespaces, the first camera's first; empty if the recording has one camera
     cameras: tuple[str, ...]
-    extrinsics: Path | None
-    depth: str | None
-    camera: GivenCamera
+    extrinsics: Path | None  #: file of the poses of further cameras
+    depth: str | None  #: topic of depth images, or ``stereo``; None without depth
+    camera: GivenCamera  #: what the recording itself does not say about its camera
 
     @property
     def detector(self) -> Detector | None:
@@ -114,31 +104,20 @@ class RecordingRequest:
 
 @dataclass(frozen=True)
 class PersonRequest:
-    """The person to track.
+    """The person to track."""
 
-    Attributes:
-        body: the person; the mean sizes of people of the given stature without ``model``.
-        model: the file of a measured person; None if only the stature is given.
-        start_s: seconds from the recording's start at which tracking starts.
-        end_s: the same at which it ends; inf for the end of the recording.
-        is_pitch_given: whether ``body`` has the camera's pitch; else it is to be found.
-        stature_m: the stature that is given, of the first person; None with ``model``.
-        people: number of people to track, 0 for all who come; None for one without a number.
-        others: the bodies of the second and further people.
-        number: whose results commands use that use those of one.
-        statures_m: the statures that are given, by number.
-    """
-
-    body: BodyModel
-    model: Path | None
-    start_s: float
-    is_pitch_given: bool
+    body: BodyModel  #: the person; the mean sizes of people of the given stature without ``model``
+    model: Path | None  #: the file of a measured person; None if only the stature is given
+    start_s: float  #: seconds from the recording's start at which tracking starts
+    is_pitch_given: bool  #: whether ``body`` has the camera's pitch; else it is to be found
+    #: the stature that is given, of the first person; None with ``model``
     stature_m: float | None = None
-    end_s: float = math.inf
+    end_s: float = math.inf  #: the same at which it ends; inf for the end of the recording
+    #: number of people to track, 0 for all who come; None for one without a number
     people: int | None = None
-    others: tuple[BodyModel, ...] = ()
-    number: int = 1
-    statures_m: tuple[float, ...] = ()
+    others: tuple[BodyModel, ...] = ()  #: the bodies of the second and further people
+    number: int = 1  #: whose results commands use that use those of one
+    statures_m: tuple[float, ...] = ()  #: the statures that are given, by number
 
 
 TABLES = ("csv", "parquet")
@@ -147,48 +126,30 @@ FORMATS = (*TABLES, "mp4", "bag")
 
 
 class TrackFiles(NamedTuple):
-    """Files to write; None for one that is not wanted.
+    """Files to write; None for one that is not wanted."""
 
-    Attributes:
-        table: one row for each image, see :func:`~.recordings.result_table.result_table`.
-        video: overlay video, at the rate and the resolution of the recording.
-        bag: folder of a bag with the topics of the tracker.
-        body: the body that was tracked.
-        scene: camera, floor and people (:mod:`~cardbox_tracker.measuring.scene`).
-    """
-
+    #: one row for each image, see :func:`~.recordings.result_table.result_table`
     table: Path | None = None
-    video: Path | None = None
-    bag: Path | None = None
-    body: Path | None = None
-    scene: Path | None = None
+    video: Path | None = None  #: overlay video, at the rate and the resolution of the recording
+    bag: Path | None = None  #: folder of a bag with the topics of the tracker
+    body: Path | None = None  #: the body that was tracked
+    scene: Path | None = None  #: camera, floor and people (:mod:`~cardbox_tracker.measuring.scene`)
 
 
 @dataclass(frozen=True)
 class TrackingRequest:
-    """A recording to track.
+    """A recording to track."""
 
-    Attributes:
-        recording: what is read.
-        person: who is tracked.
-        preset: name of the settings that ``config`` changes.
-        config: settings of the tracker.
-        seed: random seed of the filters.
-        inputs: files and folders that are read, which no result may replace.
-        hands: network file that finds the points of hands; None if they are not measured.
-        files: results to write.
-        force: whether an existing bag is replaced.
-    """
-
-    recording: RecordingRequest
-    person: PersonRequest
-    preset: str
-    config: TrackerConfig
-    seed: int
-    inputs: tuple[Path, ...]
+    recording: RecordingRequest  #: what is read
+    person: PersonRequest  #: who is tracked
+    preset: str  #: name of the settings that ``config`` changes
+    config: TrackerConfig  #: settings of the tracker
+    seed: int  #: random seed of the filters
+    inputs: tuple[Path, ...]  #: files and folders that are read, which no result may replace
+    #: network file that finds the points of hands; None if they are not measured
     hands: Path | None = None
-    files: TrackFiles = TrackFiles()
-    force: bool = False
+    files: TrackFiles = TrackFiles()  #: results to write
+    force: bool = False  #: whether an existing bag is replaced
 
 
 class ClassName(str):
@@ -196,10 +157,7 @@ class ClassName(str):
 
 
 class Problems:
-    """What is wrong with the options of a recording, collected for one error.
-
-    A function that finds a problem returns any value of its type, because the error follows.
-    """
+    """What is wrong with options, collected for one error; values of wrong ones do not matter."""
 
     def __init__(self, recording: Path, faults: Iterable[str] = ()) -> None:
         """Begin with the ``faults`` that are known."""
@@ -630,11 +588,7 @@ def _silhouettes(
 
 
 def points_named(given: object) -> Detector | PointTable:
-    """Return the source of 2D points.
-
-    Args:
-        given: the name of a detector, the path of points, a class, or a detector of one's own.
-    """
+    """Return the source of 2D points: a detector's name, a path, a class, or one's own detector."""
     from cardbox_tracker.common.extensions import DETECTORS, extensions, loaded
     from cardbox_tracker.detectors.detector import MEDIAPIPE, Detector
     from cardbox_tracker.detectors.own_network import OwnModel

@@ -75,7 +75,6 @@ def add_score_outputs(parser: argparse.ArgumentParser) -> None:
     for flag, name, text in (
         ("--csv", "OUT.csv", "table to write, one row per image: its score, the chance of each"),
         ("--plot", "OUT.png", "draw the scores over time"),
-        ("--shares", "SHARES.csv", "write the time at each score of each part"),
         ("--html", "OUT.html", "write a page that prints: scores, shares of time, worst moments"),
     ):
         parser.add_argument(flag, type=Path, metavar=name, help=text)
@@ -84,7 +83,7 @@ def add_score_outputs(parser: argparse.ArgumentParser) -> None:
 
 def outputs_of(options: argparse.Namespace) -> tuple[Path | None, ...]:
     """Return the files of :func:`add_score_outputs`; None for each that is not wanted."""
-    return options.csv, options.plot, options.shares, options.html
+    return options.csv, options.plot, options.html
 
 
 def write_scores(options: argparse.Namespace, content: PageContent) -> None:
@@ -100,8 +99,6 @@ def write_scores(options: argparse.Namespace, content: PageContent) -> None:
     if options.plot is not None:
         with atomic_path(options.plot) as temporary:
             temporary.write_bytes(report.score_plot(rows, (), method))
-    if options.shares is not None:
-        recording.write_shares(shares, options.shares)
     if options.html is not None:
         report.write_page(content, options.html)
     for path in outputs_of(options):

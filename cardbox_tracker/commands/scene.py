@@ -27,16 +27,8 @@ def measured_scene(
 ) -> Iterator[tuple[Recording, Scene]]:
     """Open a recording whose scene is measured, in all of it, before it is tracked.
 
-    A roll that is found turns the images back, unless one is given.
-
-    Args:
-        recording: what is read.
-        person: who is tracked, and what is given of them and of the camera.
-        config: settings of the tracker.
-        seed: random seed of the fits.
-
-    Raises:
-        CardboxError: the recording cannot be read, or the detector cannot be loaded.
+    A roll that is found turns the images back, unless one is given. Raises CardboxError if the
+    recording cannot be read, or the detector cannot be loaded.
     """
     if person.model is not None and not person.body.unknown:
         roll_rad = person.body.camera_pose.roll_rad

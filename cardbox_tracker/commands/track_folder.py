@@ -1,7 +1,7 @@
 """``cardbox track FOLDER``: all recordings of a folder, in parallel processes.
 
-The summary of the results, ``_summary.csv``, has a row for each recording, with a digest of all
-that determines its results. By it an interrupted run goes on, and only what changed is done again.
+The summary, ``_summary.csv``, has a row for each with a digest of what determines its results. By
+it an interrupted run goes on, and only what changed is done again.
 """
 
 from __future__ import annotations
@@ -65,29 +65,17 @@ _SOURCES = ("*.py", "*.json")
 
 
 class Row(NamedTuple):
-    """The row of one recording in the summary; all values are texts, empty where unknown.
+    """The row of one recording in the summary; all values are texts, empty where unknown."""
 
-    Attributes:
-        recording: its name.
-        status: ``TRACKED`` or ``FAILED``.
-        images: number of images.
-        images_tracked: number of images with a posture.
-        images_uncertain: number of images whose posture may be wrong.
-        mean_cost_px: mean cost over the tracked images.
-        mean_iou: mean overlap over the tracked images.
-        reason: reason of a failure.
-        inputs: see :func:`digest_of_inputs`.
-    """
-
-    recording: str
-    status: str
-    images: str = ""
-    images_tracked: str = ""
-    images_uncertain: str = ""
-    mean_cost_px: str = ""
-    mean_iou: str = ""
-    reason: str = ""
-    inputs: str = ""
+    recording: str  #: its name
+    status: str  #: ``TRACKED`` or ``FAILED``
+    images: str = ""  #: number of images
+    images_tracked: str = ""  #: number of images with a posture
+    images_uncertain: str = ""  #: number of images whose posture may be wrong
+    mean_cost_px: str = ""  #: mean cost over the tracked images
+    mean_iou: str = ""  #: mean overlap over the tracked images
+    reason: str = ""  #: reason of a failure
+    inputs: str = ""  #: see :func:`digest_of_inputs`
 
     @classmethod
     def tracked(cls, recording: str, summary: TrackSummary, inputs: str) -> Row:
@@ -121,21 +109,14 @@ class Row(NamedTuple):
 
 
 class Job(NamedTuple):
-    """A recording to track.
+    """A recording to track."""
 
-    Attributes:
-        name: see :func:`~.recordings.open_images.recordings_in`.
-        request: what is tracked; its results are in a folder of the job's own.
-        inputs: see :func:`digest_of_inputs`.
-        folder: folder in which relative paths begin; None for that of the process.
-        program: see :func:`digest_of_program`; empty if the process has this program.
-    """
-
-    name: str
-    request: TrackingRequest
-    inputs: str
+    name: str  #: see :func:`~.recordings.open_images.recordings_in`
+    request: TrackingRequest  #: what is tracked; its results are in a folder of the job's own
+    inputs: str  #: see :func:`digest_of_inputs`
+    #: folder in which relative paths begin; None for that of the process
     folder: Path | None = None
-    program: str = ""
+    program: str = ""  #: see :func:`digest_of_program`; empty if the process has this program
 
 
 def track_folder(options: argparse.Namespace) -> None:
@@ -359,10 +340,7 @@ def _table(rows: Sequence[Row]) -> Iterator[str]:
 
 
 def _reasons(rows: Iterable[Row], paths: Mapping[str, Path]) -> Iterator[tuple[str, str]]:
-    """Yield the recordings that failed for one reason, and the reason.
-
-    Reasons that differ only in the path of the recording are one, and it has the first one's.
-    """
+    """Yield recordings that failed for one reason but for their path, and the first one's text."""
     reasons: dict[str, list[Row]] = {}
     for row in sorted(rows):
         if row.status == FAILED:
@@ -375,10 +353,7 @@ def _reasons(rows: Iterable[Row], paths: Mapping[str, Path]) -> Iterator[tuple[s
 
 
 def digest_of_inputs(request: TrackingRequest, formats: Sequence[str], program: str) -> str:
-    """Return a digest of all that determines the results of a recording.
-
-    The recording counts by the names, sizes and times of its files, other files by their content.
-    """
+    """Return a digest of what determines results: content, but name, size, time of recordings."""
     path = request.recording.path
     asked = replace(request, recording=replace(request.recording, path=Path()), inputs=())
     digest = hashlib.sha256(f"{program} {formats}".encode())

@@ -28,14 +28,9 @@ def track(
 ) -> TrackSummary:
     """Track a recording, print remarks and return the summary.
 
-    Args:
-        request: what is tracked, and the results to write.
-        observers: called after each image.
-        show: receives the finished fraction, 0 to 1; if None, there are a progress bar and lines
-            that say what was assumed, and how good the results are.
-
-    Raises:
-        CardboxError: the recording cannot be read, or a result cannot be written.
+    ``observers`` are called after each image. ``show`` receives the finished fraction, 0 to 1;
+    without it, there are a progress bar and lines on assumptions and quality. Raises CardboxError
+    if the recording cannot be read, or a result cannot be written.
     """
     from cardbox_tracker.commands.scene import measured_scene
     from cardbox_tracker.common.progress import progress_bar

@@ -1,7 +1,4 @@
-"""The check of arrays before they are given to compiled code.
-
-Code without bounds checks reads and writes beyond an array whose shape is not the expected one.
-"""
+"""The check of arrays before they are given to compiled code, which reads without bounds."""
 
 from __future__ import annotations
 

@@ -16,13 +16,10 @@ _MOST = 3
 
 
 def results_ahead(call: Callable[[A], R], items: Iterable[A]) -> Iterator[R]:
-    """Yield the results of calls in order; the next ones are made while the caller works.
+    """Yield the results of calls in order; another thread makes the next ones meanwhile.
 
-    An error of a call is raised in place of its result. The thread ends with the iterator.
-
-    Args:
-        call: called by another thread, for one item after the other.
-        items: their iterator is advanced by the caller's thread, a few items ahead.
+    An error of a call is raised in place of its result. The thread ends with the iterator; the
+    caller's thread advances ``items`` a few ahead.
     """
     with _worker() as pool:
         waiting = deque[Future[R]]()

@@ -49,9 +49,6 @@ def sources_of_kernels(package: str) -> dict[str, bytes]:
     """Return path and content of each file that compiled code of the package may contain.
 
     These are the files that import this module, and all files of the package that they import.
-
-    Args:
-        package: folder of the package.
     """
     texts: dict[str, bytes] = {}
     for folder, _, names in os.walk(package):
@@ -77,9 +74,6 @@ def choose_folder(package: str) -> Path | None:
 
     It lies in ``NUMBA_CACHE_DIR`` if that is set, beside the sources, in the user's folder for
     caches, or in the folder for temporary files: in the first of them that can be written to.
-
-    Args:
-        package: folder of the package.
     """
     digest = hashlib.sha256(repr(_CONFIG.BOUNDSCHECK).encode())
     for path, text in sources_of_kernels(package).items():

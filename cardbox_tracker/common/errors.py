@@ -1,15 +1,4 @@
-"""The errors that users can cause; the text has the fault, the expectation and the remedy.
-
-CardboxError
-    BodyModelError       a body model file or a size
-    CameraError          a calibration or a CameraInfo
-    EncodingError        an image's encoding or its bytes
-    InitializationError  reference silhouettes from which no body can be measured
-    BackgroundFileError  a file with a learned background
-    BagError             a recording that cannot be read or written
-    NotFiniteError       a result with values that are not finite numbers
-    RosMissingError      ROS 2 is not installed
-"""
+"""The errors that users can cause; the text has the fault, the expectation and the remedy."""
 
 from __future__ import annotations
 

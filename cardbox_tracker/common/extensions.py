@@ -29,10 +29,7 @@ def extensions(kind: str, taken: Container[str]) -> dict[str, EntryPoint]:
 
 
 def loaded(entry: EntryPoint) -> Any:
-    """Return what an entry point names.
-
-    Raises CardboxError if it cannot be imported; the text names its distribution.
-    """
+    """Return what an entry point names; CardboxError, with its distribution, if that fails."""
     try:
         return entry.load()
     except Exception as error:

@@ -83,6 +83,23 @@ def atomic_path(path: str | os.PathLike[str]) -> Iterator[Path]:
 
 
 @contextmanager
+def saved_file(path: str | os.PathLike[str], kind: type[CardboxError]) -> Iterator[BinaryIO]:
+    """Yield a file that replaces ``path`` when it is on the disk; raise ``kind`` if that fails."""
+    try:
+        with atomic_path(path) as temporary, temporary.open("wb") as file:
+            yield file
+            file.flush()
+            os.fsync(file.fileno())
+    except CardboxError as error:
+        raise kind(str(error)) from None
+    except OSError as error:
+        raise kind(
+            f"cannot write {os.fspath(path)}: {error.strerror}; choose a folder that exists and is "
+            "writable, on a disk with space"
+        ) from None
+
+
+@contextmanager
 def claimed_name(target: Path, *, is_folder: bool) -> Iterator[Path]:
     """Yield a new empty file or folder beside ``target``, and remove it at the end if it exists.
 
@@ -111,10 +128,7 @@ def claimed_name(target: Path, *, is_folder: bool) -> Iterator[Path]:
 
 
 def resolved(path: str | os.PathLike[str]) -> Path:
-    """Return the file to write for ``path``, which is the target if ``path`` is a link.
-
-    Raises CardboxError if ``path`` is a folder or a circular link.
-    """
+    """Return the file to write, a link's target; CardboxError for a folder or a circular link."""
     target = Path(path)
     if target.is_dir():
         raise CardboxError(f"cannot write {target}: it is a folder; give the name of a file")
@@ -161,10 +175,7 @@ def regular_file(path: str | os.PathLike[str], most_bytes: int) -> Iterator[Bina
 
 
 def read_regular(path: str | os.PathLike[str], most_bytes: int) -> bytes:
-    """Return the content of a regular file of at most ``most_bytes``.
-
-    Raises the errors of :func:`regular_file`.
-    """
+    """Return the content of a :func:`regular_file` of at most ``most_bytes``; raises its errors."""
     with regular_file(path, most_bytes) as file:
         try:
             data = file.read(most_bytes + 1)
@@ -183,10 +194,7 @@ def _check_size(found: int, most_bytes: int) -> None:
 
 
 def check_writable(path: str | os.PathLike[str]) -> None:
-    """Check before a long computation that :func:`atomic_path` can write ``path``.
-
-    Raises CardboxError if ``path`` or its folder cannot be written.
-    """
+    """Raise CardboxError if :func:`atomic_path` cannot write ``path``, before long computations."""
     if is_written_in_place(path):
         return
     try:
@@ -199,10 +207,7 @@ def check_writable(path: str | os.PathLike[str]) -> None:
 
 
 def is_written_in_place(path: str | os.PathLike[str]) -> bool:
-    """Return whether ``path`` cannot be replaced, as a pipe, a terminal or ``/dev/null``.
-
-    Raises CardboxError if ``path`` is a disk or a socket.
-    """
+    """Return whether ``path`` cannot be replaced, as a pipe; CardboxError if a disk or a socket."""
     try:
         mode = os.stat(path).st_mode
     except OSError:

@@ -39,10 +39,7 @@ def received() -> int:
 
 
 def end_at_once(code: int | None = None) -> None:
-    """Let SIGINT and SIGTERM end the process with ``code``; use it during imports.
-
-    None stands for 128 plus the signal's number.
-    """
+    """Let SIGINT and SIGTERM end imports with ``code``; None is 128 plus the signal's number."""
     _state.response, _state.code = "end", code
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, _handle)
@@ -73,10 +70,7 @@ def raised() -> Iterator[None]:
 
 @contextmanager
 def only_noted() -> Iterator[None]:
-    """Context in which signals raise nothing, because the handler of rclpy shuts ROS down.
-
-    The handler is not replaced, because that would remove the one of rclpy.
-    """
+    """Context in which signals raise nothing; the handler of rclpy stays and shuts ROS down."""
     with _responding("note"):
         yield
 
@@ -99,10 +93,7 @@ def withheld() -> Iterator[None]:
 
 
 def ignore() -> None:
-    """Ignore SIGINT and SIGTERM from now on: for a node that ends, while DDS leaves the network.
-
-    Python has no handlers of its own while it ends, so that a signal would kill the process.
-    """
+    """Ignore SIGINT and SIGTERM while DDS leaves the network: Python ends without handlers."""
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, signal.SIG_IGN)
 

@@ -52,18 +52,10 @@ def results_of(
 ) -> Iterator[Iterator[R]]:
     """Context of an iterator over the results of calls, in the order in which they finish.
 
-    Leaving the context before the end, as by Ctrl-C, ends all processes at once.
-
-    Args:
-        function: function of a module that other processes can import.
-        arguments: the argument of each call; calls begin in this order.
-        jobs: number of processes; with 1, the calls are done in this process.
-        scheduler: address of the scheduler of a Dask cluster, whose workers do the calls in place
-            of ``jobs`` processes.
-
-    Raises:
-        CardboxError: a process ended unexpectedly, at the beginning or from the iterator; or there
-            is no cluster of workers with one thread each.
+    Other processes import the module of ``function`` and begin in the order of ``arguments``:
+    ``jobs`` of them, or this one with 1 job, or the workers of the Dask cluster of a ``scheduler``.
+    Leaving the context before the end, as by Ctrl-C, ends all at once. Raises CardboxError if a
+    process ended unexpectedly, or there is no cluster of workers with one thread each.
     """
     from joblib import parallel_config
 

@@ -48,10 +48,7 @@ def progress_bar(text: str, every_s: float = 1.0) -> Iterator[Callable[[float], 
 
 @contextmanager
 def told(say: Callable[[str], object], text: str, every_s: float = 5.0) -> Iterator[None]:
-    """Call ``say`` with ``text`` at once, and every ``every_s`` with the seconds that have passed.
-
-    ``say`` is also called by another thread, while the context lasts.
-    """
+    """Call ``say`` with ``text`` now, and by a thread every ``every_s`` with the seconds passed."""
     say(text)
     begun_s, done = time.monotonic(), threading.Event()
 

@@ -23,23 +23,14 @@ _TYPE_TEXTS = {bool: "true or false", int: "a whole number", float: "a number", 
 
 @dataclass(frozen=True)
 class Setting:
-    """Properties of a setting in addition to name, type and default.
+    """Properties of a setting in addition to name, type and default."""
 
-    Attributes:
-        description: its effect, in one sentence or phrase.
-        unit: its unit; empty for a plain number or a text.
-        minimum: smallest allowed value; None without a limit.
-        maximum: largest allowed value; None without a limit.
-        choices: the allowed texts; empty if any text is allowed.
-        restarts: True if tracking has to start again when it changes.
-    """
-
-    description: str
-    unit: str = ""
-    minimum: float | None = None
-    maximum: float | None = None
-    choices: tuple[str, ...] = ()
-    restarts: bool = False
+    description: str  #: its effect, in one sentence or phrase
+    unit: str = ""  #: its unit; empty for a plain number or a text
+    minimum: float | None = None  #: smallest allowed value; None without a limit
+    maximum: float | None = None  #: largest allowed value; None without a limit
+    choices: tuple[str, ...] = ()  #: the allowed texts; empty if any text is allowed
+    restarts: bool = False  #: True if tracking has to start again when it changes
 
     @property
     def limits(self) -> tuple[float, float] | None:
@@ -148,8 +139,7 @@ def settings_below(instance: Any, before: str = "") -> Iterator[tuple[str, Any, 
 def check(instance: Any) -> None:
     """Check every setting of a dataclass instance.
 
-    Raises:
-        ValueError: a value is not allowed; the text names it.
+    Raises ValueError if a value is not allowed; the text names it.
     """
     for name, one in settings_of(instance).items():
         one.check(name, getattr(instance, name))
@@ -158,8 +148,7 @@ def check(instance: Any) -> None:
 class Settings:
     """Base of settings dataclasses: the ranges are checked when one is made.
 
-    Raises:
-        ValueError: a value is not allowed; the text names it.
+    Raises ValueError if a value is not allowed; the text names it.
     """
 
     def __post_init__(self) -> None:
@@ -206,8 +195,7 @@ def changed(instance: T, given: Mapping[str, Any], where: str = "") -> T:
 def nested(values: Mapping[str, Any]) -> dict[str, Any]:
     """Return values by dotted names, such as ``whole_body.effort``, as nested mappings.
 
-    Raises:
-        ValueError: a name is given a value, and settings below it, too.
+    Raises ValueError if a name is given a value, and settings below it, too.
     """
     result: dict[str, Any] = {}
     for dotted, value in values.items():

@@ -25,10 +25,8 @@ class SmallYamlError(CardboxError):
 def parse_small_yaml(text: str) -> Any:
     """Return the mapping, list or value of a YAML text.
 
-    Aliases, tags, repeated keys, more than 64 kB, and more than 8 levels are refused.
-
-    Raises:
-        SmallYamlError: the text is refused or not valid YAML. The message does not name the source.
+    Aliases, tags, repeated keys, more than 64 kB, and more than 8 levels are refused. Raises
+    SmallYamlError if the text is refused or not valid YAML. The message does not name the source.
     """
     # The first comparison avoids encoding a long text, because a character has at least one byte.
     if len(text) > MOST_BYTES or len(text.encode("utf-8", "replace")) > MOST_BYTES:
@@ -73,10 +71,7 @@ class _Loader(yaml.SafeLoader):
 
 
 def read_small_text(path: str | os.PathLike[str]) -> str:
-    """Return the text of a regular file of at most 64 kB, without waiting for pipes.
-
-    Raises SmallYamlError if the file cannot be read, is too large, or is not a text file.
-    """
+    """Return the text of a regular file of at most 64 kB; SmallYamlError if it is none."""
     try:
         data = read_regular(path, MOST_BYTES)
     except UnreadableFileError as error:

@@ -54,11 +54,7 @@ class Detector(NamedTuple):
 
 
 class PersonDetector:
-    """Finds the person in image after image of one camera.
-
-    Attributes:
-        missed: number of images in which nobody was found.
-    """
+    """Finds the person in image after image of a camera; ``missed`` counts those without one."""
 
     def __init__(self, network: PoseNetwork, people: PeopleNetwork | None = None) -> None:
         """Use the networks for one camera alone, because they follow the people."""

@@ -1,7 +1,4 @@
-"""MediaPipe's hand network on LiteRT: 21 points of one hand in a square of an image.
-
-The file is in the same wheel as the pose networks (Apache-2.0), see :mod:`.model_files`.
-"""
+"""MediaPipe's hand network on LiteRT: 21 points of one hand in a square of an image."""
 
 from __future__ import annotations
 

@@ -161,10 +161,7 @@ class Identity:
             self.forget()
 
     def is_same(self, figure: Figure, colours: FloatArray | None, now_ns: int) -> bool:
-        """Return whether somebody in an image is the person; the first one is.
-
-        ``colours`` are those of the trunk, see :func:`colours_in`, or None.
-        """
+        """Return whether this is the person, by place and trunk ``colours``, or the first one."""
         self.nobody(now_ns)
         self._anybody_ns = now_ns
         away_ns = abs(now_ns - self._seen_ns)

@@ -81,26 +81,23 @@ class LegPoints(NamedTuple):
 class ImagePoints:
     """The points of one person in one image.
 
-    Attributes:
-        px: column and row of each of ``POINT_NAMES``, (17, 2); (0, 0) is the centre of the first
-            pixel. A point that is not known is nan, as is one a million pixels away.
-        scores: chance that the point is right, 0 to 1, (17,); 0 for a point that is not known.
-        stamp_ns: stamp of the image, ns; points may be older than the image they are used with.
-            None if they are of the same image.
-        spatial_m: the points in space as the detector estimates them, (17, 3), up to a common
-            scale: x right, y down, z away from the camera, in a level frame; None without it. Only
-            directions between the points are used.
-        legs: the points of the legs, which the tracker of the upper body does not use; None without
-            them.
-
     Raises:
         ValueError: an array has another shape or is not numeric, or the stamp is no whole number.
     """
 
+    #: column and row of each of ``POINT_NAMES``, (17, 2); (0, 0) is the centre of the first pixel.
+    #: A point that is not known is nan, as is one a million pixels away.
     px: FloatArray
+    #: chance that the point is right, 0 to 1, (17,); 0 for a point that is not known
     scores: FloatArray
+    #: stamp of the image, ns; points may be older than the image they are used with. None if they
+    #: are of the same image.
     stamp_ns: int | None = None
+    #: the points in space as the detector estimates them, (17, 3), up to a common scale: x right, y
+    #: down, z away from the camera, in a level frame; None without it. Only directions between the
+    #: points are used.
     spatial_m: FloatArray | None = None
+    #: the points of the legs, which the tracker of the upper body does not use; None without them
     legs: LegPoints | None = None
 
     def __post_init__(self) -> None:

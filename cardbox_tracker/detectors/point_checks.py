@@ -24,10 +24,7 @@ _SHARES, _LEAST_POINTS = 1.5, 3
 
 
 def check_point(point: NamedPoint, size: Size | None) -> None:
-    """Raise CardboxError if a score is no chance, or its place is not in or near the image.
-
-    A point with the score 0 is missing and may be anywhere, as may others without a ``size``.
-    """
+    """Raise CardboxError if a score is no chance, or, above 0, its place far off the image."""
     name, column, row, score = point
     if not 0.0 <= score <= _MOST_SCORE:
         raise CardboxError(f"{name} has the score {score:g}; expected a chance from 0 to 1")

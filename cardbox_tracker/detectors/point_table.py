@@ -329,10 +329,7 @@ _EXPECTED = {
 
 
 def why_not(silhouette: NDArray[np.uint8], person: ImagePoints) -> str:
-    """Return why points are not those of the person in a silhouette (H, W); empty if they may be.
-
-    Points that are wrong in another way than their place may lie on the person in part.
-    """
+    """Return why points are not those of a person in a silhouette (H, W); empty if they may be."""
     near = near_person(silhouette)
     if near is None or person.is_empty:
         return ""

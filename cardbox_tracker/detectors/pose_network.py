@@ -125,10 +125,7 @@ class PoseNetwork:
     """
 
     def __init__(self, detector: Path, landmarks: Path) -> None:
-        """Load both networks.
-
-        Raises CardboxError if LiteRT is not installed, or a file is missing or damaged.
-        """
+        """Load both networks; CardboxError without LiteRT, or if a file is missing or damaged."""
         self._detect = Network(detector)
         self._locate = Network(landmarks)
         self.choose: Choose | None = None
@@ -141,13 +138,10 @@ class PoseNetwork:
         self._identity = Identity()
 
     def __call__(self, image: ColorImage, stamp_ns: int | None = None) -> Detection | None:
-        """Return the person in an image; None where the one who is followed is not seen.
+        """Return the person in an image (H, W, 3), bgr; None where the followed one is not seen.
 
-        Whom it found first it follows, and nobody else.
-
-        Args:
-            image: (H, W, 3), bgr.
-            stamp_ns: its time, ns; None for 1/30 s after the last image.
+        Whom it found first it follows, and nobody else. The stamp is in ns; None is 1/30 s after
+        the last.
         """
         rgb = np.asarray(cv2.cvtColor(image, cv2.COLOR_BGR2RGB), np.uint8)
         self._images += 1
@@ -215,15 +209,9 @@ class PoseNetwork:
     def located(
         self, image: ColorImage, square: Square, others: NDArray[np.uint8] | None = None
     ) -> tuple[Detection, Square] | None:
-        """Return the person in a square of an rgb image, and the square of the next image.
+        """Return the person in a square of an rgb image (H, W, 3), and the next square, or None.
 
-        Args:
-            image: (H, W, 3).
-            square: where the person is.
-            others: (H, W), not 0 at pixels of other people, which the network does not see.
-
-        Returns:
-            None if nobody is there.
+        The network does not see pixels of others, (H, W), that are not 0.
         """
         cut = cut_out(image, square, _LANDMARK_PX, cv2.BORDER_REPLICATE)
         if others is not None:
@@ -249,10 +237,7 @@ class Network:
     """One network file on one thread."""
 
     def __init__(self, path: Path) -> None:
-        """Load it.
-
-        Raises CardboxError if LiteRT is not installed, or the file is missing or damaged.
-        """
+        """Load it; CardboxError without LiteRT, or if the file is missing or damaged."""
         try:
             from ai_edge_litert.interpreter import Interpreter
         except ImportError as error:

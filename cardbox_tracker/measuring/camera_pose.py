@@ -83,11 +83,7 @@ class _Equations(NamedTuple):
 
 
 class PoseProblem:
-    """The bundle adjustment of one further camera.
-
-    Attributes:
-        states: current estimate (14,) for each sighting.
-    """
+    """The bundle adjustment of a further camera; ``states`` (14,) are those of each sighting."""
 
     def __init__(
         self,
@@ -131,14 +127,9 @@ class PoseProblem:
         """Return the pose after one Gauss-Newton step, which also updates the states.
 
         The number is the mean of the sightings' weighted squared distances before the step.
-
-        Args:
-            extrinsics: current pose.
-            free: indices of the change that are estimated; by default all, or all except the roll
-                if there are no tangents.
-
-        Raises:
-            CameraError: the person is not in front of the further camera.
+        ``free`` are indices of the change that are estimated; by default all, or all except the
+        roll without tangents. Raises CameraError if the person is not in front of the further
+        camera.
         """
         if free is None:
             free = WITHOUT_ROLL if self._tangents is None else range(N_POSE)

@@ -60,19 +60,13 @@ class InitializationConfig(Settings):
 
 @dataclass(frozen=True)
 class InitializationResult:
-    """Result of the initialization.
+    """Result of the initialization."""
 
-    Attributes:
-        body: the measured person.
-        iou: fit of each reference by name.
-        rounds: number of rounds of both passes by subset.
-        costs_px: cost plus prior of the best hypothesis before the first and after each round, by
-            subset, with one tuple for each pass.
-    """
-
-    body: BodyModel
-    iou: dict[str, float]
-    rounds: dict[str, int]
+    body: BodyModel  #: the measured person
+    iou: dict[str, float]  #: fit of each reference by name
+    rounds: dict[str, int]  #: number of rounds of both passes by subset
+    #: cost plus prior of the best hypothesis before the first and after each round, by subset, with
+    #: one tuple for each pass
     costs_px: dict[str, list[tuple[float, ...]]]
 
     @property

@@ -1,7 +1,4 @@
-"""Checks of the reference silhouettes, and the person's lateral place in them.
-
-:mod:`cardbox_tracker.measuring.measure` estimates the sizes.
-"""
+"""Checks of the reference silhouettes, and the person's lateral place in them."""
 
 from __future__ import annotations
 

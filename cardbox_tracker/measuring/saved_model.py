@@ -35,10 +35,7 @@ class SavedModel:
             self.warning = f"{error}; until then a new measurement will not be saved"
 
     def save(self, body: BodyModel) -> str:
-        """Write ``body`` if there is a file name; return a text with the path for the answer.
-
-        Raises InitializationError if the file cannot be written.
-        """
+        """Write ``body`` to the file, if any; return words on it, or raise InitializationError."""
         if self._path is None:
             return ""
         try:

@@ -98,10 +98,7 @@ def save_scene(scene: Scene, path: str | os.PathLike[str]) -> None:
 
 
 def load_scene(path: str | os.PathLike[str]) -> Scene:
-    """Read a scene.
-
-    Raises CardboxError if the file cannot be read or is no scene; the text names what is wrong.
-    """
+    """Read a scene; CardboxError says what is wrong if it cannot be read or is none."""
     with foreign(path, CardboxError, "a file OUT.scene.yaml that 'cardbox track' has written"):
         return _scene_of(parse_small_yaml(read_small_text(path)))
 

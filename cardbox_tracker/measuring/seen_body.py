@@ -77,10 +77,7 @@ class SeenBody:
         time_s: float,
         is_detected: bool = False,
     ) -> bool:
-        """Fit a silhouette (H, W), 0 or 255, if it is time to; return whether ``body`` has changed.
-
-        The image of that time teaches the colours. A person whom a detector finds may be small.
-        """
+        """Fit a silhouette (H, W), and colours of its image, if due; return if ``body`` changed."""
         if time_s < self._next_s or len(self._fits) == MOST_SIGHTS:
             return False
         seen = upper_body(silhouette, is_detected)

@@ -73,10 +73,7 @@ _SPECK_PX = 2
 
 
 def at_height_of(silhouette: NDArray[np.uint8], body: BodyModel, camera: Camera) -> BodyModel:
-    """Return ``body`` with the hip height that aligns its head with the silhouette's top row.
-
-    It is unchanged if the silhouette (H, W) is empty or the head is cut off.
-    """
+    """Return ``body`` with hips that put its head at the top of (H, W); the same if cut off."""
     rows = np.flatnonzero(np.count_nonzero(silhouette, axis=1) > _SPECK_PX)
     if rows.size == 0 or rows[0] == 0:
         return body

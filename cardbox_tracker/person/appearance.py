@@ -53,18 +53,13 @@ def steps_of_levels(brightness: FloatArray, learned: FloatArray) -> NDArray[np.i
 class Appearance:
     """The colours of one person's parts in one light.
 
-    Attributes:
-        levels: stored probability of each part of ``PARTS`` and each bin, (5, bins), uint8, see the
-            module; bins are ordered by the step in the first channel, then the second and the
-            third.
-        brightness: median of each channel over the torso, (channels,), 1 for grey images, 3 for
-            bgr; grey levels.
-
-    Raises:
-        BodyModelError: the shapes do not fit.
+    Raises BodyModelError if the shapes do not fit.
     """
 
+    #: stored probability of each part of ``PARTS`` and each bin, (5, bins), uint8, see the module;
+    #: bins are ordered by the step in the first channel, then the second and the third
     levels: NDArray[np.uint8]
+    #: median of each channel over the torso, (channels,), 1 for grey images, 3 for bgr; grey levels
     brightness: FloatArray
 
     def __post_init__(self) -> None:

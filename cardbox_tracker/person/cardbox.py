@@ -42,10 +42,7 @@ NECK_PATCHES = slice(15, 16)
 
 
 class PartPatches(NamedTuple):
-    """Corners of the patches, metres, each in the frame of its part; see ``person/parts.py``.
-
-    The corners of a patch are in order around it.
-    """
+    """Corners, metres, in order around each patch, in the frame of its part, see ``parts.py``."""
 
     trunk: FloatArray
     """Shape (..., 7, 4, 3): torso, waist and head, in the torso's frame."""

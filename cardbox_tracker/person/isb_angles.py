@@ -49,10 +49,7 @@ _MIRROR = np.array([1.0, 1.0, -1.0])
 
 
 def isb_angles(states: FloatArray) -> FloatArray:
-    """Return the angles of ``ISB_NAMES``, (n, 11), rad, for states (n, 14) or postures (n, 12).
-
-    They are nan in gaps, and where they are not determined.
-    """
+    """Return ``ISB_NAMES``, (n, 11), rad, of states or postures; nan where not determined."""
     d = np.asarray(states, dtype=np.float64)
     left = arm_angles(*arm_directions(d[:, LEFT_ARM], 1.0), side=1.0)
     right = arm_angles(*arm_directions(d[:, RIGHT_ARM], -1.0), side=-1.0)
@@ -73,10 +70,7 @@ def anatomical_angles(posture: FloatArray) -> FloatArray:
 
 
 def thorax_angles(postures: FloatArray) -> FloatArray:
-    """Return extension, lateral flexion to the right and rotation to the left, (n, 3), rad.
-
-    They are those of the whole trunk, which is one part, for states (n, 14) or postures (n, 12).
-    """
+    """Return the whole trunk's extension, lateral flexion right, rotation left, (n, 3), rad."""
     roll, pitch, yaw = (postures[:, i] for i in (ROLL, PITCH, YAW))
     torso = rotation_z(yaw) @ rotation_y(pitch) @ rotation_x(roll)
     r = LABORATORY @ torso @ LABORATORY.T

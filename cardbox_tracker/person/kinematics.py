@@ -222,10 +222,7 @@ def pose(
 
 
 def jacobian(body: BodyModel, states: FloatArray, pitch_rad: float | None = None) -> FloatArray:
-    """Return the derivatives of :attr:`PosedBodies.points_m`, (..., 9, 3, 14), by the states.
-
-    The arguments are those of :func:`pose`.
-    """
+    """Return derivatives (..., 9, 3, 14) of :attr:`PosedBodies.points_m`; see :func:`pose`."""
     flat, shape = _flat(states)
     derivatives = np.empty((len(flat), _N_POINTS, 3, N_STATE))
     bones = (*_bones(body.person, body.placement, body.shoulder_rise), _tilt(pitch_rad))
@@ -714,10 +711,7 @@ def keypoints_of_states(
 def angles_of_arm(
     directions: FloatArray, side: float, limits: FloatArray, angles: FloatArray
 ) -> None:
-    """Write the angles (4,) of an arm with ``directions`` (6,) in the torso's frame.
-
-    This is the inverse of :func:`limb_directions`, within ``limits`` (4, 2).
-    """
+    """Write an arm's angles (4,) within ``limits`` (4, 2): inverse of :func:`limb_directions`."""
     flexion = asin(min(max(directions[0], -1.0), 1.0))
     turned = atan2(directions[1], -directions[2])
     abduction = side * turned

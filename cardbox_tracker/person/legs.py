@@ -48,10 +48,7 @@ def stature_of(parts: BodyParts[float]) -> float:
 
 
 def floor_m(body: BodyModel) -> float | None:
-    """Return the height of the floor above the camera, m; None if nothing is known of it.
-
-    It is that of the scene, or that on which the measured person stood.
-    """
+    """Return the floor's height above the camera, m, by scene or measured person, or None."""
     if body.camera_pose.height_m is not None:
         return -body.camera_pose.height_m
     if "hip_height_m" in body.unknown:

@@ -48,10 +48,7 @@ MEASURED, PROPORTIONS = SOURCES = ("measured", "proportions")
 
 
 def check_range(name: str, value: float, lowest: float, highest: float, unit: str) -> None:
-    """Raise BodyModelError if a value is not finite or outside of ``lowest`` to ``highest``.
-
-    The text gives name, value, unit, range and a likely wrong unit.
-    """
+    """Raise BodyModelError, with unit and range, if a value is not finite or out of range."""
     if not math.isfinite(value):
         raise BodyModelError(f"{name} is {value}; expected a finite number of {unit}")
     if not lowest <= value <= highest:
@@ -69,13 +66,10 @@ def check_range(name: str, value: float, lowest: float, highest: float, unit: st
 class Person:
     """Sizes of one person, independent of place and camera.
 
-    Attributes:
-        sizes: shape (18,), metres, ordered as ``SIZE_NAMES``; kept read-only.
-
-    Raises:
-        BodyModelError: a size is not finite or outside of its range; the text names it.
+    Raises BodyModelError if a size is not finite or outside of its range; the text names it.
     """
 
+    #: shape (18,), metres, ordered as ``SIZE_NAMES``; kept read-only
     sizes: FloatArray = field(default_factory=lambda: DEFAULT_SIZES.copy())
 
     def __post_init__(self) -> None:
@@ -114,8 +108,7 @@ class Person:
 class Placement:
     """Position of mid-hip in the front reference posture, metres in the reference frame.
 
-    Raises:
-        BodyModelError: a value is not finite or outside of its range; the text names it.
+    Raises BodyModelError if a value is not finite or outside of its range; the text names it.
     """
 
     distance_m: float = 2.0  #: level distance from the camera: X is ``-distance_m``
@@ -133,8 +126,7 @@ class Placement:
 class CameraPose:
     """Pose of the camera in the reference frame, whose origin is the camera's centre.
 
-    Raises:
-        BodyModelError: a value is not finite or outside of its range.
+    Raises BodyModelError if a value is not finite or outside of its range.
     """
 
     pitch_rad: float = 0.0  #: downward pitch, rad
@@ -159,40 +151,31 @@ class CameraPose:
 class BodyModel:
     """One person in one place before one camera.
 
-    Attributes:
-        person: the 18 sizes.
-        placement: position of mid-hip.
-        camera_pose: pose of the camera.
-        side_turn: turn of the person for the side reference, ``left`` or ``right``.
-        appearance: the colours of the person's parts; None if they were not learned.
-        source: one of ``SOURCES``; sizes from proportions are less exact.
-        unknown: names of sizes and of ``PLACEMENT`` whose values are guesses; a tracker fits them
-            to the first silhouette of a person.
-        stature_stddev: relative standard deviation of a stature that is only that of most people;
-            it is no part of a model file.
-        shoulder_rise: rise of a shoulder joint per radian of elevation of its arm, in shoulder
-            breadths (:mod:`.skeleton`); it is no part of a model file.
-        is_distance_found: whether the images show the distance, and nobody has given it; it is no
-            part of a model file.
-        version: number of a body that is measured while it is tracked live, from 1 on; 0 for
-            others. Equal bodies may have different ones.
-        stamp_ns: stamp of the first image to which this version belongs, ns; 0 without one.
-
-    Raises:
-        BodyModelError: ``side_turn``, ``source`` or a name in ``unknown`` is not valid.
+    Raises BodyModelError if ``side_turn``, ``source`` or a name in ``unknown`` is not valid.
     """
 
-    person: Person = field(default_factory=Person)
-    placement: Placement = Placement()
-    camera_pose: CameraPose = CameraPose()
-    side_turn: str = "left"
+    person: Person = field(default_factory=Person)  #: the 18 sizes
+    placement: Placement = Placement()  #: position of mid-hip
+    camera_pose: CameraPose = CameraPose()  #: pose of the camera
+    side_turn: str = "left"  #: turn of the person for the side reference, ``left`` or ``right``
+    #: the colours of the person's parts; None if they were not learned
     appearance: Appearance | None = None
-    source: str = MEASURED
+    source: str = MEASURED  #: one of ``SOURCES``; sizes from proportions are less exact
+    #: names of sizes and of ``PLACEMENT`` whose values are guesses; a tracker fits them to the
+    #: first silhouette of a person
     unknown: tuple[str, ...] = ()
+    #: relative standard deviation of a stature that is only that of most people; it is no part of a
+    #: model file
     stature_stddev: float = 0.0
+    #: rise of a shoulder joint per radian of elevation of its arm, in shoulder breadths
+    #: (:mod:`.skeleton`); it is no part of a model file
     shoulder_rise: float = SHOULDER_RISE
+    #: whether the images show the distance, and nobody has given it; it is no part of a model file
     is_distance_found: bool = field(default=False, compare=False)
+    #: number of a body that is measured while it is tracked live, from 1 on; 0 for others. Equal
+    #: bodies may have different ones.
     version: int = field(default=0, compare=False)
+    #: stamp of the first image to which this version belongs, ns; 0 without one
     stamp_ns: int = field(default=0, compare=False)
 
     def __post_init__(self) -> None:

@@ -9,8 +9,8 @@ import os
 import textwrap
 from typing import Any
 
-from cardbox_tracker.common.errors import BodyModelError, CardboxError, cut, quoted
-from cardbox_tracker.common.files import atomic_path, foreign
+from cardbox_tracker.common.errors import BodyModelError, cut, quoted
+from cardbox_tracker.common.files import foreign, saved_file
 from cardbox_tracker.common.small_yaml import SmallYamlError, parse_small_yaml, read_small_text
 from cardbox_tracker.person.appearance import Appearance
 from cardbox_tracker.person.model import (
@@ -82,10 +82,7 @@ def _yaml_number(value: float) -> str:
 
 
 def loads_body_model(text: str, source: str = "body model") -> BodyModel:
-    """Parse YAML as :func:`dumps_body_model` writes it; ``source`` names the text in errors.
-
-    Raises BodyModelError, with the wrong key, if it is no body model.
-    """
+    """Parse YAML of :func:`dumps_body_model`; BodyModelError names ``source`` and the wrong key."""
     try:
         data = parse_small_yaml(text)
     except SmallYamlError as error:
@@ -108,18 +105,8 @@ def load_body_model(path: str | os.PathLike[str]) -> BodyModel:
 
 def save_body_model(model: BodyModel, path: str | os.PathLike[str]) -> None:
     """Write ``model`` to ``path`` atomically; raise BodyModelError if that fails."""
-    try:
-        with atomic_path(path) as temporary, temporary.open("w", encoding="utf-8") as file:
-            file.write(dumps_body_model(model))
-            file.flush()
-            os.fsync(file.fileno())
-    except CardboxError as error:
-        raise BodyModelError(str(error)) from None
-    except OSError as error:
-        raise BodyModelError(
-            f"cannot write {os.fspath(path)}: {error.strerror}; choose a folder that exists and is "
-            "writable"
-        ) from None
+    with saved_file(path, BodyModelError) as file:
+        file.write(dumps_body_model(model).encode())
 
 
 def _from_mapping(data: object) -> BodyModel:

@@ -146,10 +146,7 @@ class Rep155Joints:
 def _angles(
     sine: float, cosine: float, up: float, last_turn: float, last_tilt: float, lowest: float
 ) -> tuple[float, float]:
-    """Return turn and tilt with (sine, cosine) = sin(tilt) (sin, cos)(turn) and up = cos(tilt).
-
-    The solution that is nearer to the last one is returned if its tilt is not below ``lowest``.
-    """
+    """Return turn and tilt for (sine, cosine, up), near the last ones and not below ``lowest``."""
     tilt = float(np.arctan2(np.hypot(sine, cosine), up))
     sign = 1.0 if last_tilt >= 0 else -1.0
     if min(tilt, np.pi - tilt) < _MEANINGLESS_RAD and sign * tilt >= lowest:

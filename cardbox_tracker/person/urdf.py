@@ -155,10 +155,7 @@ class _Robot:
         xyz_m: Vector = _ZERO,
         rpy: Vector = _ZERO,
     ) -> None:
-        """Add a skeleton with its links, parents first, from the pose of the hips in ``root`` on.
-
-        Without ``has_all``, only the joints of the posture can move.
-        """
+        """Add a skeleton from ``root`` on; without ``has_all``, only joints of the posture move."""
         parts, joints = body_parts(body.sizes), {joint.name: joint for joint in skeleton}
         used = {Group.POSTURE, Group.NOTHING, *(Group if has_all else ())}
         places = iter(place_limits(body.placement.distance_m).tolist())
@@ -197,10 +194,7 @@ class _Robot:
         return joint
 
     def show(self, link: str, material: str, part: Part[float], height_m: float = 0.0) -> None:
-        """Show the frontal and the sagittal patch of a part, whose link is at ``height_m``.
-
-        URDF has no trapezoid: the torso's frontal patch is drawn with its mean width.
-        """
+        """Show the frontal patch, a torso's with its mean width, and the sagittal one of a part."""
         middle_m = part.middle_m - height_m
         self.box(link, material, (PATCH_THICKNESS_M, part.mean_width_m, part.height_m), middle_m)
         self.box(link, material, (part.depth_m, PATCH_THICKNESS_M, part.height_m), middle_m)
@@ -231,10 +225,7 @@ def _seen_from_camera(body: BodyModel) -> tuple[Vector, Vector]:
 
 
 def _optical(body: BodyModel) -> FloatArray:
-    """Return the rotation (3, 3) from the reference frame into the optical frame.
-
-    Columns: the body's X (to the camera), Y (to the right of the image) and Z (up).
-    """
+    """Return the rotation (3, 3) from reference to optical frame; columns are the body's axes."""
     down, roll = body.camera_pose.pitch_rad, body.camera_pose.roll_rad
     rotation = np.array(
         [
@@ -308,10 +299,7 @@ class LinkTransforms:
         self.joint_names = tuple(joint.name for joint in self._movable)
 
     def at(self, positions: Mapping[str, float]) -> list[LinkTransform]:
-        """Return the transform of every link but the root, at ``positions``, rad and metres.
-
-        Raises ValueError if a movable joint has no position.
-        """
+        """Return the transform of each link but the root at ``positions``; else ValueError."""
         missing = [name for name in self.joint_names if name not in positions]
         if missing:
             raise ValueError(f"joints {', '.join(missing)} are missing")

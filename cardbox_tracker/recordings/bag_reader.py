@@ -67,10 +67,7 @@ class BagMessage(NamedTuple):
 
 
 class BagReader:
-    """Context of an open recording.
-
-    All methods raise BagError if the recording cannot be read or lacks the requested topic.
-    """
+    """Context of an open recording; methods raise BagError if it, or a topic, cannot be read."""
 
     def __init__(self, path: str | os.PathLike[str], camera: GivenCamera | None = None) -> None:
         """Store the path: folder of a rosbag2 recording, or its .mcap or .db3 file.

@@ -1,7 +1,7 @@
-"""The camera as a user describes it, or a phone by the focal length that it writes into its files.
+"""The camera as a user describes it, or a phone by the focal length in its files.
 
-Images state it as EXIF ``FocalLengthIn35mmFilm``. Films have it among their QuickTime metadata, in
-``meta`` of the film or of a track: names of values in ``keys``, the values in ``ilst``.
+Images state it as EXIF ``FocalLengthIn35mmFilm``; films in QuickTime's ``meta``: names in ``keys``,
+values in ``ilst``.
 """
 
 from __future__ import annotations

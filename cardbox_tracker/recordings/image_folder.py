@@ -39,11 +39,7 @@ def _by_number(path: Path) -> list[tuple[int, str]]:
 
 
 def _numbered(files: Sequence[Path]) -> list[int]:
-    """Return the place of each image in an even sequence, counted from 0.
-
-    Images that a recorder dropped are missing if all names have one number that mostly grows by the
-    same step; otherwise the images follow each other.
-    """
+    """Return places from 0 by numbers that mostly grow by one step, else the order of names."""
     parts = [_by_number(path) for path in files]
     if len({len(part) for part in parts}) == 1:
         varying = [column for column in zip(*parts, strict=True) if len(set(column)) > 1]

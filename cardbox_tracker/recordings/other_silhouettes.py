@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from cardbox_tracker.camera.camera import Camera
 from cardbox_tracker.camera.depth_image import DepthImage, at_size, depth_from_image
@@ -19,7 +20,7 @@ from cardbox_tracker.detectors.detector import Detector
 from cardbox_tracker.detectors.point_table import PointTable
 from cardbox_tracker.recordings.bag_reader import IMAGE_TYPES, BagReader
 from cardbox_tracker.recordings.open_images import ImageRecording
-from cardbox_tracker.recordings.silhouettes import RecordedFrame, SilhouetteSource
+from cardbox_tracker.recordings.silhouettes import PreparedImage, RecordedFrame, SilhouetteSource
 from cardbox_tracker.segmentation.learning import Learning, PersonInViewLearning
 from cardbox_tracker.segmentation.silhouettes import (
     WITHIN_LIMITS_M,
@@ -143,26 +144,12 @@ class DetectorSilhouetteSource(SilhouetteSource):
         self._detector = self._detector or self._started(detector)
         self._finds_people = detector.people > 0
 
-    def frames(self, start_s: float = 0.0, end_s: float = float("inf")) -> Iterator[RecordedFrame]:
-        """Yield every image from ``start_s`` to ``end_s``, in order, with the person's mask.
-
-        The detector starts anew at ``start_s``, so that a frame depends on the span alone.
-        """
-        self._start_points(start_s, end_s)
-        for prepared in self._images_until(end_s, start_s):
-            stamp_ns, time_s, image, recorded, _, found = prepared
-            if time_s < start_s:
-                continue
-            silhouette = np.zeros(image.shape[:2], np.uint8)
-            for one in found:
-                silhouette |= one.silhouette()
-            seen = brightness_of(image), silhouette, image
-            frame = RecordedFrame(stamp_ns, time_s, *seen, recorded=recorded)
-            if self._finds_people:
-                yield frame._replace(people=self._people(prepared))
-            else:
-                yield frame._replace(points=self._points(prepared, silhouette))
-        self._end_points()
+    def _silhouette(self, prepared: PreparedImage) -> NDArray[np.uint8]:
+        """Return the masks of all whom the detector finds."""
+        silhouette = np.zeros(prepared.image.shape[:2], np.uint8)
+        for one in prepared.found:
+            silhouette |= one.silhouette()
+        return silhouette
 
 
 # A standing person sways too slowly to be seen in images at a higher rate than the live nodes'.

@@ -83,10 +83,7 @@ def place_state(estimate: Estimate) -> KeypointStates | None:
 
 
 class JointValues(NamedTuple):
-    """Values (n,) of the joints ``names``, rad and metres.
-
-    ``velocities`` (n,) are their changes, rad/s and m/s; None if unknown.
-    """
+    """Values (n,) of the joints ``names``, rad and m, and velocities, rad/s and m/s, if known."""
 
     names: tuple[str, ...]
     values: FloatArray
@@ -184,8 +181,8 @@ def joint_values(estimate: Estimate, torso_place: bool = True) -> JointValues | 
 def joint_deviations(estimate: Estimate, torso_place: bool = True) -> JointValues | None:
     """Return the standard deviation of each joint; None if unknown.
 
-    The joints of the neck, or of a hand, are among them only if it was seen. Legs that are not
-    known may be anywhere in their range.
+    Neck and hands are among them only if they were seen; unknown legs may be anywhere in their
+    range.
     """
     if estimate.posture_stddev is None or not torso_place:
         return _joints(JOINT_NAMES, estimate.posture_stddev)

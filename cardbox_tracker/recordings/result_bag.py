@@ -1,7 +1,4 @@
-"""Writer of the bag of ``cardbox track --bag``, with the topics of the tracker node.
-
-``cardbox demo`` records the same topics from the nodes with :func:`result_writer`.
-"""
+"""Writer of the bag of ``cardbox track --bag`` and ``demo``, with the topics of the tracker."""
 
 from __future__ import annotations
 
@@ -38,10 +35,7 @@ from cardbox_tracker.tracking.tracker import Tracker
 
 
 class BagTransforms:
-    """Writes ``/tf`` for the joint states of a recording, from its URDF.
-
-    A viewer needs ``/tf`` to move the URDF, and a recording has no robot_state_publisher.
-    """
+    """Writes ``/tf`` for joint states from their URDF, as robot_state_publisher does live."""
 
     def __init__(self, writer: BagWriter) -> None:
         """Use ``writer``; nothing is written before :meth:`describe`."""

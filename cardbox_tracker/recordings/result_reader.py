@@ -1,7 +1,4 @@
-"""Reads results: tables of ``cardbox track``, and bags of the same or of running nodes.
-
-All that use results read them here, so that the same files are accepted and refused by all.
-"""
+"""Reads results for all that use them: tables of ``cardbox track``, bags of it or of the nodes."""
 
 from __future__ import annotations
 
@@ -150,10 +147,7 @@ class _Rows:
         self._found_texts: dict[str, list[str]] = {name: [] for name in self._texts}
 
     def add(self, row: Mapping[str, Any]) -> None:
-        """Take the values of an image by name, as numbers or texts; None and "" are unknown.
-
-        Raises ValueError, which names the value, if it is not that of a result.
-        """
+        """Take an image's values, None or "" if unknown; ValueError names one of no result."""
         stamp_ns = _number(row, "stamp_ns", int)
         time_s, state = _number(row, "time_s"), str(row["state"])
         if state not in (*_SEEN, *_GAPS):
@@ -310,10 +304,7 @@ def _check(path: Path, names: Sequence[str]) -> None:
 
 
 def namespace_of(bag: BagReader, person: int | None = None) -> str:
-    """Return the first namespace with the tracker's topics, such as "" or "/left".
-
-    With ``person``, that of one of several people. Raises BagError if there is none.
-    """
+    """Return the first namespace with topics of the tracker, or of ``person``; else BagError."""
     models = sorted(topic for topic in bag.topics if topic.endswith(MODEL))
     if not models:
         raise BagError(

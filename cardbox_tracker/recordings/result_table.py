@@ -82,8 +82,8 @@ def units(
 ) -> dict[str, str]:
     """Return the unit of each column by its name, in their order; empty for none.
 
-    The names up to the person's place are fixed, because scripts read them; standard deviations end
-    in their unit. Neck and legs are there for recordings with points of the person.
+    The first names are fixed, because scripts read them; standard deviations end in their unit.
+    Neck and legs are there for recordings with points of the person.
     """
     return {
         "stamp": "s",

@@ -217,10 +217,7 @@ class SilhouetteSource:
         return prepared._replace(found=found)
 
     def _images_until(self, end_s: float, start_s: float) -> Iterator[PreparedImage]:
-        """Yield every image to ``end_s``, those from ``start_s`` on with whom the detector finds.
-
-        It looks at the next images while the caller works.
-        """
+        """Yield images to ``end_s``, from ``start_s`` on with whom the detector finds meanwhile."""
         within = takewhile(lambda one: one.time_s <= end_s, self.images())
         look = partial(self._looked_at, start_s=start_s)
         return within if self._detector is None else results_ahead(look, within)
@@ -252,7 +249,7 @@ class SilhouetteSource:
         self._start_points(start_s, end_s)
         for prepared in self._images_until(end_s, start_s):
             stamp_ns, time_s, image, recorded, *_ = prepared
-            silhouette = self._pipeline.silhouette(image, stamp_ns)
+            silhouette = self._silhouette(prepared)
             if time_s >= start_s:
                 seen = brightness_of(image), silhouette, image
                 frame = RecordedFrame(stamp_ns, time_s, *seen, recorded=recorded)
@@ -261,6 +258,9 @@ class SilhouetteSource:
                 else:
                     yield frame._replace(points=self._points(prepared, silhouette))
         self._end_points()
+
+    def _silhouette(self, prepared: PreparedImage) -> NDArray[np.uint8]:
+        return self._pipeline.silhouette(prepared.image, prepared.stamp_ns)
 
     def _people(self, prepared: PreparedImage) -> tuple[ImagePoints, ...]:
         """Return the points of all people in an image."""
@@ -294,10 +294,7 @@ class SilhouetteSource:
         return found
 
     def period_ns(self) -> int:
-        """Return the median time between images, ns.
-
-        Raises BagError if there are fewer than two images.
-        """
+        """Return the median time between images, ns; raise BagError if there are fewer than two."""
         images = islice(self._bag.images(self.topic), _PERIOD_IMAGES)
         stamps_ns = [image.stamp_ns for image in images]
         if len(stamps_ns) < 2:

@@ -163,10 +163,7 @@ class TrackingError:
 
 
 def tracking_error(estimates: Mapping[int, FloatArray], truth: GroundTruth) -> TrackingError:
-    """Compare keypoints (6, 3), metres in the optical frame, by stamp, with the truth.
-
-    Raises CardboxError if no estimate has the stamp of a true frame.
-    """
+    """Compare keypoints (6, 3), m, optical frame, with the truth; CardboxError if no stamp fits."""
     stamps = [stamp for stamp in estimates if stamp in truth.frames]
     if not stamps:
         raise CardboxError(

@@ -82,10 +82,7 @@ class VideoReader(Film):
         return self
 
     def images(self, topic: str | None = None) -> Iterator[RecordedImage]:
-        """Yield the images in order, with the time in the file or at the given rate.
-
-        Images that cannot be decoded are left out; those after them keep their times.
-        """
+        """Yield images that can be decoded, with the time in the file or at the given rate."""
         first_ms, file_ns, stamp_ns = 0.0, -1, -1
         number = damaged = 0
         with _opened(self.path) as capture:
@@ -146,10 +143,7 @@ def _opened(path: Path) -> Iterator[cv2.VideoCapture]:
 
 
 def _read(capture: cv2.VideoCapture) -> Iterator[tuple[NDArray[Any] | None, float]]:
-    """Yield the images of an open video to its end, with their times in the file, ms.
-
-    An image is None if it cannot be decoded. The next ones are decoded while the caller works.
-    """
+    """Yield images, None if broken, and their times in the file, ms; the next are decoded ahead."""
     failed = 0
     for image, time_ms in results_ahead(partial(_next, capture), count()):
         if image is not None:

@@ -59,11 +59,7 @@ _AGAIN_NOISE = 0.45
 
 
 class ArmSearch:
-    """Searches arms (N, 4) with all cameras of a cost, beside its fixed torso.
-
-    Attributes:
-        spreads_m: deviations of left elbow and hand, right elbow and hand, in the last frame, m.
-    """
+    """Searches arms (N, 4) beside a cost's torso; ``spreads_m`` are those of elbows and hands."""
 
     def __init__(self, cost: MultiViewCost) -> None:
         """Prepare for searches with ``cost``."""
@@ -77,10 +73,7 @@ class ArmSearch:
     def __call__(
         self, pool: FloatArray, arm: int, profile: SearchProfile, draws: Draws
     ) -> tuple[FloatArray, FloatArray]:
-        """Return arms (N, 4), 0 left or 1 right, and their ratings (N,).
-
-        The states ``pool`` (M, 14) have this torso, the best first.
-        """
+        """Return arms (N, 4) with this torso of ``pool`` (M, 14), best first, and ratings (N,)."""
         cost = self._cost
         arms = self._proposed(pool, arm, profile, *draws.for_arms())
         ratings, joints_m = cost.arms(arms, arm)
@@ -106,10 +99,7 @@ class ArmSearch:
         normals: FloatArray,
         uniforms: FloatArray,
     ) -> FloatArray:
-        """Return arms (N, 4), of which each camera that shows the person proposes an equal part.
-
-        Each camera uses its own uncovered foreground and line of sight.
-        """
+        """Return arms (N, 4), an equal part by each camera that shows the person."""
         cost, candidates = self._cost, profile.candidates
         seeing: Sequence[int] = cost.seeing
         count, rated = len(seeing), len(normals) // candidates

@@ -73,12 +73,6 @@ class FilterConfig(Settings):
 class TrackerConfig(Settings):
     """Settings of the filters and of the extensions; the defaults are those of the paper.
 
-    Attributes:
-        torso: filter of d1..d4 (Table I).
-        arm: filter of each arm (Table I).
-        terms: settings of the cost's terms in addition to the silhouette (``terms/``).
-        whole_body: settings of the filter ``whole_body``.
-
     The filter ``hierarchical`` uses all settings except ``whole_body``. The filter ``whole_body``
     uses ``whole_body``, ``terms``, ``relocalize``, ``select_person``, ``lost_iou`` and
     ``lost_frames``.
@@ -91,14 +85,15 @@ class TrackerConfig(Settings):
         choices=FILTERS,
     )
 
-    torso: FilterConfig = FilterConfig(200, 0.2, 0.1, 0.02, 8000.0)
-    arm: FilterConfig = FilterConfig(200, 0.4, 0.25, 0.0, 4000.0)
+    torso: FilterConfig = FilterConfig(200, 0.2, 0.1, 0.02, 8000.0)  #: filter of d1..d4 (Table I)
+    arm: FilterConfig = FilterConfig(200, 0.4, 0.25, 0.0, 4000.0)  #: filter of each arm (Table I)
     strategy: str = restarting(
         "drs", "resampling strategy of the filters", choices=tuple(STRATEGIES)
     )
     cycles: int = setting(1, "estimation cycles per image", limits=(1, 100))
+    #: settings of the cost's terms in addition to the silhouette (``terms/``)
     terms: tuple[TermSettings, ...] = ()
-    whole_body: WholeBodyConfig = WholeBodyConfig()
+    whole_body: WholeBodyConfig = WholeBodyConfig()  #: settings of the filter ``whole_body``
     average: int = restarting(
         1,
         "best particles whose weighted mean is the result; 1: the best one",
@@ -180,10 +175,7 @@ class TrackerConfig(Settings):
             raise NoEffectError(name, "of arms, which have no place", "arm.rotation_noise_rad")
 
     def with_particles(self, particles: int) -> TrackerConfig:
-        """Return these settings with N = ``particles`` in each of the three filters.
-
-        Raises NoEffectError if the filter is not ``hierarchical``, ValueError if N is out of range.
-        """
+        """Return these settings with N = ``particles`` in each of the paper's three filters."""
         number = {"particles": particles}
         fewer = {"average": particles} if particles < self.average else {}
         return self.changed({"torso": number, "arm": number, **fewer})

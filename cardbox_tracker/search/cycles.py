@@ -28,10 +28,7 @@ MakeHierarchy = Callable[[TrackerConfig, int, np.random.Generator], Hierarchical
 
 
 class Cycles:
-    """The paper's filter as :class:`~cardbox_tracker.search.pose_filter.PoseFilter`.
-
-    It runs the algorithm "Online Motion Tracking".
-    """
+    """The paper's algorithm "Online Motion Tracking" as a :class:`~.pose_filter.PoseFilter`."""
 
     def __init__(
         self,

@@ -103,20 +103,16 @@ class Model(NamedTuple):
 
 
 class Models(NamedTuple):
-    """The models of results that rest on the same.
+    """The models of results that rest on the same."""
 
-    Attributes:
-        uncertain_from: probability of being wrong above which a keypoint is uncertain: the highest
-            one with which at most 2 % of the tracked keypoints of left-out sources are wrong.
-        doubtful_from: that of a hand, over time (:func:`remembered`), above which the posture is
-            uncertain, and without points the hand: the highest one with which at most 2 % of the
-            images that are ``tracking`` have a wrong keypoint.
-        by_kind: models by the names of :data:`KINDS`, and ``whole``.
-    """
-
+    #: probability of being wrong above which a keypoint is uncertain: the highest one with which at
+    #: most 2 % of the tracked keypoints of left-out sources are wrong
     uncertain_from: float
+    #: that of a hand, over time (:func:`remembered`), above which the posture is uncertain, and
+    #: without points the hand: the highest one with which at most 2 % of the images that are
+    #: ``tracking`` have a wrong keypoint
     doubtful_from: float
-    by_kind: Mapping[str, Model]
+    by_kind: Mapping[str, Model]  #: models by the names of :data:`KINDS`, and ``whole``
 
 
 class Judgement(NamedTuple):

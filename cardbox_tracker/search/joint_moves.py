@@ -1,7 +1,4 @@
-"""Compiled moves of whole states.
-
-Callers pass the random numbers, unit normal or uniform in 0..1.
-"""
+"""Compiled moves of whole states by random numbers, unit normal or uniform in 0..1."""
 
 from __future__ import annotations
 

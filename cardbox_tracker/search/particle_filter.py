@@ -105,11 +105,7 @@ class ParticleFilter:
         return mean
 
     def stddev(self, mean: FloatArray, spread_scale: float = 1.0) -> FloatArray:
-        """Return the standard deviation (D,) of all particles around ``mean`` (D,).
-
-        The weights are those of :meth:`mean`, so it tells how far a joint can move until the fit is
-        worse.
-        """
+        """Return the deviation (D,) of all particles around ``mean``, by the weights of it."""
         stddev: FloatArray = weighted_stddev(
             self.particles, self.costs, mean, SPREAD_PX * spread_scale
         )

@@ -32,10 +32,7 @@ def clip(particles: Any, limits: Any) -> None:
 
 @kernel
 def weighted_stddev(particles: Any, costs: Any, mean: Any, spread: float) -> Any:
-    """Return the standard deviation (D,) of particles (N, D) around ``mean`` (D,).
-
-    With ``costs`` W (N,), the weights are exp(-(W - W_best) / spread).
-    """
+    """Return the deviation (D,) around ``mean``, by weights exp(-(W - W_best) / spread)."""
     best = costs.min()
     total = 0.0
     squares = np.zeros(particles.shape[1])
@@ -86,10 +83,7 @@ def truncate(costs: Any, count: int) -> Any:
 
 @kernel
 def weighted_mean(particles: Any, costs: Any, count: int, spread: float) -> Any:
-    """Return the weighted mean (D,) of the ``count`` best particles (N, D) by ``costs`` (N,).
-
-    The weights are exp(-(W - W_best) / spread).
-    """
+    """Return the mean (D,) of the best ``count`` (N, D), by weights exp(-(W - W_best) / spread)."""
     best = costs.min()
     total = 0.0
     mean = np.zeros(particles.shape[1])

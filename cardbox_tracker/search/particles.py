@@ -56,10 +56,7 @@ class Particles:
     spread: float  #: difference of ratings that changes a weight by the factor e
 
     def postures(self, around: FloatArray, count: int, rng: np.random.Generator) -> FloatArray:
-        """Return equally weighted postures (count, 12), drawn from the weighted particles.
-
-        They are moved ``around`` the result (14,) and have its deviations.
-        """
+        """Return equally weighted postures (count, 12) with the deviations of ``around`` (14,)."""
         weights = np.exp((self.ratings.min() - self.ratings) / self.spread)
         chosen = rng.choice(len(weights), count, p=weights / weights.sum())
         deviations = calibrated_deviations(self.states[chosen] - self.mean, rng)

@@ -66,10 +66,7 @@ class PoseFilter(Protocol):
         """Set the frames of all cameras; return whether they can show a person."""
 
     def follow(self, frames: Sequence[Frame], terms: Sequence[Sequence[Term]]) -> Fit:
-        """Estimate the posture in the frames of the last :meth:`look`, by the cameras' terms.
-
-        A new search starts around the front reference posture.
-        """
+        """Estimate the posture in the frames of the last :meth:`look`, anew around the front."""
 
     def ious(self) -> list[float | None]:
         """Return the IoU of the last result in each camera; None where there was none."""

@@ -41,10 +41,7 @@ def least_of(ratings: Floats, count: int) -> Indices:
 
 @kernel
 def spread_of_arm(joints_m: Floats, ratings: Floats, spread: float) -> tuple[float, float]:
-    """Return the weighted deviations of elbow and hand in the torso's frame, metres.
-
-    The weights of the arms, with ``joints_m`` (N, 3, 3), are exp(-(rating - best) / ``spread``).
-    """
+    """Return weighted deviations of elbow and hand, m, of arms with ``joints_m`` (N, 3, 3)."""
     best = ratings.min()
     total = 0.0
     sums, squares = np.zeros((3, 3)), np.zeros((3, 3))

@@ -1,7 +1,4 @@
-"""Compiled proposals of torsos.
-
-Callers pass the random numbers, unit normal or uniform in 0..1.
-"""
+"""Compiled proposals of torsos by random numbers, unit normal or uniform in 0..1."""
 
 from __future__ import annotations
 

@@ -145,10 +145,7 @@ class WholeBodyFilter:
         self.approach.begin(float(self._survivors[0, TORSO_X]))
 
     def recover(self) -> None:
-        """See :class:`~.pose_filter.PoseFilter`; an upright state is added to the search.
-
-        The survivors are kept, because the silhouettes may stay poor for a while.
-        """
+        """See :class:`~.pose_filter.PoseFilter`; add an upright state, keep survivors."""
         self._is_lost = True
         # A wrong result must not be smoothed into the next one.
         self._output = self._correction = None

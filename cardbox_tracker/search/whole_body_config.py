@@ -135,14 +135,10 @@ arms as one camera needs, some searches fail (``docs/research.md#several-cameras
 
 @dataclass(frozen=True)
 class WholeBodyConfig(Settings):
-    """Settings of the whole-body filter.
+    """Settings of the whole-body filter."""
 
-    Attributes:
-        cost: constants of the rating.
-        profile: constants of the search; None for those of the number of cameras.
-    """
-
-    cost: WholeBodyCostConfig = WholeBodyCostConfig()
+    cost: WholeBodyCostConfig = WholeBodyCostConfig()  #: constants of the rating
+    #: constants of the search; None for those of the number of cameras
     profile: SearchProfile | None = None
     effort: float = restarting(
         1.0,

@@ -21,11 +21,11 @@ from numpy.typing import NDArray
 from cardbox_tracker.camera.camera import Calibration
 from cardbox_tracker.common.errors import BackgroundFileError, CardboxError, quoted
 from cardbox_tracker.common.files import (
-    atomic_path,
     check_writable,
     foreign,
     is_written_in_place,
     regular_file,
+    saved_file,
     user_path,
 )
 from cardbox_tracker.segmentation.chroma import ChromaModel
@@ -69,10 +69,7 @@ class StoredBackground(NamedTuple):
 
 
 def background_path(name: str) -> Path | None:
-    """Return the path that ``name`` stands for, ``~`` expanded; None for an empty name.
-
-    Raises BackgroundFileError if no file can be read or written there.
-    """
+    """Return the path of ``name``; None if empty, BackgroundFileError if it cannot be."""
     if not name:
         return None
     try:
@@ -99,25 +96,12 @@ def save_background(stored: StoredBackground, path: str | os.PathLike[str]) -> N
     }
     if model.chroma is not None:
         arrays |= {_CHROMA_MEAN: model.chroma.mean, _CHROMA_STDDEV: model.chroma.stddev}
-    try:
-        with atomic_path(path) as temporary, temporary.open("wb") as file:
-            np.savez(file, allow_pickle=False, **arrays)
-            file.flush()
-            os.fsync(file.fileno())
-    except CardboxError as error:
-        raise BackgroundFileError(str(error)) from None
-    except OSError as error:
-        raise BackgroundFileError(
-            f"cannot write the background {os.fspath(path)}: {error.strerror}; choose a folder "
-            "that exists and is writable, on a disk with space"
-        ) from None
+    with saved_file(path, BackgroundFileError) as file:
+        np.savez(file, allow_pickle=False, **arrays)
 
 
 def load_background(path: str | os.PathLike[str], size: tuple[int, int]) -> StoredBackground:
-    """Read a background of the working size (width, height), px.
-
-    Raises BackgroundFileError if it cannot be read, is no background, or is of another size.
-    """
+    """Read a background of size (width, height), px; BackgroundFileError if it is none."""
     expected = (
         "a background that can be used: the file that the background node wrote. Delete it, or "
         "give another name, and let the node learn with nobody in view"

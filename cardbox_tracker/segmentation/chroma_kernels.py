@@ -167,10 +167,7 @@ def _part(memory: Any, height: Any, width: Any) -> Any:
 
 @inlined_kernel
 def _enlarge(margin: Any, row: Any, mask: Any) -> None:
-    """Write where the margin (h, w), interpolated at twice the resolution, is at least 0.
-
-    ``row`` is scratch, (w + 2,).
-    """
+    """Write where the margin (h, w) is at least 0 at twice the resolution; ``row`` is scratch."""
     height, width = margin.shape
     near, far, zero = _f32(0.75), _f32(0.25), _f32(0)
     first, second = _u16(0x00FF), _u16(0xFF00)

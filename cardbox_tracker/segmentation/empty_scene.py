@@ -21,17 +21,12 @@ ImageArray = NDArray[np.uint8]
 class BackgroundModel:
     """Mean and standard deviation of the empty scene's brightness, each (H, W) float32.
 
-    Attributes:
-        mean: mean brightness.
-        stddev: standard deviation of the brightness.
-        chroma: mean and standard deviation of the colours; None if the images were grey.
-
-    Raises:
-        ValueError: an array has another shape or type.
+    Raises ValueError if an array has another shape or type.
     """
 
-    mean: FloatImage
-    stddev: FloatImage
+    mean: FloatImage  #: mean brightness
+    stddev: FloatImage  #: standard deviation of the brightness
+    #: mean and standard deviation of the colours; None if the images were grey
     chroma: ChromaModel | None = None
 
     def __post_init__(self) -> None:
@@ -58,11 +53,7 @@ class BackgroundLearner:
         return self._brightness.count
 
     def add(self, image: NDArray[np.uint8] | FloatImage) -> None:
-        """Learn from one image: brightness (H, W), or bgr (H, W, 3), of any type of ``image_from``.
-
-        Raises ValueError if its size differs from the earlier ones', or type or values are
-        impossible.
-        """
+        """Learn from brightness (H, W) or bgr (H, W, 3), or raise ValueError."""
         image = image_from(image)
         self._brightness.add(brightness_of(image) if image.ndim == 3 else image)
         # A single grey image makes the comparison by colour impossible.

@@ -22,10 +22,7 @@ _FEW = 16
 
 
 def median(values: NDArray[np.float32]) -> float:
-    """Return the median of an array of any shape; of an even number, the mean of the middle two.
-
-    Raises ValueError if it is empty, of another type or layout, or a value is negative or nan.
-    """
+    """Return the median, or mean of the middle two, of any shape, or raise ValueError."""
     flat = np.ascontiguousarray(values).reshape(-1)
     check_array("values", flat, (ANY,), np.float32)
     if not flat.size:

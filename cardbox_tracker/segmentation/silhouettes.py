@@ -111,10 +111,7 @@ class SilhouettePipeline:
         self._extractor = other if found > _IN_WRONG_LIGHT * left else extractor
 
     def silhouette(self, image: ImageArray, stamp_ns: int = 0) -> ImageArray:
-        """Return the silhouette (H, W), 0 or 255, of a prepared image, grey or bgr.
-
-        The stamp, ns, 0 if unknown, only tells the rate. Raises RuntimeError without a background.
-        """
+        """Return the silhouette (H, W) of a prepared image; the stamp, ns or 0, tells the rate."""
         if self._extractor is None:
             raise RuntimeError("no background is learned yet; call finish_learning() first")
         return self._extractor(image, stamp_ns)
@@ -130,10 +127,7 @@ class SilhouettePipeline:
         return 1.0 if self._extractor is None else self._extractor.gain
 
     def drift(self, image: ImageArray) -> float:
-        """Return the median difference of a prepared image from the background, grey levels.
-
-        The person covers less than half of the image. It is 0 before a background is learned.
-        """
+        """Return the median difference from the background, grey levels; 0 without one."""
         if self._extractor is None:
             return 0.0
         return float(np.median(brightness_of(image) - self._extractor.model.mean))

@@ -58,10 +58,7 @@ class Window(NamedTuple):
         )
 
     def grown(self, margin_px: int, shape: tuple[int, ...]) -> Window:
-        """Return the window with a margin and edges at multiples of 8, in an image of ``shape``.
-
-        An empty window stays empty.
-        """
+        """Return the window, unless empty, with a margin and edges at multiples of 8."""
         top, bottom, left, right = self
         if bottom <= top or right <= left:
             return Window(0, 0, 0, 0)
@@ -88,10 +85,7 @@ def window_of(image: ImageArray) -> Window:
 
 @kernel
 def find_edges(image: Any) -> Any:
-    """Return first and end row, first and end column of the window of an image (H, W) uint8.
-
-    The columns are multiples of 8 if W is one.
-    """
+    """Return first and end row, first and end column (by 8) of the window of (H, W) uint8."""
     if image.shape[1] % 8:
         return _edges(image, 1)
     return _edges(image.view(np.uint64), 8)

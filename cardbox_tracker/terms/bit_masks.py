@@ -1,8 +1,7 @@
-"""Compiled sums of (1 - 2 f) over the union of patches, which are drawn as bits.
+"""Compiled sums of (1 - 2 f) over the union of patches, drawn as bits of :mod:`.bit_planes`.
 
 No step depends on the order of the patches in a row, so this is faster than runs of columns
-(:mod:`.union`) where many patches overlap. The results are equal. :mod:`.bit_planes` defines the
-words.
+(:mod:`.union`) where many patches overlap. The results are equal.
 """
 
 from __future__ import annotations

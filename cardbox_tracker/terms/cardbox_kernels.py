@@ -131,11 +131,7 @@ def _place_trunk(work: Workspace) -> None:
 
 @inlined_kernel
 def _place_arm(work: Workspace, first: int, angles: Floats, side: float, model: Cardbox) -> None:
-    """Write the corners of an arm at the torso's pose; ``side`` is 1 for left, -1 for right.
-
-    The patches of the arm begin at ``first``. The ``angles`` (4,) are abduction and flexion of
-    shoulder and elbow, rad.
-    """
+    """Write an arm's corners from ``first`` on, of ``angles`` (4,), rad; ``side`` 1 is left."""
     elbow, end = first + ARM_PATCHES // 2, first + ARM_PATCHES
     for j in range(3):
         work.joint[j] = _joint(j, side, model.shoulder, work.torso, work.hip)

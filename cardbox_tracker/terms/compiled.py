@@ -1,8 +1,4 @@
-"""Compiled implementation of the silhouette's term.
-
-``lab/experiments/reference.py`` is the reference with equal results;
-:mod:`cardbox_tracker.terms.cardbox_kernels` explains the method.
-"""
+"""Compiled silhouette term (:mod:`.cardbox_kernels`), equal to ``lab/experiments/reference.py``."""
 
 from __future__ import annotations
 

@@ -59,11 +59,7 @@ class Depth(Settings):
 
 
 class DepthTerm:
-    """The term for one person and one camera.
-
-    Attributes:
-        body_px: largest cost of a whole body, px.
-    """
+    """The term for one person and one camera, of at most ``body_px`` for a whole body."""
 
     def __init__(self, config: Depth, person: BodyModel, camera: Camera) -> None:
         """Prepare for one person and one camera."""

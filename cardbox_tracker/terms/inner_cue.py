@@ -125,10 +125,7 @@ class Sleeves:
 
 
 def arms_in_image(posed: Posed, arm: int) -> tuple[FloatArray, NDArray[np.bool_]]:
-    """Return column, row and pixels per metre of elbow and hand of one arm, (N, 2, 3).
-
-    ``arm`` is 0 left or 1 right. Also returns whether the hand is behind the trunk, (N,).
-    """
+    """Return column, row, px/m of elbow and hand, (N, 2, 3), and if the hand is behind, (N,)."""
     points, hidden = np.empty((len(posed), 2, 3)), np.empty(len(posed), np.bool_)
     kernels.project_arms(posed.states, arm, posed.body, points, hidden)
     return points, hidden
@@ -209,7 +206,7 @@ class InnerCueTerm:
     """The cue for one person with known colours."""
 
     def __init__(self, config: InnerCue, body: BodyModel, camera: Camera) -> None:
-        """Prepare for a body, which must have an appearance, before one camera."""
+        """Prepare for ``histograms`` (5, bins), a forearm, m, and the expected place's scale."""
         if body.appearance is None:
             raise ValueError("the body has no appearance; learn it, or track without this term")
         self.config = config

@@ -131,10 +131,7 @@ def project_arms(states: Any, arm: int, body: BodyTuple, points: Any, hidden: An
 
 @kernel
 def _mean(ratios: Any, centre: Pair, half: Pair, aside: Pair, points: tuple[int, int]) -> float:
-    """Return the mean of ``ratios`` (h, w) over a grid of ``points`` of a patch, 0 outside of it.
-
-    ``half`` and ``aside`` are the half axes of the patch along and across the limb, px.
-    """
+    """Return the mean of ``ratios`` (h, w) at ``points`` of a patch of half axes, px; 0 outside."""
     h, w = ratios.shape
     along, across = points
     total = 0.0

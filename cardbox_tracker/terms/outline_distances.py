@@ -1,7 +1,4 @@
-"""Signed distances from the outlines of model and silhouette, on a common grid of image points.
-
-A signed distance changes smoothly when an outline moves, unlike a number of pixels.
-"""
+"""Signed distances, which change smoothly, of model's and silhouette's outline on a grid."""
 
 from __future__ import annotations
 

@@ -1,7 +1,4 @@
-"""Compiled points of a body's outline in an image.
-
-The outline consists of points on the edges of the patches that no other patch covers.
-"""
+"""Compiled points of a body's outline: on edges of patches that no other patch covers."""
 
 from __future__ import annotations
 

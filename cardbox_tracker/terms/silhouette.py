@@ -34,10 +34,7 @@ class SilhouetteObservation(ABC):
 
     @abstractmethod
     def torsos_beside(self, arms: FloatArray | None) -> TorsoCosts:
-        """Return the function that rates torsos d1..d4: torso, waist and head are drawn.
-
-        The arms of the posture (12,) ``arms`` stay at their place in the image; None draws none.
-        """
+        """Return what rates torsos d1..d4; arms of ``arms`` (12,), if any, stay."""
 
     @abstractmethod
     def arms_beside(self, torso: FloatArray) -> ArmCosts:
@@ -61,11 +58,7 @@ class SilhouetteTerm(ABC):
         self.rows = rows_above_hips(body, camera)
 
     def frame(self, silhouette: Silhouette, image: Image | None = None) -> Frame:
-        """Return a frame for this and all other terms of a silhouette (H, W), 0 or 255.
-
-        The image of that time is (H, W) grey or (H, W, 3) bgr, or None. Raises ValueError if a size
-        is not the camera's, or a type or values are impossible.
-        """
+        """Return a frame of a silhouette (H, W), 0 or 255, and image, or raise ValueError."""
         size = self.camera.height, self.camera.width
         silhouette = silhouette_from(silhouette, size=size)
         if image is not None:

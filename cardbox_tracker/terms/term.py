@@ -156,19 +156,13 @@ class Frame:
 
 
 class Residuals(NamedTuple):
-    """Robust residuals of N states, for a Gauss-Newton step.
+    """Robust residuals of N states, for a Gauss-Newton step."""
 
-    Attributes:
-        values: residuals in units of their deviations, times the root of their robust weight,
-            (N, R).
-        jacobian: derivatives of ``values`` by the values of the states, (N, R, 14), with constant
-            weights.
-        costs: robust costs, (N,), which a step should reduce.
-    """
-
+    #: residuals in units of their deviations, times the root of their robust weight, (N, R)
     values: FloatArray
+    #: derivatives of ``values`` by the values of the states, (N, R, 14), with constant weights
     jacobian: FloatArray
-    costs: FloatArray
+    costs: FloatArray  #: robust costs, (N,), which a step should reduce
 
 
 class TermObservation:

@@ -1,8 +1,4 @@
-"""Compiled sums of (1 - 2 f) over the pixels under any patch, read from row sums.
-
-A covered run a <= u < b of row v contributes S(v, b) - S(v, a), so the time for a state grows with
-its rows and not with its area.
-"""
+"""Compiled sums of (1 - 2 f) over pixels under any patch, S(v, b) - S(v, a) of each run."""
 
 from __future__ import annotations
 

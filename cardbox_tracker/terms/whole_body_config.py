@@ -1,7 +1,4 @@
-"""Constants of the whole-body rating: the drawn model and the priors.
-
-Values without a source were chosen on recorded sessions with ground truth (``docs/research.md``).
-"""
+"""Constants of the whole-body rating: the drawn model and the priors (``docs/research.md``)."""
 
 from __future__ import annotations
 

@@ -53,11 +53,7 @@ _TOPS_EVERY, _TOPS, _SURE_DEG = 6, 70, 0.5
 
 
 class CameraAgreement:
-    """Compares the extrinsics of each further camera with an estimate from silhouettes.
-
-    :meth:`see` is cheap. :meth:`check` takes as long as tracking about 100 frames for each further
-    camera; call it when :attr:`is_due`, in any thread.
-    """
+    """Compares extrinsics with silhouettes; :meth:`check` takes as long as about 100 frames."""
 
     def __init__(
         self,
@@ -85,10 +81,7 @@ class CameraAgreement:
         )
 
     def look(self, first: Silhouette, others: Sequence[Silhouette | None]) -> None:
-        """Compare silhouettes (H, W), 0 or 255, of a person, whether or not a posture fits them.
-
-        Those of further cameras are upright; None for a missing image.
-        """
+        """Compare silhouettes (H, W), upright, None if missing, whether or not a posture fits."""
         for direction, other in zip(self._directions, others, strict=False):
             if other is not None:
                 direction.see(first, other)
@@ -119,10 +112,7 @@ class CameraAgreement:
         return any(count <= 0 for count in self._missing)
 
     def check(self, is_last: bool = False) -> None:
-        """Estimate the rotation of the cameras that have a full window.
-
-        If no more frames follow, cameras that were never checked are checked with fewer.
-        """
+        """Estimate rotations of cameras with a full window, of others too if no frames follow."""
         for number, view in enumerate(self._views):
             is_enough = is_last and not self._found[number] and len(self._kept[number]) >= _LEAST
             if self._missing[number] > 0 and not is_enough:
@@ -143,11 +133,7 @@ class CameraAgreement:
 
     @property
     def rolled_deg(self) -> list[float | None]:
-        """Roll of each further camera against its extrinsics, degrees, with its sign.
-
-        The median of the latest windows; None before the first check, or if the person hardly
-        moved.
-        """
+        """Median roll against the extrinsics, signed degrees; None before it, or without motion."""
         return [float(np.median(found)) if found else None for found in self._rolls]
 
     def remarks(self, names: Sequence[str]) -> list[str]:

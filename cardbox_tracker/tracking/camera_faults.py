@@ -52,11 +52,7 @@ _SHOULDERS = [POINT_INDEX["left_shoulder"], POINT_INDEX["right_shoulder"]]
 
 
 class CameraFaults:
-    """Compares each camera's images with those before, and with those of the first camera.
-
-    Attributes:
-        left_out: number of images of each camera that were not used, by the reason.
-    """
+    """Compares each camera's images with others; ``left_out`` counts unused ones by the reason."""
 
     def __init__(self, count: int) -> None:
         """Begin without images of ``count`` cameras."""
@@ -140,10 +136,7 @@ class CameraFaults:
 
 
 def facing_rad(points: ImagePoints | None, camera: Camera) -> float:
-    """Return the direction from the left to the right shoulder in a camera's level frame, rad.
-
-    It is an angle about the vertical; nan without points in space. The camera is upright.
-    """
+    """Return the angle from left to right shoulder in the level frame, rad; nan without points."""
     if points is None or points.spatial_m is None:
         return float("nan")
     across, _, away = np.subtract(*points.spatial_m[_SHOULDERS[::-1]])

@@ -90,64 +90,50 @@ class Legs(NamedTuple):
 
 @dataclass(frozen=True)
 class Estimate:
-    """State of tracking and posture of the person at one time.
+    """State of tracking and posture of the person at one time."""
 
-    Attributes:
-        state: ``tracking``, ``uncertain``, ``lost`` or ``no_person``; with the last two, all other
-            attributes are None.
-        posture: d1..d12, (12,), rad and metres.
-        posture_stddev: standard deviation of each joint, (12,), rad and metres: the weighted spread
-            of the particles.
-        keypoints_m: shoulder, elbow, hand of the left, then the right arm, (6, 3), metres in the
-            optical frame.
-        keypoint_states: state of each keypoint, (6,): ``tracked``; ``uncertain`` (it may be off by
-            more than 30 cm); ``lost`` (it rather is); ``hidden`` (behind the trunk or outside of
-            the images). ``tracking`` has no ``uncertain`` or ``lost`` hand. None if the filter has
-            none.
-        keypoint_chances: probability of each keypoint to be off by more than 30 cm relative to the
-            middle of the shoulders, (6,), or None.
-        evidence: what these probabilities follow from, by name, one value for each keypoint, (6,).
-        cost_px: cost of the posture (equation (2)), px.
-        iou: intersection over union of model and silhouette, above the hips.
-        offset_m: ``torso_x`` and ``torso_z``, (2,), metres: displacement of the hips from the body
-            model's placement, towards the camera and up; None if the filter keeps it constant.
-        offset_stddev_m: standard deviations of ``offset_m``, (2,), metres.
-        neck: ``neck_yaw`` and ``neck_pitch``, (2,), rad, relative to the torso; None without points
-            of the face.
-        neck_stddev: standard deviations of ``neck``, (2,), rad, those of the torso included.
-        clavicles_m: rise of the left and right shoulder with the arms, (2,), metres; None without a
-            posture.
-        clavicles_stddev_m: standard deviations of ``clavicles_m``, (2,), metres.
-        place: how surely distance, scale and height are known, and by what; None if the filter
-            keeps them constant. All states above are about the shape alone.
-        person: number of the person, 1, 2, ...; None if only one is tracked.
-        person_chance: probability that it is the person who had this number before: 1 unless they
-            were away; None if only one is tracked.
-        hands: the left and the right hand, None for one that is not known; None unless hands are
-            looked at.
-        legs: None without a posture, and as long as no points have shown them.
-    """
-
+    #: ``tracking``, ``uncertain``, ``lost`` or ``no_person``; with the last two, all other
+    #: attributes are None
     state: str
-    posture: FloatArray | None = None
+    posture: FloatArray | None = None  #: d1..d12, (12,), rad and metres
+    #: standard deviation of each joint, (12,), rad and metres: the weighted spread of the particles
     posture_stddev: FloatArray | None = None
+    #: shoulder, elbow, hand of the left, then the right arm, (6, 3), metres in the optical frame
     keypoints_m: FloatArray | None = None
-    cost_px: int | None = None
-    iou: float | None = None
+    cost_px: int | None = None  #: cost of the posture (equation (2)), px
+    iou: float | None = None  #: intersection over union of model and silhouette, above the hips
+    #: ``torso_x`` and ``torso_z``, (2,), metres: displacement of the hips from the body model's
+    #: placement, towards the camera and up; None if the filter keeps it constant
     offset_m: FloatArray | None = None
-    offset_stddev_m: FloatArray | None = None
+    offset_stddev_m: FloatArray | None = None  #: standard deviations of ``offset_m``, (2,), metres
+    #: ``neck_yaw`` and ``neck_pitch``, (2,), rad, relative to the torso; None without points of the
+    #: face
     neck: FloatArray | None = None
+    #: standard deviations of ``neck``, (2,), rad, those of the torso included
     neck_stddev: FloatArray | None = None
+    #: state of each keypoint, (6,): ``tracked``; ``uncertain`` (it may be off by more than 30 cm);
+    #: ``lost`` (it rather is); ``hidden`` (behind the trunk or outside of the images). ``tracking``
+    #: has no ``uncertain`` or ``lost`` hand. None if the filter has none.
     keypoint_states: tuple[KeypointState, ...] | None = None
+    #: probability of each keypoint to be off by more than 30 cm relative to the middle of the
+    #: shoulders, (6,), or None
     keypoint_chances: FloatArray | None = None
+    #: what these probabilities follow from, by name, one value for each keypoint, (6,)
     evidence: Mapping[str, FloatArray] | None = None
+    #: rise of the left and right shoulder with the arms, (2,), metres; None without a posture
     clavicles_m: FloatArray | None = None
+    #: standard deviations of ``clavicles_m``, (2,), metres
     clavicles_stddev_m: FloatArray | None = None
+    #: how surely distance, scale and height are known, and by what; None if the filter keeps them
+    #: constant. All states above are about the shape alone.
     place: Place | None = None
-    person: int | None = None
+    person: int | None = None  #: number of the person, 1, 2, ...; None if only one is tracked
+    #: probability that it is the person who had this number before: 1 unless they were away; None
+    #: if only one is tracked
     person_chance: float | None = None
+    #: the left and the right hand, None for one that is not known; None unless hands are looked at
     hands: tuple[Hand | None, Hand | None] | None = None
-    legs: Legs | None = None
+    legs: Legs | None = None  #: None without a posture, and as long as no points have shown them
 
     def as_camera_stands(self, roll_rad: float) -> Estimate:
         """Return the estimate in the frame of the rolled camera, not of images turned upright."""

@@ -43,11 +43,7 @@ _LONGEST_S = 1.0
 
 
 class Facing:
-    """Doubt about one person before one camera.
-
-    Attributes:
-        shows_back: whether there is hair where the face was.
-    """
+    """Doubt about one person before a camera; ``shows_back`` says if hair is where the face was."""
 
     def __init__(self, body: BodyModel) -> None:
         """Prepare for a person, whose appearance may be missing."""
@@ -128,10 +124,7 @@ class Facing:
 
 
 def _is_low(zones: FloatArray, silhouette: Silhouette) -> bool:
-    """Return whether the head is lower than the model's: a person who leans shows the hair.
-
-    The lean itself is often missed, as an outline hardly shows it.
-    """
+    """Return whether the head is lower than the model's, as of a lean, which is often missed."""
     u, v, _, half_height = zones[:4].tolist()
     row, column = round(v - _TOP * half_height), round(u)
     height, width = silhouette.shape

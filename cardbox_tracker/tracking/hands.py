@@ -316,10 +316,7 @@ def _finger_bend(at: FloatArray, base: int) -> float:
 
 
 def _forearm(side: str, arm: FloatArray, points: ImagePoints, camera: Camera) -> FloatArray:
-    """Return the direction of the forearm (3,), in the optical frame.
-
-    The tracked arm ends at the knuckles, so it bends with the wrist; only its depth is used.
-    """
+    """Return the forearm's direction (3,), optical frame, of the tracked arm only by its depth."""
     elbow, wrist = points.px[[POINT_INDEX[f"{side}_{name}"] for name in ("elbow", "wrist")]]
     depths_m = arm[1, 2] + np.array([0.0, WRIST_SHARE]) * (arm[2, 2] - arm[1, 2])
     rays = [

@@ -151,11 +151,7 @@ class _Person:
 
 
 class Session:
-    """Tracks up to six people before up to four cameras.
-
-    Attributes:
-        config: settings of all trackers.
-    """
+    """Tracks up to six people before up to four cameras, with the settings ``config``."""
 
     def __init__(
         self,

@@ -16,13 +16,13 @@ def options(files: Path) -> tuple[object, ...]:
 
 def test_a_recording_is_scored(files: Path, tmp_path: Path, cardbox: Callable) -> None:
     table, plot = tmp_path / "rula.csv", tmp_path / "rula.png"
-    shares, page = tmp_path / "shares.csv", tmp_path / "rula.html"
+    page = tmp_path / "rula.html"
     words = ("rula", *options(files), "--csv", table, "--arm-load", "3", "--trunk-twisted")
-    pages = ("--shares", shares, "--html", page, "--title", "Packing")
+    pages = ("--html", page, "--title", "Packing")
     done = cardbox(*words, "--plot", plot, *pages)
     assert done.code == 0, done.err
     assert "expected RULA score" in done.out
-    for path in (table, plot, shares, page):
+    for path in (table, plot, page):
         assert f"wrote {path}" in done.out
     assert "declared, not seen: arm load 3, trunk twisted yes" in done.out
     assert plot.read_bytes().startswith(b"\x89PNG")
@@ -37,13 +37,10 @@ def test_a_recording_is_scored(files: Path, tmp_path: Path, cardbox: Callable) -
     assert sum(row["state"] == "tracking" for row in rows) >= 3
     assert "distance 2.00 m (from person.yaml)" in text
     assert "data:image/jpeg;base64," in text
-    with shares.open(encoding="utf-8") as file:
-        grand = [float(row["share"]) for row in csv.DictReader(file) if row["part"] == "grand"]
-    assert sum(grand) == pytest.approx(1, abs=0.001)
-    first = table.read_bytes(), shares.read_bytes()
+    first = table.read_bytes()
     done = cardbox(*words, *pages, "--images", "none", "--force")
     assert done.code == 0, done.err
-    assert (table.read_bytes(), shares.read_bytes()) == first
+    assert table.read_bytes() == first
     assert "data:image/jpeg" not in page.read_text(encoding="utf-8")
     only = tmp_path / "only.html"
     done = cardbox("rula", *options(files), "--html", only, "--title", "Packing")

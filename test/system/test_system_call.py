@@ -16,11 +16,19 @@ from std_srvs.srv import Trigger  # noqa: E402
 
 from cardbox_tracker.ros.runtime import qos  # noqa: E402
 
+CALL = """
+import sys
+from cardbox_tracker.commands.main import main
+from cardbox_tracker.ros.runtime import call
+call._FIND_S = float(sys.argv[1])
+sys.exit(main(sys.argv[2:]))
+"""
 
-def called(graph: Any, service: str) -> subprocess.CompletedProcess[str]:
-    """Run ``cardbox call`` while the graph's node spins, and return its output."""
+
+def called(graph: Any, service: str, find_s: float = 10.0) -> subprocess.CompletedProcess[str]:
+    """Run ``cardbox call``, which waits ``find_s`` for a service, while the graph's node spins."""
     process = subprocess.Popen(
-        [sys.executable, "-m", "cardbox_tracker.commands.main", "call", service],
+        [sys.executable, "-c", CALL, str(find_s), "call", service],
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,
@@ -74,7 +82,7 @@ def test_what_is_no_name_of_a_service_is_told(graph: Any, name: str) -> None:
 @pytest.mark.slow
 def test_a_service_that_is_not_there_is_answered_with_those_that_are(graph: Any) -> None:
     offer(graph, "/eye/other", True, "")
-    result = called(graph, "/eye/missing/do")
+    result = called(graph, "/eye/missing/do", find_s=3.0)
     assert result.returncode == 1
     assert "for the service /eye/missing/do" in result.stdout
     assert "nobody offers the service /eye/missing/do" in result.stderr

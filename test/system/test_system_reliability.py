@@ -57,7 +57,8 @@ EXAMPLES = int(os.environ.get("RELIABILITY_EXAMPLES", "0"))
 LONG = pytest.mark.skipif(not EXAMPLES, reason="a part of 'make reliability' only")
 SHARE = EXAMPLES / 100_000
 LEARN_IMAGES = 10
-LAYOUTS = ("separate", "together")
+# One process has the same nodes with one executor for all; separate ones are for the long run.
+LAYOUTS = ("together", "separate")[: 1 + bool(EXAMPLES)]
 SERVICES = ("background", "initializer", "tracker")
 # The length is a multiple of the motion's period, so that all runs begin alike.
 APART_S = 96.0

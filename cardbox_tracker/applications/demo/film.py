@@ -55,22 +55,15 @@ class _Replay(PersonDetector):
 
 
 class DemoFilm(NamedTuple):
-    """The film of n images.
+    """The film of n images."""
 
-    Attributes:
-        path: the video.
-        fov_deg: field of view across its width.
-        stature_m: of the woman.
-        true_m: reference of shoulders, elbows and hands, (n, 6, 3), metres in the optical frame;
-            nan where there is none.
-        found: what the detector found.
-    """
-
-    path: Path
-    fov_deg: float
-    stature_m: float
+    path: Path  #: the video
+    fov_deg: float  #: field of view across its width
+    stature_m: float  #: of the woman
+    #: reference of shoulders, elbows and hands, (n, 6, 3), metres in the optical frame; nan where
+    #: there is none
     true_m: FloatArray
-    found: tuple[Detection, ...]
+    found: tuple[Detection, ...]  #: what the detector found
 
     @classmethod
     def load(cls) -> DemoFilm:
@@ -98,10 +91,7 @@ class DemoFilm(NamedTuple):
         """Return the detector's own points in space, (n, 6, 3), m relative to the hips.
 
         A hand is where the reference has it: from the wrist towards the knuckles. The detector
-        takes the camera for level.
-
-        Args:
-            pitch_rad: downward pitch of the camera, by which the points are turned.
+        takes the camera for level, so points are turned by its downward pitch ``pitch_rad``.
         """
         points = np.array([one.spatial_m for one in self.found])
         at = {name: points[:, number] for number, name in enumerate(LANDMARKS)}
@@ -116,11 +106,10 @@ class DemoFilm(NamedTuple):
         return np.asarray(np.stack(joints, axis=1) @ turn.T)
 
     def errors_m(self, keypoints_m: FloatArray, *, is_placed: bool = False) -> FloatArray:
-        """Return the mean distance of keypoints (n, 6, 3) to the reference in each image, (n,).
+        """Return the mean distance of keypoints (n, 6, 3), m, to the reference in each image, (n,).
 
-        Args:
-            keypoints_m: metres in the optical frame.
-            is_placed: whether the place counts; else the middle of the shoulders is the same.
+        They are in the optical frame; unless ``is_placed``, the middle of the shoulders is made
+        equal.
         """
         difference = keypoints_m - self.true_m
         moved = difference if is_placed else beside_shoulders(difference)

@@ -51,19 +51,12 @@ _DARKER = 2
 
 
 class Asked(NamedTuple):
-    """The posture that a person is asked to take.
+    """The posture that a person is asked to take."""
 
-    Attributes:
-        body: a body of about the person's size, at their place.
-        camera: camera at the working resolution, with the pitch of the body model.
-        posture: (12,), rad and metres.
-        fit: fit of the person to the posture: ``far``, ``nearly`` or ``fits``.
-    """
-
-    body: BodyModel
-    camera: Camera
-    posture: FloatArray
-    fit: str = "far"
+    body: BodyModel  #: a body of about the person's size, at their place
+    camera: Camera  #: camera at the working resolution, with the pitch of the body model
+    posture: FloatArray  #: (12,), rad and metres
+    fit: str = "far"  #: fit of the person to the posture: ``far``, ``nearly`` or ``fits``
 
 
 class Guide:
@@ -116,19 +109,12 @@ def draw_guidance(
     scale: int = 1,
     mirror: bool = False,
 ) -> ImageArray:
-    """Return a colour image with instructions for a person and the words in a band above it.
+    """Return (1.3 scale H, scale W, 3) bgr with words in a band above the image of a person.
 
-    Args:
-        image: (H, W) grey or silhouette, or (H, W, 3) bgr, of the camera's size.
-        words: a few words, which are written in at most two lines.
-        mood: colour of the band: ``ask``, ``good`` or ``bad``.
-        number: seconds left, beside the head; None for no number.
-        asked: outline to stand in, with nose and arrow if it looks aside; None for no outline.
-        scale: enlargement of the result.
-        mirror: mirror the image, but not words and number.
-
-    Returns:
-        (1.3 scale H, scale W, 3) bgr.
+    The image is (H, W) grey or silhouette, or (H, W, 3) bgr, of the camera's size. The words take
+    at most two lines, and the ``mood`` colours the band: ``ask``, ``good`` or ``bad``. ``number``
+    are seconds left, beside the head. ``asked`` is an outline to stand in, with nose and arrow if
+    it looks aside. ``mirror`` mirrors the image, but not words and number.
     """
     canvas = enlarged(image, scale)
     if asked is not None:

@@ -59,18 +59,11 @@ _BLOCKS = 6
 def draw_overlay(
     image: ImageArray, body: BodyModel, camera: Camera, estimate: Estimate, scale: int = 1
 ) -> ImageArray:
-    """Return a colour image with the model of ``estimate`` drawn over it.
+    """Return (scale H, scale W, 3) bgr with the model of ``estimate`` drawn over an image.
 
-    Args:
-        image: (H, W) grey or silhouette, or (H, W, 3) bgr, of the camera's size.
-        body: the measured person.
-        camera: camera at the working resolution, with the pitch of the body model.
-        estimate: the estimate to draw; without a posture only its state is written, and if the
-            posture may be wrong, outline and state are amber.
-        scale: enlargement of the result, so that thin lines and text stay readable.
-
-    Returns:
-        (scale H, scale W, 3) bgr.
+    The image is (H, W) grey or silhouette, or (H, W, 3) bgr, of the size of the working camera,
+    which has the pitch of the body model. Without a posture only the state is written; outline and
+    state are amber if the posture may be wrong.
     """
     canvas = enlarged(image, scale)
     text = estimate.state.replace("_", " ")
@@ -112,10 +105,7 @@ def draw_camera_overlay(
 
 
 def draw_sharp_overlay(picture: ImageArray, estimate: Estimate, tracker: Tracker) -> ImageArray:
-    """Return the first camera's picture with the model over it, for a bag.
-
-    A small picture is enlarged by repeated pixels, which compress well under sharp lines and text.
-    """
+    """Return the first camera's picture with the model, enlarged in pixels, which compress well."""
     scale = readable_scale(picture)
     large = picture.repeat(scale, axis=0).repeat(scale, axis=1)
     return draw_overlay(large, tracker.body, tracker.camera, estimate)
@@ -308,10 +298,7 @@ def enlarged(image: ImageArray, scale: int) -> ImageArray:
 
 
 def _subpixels(pixels: FloatArray, corner: tuple[int, int] = (0, 0)) -> NDArray[np.int32]:
-    """Return pixel coordinates in OpenCV's fixed-point format with ``_SHIFT`` fractional bits.
-
-    They count from the pixel ``corner`` (column, row).
-    """
+    """Return pixels from ``corner`` (column, row) on in OpenCV's format of ``_SHIFT`` bits."""
     clipped = np.clip(pixels, -30_000, 30_000)
     placed = np.asarray(np.round(clipped * (1 << _SHIFT)), dtype=np.int32)
     return placed - (np.asarray(corner, np.int32) << _SHIFT)
@@ -341,15 +328,11 @@ def with_hidden_head(
     estimate: Estimate,
     points: ImagePoints | None = None,
 ) -> ImageArray:
-    """Return a copy of ``image`` in which coarse pixels make the head unrecognizable.
+    """Return a copy of an image in which coarse pixels make the head unrecognizable.
 
-    Args:
-        image: (H, W) or (H, W, 3), of the camera's size.
-        body: the measured person.
-        camera: with the pitch of the body model.
-        estimate: an estimate; without a posture, or with the head behind the camera, the whole
-            image becomes coarse.
-        points: of a detector in this image; those of the face are covered, too.
+    The image is (H, W) or (H, W, 3), of the size of the camera, which has the pitch of the body
+    model. Without a posture, or with the head behind the camera, all of it becomes coarse. A face
+    that the ``points`` of a detector show is covered, too.
     """
     hidden = image.copy()
     part = hidden[_head_region(body, camera, estimate, points)]

@@ -16,8 +16,7 @@ if TYPE_CHECKING:
 def render_page(path: Path, template: Path, **values: object) -> None:
     """Write a page from a template of Jinja, whose filter ``data`` turns bytes into base64.
 
-    Raises:
-        CardboxError: the file cannot be written.
+    Raises CardboxError if the file cannot be written.
     """
     import jinja2
 

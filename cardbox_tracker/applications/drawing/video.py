@@ -31,11 +31,9 @@ _H264 = {"preset": "superfast", "crf": "23"}
 def video_file(path: str | os.PathLike[str], fps: float) -> Iterator[Callable[[ImageArray], None]]:
     """Yield a function that adds an image (H, W, 3), bgr uint8, to a video.
 
-    The first image determines the size of the video; later ones are resized to it. The file
-    appears on exit, and after an error there is none.
-
-    Raises:
-        CardboxError: the file cannot be written, or its suffix is not .mp4.
+    The first image determines the size; later ones are resized to it. The file appears on exit, and
+    after an error there is none. Raises CardboxError if it cannot be written, or its suffix is not
+    .mp4.
     """
     name = os.fspath(path)
     if not name.endswith(".mp4"):
@@ -80,13 +78,9 @@ def _encoder(
 def overlay_video(path: Path, recording: Recording) -> Iterator[Observer]:
     """Context of an observer that draws each estimate over the image of the first camera.
 
-    Another thread draws and encodes, while the next images are tracked.
-
-    The video has the rate, the size and the aspect ratio of the recorded images; small images are
-    enlarged to at least 640 px along the longer side.
-
-    Raises:
-        CardboxError: the file cannot be written, or its suffix is not .mp4.
+    Another thread draws and encodes. The video has the rate, size and aspect ratio of the recorded
+    images; small ones are enlarged to at least 640 px along the longer side. Raises as
+    :func:`video_file`.
     """
     try:
         rate_hz = round(1e9 / max(1, recording.first.period_ns()), 2)

@@ -37,13 +37,14 @@ from cardbox_tracker.applications.ergonomics.rula import (
     WRISTS,
     ErgonomicConfig,
     Method,
-    Part,
     ScoreArray,
     ScoreDistribution,
     distribution_of,
     elbow_scores,
     measured_wrists,
     neck_samples,
+    of_both_arms,
+    part,
     table_of,
     trunk_scores,
     upper_arm_scores,
@@ -183,18 +184,12 @@ REBA = Method(
         (11, 15, "very high risk; change now"),
     ),
     (
-        Part("left_upper_arm", "upper arm, left", 6, lambda scores: scores.left.upper_arm),
-        Part("right_upper_arm", "upper arm, right", 6, lambda scores: scores.right.upper_arm),
-        Part("left_lower_arm", "lower arm, left", 2, lambda scores: scores.left.lower_arm),
-        Part("right_lower_arm", "lower arm, right", 2, lambda scores: scores.right.lower_arm),
-        Part("trunk", "trunk", 5, lambda scores: scores.trunk),
-        Part("neck", "neck", 3, lambda scores: scores.neck),
-        Part("legs", "legs", 4, lambda scores: scores.legs),
-        Part("left_table_b", "table B, left", 9, lambda scores: scores.left.table_b),
-        Part("right_table_b", "table B, right", 9, lambda scores: scores.right.table_b),
-        Part("table_a", "table A", 9, lambda scores: scores.table_a),
-        Part("left_wrist", "wrist, left", 3, lambda scores: scores.left.wrist),
-        Part("right_wrist", "wrist, right", 3, lambda scores: scores.right.wrist),
+        *of_both_arms("upper arm", 6),
+        *of_both_arms("lower arm", 2),
+        *(part("trunk", 5), part("neck", 3), part("legs", 4)),
+        *of_both_arms("table B", 9),
+        part("table A", 9),
+        *of_both_arms("wrist", 3),
     ),
     {},
     ("neck", "legs", *WRISTS),
@@ -213,34 +208,26 @@ _LEVEL_RAD, _SITS_NS = math.radians(30.0), 1_000_000_000
 
 
 class Seen(NamedTuple):
-    """One image of a table.
+    """One image of a table."""
 
-    Attributes:
-        stamp_ns: its stamp.
-        time_s: seconds from the recording's start.
-        state: of the tracker.
-        posture: d1..d12 and their standard deviations, (2, 12); None without a posture.
-        neck: ``neck_yaw`` and ``neck_pitch`` and their deviations, (2, 2); None if unknown.
-        wrists: see :func:`.rula.wrist_samples`.
-        legs: ``LEG_NAMES`` and their deviations, (2, 8); None unless both legs are ``tracked``.
-        lengths_m: hips to shoulders, then thigh and shank of the left and the right leg, (5,).
-    """
-
-    stamp_ns: int
-    time_s: float
-    state: str
+    stamp_ns: int  #: its stamp
+    time_s: float  #: seconds from the recording's start
+    state: str  #: of the tracker
+    #: d1..d12 and their standard deviations, (2, 12); None without a posture
     posture: FloatArray | None
+    #: ``neck_yaw`` and ``neck_pitch`` and their deviations, (2, 2); None if unknown
     neck: FloatArray | None
-    wrists: FloatArray
+    wrists: FloatArray  #: see :func:`.rula.wrist_samples`
+    #: ``LEG_NAMES`` and their deviations, (2, 8); None unless both legs are ``tracked``
     legs: FloatArray | None
+    #: hips to shoulders, then thigh and shank of the left and the right leg, (5,)
     lengths_m: FloatArray
 
 
 def read_table(path: Path, person: int = 1) -> list[Seen]:
     """Return the images of a table of ``cardbox track --legs``; of several people, of one.
 
-    Raises:
-        CardboxError: the file cannot be read, or lacks columns of the legs.
+    Raises CardboxError if the file cannot be read, or lacks columns of the legs.
     """
     results = read_results(path, None if person == 1 else person)
     missing = [name for name in LEG_NAMES if name not in results.numbers]

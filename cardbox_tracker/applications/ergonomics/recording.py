@@ -47,7 +47,6 @@ def header_of(method: Method) -> tuple[str, ...]:
 
 MEAN_POSTURE = "mean_posture"
 """Name of the grand score of the mean posture among the shares."""
-SHARES_HEADER = ("part", "source", "score", "time_s", "share")
 
 MOST_MOMENTS, GAP_S = 6, 3.0
 """Number of worst moments, and the least time between two of them, s."""
@@ -64,20 +63,13 @@ _WIDTH_PX, _QUALITY = 640, 80
 
 @dataclass(frozen=True)
 class RulaRow:
-    """One image.
+    """One image."""
 
-    Attributes:
-        stamp_ns: stamp of the image.
-        state: of the tracker.
-        scores: its scores; None without a posture.
-        time_s: seconds from the recording's start.
-        measured: which of the method's ``measurable`` parts are measured; others are declared.
-    """
-
-    stamp_ns: int
-    state: str
-    scores: ScoreDistribution | None
-    time_s: float
+    stamp_ns: int  #: stamp of the image
+    state: str  #: of the tracker
+    scores: ScoreDistribution | None  #: its scores; None without a posture
+    time_s: float  #: seconds from the recording's start
+    #: which of the method's ``measurable`` parts are measured; others are declared
     measured: frozenset[str] = frozenset()
 
     @property
@@ -117,11 +109,7 @@ class MomentImages:
 
 
 class RulaObserver:
-    """Observer of :func:`~cardbox_tracker.recordings.track.track_recording` that scores each image.
-
-    Attributes:
-        rows: one row an image, in order.
-    """
+    """Observer of :func:`~.recordings.track.track_recording` that scores each image in ``rows``."""
 
     def __init__(self, config: RulaConfig, seed: int, images: MomentImages | None = None) -> None:
         """Seed the random numbers; the same images and ``seed`` give the same rows."""
@@ -165,24 +153,15 @@ def worst_moments(
 
 @dataclass(frozen=True)
 class RulaSummary:
-    """Expected times, s.
+    """Expected times, s."""
 
-    Attributes:
-        measured_s: time with a posture.
-        above_s: time with a score above ``above`` of the method.
-        by_level_s: time at each action level.
-        mean: expected score over the measured time; nan without any.
-        of_mean: mean score of the mean postures over the same time.
-        uncertain_s: part of the measured time whose postures may be wrong.
-        measured_parts_s: part of the measured time in which each measurable part was measured.
-    """
-
-    measured_s: float
-    above_s: float
-    by_level_s: tuple[float, ...]
-    mean: float
-    of_mean: float
-    uncertain_s: float
+    measured_s: float  #: time with a posture
+    above_s: float  #: time with a score above ``above`` of the method
+    by_level_s: tuple[float, ...]  #: time at each action level
+    mean: float  #: expected score over the measured time; nan without any
+    of_mean: float  #: mean score of the mean postures over the same time
+    uncertain_s: float  #: part of the measured time whose postures may be wrong
+    #: part of the measured time in which each measurable part was measured
     measured_parts_s: Mapping[str, float]
 
     @property
@@ -213,19 +192,12 @@ def summarize(rows: Sequence[RulaRow], method: Method = RULA) -> RulaSummary:
 
 
 class ScoreShares(NamedTuple):
-    """Expected time at each score of a part.
+    """Expected time at each score of a part."""
 
-    Attributes:
-        name: of the part, as in the tables.
-        words: the same for people.
-        source: ``MEASURED``, ``DECLARED`` or ``MIXED``.
-        time_s: time (n,) at the scores 1 to n, s.
-    """
-
-    name: str
-    words: str
-    source: str
-    time_s: FloatArray
+    name: str  #: of the part, as in the tables
+    words: str  #: the same for people
+    source: str  #: ``MEASURED``, ``DECLARED`` or ``MIXED``
+    time_s: FloatArray  #: time (n,) at the scores 1 to n, s
 
     @property
     def shares(self) -> FloatArray:
@@ -282,26 +254,8 @@ def _time_at(rows: Sequence[RulaRow], part: str, highest: int) -> FloatArray:
     return np.asarray(durations_of(rows) @ found)
 
 
-def write_shares(shares: Sequence[ScoreShares], path: Path) -> None:
-    """Write ``SHARES_HEADER`` and a row for each score of each part; unknown shares are empty.
-
-    Raises:
-        CardboxError: the file cannot be written.
-    """
-    rows = (
-        (one.name, one.source, str(score), f"{time_s:.3f}", "" if np.isnan(x) else f"{x:.4f}")
-        for one in shares
-        for score, (time_s, x) in enumerate(zip(one.time_s, one.shares, strict=True), 1)
-    )
-    write_table(path, SHARES_HEADER, rows)
-
-
 def write_csv(rows: Sequence[RulaRow], path: Path, method: Method = RULA) -> None:
-    """Write the columns of :func:`header_of` and a row per image; unknown values are left empty.
-
-    Raises:
-        CardboxError: the file cannot be written.
-    """
+    """Write the columns of :func:`header_of`, unknown values empty, or raise CardboxError."""
     header = header_of(method)
     write_table(path, header, (_fields(row, method) for row in rows))
 

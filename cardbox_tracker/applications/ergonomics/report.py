@@ -70,33 +70,20 @@ def report_lines(
 
 @dataclass(frozen=True)
 class PageContent:
-    """Content of the page.
+    """Content of the page."""
 
-    Attributes:
-        title: heading of the page.
-        facts: lines about recording, person and settings, by name.
-        config: settings of the score.
-        rows: one image each, in order.
-        images: JPEG of images by stamp; None if no images are wanted or given.
-        are_heads_hidden: whether heads in the images were made unrecognizable.
-        method: of the scores.
-    """
-
-    title: str
-    facts: Mapping[str, str]
-    config: ErgonomicConfig
-    rows: Sequence[RulaRow]
+    title: str  #: heading of the page
+    facts: Mapping[str, str]  #: lines about recording, person and settings, by name
+    config: ErgonomicConfig  #: settings of the score
+    rows: Sequence[RulaRow]  #: one image each, in order
+    #: JPEG of images by stamp; None if no images are wanted or given
     images: Mapping[int, bytes] | None = None
-    are_heads_hidden: bool = True
-    method: Method = RULA
+    are_heads_hidden: bool = True  #: whether heads in the images were made unrecognizable
+    method: Method = RULA  #: of the scores
 
 
 def write_page(content: PageContent, path: Path) -> None:
-    """Write the page, a single file of HTML without scripts, see ``page.html``.
-
-    Raises:
-        CardboxError: the file cannot be written.
-    """
+    """Write the page, one file of HTML without scripts (``page.html``), or raise CardboxError."""
     rows, config, method = content.rows, content.config, content.method
     summary = summarize(rows, method)
     shares, moments = score_shares(rows, config, method), worst_moments(rows)

@@ -20,8 +20,9 @@ count from 1, so an index into a table or into chances is the score less one.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, fields
+from operator import attrgetter
 from types import MappingProxyType
 from typing import Any, ClassVar, NamedTuple
 
@@ -48,14 +49,10 @@ NOT_MEASURED = "declared, since it is not measured"
 class ErgonomicConfig(Settings):
     """What no image shows, of both methods.
 
-    Attributes:
-        inputs: names of the settings in their order on the page.
-
-    Raises:
-        ValueError: a value is out of its range; the text names it.
+    Raises ValueError if a value is out of its range; the text names it.
     """
 
-    inputs: ClassVar[tuple[str, ...]]
+    inputs: ClassVar[tuple[str, ...]]  #: names of the settings in their order on the page
     shoulders_raised: bool = setting(False, f"the shoulders are raised; {NOT_MEASURED}")
     arms_supported: bool = setting(
         False, f"the arms are supported, or the person leans; {NOT_MEASURED}"
@@ -107,14 +104,7 @@ class RulaConfig(ErgonomicConfig):
 
 
 class Declared(NamedTuple):
-    """A declared input.
-
-    Attributes:
-        name: of the setting.
-        value: a score, or ``yes`` or ``no``.
-        is_default: whether it is the value that holds without a declaration.
-        description: its meaning.
-    """
+    """A declared setting, its value or ``yes`` or ``no``, and whether this is the default."""
 
     name: str
     value: str
@@ -244,33 +234,42 @@ class RulaScores(NamedTuple):
 
 
 class Part(NamedTuple):
-    """A part score: column of the tables, words, highest score, place among all scores."""
+    """A part score: column of the tables and place among all scores, words, highest score."""
 
     name: str
     words: str
     highest: int
-    of: Callable[[Any], ScoreArray]
+    place: str
+
+    def of(self, scores: Any) -> ScoreArray:
+        """Return the part's scores among all."""
+        return np.asarray(attrgetter(self.place)(scores))
+
+
+def part(words: str, highest: int, side: str = "") -> Part:
+    """Return a part of the body, or of the arm of a ``side``, by its words."""
+    name = words.lower().replace(" ", "_")
+    if not side:
+        return Part(name, words, highest, name)
+    return Part(f"{side}_{name}", f"{words}, {side}", highest, f"{side}.{name}")
+
+
+def of_both_arms(words: str, highest: int) -> tuple[Part, Part]:
+    """Return a part of the left and of the right arm."""
+    return part(words, highest, "left"), part(words, highest, "right")
 
 
 class Method(NamedTuple):
-    """What tables and pages of scores need to know of a method.
+    """What tables and pages of scores need to know of a method."""
 
-    Attributes:
-        name: its name.
-        highest: highest grand score.
-        above: grand score above which work has to be changed soon or at once.
-        levels: lowest and highest grand score of each action level, and its meaning.
-        parts: parts and tables whose scores are shown.
-        declared_parts: highest score of each part that no image shows.
-        measurable: names of the parts that are measured in some images and declared in others.
-    """
-
-    name: str
-    highest: int
-    above: int
+    name: str  #: its name
+    highest: int  #: highest grand score
+    above: int  #: grand score above which work has to be changed soon or at once
+    #: lowest and highest grand score of each action level, and its meaning
     levels: tuple[tuple[int, int, str], ...]
-    parts: tuple[Part, ...]
-    declared_parts: Mapping[str, int]
+    parts: tuple[Part, ...]  #: parts and tables whose scores are shown
+    declared_parts: Mapping[str, int]  #: highest score of each part that no image shows
+    #: names of the parts that are measured in some images and declared in others
     measurable: tuple[str, ...]
 
 
@@ -285,17 +284,12 @@ RULA = Method(
         (7, 7, "investigate and change immediately"),
     ),
     (
-        Part("left_upper_arm", "upper arm, left", 6, lambda scores: scores.left.upper_arm),
-        Part("right_upper_arm", "upper arm, right", 6, lambda scores: scores.right.upper_arm),
-        Part("left_lower_arm", "lower arm, left", 3, lambda scores: scores.left.lower_arm),
-        Part("right_lower_arm", "lower arm, right", 3, lambda scores: scores.right.lower_arm),
-        Part("trunk", "trunk", 6, lambda scores: scores.trunk),
-        Part("neck", "neck", 6, lambda scores: scores.neck),
-        Part("left_table_a", "table A, left", 9, lambda scores: scores.left.table_a),
-        Part("right_table_a", "table A, right", 9, lambda scores: scores.right.table_a),
-        Part("table_b", "table B", 9, lambda scores: scores.table_b),
-        Part("left_wrist", "wrist, left", 4, lambda scores: scores.left.wrist),
-        Part("right_wrist", "wrist, right", 4, lambda scores: scores.right.wrist),
+        *of_both_arms("upper arm", 6),
+        *of_both_arms("lower arm", 3),
+        *(part("trunk", 6), part("neck", 6)),
+        *of_both_arms("table A", 9),
+        part("table B", 9),
+        *of_both_arms("wrist", 4),
     ),
     {"wrist_twist": 2, "legs": 2},
     ("neck", *WRISTS),
@@ -305,20 +299,14 @@ muscle use."""
 
 
 class ScoreDistribution(NamedTuple):
-    """Chances (n,) of the grand scores 1 to n, which is 7 in RULA; each array adds up to 1.
+    """Chances (n,) of the grand scores 1 to n, which is 7 in RULA; each array adds up to 1."""
 
-    Attributes:
-        grand: chances for the worse arm.
-        left: chances for the left arm.
-        right: chances for the right arm.
-        parts: the same of the scores of each part, by its name; empty if they are not known.
-        of_mean: score of the mean posture, from which the samples deviate; 0 if it is not known.
-    """
-
-    grand: FloatArray
-    left: FloatArray
-    right: FloatArray
+    grand: FloatArray  #: chances for the worse arm
+    left: FloatArray  #: chances for the left arm
+    right: FloatArray  #: chances for the right arm
+    #: the same of the scores of each part, by its name; empty if they are not known
     parts: Mapping[str, FloatArray] = MappingProxyType({})
+    #: score of the mean posture, from which the samples deviate; 0 if it is not known
     of_mean: int = 0
 
     @property
@@ -352,14 +340,9 @@ def neck_samples(
 def wrist_samples(wrists: FloatArray, count: int, rng: np.random.Generator) -> FloatArray | None:
     """Return normal samples (count, 2, 2) of the wrists, rad; None if both are unknown.
 
-    A wrist is drawn with its whole deviation, because so little of it is measured: a quarter would
-    make nearly every wrist straight.
-
-    Args:
-        wrists: flexion and deviation of both wrists, and their standard deviations, (2, 2, 2), rad;
-            the deviations of an unknown wrist are nan.
-        count: number of samples.
-        rng: random numbers.
+    ``wrists`` (2, 2, 2) are flexion and deviation of both, and standard deviations, rad, nan if
+    unknown. A wrist is drawn with its whole deviation, because so little of it is measured: a
+    quarter would make nearly every wrist straight.
     """
     mean, stddev = wrists
     if np.isnan(stddev).all():
@@ -384,14 +367,9 @@ def sampled_scores(
 ) -> tuple[ScoreDistribution, frozenset[str]]:
     """Return the scores of an uncertain posture, and which of the measurable parts are measured.
 
-    Args:
-        body: the person.
-        posture: mean, (12,), rad and metres.
-        drawn: samples of the posture with its whole deviation, (n, 12).
-        neck: angles of the neck and their standard deviations, (2,) each, rad; None if unknown.
-        wrists: see :func:`wrist_samples`.
-        config: settings.
-        rng: random numbers for neck and wrists.
+    ``posture`` (12,) is the mean, ``drawn`` (n, 12) are samples with its whole deviation, rad and
+    m; ``neck`` are its angles and their standard deviations, (2,) each, rad, or None. ``wrists``
+    are as in :func:`wrist_samples`.
     """
     angles, stddev = neck
     necks, measured = None, measured_wrists(wrists)
@@ -414,10 +392,7 @@ def score_distribution(
     necks: FloatArray | None = None,
     wrists: FloatArray | None = None,
 ) -> ScoreDistribution:
-    """Return the distribution of the scores, given equally likely postures (n, 12) of ``body``.
-
-    ``necks`` and ``wrists`` are as in :func:`rula_scores`.
-    """
+    """Return the distribution of :func:`rula_scores` of equally likely postures (n, 12)."""
     return distribution_of(rula_scores(body, postures, config, necks, wrists), RULA)
 
 
@@ -439,15 +414,10 @@ def rula_scores(
     necks: FloatArray | None = None,
     wrists: FloatArray | None = None,
 ) -> RulaScores:
-    """Return the scores of postures of ``body``.
+    """Return the scores of postures (..., 12), rad and metres, of ``body``.
 
-    Args:
-        body: the person.
-        postures: shape (..., 12), rad and metres.
-        config: settings.
-        necks: ``neck_yaw`` and ``neck_pitch`` of each posture, (..., 2), rad; None if unknown.
-        wrists: flexion and deviation of the left and the right wrist in each posture,
-            (..., 2, 2), rad; nan or None if unknown.
+    ``necks`` (..., 2) are ``neck_yaw`` and ``neck_pitch``, rad, or None; ``wrists`` (..., 2, 2)
+    flexion and deviation of the left and the right wrist, rad, nan or None if unknown.
     """
     d = np.asarray(postures, dtype=np.float64)
     if wrists is None:

@@ -48,19 +48,13 @@ _SIDES = (("Left", 1.0), ("Right", -1.0))
 
 
 class Bone(NamedTuple):
-    """A joint of the skeleton and what hangs on it.
+    """A joint of the skeleton and what hangs on it."""
 
-    Attributes:
-        name: name of the joint; empty for the end of a chain.
-        offset_m: place in the parent's frame at rest, metres in the axes of the file.
-        channels: values per frame in their order.
-        children: the next joints.
-    """
-
-    name: str
+    name: str  #: name of the joint; empty for the end of a chain
+    #: place in the parent's frame at rest, metres in the axes of the file
     offset_m: tuple[float, float, float]
-    channels: tuple[str, ...] = ()
-    children: tuple[Bone, ...] = ()
+    channels: tuple[str, ...] = ()  #: values per frame in their order
+    children: tuple[Bone, ...] = ()  #: the next joints
 
 
 def skeleton(body: BodyModel) -> Bone:
@@ -102,11 +96,7 @@ def _clavicle_m(body: BodyModel) -> float:
 
 
 def channel_values(motion: Motion, body: BodyModel) -> dict[str, FloatArray]:
-    """Return the values of the channels of each joint that moves, by its name.
-
-    Each has the shape (n, number of channels), metres and degrees. A gap repeats the posture
-    before it, or the first one.
-    """
+    """Return values (n, channels), m and deg, of joints that move; a gap repeats the last."""
     frames = frames_of(motion, body)
     parts = body_parts(body.sizes)
     states, hip = held(motion.states), held(frames.hip - floor_below(body))
@@ -141,11 +131,7 @@ def channel_values(motion: Motion, body: BodyModel) -> dict[str, FloatArray]:
 
 
 def write_bvh(path: Path, motion: Motion, body: BodyModel | None) -> None:
-    """Write the skeleton and its motion at a constant rate.
-
-    Raises:
-        CardboxError: the body is not known, or the file cannot be written.
-    """
+    """Write skeleton and motion at a constant rate; raise CardboxError without body or file."""
     if body is None:
         raise CardboxError(
             "BVH needs the bones of the person: give --model MODEL.yaml, with which the results "

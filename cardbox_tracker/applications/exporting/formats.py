@@ -29,11 +29,7 @@ from cardbox_tracker.tracking.estimate import UNCERTAIN
 
 
 def write_isb(path: Path, motion: Motion, body: BodyModel | None = None) -> None:
-    """Write a CSV file with the angles of the ISB in degrees, then our own joints.
-
-    Raises:
-        CardboxError: the file cannot be written.
-    """
+    """Write CSV with angles of the ISB in degrees, then our joints, or raise CardboxError."""
     names = (*JOINT_NAMES, *PLACE_NAMES, *NECK_NAMES)
     values = np.hstack([np.degrees(isb_angles(motion.states)), motion.states, motion.neck])
     rows = (
@@ -48,19 +44,13 @@ def write_isb(path: Path, motion: Motion, body: BodyModel | None = None) -> None
 
 
 class Format(NamedTuple):
-    """One format.
+    """One format."""
 
-    Attributes:
-        suffix: end of the names of its files.
-        write: writes a motion of a body to a file; the body may be unknown.
-        check: raises CardboxError if a library is missing.
-        has_places: whether it depends on the pitch of the camera.
-    """
-
-    suffix: str
+    suffix: str  #: end of the names of its files
+    #: writes a motion of a body to a file; the body may be unknown
     write: Callable[[Path, Motion, BodyModel | None], None]
-    check: Callable[[], object] = lambda: None
-    has_places: bool = True
+    check: Callable[[], object] = lambda: None  #: raises CardboxError if a library is missing
+    has_places: bool = True  #: whether it depends on the pitch of the camera
 
 
 FORMATS: dict[str, Format] = {
@@ -73,11 +63,7 @@ FORMATS: dict[str, Format] = {
 
 
 def formats() -> dict[str, Format]:
-    """Return all formats by name, those of other packages last.
-
-    Raises:
-        CardboxError: a package adds what is no format or cannot be imported, or a taken name.
-    """
+    """Return all formats by name, others' last; CardboxError if one is none, or its name taken."""
     found = dict(FORMATS)
     for name, entry in extensions(EXPORTERS, FORMATS).items():
         found[name] = loaded(entry)
@@ -87,14 +73,10 @@ def formats() -> dict[str, Format]:
 
 
 def export(results: Results, path: Path, to: Format, model: BodyModel | None = None) -> list[str]:
-    """Write results of one person, by default of the body that they have, to a file.
+    """Write results of one person, by default of the body that they have; return lines about it.
 
-    Returns:
-        Lines that say what was written, and what is not known.
-
-    Raises:
-        CardboxError: no image has a posture, the results are those of another person, a library is
-            missing, or the file cannot be written.
+    Raises CardboxError if no image has a posture, the results are those of another person, a
+    library is missing, or the file cannot be written.
     """
     to.check()
     motion, body = Motion.of(results), model or results.body
@@ -126,10 +108,8 @@ class Result(Results):
     def to_pandas(self) -> Any:
         """Return a ``pandas.DataFrame`` with a row for each image and the columns of the table.
 
-        Unknown numbers are nan, unknown texts empty; ``stamp_ns`` is the only stamp.
-
-        Raises:
-            CardboxError: pandas is not installed.
+        Unknown numbers are nan, unknown texts empty; ``stamp_ns`` is the only stamp. Raises
+        CardboxError if pandas is not installed.
         """
         try:
             import pandas
@@ -143,13 +123,9 @@ class Result(Results):
         return pandas.DataFrame({name: found[name] for name in units(*[True] * 3) if name in found})
 
     def save(self, path: str | os.PathLike[str]) -> list[str]:
-        """Write a file in the format of ``cardbox export`` that its ending says, and replace it.
+        """Write, or replace, a file in the format of its ending; return lines about it.
 
-        Returns:
-            Lines that say what was written, and what is not known.
-
-        Raises:
-            CardboxError: no format has this ending, or see :func:`~.formats.export`.
+        Raises CardboxError if no format has this ending, or as :func:`~.formats.export`.
         """
         path, known = Path(path), formats().values()
         fitting = [one for one in known if path.name.endswith(one.suffix)]
@@ -160,11 +136,7 @@ class Result(Results):
 
 
 def read_result(path: str | os.PathLike[str], person: int | None = None) -> Result:
-    """Return the results in a table or a bag, see :func:`~.result_reader.read_results`, and scene.
-
-    Raises:
-        CardboxError: a file cannot be read, or contains what no result is; the text names the line.
-    """
+    """Return the results in a table or a bag, and their scene; CardboxError names a wrong line."""
     path = Path(path)
     results, beside = result_reader.read_results(path, person), scene_beside(path)
     scene = load_scene(beside) if beside.is_file() else None

@@ -86,11 +86,7 @@ def _legs_m(motion: Motion, body: BodyModel | None) -> FloatArray:
 
 
 def write_trc(path: Path, motion: Motion, body: BodyModel | None) -> None:
-    """Write the markers as TRC in metres, with a row for each image; gaps are empty.
-
-    Raises:
-        CardboxError: the file cannot be written.
-    """
+    """Write TRC in metres, a row for each image, gaps empty, or raise CardboxError."""
     names, points_m, _ = markers_of(motion, body)
     rate, count = f"{motion.rate_hz:g}", str(len(points_m))
     numbers = range(1, len(names) + 1)
@@ -117,10 +113,8 @@ def write_c3d(path: Path, motion: Motion, body: BodyModel | None) -> None:
     """Write the markers as C3D in millimetres at a constant rate.
 
     The residual of a point is its standard deviation, or 0 if there is none; points that are not
-    known have -1, which the format defines as invalid.
-
-    Raises:
-        CardboxError: ezc3d is missing, or the file cannot be written.
+    known have -1, which the format defines as invalid. Raises CardboxError if ezc3d is missing, or
+    the file cannot be written.
     """
     even = motion.evenly()
     names, points_m, stddev_m = markers_of(even, body)
@@ -144,11 +138,7 @@ def write_c3d(path: Path, motion: Motion, body: BodyModel | None) -> None:
 
 
 def ezc3d_or_error() -> Any:
-    """Return the module ezc3d.
-
-    Raises:
-        CardboxError: it is not installed.
-    """
+    """Return the module ezc3d; raise CardboxError if it is not installed."""
     try:
         import ezc3d
     except ImportError as error:

@@ -37,11 +37,7 @@ _MIRROR = np.array([1.0, 1.0, -1.0])
 
 
 def coordinates_of(states: FloatArray) -> dict[str, FloatArray]:
-    """Return the rotations, (n,), rad, by the names of the coordinates.
-
-    Args:
-        states: (n, 14), rad and metres, without gaps.
-    """
+    """Return rotations, (n,), rad, by the coordinates' names; states are (n, 14) without gaps."""
     found = dict(zip(LUMBAR, thorax_angles(states).T, strict=True))
     for suffix, arm, side in (("r", RIGHT_ARM, -1.0), ("l", LEFT_ARM, 1.0)):
         directions = arm_directions(states[:, arm], side)
@@ -52,10 +48,7 @@ def coordinates_of(states: FloatArray) -> dict[str, FloatArray]:
 
 
 def _limbs(motion: Motion) -> dict[str, FloatArray]:
-    """Return the rotations of legs and hands, (n,), rad, as far as an image has them.
-
-    A hand or leg that is not known keeps its last rotation, or is at rest before the first.
-    """
+    """Return rotations (n,), rad, of legs and hands; unknown ones stay, or rest at first."""
     found: dict[str, FloatArray] = {}
     rest = 0.0, 0.0, np.pi / 2
     for number, suffix in enumerate("lr"):
@@ -87,12 +80,9 @@ def _arm_angles(upper: FloatArray, lower: FloatArray) -> FloatArray:
 
 
 def write_mot(path: Path, motion: Motion, body: BodyModel | None) -> None:
-    """Write a row for each image with a posture: time (s), rotations (degrees), place (m).
+    """Write time (s), rotations (deg) and, with the body, place (m) of each image with a posture.
 
-    Without the body there is no place.
-
-    Raises:
-        CardboxError: the file cannot be written.
+    Raises CardboxError if the file cannot be written.
     """
     seen = motion.is_seen
     states, turned = motion.states[seen], {}

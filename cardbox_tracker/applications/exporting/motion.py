@@ -37,44 +37,30 @@ MISSING = "missing"
 
 @dataclass(frozen=True)
 class Motion:
-    """Results for n images in order of time; gaps are images without a posture.
+    """Results for n images in order of time; gaps are images without a posture."""
 
-    Attributes:
-        stamp_ns: stamps of the images, (n,), rising.
-        time_s: seconds from the start of the recording, (n,).
-        state: tracking state of each image, n texts.
-        states: d1..d12, ``torso_x`` and ``torso_z``, (n, 14), rad and metres; nan in gaps.
-        neck: ``neck_yaw`` and ``neck_pitch``, (n, 2), rad; nan while the face is not seen.
-        keypoints_m: (n, 6, 3), ordered as ``KEYPOINT_NAMES``, metres in the optical frame of the
-            first camera; nan in gaps.
-        wrists: flexion, deviation and rotation of the forearm of both hands, (n, 2, 3), rad; nan
-            where they are unknown, as all that follows.
-        palms: normals out of the palms, (n, 2, 3), unit vectors in the optical frame.
-        legs: ``LEG_NAMES``, (n, 8), rad.
-        leg_points_m: (n, 6, 3), ordered as ``LEG_KEYPOINT_NAMES``, in the optical frame; nan where
-            they are hidden.
-        leg_stddev_m: their standard deviations, (n, 6).
-    """
-
-    stamp_ns: NDArray[np.int64]
-    time_s: FloatArray
-    state: tuple[str, ...]
+    stamp_ns: NDArray[np.int64]  #: stamps of the images, (n,), rising
+    time_s: FloatArray  #: seconds from the start of the recording, (n,)
+    state: tuple[str, ...]  #: tracking state of each image, n texts
+    #: d1..d12, ``torso_x`` and ``torso_z``, (n, 14), rad and metres; nan in gaps
     states: FloatArray
+    #: ``neck_yaw`` and ``neck_pitch``, (n, 2), rad; nan while the face is not seen
     neck: FloatArray
+    #: (n, 6, 3), ordered as ``KEYPOINT_NAMES``, metres in the optical frame of the first camera;
+    #: nan in gaps
     keypoints_m: FloatArray
+    #: flexion, deviation and rotation of the forearm of both hands, (n, 2, 3), rad; nan where they
+    #: are unknown, as all that follows
     wrists: FloatArray
-    palms: FloatArray
-    legs: FloatArray
+    palms: FloatArray  #: normals out of the palms, (n, 2, 3), unit vectors in the optical frame
+    legs: FloatArray  #: ``LEG_NAMES``, (n, 8), rad
+    #: (n, 6, 3), ordered as ``LEG_KEYPOINT_NAMES``, in the optical frame; nan where they are hidden
     leg_points_m: FloatArray
-    leg_stddev_m: FloatArray
+    leg_stddev_m: FloatArray  #: their standard deviations, (n, 6)
 
     @classmethod
     def of(cls, results: Results) -> Motion:
-        """Return the motion of results.
-
-        Raises:
-            CardboxError: no image has a posture.
-        """
+        """Return the motion of results; raise CardboxError if no image has a posture."""
         n = len(results.state)
         hidden = np.array(
             [
@@ -137,11 +123,8 @@ class Motion:
     def evenly(self) -> Motion:
         """Return the motion at moments of equal distance, for formats with a constant rate.
 
-        Each moment has the nearest image, at most half a step away; without one it is a gap. Images
-        of a constant rate stay as they are.
-
-        Raises:
-            CardboxError: most moments have no image, because the stamps jump.
+        Each moment has the nearest image, at most half a step away; without one it is a gap. Raises
+        CardboxError if most are gaps, because the stamps jump.
         """
         since_ns = self.stamp_ns - self.stamp_ns[0]
         step_ns = 1e9 / self.rate_hz
@@ -168,10 +151,7 @@ class Motion:
 
 
 def held(values: FloatArray) -> FloatArray:
-    """Return values (n, k) with unknown rows replaced by the last known ones, or the first.
-
-    They are 0 if none is known.
-    """
+    """Return values (n, k) with the last known row, or the first, in gaps; 0 if none is known."""
     known = np.isfinite(values).all(1)
     if not known.any():
         return np.zeros_like(values)
@@ -191,21 +171,16 @@ _MOST_RISE_M = 0.15
 
 
 def in_reference(optical: FloatArray, body: BodyModel | None) -> FloatArray:
-    """Return points or directions (..., 3) of the optical frame in the reference frame.
+    """Return points, m, or directions (..., 3) of the optical frame in the reference frame.
 
-    Args:
-        optical: points, metres, or directions.
-        body: has pitch and roll of the camera; without it the camera is level.
+    The body has pitch and roll of the camera; without it the camera is level.
     """
     tilt = CameraPose() if body is None else body.camera_pose
     return np.asarray(optical @ level_to_optical(tilt.pitch_rad, tilt.roll_rad))
 
 
 def floor_below(body: BodyModel | None) -> FloatArray:
-    """Return the origin of exports, (3,), m in the reference frame: on the floor, if it is known.
-
-    The floor is that on which the measured person stands; otherwise it is the camera.
-    """
+    """Return the origin, (3,), m in the reference frame: on the floor, if known, or the camera."""
     height_m = None if body is None else floor_m(body)
     return np.array([0.0, 0.0, height_m or 0.0])
 
@@ -221,12 +196,9 @@ def frames_of(motion: Motion, body: BodyModel) -> PosedBodies:
 
 
 def images_of_body(motion: Motion, body: BodyModel) -> Motion:
-    """Return the motion with gaps where an image was tracked with another body.
+    """Return the motion with gaps where a running tracker got another body.
 
-    A running tracker may get another body from the initializer.
-
-    Raises:
-        CardboxError: most images were tracked with another body.
+    Raises CardboxError if most images were tracked with another one.
     """
     keypoints_m = in_reference(motion.keypoints_m, body)
     frames = frames_of(motion, body)

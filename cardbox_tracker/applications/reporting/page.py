@@ -82,10 +82,7 @@ def _words(joint: str, group: str) -> str:
 
 
 def doubtful_spans(results: Results) -> list[tuple[float, float, str]]:
-    """Return start and end, s, of each time whose posture may be wrong or is missing.
-
-    The third value is ``uncertain``, or "" without a posture.
-    """
+    """Yield start, end, s, and ``uncertain``, or "" without a posture, of doubtful times."""
     step_s = float(np.median(np.diff(results.time_s))) if len(results.time_s) > 1 else 0.0
     spans: list[tuple[float, float, str]] = []
     before = None
@@ -99,13 +96,9 @@ def doubtful_spans(results: Results) -> list[tuple[float, float, str]]:
 
 
 def space_view(motion: Motion, body: BodyModel | None, true_m: FloatArray | None = None) -> bytes:
-    """Return the skeleton from aside at some moments as PNG.
+    """Return the skeleton from aside at some moments of a motion of n images as PNG.
 
-    Args:
-        motion: results of n images, with a posture in some.
-        body: the person that was tracked; None if it is not known.
-        true_m: keypoints of a reference, (n, 6, 3), metres in the optical frame; nan where there
-            are none.
+    ``true_m`` are keypoints of a reference, (n, 6, 3), metres in the optical frame, or nan.
     """
     from matplotlib.figure import Figure
 
@@ -165,17 +158,10 @@ _MOST_SPANS = 20
 def write_page(
     path: Path, film: Path, title: str, people: Mapping[str, Results], lines: Sequence[str]
 ) -> None:
-    """Write the page, which needs no other file than the film.
+    """Write the page, which needs no other file than the ``film``, named relative to it.
 
-    Args:
-        path: file to write, .html.
-        film: overlay video, which the page names by its place relative to the page.
-        title: heading.
-        people: results of each person by a heading.
-        lines: what the results rest on, and warnings.
-
-    Raises:
-        CardboxError: the file cannot be written.
+    It has the results of ``people`` by a heading, and ``lines`` on what they rest on. Raises
+    CardboxError if the file cannot be written.
     """
     render_page(
         path,

@@ -88,11 +88,7 @@ class Kinematics:
     """
 
     def __init__(self, arm: Arm, trunk_radius_m: float = 0.0, lowest_m: float = -math.inf) -> None:
-        """Prepare; for the settings see :class:`~.config.RetargetConfig`.
-
-        Raises:
-            CardboxError: the arm has an impossible length, or no elbow and hand.
-        """
+        """Prepare; raise CardboxError if a length is impossible, or there is no elbow and hand."""
         self._lowest_m = lowest_m
         self._steps, self._tip_m = _steps(arm)
         self._slides = np.array([step.slides for step in self._steps if step.is_own])
@@ -252,11 +248,7 @@ class ArmFollower:
     """
 
     def __init__(self, robot: Robot, config: RetargetConfig, side: str = "") -> None:
-        """Prepare for one ``side``; that of the settings if it is empty.
-
-        Raises:
-            CardboxError: see :func:`~.chain.find_arm` and :class:`Kinematics`.
-        """
+        """Prepare for one ``side``, or that of the settings; raise CardboxError without an arm."""
         self._side = side or config.side
         self.arm = find_arm(robot, self._side, config.base, config.hand, config.gripper)
         self.kinematics = Kinematics(self.arm, config.trunk_radius_m, config.lowest_m)

@@ -31,20 +31,13 @@ _LONGEST_FINGER_M = 0.25
 
 @dataclass(frozen=True)
 class Arm:
-    """A robot's arm.
+    """A robot's arm."""
 
-    Attributes:
-        path: all joints from the robot's root to the tip.
-        joints: names of those that follow the person's arm, in this order.
-        tip: link of the hand.
-        gripper: name of the joint that opens the hand; empty for none.
-        stays: names of the movable joints before the arm and beyond it that do not move.
-    """
-
-    path: tuple[Joint, ...]
-    joints: tuple[str, ...]
-    tip: str
-    gripper: str
+    path: tuple[Joint, ...]  #: all joints from the robot's root to the tip
+    joints: tuple[str, ...]  #: names of those that follow the person's arm, in this order
+    tip: str  #: link of the hand
+    gripper: str  #: name of the joint that opens the hand; empty for none
+    #: names of the movable joints before the arm and beyond it that do not move
     stays: tuple[str, ...]
 
     def table(self, robot: Robot, max_speed: float) -> str:
@@ -58,20 +51,12 @@ class Arm:
 
 
 def find_arm(robot: Robot, side: str, base: str = "", hand: str = "", gripper: str = "") -> Arm:
-    """Return the arm that follows the person's ``side``.
+    """Return the arm that follows the person's ``side``, by its name one of two arms.
 
     The arm is the chain of movable joints to its hand without those that another chain shares, such
-    as the waist of a humanoid robot, and without the gripper.
-
-    Args:
-        robot: the robot.
-        side: ``left`` or ``right``; decides between two arms by their names.
-        base: link at which the arm begins; if empty, the last one that another chain shares.
-        hand: link of the hand; if empty, it is found.
-        gripper: joint that opens the hand; if empty, the only one beyond the arm.
-
-    Raises:
-        CardboxError: there is no such link or joint, or several arms remain.
+    as the waist of a humanoid robot, and without the gripper. What is empty is found: the links
+    ``base``, at which the arm begins, and ``hand``, and the joint ``gripper``. Raises CardboxError
+    if there is no such link or joint, or several arms remain.
     """
     ends = _ends(robot, _fingers(robot))
     path = robot.path(hand) if hand else _chosen(robot, ends, side)

@@ -9,11 +9,7 @@ from cardbox_tracker.common.settings import Settings, setting
 
 @dataclass(frozen=True)
 class RetargetConfig(Settings):
-    """Settings of how a robot follows a person and when it stands still.
-
-    Raises:
-        ValueError: a value is out of its range; the text names it.
-    """
+    """Settings of how a robot follows a person and when it stands still."""
 
     side: str = setting(
         "right",

@@ -62,11 +62,8 @@ def with_head_and_hands(
 ) -> FloatArray:
     """Return a posture with head and hands, (16,), nan where they are not known.
 
-    Args:
-        posture: d1..d12, with ``neck_yaw`` and ``neck_pitch`` if they are known, (12,) or (14,).
-        stddev: standard deviations in the same order, (12,) or (14,).
-        most_stddev_rad: largest deviation of a known angle, rad.
-        hands: ``HAND_OPEN_NAMES``, (2,), nan for one that is not known; None without any.
+    Posture and deviations are (12,), or (14,) with the neck, rad and m; angles with a deviation
+    above ``most_stddev_rad`` are not known. ``hands`` are ``HAND_OPEN_NAMES``, (2,), or nan.
     """
     whole = np.full(len(WITH_HEAD_AND_HANDS), np.nan)
     whole[:N_JOINTS] = posture[:N_JOINTS]
@@ -94,19 +91,12 @@ def angles_of(posture: FloatArray) -> dict[str, float]:
 
 @dataclass(frozen=True)
 class JointMap:
-    """A :class:`~.retargeter.Method`: each of ``joints`` follows an angle of the person.
+    """A :class:`~.retargeter.Method`: each of ``joints`` follows an angle of the person."""
 
-    Attributes:
-        angles: one of ``ANGLES`` for each joint; None for a joint that stays.
-        joints: the robot's joints without repetition.
-        scale: (n,).
-        offset_rad: (n,).
-    """
-
-    angles: tuple[str | None, ...]
-    joints: tuple[str, ...]
-    scale: FloatArray
-    offset_rad: FloatArray
+    angles: tuple[str | None, ...]  #: one of ``ANGLES`` for each joint; None for a joint that stays
+    joints: tuple[str, ...]  #: the robot's joints without repetition
+    scale: FloatArray  #: (n,)
+    offset_rad: FloatArray  #: (n,)
 
     @property
     def roles(self) -> dict[str, str]:
@@ -151,11 +141,7 @@ def head_map(robot: Robot) -> JointMap | None:
 
 
 def load_joint_map(path: str | os.PathLike[str]) -> JointMap:
-    """Read a joint map from a YAML file.
-
-    Raises:
-        CardboxError: the file cannot be read, or is not a valid joint map.
-    """
+    """Read a joint map from YAML; raise CardboxError if it cannot be read, or is none."""
     with foreign(path, CardboxError, "a joint map, as the example config/example_joint_map.yaml"):
         rows = parse_small_yaml(read_small_text(path))["joints"]
         if not isinstance(rows, list) or not rows:

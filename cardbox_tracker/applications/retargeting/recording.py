@@ -87,11 +87,7 @@ def _until(
 
 
 def write_csv(way: Sequence[StampedMoment], joints: Sequence[str], path: Path) -> None:
-    """Write a row for each time: stamp, ns, status, positions (rad or m), and velocities.
-
-    Raises:
-        CardboxError: the file cannot be written.
-    """
+    """Write stamp, ns, status, positions (rad or m), velocities of each time, or CardboxError."""
     rows = (
         (str(stamp_ns), status, *(f"{value:.6f}" for part in moment for value in part))
         for stamp_ns, status, moment in way
@@ -108,11 +104,7 @@ def write_bag(
     path: Path,
     overwrite: bool = False,
 ) -> None:
-    """Write the results together with the topics that the node ``retarget`` publishes.
-
-    Raises:
-        BagError: ``path`` exists and may not be replaced.
-    """
+    """Write results with the topics of the node ``retarget``; raise BagError if it exists."""
     latched = [topic for topic in bag.topics if topic.endswith(("_model", "_description"))]
     description = f"{SPACE}/robot_description"
     with BagWriter(path, "mcap", overwrite, compress=True, latched=[*latched, description]) as out:

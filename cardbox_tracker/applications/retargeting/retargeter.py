@@ -179,17 +179,11 @@ class SafeMotion:
 
 
 class Command(NamedTuple):
-    """Command for the robot at one image.
+    """Command for the robot at one image."""
 
-    Attributes:
-        positions: positions (n,) of ``Retargeter.joints``, rad or m.
-        status: ``moving``, or ``frozen:`` with the reason.
-        duration_s: time in which the robot reaches the positions, s.
-    """
-
-    positions: FloatArray
-    status: str
-    duration_s: float
+    positions: FloatArray  #: positions (n,) of ``Retargeter.joints``, rad or m
+    status: str  #: ``moving``, or ``frozen:`` with the reason
+    duration_s: float  #: time in which the robot reaches the positions, s
 
     @property
     def is_moving(self) -> bool:
@@ -211,8 +205,7 @@ class Retargeter:
     def __init__(self, robot: Robot, method: Method, config: RetargetConfig) -> None:
         """Begin at ``config.start``, at 0, or at the limit nearest to 0, for each joint.
 
-        Raises:
-            CardboxError: the robot lacks a joint of ``method``, or ``config.start`` does not fit.
+        Raises CardboxError if the robot lacks a joint of ``method``, or the start does not fit.
         """
         self.joints = method.joints
         limits = Limits(*robot.limits_of(method.joints))
@@ -257,19 +250,14 @@ class Retargeter:
         hands: FloatArray | None = None,
         keypoints: Mapping[str, tuple[str, float]] | None = None,
     ) -> Command:
-        """Return the command for an image.
+        """Return the command for an image of a stamp, ns.
 
-        Args:
-            stamp_ns: stamp of the image.
-            state: tracking state; the robot moves in the state ``tracking``, and those of its
-                joints whose keypoints are ``tracked`` also in the state ``uncertain``.
-            body: the person.
-            posture: d1..d12, rad and metres, and the angles of the neck if known; (12,) or (14,).
-            stddev: their standard deviations, (12,) or (14,).
-            now_ns: time of the robot's clock; None if that is the stamp. The robot moves for no
-                longer than since the command before, whatever the stamps say.
-            hands: how open both hands are, (2,), 0 to 1, nan for one that is not known.
-            keypoints: state and chance to be wrong of each keypoint by name; None if not known.
+        The robot moves in the state ``tracking``, and those of its joints whose keypoints are
+        ``tracked`` also in the state ``uncertain``; ``keypoints`` are states and chances to be
+        wrong by name. Posture and deviations are (12,), or (14,) with the neck, rad and metres.
+        ``now_ns`` is the robot's clock, None if that is the stamp: the robot moves for no longer
+        than since the command before, whatever the stamps say. ``hands`` are how open both are,
+        (2,), 0 to 1, nan if not known.
         """
         now_ns = stamp_ns if now_ns is None else now_ns
         now_ns = max(now_ns, self._commanded_ns or now_ns)
@@ -380,11 +368,9 @@ def make_retargeter(
 ) -> tuple[Robot, Retargeter, str]:
     """Return a robot, its retargeter, and a table of the joints that were found.
 
-    Without a joint map, the robot's arm is found and follows, or both and the head.
-
-    Raises:
-        CardboxError: a file cannot be read, the robot lacks a joint or link, its arm is not clear,
-            or a setting is given that a joint map does not need.
+    Without a joint map, the robot's arm is found and follows, or both and the head. Raises
+    CardboxError if a file cannot be read, the robot lacks a joint or link, its arm is not clear, or
+    a setting is given that a joint map does not need.
     """
     robot = load_robot(robot_file)
     if joint_map:

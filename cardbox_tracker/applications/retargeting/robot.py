@@ -31,31 +31,19 @@ _FREEDOMS = {"fixed": 0, "planar": 3, "floating": 6}
 
 @dataclass(frozen=True)
 class Joint:
-    """One joint between two links.
-
-    Attributes:
-        kind: ``revolute``, ``continuous``, ``prismatic`` or any that stays, such as ``fixed``.
-        parent: name of a link.
-        child: name of a link.
-        origin_m: (3,), in the frame of ``parent``.
-        turn: rotation matrix (3, 3) from the child at 0 to ``parent``.
-        axis: unit vector (3,) in the frame of ``child``.
-        lower: lowest position, rad or m; half a turn back for a ``continuous`` joint.
-        upper: highest position, rad or m.
-        speed: highest speed, rad/s or m/s; inf if the description gives none, or 0.
-        mimics: the joint that it copies, ``multiplier * position + offset``; empty for none.
-    """
+    """One joint between two links."""
 
     name: str
-    kind: str
-    parent: str
-    child: str
-    origin_m: FloatArray
-    turn: FloatArray
-    axis: FloatArray
-    lower: float = 0.0
-    upper: float = 0.0
-    speed: float = math.inf
+    kind: str  #: ``revolute``, ``continuous``, ``prismatic`` or any that stays, such as ``fixed``
+    parent: str  #: name of a link
+    child: str  #: name of a link
+    origin_m: FloatArray  #: (3,), in the frame of ``parent``
+    turn: FloatArray  #: rotation matrix (3, 3) from the child at 0 to ``parent``
+    axis: FloatArray  #: unit vector (3,) in the frame of ``child``
+    lower: float = 0.0  #: lowest position, rad or m; half a turn back for a ``continuous`` joint
+    upper: float = 0.0  #: highest position, rad or m
+    speed: float = math.inf  #: highest speed, rad/s or m/s; inf if the description gives none, or 0
+    #: the joint that it copies, ``multiplier * position + offset``; empty for none
     mimics: str = ""
     multiplier: float = 1.0
     offset: float = 0.0
@@ -68,15 +56,10 @@ class Joint:
 
 @dataclass(frozen=True)
 class Robot:
-    """A robot.
+    """A robot."""
 
-    Attributes:
-        urdf: description.
-        all_joints: every joint by the name of its child link.
-    """
-
-    urdf: str
-    all_joints: dict[str, Joint]
+    urdf: str  #: description
+    all_joints: dict[str, Joint]  #: every joint by the name of its child link
 
     @property
     def joints(self) -> dict[str, Joint]:
@@ -90,11 +73,7 @@ class Robot:
         return (*sorted(roots), *self.all_joints)
 
     def path(self, link: str) -> tuple[Joint, ...]:
-        """Return all joints from the root to ``link``.
-
-        Raises:
-            CardboxError: there is no such link.
-        """
+        """Return all joints from the root to ``link``; raise CardboxError if there is none."""
         if link not in self.links:
             raise CardboxError(
                 f"the robot has no link {quoted(link)}; it has {cut(', '.join(self.links))}"
@@ -108,8 +87,7 @@ class Robot:
     def limits_of(self, names: Sequence[str]) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Return lower limits, upper limits and highest speeds, each (n,), of joints.
 
-        Raises:
-            CardboxError: there is no movable joint of that name.
+        Raises CardboxError if there is no movable joint of that name.
         """
         unknown = [name for name in names if name not in self.joints]
         if unknown:
@@ -144,22 +122,17 @@ class Robot:
 
 
 def load_robot(path: str | os.PathLike[str]) -> Robot:
-    """Read a URDF file.
-
-    Raises:
-        CardboxError: the file cannot be read, or is not a URDF with movable joints.
-    """
+    """Read a URDF file; raise CardboxError if it cannot be read, or has no movable joints."""
     with foreign(path, CardboxError, "a URDF file"):
         content = read_regular(path, _LARGEST_BYTES)
     return parse_robot(content, str(path))
 
 
 def parse_robot(content: str | bytes, source: str = "the description") -> Robot:
-    """Parse a URDF; ``source`` names it in errors. Bytes have the encoding that they declare.
+    """Parse a URDF, in bytes of the encoding that they declare; ``source`` names it in errors.
 
-    Raises:
-        CardboxError: see :func:`load_robot`; or it is unprocessed xacro, defines entities, or has
-            too many levels, elements or joints.
+    Raises CardboxError as :func:`load_robot`, and for xacro, entities, or too many levels, elements
+    or joints.
     """
     encoding = "utf-8" if isinstance(content, str) else None
     data = content.encode("utf-8", "replace") if isinstance(content, str) else content

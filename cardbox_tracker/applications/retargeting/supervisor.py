@@ -37,13 +37,9 @@ class Supervisor:
     """
 
     def __init__(self, retargeter: Retargeter, config: RetargetConfig, timeout_s: float) -> None:
-        """Begin ``DISABLED``.
+        """Begin ``DISABLED``; with ``config.start``, the robot need not tell its positions.
 
-        Args:
-            retargeter: makes the motion.
-            config: with ``start``, the robot need not tell its positions.
-            timeout_s: after this time without a posture, or without the robot's positions, the
-                robot stops.
+        After ``timeout_s`` without a posture, or without the robot's positions, it stops.
         """
         self.phase = Phase.DISABLED
         self._retargeter, self._config = retargeter, config

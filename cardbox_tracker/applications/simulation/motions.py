@@ -31,18 +31,12 @@ _ENTER_FROM_M = 1.6
 
 @dataclass(frozen=True)
 class Segment:
-    """Part of the timeline.
+    """Part of the timeline."""
 
-    Attributes:
-        name: name of the motion or reference posture.
-        start_s: start, seconds from the session's start.
-        end_s: end, seconds from the session's start.
-        pose: posture (12,) at a time in seconds from ``start_s``; None in the empty scene.
-    """
-
-    name: str
-    start_s: float
-    end_s: float
+    name: str  #: name of the motion or reference posture
+    start_s: float  #: start, seconds from the session's start
+    end_s: float  #: end, seconds from the session's start
+    #: posture (12,) at a time in seconds from ``start_s``; None in the empty scene
     pose: Callable[[float], FloatArray] | None
 
 
@@ -111,14 +105,10 @@ MOTIONS: dict[str, tuple[float, Callable[[float], FloatArray]]] = {
 
 
 def timeline(motion: str, side_turn: str = "left") -> list[Segment]:
-    """Return the segments of a session.
+    """Return the segments of a session with a motion of ``MOTIONS``, or ``all`` in turn.
 
-    Args:
-        motion: a name of ``MOTIONS``, or ``all`` for each of them in turn.
-        side_turn: direction in which the person turns for the side reference.
-
-    Raises:
-        CardboxError: the motion is unknown.
+    For the side reference the person turns to ``side_turn``. Raises CardboxError if the motion is
+    unknown.
     """
     if motion != "all" and motion not in MOTIONS:
         raise CardboxError(f"motion '{motion}' is unknown; expected {', '.join(MOTIONS)} or all")

@@ -1,10 +1,8 @@
-"""A synthetic person with rounded body parts.
+"""A synthetic person with rounded body parts; :func:`person_frames` gives the true skeleton.
 
-Each part is a stack of elliptical rings; the part is the convex hull of each two neighbouring
-rings. The rings roughly follow the sizes of a :class:`BodyModel`: limbs taper, the torso narrows at
-waist and shoulders, and there are a neck, open hands and legs. The shoulder joints rise with the
-arms. Therefore the cardbox model never matches exactly. :func:`person_frames` gives the true
-skeleton.
+Each part is the convex hull of neighbouring elliptical rings, which roughly follow the sizes of a
+:class:`BodyModel`: limbs taper, the torso narrows at waist and shoulders, and there are a neck,
+open hands and legs. Shoulders rise with the arms. So the cardbox model never matches exactly.
 """
 
 from __future__ import annotations
@@ -76,14 +74,9 @@ def person_parts(body: BodyModel, posture: FloatArray) -> list[VolumePart]:
 
 
 def person_frames(body: BodyModel, postures: FloatArray) -> PosedBodies:
-    """Return the frames of a person whose shoulders rise with the arms.
+    """Return frames (...) of a person in postures (..., 12), whose shoulders rise with the arms.
 
-    Args:
-        body: the person.
-        postures: shape (..., 12), rad and metres.
-
-    Returns:
-        Frames in the reference frame, with the leading shape of ``postures``.
+    They are in the reference frame; postures are in rad and metres.
     """
     frames = pose(body.rigid, postures)
     up = frames.torso_rotation[..., 2]
@@ -99,9 +92,8 @@ def person_frames(body: BodyModel, postures: FloatArray) -> PosedBodies:
 def girdle_lift_m(breadth_m: float, elevation_rad: FloatArray) -> FloatArray:
     """Return the lift (...) of a shoulder joint along the torso's axis, metres.
 
-    Args:
-        breadth_m: distance of the shoulder joints while the arms hang.
-        elevation_rad: angle (...) between the upper arm and the downward axis of the torso.
+    ``breadth_m`` is that of shoulders with hanging arms, ``elevation_rad`` (...) the angle between
+    the upper arm and the downward axis of the torso.
     """
     rise_rad = _CLAVICLE_RISE * np.maximum(0.0, np.asarray(elevation_rad) - _SETTING_RAD)
     lift: FloatArray = _CLAVICLE_OF_BREADTH * breadth_m * np.sin(rise_rad)

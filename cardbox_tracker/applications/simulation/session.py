@@ -39,18 +39,12 @@ _ROUND_DEG = (0.0, 65.0, -55.0, 110.0)
 
 @dataclass(frozen=True)
 class SyntheticCamera:
-    """One camera of a session.
+    """One camera of a session."""
 
-    Attributes:
-        name: namespace of its topics.
-        camera: intrinsics and pitch.
-        extrinsics: transform from the optical frame of the first camera to this one's.
-        view: transform of body states to a further camera; None for the first camera.
-    """
-
-    name: str
-    camera: Camera
-    extrinsics: Extrinsics
+    name: str  #: namespace of its topics
+    camera: Camera  #: intrinsics and pitch
+    extrinsics: Extrinsics  #: transform from the optical frame of the first camera to this one's
+    #: transform of body states to a further camera; None for the first camera
     view: View | None = None
 
     @property
@@ -102,10 +96,8 @@ class SyntheticCamera:
 def synthetic_cameras(body: BodyModel, first: Camera, count: int) -> list[SyntheticCamera]:
     """Return ``count`` cameras like ``first``; the person, placed as in ``body``, faces the first.
 
-    All have the height of the first camera and look at the person.
-
-    Raises:
-        CardboxError: ``count`` is out of range.
+    All have the height of the first camera and look at the person. Raises CardboxError if ``count``
+    is out of range.
     """
     if not 1 <= count <= MOST_CAMERAS:
         raise CardboxError(f"{count} cameras were requested; expected 1 to {MOST_CAMERAS}")
@@ -138,26 +130,17 @@ _FOCAL_OF_WIDTH = 330.0 / 320.0
 
 @dataclass(frozen=True)
 class SessionFormat:
-    """Format of a synthetic recording.
+    """Format of a synthetic recording."""
 
-    Attributes:
-        fps: images per second.
-        width: image width, px.
-        height: image height, px.
-        cameras: number of cameras, 1 to 4. Several have the namespaces ``cam0``, ``cam1``, ...;
-            ``extrinsics.yaml`` in the folder has their poses.
-        compressed: JPEG images on ``/camera/image_raw/compressed`` instead of raw ones.
-        encoding: encoding of raw images: ``mono8``, ``rgb8`` or ``bgr8``.
-        storage: ``mcap`` or ``sqlite3``.
-    """
-
-    fps: float = 15.0
-    width: int = 320
-    height: int = 240
+    fps: float = 15.0  #: images per second
+    width: int = 320  #: image width, px
+    height: int = 240  #: image height, px
+    #: number of cameras, 1 to 4. Several have the namespaces ``cam0``, ``cam1``, ...;
+    #: ``extrinsics.yaml`` in the folder has their poses.
     cameras: int = 1
-    compressed: bool = False
-    encoding: str = "mono8"
-    storage: str = "mcap"
+    compressed: bool = False  #: JPEG images on ``/camera/image_raw/compressed`` instead of raw ones
+    encoding: str = "mono8"  #: encoding of raw images: ``mono8``, ``rgb8`` or ``bgr8``
+    storage: str = "mcap"  #: ``mcap`` or ``sqlite3``
 
 
 DEFAULT_FORMAT = SessionFormat()
@@ -178,19 +161,11 @@ def synthesize_session(
     overwrite: bool = False,
     progress: Callable[[float], None] | None = None,
 ) -> dict[str, Any]:
-    """Write a session and return its ground truth.
+    """Write a session to the folder ``output``, which appears complete; return its truth.
 
-    Args:
-        output: folder of the recording; it appears when it is complete.
-        motion: ``wave``, ``bend``, ``bow`` or ``all``.
-        seed: seed of noise and sway.
-        form: format of the recording.
-        body: the person, and the pitch of the camera; None for the default person.
-        overwrite: replace an existing recording of that name.
-        progress: called with the finished fraction.
-
-    Raises:
-        CardboxError: the motion or the encoding is unknown, or the folder cannot be written.
+    The motion is ``wave``, ``bend``, ``bow`` or ``all``. The body has the pitch of the camera; by
+    default it is the usual person. Raises CardboxError if motion or encoding is unknown, or the
+    folder cannot be written.
     """
     if form.encoding not in _ENCODINGS:
         raise EncodingError(

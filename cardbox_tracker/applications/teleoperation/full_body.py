@@ -66,25 +66,18 @@ _SHANK = "knee", "ankle", "foot"
 
 
 class FullBody(NamedTuple):
-    """A person at one time.
+    """A person at one time."""
 
-    Attributes:
-        stamp_ns: stamp of the image, or the time between two.
-        points_m: (24, 3), metres in the person's frame, always finite.
-        turns: unit quaternions (24, 4), w first, of each joint in the person's frame; at rest, with
-            hanging arms, all are (1, 0, 0, 0).
-        yaw_rad: how far the person's frame is turned to the left of facing the camera.
-        wrists_rad: roll, pitch and yaw of both wrists, (2, 3): about the forearm, down and to the
-            left for a forearm ahead whose thumb is up; 0 where a hand is not measured.
-        valid: whether each joint is measured, (24,); others keep what they had.
-    """
-
-    stamp_ns: int
-    points_m: FloatArray
+    stamp_ns: int  #: stamp of the image, or the time between two
+    points_m: FloatArray  #: (24, 3), metres in the person's frame, always finite
+    #: unit quaternions (24, 4), w first, of each joint in the person's frame; at rest, with hanging
+    #: arms, all are (1, 0, 0, 0)
     turns: FloatArray
-    yaw_rad: float
+    yaw_rad: float  #: how far the person's frame is turned to the left of facing the camera
+    #: roll, pitch and yaw of both wrists, (2, 3): about the forearm, down and to the left for a
+    #: forearm ahead whose thumb is up; 0 where a hand is not measured
     wrists_rad: FloatArray
-    valid: NDArray[np.bool_]
+    valid: NDArray[np.bool_]  #: whether each joint is measured, (24,); others keep what they had
 
     def invalid(self, stamp_ns: int) -> FullBody:
         """Return the same body of a time of which nothing is known."""
@@ -128,13 +121,8 @@ class FullBodies:
     ) -> FullBody | None:
         """Return the body of an image; None before the first one with a person.
 
-        Args:
-            stamp_ns: stamp of the image.
-            state: tracking state of the image.
-            body: the person.
-            values: positions of joints by name, rad and metres.
-            stddev: their standard deviations; a joint without one is not known.
-            keypoints: state and chance to be wrong of each keypoint by name; empty: all tracked.
+        ``values`` are joints by name, rad and m. A joint without a deviation in ``stddev`` is not
+        known. ``keypoints`` are states and chances to be wrong by name; if empty, all are tracked.
         """
         known = {
             name: values[name]

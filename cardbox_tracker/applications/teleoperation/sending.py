@@ -34,11 +34,7 @@ def line(content: dict[str, Any]) -> bytes:
 
 
 def optional(name: str) -> Any:
-    """Return a module of the extra ``teleoperation``.
-
-    Raises:
-        CardboxError: it is not installed.
-    """
+    """Return a module of the extra ``teleoperation``, or raise CardboxError."""
     try:
         return importlib.import_module(name)
     except ImportError as error:
@@ -60,11 +56,7 @@ class ZmqSender:
     """Publishes packets by ZMQ; who subscribes later misses the first ones."""
 
     def __init__(self, address: str) -> None:
-        """Listen on ``address``, such as ``tcp://127.0.0.1:5556``.
-
-        Raises:
-            CardboxError: pyzmq is not installed, or the address cannot be used.
-        """
+        """Listen on ``address``, such as ``tcp://127.0.0.1:5556``, or raise CardboxError."""
         zmq = optional("zmq")
         self._context = zmq.Context()
         self._socket = self._context.socket(zmq.PUB)
@@ -132,11 +124,7 @@ def sonic_packet(body: FullBody, number: int) -> bytes:
 
 
 def isaac_packet(body: FullBody, _: int) -> bytes:
-    """Return the msgpack of Isaac Teleop's full body, in OpenXR's axes, the feet on the floor.
-
-    Raises:
-        CardboxError: msgpack is not installed.
-    """
+    """Return the msgpack of Isaac Teleop's body in OpenXR's axes, or raise CardboxError."""
     points_m = body.points_m @ rotation_z(np.array(body.yaw_rad)).T @ _TO_OPENXR.T
     points_m[:, 1] -= points_m[_FEET, 1].min()
     turned = Rotation.from_rotvec([0.0, 0.0, body.yaw_rad]) * Rotation.from_quat(

@@ -77,11 +77,7 @@ _JPEG_QUALITY = 92
 
 
 def layout(has_truth: bool = False, is_live: bool = False) -> Any:
-    """Return the blueprint of the views.
-
-    Raises:
-        CardboxError: rerun-sdk is not installed.
-    """
+    """Return the blueprint of the views; raise CardboxError if rerun-sdk is not installed."""
     views = rerun().blueprint
     # The heights of plots with joints, errors and states.
     error, shares = ([_plot(_ERROR, "error [cm]")], [2]) if has_truth else ([], [])
@@ -141,11 +137,7 @@ class Scene:
         self._states: tuple[int, Sequence[str]] | None = None
 
     def model(self, text: str, source: str) -> None:
-        """Show the person of a body model, YAML text, from now on; ``source`` names it in errors.
-
-        Raises:
-            CardboxError: the text is no body model.
-        """
+        """Show the person of a body model, YAML, from now on; CardboxError names ``source``."""
         body = loads_body_model(text, source=source)
         if body != self._body:
             self._body = body
@@ -156,11 +148,7 @@ class Scene:
         self._robot("person", urdf_from_body(self._body, hands=self._has_hands))
 
     def robot(self, name: str, urdf: str) -> None:
-        """Show a robot beside the person; it faces the camera.
-
-        Raises:
-            CardboxError: the description cannot be read.
-        """
+        """Show a robot beside the person, facing the camera, or raise CardboxError."""
         root = self._robot(name, urdf)
         put = self._rr.Transform3D(
             translation=_ROBOT_PLACE_M,
@@ -222,10 +210,7 @@ class Scene:
         self._states = stamp_ns, states
 
     def keypoints(self, stamp_ns: int, points_m: FloatArray) -> None:
-        """Show keypoints (6, 3), metres in the optical frame, and plot their errors.
-
-        Uncertain joints are yellow, lost ones red and hidden ones grey. Other shapes are ignored.
-        """
+        """Show keypoints (6, 3), m in the optical frame, coloured by state; plot the errors."""
         if points_m.shape != (6, 3) or not np.isfinite(points_m).all():
             return
         self._at(stamp_ns)
@@ -315,12 +300,9 @@ def errors_cm(points_m: FloatArray, truth_m: FloatArray) -> dict[str, float]:
 
 
 def level_points(points_m: FloatArray, pitch_rad: float, roll_rad: float = 0.0) -> FloatArray:
-    """Transform optical points (n, 3) to the level frame of the URDF's root: X ahead, Y left, Z up.
+    """Return optical points (n, 3), m, in the level frame of the root: X ahead, Y left, Z up.
 
-    Args:
-        points_m: points in the optical frame, metres: x to the right, y down, z ahead.
-        pitch_rad: downward pitch of the camera.
-        roll_rad: its roll.
+    The camera looks down by ``pitch_rad`` and is turned by ``roll_rad``.
     """
     return np.asarray(points_m @ level_to_optical(pitch_rad, roll_rad) * (-1.0, -1.0, 1.0))
 
@@ -343,11 +325,7 @@ _ROBOT_TOPIC, _JOINTS_TOPIC = "/robot_description", "/joint_states"
 def show_results(
     path: Path, scene: Scene, progress: Callable[[float], None], person: int | None = None
 ) -> int:
-    """Show a bag of results; return the number of images with joints.
-
-    Raises:
-        BagError: the bag has no results of the tracker, or is damaged.
-    """
+    """Show a bag; return the number of images with joints, or raise BagError without any."""
     count = 0
     with BagReader(path) as bag:
         space = namespace_of(bag, person)

@@ -1,7 +1,7 @@
 """Opens recordings of the optional library rerun-sdk: to a file, in a window or in a browser.
 
-The page of Rerun reports its use to its maker and loads fonts and news. A content security policy
-restricts the browser to this computer, so nothing of a session is sent out.
+A content security policy restricts the browser to this computer, since the page of Rerun reports
+its use to its maker and loads fonts and news.
 """
 
 from __future__ import annotations
@@ -36,11 +36,7 @@ _TIMEOUT_S = 10.0
 
 
 def rerun() -> Any:
-    """Return the module rerun.
-
-    Raises:
-        CardboxError: the library is not installed; the text gives the command.
-    """
+    """Return the module rerun, or raise CardboxError with the command that installs it."""
     try:
         import rerun as module
         import rerun.blueprint
@@ -62,19 +58,11 @@ def rerun_program() -> tuple[str, ...]:
 
 @contextmanager
 def recording(blueprint: Any, save: Path | None, web: bool) -> Iterator[tuple[Any, str]]:
-    """Context of a stream to a file, to a browser, or by default to a window.
+    """Context of a stream and its address: to a ``save`` .rrd file, a ``web`` browser or a window.
 
-    Args:
-        blueprint: arrangement of the views.
-        save: .rrd file, which is written atomically at the end.
-        web: serve the viewer to a browser while the context lasts.
-
-    Yields:
-        The stream, and the address for a browser, which is empty without ``web``.
-
-    Raises:
-        CardboxError: rerun-sdk is not installed, the file cannot be written, or neither a port nor
-            a window can be opened.
+    The file is written atomically at the end; the address is empty without ``web``. Raises
+    CardboxError if rerun-sdk is not installed, the file cannot be written, or neither a port nor a
+    window can be opened.
     """
     rr = rerun()
     if save is None and not web and not _has_display():
@@ -114,14 +102,9 @@ def _has_display() -> bool:
 
 @contextmanager
 def web_page(program: Sequence[str], port: int = PORT) -> Iterator[str]:
-    """Context of the viewer's page; gives its address.
+    """Context of the page of the command ``program`` on ``port``, 0 for any; gives its address.
 
-    Args:
-        program: command of Rerun.
-        port: port of this computer; 0 takes any free one.
-
-    Raises:
-        OSError: the port is in use.
+    Raises OSError if the port is in use.
     """
     files_port = _free_port()
     try:
@@ -143,10 +126,7 @@ def web_page(program: Sequence[str], port: int = PORT) -> Iterator[str]:
 
 @contextmanager
 def _files(program: Sequence[str], port: int) -> Iterator[None]:
-    """Context of Rerun's server of the viewer's files, for this computer alone.
-
-    The server within a Python process would listen to all computers.
-    """
+    """Context of Rerun's server for this computer; its server in Python listens to all."""
     words = "--serve-web", "--bind", THIS_COMPUTER
     numbers = "--web-viewer-port", str(port), "--port", str(_free_port())
     # Rerun reports its use to its maker, but not from tests.

@@ -230,11 +230,7 @@ def _last_before(truth: GroundTruth, time_s: float) -> int:
 def track_through_nodes(
     session: Path, truth: GroundTruth, start_s: float, output: Path, preset: str, seed: int
 ) -> tuple[float, float]:
-    """Play ``session`` to the nodes, which measure and track the person; record ``output``/bag.
-
-    Returns:
-        Joint states a second, and the mean fit of the references.
-    """
+    """Play ``session`` to the nodes, record ``output``/bag; return rate, Hz, and mean fit."""
     pauses = {name: round(float(np.mean(truth.spans[name])), 3) for name in REFERENCE_NAMES}
     with running_nodes(output) as nodes, result_writer(output / "bag", overwrite=True) as bag:
         client = Client(nodes, bag, truth.cameras)

@@ -50,14 +50,8 @@ def image_of(
 ) -> ImageArray:
     """Return an image message as (H, W, 3) bgr, or as (H, W) if it has no colours.
 
-    Args:
-        message: the message.
-        most_pixels: limit of the pixels.
-        levels: what scales 16 bits, see :func:`.decode_grey`.
-
-    Raises:
-        EncodingError: the encoding is not supported, the bytes do not match it, or the image has
-            more than ``most_pixels``.
+    ``levels`` scales 16 bits, see :func:`.decode_grey`. Raises EncodingError if the encoding is not
+    supported, the bytes do not match it, or there are more than ``most_pixels``.
     """
     if isinstance(message, CompressedImage):
         return decode_compressed(message.data, most_pixels, levels)
@@ -65,19 +59,15 @@ def image_of(
 
 
 def most_pixels_of(calibration: Calibration) -> float:
-    """Return the largest number of pixels to decode for a camera.
-
-    It is sixteen times the size of the calibration at most; a few bytes can expand to gigabytes.
-    """
+    """Return the most pixels to decode, 16 times those calibrated; few bytes can be gigabytes."""
     return min(MOST_PIXELS, 16.0 * calibration.width * calibration.height)
 
 
 def image_behind(silhouette: ImageArray, message: Image | None) -> ImageArray | None:
     """Return the image (H, W, 3) or (H, W) of a silhouette (H, W); None without a message.
 
-    Raises:
-        CameraError: image and silhouette differ in size.
-        EncodingError: the encoding is not supported or the bytes do not match it.
+    Raises CameraError if image and silhouette differ in size, and EncodingError if the encoding is
+    not supported or the bytes do not match it.
     """
     if message is None:
         return None
@@ -96,10 +86,8 @@ def silhouette_of(message: Image) -> ImageArray:
     """Return the silhouette (H, W), 0 or 255, of a mask with one number for each pixel.
 
     :func:`~cardbox_tracker.camera.given_arrays.silhouette_from` says which pixels are the person.
-
-    Raises:
-        EncodingError: the encoding is not that of a mask, the bytes do not match the size, or the
-            values are impossible.
+    Raises EncodingError if the encoding is not that of a mask, the bytes do not match the size, or
+    the values are impossible.
     """
     if message.encoding not in _MASKS:
         raise EncodingError(
@@ -123,10 +111,7 @@ def silhouette_of(message: Image) -> ImageArray:
 
 
 def image_message(header: Header, image: NDArray[Any], encoding: str = "") -> Image:
-    """Return a message of ``image`` (H, W) or (H, W, 3), uint8 or float32.
-
-    Without an ``encoding`` it is mono8 or bgr8.
-    """
+    """Return a message of (H, W) or (H, W, 3), uint8 or float32, mono8 or bgr8 by default."""
     contiguous = np.ascontiguousarray(image)
     message = Image(
         header=header,
@@ -145,10 +130,7 @@ def image_message(header: Header, image: NDArray[Any], encoding: str = "") -> Im
 def camera_info_message(
     header: Header, camera: Camera, source: CameraInfo | None = None
 ) -> CameraInfo:
-    """Return the CameraInfo of an ideal pinhole camera without distortion.
-
-    R, and the baseline in P, are copied from ``source``, the CameraInfo of the original image.
-    """
+    """Return a pinhole camera's CameraInfo, with R and the baseline in P of ``source``."""
     k = [camera.fx, 0.0, camera.cx, 0.0, camera.fy, camera.cy, 0.0, 0.0, 1.0]
     message = _info(header, camera.width, camera.height, "plumb_bob", [0.0] * 5, k)
     if source is not None:
@@ -208,11 +190,7 @@ def is_same_info(one: CameraInfo, other: CameraInfo) -> bool:
 
 
 def camera_of(message: CameraInfo) -> Camera:
-    """Return the pinhole camera of a ``silhouette/camera_info``.
-
-    Raises:
-        CameraError: the size or the matrix is invalid, or the image is distorted.
-    """
+    """Return the pinhole camera of a ``silhouette/camera_info``, or raise CameraError."""
     k = message.k
     pixels = message.width * message.height
     if pixels > _MOST_WORKING_PIXELS:

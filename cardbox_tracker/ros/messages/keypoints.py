@@ -43,13 +43,7 @@ Convert = Callable[[Any, Size], list[ImagePoints]]
 
 
 def keypoints_message(header: Header, px: FloatArray, scores: FloatArray) -> PolygonStamped:
-    """Return the message of the landmarks of one person.
-
-    Args:
-        header: header of the image.
-        px: column and row of each of ``LANDMARKS``, (33, 2).
-        scores: chance that each is right, (33,); all zero if nobody is there.
-    """
+    """Return the message of one person's ``LANDMARKS``, (33, 2), px, and scores, (33,)."""
     points = [
         Point32(x=float(px[i, 0]), y=float(px[i, 1]), z=float(scores[i]))
         for i in map(LANDMARKS.index, MESSAGE_NAMES)
@@ -88,10 +82,8 @@ def skeleton_message(
 def persons_of_polygon(message: Any, size: Size) -> list[ImagePoints]:
     """Return the people of a PolygonStamped, each with all points of ``MESSAGE_NAMES``.
 
-    One person may lack the knuckles.
-
-    Raises:
-        CardboxError: the number of points is wrong, or a point is impossible.
+    One person may lack the knuckles. Raises CardboxError if the number of points is wrong, or a
+    point is impossible.
     """
     points = message.polygon.points
     if not points:
@@ -116,11 +108,7 @@ def persons_of_polygon(message: Any, size: Size) -> list[ImagePoints]:
 
 
 def persons_of_skeleton(message: Any, size: Size) -> list[ImagePoints]:
-    """Return the person of a Skeleton2D.
-
-    Raises:
-        CardboxError: the number of points is wrong, or a point is impossible.
-    """
+    """Return the person of a Skeleton2D, or raise CardboxError for wrong points."""
     points, (width, height) = message.skeleton, size
     if len(points) != len(SKELETON_NAMES):
         raise CardboxError(
@@ -132,11 +120,7 @@ def persons_of_skeleton(message: Any, size: Size) -> list[ImagePoints]:
 
 
 def persons_of_detections(message: Any, size: Size) -> list[ImagePoints]:
-    """Return the persons of a DetectionArray of yolo_msgs that have keypoints.
-
-    Raises:
-        CardboxError: there are too many persons, a point has an unknown number, or is impossible.
-    """
+    """Return the persons with keypoints of yolo_msgs' DetectionArray, or raise CardboxError."""
     found = message.detections
     if len(found) > _MOST_PERSONS:
         raise CardboxError(f"{len(found)} detections; expected at most {_MOST_PERSONS}")

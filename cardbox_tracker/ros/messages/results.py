@@ -32,11 +32,7 @@ from cardbox_tracker.recordings.outputs import (
 
 
 def joint_state_message(header: Header, joints: JointValues) -> JointState:
-    """Return joint values, rad and metres (or their deviations), as positions, and velocities.
-
-    Raises:
-        NotFiniteError: a value is not a finite number.
-    """
+    """Return joint values or deviations, rad and m, and velocities, or raise NotFiniteError."""
     message = JointState(
         header=header,
         name=list(joints.names),
@@ -56,9 +52,8 @@ def joint_values_of(message: JointState) -> JointValues:
 def posture_of(message: JointState) -> FloatArray:
     """Return the posture (12,), or its deviations, of a message of the tracker.
 
-    Raises:
-        NotFiniteError: a value is not a finite number.
-        CardboxError: a joint is missing, or the numbers of names and values differ.
+    Raises NotFiniteError if a value is not a finite number, and CardboxError if a joint is missing,
+    or the numbers of names and values differ.
     """
     try:
         found = posture_from(joint_values_of(message))
@@ -68,10 +63,9 @@ def posture_of(message: JointState) -> FloatArray:
 
 
 def neck_of(message: JointState) -> FloatArray | None:
-    """Return ``neck_yaw`` and ``neck_pitch`` (2,), rad, or their deviations; None if missing.
+    """Return ``neck_yaw`` and ``neck_pitch`` (2,), rad, or deviations; None if missing.
 
-    Raises:
-        NotFiniteError: a value is not a finite number.
+    Raises NotFiniteError if a value is not a finite number.
     """
     found = neck_from(joint_values_of(message))
     return None if found is None else _finite(found, "joint states")
@@ -80,20 +74,15 @@ def neck_of(message: JointState) -> FloatArray | None:
 def posture_and_neck_of(message: JointState) -> FloatArray:
     """Return the posture, and the neck if it is there, or their deviations; (12,) or (14,).
 
-    Raises:
-        NotFiniteError: a value is not a finite number.
-        CardboxError: a joint is missing, or the numbers of names and values differ.
+    Raises NotFiniteError if a value is not a finite number, and CardboxError if a joint is missing,
+    or the numbers of names and values differ.
     """
     posture, neck = posture_of(message), neck_of(message)
     return posture if neck is None else np.concatenate([posture, neck])
 
 
 def points_message(header: Header, points: Points) -> PoseArray:
-    """Return points, metres in the frame of ``header``, as poses without rotation.
-
-    Raises:
-        NotFiniteError: a coordinate is not a finite number.
-    """
+    """Return points, m in the frame of ``header``, without rotation, or raise NotFiniteError."""
     upright = Quaternion(w=1.0)
     return PoseArray(
         header=header,
@@ -102,11 +91,7 @@ def points_message(header: Header, points: Points) -> PoseArray:
 
 
 def markers_message(header: Header, markers: Markers) -> MarkerArray:
-    """Return shapes in the frame of ``header``; without shapes, remove the earlier ones.
-
-    Raises:
-        NotFiniteError: a coordinate is not a finite number.
-    """
+    """Return shapes in the frame of ``header``, instead of all before, or raise NotFiniteError."""
     if not markers.shapes:
         return MarkerArray(markers=[Marker(header=header, action=Marker.DELETEALL)])
     return MarkerArray(markers=[_marker(header, shape) for shape in markers.shapes])
@@ -201,11 +186,7 @@ def refused_message(text: str) -> DiagnosticStatus:
 
 
 def mean_iou_of(message: DiagnosticStatus) -> float:
-    """Return the mean fit of the references, 0 to 1.
-
-    Raises:
-        ValueError: the initialization failed; the text has the reason.
-    """
+    """Return the mean fit of the references, 0 to 1, or raise ValueError with the reason."""
     values = {entry.key: entry.value for entry in message.values}
     if _MEAN_IOU not in values:
         raise ValueError(message.message)

@@ -13,11 +13,7 @@ _TYPE = re.compile(r"([a-z][a-z0-9_]{0,99})/msg/([A-Z][A-Za-z0-9]{0,99})")
 
 
 def message_class(topic: str, kind: str) -> Any:
-    """Return the class of the message type ``kind``, such as ``sensor_msgs/msg/Image``.
-
-    Raises:
-        BagError: the type is not installed; the text names ``topic``.
-    """
+    """Return the class of a message type, or raise BagError with ``topic``."""
     parts = _TYPE.fullmatch(kind)
     if parts is None:
         raise BagError(
@@ -46,10 +42,9 @@ def optional_class(package: str, name: str) -> Any:
 def message_classes(
     kinds: Mapping[str, str], chosen: Iterable[str], leave_out: Callable[[str], None]
 ) -> dict[str, Any]:
-    """Return the class of each topic's messages; ``leave_out`` is told of those not installed.
+    """Return the class of each topic; ``leave_out`` is told of those not installed.
 
-    Raises:
-        BagError: the type of a chosen topic is not installed, or no type is.
+    Raises BagError if a chosen topic's type, or every type, is not installed.
     """
     names = list(chosen)
     if names:

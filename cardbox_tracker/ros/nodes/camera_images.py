@@ -51,14 +51,10 @@ class CameraImages:
         deliver: Deliver,
         roll_deg: float = 0.0,
     ) -> None:
-        """Subscribe with ``node`` and report on its diagnostics.
+        """Subscribe with ``node``, ``raw`` or ``compressed``, and report on its diagnostics.
 
-        Args:
-            node: the node.
-            transport: ``raw`` or ``compressed``.
-            changed: called with the first calibration, and with another one that lasts.
-            deliver: called with each image once the calibration is known.
-            roll_deg: roll of the camera, degrees.
+        ``changed`` is called with the first calibration and others that last, ``deliver`` with each
+        image once it is known; ``roll_deg`` is that of the camera.
         """
         self._node = node
         self._changed, self._deliver = changed, deliver
@@ -144,11 +140,7 @@ class CameraImages:
 
 
 class SilhouetteOutputs:
-    """Publishes silhouettes with the image behind each and the camera of both.
-
-    Attributes:
-        covered: fraction of the last silhouette that is foreground.
-    """
+    """Publishes silhouettes, images and camera; ``covered`` is the last one's foreground share."""
 
     def __init__(self, node: CardboxNode) -> None:
         """Advertise the topics for ``node``."""

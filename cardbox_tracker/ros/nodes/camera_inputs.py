@@ -103,22 +103,15 @@ class Received(NamedTuple):
 
 @dataclass(frozen=True)
 class ObservationSet:
-    """Observations of all cameras at one time.
+    """Observations of all cameras at one time."""
 
-    Attributes:
-        header: header in the first camera's frame, with the stamp of its silhouette, or of the
-            earliest one.
-        headers: header of each camera's silhouette, the first camera's first; None without one.
-        observations: observation of each camera, as a tracker takes them.
-        sent_ns: send time of the last silhouette, ns since the epoch.
-        nothing: black image (H, W) of the first camera.
-    """
-
+    #: header in the first camera's frame, with the stamp of its silhouette, or of the earliest one
     header: Header
+    #: header of each camera's silhouette, the first camera's first; None without one
     headers: list[Header | None]
-    observations: list[Observation]
-    sent_ns: int
-    nothing: ImageArray
+    observations: list[Observation]  #: observation of each camera, as a tracker takes them
+    sent_ns: int  #: send time of the last silhouette, ns since the epoch
+    nothing: ImageArray  #: black image (H, W) of the first camera
 
     def picture(self, number: int = 0) -> ImageArray:
         """Return a camera's image, or its silhouette, or a black image."""
@@ -142,18 +135,12 @@ class CameraInputs:
         changed: Callable[[Camera | None, Sequence[OtherCamera]], None],
         deliver: Callable[[Received, Sequence[Received | None]], None],
     ) -> None:
-        """Subscribe with ``node``.
+        """Subscribe with ``node``, the tracker.
 
-        Args:
-            node: the tracker.
-            settings: its parameters.
-            changed: called with the first and the further cameras when all are known or one has
-                changed; called with None if their poses are no longer known.
-            deliver: called with the silhouette whose stamp represents the set, and with the
-                messages of one time, for :meth:`observed`.
-
-        Raises:
-            CardboxError: the file of the extrinsics cannot be read, or a name is not allowed.
+        ``changed`` is called with the first and the further cameras when all are known or one has
+        changed, and with None if their poses are no longer known; ``deliver`` with the silhouette
+        whose stamp represents the set, and the messages of one time, for :meth:`observed`. Raises
+        CardboxError if the file of the extrinsics cannot be read, or a name is not allowed.
         """
         cameras = settings.cameras or [""]
         self._changed, self._deliver = changed, deliver
@@ -236,12 +223,9 @@ class CameraInputs:
         return first or min(there, key=lambda one: _stamp_ns(one.message))
 
     def observed(self, received: Sequence[Received | None]) -> ObservationSet:
-        """Convert delivered messages to arrays, once the cameras are known.
+        """Convert delivered messages to arrays, without unreadable ones, which are reported.
 
-        A message that cannot be read is dropped and reported.
-
-        Raises:
-            CameraError: no silhouette can be read.
+        Raises CameraError if no silhouette can be read.
         """
         first = self._poses.first
         assert first is not None

@@ -53,19 +53,12 @@ class DepthInput:
 
 
 class Taken(NamedTuple):
-    """An image or a depth image that waits for its counterpart.
+    """An image or a depth image that waits for its counterpart."""
 
-    Attributes:
-        message: header of the image, or the depth image.
-        camera: camera of the image; None for a depth image.
-        within_m: depth limit at the time of the image, metres.
-        sent_ns: send time, ns since the epoch.
-    """
-
-    message: Any
-    camera: Camera | None
-    within_m: float
-    sent_ns: int
+    message: Any  #: header of the image, or the depth image
+    camera: Camera | None  #: camera of the image; None for a depth image
+    within_m: float  #: depth limit at the time of the image, metres
+    sent_ns: int  #: send time, ns since the epoch
 
 
 Send = Callable[[Header, ImageArray, Camera, int], None]
@@ -73,11 +66,7 @@ Send = Callable[[Header, ImageArray, Camera, int], None]
 
 
 class DepthCut:
-    """Pairs images with depth images and cuts out the pixels nearer than a limit.
-
-    Attributes:
-        depth_m: last depth image, metres, as the camera sees it; empty before it.
-    """
+    """Pairs images with depth, the last ``depth_m``, and cuts out pixels nearer than a limit."""
 
     def __init__(self, node: CardboxNode, topic: str, send: Send) -> None:
         """Subscribe with ``node`` to depth images on ``topic``; ``send`` receives silhouettes."""

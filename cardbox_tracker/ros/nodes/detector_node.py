@@ -34,7 +34,7 @@ from cardbox_tracker.ros.nodes.shared_parameters import (
 from cardbox_tracker.ros.runtime import qos
 from cardbox_tracker.ros.runtime.command_line import node_main
 from cardbox_tracker.ros.runtime.node import CardboxNode
-from cardbox_tracker.ros.runtime.parameter_fields import AT_START, NodeParameters, parameter
+from cardbox_tracker.ros.runtime.parameter_fields import NodeParameters, at_start, parameter
 from cardbox_tracker.ros.runtime.parameters import LiveParameters
 from cardbox_tracker.ros.runtime.publishers import SinglePublisher
 from cardbox_tracker.segmentation.silhouettes import SilhouettePipeline
@@ -91,23 +91,15 @@ class DetectorParameters(NodeParameters):
     """Find a person with a neural network: images in, 2D points and silhouettes out."""
 
     image_transport: str = image_transport_parameter()
-    width: int = parameter(
-        320, "working resolution, width", unit="px", limits=(32, 4096), effect=AT_START
-    )
-    height: int = parameter(
-        240, "working resolution, height", unit="px", limits=(32, 4096), effect=AT_START
-    )
-    publish_silhouette: bool = parameter(
+    width: int = at_start(320, "working resolution, width", unit="px", limits=(32, 4096))
+    height: int = at_start(240, "working resolution, height", unit="px", limits=(32, 4096))
+    publish_silhouette: bool = at_start(
         False,
         "also publish the person's mask on silhouette, instead of the node background, which must "
         "not run beside it",
-        effect=AT_START,
     )
-    people: int = parameter(
-        0,
-        "number of people to find at most; 0: one, who is followed",
-        limits=(0, MOST_PEOPLE),
-        effect=AT_START,
+    people: int = at_start(
+        0, "number of people to find at most; 0: one, who is followed", limits=(0, MOST_PEOPLE)
     )
     rate_hz: float = parameter(
         10.0,
@@ -123,14 +115,9 @@ class DetectorNode(CardboxNode):
     """Looks at the newest image; images that come in the meantime are left out."""
 
     def __init__(self, person: PersonDetector | None = None, **options: Any) -> None:
-        """Load the networks, subscribe to the camera and wait for its images.
+        """Load the networks, unless a ``person`` is given that finds people, and subscribe.
 
-        Args:
-            person: finds the person in images; the installed detector without one.
-            options: options of :class:`CardboxNode`.
-
-        Raises:
-            CardboxError: the detector is not installed.
+        Raises CardboxError if the detector is not installed.
         """
         super().__init__("detector", **options)
         self.parameters = LiveParameters(self, DetectorParameters)
@@ -213,10 +200,7 @@ class DetectorNode(CardboxNode):
     def _send_points(
         self, header: Header, found: Sequence[Detection], pipeline: SilhouettePipeline
     ) -> None:
-        """Publish the points, all with the score 0 if nobody is there; of several as skeleton one.
-
-        The skeleton is that of the first person.
-        """
+        """Publish all points, with the score 0 if nobody is there, and the first skeleton."""
         calibration, camera = pipeline.calibration, pipeline.camera
         size = camera.width, camera.height
         people = [

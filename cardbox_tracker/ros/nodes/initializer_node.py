@@ -219,10 +219,9 @@ class InitializerNode(CardboxNode):
 
 
 class GuideOutputs:
-    """Outputs of the guidance: drawings on ``overlay`` and words to say aloud on ``~/say``.
+    """Outputs of the guidance: drawings on ``overlay``, words on ``~/say``, more on ``~/status``.
 
-    ``~/status`` has the details for the operator. While ``~/guiding`` is true, the tracker does not
-    publish ``overlay``.
+    While ``~/guiding`` is true, the tracker does not publish ``overlay``.
     """
 
     def __init__(self, node: CardboxNode) -> None:
@@ -264,10 +263,7 @@ class GuideOutputs:
         camera: Camera | None,
         settings: InitializerParameters,
     ) -> None:
-        """Draw the current prompt over an image if there is a prompt and a subscriber.
-
-        ``message`` is the silhouette, and ``seen`` its image, if that came in time.
-        """
+        """Draw a prompt over ``seen``, the image of the silhouette ``message``, if it is wanted."""
         prompt = self._prompt
         if prompt is None or camera is None or not self._overlay.get_subscription_count():
             return

@@ -67,9 +67,8 @@ class InputStream:
 class ClockDifference:
     """How far the clocks of two streams are apart, by when their images arrive.
 
-    Images of the same moment arrive at almost the same time, so that a steady difference of their
-    stamps is one of the clocks, or of the time that the images take to arrive. The median is not
-    disturbed by single images that are late.
+    Images of the same moment arrive at almost the same time, so a steady difference of their stamps
+    is one of the clocks, or of the time on the way. Late images do not change the median.
     """
 
     def __init__(self, first: InputStream, other: InputStream) -> None:
@@ -86,10 +85,9 @@ class ClockDifference:
 
     @property
     def medians_s(self) -> tuple[float, float]:
-        """Differences of the stamps and of the computers' clocks, seconds; 0 while unknown.
+        """Differences of stamps that arrive together, and of clocks, s; 0 while unknown.
 
-        The stamps are those of images that arrive together. Both are positive if the clock of the
-        other stream is ahead.
+        Both are positive if the clock of the other stream is ahead.
         """
         is_known = len(self._found) >= _LEAST and self._other.age_s < _RECENT_S
         stamps_s, computers_s = np.median(self._found, axis=0) if is_known else (0.0, 0.0)

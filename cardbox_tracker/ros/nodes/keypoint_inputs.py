@@ -45,17 +45,11 @@ _IN_DOUBT = 5
 
 
 class Taken(NamedTuple):
-    """Points of all persons in one image, in pixels of the camera's own image.
+    """Points of all persons in one image, in pixels of the camera's own image."""
 
-    Attributes:
-        stamp_ns: stamp of the image.
-        frame_id: frame of the image; empty if it is not known.
-        persons: points of each person.
-    """
-
-    stamp_ns: int
-    frame_id: str
-    persons: list[ImagePoints]
+    stamp_ns: int  #: stamp of the image
+    frame_id: str  #: frame of the image; empty if it is not known
+    persons: list[ImagePoints]  #: points of each person
 
 
 class KeypointTopic:
@@ -84,12 +78,7 @@ class KeypointTopic:
         self._timer = node.create_timer(_LOOK_S, self._look, clock=steady)
 
     def take(self, at_ns: int, frame_id: str) -> Taken | None:
-        """Return the newest points for a silhouette, once; None if there are none in time.
-
-        Args:
-            at_ns: stamp of the silhouette.
-            frame_id: frame of the silhouette.
-        """
+        """Return the newest points for a silhouette of this stamp and frame, once, or None."""
         self._asked_ns, newest = at_ns, None
         while self._kept and self._kept[0].stamp_ns <= at_ns + SAME_TIME_NS:
             newest = self._kept.popleft()
@@ -215,18 +204,10 @@ _BESIDE = 10
 
 
 class KeypointInputs:
-    """The points of all cameras; the tracker never waits for them.
-
-    Attributes:
-        cameras: those of each camera; empty without a source of points.
-    """
+    """The points of all ``cameras``, none without a source; the tracker never waits for them."""
 
     def __init__(self, node: CardboxNode, settings: TrackerParameters) -> None:
-        """Subscribe with ``node``, the tracker, if its parameter ``keypoints`` is given.
-
-        Raises:
-            CardboxError: the table cannot be read, or the topic's name is not allowed.
-        """
+        """Subscribe with ``node`` if ``keypoints`` is given; raise CardboxError if it is wrong."""
         cameras = (settings.cameras or [""]) if settings.keypoints else []
         self.cameras = [CameraKeypoints(node, settings, name) for name in cameras]
         self._topics = [one.topic for one in self.cameras if one.topic is not None]
@@ -290,13 +271,10 @@ class CameraKeypoints:
         silhouette: ImageArray,
         tolerance_ns: int = TOLERANCE_NS,
     ) -> ImagePoints | None:
-        """Return the points for a silhouette, px of the silhouette, if there are any.
+        """Return the points for a silhouette (H, W), 0 or 255, px of it, if there are any.
 
-        Args:
-            header: header of the silhouette.
-            camera: camera of the silhouette.
-            silhouette: (H, W), 0 or 255, in which the person is looked for among several.
-            tolerance_ns: half the time between images, within which points of a table join.
+        Of several people it chooses the one in the silhouette; points of a table join within
+        ``tolerance_ns``.
         """
         calibration, at_ns = self._watch.current, stamp_ns(header.stamp)
         taken = self._taken(at_ns, header.frame_id, tolerance_ns)

@@ -38,10 +38,9 @@ _COMPRESSED = "/compressed"
 
 
 def find_topics(bag: str, wanted: Iterable[str], cameras: Sequence[str] = ()) -> dict[str, str]:
-    """Return the topics of a bag as values of the launch arguments of the same names.
+    """Return the topics of a bag as launch arguments: ``image``, its transport, ``camera_info``.
 
-    Wanted are ``image``, with ``image_transport``, and ``camera_info``; those of several
-    ``cameras`` are relative to each namespace.
+    Those of several ``cameras`` are relative to each namespace.
     """
     with BagReader(bag) as reader:
         images = reader.image_topics
@@ -233,11 +232,7 @@ class PlayBagNode(CardboxNode):
             self._executor.spin_once(timeout_sec=0.1 if self._paused else min(left_s, 0.1))
 
     def _settle(self, delay_s: float) -> None:
-        """Serve calls until no subscriber has come or gone for ``delay_s``.
-
-        DDS matches a subscriber topic by topic. The nodes of several cameras start one after the
-        other, so the player waits longer while images of one camera have no subscriber.
-        """
+        """Serve calls until subscribers rest for ``delay_s``, longer while a camera has none."""
         subscribers, since_s = list[int](), time.monotonic()
         others_s = _OTHER_CAMERAS_S if delay_s and self.parameters.value.wait_for_subscribers else 0
         while True:

@@ -20,24 +20,15 @@ from cardbox_tracker.tracking.estimate import TRACKING, UNCERTAIN
 
 
 class Tracked(NamedTuple):
-    """What the tracker says of an image.
+    """What the tracker says of an image."""
 
-    Attributes:
-        stamp_ns: its stamp; without a posture that of the image before.
-        state: tracking state.
-        body: the person; None if not known yet.
-        joints: joint states; None without a posture, as the rest.
-        stddev: their deviations.
-        hands: how open the hands are; None if that is not known.
-        keypoints: state and chance to be wrong by keypoint; None if not known.
-    """
-
-    stamp_ns: int
-    state: str
-    body: BodyModel | None
-    joints: JointState | None = None
-    stddev: JointState | None = None
-    hands: JointState | None = None
+    stamp_ns: int  #: its stamp; without a posture that of the image before
+    state: str  #: tracking state
+    body: BodyModel | None  #: the person; None if not known yet
+    joints: JointState | None = None  #: joint states; None without a posture, as the rest
+    stddev: JointState | None = None  #: their deviations
+    hands: JointState | None = None  #: how open the hands are; None if that is not known
+    #: state and chance to be wrong by keypoint; None if not known
     keypoints: dict[str, tuple[str, float]] | None = None
 
 

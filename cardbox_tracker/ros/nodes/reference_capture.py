@@ -112,12 +112,9 @@ class ReferenceCapture:
             )
 
     def capture(self, name: str, camera: Camera | None, config: InitializationConfig) -> str:
-        """Keep the majority of the latest silhouettes as the reference ``name``.
+        """Keep most of the latest silhouettes as reference ``name``; return words on the rest.
 
         If the working camera is known, the posture is compared with the requested one.
-
-        Returns:
-            Text with the result and the missing references, for a person.
         """
         self.check_running()
         alike = alike_of(self._recent)
@@ -161,11 +158,7 @@ class DepthDistance:
         references: ReferenceCapture,
         camera: Callable[[], Camera | None],
     ) -> None:
-        """Subscribe with ``node``, the initializer, to depth images on ``topic``.
-
-        ``camera`` returns the camera of the silhouettes in ``references``, or None until it is
-        known.
-        """
+        """Subscribe to depth on ``topic``; ``camera`` returns that of the silhouettes, if known."""
         self._topic, self._references, self._camera = node.resolve(topic), references, camera
         self._recent: deque[tuple[int, DepthImage]] = deque(maxlen=_KEPT_DEPTHS)
         self._captured: dict[str, DepthImage] = {}

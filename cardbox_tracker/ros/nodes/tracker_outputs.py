@@ -5,28 +5,24 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from geometry_msgs.msg import Quaternion, Transform, TransformStamped, Vector3
 from sensor_msgs.msg import Image, JointState
 from std_msgs.msg import Bool, Header, String
 
 from cardbox_tracker.applications.drawing.overlay import draw_camera_overlay, draw_message
 from cardbox_tracker.camera.camera import OPTICAL_FRAME
-from cardbox_tracker.common.errors import CardboxError
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.model_file import dumps_body_model
 from cardbox_tracker.person.rep155 import Rep155Joints, head_joints, joint_names
-from cardbox_tracker.person.urdf import LinkTransform, LinkTransforms, rep155_urdf, urdf_from_body
+from cardbox_tracker.person.urdf import rep155_urdf
 from cardbox_tracker.recordings.outputs import (
     JointValues,
     Output,
     OutputStream,
     clavicles_of,
-    joint_values,
     neck_of,
     outputs,
     person_space,
     place_of,
-    positions_of,
 )
 from cardbox_tracker.ros.messages import conversions, results
 from cardbox_tracker.ros.messages.types import optional_class
@@ -61,30 +57,6 @@ class TrackedBodies:
             self._publisher.publish(self._ids_list(header=header, ids=ids))
 
 
-class BodyJoints:
-    """The joints of a body after REP-155.
-
-    Attributes:
-        names: their names, which end in the body's ID.
-    """
-
-    def __init__(self, body_id: str, torso_place: bool) -> None:
-        """Name the joints; with ``torso_place``, also those of place, head and clavicles."""
-        self._torso_place = torso_place
-        self.names = tuple(joint_names(body_id, torso_place))
-        self._convert = Rep155Joints()
-
-    def of(self, estimate: Estimate) -> JointValues | None:
-        """Return the joints of an estimate; None without a posture."""
-        if estimate.posture is None:
-            return None
-        values = self._convert(estimate.posture)
-        if self._torso_place:
-            others = place_of(estimate), head_joints(neck_of(estimate)), clavicles_of(estimate)
-            values = np.concatenate([values, *others])
-        return JointValues(self.names, values)
-
-
 class Rep155Outputs:
     """Publishes joints, URDF and presence of a body."""
 
@@ -94,7 +66,8 @@ class Rep155Outputs:
         """Advertise the topics of the body ``body_id``."""
         self._id, self._bodies = body_id, bodies
         self._torso_place = settings.torso_place
-        self._values = BodyJoints(body_id, settings.torso_place)
+        self._names = tuple(joint_names(body_id, settings.torso_place))
+        self._convert = Rep155Joints()
         self._described: tuple[Any, str] | None = None
         place = f"/humans/bodies/{body_id}"
         self._joints = node.advertise(JointState, f"{place}/joint_states", qos.RESULT)
@@ -111,79 +84,17 @@ class Rep155Outputs:
             return
         if self._described != (tracker.body, header.frame_id):
             self._described = (tracker.body, header.frame_id)
-            self._values = BodyJoints(self._id, self._torso_place)
+            self._convert = Rep155Joints()
             frame_id = header.frame_id or OPTICAL_FRAME
             urdf = rep155_urdf(tracker.body, self._id, frame_id, self._torso_place)
             for publisher in self._descriptions:
                 publisher.publish(String(data=urdf))
-        joints = self._values.of(estimate)
-        assert joints is not None
+        values = self._convert(estimate.posture)
+        if self._torso_place:
+            others = place_of(estimate), head_joints(neck_of(estimate)), clavicles_of(estimate)
+            values = np.concatenate([values, *others])
+        joints = JointValues(self._names, values)
         self._joints.publish(results.joint_state_message(header, joints))
-
-
-class TfOutputs:
-    """Publishes the frames of the links of ``robot_description`` for each image.
-
-    Of several people, these are the frames of REP-155, which end in the person's ID.
-    """
-
-    def __init__(
-        self, node: CardboxNode, settings: TrackerParameters, body_id: str | None = None
-    ) -> None:
-        """Advertise ``/tf`` for ``node``; ``body_id`` is the ID of one of several people."""
-        self._kind = optional_class("tf2_msgs", "TFMessage")
-        if self._kind is None:
-            raise CardboxError(
-                "publish_tf needs the package tf2_msgs, which is not installed; install it (sudo "
-                "apt install ros-jazzy-tf2-msgs; PyPI has none), or leave publish_tf off: "
-                "robot_state_publisher makes /tf from robot_description and joint_states, and the "
-                "bag of 'cardbox track --bag' has it"
-            )
-        self._publisher = node.advertise(self._kind, "/tf", qos.TF)
-        self._settings = settings
-        self._id, self._joints = body_id, None
-        if body_id is not None:
-            self._joints = BodyJoints(body_id, settings.torso_place)
-        self._described: tuple[Any, str] | None = None
-        self._links: LinkTransforms | None = None
-
-    def publish(self, header: Header, estimate: Estimate, tracker: Tracker) -> None:
-        """Publish the frames of an image if it has a posture."""
-        settings = self._settings
-        joints = (
-            joint_values(estimate, settings.torso_place)
-            if self._joints is None
-            else self._joints.of(estimate)
-        )
-        if joints is None:
-            return
-        if self._links is None or self._described != (tracker.body, header.frame_id):
-            self._described = (tracker.body, header.frame_id)
-            optical, place = header.frame_id, settings.torso_place
-            if self._id is not None:
-                frame_id = optical or OPTICAL_FRAME
-                urdf = rep155_urdf(tracker.body, self._id, frame_id, place)
-            else:
-                root = optical if settings.optical_frame_in_tf else ""
-                urdf = urdf_from_body(
-                    tracker.body, root or None, torso_place=place, hands=settings.hands
-                )
-            self._links = LinkTransforms(urdf)
-        links = self._links.at(positions_of(joints))
-        transforms = [_stamped(header, link) for link in links]
-        self._publisher.publish(self._kind(transforms=transforms))
-
-
-def _stamped(header: Header, link: LinkTransform) -> TransformStamped:
-    x, y, z = link.translation_m
-    qx, qy, qz, qw = link.rotation
-    return TransformStamped(
-        header=Header(stamp=header.stamp, frame_id=link.parent),
-        child_frame_id=link.child,
-        transform=Transform(
-            translation=Vector3(x=x, y=y, z=z), rotation=Quaternion(x=qx, y=qy, z=qz, w=qw)
-        ),
-    )
 
 
 class TrackerOutputs:
@@ -219,9 +130,6 @@ class TrackerOutputs:
         self._human = None
         if bodies is not None:
             self._human = Rep155Outputs(node, settings, settings.rep155_id + ending, bodies)
-        self._tf = None
-        if settings.publish_tf:
-            self._tf = TfOutputs(node, settings, None if person is None else f"person{ending}")
         self._guided = False
         node.subscribe(Bool, "initializer/guiding", self._on_guiding, qos.LATCHED)
 
@@ -240,8 +148,6 @@ class TrackerOutputs:
             self._publishers[output.topic].publish(results.message_of(header, value))
         if self._human is not None:
             self._human.publish(header, estimate, tracker)
-        if self._tf is not None:
-            self._tf.publish(header, estimate, tracker)
         if _wanted(self._overlay) and not self._guided:
             image = draw_camera_overlay(seen.picture(), 0, estimate, tracker)
             self._overlay.publish(conversions.image_message(header, image, "bgr8"))

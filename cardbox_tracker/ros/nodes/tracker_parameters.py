@@ -104,13 +104,10 @@ class TrackerParameters(NodeParameters):
         "also use silhouette/image to find hands and forearms in front of the torso by the colours "
         "in the body model",
     )
-    publish_tf: bool = at_start(
-        False,
-        "also publish the links of robot_description on /tf, instead of robot_state_publisher; "
-        "not for several trackers in one TF tree; needs the package tf2_msgs",
-    )
     optical_frame_in_tf: bool = at_start(
-        True, "publish_tf includes the camera's optical frame; false if another node publishes it"
+        True,
+        "robot_description of people who are not measured has the camera's optical frame; false "
+        "if another node publishes it",
     )
     rep155_id: str = at_start(
         "",

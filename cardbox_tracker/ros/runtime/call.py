@@ -1,7 +1,4 @@
-"""``cardbox call``: call a service of the running nodes without the command ``ros2``.
-
-The packages on PyPI contain rclpy but not ROS's command line.
-"""
+"""``cardbox call``: call a service of the nodes; PyPI has rclpy but not the command ``ros2``."""
 
 from __future__ import annotations
 
@@ -29,9 +26,7 @@ _TYPE = "std_srvs/srv/Trigger"
 def call_service(service: str, say: Callable[[str], None]) -> str:
     """Call a Trigger service and return its answer; ``say`` gets lines of its node's status.
 
-    Raises:
-        CardboxError: ``service`` is not a valid name or not available, or it refused; the text
-            has the reason.
+    Raises CardboxError, with the reason, if it is not available or refuses.
     """
     rclpy.init(args=[])
     try:

@@ -26,25 +26,15 @@ SERVICE = "service"
 
 
 class Entry(NamedTuple):
-    """One topic or service of a node.
+    """One topic or service of a node."""
 
-    Attributes:
-        node: name of the node.
-        case: settings with which it exists; empty for the default.
-        direction: ``in``, ``out`` or ``service``.
-        name: relative or absolute; words in capitals are values of parameters.
-        type: such as ``sensor_msgs/Image``.
-        qos: reliability, or ``latched``, and depth; empty for a service.
-        content: phrase in Markdown.
-    """
-
-    node: str
-    case: str
-    direction: str
-    name: str
-    type: str
-    qos: str
-    content: str
+    node: str  #: name of the node
+    case: str  #: settings with which it exists; empty for the default
+    direction: str  #: ``in``, ``out`` or ``service``
+    name: str  #: relative or absolute; words in capitals are values of parameters
+    type: str  #: such as ``sensor_msgs/Image``
+    qos: str  #: reliability, or ``latched``, and depth; empty for a service
+    content: str  #: phrase in Markdown
 
 
 def entries(node: str = "") -> list[Entry]:

@@ -1,8 +1,6 @@
 """The state of a node on ``/diagnostics`` once a second, and in its log when it changes.
 
-A node reports when it waits for input and when its input has ceased. Lost images are counted by the
-spacing of their stamps, because the middleware does not report them. :class:`LogLimit` limits
-repeated log messages.
+Lost images are counted by their stamps, because the middleware does not report them.
 """
 
 from __future__ import annotations
@@ -41,9 +39,8 @@ class _Spell:
 class LogLimit:
     """Allows the first texts of a kind, then one text after each of growing pauses.
 
-    The kind is the fault without the numbers and names of its text, because a sender of always
-    different nonsense would otherwise fill log and memory. A kind that was quiet for longer than
-    its pause starts anew.
+    A sender of always different nonsense would otherwise fill log and memory. A kind that was quiet
+    for longer than its pause starts anew.
     """
 
     def __init__(self, now_s: Callable[[], float] = time.monotonic) -> None:
@@ -101,8 +98,7 @@ class NodeDiagnostics:
             ceased.
         advice: called once a second; returns temporary warnings, such as lost images, text by kind.
             Warnings of the kind "" are not logged here, because the node logs them.
-        remarks: called once a second; returns warnings of common checks, such as the types of the
-            topics, which write their own log messages.
+        remarks: as ``advice``, for what all nodes check, such as the types of their topics.
         remedy: what to do if results take longer than the period of the images; empty if that is
             no fault of this node, which then reports nothing.
     """
@@ -113,7 +109,7 @@ class NodeDiagnostics:
         self.extra: Callable[[], dict[str, str]] = dict
         self.advice: Callable[[], dict[str, str]] = dict
         self.source = ""
-        self.remarks: Callable[[], list[str]] = list
+        self.remarks: Callable[[], dict[str, str]] = dict
         self.remedy = ""
         self._node = node
         self._waiting = ""
@@ -236,12 +232,12 @@ class NodeDiagnostics:
 
     def _remarks(self) -> list[str]:
         """Return all current warnings, and log each new kind."""
-        found = self.input.remarks() | self._slowness() | self.advice()
+        found = self.remarks() | self.input.remarks() | self._slowness() | self.advice()
         found = {kind: plain(text) for kind, text in found.items()}
         for kind, text in found.items():
             if kind and self._log.allows(kind, kind):
                 self._node.get_logger().warning(text)
-        return [*self._warnings, *self.remarks(), *found.values()]
+        return [*self._warnings, *found.values()]
 
     def publish(self) -> None:
         """Publish the status and log its changes; a timer calls this once a second."""

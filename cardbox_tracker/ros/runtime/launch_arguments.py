@@ -33,32 +33,22 @@ _EXPECTED = {
 
 @dataclass(frozen=True)
 class Argument:
-    """One argument of a launch file.
+    """One argument of a launch file."""
 
-    Attributes:
-        default: default as text; None if the argument is required. A number whose default is
-            empty may be left out.
-        meaning: one line for ``--show-args``.
-        kind: type of its value; ``list`` is a list of numbers, ``Path`` the name of a file to read.
-        choices: allowed texts; empty if any text is allowed.
-        limits: lowest and highest allowed number.
-        name: True if the value must be empty, or a letter followed by letters, digits and
-            underscores. In a list, this holds for each item, and all must differ.
-    """
-
+    #: default as text; None if the argument is required. A number whose default is empty may be
+    #: left out.
     default: str | None
-    meaning: str
+    meaning: str  #: one line for ``--show-args``
+    #: type of its value; ``list`` is a list of numbers, ``Path`` the name of a file to read
     kind: type = str
-    choices: tuple[str, ...] = ()
-    limits: tuple[float, float] | None = None
+    choices: tuple[str, ...] = ()  #: allowed texts; empty if any text is allowed
+    limits: tuple[float, float] | None = None  #: lowest and highest allowed number
+    #: True if the value must be empty, or a letter followed by letters, digits and underscores. In
+    #: a list, this holds for each item, and all must differ.
     name: bool = False
 
     def value(self, text: str) -> Value | None:
-        """Return the value of ``text``; None for a number that is left out.
-
-        Raises:
-            ValueError: ``text`` is not valid; the error's text is the expectation.
-        """
+        """Return the value of ``text``, None if left out, or raise ValueError: the expectation."""
         expected = " or ".join(self.choices) if self.choices else _EXPECTED.get(self.kind, "")
         lowest, highest = self.limits or (-math.inf, math.inf)
         if self.limits is not None:
@@ -85,11 +75,7 @@ class Argument:
 
 
 def values(arguments: Mapping[str, Argument], given: Mapping[str, str]) -> dict[str, Value | None]:
-    """Return the value of each of ``arguments`` from the texts ``given`` by name.
-
-    Raises:
-        CardboxError: values are wrong; the text has each of them and the expectation.
-    """
+    """Return the value of each of ``arguments``, or raise CardboxError with all that are wrong."""
     found: dict[str, Value | None] = {}
     wrong = []
     for name, argument in arguments.items():
@@ -103,11 +89,10 @@ def values(arguments: Mapping[str, Argument], given: Mapping[str, str]) -> dict[
 
 
 def shares_process(given: Mapping[str, str]) -> bool:
-    """Return whether background, initializer, tracker and the source of images share a process.
+    """Return whether background, initializer, tracker and source share a process.
 
-    Args:
-        given: arguments of a launch file; ``single_process`` is ``auto`` if it is missing. Then
-            they do, unless there are several cameras or the detector makes the silhouettes.
+    With ``single_process:=auto``, the default, they do, unless there are several cameras or the
+    detector makes the silhouettes.
     """
     text = given.get("single_process", "auto").strip().lower()
     if text != "auto":
@@ -117,15 +102,10 @@ def shares_process(given: Mapping[str, str]) -> bool:
 
 
 def parameters_in(sections: object, node: str) -> dict[str, object]:
-    """Return the parameters of a node in the content of a parameter file of ROS.
+    """Return the parameters of a node, by its full name, in the content of a parameter file.
 
-    Args:
-        sections: the parsed YAML: a mapping from names of nodes, with wildcards, to
-            ``ros__parameters``.
-        node: full name of the node, with its namespace.
-
-    Raises:
-        ValueError: the content has another form; the error's text is the expectation.
+    The parsed YAML maps names of nodes, with wildcards, to ``ros__parameters``. Raises ValueError,
+    with the expectation, if it has another form.
     """
     if not isinstance(sections, Mapping):
         raise ValueError("a mapping from names of nodes to ros__parameters")
@@ -142,19 +122,10 @@ def parameters_in(sections: object, node: str) -> dict[str, object]:
 
 
 def check_names(file: str, known: Iterable[str], command_line: Sequence[str]) -> None:
-    """Refuse unknown arguments of the launch file ``file``.
+    """Raise CardboxError for arguments of the launch file ``file`` that are not ``known``.
 
     ``ros2 launch`` accepts any name and ignores a misspelt one. If another launch file includes
     this one, the command line belongs to the other file, and nothing is checked.
-
-    Args:
-        file: path of the launch file.
-        known: names of the arguments of this launch file and of those that it includes.
-        command_line: command line of the process, such as
-            ros2 launch cardbox_tracker live.launch.py loop:=true.
-
-    Raises:
-        CardboxError: arguments are unknown; the text names them and the known ones.
     """
     names = sorted(known)
     given = [word.partition(":=")[0] for word in _arguments_of(file, command_line) if ":=" in word]

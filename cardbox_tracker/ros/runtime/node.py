@@ -101,11 +101,7 @@ class CardboxNode(Node):
         self.diagnostics.remarks = self._types.remarks
 
     def resolve(self, topic: str) -> str:
-        """Return the full name of ``topic`` after namespace and remapping.
-
-        Raises:
-            CardboxError: ROS does not allow the name, which may come from a recording.
-        """
+        """Return the full name of ``topic``, or raise CardboxError if ROS does not allow it."""
         try:
             return self.resolve_topic_name(topic)
         except Exception as error:
@@ -144,13 +140,10 @@ class CardboxNode(Node):
         *,
         has_one_type: bool = True,
     ) -> Subscription | None:
-        """Subscribe to a topic, bypassing DDS if a node of this process offers it.
+        """Subscribe to a topic; return None if a node of this process offers it without DDS.
 
         An exception in ``callback`` is reported, and the node continues. Without ``has_one_type``,
         the caller adapts to publishers of another type.
-
-        Returns:
-            The subscription; None without DDS.
         """
         guarded = self._guarded(topic, callback)
         if has_one_type:
@@ -239,11 +232,7 @@ def spin(node: CardboxNode) -> None:
 
 
 def own_arguments(command_line: list[str]) -> list[str]:
-    """Return a command line without the program and the ROS arguments.
-
-    Raises:
-        SystemExit: the ROS arguments are invalid (code 2); an error was printed.
-    """
+    """Return a command line without program and ROS arguments; wrong ones end it with code 2."""
     try:
         return remove_ros_args(command_line)[1:]
     except Exception as error:

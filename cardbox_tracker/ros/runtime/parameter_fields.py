@@ -24,13 +24,9 @@ AT_START = "only at the start"
 
 @dataclass(frozen=True)
 class ParameterSpec(Setting):
-    """Description, range and behaviour of one parameter.
+    """Description, range and behaviour of one parameter."""
 
-    Attributes:
-        effect: when a change takes effect.
-    """
-
-    effect: str = NEXT_IMAGE
+    effect: str = NEXT_IMAGE  #: when a change takes effect
 
     @property
     def read_only(self) -> bool:
@@ -62,11 +58,7 @@ at_start = partial(parameter, effect=AT_START)
 
 
 def shared(kind: Any, name: str, **changes: Any) -> Any:
-    """Return a field for the setting ``name`` of the core dataclass ``kind``.
-
-    Default, description, unit, range and choices are those of the core; ``changes`` are arguments
-    of :func:`parameter` that differ, such as a default.
-    """
+    """Return a field like a core setting; ``changes`` are arguments of :func:`parameter`."""
     core = settings_of(kind)[name]
     given = {
         "default": getattr(kind, name),
@@ -88,11 +80,9 @@ class NodeParameters:
     """Base of the parameter dataclasses; every own field is made by :func:`parameter`.
 
     A class may also inherit settings of the core, all of which are parameters then.
-
-    Attributes:
-        effects: effect of a change of inherited settings that is not that of the core, by name.
     """
 
+    #: effect of a change of inherited settings that is not that of the core, by name
     effects: ClassVar[Mapping[str, str]] = MappingProxyType({})
 
     def check(self) -> None:

@@ -1,7 +1,6 @@
-"""Parameters of a node, declared from a dataclass that defines types and defaults.
+"""Parameters of a node, declared from the fields of :mod:`.parameter_fields`.
 
-:class:`LiveParameters` declares the fields of :mod:`.parameter_fields` on a node and keeps a
-validated instance. A wrong value is refused with the reason, and the old value stays.
+A wrong value is refused with the reason, and the old value stays.
 """
 
 from __future__ import annotations
@@ -40,10 +39,7 @@ _TYPE_TEXTS = {
 
 
 class NotDeclared(ParameterNotDeclaredException):
-    """A name that is not declared; rclpy answers a request to set it with this text.
-
-    The text of its own exception contains no name.
-    """
+    """A name that is not declared, with a text, which the exception of rclpy lacks."""
 
     def __init__(self, text: str) -> None:
         """Keep ``text`` as it is, without the words of the base class."""
@@ -51,11 +47,7 @@ class NotDeclared(ParameterNotDeclaredException):
 
 
 class LiveParameters(Generic[T]):
-    """The declared parameters of one node; :attr:`value` is always a valid set.
-
-    Raises:
-        CardboxError: a value given at the start is refused; the text has its name and the reason.
-    """
+    """The declared parameters of a node, always valid; a wrong value raises CardboxError."""
 
     def __init__(
         self, node: Node, kind: type[T], on_change: Callable[[T], None] | None = None
@@ -125,10 +117,7 @@ class LiveParameters(Generic[T]):
         return value
 
     def _warn_of_unknown(self) -> None:
-        """Warn of unknown names given at the start, which ROS ignores silently.
-
-        They are not errors, because a file may serve several nodes.
-        """
+        """Warn of unknown names at the start, no errors since a file may serve several nodes."""
         # rclpy has no public interface to the given values.
         given = getattr(self._node, "_parameter_overrides", {})
         for name in given:

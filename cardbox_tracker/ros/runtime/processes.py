@@ -22,10 +22,7 @@ _OF_PACKAGE = (sys.executable, "-P", "-m")
 
 
 def isolate() -> None:
-    """Set a separate DDS domain and a profile for large images for this process and its children.
-
-    A domain or profile that is already set is kept.
-    """
+    """Give this process and its children, unless set, a domain and a profile for large images."""
     os.environ.setdefault("ROS_DOMAIN_ID", str(random.SystemRandom().randint(1, 100)))
     os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
     profile = share_file("config/fastdds_large_images.xml")
@@ -43,11 +40,7 @@ def share_file(name: str) -> Path | None:
 
 
 def compile_kernels() -> None:
-    """Compile the code that the nodes will run, unless its cache has it; takes minutes at most.
-
-    Raises:
-        CardboxError: the process failed; the text has the end of its output.
-    """
+    """Compile what the nodes run, unless it is kept; raise CardboxError if that fails."""
     done = subprocess.run(
         [*_OF_PACKAGE, "cardbox_tracker.tracking.precompile"],
         stdout=subprocess.PIPE,
@@ -71,10 +64,7 @@ class Nodes:
         self._processes: dict[str, subprocess.Popen[bytes]] = {}
 
     def start(self, name: str, *arguments: str, called: str = "") -> None:
-        """Start the executable ``name`` of this package, see ``start.NODES``.
-
-        ``called`` distinguishes several processes of one executable.
-        """
+        """Start the executable ``name`` of ``start.NODES``, as ``called`` if there are several."""
         called = called or name
         with (self._logs / f"{called}.log").open("wb") as log:
             self._processes[called] = subprocess.Popen(
@@ -85,11 +75,7 @@ class Nodes:
         return [*_OF_PACKAGE, "cardbox_tracker.start"]
 
     def check(self) -> None:
-        """Raise if a node died.
-
-        Raises:
-            CardboxError: a node died; the text has the end of its log.
-        """
+        """Raise CardboxError, with the end of its log, if a node died."""
         for name, process in self._processes.items():
             if process.poll() not in (None, 0):
                 words = self.text(name)[-_SHOWN:]

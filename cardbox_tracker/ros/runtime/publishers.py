@@ -72,24 +72,19 @@ class TopicTypes:
         """Begin without topics of ``node``; :meth:`add` adds one."""
         self._node = node
         self._types: dict[str, str] = {}
-        self._said: set[str] = set()
 
     def add(self, topic: str, kind: Any) -> None:
         """Compare the resolved name ``topic``, on which this node uses messages ``kind``."""
         self._types[topic] = f"{kind.__module__.split('.')[0]}/msg/{kind.__name__}"
 
-    def remarks(self) -> list[str]:
-        """Return a warning for each topic with several types, and log new ones."""
-        found = []
-        for topic, types in self._node.get_topic_names_and_types():
-            own = self._types.get(topic)
-            if own is not None and len(types) > 1:
-                found += self._others(topic, own)
-        for text in found:
-            if text not in self._said:
-                self._said.add(text)
-                self._node.get_logger().warning(text)
-        return found
+    def remarks(self) -> dict[str, str]:
+        """Return a warning for each other type of a topic, by itself."""
+        return {
+            text: text
+            for topic, types in self._node.get_topic_names_and_types()
+            if topic in self._types and len(types) > 1
+            for text in self._others(topic, self._types[topic])
+        }
 
     def _others(self, topic: str, own: str) -> list[str]:
         node = self._node

@@ -28,8 +28,6 @@ SILHOUETTE = QoSProfile(depth=1, reliability=ReliabilityPolicy.RELIABLE)
 # With a queue of five, a subscriber may fall behind by some images.
 SILHOUETTE_INPUT = QoSProfile(depth=5, reliability=ReliabilityPolicy.RELIABLE)
 RESULT = QoSProfile(depth=10, reliability=ReliabilityPolicy.RELIABLE)
-# tf2's broadcasters and listeners use the same profile.
-TF = QoSProfile(depth=100, reliability=ReliabilityPolicy.RELIABLE)
 # A player can wait for a slow subscriber, and the queue holds 100 images.
 PLAYED = QoSProfile(depth=100, reliability=ReliabilityPolicy.RELIABLE)
 # Calls wait while a node is busy, and a queue of ten, ROS's default, loses the others.
@@ -56,10 +54,7 @@ _MEANING = {
 
 
 def overridable(profile: QoSProfile) -> QoSOverridingOptions:
-    """Return options that declare ``qos_overrides.<topic>...`` parameters.
-
-    Durability can be overridden except on latched topics, which depend on it.
-    """
+    """Return options that declare ``qos_overrides.<topic>...``, if latched without durability."""
     kinds = [QoSPolicyKind.HISTORY, QoSPolicyKind.DEPTH, QoSPolicyKind.RELIABILITY]
     if profile.durability != DurabilityPolicy.TRANSIENT_LOCAL:
         kinds.append(QoSPolicyKind.DURABILITY)
@@ -76,14 +71,8 @@ def copy_of(profile: QoSProfile) -> QoSProfile:
     )
 
 
-def mismatch_text(topic: str, kind: QoSPolicyKind, *, subscribing: bool) -> str:
-    """Return an explanation of a QoS mismatch between publisher and subscriber of ``topic``.
-
-    Args:
-        topic: the resolved topic name.
-        kind: the policy that does not match.
-        subscribing: True if this node is the subscriber, False if it publishes.
-    """
+def mismatch_text(topic: str, kind: QoSPolicyKind, subscribing: bool) -> str:
+    """Return an explanation of a QoS mismatch; ``subscribing`` is False if this node publishes."""
     name = qos_policy_name_from_kind(kind)
     weak, strong, low, high = _MEANING.get(name, ("less", "more", "volatile", "transient_local"))
     policy = name.lower()
@@ -100,24 +89,20 @@ def mismatch_text(topic: str, kind: QoSPolicyKind, *, subscribing: bool) -> str:
     )
 
 
+def _reports(topic: str, report: Callable[[str], None], subscribing: bool) -> Callable[[Any], None]:
+    return lambda event: report(mismatch_text(topic, event.last_policy_kind, subscribing))
+
+
 def subscription_events(topic: str, report: Callable[[str], None]) -> SubscriptionEventCallbacks:
     """Return callbacks that pass a mismatch of QoS on ``topic`` to ``report``."""
     # The default callbacks wait for other events, which lengthens every wait of the executor.
     return SubscriptionEventCallbacks(
-        incompatible_qos=_reports(topic, report, subscribing=True), use_default_callbacks=False
+        incompatible_qos=_reports(topic, report, True), use_default_callbacks=False
     )
 
 
 def publisher_events(topic: str, report: Callable[[str], None]) -> PublisherEventCallbacks:
     """Return callbacks that pass a mismatch of QoS on ``topic`` to ``report``."""
     return PublisherEventCallbacks(
-        incompatible_qos=_reports(topic, report, subscribing=False), use_default_callbacks=False
-    )
-
-
-def _reports(
-    topic: str, report: Callable[[str], None], *, subscribing: bool
-) -> Callable[[Any], None]:
-    return lambda event: report(
-        mismatch_text(topic, event.last_policy_kind, subscribing=subscribing)
+        incompatible_qos=_reports(topic, report, False), use_default_callbacks=False
     )

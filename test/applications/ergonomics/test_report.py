@@ -15,7 +15,6 @@ import numpy as np
 import pytest
 
 from cardbox_tracker.applications.ergonomics.recording import (
-    SHARES_HEADER,
     MomentImages,
     RulaObserver,
     RulaRow,
@@ -24,7 +23,6 @@ from cardbox_tracker.applications.ergonomics.recording import (
     summarize,
     worst_moments,
     write_csv,
-    write_shares,
 )
 from cardbox_tracker.applications.ergonomics.report import (
     PageContent,
@@ -133,24 +131,6 @@ def test_the_neck_is_what_its_images_are(measured: tuple[bool, ...], source: str
     shares = {one.name: one for one in score_shares(rows, RulaConfig())}
     assert shares["neck"].source == source
     assert summarize(rows).measured_parts_s["neck"] == sum(measured)
-
-
-def test_shares_are_a_table(tmp_path: Path) -> None:
-    shares = score_shares([row(0, 3), row(1, 3), row(2, 6), row(3, 6)], RulaConfig())
-    write_shares(shares, tmp_path / "shares.csv")
-    with (tmp_path / "shares.csv").open(encoding="utf-8") as file:
-        header, *lines = csv.reader(file)
-    assert tuple(header) == SHARES_HEADER
-    assert ["grand", "mixed", "6", "2.000", "0.5000"] in lines
-    assert ["legs", "declared", "1", "4.000", "1.0000"] in lines
-    assert len(lines) == sum(len(one.time_s) for one in shares)
-
-
-def test_shares_without_a_posture_are_empty(tmp_path: Path) -> None:
-    shares = score_shares([row(0, None, "lost")], RulaConfig())
-    write_shares(shares, tmp_path / "shares.csv")
-    lines = (tmp_path / "shares.csv").read_text(encoding="utf-8").splitlines()[1:]
-    assert {line.split(",", 3)[3] for line in lines} == {"0.000,"}
 
 
 def test_worst_moments_are_apart() -> None:

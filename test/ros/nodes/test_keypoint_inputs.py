@@ -408,7 +408,7 @@ def test_the_type_of_the_publisher_is_used_when_it_comes(
             return bool(topic._kept) and len(topic._kept[-1].persons) == count
 
         until(tracker_node, arrived)
-        assert not said("cannot be read") and tracker_node.diagnostics.remarks() == []
+        assert not said("cannot be read") and tracker_node.diagnostics.remarks() == {}
         foreign.close()
 
 
