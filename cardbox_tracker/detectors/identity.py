@@ -23,6 +23,8 @@ GONE_NS = 1_500_000_000
 
 DROPPED_NS = 300_000_000
 """Time for which somebody whom a detector misses stays where they were, ns."""
+KNOWN_IMAGES = 5
+"""Images after which the colours of a person are known."""
 OTHER = 16.0
 """Sum of squared deviations above which a figure is somebody else, see :func:`unlike`."""
 
@@ -32,9 +34,9 @@ _PLACE, _PLACE_PER_S = 0.5, 2.0
 _COLOURS = 0.3
 # Length of a trunk, m; speed of a person who runs, m/s, and error of a place, m.
 _TRUNK_M, _RUN_M_PER_S, _ERROR_M = 0.5, 4.0, 0.2
-# Weight of an image in the colours, images after which they are known, and those in a row with
-# other colours that nothing that is held before the trunk explains for so short a time.
-_LEARN_RATE, _KNOWN_IMAGES, _OTHER_IMAGES = 0.1, 5, 3
+# Weight of an image in the colours, and images in a row with other colours that nothing that is
+# held before the trunk explains for so short a time.
+_LEARN_RATE, _OTHER_IMAGES = 0.1, 3
 # Fewest pixels whose colours count, and time without anybody after which whoever comes is new, ns.
 _LEAST_PX, _EMPTY_NS = 20, 60_000_000_000
 
@@ -140,7 +142,7 @@ class Identity:
     @property
     def is_known(self) -> bool:
         """Whether somebody has been followed for long enough to be known again."""
-        return self._images >= _KNOWN_IMAGES
+        return self._images >= KNOWN_IMAGES
 
     def is_other(self, colours: FloatArray | None) -> bool:
         """Return whether colours are not those of the person; unknown ones may be."""

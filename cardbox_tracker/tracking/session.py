@@ -27,6 +27,7 @@ from cardbox_tracker.detectors.identity import (
     ALIKE,
     DROPPED_NS,
     GONE_NS,
+    KNOWN_IMAGES,
     OTHER,
     apart,
     cheapest,
@@ -107,6 +108,7 @@ class _Sight:
         self.points: ImagePoints | None = None
         self.pixels: Silhouette | None = None
         self.colours: FloatArray | None = None
+        self.learned = 0
         self.seen_ns: int | None = None
 
 
@@ -340,7 +342,10 @@ class Session:
             # Another camera has seen the person since.
             before, seen_ns = person.expected(camera), person.fitted_ns
         away_ns = abs(self._last_ns - (seen_ns or 0))
-        away = unlike(before, sight.colours, one.figure, colours, away_ns)
+        # Those of somebody who comes in are not sure, but all that is left of who has gone.
+        is_known = sight.learned >= KNOWN_IMAGES or away_ns > GONE_NS
+        known = sight.colours if is_known else None
+        away = unlike(before, known, one.figure, colours, away_ns)
         return away + self._gap(person, camera, one)
 
     def _gap(self, person: _Person, camera: int, one: Shown) -> float:
@@ -429,6 +434,7 @@ class Session:
         if colours is None or self._share_of_others(person, camera, sight.pixels) > _LEARNS:
             return
         sight.colours = learned(sight.colours, colours)
+        sight.learned += 1
 
     def _share_of_others(self, person: _Person, camera: int, pixels: Silhouette) -> float:
         """Return the share of a person's pixels that are also those of others."""
