@@ -14,6 +14,7 @@ import pytest
 
 from cardbox_tracker.detectors import detector as detector_module
 from cardbox_tracker.detectors.model_files import ModelFiles
+from cardbox_tracker.measuring.people_camera import Distances
 from cardbox_tracker.measuring.scene import SceneCamera, Value
 from cardbox_tracker.measuring.scene_camera import FoundCamera
 from cardbox_tracker.person.model_file import load_body_model
@@ -307,7 +308,8 @@ def test_the_cameras_pitch_is_found_from_the_recording(
     pitch, roll = (Value(float(np.radians(d)), 0.0873) for d in (pitch_deg, roll_deg))
     tilt = SceneCamera(Value(1.0, 0.01), pitch, roll)
     remarks = ("it moves",) if pitch_deg < 0.0 else ()
-    found = FoundCamera(tilt, sources, remarks, (2.0 / 1.72,))
+    far = Distances(np.zeros(1), np.full(1, 2.0 / 1.72), 0.1)
+    found = FoundCamera(tilt, sources, remarks, (far,))
     monkeypatch.setattr("cardbox_tracker.commands.scene.scene_camera", found_in)
 
     def opened(bag: Any, detector: Any, camera: Any, points: Any) -> SilhouetteSource:
