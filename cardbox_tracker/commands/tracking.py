@@ -145,7 +145,8 @@ def _assumptions(request: TrackingRequest, scene: Scene) -> Iterator[str]:
         whose = "" if person.people is None else f" of person {number}"
         yield f"distance{whose} {body.placement.distance_m:.2f} m ({distance})"
     if person.stature_m is not None:
-        yield f"stature {person.stature_m:.2f} m (given), sizes from proportions"
+        each = " and ".join(f"{one:.2f}" for one in person.statures_m or (person.stature_m,))
+        yield f"stature {each} m (given), sizes from proportions"
     elif person.model is None:
         yield f"stature {USUAL_STATURE_M:.2f} m (the mean of adults), sizes from proportions"
     else:

@@ -20,6 +20,9 @@ from tempfile import TemporaryDirectory
 from threading import local
 from typing import Any
 
+import cardbox_tracker.start  # noqa: F401  # sets threads as for the programs, before numpy comes
+
+# isort: split
 import cv2
 import numpy as np
 
