@@ -57,10 +57,12 @@ class CameraPitch:
         """Look again, because the camera is another one."""
         self._seen: list[ImagePoints] = []
         self._is_found = False
+        self._images, self._every = 0, 1
 
     def see(self, found: Detection, camera: Camera) -> None:
         """Add a person in the image of ``camera``."""
-        if self._is_found:
+        self._images += 1
+        if self._is_found or self._images % self._every:
             return
         self._seen.append(image_points(found))
         if len(self._seen) < _IMAGES:
@@ -68,6 +70,8 @@ class CameraPitch:
         # Images of one posture count as one.
         shown = people_camera([[(0.0, points) for points in self._seen]], [None], camera)
         self._seen.clear()
+        # A try takes as long as several images, so further ones come more and more seldom.
+        self._every *= 2
         if shown is None:
             return
         pitch_rad, stddev_rad = float(shown.values[0]), math.sqrt(shown.covariance[0, 0])

@@ -15,7 +15,13 @@ from std_msgs.msg import Float64, Header, String
 from cardbox_tracker.camera.camera import Camera
 from cardbox_tracker.camera.rasterisation import render
 from cardbox_tracker.detectors.pose_network import LANDMARKS, Detection
-from cardbox_tracker.measuring.people_camera import FORWARD, FOUND_STDDEV, HEIGHTS, LEVELS
+from cardbox_tracker.measuring.people_camera import (
+    FORWARD,
+    FOUND_STDDEV,
+    HEIGHTS,
+    LEVELS,
+    people_camera,
+)
 from cardbox_tracker.person.cardbox import cardbox_patches
 from cardbox_tracker.person.model_file import dumps_body_model, loads_body_model
 from cardbox_tracker.person.posture import reference_posture
@@ -132,7 +138,9 @@ def test_without_either_a_measured_body_is_waited_for(bus: Any, start: Any) -> N
 
 
 @pytest.mark.parametrize("shown", [True, False])
-def test_a_standing_person_shows_the_detector_the_pitch(bus: Any, shown: bool) -> None:
+def test_a_standing_person_shows_the_detector_the_pitch(
+    bus: Any, shown: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
     pitch = CameraPitch(bus.start(lambda **options: CardboxNode("detector", **options)))
     camera, px = CAMERA.with_pitch(0.2), np.zeros((33, 2))
     for number, name in enumerate(LANDMARKS):
@@ -143,8 +151,19 @@ def test_a_standing_person_shows_the_detector_the_pitch(bus: Any, shown: bool) -
             there = np.array((-2.5 + 1.8 * FORWARD[at], 0.0, 1.8 * HEIGHTS[at] - 1.6))
             px[number] = camera.project(camera.reference_to_optical(there))
     scores = np.full(33, 0.9 if shown else 0.1)
-    for _ in range(40):
-        pitch.see(Detection(px, scores, np.zeros((120, 160), np.uint8)), CAMERA)
+    tries: list[int] = []
+    images: list[Detection] = []
+
+    def seen_in(*given: Any) -> Any:
+        tries.append(len(images))
+        return people_camera(*given)
+
+    monkeypatch.setattr("cardbox_tracker.ros.nodes.detector_node.people_camera", seen_in)
+    for _ in range(100):
+        images.append(Detection(px, scores, np.zeros((120, 160), np.uint8)))
+        pitch.see(images[-1], CAMERA)
+    # A live node has little time for it.
+    assert tries == ([10] if shown else [10, 30, 68])
     found = bus.texts("/detector/camera_pitch")
     assert found == ([pytest.approx(0.2, abs=0.06)] if shown else [])
 
