@@ -101,8 +101,12 @@ def unlike(
 def cheapest(costs: Sequence[Sequence[float]]) -> dict[int, int]:
     """Return the column of each row of ``costs`` (N, M) below ``OTHER``, with the least sum.
 
-    A row without a column counts ``OTHER``. The time grows with 2 to the number of rows.
+    A row without a column counts ``OTHER``. The time grows with 2 to the smaller of N and M.
     """
+    if len(costs) and len(costs) > len(costs[0]):
+        # Many short tracks of a film stand beside the few people of an image.
+        turned = cheapest(list(zip(*costs, strict=True)))
+        return {row: column for column, row in turned.items()}
     best: dict[int, tuple[float, dict[int, int]]] = {0: (0.0, {})}
     for column, of_rows in enumerate(zip(*costs, strict=True)):
         for taken, (total, pairs) in list(best.items()):
