@@ -77,7 +77,7 @@ def points_of(values: Floats, of: Person) -> Floats:
     return points_m
 
 
-@inlined_kernel
+@kernel
 def _write_residuals(values: Floats, given: Given, points_m: Floats, residuals: Floats) -> float:
     """Write the residuals (34,) of values (12,), and return the sum of their squares."""
     of, (axes, (fx, fy, cx, cy)), (before, change, expected, root), shown = given
@@ -127,15 +127,15 @@ def fit(first: Floats, others: Floats, given: Given) -> tuple[Floats, Floats, fl
     points_m, jacobian = np.empty((6, 3)), np.empty((_N_RESIDUALS, N_VALUES))
     here, above, step = np.empty(_N_RESIDUALS), np.empty(_N_RESIDUALS), np.empty(N_VALUES)
     normal, information = np.empty((N_VALUES, N_VALUES)), np.empty((N_VALUES, N_VALUES))
-    values, best, start, least = first.copy(), first.copy(), first, inf
+    values, best, start, least = np.empty(N_VALUES), np.empty(N_VALUES), first, inf
     for row in range(others.shape[0]):
         cost = _write_residuals(others[row], given, points_m, here)
         if cost < least:
             least, start = cost, others[row]
     least = inf
     for begun in range(2 if others.shape[0] else 1):
-        if begun:
-            values[:] = start
+        for j in range(N_VALUES):
+            values[j] = start[j] if begun else first[j]
         for number in range(_STEPS + 1):
             cost = _write_residuals(values, given, points_m, here)
             for j in range(N_VALUES):
@@ -143,11 +143,15 @@ def fit(first: Floats, others: Floats, given: Given) -> tuple[Floats, Floats, fl
                 values[j] = before + DIFFERENCE
                 _write_residuals(values, given, points_m, above)
                 values[j] = before
-                jacobian[:, j] = (above - here) / DIFFERENCE
+                for i in range(_N_RESIDUALS):
+                    jacobian[i, j] = (above[i] - here[i]) / DIFFERENCE
             write_normal(jacobian, here, normal, step)
             if cost < least:
                 least = cost
-                best[:], information[:] = values, normal
+                for j in range(N_VALUES):
+                    best[j] = values[j]
+                    for i in range(N_VALUES):
+                        information[i, j] = normal[i, j]
             if number == _STEPS:
                 break
             solve(normal, step)
