@@ -132,8 +132,8 @@ def seen_person(
 ) -> BodyModel:
     """Return the body of the person who was watched by the working ``camera`` of the frames.
 
-    A ``guess`` without ``unknown`` values is returned; ``seed`` is that of the fits. Where the
-    person is by all images, ``far``, m, corrects the scale of the body.
+    A ``guess`` without ``unknown`` values is returned; ``seed`` is that of the fits. The distances
+    ``far``, in metres here, correct the scale of the body.
     """
     if not guess.unknown:
         return guess

@@ -39,7 +39,7 @@ ROBOT = "retarget"
 PERCENTILES = (50, 95, 99)
 
 _ARM = Path(__file__).parents[2] / "config" / "example_arm.urdf"
-_START = "shoulder_roll=0.2"
+_ARM_BEGINS = "shoulder_roll=0.2"
 _START_S = 30.0
 _LAST_S = 0.5
 
@@ -208,7 +208,7 @@ class CameraAndListener:
         if name == "initializer" and ROBOT in self._processes:
             arguments = ["--ros-args", "-p", parameter]
         if name == ROBOT:
-            arguments = ["--ros-args", "-p", f"robot_file:={_ARM}", "-p", f"start:={_START}"]
+            arguments = ["--ros-args", "-p", f"robot_file:={_ARM}", "-p", f"start:={_ARM_BEGINS}"]
         self._nodes.start(name, *arguments)
         expected = set(SEPARATE) if together else {name}
         while not expected <= self._ready:
