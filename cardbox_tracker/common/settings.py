@@ -80,13 +80,6 @@ class NoEffectError(ValueError):
         super().__init__(f"{name} has no effect {where}; use {instead}")
         self.name, self.where, self.instead = name, where, instead
 
-    def renamed(self, names: Mapping[str, str]) -> str:
-        """Return the text with the ``names`` that a program uses for the settings."""
-        instead = self.instead
-        for name, other in names.items():
-            instead = instead.replace(name, other)
-        return f"{names.get(self.name, self.name)} has no effect {self.where}; use {instead}"
-
 
 def setting(
     default: Any,
