@@ -185,7 +185,7 @@ def _of_side(joint: Joint, name: str, side: float) -> Joint:
 SKELETON: tuple[Joint, ...] = (
     Joint("torso_y", _POSTURE, "torso_z", PRISMATIC, Y, (-3.0, 3.0), "body"),
     Joint("torso_roll", _POSTURE, "torso_pitch", REVOLUTE, X, _deg(-45, 45), "r_waist", "torso"),
-    Joint("torso_pitch", _POSTURE, "torso_yaw", REVOLUTE, Y, _deg(-25, 90), "waist"),
+    Joint("torso_pitch", _POSTURE, "torso_yaw", REVOLUTE, Y, _deg(-25, 100), "waist"),
     Joint("torso_yaw", _POSTURE, "torso_y", REVOLUTE, Z, _deg(-280, 280), "y_waist"),
     *_arms(_POSTURE),
     Joint("torso_x", _PLACE, "", PRISMATIC, X, (-math.inf, math.inf), "x_body"),
