@@ -145,7 +145,6 @@ def follow_live(scene: Path, seconds: float, has_pictures: bool = False) -> Run:
         began_s, count = began_s or time.monotonic(), count + 1
         there = dict(zip(received[-1].name, received[-1].position, strict=True))
         arm.move(np.array([there[name] for name in arm.joints]), time.monotonic() - began_s)
-    node.destroy_node()
     rclpy.shutdown()
     return arm.run(_spread(count) if has_pictures else ())
 

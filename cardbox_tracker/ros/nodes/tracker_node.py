@@ -219,10 +219,10 @@ class TrackerNode(CardboxNode):
         )
         self._own: OwnBody | None = None
         file = settings.model_file
-        bodies = [load_body_model(user_path(file))] if file else settings.guesses
-        if bodies:
+        known = [load_body_model(user_path(file))] if file else settings.guesses
+        if known:
             self._own = OwnBody(self, settings, self._tilt)
-            self._use(bodies)
+            self._use(known)
         self._wait()
 
     def _prepare(self, settings: TrackerParameters) -> None:
