@@ -17,6 +17,7 @@ from cardbox_tracker.common.files import check_writable, is_written_in_place
 from cardbox_tracker.common.settings import settings_of
 
 if TYPE_CHECKING:
+    from cardbox_tracker.recordings.result_reader import Results
     from cardbox_tracker.recordings.silhouettes import TimeSpan
 
 T = TypeVar("T")
@@ -255,6 +256,16 @@ def add_results(parser: argparse.ArgumentParser) -> None:
         metavar="K",
         help="results of several people: the number of the person (default: 1)",
     )
+
+
+def results_of(path: Path, person: int | None) -> Results:
+    """Return the results of a person, or of the first one of several, which is said."""
+    from cardbox_tracker.recordings.result_reader import read_results
+
+    results = read_results(path, person)
+    if results.has_others and person is None:
+        print_remarks([f"{path} has several people: person 1 is used; --person K gives another"])
+    return results
 
 
 def print_remarks(*remarks: Iterable[str]) -> None:

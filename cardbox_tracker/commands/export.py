@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from cardbox_tracker.commands.arguments import add_force, add_results, check_outputs
+from cardbox_tracker.commands.arguments import add_force, add_results, check_outputs, results_of
 from cardbox_tracker.common.files import body_beside, body_of_person
 
 NAME = "export"
@@ -47,7 +47,6 @@ def run(options: argparse.Namespace) -> None:
     """Read the results and write the file."""
     from cardbox_tracker.applications.exporting.formats import export, formats
     from cardbox_tracker.person.model_file import load_body_model
-    from cardbox_tracker.recordings.result_reader import read_results
 
     chosen = formats()[options.to]
     output = options.output or Path(options.results.resolve().stem + chosen.suffix)
@@ -55,7 +54,7 @@ def run(options: argparse.Namespace) -> None:
     check_outputs((output,), options.force, inputs=(options.results, options.model, beside))
     chosen.check()
     given = None if options.model is None else load_body_model(options.model)
-    results = read_results(options.results, options.person)
+    results = results_of(options.results, options.person)
     remarks = export(results, output, chosen, given)
     if given is None and chosen.has_places and beside.is_file():
         print(f"took the body of {beside}; --model gives another")

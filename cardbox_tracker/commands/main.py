@@ -8,7 +8,7 @@ import os
 import signal
 import sys
 from collections.abc import Container, Sequence
-from typing import Protocol
+from typing import Any, Protocol
 
 from cardbox_tracker import __version__
 from cardbox_tracker.commands import (
@@ -157,9 +157,25 @@ def build_parser(words: Container[str] = _EVERY_COMMAND) -> argparse.ArgumentPar
             formatter_class=_Formatter,
         )
         added.set_defaults(run=command.run)
+        added.register("action", None, _Once)
         if command.NAME in words:
             command.add_arguments(added)
     return parser
+
+
+class _Once(argparse._StoreAction):
+    """Stores the value of an option, and says so where it replaces another one."""
+
+    _taken: argparse.Namespace | None = None
+
+    def __call__(
+        self, parser: argparse.ArgumentParser, namespace: argparse.Namespace, *given: Any
+    ) -> None:
+        if self.option_strings and self._taken is namespace:
+            name = self.option_strings[-1]
+            print(f"cardbox: {name} is given more than once; the last one counts", file=sys.stderr)
+        self._taken = namespace
+        super().__call__(parser, namespace, *given)
 
 
 class _Formatter(argparse.RawDescriptionHelpFormatter):

@@ -12,6 +12,7 @@ from cardbox_tracker.commands.arguments import (
     add_settings,
     at_least,
     check_outputs,
+    results_of,
     settings_from,
 )
 from cardbox_tracker.commands.rula import add_score_outputs, outputs_of, write_scores
@@ -27,7 +28,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add = parser.add_argument
     add("table", type=Path, metavar="TABLE.csv", help="table of 'cardbox track --legs --csv'")
     add_score_outputs(parser)
-    add("--person", type=at_least(1), default=1, metavar="K", help="whom of several people")
+    add("--person", type=at_least(1), metavar="K", help="whom of several people (default: 1)")
     add_seed(parser, "the samples of the postures")
     add_force(parser)
     add_settings(parser, RebaConfig, "what no image shows")
@@ -38,14 +39,15 @@ def run(options: argparse.Namespace) -> None:
     from cardbox_tracker.applications.ergonomics.reba import (
         REBA,
         RebaConfig,
-        read_table,
+        images_of,
         score_table,
     )
     from cardbox_tracker.applications.ergonomics.report import PageContent
 
     check_outputs(outputs_of(options), options.force, inputs=(options.table,))
     config = settings_from(options, RebaConfig)
-    rows = score_table(read_table(options.table, options.person), config, options.seed)
+    results = results_of(options.table, options.person)
+    rows = score_table(images_of(results), config, options.seed)
     span = f"{rows[0].time_s:.1f} to {rows[-1].time_s:.1f} s, {len(rows)} images"
     facts = {
         "Table": f"{options.table.name}, {span}",

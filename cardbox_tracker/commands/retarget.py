@@ -12,6 +12,7 @@ from cardbox_tracker.commands.arguments import (
     add_results,
     add_settings,
     check_outputs,
+    results_of,
     settings_from,
 )
 from cardbox_tracker.common.errors import CardboxError
@@ -70,7 +71,6 @@ def run(options: argparse.Namespace) -> None:
     )
     from cardbox_tracker.recordings.bag_reader import BagReader
     from cardbox_tracker.recordings.open_images import is_bag
-    from cardbox_tracker.recordings.result_reader import read_results
 
     check_outputs(
         (options.csv,),
@@ -82,7 +82,7 @@ def run(options: argparse.Namespace) -> None:
         raise CardboxError(f"--bag adds the robot to a bag; {options.results} is a table")
     config = settings_from(options, RetargetConfig)
     robot, retargeter, table = make_retargeter(options.robot, options.map, config)
-    results = read_results(options.results, options.person)
+    results = results_of(options.results, options.person)
     results.check_body()
     motion = retarget_results(results, retargeter, config.rate_hz)
     joints = retargeter.joints

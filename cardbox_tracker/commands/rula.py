@@ -9,7 +9,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from cardbox_tracker import __version__
-from cardbox_tracker.commands.arguments import add_force, add_settings, check_outputs, settings_from
+from cardbox_tracker.commands.arguments import (
+    add_force,
+    add_settings,
+    check_outputs,
+    print_remarks,
+    settings_from,
+)
 from cardbox_tracker.commands.request import add_tracking, tracking_request
 from cardbox_tracker.commands.tracking import track
 from cardbox_tracker.common.errors import CardboxError
@@ -66,6 +72,8 @@ def run(options: argparse.Namespace) -> None:
     if options.html is not None and options.images != NO_IMAGES:
         images = MomentImages(is_head_hidden=options.images == HIDDEN_HEAD)
     observer = RulaObserver(config, options.seed, images)
+    if options.people is not None and options.person is None:
+        print_remarks(["of several people, person 1 is scored; --person K gives another"])
     summary = track(request, observers=(observer,))
     write_scores(options, _content(options, config, observer.rows, summary, images))
 

@@ -6,7 +6,7 @@ import argparse
 import sys
 from contextlib import closing, nullcontext
 
-from cardbox_tracker.commands.arguments import add_results, between
+from cardbox_tracker.commands.arguments import add_results, between, results_of
 
 NAME = "stream"
 HELP = "stream results as 24 joints in real time, to programs that teleoperate robots"
@@ -39,9 +39,8 @@ def run(options: argparse.Namespace) -> None:
     """Read the results and send them."""
     from cardbox_tracker.applications.teleoperation.full_body import at_rate, bodies_of
     from cardbox_tracker.applications.teleoperation.sending import ZmqSender, in_real_time, packet
-    from cardbox_tracker.recordings.result_reader import read_results
 
-    results = read_results(options.results, options.person)
+    results = results_of(options.results, options.person)
     results.check_body()
     bodies = at_rate(bodies_of(results), options.rate)
     sent = number = 0

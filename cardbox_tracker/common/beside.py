@@ -38,11 +38,20 @@ def done_beside(call: Callable[..., object]) -> Iterator[Callable[..., None]]:
     It waits while several calls are not done. It, or the end of the context, raises the error of a
     call; after any error, calls that have not begun are left out.
     """
+    failed = False
+
+    def unless_failed(*given: object) -> None:
+        nonlocal failed
+        if not failed:
+            failed = True
+            call(*given)
+            failed = False
+
     with _worker() as pool:
         waiting = deque[Future[object]]()
 
         def submit(*given: object) -> None:
-            waiting.append(pool.submit(call, *given))
+            waiting.append(pool.submit(unless_failed, *given))
             while len(waiting) > _MOST:
                 waiting.popleft().result()
 

@@ -84,6 +84,8 @@ class PointTable(NamedTuple):
             except CardboxError as error:
                 raise CardboxError(f"{found.place}: {error}") from None
             persons.setdefault(found.image, []).append(person)
+        if not persons:
+            raise CardboxError(f"{path} has no point of anybody; give what a detector has found")
         is_named = any(isinstance(key, str) for key in persons)
         return GivenPoints(path, "name" if is_named else FRAME, persons)
 

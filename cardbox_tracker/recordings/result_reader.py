@@ -87,6 +87,7 @@ class Results:
     #: the same for columns of texts, such as the states of keypoints.
     texts: Mapping[str, tuple[str, ...]]
     bodies: tuple[BodyModel | None, ...]  #: the person as of each image; None where it is not known
+    has_others: bool = False  #: whether the file has results of other people, too
 
     @property
     def body(self) -> BodyModel | None:
@@ -233,10 +234,11 @@ def read_results(path: Path, person: int | None = None) -> Results:
         )
     if is_bag(path):
         with BagReader(path) as bag:
-            return results_in(bag, person)
+            has_others = any(f"{person_space(2)}/" in topic for topic in bag.topics)
+            return replace(results_in(bag, person), has_others=has_others)
     if not path.is_file():
         raise CardboxError(f"{path} is no table and no bag; give the results of 'cardbox track'")
-    found: _Rows | None = None
+    found, has_others = None, False
     cells = _parquet_cells(path) if path.suffix == PARQUET else _csv_cells(path)
     for line, row in cells:
         if person is not None and PERSON not in row:
@@ -246,6 +248,7 @@ def read_results(path: Path, person: int | None = None) -> Results:
             if path.suffix != PARQUET and (None in row or None in row.values()):
                 raise ValueError("it has not as many cells as line 1")
             if PERSON in row and _number(row, PERSON, int) != (person or 1):
+                has_others = True
                 continue
             found = found or _Rows(path, row, _NEEDED)
             found.add(row)
@@ -260,7 +263,7 @@ def read_results(path: Path, person: int | None = None) -> Results:
     beside = body_of_person(body_beside(path), person or 1)
     body = load_body_model(beside) if beside.is_file() else None
     results = found.results(())
-    return replace(results, bodies=(body,) * len(results.state))
+    return replace(results, bodies=(body,) * len(results.state), has_others=has_others)
 
 
 def _csv_cells(path: Path) -> Iterator[tuple[str, Mapping[str, Any]]]:

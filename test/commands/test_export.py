@@ -147,6 +147,15 @@ def test_what_track_writes_is_exported_to_every_format(
     assert all(right_ankle) == (name == "all_bag")  # it is hidden, which a bag does not say
 
 
+@pytest.mark.parametrize("name", ["all.csv", "all_bag"])
+def test_which_of_several_people_is_used_is_told(
+    name: str, whole_body: Path, tmp_path: Path, cardbox: Callable
+) -> None:
+    words = ("export", whole_body / name, "--to", "trc", "--output")
+    assert "person 1 is used; --person K gives another" in cardbox(*words, tmp_path / "a.trc").err
+    assert not cardbox(*words, tmp_path / "b.trc", "--person", "1").err
+
+
 def test_damaged_results_are_refused_by_all_that_read_them(
     whole_body: Path, tmp_path: Path, cardbox: Callable
 ) -> None:

@@ -160,6 +160,13 @@ def test_mistakes(files: Path, words: tuple[str, ...], expected: str, cardbox: C
     assert not (files / "new").exists()
 
 
+def test_an_option_that_replaces_another_is_told(files: Path, cardbox: Callable) -> None:
+    one, other = files / "missing.yaml", files / "text.txt"
+    done = cardbox("demo", "--output", one, "--outp", other)
+    assert "--output is given more than once; the last one counts" in done.err
+    assert "more than once" not in cardbox("demo", "--output", other).err
+
+
 def test_the_course_of_the_readme(
     files: Path, tmp_path: Path, spans: dict[str, str], cardbox: Callable
 ) -> None:

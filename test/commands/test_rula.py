@@ -5,13 +5,31 @@ from __future__ import annotations
 import csv
 from collections.abc import Callable
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
+
+from cardbox_tracker.commands import rula
+from cardbox_tracker.common.errors import CardboxError
 
 
 def options(files: Path) -> tuple[object, ...]:
     inputs = (files / "session", "--background", "0:3.9", "--model", files / "person.yaml")
     return (*inputs, "--start", "15.6")
+
+
+@pytest.mark.parametrize("chosen", [(), ("--person", "2")])
+def test_who_of_several_people_is_scored_is_told(
+    chosen: tuple[str, ...], cardbox: Callable, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def stop(*_: object, **__: object) -> None:
+        raise CardboxError("stop")
+
+    monkeypatch.setattr(rula, "tracking_request", lambda _: SimpleNamespace(inputs=()))
+    monkeypatch.setattr(rula, "track", stop)
+    done = cardbox("rula", "film.mp4", "--people", "2", *chosen)
+    assert "stop" in done.err
+    assert ("person 1 is scored; --person K gives another" in done.err) == (not chosen)
 
 
 def test_a_recording_is_scored(files: Path, tmp_path: Path, cardbox: Callable) -> None:

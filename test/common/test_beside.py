@@ -54,6 +54,21 @@ def test_few_items_are_taken_ahead_and_the_thread_ends_with_the_iterator() -> No
     assert threading.active_count() == before
 
 
+def test_nothing_is_done_after_an_error() -> None:
+    begun = list[int]()
+
+    def call(item: int) -> None:
+        begun.append(item)
+        if item == 1:
+            raise ZeroDivisionError
+
+    with pytest.raises(ZeroDivisionError), done_beside(call) as submit:
+        for item in range(4):
+            submit(item)
+        time.sleep(0.1)  # An encoder of a film that could not be written crashed meanwhile.
+    assert begun == [0, 1]
+
+
 def test_an_error_comes_in_place_of_its_result() -> None:
     results = results_ahead(lambda item: 1 // item, [1, 0, 1])
     assert next(results) == 1

@@ -406,6 +406,7 @@ def test_each_camera_has_its_folder_or_file(tmp_path: Path) -> None:
         ('[{"image_id": 1, "keypoints": FAR}]', "entry 0: nose is at .* px; expected a place"),
         ('[{"image_id": 1, "keypoints": NAN}]', "entry 0: nose has the score nan"),
         ('[{"image_id": 1, "keypoints": SHARES}]', "entry 0: all points .* shares of the image"),
+        ('{"images": null, "annotations": []}', "has no point of anybody"),
     ],
 )
 def test_json_that_has_no_points_is_refused(tmp_path: Path, content: str, words: str) -> None:

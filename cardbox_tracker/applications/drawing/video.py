@@ -43,18 +43,18 @@ def video_file(path: str | os.PathLike[str], fps: float) -> Iterator[Callable[[I
 
         def add(image: ImageArray) -> None:
             nonlocal write, size
-            if write is None:
-                # Encoders want even sizes.
-                size = image.shape[1] // 2 * 2, image.shape[0] // 2 * 2
-                try:
+            try:
+                if write is None:
+                    # Encoders want even sizes.
+                    size = image.shape[1] // 2 * 2, image.shape[0] // 2 * 2
                     write = stack.enter_context(_encoder(temporary, fps, size))
-                except (OSError, ValueError) as error:
-                    raise CardboxError(
-                        f"cannot write the video {name}: {error}; give another name or folder"
-                    ) from None
-            fits = image.shape[1::-1] == size
-            fitting = image if fits else cv2.resize(image, size, interpolation=cv2.INTER_AREA)
-            write(np.asarray(fitting, np.uint8))
+                fits = image.shape[1::-1] == size
+                fitting = image if fits else cv2.resize(image, size, interpolation=cv2.INTER_AREA)
+                write(np.asarray(fitting, np.uint8))
+            except (OSError, ValueError) as error:
+                raise CardboxError(
+                    f"cannot write the video {name}: {error}; give another name or folder"
+                ) from None
 
         yield add
 

@@ -22,7 +22,6 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
@@ -58,7 +57,7 @@ from cardbox_tracker.person.legs import LEG_KEYPOINT_NAMES, LEG_NAMES, leg_direc
 from cardbox_tracker.person.posture import LEFT_ARM, PITCH, RIGHT_ARM
 from cardbox_tracker.person.sizes import FloatArray
 from cardbox_tracker.person.skeleton import JOINT_NAMES, NECK_NAMES, KeypointState, arm_directions
-from cardbox_tracker.recordings.result_reader import Results, read_results
+from cardbox_tracker.recordings.result_reader import Results
 from cardbox_tracker.recordings.result_table import LEG_POINT_COLUMNS, POINT_COLUMNS
 from cardbox_tracker.search.particles import normal_postures
 
@@ -224,17 +223,13 @@ class Seen(NamedTuple):
     lengths_m: FloatArray
 
 
-def read_table(path: Path, person: int = 1) -> list[Seen]:
-    """Return the images of a table of ``cardbox track --legs``; of several people, of one.
-
-    Raises CardboxError if the file cannot be read, or lacks columns of the legs.
-    """
-    results = read_results(path, None if person == 1 else person)
+def images_of(results: Results) -> list[Seen]:
+    """Return the images of a table of ``cardbox track --legs``; CardboxError if it has no legs."""
     missing = [name for name in LEG_NAMES if name not in results.numbers]
     if missing:
         raise CardboxError(
-            f"{path} has no column {missing[0]}; make a table with 'cardbox track RECORDING "
-            "--detector mediapipe --legs --csv OUT.csv'"
+            f"{results.path} has no column {missing[0]}; make a table with 'cardbox track "
+            "RECORDING --detector mediapipe --legs --csv OUT.csv'"
         )
     shape = len(results.state), 2, 3, 3
     legs_m = results.of(LEG_POINT_COLUMNS).reshape(shape)

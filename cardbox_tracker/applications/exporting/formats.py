@@ -131,7 +131,10 @@ class Result(Results):
         fitting = [one for one in known if path.name.endswith(one.suffix)]
         if not fitting:
             endings = ", ".join(one.suffix for one in known)
-            raise CardboxError(f"no format has the ending of {path}; those are {endings}")
+            raise CardboxError(
+                f"no format has the ending of {path}; those are {endings}; "
+                "track(..., csv='OUT.csv') keeps the table"
+            )
         return export(self, path, max(fitting, key=lambda one: len(one.suffix)))
 
 

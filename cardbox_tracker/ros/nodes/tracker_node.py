@@ -118,8 +118,8 @@ class TrackingReport:
         return values | {f"{name} (m)": f"{value:.3f}" for name, value in places}
 
 
-class FoundBody:
-    """Publishes what was found, latched, until a measured body replaces it.
+class OwnBody:
+    """Publishes the body of model_file or of the images, latched, until a measured one replaces it.
 
     Attributes:
         text: the body model that was published last; empty before.
@@ -134,8 +134,11 @@ class FoundBody:
         self.text = ""
         self._node, self._settings, self._tilt = node, settings, tilt
         self._is_measured = False
+        self._body: BodyModel | None = None
         self._model = node.advertise(String, "body_model", qos.LATCHED)
         self._description = node.advertise(String, "robot_description", qos.LATCHED)
+        if settings.model_file:
+            return
         if settings.camera_pitch_deg == NOT_GIVEN_DEG:
             node.subscribe(Float64, "detector/camera_pitch", self._on_pitch, qos.LATCHED)
         given = settings.statures or [settings.stature]
@@ -163,9 +166,10 @@ class FoundBody:
         self._model.publish(String(data=text))
 
     def publish(self, body: BodyModel, frame_id: str) -> None:
-        """Publish a body that was fitted to the images of a camera's frame."""
-        if self._is_measured:
+        """Publish a new body before the images of a camera's frame, unless it is a first guess."""
+        if self._is_measured or body is self._body or body.unknown:
             return
+        self._body = body
         self.text = dumps_body_model(body)
         self._model.publish(String(data=self.text))
         settings = self._settings
@@ -213,12 +217,12 @@ class TrackerNode(CardboxNode):
         self.diagnostics.remedy = (
             "lower the effort, take a smaller working resolution, or fewer images a second"
         )
-        self._found: FoundBody | None = None
-        if settings.model_file:
-            self._use([load_body_model(user_path(settings.model_file))])
-        elif settings.guesses:
-            self._found = FoundBody(self, settings, self._tilt)
-            self._use(settings.guesses)
+        self._own: OwnBody | None = None
+        file = settings.model_file
+        known = [load_body_model(user_path(file))] if file else settings.guesses
+        if known:
+            self._own = OwnBody(self, settings, self._tilt)
+            self._use(known)
         self._wait()
 
     def _prepare(self, settings: TrackerParameters) -> None:
@@ -234,13 +238,13 @@ class TrackerNode(CardboxNode):
         self._prepared.add(settings.preset)
 
     def _on_model(self, message: String, _: int) -> None:
-        if self._found is not None and message.data == self._found.text:
+        if self._own is not None and message.data == self._own.text:
             return
         body = self._rolled(loads_body_model(message.data, source=self._model_topic))
         if self._bodies != [body]:
             self._use([body])
-        if self._found is not None:
-            self._found.replace(message.data)
+        if self._own is not None:
+            self._own.replace(message.data)
 
     def _rolled(self, body: BodyModel) -> BodyModel:
         """Return the body before this camera, as it stands."""
@@ -362,8 +366,8 @@ class TrackerNode(CardboxNode):
             for kind, text in news.items():
                 self.diagnostics.say(named + kind, named + text)
             # Joint states of a new version of the body follow the version.
-            if self._found is not None and "body" in news and tracker is trackers[0]:
-                self._found.publish(tracker.body, seen.header.frame_id)
+            if self._own is not None and tracker is trackers[0]:
+                self._own.publish(tracker.body, seen.header.frame_id)
             outputs.publish(seen, estimate, tracker)
         self._agreement.see(self._session.agreement)
         self.diagnostics.advice = self._warnings

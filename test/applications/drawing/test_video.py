@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from contextlib import nullcontext
 from pathlib import Path
 
 import cv2
 import numpy as np
 import pytest
 
+from cardbox_tracker.applications.drawing import video
 from cardbox_tracker.applications.drawing.video import video_file
 from cardbox_tracker.common.errors import CardboxError
 
@@ -71,6 +73,17 @@ def test_an_error_on_the_way_leaves_the_old_video(tmp_path: Path) -> None:
         raise RuntimeError("stop")
     assert path.read_bytes() == old
     assert [entry.name for entry in tmp_path.iterdir()] == ["a.mp4"]
+
+
+def test_a_full_disk_is_told_with_the_name_of_the_video(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def full(image: np.ndarray) -> None:
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(video, "_encoder", lambda *_: nullcontext(full))
+    with pytest.raises(CardboxError, match=r"cannot write the video .*a\.mp4: .*No space left"):
+        write(tmp_path / "a.mp4")
 
 
 def test_a_folder_that_is_not_there_is_named(tmp_path: Path) -> None:

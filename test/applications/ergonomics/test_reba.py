@@ -15,7 +15,7 @@ from cardbox_tracker.applications.ergonomics.reba import (
     TABLE_B,
     TABLE_C,
     RebaConfig,
-    read_table,
+    images_of,
     reba_scores,
     score_table,
     sits,
@@ -27,6 +27,7 @@ from cardbox_tracker.common.errors import CardboxError
 from cardbox_tracker.person.posture import PITCH, ROLL
 from cardbox_tracker.person.sizes import FloatArray
 from cardbox_tracker.person.skeleton import JOINT_NAMES, KeypointState
+from cardbox_tracker.recordings.result_reader import read_results
 from cardbox_tracker.recordings.result_table import columns, row_of
 from cardbox_tracker.tracking.estimate import Estimate, Hand, Legs
 
@@ -107,7 +108,7 @@ def test_scores_of_the_legs() -> None:
 def test_knees_do_not_count_for_who_sits(tmp_path: Path) -> None:
     def legs_in(angles: FloatArray, period_s: float) -> list[float]:
         path = table(tmp_path / "sits.csv", angles, period_s=period_s)
-        rows = score_table(read_table(path), CONFIG, seed=1)
+        rows = score_table(images_of(read_results(path)), CONFIG, seed=1)
         return [float(row.scores.parts["legs"].argmax()) + 1 for row in rows if row.scores]
 
     assert legs_in(SEATED, 0.5) == [1.0] * 4
@@ -164,7 +165,7 @@ def test_wrists_of_a_table_are_read(tmp_path: Path) -> None:
             found = replace(seen(SEATED), hands=hands)
             cells = row_of(10**9 + i, 0.0, found, has_points=True, has_hands=True)
             writer.writerow(["" if cell is None else cell for cell in cells])
-    before, after = score_table(read_table(path), CONFIG, seed=1)
+    before, after = score_table(images_of(read_results(path)), CONFIG, seed=1)
     assert (before.measured, after.measured) == ({"legs"}, {"legs", "right_wrist"})
     # 23 degrees, and bent aside.
     assert after.scores is not None and after.scores.parts["right_wrist"][2] > 0.8
@@ -205,7 +206,7 @@ def table(
 
 
 def test_a_table_of_results_is_scored(tmp_path: Path) -> None:
-    images = read_table(table(tmp_path / "a.csv", SEATED))
+    images = images_of(read_results(table(tmp_path / "a.csv", SEATED)))
     rows = score_table(images, CONFIG, seed=1)
     assert [row.scores is None for row in rows] == [False] * 4 + [True]
     assert all(row.measured == {"legs"} for row in rows[:4])
@@ -230,7 +231,7 @@ def test_a_table_of_results_is_scored(tmp_path: Path) -> None:
 
 
 def test_hidden_legs_count_as_declared(tmp_path: Path) -> None:
-    images = read_table(table(tmp_path / "a.csv", SEATED, KeypointState.HIDDEN))
+    images = images_of(read_results(table(tmp_path / "a.csv", SEATED, KeypointState.HIDDEN)))
     rows = score_table(images, replace(CONFIG, legs=4), seed=1)
     assert not any(row.measured for row in rows)
     assert rows[0].scores is not None and rows[0].scores.parts["legs"][3] == 1.0
@@ -240,6 +241,6 @@ def test_a_table_without_legs_is_refused(tmp_path: Path) -> None:
     path = table(tmp_path / "a.csv", SEATED)
     path.write_text(path.read_text().replace("left_hip_flexion", "other"))
     with pytest.raises(CardboxError, match="--legs --csv"):
-        read_table(path)
+        images_of(read_results(path))
     with pytest.raises(CardboxError, match="there are no results"):
-        read_table(tmp_path / "none.csv")
+        images_of(read_results(tmp_path / "none.csv"))

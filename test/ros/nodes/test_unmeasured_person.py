@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -67,6 +68,18 @@ def test_a_stature_is_enough(bus: Any, start: Any) -> None:
     bus.send("/body_model", String(data=text))
     show(bus, 2)
     assert bus.texts("/body_model") == [text]
+
+
+def test_a_loaded_body_is_told_to_others(bus: Any, start: Any, tmp_path: Path) -> None:
+    (tmp_path / "model.yaml").write_text(dumps_body_model(PERSON))
+    node = start(model_file=str(tmp_path / "model.yaml"))
+    for second in (1, 2):
+        show(bus, second)
+    assert bus.texts("/body_model") == [dumps_body_model(PERSON)]
+    assert len(bus.sent["/robot_description"]) == 1
+    session = node._session
+    bus.send("/body_model", String(data=dumps_body_model(PERSON)))
+    assert node._session is session
 
 
 def test_a_measured_body_replaces_it(bus: Any, start: Any) -> None:
