@@ -32,8 +32,15 @@ FIGURES = (
 
 
 @pytest.fixture(scope="module")
-def output(tmp_path_factory: pytest.TempPathFactory, tiny_plan: Plan, silent: Progress) -> Path:
+def output(
+    of_recording: Path,
+    tmp_path_factory: pytest.TempPathFactory,
+    tiny_plan: Plan,
+    silent: Progress,
+) -> Path:
+    """The results of all experiments, in a folder with those of a recorded session."""
     folder = tmp_path_factory.mktemp("tiny")
+    shutil.copytree(of_recording, folder / "person")
     evaluate(folder, tiny_plan, progress=silent)
     return folder
 
@@ -191,11 +198,7 @@ def test_a_recorded_session_with_another_seed(
     assert (tmp_path / "out" / "sequence_bow.png").exists()
 
 
-def test_recorded_sessions_below_the_output_are_in_its_report(
-    of_recording: Path, output: Path, tiny_plan: Plan, silent: Progress
-) -> None:
-    shutil.copytree(of_recording, output / "person")
-    evaluate(output, tiny_plan, progress=silent)
+def test_recorded_sessions_below_the_output_are_in_its_report(output: Path) -> None:
     report = (output / "report.md").read_text()
     assert "## Recorded sessions" in report
     assert "[person](person/report.md)" in report
