@@ -70,6 +70,7 @@ def track(
                 person.end_s,
                 person.people,
                 None if request.hands is None else HandNetwork(request.hands),
+                pictures=request.files.video is not None,
             )
         remarks = [remark for remark in source.first.remarks if remark not in early]
         accounts = tuple(one.account for one in source.sources)

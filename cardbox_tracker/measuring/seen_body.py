@@ -55,6 +55,11 @@ class SeenBody:
         self._guess, self._pause_s = guess, pause_s
         self.forget()
 
+    @property
+    def is_complete(self) -> bool:
+        """Whether no further image changes the body."""
+        return len(self._fits) == MOST_SIGHTS
+
     def forget(self) -> None:
         """Expect another person."""
         self.body, self._next_s, self._poor_iou = self._guess, float("-inf"), 0.0
@@ -78,7 +83,7 @@ class SeenBody:
         is_detected: bool = False,
     ) -> bool:
         """Fit a silhouette (H, W), and colours of its image, if due; return if ``body`` changed."""
-        if time_s < self._next_s or len(self._fits) == MOST_SIGHTS:
+        if time_s < self._next_s or self.is_complete:
             return False
         seen = upper_body(silhouette, is_detected)
         if seen is None:

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import math
+import weakref
 from collections.abc import Callable, Collection, Iterator, Sequence
 from dataclasses import replace
 from functools import partial
 from itertools import islice, takewhile
 from pathlib import Path
+from tempfile import TemporaryFile
 from typing import NamedTuple
 
 import numpy as np
@@ -33,6 +35,8 @@ _PERIOD_IMAGES = 60
 _OTHER_CLOCK_NS = 1_000_000_000
 # Spans are often rounded up by less.
 _SHORT_S = 1.0
+# Bytes of the file of kept images: ten minutes of a film.
+_MOST_KEPT = 4 * 1024**3
 
 
 class TimeSpan(NamedTuple):
@@ -104,6 +108,41 @@ class RecordedFrame(NamedTuple):
         return self.brightness if self.image is None else self.image
 
 
+class KeptImages:
+    """Small images of a recording in a temporary file, since decoding again takes longer.
+
+    Attributes:
+        end_s: time up to which all images are kept.
+    """
+
+    def __init__(self) -> None:
+        """Begin without an image."""
+        self._file, self._images = TemporaryFile(), list[PreparedImage]()  # noqa: SIM115
+        weakref.finalize(self, self._file.close)
+        self.end_s = -math.inf
+
+    def add(self, one: PreparedImage) -> bool:
+        """Keep the next image, without what it was made of; return whether there was room."""
+        try:
+            self._file.write(one.image.tobytes())
+        except OSError:
+            return False
+        shape_only = np.broadcast_to(np.uint8(0), one.image.shape)
+        recorded = replace(one.recorded, _decode=lambda: shape_only)
+        self._images.append(one._replace(image=shape_only, recorded=recorded))
+        self.end_s = one.time_s
+        return self._file.tell() < _MOST_KEPT
+
+    def __iter__(self) -> Iterator[PreparedImage]:
+        """Read the images."""
+        place = 0
+        for one in self._images:
+            self._file.seek(place)
+            pixels = np.fromfile(self._file, np.uint8, one.image.size)
+            place += pixels.size
+            yield one._replace(image=pixels.reshape(one.image.shape))
+
+
 class SilhouetteSource:
     """One camera of a recording: its silhouettes, at the working resolution.
 
@@ -115,11 +154,13 @@ class SilhouetteSource:
             model does.
         has_points: whether the frames can have points of the person.
         used_beside: topics of other images of the recording that are used, too.
+        kept: keeps the images of the next pass; None to keep none.
     """
 
     depth_topic: str | None = None
     _background_s = 0.0
     used_beside: Collection[str] = ()
+    kept: KeptImages | None = None
 
     def __init__(
         self,
@@ -216,9 +257,12 @@ class SilhouetteSource:
         found = self._detector(prepared.number, prepared.stamp_ns, prepared.image)
         return prepared._replace(found=found)
 
-    def _images_until(self, end_s: float, start_s: float) -> Iterator[PreparedImage]:
+    def _images_until(
+        self, end_s: float, start_s: float, pictures: bool
+    ) -> Iterator[PreparedImage]:
         """Yield images to ``end_s``, from ``start_s`` on with whom the detector finds meanwhile."""
-        within = takewhile(lambda one: one.time_s <= end_s, self.images())
+        images = self.images(None if pictures else end_s)
+        within = takewhile(lambda one: one.time_s <= end_s, images)
         look = partial(self._looked_at, start_s=start_s)
         return within if self._detector is None else results_ahead(look, within)
 
@@ -242,17 +286,23 @@ class SilhouetteSource:
         """Seconds from the first to the last message of the recording."""
         return self._bag.duration_s
 
-    def frames(self, start_s: float = 0.0, end_s: float = float("inf")) -> Iterator[RecordedFrame]:
-        """Yield every image from ``start_s`` to ``end_s`` in order."""
+    def frames(
+        self, start_s: float = 0.0, end_s: float = float("inf"), pictures: bool = True
+    ) -> Iterator[RecordedFrame]:
+        """Yield every image from ``start_s`` to ``end_s`` in order.
+
+        Without ``pictures``, the frames have no ``recorded`` image, so kept images serve.
+        """
         # The background adapts from the first image on, so frames do not depend on the span.
         self._pipeline.restart()
         self._start_points(start_s, end_s)
-        for prepared in self._images_until(end_s, start_s):
+        for prepared in self._images_until(end_s, start_s, pictures):
             stamp_ns, time_s, image, recorded, *_ = prepared
             silhouette = self._silhouette(prepared)
             if time_s >= start_s:
                 seen = brightness_of(image), silhouette, image
-                frame = RecordedFrame(stamp_ns, time_s, *seen, recorded=recorded)
+                shown = recorded if pictures else None
+                frame = RecordedFrame(stamp_ns, time_s, *seen, recorded=shown)
                 if self._finds_people:
                     yield frame._replace(people=self._people(prepared))
                 else:
@@ -360,9 +410,16 @@ class SilhouetteSource:
             self._full = (width, height), rectifier
         return image if rectifier is None else rectifier(image)
 
-    def images(self) -> Iterator[PreparedImage]:
-        """Yield every image that can be decoded; the next ones are, while the caller works."""
-        used = 0
+    def images(self, kept_s: float | None = None) -> Iterator[PreparedImage]:
+        """Yield every image that can be decoded; the next ones are, while the caller works.
+
+        If all images to ``kept_s`` are kept, these are yielded, without the recorded ones.
+        """
+        kept, used = self.kept, 0
+        if kept is not None and kept_s is not None and kept.end_s >= kept_s:
+            yield from kept
+            return
+        keeps = kept is not None and kept.end_s == -math.inf
         taken = enumerate(self._bag.images(self.topic), 1)
         for number, image, prepared in results_ahead(self._prepared, taken):
             if number == 1:
@@ -375,7 +432,11 @@ class SilhouetteSource:
             used += 1
             self._used = max(self._used, used)
             time_ns = image.stamp_ns + self._clock_ns - self._bag.start_ns
-            yield PreparedImage(image.stamp_ns, time_ns / 1e9, prepared, image, number - 1)
+            found = PreparedImage(image.stamp_ns, time_ns / 1e9, prepared, image, number - 1)
+            keeps = keeps and kept is not None and kept.add(found)
+            yield found
+        if keeps and kept is not None:
+            kept.end_s = math.inf
 
     def _prepared(
         self, taken: tuple[int, RecordedImage]

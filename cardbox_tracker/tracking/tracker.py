@@ -520,6 +520,20 @@ class Tracker:
         return self._is_contradicted
 
 
+class BodyTracker(Tracker):
+    """Measures the body alone, so that an image without a fit takes little time."""
+
+    def _track(self, frames: list[Frame]) -> Estimate:
+        if self._measuring is not None:
+            self._measure(self._measuring, frames)
+        return Estimate(LOST)
+
+    @property
+    def is_measured(self) -> bool:
+        """Whether no further image changes the body."""
+        return self._measuring is None or self._measuring.is_complete
+
+
 def _are_whole(frames: Sequence[Frame]) -> bool:
     """Return whether no other person hides pixels of this one."""
     # What others hide is missing in the outline, and networks mix people.
