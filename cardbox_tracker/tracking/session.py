@@ -12,7 +12,7 @@ were, and is ``uncertain``, with ``hidden`` keypoints.
 
 from __future__ import annotations
 
-from collections.abc import Container, Iterator, Mapping, Sequence
+from collections.abc import Callable, Container, Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -164,7 +164,7 @@ class Session:
         others: Sequence[OtherCamera] = (),
         people: int | None = None,
         look: Look | None = None,
-        make_tracker: type[Tracker] = Tracker,
+        make_tracker: Callable[..., Tracker] = Tracker,
     ) -> None:
         """Set up for people who may come, with the body of each in the order of their numbers.
 
