@@ -51,6 +51,8 @@ def track(
         qualities.setdefault(estimate.person or 0, Quality())(frame, estimate, tracker)
 
     with measured_scene(recording, person, request.config, request.seed) as (source, scene):
+        # Hands and the overlay are seen at the resolution of the recording.
+        source.first.has_pictures = request.hands is not None or request.files.video is not None
         early = source.first.remarks
         print_remarks(_with_unknown(early, person))
         total_s = max(1e-9, min(source.first.duration_s, person.end_s) - start_s)
@@ -70,7 +72,6 @@ def track(
                 person.end_s,
                 person.people,
                 None if request.hands is None else HandNetwork(request.hands),
-                pictures=request.files.video is not None,
             )
         remarks = [remark for remark in source.first.remarks if remark not in early]
         accounts = tuple(one.account for one in source.sources)

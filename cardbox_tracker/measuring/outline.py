@@ -72,18 +72,12 @@ def filled(silhouette: Silhouette) -> Silhouette:
     Regions belong together if the gap between them is narrower than about an arm. Holes smaller
     than the square of that gap are filled.
     """
+    seen = (silhouette > 0).astype(np.uint8)
     gap = max(3, silhouette.shape[0] // _GAP | 1)  # odd, so that closing removes no pixel
-    # Around it, nothing changes.
-    left, top, width, height = cv2.boundingRect(silhouette)
-    columns, rows = (
-        slice(max(0, low - gap), low + size + gap) for low, size in ((left, width), (top, height))
-    )
-    seen = (silhouette[rows, columns] > 0).astype(np.uint8)
-    found = np.zeros_like(silhouette)
     joined = cv2.morphologyEx(seen, cv2.MORPH_CLOSE, np.ones((gap, gap), np.uint8))
     _, labels, statistics, _ = cv2.connectedComponentsWithStats(joined, connectivity=8)
     if len(statistics) < 2:
-        return found
+        return np.zeros_like(silhouette)
     person = seen * (labels == 1 + np.argmax(statistics[1:, cv2.CC_STAT_AREA]))
     # The rim of a hole may be broken by a pixel or two. Larger holes are gaps between trunk and
     # arm, if a hand touches the hips.
@@ -92,8 +86,7 @@ def filled(silhouette: Silhouette) -> Silhouette:
     small = np.nonzero(statistics[:, cv2.CC_STAT_AREA] < gap * gap)[0]
     holes = np.isin(labels, small[small > 0]).astype(np.uint8)
     whole = person | cv2.dilate(holes, np.ones((3, 3), np.uint8))
-    found[rows, columns] = whole * np.uint8(255)
-    return found
+    return np.asarray(whole * np.uint8(255), dtype=np.uint8)
 
 
 def level_arm(

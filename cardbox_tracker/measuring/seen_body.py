@@ -61,11 +61,6 @@ class SeenBody:
         self._guess, self._pause_s = guess, pause_s
         self.forget()
 
-    @property
-    def is_complete(self) -> bool:
-        """Whether no further image changes the body."""
-        return len(self._fits) == MOST_SIGHTS
-
     def forget(self) -> None:
         """Expect another person."""
         self.body, self._next_s, self._poor_iou = self._guess, float("-inf"), 0.0
@@ -97,7 +92,7 @@ class SeenBody:
                 return False
             self._begun = None
             return self._add(fitting.result, begun_s)
-        if time_s < self._next_s or self.is_complete:
+        if time_s < self._next_s or len(self._fits) == MOST_SIGHTS:
             return False
         seen = upper_body(silhouette, is_detected)
         if seen is None:

@@ -27,7 +27,7 @@ from cardbox_tracker.measuring.seen_body import MOST_SIGHTS, SeenBody
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.sizes import FloatArray
 from cardbox_tracker.recordings.recording import FrameSet, Recording
-from cardbox_tracker.recordings.silhouettes import KeptImages, RecordedFrame
+from cardbox_tracker.recordings.silhouettes import RecordedFrame
 from cardbox_tracker.search.config import TrackerConfig
 from cardbox_tracker.tracking.session import Session
 from cardbox_tracker.tracking.tracker import BodyTracker, Tracker
@@ -71,9 +71,12 @@ class Watched(NamedTuple):
 
 
 def watch(recording: Recording, start_s: float = 0.0, end_s: float = math.inf) -> Watched:
-    """Read a recording from ``start_s`` to ``end_s``, seconds from its start; keep its images."""
+    """Read a recording from ``start_s`` to ``end_s``, seconds from its start.
+
+    From then on, its frames have small images alone.
+    """
     for source in recording.sources:
-        source.kept = KeptImages()
+        source.keep_images()
     frames, pictures = Spread[RecordedFrame](MOST_SIGHTS), Spread[Picture](_MOST_PICTURES)
     people: list[_Person] = []
     for taken in recording.frames(start_s, end_s):
@@ -82,6 +85,8 @@ def watch(recording: Recording, start_s: float = 0.0, end_s: float = math.inf) -
             frames.add(partial(frame._replace, recorded=None))
         pictures.add(partial(_picture, taken))
         _assign(people, frame, taken.time_s)
+    for source in recording.sources:
+        source.has_pictures = False
     return Watched(frames.items, pictures.items, [one.seen for one in people])
 
 
@@ -171,10 +176,7 @@ def seen_people(
     # One camera's points tell who is who, but regions and other cameras need postures.
     is_enough = recording.first.has_points and not recording.others
     session = Session(*given, make_tracker=BodyTracker if is_enough else Tracker)
-    for taken in recording.frames(start_s, end_s, pictures=False):
+    for taken in recording.frames(start_s, end_s):
         session.track(taken.observations)
-        known = [isinstance(one, BodyTracker) and one.is_measured for one in session.trackers]
-        if most and all(known):
-            break
     bodies = [replace(tracker.body, version=0, stamp_ns=0) for tracker in session.trackers]
     return bodies or list(guesses)

@@ -76,12 +76,10 @@ class DepthSilhouetteSource(SilhouetteSource):
         self._within, self.depth_topic = within, within.topic
         self._without, self._nearest_m, self._is_near = 0, math.inf, False
 
-    def frames(
-        self, start_s: float = 0.0, end_s: float = float("inf"), pictures: bool = True
-    ) -> Iterator[RecordedFrame]:
+    def frames(self, start_s: float = 0.0, end_s: float = float("inf")) -> Iterator[RecordedFrame]:
         """Yield every image from ``start_s`` to ``end_s`` that has a depth image, in order."""
         depths = depth_images(self._bag.path, self._within.topic, self.camera)
-        streams: list[Iterator[Any]] = [self.images(None if pictures else end_s), depths]
+        streams: list[Iterator[Any]] = [self.images(end_s), depths]
         self._without = 0
         self._start_points(start_s, end_s)
         for seen, measured in side_by_side(streams, lambda item: int(item[0]), TOLERANCE_NS):
@@ -100,8 +98,9 @@ class DepthSilhouetteSource(SilhouetteSource):
             if not self._is_near:
                 self._nearest_m = min(self._nearest_m, nearest_m(measured[1]))
             found = self._points(self._looked_at(seen), silhouette)
-            shown = brightness_of(image), silhouette, image, measured[1], found
-            yield RecordedFrame(stamp_ns, time_s, *shown, recorded if pictures else None)
+            pictures = brightness_of(image), silhouette, image
+            shown = recorded if self.has_pictures else None
+            yield RecordedFrame(stamp_ns, time_s, *pictures, measured[1], found, shown)
         self._end_points()
 
     @property

@@ -140,17 +140,12 @@ class Recording:
         if all(faults):
             raise CardboxError(faults[0])
 
-    def frames(
-        self, start_s: float = 0.0, end_s: float = math.inf, pictures: bool = True
-    ) -> Iterator[FrameSet]:
-        """Yield synchronized frames from ``start_s`` to ``end_s``; each image is in one set.
-
-        Without ``pictures``, none has the resolution of the recording, which takes less time.
-        """
+    def frames(self, start_s: float = 0.0, end_s: float = math.inf) -> Iterator[FrameSet]:
+        """Yield synchronized frames from ``start_s`` to ``end_s``; each image is in one set."""
         # Images slightly before the start can belong to the first set.
         early_s = max(0.0, start_s - self._tolerance_ns / 1e9)
         late_s = end_s + self._tolerance_ns / 1e9
-        streams = [source.frames(early_s, late_s, pictures) for source in self.sources]
+        streams = [source.frames(early_s, late_s) for source in self.sources]
         depths = self._depths()
         depth = next(depths, None)
         black = np.zeros((self.first.camera.height, self.first.camera.width), np.uint8)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import pickle
 import weakref
 from collections.abc import Callable, Collection, Iterator, Sequence
 from dataclasses import replace
@@ -10,7 +11,7 @@ from functools import partial
 from itertools import islice, takewhile
 from pathlib import Path
 from tempfile import TemporaryFile
-from typing import NamedTuple
+from typing import BinaryIO, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -108,41 +109,6 @@ class RecordedFrame(NamedTuple):
         return self.brightness if self.image is None else self.image
 
 
-class KeptImages:
-    """Small images of a recording in a temporary file, since decoding again takes longer.
-
-    Attributes:
-        end_s: time up to which all images are kept.
-    """
-
-    def __init__(self) -> None:
-        """Begin without an image."""
-        self._file, self._images = TemporaryFile(), list[PreparedImage]()  # noqa: SIM115
-        weakref.finalize(self, self._file.close)
-        self.end_s = -math.inf
-
-    def add(self, one: PreparedImage) -> bool:
-        """Keep the next image, without what it was made of; return whether there was room."""
-        try:
-            self._file.write(one.image.tobytes())
-        except OSError:
-            return False
-        shape_only = np.broadcast_to(np.uint8(0), one.image.shape)
-        recorded = replace(one.recorded, _decode=lambda: shape_only)
-        self._images.append(one._replace(image=shape_only, recorded=recorded))
-        self.end_s = one.time_s
-        return self._file.tell() < _MOST_KEPT
-
-    def __iter__(self) -> Iterator[PreparedImage]:
-        """Read the images."""
-        place = 0
-        for one in self._images:
-            self._file.seek(place)
-            pixels = np.fromfile(self._file, np.uint8, one.image.size)
-            place += pixels.size
-            yield one._replace(image=pixels.reshape(one.image.shape))
-
-
 class SilhouetteSource:
     """One camera of a recording: its silhouettes, at the working resolution.
 
@@ -154,13 +120,17 @@ class SilhouetteSource:
             model does.
         has_points: whether the frames can have points of the person.
         used_beside: topics of other images of the recording that are used, too.
-        kept: keeps the images of the next pass; None to keep none.
+        has_pictures: whether frames have the images as they were recorded; small images of the
+            passes before serve without, since decoding takes longer.
     """
 
     depth_topic: str | None = None
     _background_s = 0.0
     used_beside: Collection[str] = ()
-    kept: KeptImages | None = None
+    has_pictures = True
+    # Small images to a time, s, are in a file.
+    _kept, _kept_s = 0, -math.inf
+    _file: BinaryIO | None = None
 
     def __init__(
         self,
@@ -257,12 +227,9 @@ class SilhouetteSource:
         found = self._detector(prepared.number, prepared.stamp_ns, prepared.image)
         return prepared._replace(found=found)
 
-    def _images_until(
-        self, end_s: float, start_s: float, pictures: bool
-    ) -> Iterator[PreparedImage]:
+    def _images_until(self, end_s: float, start_s: float) -> Iterator[PreparedImage]:
         """Yield images to ``end_s``, from ``start_s`` on with whom the detector finds meanwhile."""
-        images = self.images(None if pictures else end_s)
-        within = takewhile(lambda one: one.time_s <= end_s, images)
+        within = takewhile(lambda one: one.time_s <= end_s, self.images(end_s))
         look = partial(self._looked_at, start_s=start_s)
         return within if self._detector is None else results_ahead(look, within)
 
@@ -286,22 +253,17 @@ class SilhouetteSource:
         """Seconds from the first to the last message of the recording."""
         return self._bag.duration_s
 
-    def frames(
-        self, start_s: float = 0.0, end_s: float = float("inf"), pictures: bool = True
-    ) -> Iterator[RecordedFrame]:
-        """Yield every image from ``start_s`` to ``end_s`` in order.
-
-        Without ``pictures``, the frames have no ``recorded`` image, so kept images serve.
-        """
+    def frames(self, start_s: float = 0.0, end_s: float = float("inf")) -> Iterator[RecordedFrame]:
+        """Yield every image from ``start_s`` to ``end_s`` in order."""
         # The background adapts from the first image on, so frames do not depend on the span.
         self._pipeline.restart()
         self._start_points(start_s, end_s)
-        for prepared in self._images_until(end_s, start_s, pictures):
+        for prepared in self._images_until(end_s, start_s):
             stamp_ns, time_s, image, recorded, *_ = prepared
             silhouette = self._silhouette(prepared)
             if time_s >= start_s:
                 seen = brightness_of(image), silhouette, image
-                shown = recorded if pictures else None
+                shown = recorded if self.has_pictures else None
                 frame = RecordedFrame(stamp_ns, time_s, *seen, recorded=shown)
                 if self._finds_people:
                     yield frame._replace(people=self._people(prepared))
@@ -410,16 +372,21 @@ class SilhouetteSource:
             self._full = (width, height), rectifier
         return image if rectifier is None else rectifier(image)
 
-    def images(self, kept_s: float | None = None) -> Iterator[PreparedImage]:
+    def keep_images(self) -> None:
+        """Keep small images of the next pass in a file for passes without pictures."""
+        self._file = TemporaryFile()  # noqa: SIM115
+        weakref.finalize(self, self._file.close)
+
+    def images(self, end_s: float = math.inf) -> Iterator[PreparedImage]:
         """Yield every image that can be decoded; the next ones are, while the caller works.
 
-        If all images to ``kept_s`` are kept, these are yielded, without the recorded ones.
+        Without pictures, kept images serve if there are all to ``end_s``.
         """
-        kept, used = self.kept, 0
-        if kept is not None and kept_s is not None and kept.end_s >= kept_s:
-            yield from kept
+        if self._file is not None and not self.has_pictures and self._kept_s >= end_s:
+            self._file.seek(0)
+            yield from (pickle.load(self._file) for _ in range(self._kept))
             return
-        keeps = kept is not None and kept.end_s == -math.inf
+        used, keeps = 0, self._file is not None and self._kept == 0
         taken = enumerate(self._bag.images(self.topic), 1)
         for number, image, prepared in results_ahead(self._prepared, taken):
             if number == 1:
@@ -433,10 +400,20 @@ class SilhouetteSource:
             self._used = max(self._used, used)
             time_ns = image.stamp_ns + self._clock_ns - self._bag.start_ns
             found = PreparedImage(image.stamp_ns, time_ns / 1e9, prepared, image, number - 1)
-            keeps = keeps and kept is not None and kept.add(found)
+            keeps = keeps and self._keep(found)
             yield found
-        if keeps and kept is not None:
-            kept.end_s = math.inf
+        self._kept_s = math.inf if keeps else self._kept_s
+
+    def _keep(self, one: PreparedImage) -> bool:
+        """Keep an image; return whether there is room for more."""
+        small = replace(one.recorded, _decode=partial(np.zeros, 0, np.uint8))
+        assert self._file is not None
+        try:
+            pickle.dump(one._replace(recorded=small), self._file)
+        except OSError:
+            return False
+        self._kept, self._kept_s = self._kept + 1, one.time_s
+        return self._file.tell() < _MOST_KEPT
 
     def _prepared(
         self, taken: tuple[int, RecordedImage]

@@ -90,15 +90,13 @@ def track_recording(
     end_s: float = math.inf,
     people: int | None = None,
     look: Look | None = None,
-    pictures: bool = True,
 ) -> TrackSummary:
     """Track every image from ``start_s`` to ``end_s``.
 
     Both count in seconds from the recording's start; at ``start_s`` the person stands in the front
     reference posture. The same recording and ``seed`` give the same bytes. ``table`` is a file of
     :func:`~.result_table.result_table`. ``observers``, such as a progress bar or a bag writer, are
-    called after each image, and for each of several people. ``pictures`` are those of
-    :meth:`~.recording.Recording.frames`; hands need them. The other arguments are those of
+    called after each image, and for each of several people. The other arguments are those of
     :class:`~cardbox_tracker.tracking.session.Session`. Raises CardboxError if no image lies after
     ``start_s``, or a file cannot be written.
     """
@@ -108,7 +106,7 @@ def track_recording(
     has = first.has_points, people is not None, look is not None
     with nullcontext() if table is None else result_table(table, *has) as add_row:
         frames = 0
-        for taken in recording.frames(start_s, end_s, pictures or look is not None):
+        for taken in recording.frames(start_s, end_s):
             frames += 1
             estimates = session.track(taken.observations)
             tallies += [_Tally() for _ in estimates[len(tallies) :]]

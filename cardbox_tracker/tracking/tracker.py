@@ -530,11 +530,6 @@ class BodyTracker(Tracker):
             self._measure(self._measuring, frames)
         return Estimate(LOST)
 
-    @property
-    def is_measured(self) -> bool:
-        """Whether no further image changes the body."""
-        return self._measuring is None or self._measuring.is_complete
-
 
 def _are_whole(frames: Sequence[Frame]) -> bool:
     """Return whether no other person hides pixels of this one."""

@@ -2,25 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from unittest.mock import Mock
-
 import cv2
 import numpy as np
 import pytest
 
-from cardbox_tracker.camera.camera import Camera
 from cardbox_tracker.detectors.figure import figure_of_points
 from cardbox_tracker.detectors.image_points import POINT_NAMES, ImagePoints
-from cardbox_tracker.person.model import BodyModel
-from cardbox_tracker.recordings.measured_scene import _assign, _Person, seen_people
-from cardbox_tracker.recordings.recording import FrameSet
+from cardbox_tracker.recordings.measured_scene import _assign, _Person
 from cardbox_tracker.recordings.silhouettes import RecordedFrame
-from cardbox_tracker.search.config import default_preset
 
 RED, BLUE = (40, 40, 220), (220, 60, 40)
 SHAPE = 240, 320
-CAMERA = Camera(320, 240, 300.0, 300.0, 159.5, 119.5)
 # Places of joints beside the middle of the shoulders, px.
 BESIDE = {"shoulder": (18, 0), "elbow": (24, 30), "wrist": (24, 55), "hip": (12, 60)}
 
@@ -67,18 +59,3 @@ def test_who_comes_after_two_seconds_is_a_new_person() -> None:
     for time_s in (0.0, 0.1, 2.1):
         _assign(people, frame((160.0, RED), found=1), time_s)
     assert [[time_s for time_s, _ in person.seen] for person in people] == [[0.0, 0.1], [2.1]]
-
-
-def test_people_whose_bodies_are_known_end_the_pass_before_tracking() -> None:
-    read = []
-
-    def frames(*_: float, pictures: bool) -> Iterator[FrameSet]:
-        assert not pictures
-        for number in range(3):
-            read.append(number)
-            yield FrameSet(number, number / 15, (None,), frame(found=0))
-
-    recording = Mock(first=Mock(camera=CAMERA, has_points=True), others=[], frames=frames)
-    known = [BodyModel.of(distance_m=2.3, hip_height_m=-0.4)] * 2
-    assert seen_people(recording, known, default_preset(), 2, 0) == known
-    assert read == [0]

@@ -21,7 +21,7 @@ from cardbox_tracker.recordings.bag_writer import BagWriter
 from cardbox_tracker.recordings.given_camera import GivenCamera
 from cardbox_tracker.recordings.image_folder import ImageFolder
 from cardbox_tracker.recordings.other_silhouettes import DetectorSilhouetteSource
-from cardbox_tracker.recordings.silhouettes import KeptImages, SilhouetteSource, TimeSpan
+from cardbox_tracker.recordings.silhouettes import SilhouetteSource, TimeSpan
 from cardbox_tracker.segmentation.background_config import BackgroundConfig
 
 
@@ -64,20 +64,22 @@ def test_a_second_pass_without_pictures_decodes_nothing(
     monkeypatch.setattr(SilhouetteSource, "_prepared", lambda *given: decoded(*given))
     with BagReader(recording.folder) as bag:
         source = SilhouetteSource(bag, TimeSpan(0.0, 1.0))
-        source.kept = KeptImages()
+        source.keep_images()
         first = list(source.frames(1.0, 2.0))
         decoded.reset_mock()
-        second = list(source.frames(1.0, 2.0, pictures=False))
+        source.has_pictures = False
+        second = list(source.frames(1.0, 2.0))
         assert not decoded.called
         for one, other in zip(first, second, strict=True):
             assert (one.stamp_ns, one.time_s) == (other.stamp_ns, other.time_s)
             assert np.array_equal(one.picture, other.picture)
             assert np.array_equal(one.silhouette, other.silhouette)
             assert other.recorded is None
-        # Pictures, and images after the kept ones, are in the recording alone.
-        assert all(frame.recorded is not None for frame in source.frames(1.0, 2.0))
-        assert list(source.frames(1.0, 4.0, pictures=False))[-1].time_s == pytest.approx(4.0)
+        # Images after the kept ones, and pictures, are in the recording alone.
+        assert list(source.frames(1.0, 4.0))[-1].time_s == pytest.approx(4.0)
         assert decoded.called
+        source.has_pictures = True
+        assert all(frame.recorded is not None for frame in source.frames(1.0, 2.0))
 
 
 def test_kept_images_end_where_there_is_no_room(
@@ -86,10 +88,11 @@ def test_kept_images_end_where_there_is_no_room(
     monkeypatch.setattr("cardbox_tracker.recordings.silhouettes._MOST_KEPT", 1_000_000)
     with BagReader(recording.folder) as bag:
         source = SilhouetteSource(bag, TimeSpan(0.0, 1.0))
-        source.kept = KeptImages()
+        source.keep_images()
         whole = [frame.stamp_ns for frame in source.frames()]
-        assert 0.0 < source.kept.end_s < bag.duration_s
-        assert [frame.stamp_ns for frame in source.frames(pictures=False)] == whole
+        assert 0.0 < source._kept_s < bag.duration_s
+        source.has_pictures = False
+        assert [frame.stamp_ns for frame in source.frames()] == whole
 
 
 def test_silhouettes_are_the_person_and_the_empty_scene_has_none(

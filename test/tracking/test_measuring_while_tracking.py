@@ -179,8 +179,6 @@ def test_a_body_is_measured_without_a_search_for_its_posture(
     track = BodyTracker(guess, *given)
     assert track.track(Observation(silhouette(good), stamp_ns=0)).state == LOST
     assert not track.body.unknown
-    assert not track.is_measured
-    assert BodyTracker(good, *given).is_measured
 
 
 @pytest.mark.parametrize(
