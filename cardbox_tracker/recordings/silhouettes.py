@@ -109,6 +109,10 @@ class RecordedFrame(NamedTuple):
         return self.brightness if self.image is None else self.image
 
 
+def _not_kept() -> NDArray[np.uint8]:
+    raise RuntimeError("the recorded image is not kept; set has_pictures")
+
+
 class SilhouetteSource:
     """One camera of a recording: its silhouettes, at the working resolution.
 
@@ -406,7 +410,7 @@ class SilhouetteSource:
 
     def _keep(self, one: PreparedImage) -> bool:
         """Keep an image; return whether there is room for more."""
-        small = replace(one.recorded, _decode=partial(np.zeros, 0, np.uint8))
+        small = replace(one.recorded, _decode=_not_kept)
         assert self._file is not None
         try:
             pickle.dump(one._replace(recorded=small), self._file)
