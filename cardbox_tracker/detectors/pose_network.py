@@ -73,7 +73,7 @@ _CENTRE, _SCALE = 33, 34
 _OUTPUTS = 39
 # A point moves to the centroid of its heat map in a window of this many cells.
 _HEAT_WINDOW, _LEAST_HEAT = 7, 0.5
-_CELLS = np.indices((_HEAT_WINDOW, _HEAT_WINDOW)).T - (_HEAT_WINDOW - 1) // 2
+_CELLS = np.indices((_HEAT_WINDOW, _HEAT_WINDOW))[::-1].reshape(2, -1).T
 
 
 class Square(NamedTuple):
@@ -342,18 +342,18 @@ def _to_image(square: Square, size: int) -> FloatArray:
 
 def _refined(points: FloatArray, heat: NDArray[Any]) -> FloatArray:
     """Move each point (N, 2) to the centroid of its heat map, logits (H, W, N), around it."""
-    size, number = np.array(heat.shape[1::-1]), np.arange(len(points))[:, None, None]
+    size, number = np.array(heat.shape[1::-1]), np.arange(len(points))[:, None]
     middles = (points * size).astype(int)
-    cells = middles[:, None, None] + _CELLS
+    corners = middles - _HEAT_WINDOW // 2
+    cells = corners[:, None] + _CELLS
     is_in = ((cells >= 0) & (cells < size)).all(axis=-1)
     column, row = np.moveaxis(cells.clip(0, size - 1), -1, 0)
     chances = np.where(is_in, _chance(heat[row, column, number]), 0.0)
-    total = chances.sum(axis=(1, 2))
     is_clear = ((middles >= 0) & (middles < size)).all(axis=1)
-    is_clear &= chances.max(axis=(1, 2)) >= _LEAST_HEAT
-    sums = np.einsum("nij,nijk->nk", chances, cells)
-    found = sums / np.where(is_clear, total, 1.0)[:, None] / size
-    return np.where(is_clear[:, None], found, points)
+    is_clear &= chances.max(axis=1) >= _LEAST_HEAT
+    total = np.where(is_clear, chances.sum(axis=1), 1.0)
+    inside = np.column_stack([(chances * one).sum(axis=1) / total for one in _CELLS.T])
+    return np.where(is_clear[:, None], (corners + inside) / size, points)
 
 
 def turned_points(points: FloatArray, angle_rad: float) -> FloatArray:
