@@ -51,6 +51,8 @@ def track(
         qualities.setdefault(estimate.person or 0, Quality())(frame, estimate, tracker)
 
     with measured_scene(recording, person, request.config, request.seed) as (source, scene):
+        # Hands and the overlay are seen at the resolution of the recording.
+        source.first.has_pictures = request.hands is not None or request.files.video is not None
         early = source.first.remarks
         print_remarks(_with_unknown(early, person))
         total_s = max(1e-9, min(source.first.duration_s, person.end_s) - start_s)

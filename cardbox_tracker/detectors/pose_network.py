@@ -73,7 +73,7 @@ _CENTRE, _SCALE = 33, 34
 _OUTPUTS = 39
 # A point moves to the centroid of its heat map in a window of this many cells.
 _HEAT_WINDOW, _LEAST_HEAT = 7, 0.5
-_CELLS = np.indices((_HEAT_WINDOW, _HEAT_WINDOW))
+_CELLS = np.indices((_HEAT_WINDOW, _HEAT_WINDOW))[::-1].reshape(2, -1).T
 
 
 class Square(NamedTuple):
@@ -342,23 +342,18 @@ def _to_image(square: Square, size: int) -> FloatArray:
 
 def _refined(points: FloatArray, heat: NDArray[Any]) -> FloatArray:
     """Move each point (N, 2) to the centroid of its heat map, logits (H, W, N), around it."""
-    height, width = heat.shape[:2]
-    refined, half = points.copy(), (_HEAT_WINDOW - 1) // 2
-    for number, (x, y) in enumerate(points):
-        column, row = int(x * width), int(y * height)
-        if not (0 <= column < width and 0 <= row < height):
-            continue
-        left, top = max(0, column - half), max(0, row - half)
-        window = _chance(heat[top : row + half + 1, left : column + half + 1, number])
-        total = window.sum()
-        if window.max() < _LEAST_HEAT or total <= 0.0:
-            continue
-        rows, columns = _CELLS[:, : window.shape[0], : window.shape[1]]
-        refined[number] = (
-            (left + (columns * window).sum() / total) / width,
-            (top + (rows * window).sum() / total) / height,
-        )
-    return refined
+    size, number = np.array(heat.shape[1::-1]), np.arange(len(points))[:, None]
+    middles = (points * size).astype(int)
+    corners = middles - _HEAT_WINDOW // 2
+    cells = corners[:, None] + _CELLS
+    is_in = ((cells >= 0) & (cells < size)).all(axis=-1)
+    column, row = np.moveaxis(cells.clip(0, size - 1), -1, 0)
+    chances = np.where(is_in, _chance(heat[row, column, number]), 0.0)
+    is_clear = ((middles >= 0) & (middles < size)).all(axis=1)
+    is_clear &= chances.max(axis=1) >= _LEAST_HEAT
+    total = np.where(is_clear, chances.sum(axis=1), 1.0)
+    inside = np.column_stack([(chances * one).sum(axis=1) / total for one in _CELLS.T])
+    return np.where(is_clear[:, None], (corners + inside) / size, points)
 
 
 def turned_points(points: FloatArray, angle_rad: float) -> FloatArray:

@@ -8,7 +8,10 @@ images of a film show of the distance (:mod:`.people_camera`) corrects it.
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from concurrent.futures import Executor, Future
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
@@ -45,12 +48,15 @@ class SeenBody:
         config: TrackerConfig,
         rng: np.random.Generator,
         pause_s: float = 1.0,
+        beside: Executor | None = None,
     ) -> None:
         """Prepare for a person of whom ``guess`` has ``unknown`` values, before a working camera.
 
         ``pause_s`` is the time between the first two images that are used; each further pause is
-        twice as long.
+        twice as long. Fits after the first one are made by ``beside``, if given, and count in
+        the first image after them.
         """
+        self._beside = beside
         self._camera, self._config, self._rng = camera, config, rng
         self._guess, self._pause_s = guess, pause_s
         self.forget()
@@ -59,11 +65,13 @@ class SeenBody:
         """Expect another person."""
         self.body, self._next_s, self._poor_iou = self._guess, float("-inf"), 0.0
         self._wait_s = self._pause_s
+        self._begun: tuple[Future[FirstSight], float] | None = None
         self._fits: list[FirstSight] = []
         self._times_s: list[float] = []
 
     def tilt(self, guess: BodyModel) -> None:
         """Go on with all fits before the camera of another ``guess``, with another pitch."""
+        self._begun = None
         pose = guess.camera_pose
         self._camera = self._camera.with_pitch(pose.pitch_rad)
         self.body = guess if self.body is self._guess else tilted_body(self.body, pose)
@@ -78,14 +86,28 @@ class SeenBody:
         is_detected: bool = False,
     ) -> bool:
         """Fit a silhouette (H, W), and colours of its image, if due; return if ``body`` changed."""
+        if self._begun is not None:
+            fitting, begun_s = self._begun
+            if not fitting.done():
+                return False
+            self._begun = None
+            return self._add(fitting.result, begun_s)
         if time_s < self._next_s or len(self._fits) == MOST_SIGHTS:
             return False
         seen = upper_body(silhouette, is_detected)
         if seen is None:
             return False
+        given = self._guess, self._camera, seen, image, self._config, self._rng
+        if self._beside is None or not self._fits:
+            return self._add(partial(fit_first_sight, *given), time_s)
+        self._begun = self._beside.submit(fit_first_sight, *given), time_s
+        return False
+
+    def _add(self, fitted: Callable[[], FirstSight], time_s: float) -> bool:
+        """Use the fit to the image of a time; return whether ``body`` changed."""
         self._next_s = time_s + _AGAIN_S
         try:
-            fit = fit_first_sight(self._guess, self._camera, seen, image, self._config, self._rng)
+            fit = fitted()
         except InitializationError:
             return False
         if not fit.body.unknown:

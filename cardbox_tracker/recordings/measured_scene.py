@@ -30,6 +30,7 @@ from cardbox_tracker.recordings.recording import FrameSet, Recording
 from cardbox_tracker.recordings.silhouettes import RecordedFrame
 from cardbox_tracker.search.config import TrackerConfig
 from cardbox_tracker.tracking.session import Session
+from cardbox_tracker.tracking.tracker import BodyTracker, Tracker
 
 T = TypeVar("T")
 
@@ -70,7 +71,12 @@ class Watched(NamedTuple):
 
 
 def watch(recording: Recording, start_s: float = 0.0, end_s: float = math.inf) -> Watched:
-    """Read a recording from ``start_s`` to ``end_s``, seconds from its start."""
+    """Read a recording from ``start_s`` to ``end_s``, seconds from its start.
+
+    From then on, its frames have small images alone.
+    """
+    for source in recording.sources:
+        source.keep_images()
     frames, pictures = Spread[RecordedFrame](MOST_SIGHTS), Spread[Picture](_MOST_PICTURES)
     people: list[_Person] = []
     for taken in recording.frames(start_s, end_s):
@@ -79,6 +85,8 @@ def watch(recording: Recording, start_s: float = 0.0, end_s: float = math.inf) -
             frames.add(partial(frame._replace, recorded=None))
         pictures.add(partial(_picture, taken))
         _assign(people, frame, taken.time_s)
+    for source in recording.sources:
+        source.has_pictures = False
     return Watched(frames.items, pictures.items, [one.seen for one in people])
 
 
@@ -157,14 +165,17 @@ def seen_people(
     start_s: float = 0.0,
     end_s: float = math.inf,
 ) -> list[BodyModel]:
-    """Return the bodies of several people, who are tracked once to tell them apart.
+    """Return the bodies of several people; who are not detected are tracked to tell them apart.
 
     ``guesses`` are those of a :class:`~cardbox_tracker.tracking.session.Session`, and ``most`` is
     the number of people, 0 for all who come. They are tracked from ``start_s`` to ``end_s``,
     seconds from the start of the recording.
     """
     rng = np.random.default_rng(seed)
-    session = Session(guesses, recording.first.camera, config, rng, recording.others, most)
+    given = guesses, recording.first.camera, config, rng, recording.others, most
+    # One camera's points tell who is who, but regions and other cameras need postures.
+    is_enough = recording.first.has_points and not recording.others
+    session = Session(*given, make_tracker=BodyTracker if is_enough else Tracker)
     for taken in recording.frames(start_s, end_s):
         session.track(taken.observations)
     bodies = [replace(tracker.body, version=0, stamp_ns=0) for tracker in session.trackers]

@@ -79,7 +79,7 @@ class DepthSilhouetteSource(SilhouetteSource):
     def frames(self, start_s: float = 0.0, end_s: float = float("inf")) -> Iterator[RecordedFrame]:
         """Yield every image from ``start_s`` to ``end_s`` that has a depth image, in order."""
         depths = depth_images(self._bag.path, self._within.topic, self.camera)
-        streams: list[Iterator[Any]] = [self.images(), depths]
+        streams: list[Iterator[Any]] = [self.images(end_s), depths]
         self._without = 0
         self._start_points(start_s, end_s)
         for seen, measured in side_by_side(streams, lambda item: int(item[0]), TOLERANCE_NS):
@@ -99,7 +99,8 @@ class DepthSilhouetteSource(SilhouetteSource):
                 self._nearest_m = min(self._nearest_m, nearest_m(measured[1]))
             found = self._points(self._looked_at(seen), silhouette)
             pictures = brightness_of(image), silhouette, image
-            yield RecordedFrame(stamp_ns, time_s, *pictures, measured[1], found, recorded)
+            shown = recorded if self.has_pictures else None
+            yield RecordedFrame(stamp_ns, time_s, *pictures, measured[1], found, shown)
         self._end_points()
 
     @property

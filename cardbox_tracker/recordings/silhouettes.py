@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import math
+import pickle
+import weakref
 from collections.abc import Callable, Collection, Iterator, Sequence
 from dataclasses import replace
 from functools import partial
 from itertools import islice, takewhile
 from pathlib import Path
-from typing import NamedTuple
+from tempfile import TemporaryFile
+from typing import BinaryIO, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -33,6 +36,8 @@ _PERIOD_IMAGES = 60
 _OTHER_CLOCK_NS = 1_000_000_000
 # Spans are often rounded up by less.
 _SHORT_S = 1.0
+# Bytes of the file of kept images: ten minutes of a film.
+_MOST_KEPT = 4 * 1024**3
 
 
 class TimeSpan(NamedTuple):
@@ -104,6 +109,10 @@ class RecordedFrame(NamedTuple):
         return self.brightness if self.image is None else self.image
 
 
+def _not_kept() -> NDArray[np.uint8]:
+    raise RuntimeError("the recorded image is not kept; set has_pictures")
+
+
 class SilhouetteSource:
     """One camera of a recording: its silhouettes, at the working resolution.
 
@@ -115,11 +124,17 @@ class SilhouetteSource:
             model does.
         has_points: whether the frames can have points of the person.
         used_beside: topics of other images of the recording that are used, too.
+        has_pictures: whether frames have the images as they were recorded; small images of the
+            passes before serve without, since decoding takes longer.
     """
 
     depth_topic: str | None = None
     _background_s = 0.0
     used_beside: Collection[str] = ()
+    has_pictures = True
+    # Small images to a time, s, are in a file.
+    _kept, _kept_s = 0, -math.inf
+    _file: BinaryIO | None = None
 
     def __init__(
         self,
@@ -218,7 +233,7 @@ class SilhouetteSource:
 
     def _images_until(self, end_s: float, start_s: float) -> Iterator[PreparedImage]:
         """Yield images to ``end_s``, from ``start_s`` on with whom the detector finds meanwhile."""
-        within = takewhile(lambda one: one.time_s <= end_s, self.images())
+        within = takewhile(lambda one: one.time_s <= end_s, self.images(end_s))
         look = partial(self._looked_at, start_s=start_s)
         return within if self._detector is None else results_ahead(look, within)
 
@@ -252,7 +267,8 @@ class SilhouetteSource:
             silhouette = self._silhouette(prepared)
             if time_s >= start_s:
                 seen = brightness_of(image), silhouette, image
-                frame = RecordedFrame(stamp_ns, time_s, *seen, recorded=recorded)
+                shown = recorded if self.has_pictures else None
+                frame = RecordedFrame(stamp_ns, time_s, *seen, recorded=shown)
                 if self._finds_people:
                     yield frame._replace(people=self._people(prepared))
                 else:
@@ -360,9 +376,21 @@ class SilhouetteSource:
             self._full = (width, height), rectifier
         return image if rectifier is None else rectifier(image)
 
-    def images(self) -> Iterator[PreparedImage]:
-        """Yield every image that can be decoded; the next ones are, while the caller works."""
-        used = 0
+    def keep_images(self) -> None:
+        """Keep small images of the next pass in a file for passes without pictures."""
+        self._file = TemporaryFile()  # noqa: SIM115
+        weakref.finalize(self, self._file.close)
+
+    def images(self, end_s: float = math.inf) -> Iterator[PreparedImage]:
+        """Yield every image that can be decoded; the next ones are, while the caller works.
+
+        Without pictures, kept images serve if there are all to ``end_s``.
+        """
+        if self._file is not None and not self.has_pictures and self._kept_s >= end_s:
+            self._file.seek(0)
+            yield from (pickle.load(self._file) for _ in range(self._kept))
+            return
+        used, keeps = 0, self._file is not None and self._kept == 0
         taken = enumerate(self._bag.images(self.topic), 1)
         for number, image, prepared in results_ahead(self._prepared, taken):
             if number == 1:
@@ -375,7 +403,21 @@ class SilhouetteSource:
             used += 1
             self._used = max(self._used, used)
             time_ns = image.stamp_ns + self._clock_ns - self._bag.start_ns
-            yield PreparedImage(image.stamp_ns, time_ns / 1e9, prepared, image, number - 1)
+            found = PreparedImage(image.stamp_ns, time_ns / 1e9, prepared, image, number - 1)
+            keeps = keeps and self._keep(found)
+            yield found
+        self._kept_s = math.inf if keeps else self._kept_s
+
+    def _keep(self, one: PreparedImage) -> bool:
+        """Keep an image; return whether there is room for more."""
+        small = replace(one.recorded, _decode=_not_kept)
+        assert self._file is not None
+        try:
+            pickle.dump(one._replace(recorded=small), self._file)
+        except OSError:
+            return False
+        self._kept, self._kept_s = self._kept + 1, one.time_s
+        return self._file.tell() < _MOST_KEPT
 
     def _prepared(
         self, taken: tuple[int, RecordedImage]

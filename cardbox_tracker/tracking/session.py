@@ -12,7 +12,7 @@ were, and is ``uncertain``, with ``hidden`` keypoints.
 
 from __future__ import annotations
 
-from collections.abc import Container, Iterator, Mapping, Sequence
+from collections.abc import Callable, Container, Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -164,6 +164,7 @@ class Session:
         others: Sequence[OtherCamera] = (),
         people: int | None = None,
         look: Look | None = None,
+        make_tracker: Callable[..., Tracker] = Tracker,
     ) -> None:
         """Set up for people who may come, with the body of each in the order of their numbers.
 
@@ -175,14 +176,14 @@ class Session:
         self._bodies, self._camera = tuple(bodies), camera
         self.config = config or TrackerConfig()
         self._rng, self._others = rng or np.random.default_rng(0), tuple(others)
-        self._look, self._is_alone = look, people is None
+        self._look, self._is_alone, self._make = look, people is None, make_tracker
         self._most = people or MOST_PEOPLE
         self._people: list[_Person] = []
         # Images in a row with somebody new, by camera.
         self._new = [0] * (1 + len(self._others))
         self._last_ns: int | None = None
         if self._is_alone:
-            tracker = Tracker(bodies[0], camera, config, rng, others=self._others, look=look)
+            tracker = make_tracker(bodies[0], camera, config, rng, others=self._others, look=look)
             self._people.append(_Person(None, tracker))
         for _ in range(people or 0):
             self._add()
@@ -191,7 +192,7 @@ class Session:
         number = len(self._people) + 1
         body = self._bodies[min(number, len(self._bodies)) - 1]
         given = body, self._camera, self.config, self._rng.spawn(1)[0]
-        tracker = Tracker(*given, others=self._others, look=self._look)
+        tracker = self._make(*given, others=self._others, look=self._look)
         self._people.append(_Person(number, tracker))
         return self._people[-1]
 

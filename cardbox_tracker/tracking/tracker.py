@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from concurrent.futures import Executor
 from dataclasses import replace
 from functools import partial
 from itertools import zip_longest
@@ -96,6 +97,7 @@ class Tracker:
         make_filter: MakeFilter | None = None,
         others: Sequence[OtherCamera] = (),
         look: Look | None = None,
+        beside: Executor | None = None,
     ) -> None:
         """Set up for ``body``; the camera, of the silhouettes' size, gets the pitch of the model.
 
@@ -104,8 +106,8 @@ class Tracker:
         camera's pitch is not known to 10 degrees, estimates are at best ``uncertain``. Settings are
         the paper's by default, and noise is seeded with 0. ``silhouette`` and ``make_filter``
         replace the compiled term and the filter of the settings. ``look`` finds the points of hands
-        in images of the first camera. ``others``, the further cameras, need the filter
-        ``whole_body``.
+        in images of the first camera. ``beside`` measures further versions while tracking goes on.
+        ``others``, the further cameras, need the filter ``whole_body``.
 
         Raises CameraError if the person was not measured in front of one of ``others``, and
         ValueError if there are others, but the filter takes one camera.
@@ -129,7 +131,7 @@ class Tracker:
             # The paper's filter cannot go on with another version of a body.
             pause_s = 1.0 if self.config.has_several_views else np.inf
             fits = self._rng.spawn(1)[0]
-            self._measuring = SeenBody(body, self.camera, self.config, fits, pause_s)
+            self._measuring = SeenBody(body, self.camera, self.config, fits, pause_s, beside)
         self._use(body, silhouette or CompiledSilhouette(body, self.camera))
 
     def _use(self, body: BodyModel, silhouette: SilhouetteTerm, is_new_start: bool = True) -> None:
@@ -518,6 +520,15 @@ class Tracker:
             self._facing.see(frame, Posed(self.cameras[0].posable, self._before[None]))
             return self._facing.shows_back
         return self._is_contradicted
+
+
+class BodyTracker(Tracker):
+    """Measures the body alone, so that an image without a fit takes little time."""
+
+    def _track(self, frames: list[Frame]) -> Estimate:
+        if self._measuring is not None:
+            self._measure(self._measuring, frames)
+        return Estimate(LOST)
 
 
 def _are_whole(frames: Sequence[Frame]) -> bool:

@@ -136,8 +136,8 @@ def _film(film: Mapping[str, Any] | None) -> list[str]:
         f"`python -m lab.benchmarks.film` (commit {film['commit']}) tracks the film of `cardbox "
         "demo`, enlarged to 1280x960, or twice side by side in 1280x480, with the detector. "
         "Processor time an image and its share, with compiled code loaded; a thread decodes, one "
-        "resizes, one detects, and one draws and encodes, beside the one that does the rest. Each "
-        "image is read twice, to measure the scene and to track. The load of the machine was "
+        "resizes, one detects, and one draws and encodes, beside the one that does the rest. Hands "
+        "and video need large images, so that film is decoded twice. The load of the machine was "
         f"{film['load']:.1f}; above the number of cores, times are longer than on a quiet one.",
         _table(("step", *runs), rows),
     ]

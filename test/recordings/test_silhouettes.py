@@ -57,6 +57,44 @@ def test_every_image_comes_once_and_in_order(recording: Any, source: SilhouetteS
     assert later == stamps[10:16]
 
 
+def test_a_second_pass_without_pictures_decodes_nothing(
+    recording: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    decoded = Mock(side_effect=SilhouetteSource._prepared)
+    monkeypatch.setattr(SilhouetteSource, "_prepared", lambda *given: decoded(*given))
+    with BagReader(recording.folder) as bag:
+        source = SilhouetteSource(bag, TimeSpan(0.0, 1.0))
+        source.keep_images()
+        first = list(source.frames(1.0, 2.0))
+        decoded.reset_mock()
+        source.has_pictures = False
+        second = list(source.frames(1.0, 2.0))
+        assert not decoded.called
+        for one, other in zip(first, second, strict=True):
+            assert (one.stamp_ns, one.time_s) == (other.stamp_ns, other.time_s)
+            assert np.array_equal(one.picture, other.picture)
+            assert np.array_equal(one.silhouette, other.silhouette)
+            assert other.recorded is None
+        # Images after the kept ones, and pictures, are in the recording alone.
+        assert list(source.frames(1.0, 4.0))[-1].time_s == pytest.approx(4.0)
+        assert decoded.called
+        source.has_pictures = True
+        assert all(frame.recorded is not None for frame in source.frames(1.0, 2.0))
+
+
+def test_kept_images_end_where_there_is_no_room(
+    recording: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("cardbox_tracker.recordings.silhouettes._MOST_KEPT", 1_000_000)
+    with BagReader(recording.folder) as bag:
+        source = SilhouetteSource(bag, TimeSpan(0.0, 1.0))
+        source.keep_images()
+        whole = [frame.stamp_ns for frame in source.frames()]
+        assert 0.0 < source._kept_s < bag.duration_s
+        source.has_pictures = False
+        assert [frame.stamp_ns for frame in source.frames()] == whole
+
+
 def test_silhouettes_are_the_person_and_the_empty_scene_has_none(
     recording: Any, source: SilhouetteSource
 ) -> None:

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from concurrent.futures import Future
+from unittest.mock import Mock
+
 import numpy as np
 import pytest
 
@@ -17,8 +20,9 @@ from cardbox_tracker.person.posture import reference_posture
 from cardbox_tracker.person.proportions import body_from_proportions, sizes_of_stature
 from cardbox_tracker.person.sizes import SIZE_INDEX
 from cardbox_tracker.search.config import default_preset
-from cardbox_tracker.tracking.estimate import TRACKING, UNCERTAIN
-from cardbox_tracker.tracking.tracker import Tracker
+from cardbox_tracker.tracking.estimate import LOST, TRACKING, UNCERTAIN
+from cardbox_tracker.tracking.observation import Observation
+from cardbox_tracker.tracking.tracker import BodyTracker, Tracker
 
 CAMERA = Camera(320, 240, 300.0, 300.0, 159.5, 119.5)
 NOBODY = np.zeros((240, 320), np.uint8)
@@ -143,6 +147,38 @@ def test_a_body_is_the_median_of_a_few_images_at_growing_pauses(
     assert used_s == [0.0, 1.0, 3.0, 7.0, 15.0, 31.0, 63.0]
     assert seen.body.size("waist_width") == pytest.approx(usual.size("waist_width"))
     assert seen.body.placement == usual.placement
+
+
+def test_further_fits_are_made_beside_and_count_when_they_are_done(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    usual, narrow = person(1.75, -0.62), person(1.75, -0.62, 0.5)
+    seen = sights(monkeypatch, [(usual, 0.8)])
+    fitting: Future[FirstSight] = Future()
+    seen._beside = Mock(submit=Mock(side_effect=[fitting, Future()]))
+    mask = silhouette(usual)
+    assert seen.see(mask, None, 0.0)
+    assert [seen.see(mask, None, time_s) for time_s in (1.0, 1.5, 4.0)] == [False] * 3
+    fitting.set_result(FirstSight(narrow, 0.9))
+    assert seen.see(mask, None, 4.1)
+    mean = (usual.size("waist_width") + narrow.size("waist_width")) / 2
+    assert seen.body.size("waist_width") == pytest.approx(mean)
+    # The next fit is that of another camera when the pitch changes.
+    assert not seen.see(mask, None, 4.2)
+    assert seen._begun is not None
+    seen.tilt(body_from_proportions(1.75, camera_pitch_rad=0.1))
+    assert seen._begun is None
+
+
+def test_a_body_is_measured_without_a_search_for_its_posture(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(Tracker, "_follow", Mock(side_effect=AssertionError))
+    good, guess = person(1.75, -0.62), body_from_proportions(1.75, distance_m=2.0)
+    given = CAMERA, default_preset(), np.random.default_rng(1)
+    track = BodyTracker(guess, *given)
+    assert track.track(Observation(silhouette(good), stamp_ns=0)).state == LOST
+    assert not track.body.unknown
 
 
 @pytest.mark.parametrize(

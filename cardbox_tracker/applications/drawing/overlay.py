@@ -42,7 +42,9 @@ _BONE_BGR = {
     KeypointState.HIDDEN: (200, 200, 200),
 }
 
-_SHIFT, _OUTLINE_SHIFT = 4, 1
+_SHIFT = 4
+# Outlines in images that are less wide are traced at twice their size.
+_FINE_PX = 1280
 # Pixels beside a polygon that drawing it may change.
 _EDGE_PX = 3
 # Lines and text are readable from this size of the longer side on.
@@ -158,7 +160,8 @@ def draw_outline(
     thickness: int,
 ) -> None:
     """Draw the common outline of ``patches`` (15, 4, 3), ``thickness`` px wide, in place."""
-    fine = camera.scaled(*(size << _OUTLINE_SHIFT for size in (camera.width, camera.height)))
+    shift = int(camera.width < _FINE_PX)
+    fine = camera.scaled(*(size << shift for size in (camera.width, camera.height)))
     parts = list(_polygons(fine, patches))
     # A patch seen edge-on is a thin line that does not show the extent of the part.
     whisker = max(3, fine.width // 128)
@@ -171,7 +174,7 @@ def draw_outline(
     opened = cv2.morphologyEx(model, cv2.MORPH_OPEN, np.ones((whisker, whisker), np.uint8))
     found, _ = cv2.findContours(opened, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE, offset=corner)
     outlines = [np.asarray(cv2.approxPolyDP(one, 1.0, True), np.int32) for one in found]
-    cv2.polylines(canvas, outlines, True, colour, thickness, cv2.LINE_AA, _OUTLINE_SHIFT)
+    cv2.polylines(canvas, outlines, True, colour, thickness, cv2.LINE_AA, shift)
 
 
 def _draw_skeleton(

@@ -7,6 +7,7 @@ import os
 import time
 from collections import deque
 from collections.abc import Sequence
+from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass
 from typing import Any
 
@@ -19,7 +20,7 @@ from cardbox_tracker.camera.stamps import WINDOW, StampOrder
 from cardbox_tracker.detectors.detector import Detector, PersonDetector
 from cardbox_tracker.detectors.image_points import ImagePoints
 from cardbox_tracker.detectors.pose_network import LANDMARKS, Detection, image_points
-from cardbox_tracker.measuring.people_camera import FOUND_STDDEV, people_camera
+from cardbox_tracker.measuring.people_camera import FOUND_STDDEV, PeopleCamera, people_camera
 from cardbox_tracker.ros.messages.conversions import ImageArray, stamp_ns
 from cardbox_tracker.ros.messages.keypoints import (
     people_message,
@@ -51,27 +52,37 @@ class CameraPitch:
         """Advertise ``~/camera_pitch`` for ``node``."""
         self._node = node
         self._publisher = node.advertise(Float64, "~/camera_pitch", qos.LATCHED)
+        # A try takes as long as several images.
+        self._beside = ThreadPoolExecutor(1)
         self.restart()
 
     def restart(self) -> None:
         """Look again, because the camera is another one."""
         self._seen: list[ImagePoints] = []
         self._is_found = False
+        self._tried: Future[PeopleCamera | None] | None = None
         self._images, self._every = 0, 1
 
     def see(self, found: Detection, camera: Camera) -> None:
         """Add a person in the image of ``camera``."""
         self._images += 1
-        if self._is_found or self._images % self._every:
+        if self._tried is not None and self._tried.done():
+            shown, self._tried = self._tried.result(), None
+            self._use(shown)
+        if self._is_found or self._tried is not None or self._images % self._every:
             return
         self._seen.append(image_points(found))
         if len(self._seen) < _IMAGES:
             return
         # Images of one posture count as one.
-        shown = people_camera([[(0.0, points) for points in self._seen]], [None], camera)
+        given = [[(0.0, points) for points in self._seen]], [None], camera
+        self._tried = self._beside.submit(people_camera, *given)
         self._seen.clear()
-        # A try takes as long as several images, so further ones come more and more seldom.
+        # Further tries come more and more seldom.
         self._every *= 2
+
+    def _use(self, shown: PeopleCamera | None) -> None:
+        """Latch the pitch if it is sure."""
         if shown is None:
             return
         pitch_rad, stddev_rad = float(shown.values[0]), math.sqrt(shown.covariance[0, 0])

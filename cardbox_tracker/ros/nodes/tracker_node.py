@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from functools import partial
 from typing import Any
 
@@ -37,6 +38,7 @@ from cardbox_tracker.tracking.camera_agreement import AgreementWatch
 from cardbox_tracker.tracking.estimate import LOST, NO_PERSON, UNCERTAIN, Estimate
 from cardbox_tracker.tracking.precompile import compile_all
 from cardbox_tracker.tracking.session import Session
+from cardbox_tracker.tracking.tracker import Tracker
 
 _REASONS = {
     NO_PERSON: "nobody is in the image",
@@ -194,6 +196,7 @@ class TrackerNode(CardboxNode):
         self.offer("~/reset", self._reset)
         settings = self.parameters.value
         self._look = HandNetwork(installed_hands()) if settings.hands else None
+        self._beside = ThreadPoolExecutor(1)
         self._prepared: set[str] = set()
         self._prepare(settings)
         self._bodies: Sequence[BodyModel] = ()
@@ -306,7 +309,9 @@ class TrackerNode(CardboxNode):
         rng = np.random.default_rng(settings.seed)
         people = settings.people or None
         given = settings.config(), rng, self._others, people, self._look
-        self._session = Session(self._bodies, self._camera, *given)
+        # A fit takes as long as several images.
+        make = partial(Tracker, beside=self._beside)
+        self._session = Session(self._bodies, self._camera, *given, make_tracker=make)
         for report, tracker in zip(self._reports, self._session.trackers, strict=True):
             report.start(tracker.body)
         self.diagnostics.say(reason, f"{reason}: tracking starts from the front reference posture")

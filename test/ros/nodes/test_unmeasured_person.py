@@ -175,6 +175,7 @@ def test_a_standing_person_shows_the_detector_the_pitch(
     for _ in range(100):
         images.append(Detection(px, scores, np.zeros((120, 160), np.uint8)))
         pitch.see(images[-1], CAMERA)
+        pitch._beside.submit(int).result()
     # A live node has little time for it.
     assert tries == ([10] if shown else [10, 30, 68])
     found = bus.texts("/detector/camera_pitch")
