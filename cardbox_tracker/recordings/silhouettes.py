@@ -36,8 +36,9 @@ _PERIOD_IMAGES = 60
 _OTHER_CLOCK_NS = 1_000_000_000
 # Spans are often rounded up by less.
 _SHORT_S = 1.0
-# Bytes of the file of kept images: ten minutes of a film.
-_MOST_KEPT = 4 * 1024**3
+# Bytes of the file of kept images: about two minutes and a half of a film. Some computers have
+# temporary files in memory.
+_MOST_KEPT = 1024**3
 
 
 class TimeSpan(NamedTuple):
