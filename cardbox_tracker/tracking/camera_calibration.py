@@ -59,8 +59,8 @@ class CalibratedCamera(NamedTuple):
         """Return the pose and its uncertainty as text."""
         return (
             f"{self.extrinsics}; the two halves of {self.frames} frames differ by "
-            f"{self.halves_deg:.1f} degrees and {100 * self.halves_m:.1f} cm; mean IoU of both "
-            f"cameras {self.iou:.3f}"
+            f"{self.halves_deg:.1f} degrees ({1000 * np.radians(self.halves_deg):.0f} mrad) and "
+            f"{100 * self.halves_m:.1f} cm; mean IoU of both cameras {self.iou:.3f}"
         )
 
 
