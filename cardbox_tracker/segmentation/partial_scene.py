@@ -32,7 +32,6 @@ class PartialScene:
     """Combines models of the scene, each of which is valid outside the person."""
 
     def __init__(self) -> None:
-        """Start with nothing seen."""
         self._model: BackgroundModel | None = None
         self._known: Mask | None = None
         self._first = np.empty((0, 0), np.float32)
@@ -113,7 +112,6 @@ def _disk(radius_px: float) -> NDArray[np.uint8]:
 
 
 def _resized(mask: Mask, size: tuple[int, ...]) -> Mask:
-    """Return the mask at another size (width, height); a pixel is set if any part of it is."""
     whole = cv2.resize(mask.astype(np.float32), (size[0], size[1]), interpolation=cv2.INTER_AREA)
     return np.asarray(whole > 0, np.bool_)
 

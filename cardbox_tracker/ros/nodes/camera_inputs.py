@@ -46,7 +46,6 @@ class ImagePairing:
     """
 
     def __init__(self, deliver: Deliver) -> None:
-        """Deliver to the callback ``deliver``."""
         self.waits = True
         self._deliver = deliver
         self._images = RecentImages(_KEPT)

@@ -72,7 +72,6 @@ class ClockDifference:
     """
 
     def __init__(self, first: InputStream, other: InputStream) -> None:
-        """Compare ``other`` with ``first``."""
         self._first, self._other = first, other
         self._found: deque[tuple[float, float]] = deque(maxlen=_COMPARED)
 

@@ -287,7 +287,6 @@ class TrackerNode(CardboxNode):
         self._build("new cameras" if others else "new camera")
 
     def _changed(self, settings: TrackerParameters) -> None:
-        """Apply changed parameters."""
         self._prepare(settings)
         if self._session is None:
             return
@@ -317,7 +316,6 @@ class TrackerNode(CardboxNode):
         self.diagnostics.say(reason, f"{reason}: tracking starts from the front reference posture")
 
     def _reset(self) -> str:
-        """Answer the service ``reset``."""
         if self._session is None:
             missing = self._model_topic if not self._bodies else self._inputs.missing
             raise CameraError(
@@ -327,14 +325,12 @@ class TrackerNode(CardboxNode):
         return "tracking starts again from the front reference posture"
 
     def _reset_person(self, number: int) -> str:
-        """Answer the service ``person_N/reset``."""
         if self._session is None:
             return self._reset()
         self._session.reset(number)
         return f"person {number} is sought again"
 
     def _wait(self) -> None:
-        """Report missing inputs."""
         if not self._bodies:
             self.diagnostics.wait_for(
                 f"a body model on {self._model_topic} (call initializer/initialize, or give "
@@ -380,7 +376,6 @@ class TrackerNode(CardboxNode):
         self.diagnostics.made("joint states", conversions.stamp_ns(seen.header.stamp))
 
     def _warnings(self) -> dict[str, str]:
-        """Return warnings for the diagnostics."""
         remarks = [] if self._session is None else self._session.remarks(self._names)
         images = {f"images {number}": text for number, text in enumerate(remarks)}
         told = self._inputs.warnings()
@@ -391,7 +386,6 @@ class TrackerNode(CardboxNode):
         return told | images
 
     def _values(self) -> dict[str, str]:
-        """Return the values of the diagnostics."""
         first = None if self._session is None else self._session.trackers[0]
         ious = [] if first is None else first.camera_ious()
         used = {} if first is None else first.used_texts()

@@ -44,7 +44,6 @@ class LogLimit:
     """
 
     def __init__(self, now_s: Callable[[], float] = time.monotonic) -> None:
-        """Measure time with ``now_s``, which returns seconds."""
         self._now_s = now_s
         self._spells: dict[str, _Spell] = {}
 
@@ -104,7 +103,6 @@ class NodeDiagnostics:
     """
 
     def __init__(self, node: Node) -> None:
-        """Publish the diagnostics of ``node`` from now on."""
         self.input = StreamStatistics()
         self.extra: Callable[[], dict[str, str]] = dict
         self.advice: Callable[[], dict[str, str]] = dict

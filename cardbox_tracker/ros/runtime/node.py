@@ -57,7 +57,6 @@ class IntraProcessPublisher:
     """Publishes to the subscribers of this process in order, then to all others."""
 
     def __init__(self, publisher: Publisher, subscribers: list[Subscriber]) -> None:
-        """Publish to other processes with ``publisher``."""
         self._publisher = publisher
         self._subscribers = subscribers
 
@@ -178,8 +177,6 @@ class CardboxNode(Node):
         timer = self.create_timer(PERIOD_S, look, clock=steady)
 
     def _guarded(self, topic: str, callback: Callback) -> Callable[[Any, dict[str, Any]], None]:
-        """Return a callback of rclpy that reports the exceptions of ``callback``."""
-
         def guarded(message: Any, info: dict[str, Any]) -> None:
             try:
                 callback(message, int(info["source_timestamp"]))
