@@ -82,9 +82,7 @@ class ReferenceCapture:
 
     def behind(self, message: Image) -> Image | None:
         """Return the image of a silhouette, or None if it has not arrived."""
-        stamp = stamp_ns(message.header.stamp)
-        images = reversed(self._recent_images)
-        return next((image for image in images if stamp_ns(image.header.stamp) == stamp), None)
+        return self._recent_images.at(stamp_ns(message.header.stamp))
 
     @property
     def latest_ns(self) -> int | None:

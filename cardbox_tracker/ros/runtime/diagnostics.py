@@ -158,8 +158,7 @@ class NodeDiagnostics:
 
     def working(self, sent_ns: int = 0) -> None:
         """Count an output; ``sent_ns`` is the send time of its input, ns since the epoch."""
-        if self._waiting or self._problem:
-            self._waiting = self._problem = ""
+        self._waiting = self._problem = ""
         self._published += 1
         if sent_ns > 0:
             latency_ns = time.time_ns() - sent_ns

@@ -221,13 +221,6 @@ class CardboxNode(Node):
         self.get_logger().debug(traceback.format_exc())
 
 
-def spin(node: CardboxNode) -> None:
-    """Spin the node until it is told to stop."""
-    executor = SingleThreadedExecutor(context=node.context)
-    executor.add_node(node)
-    executor.spin()
-
-
 def own_arguments(command_line: list[str]) -> list[str]:
     """Return a command line without program and ROS arguments; wrong ones end it with code 2."""
     try:
@@ -240,6 +233,12 @@ def own_arguments(command_line: list[str]) -> list[str]:
 
 def run_node(create: Callable[[], CardboxNode], args: list[str] | None = None) -> int:
     """Create a node and spin it until it is told to stop; return the process's exit code."""
+
+    def spin(node: CardboxNode) -> None:
+        executor = SingleThreadedExecutor(context=node.context)
+        executor.add_node(node)
+        executor.spin()
+
     return run(create, args, spin)
 
 
