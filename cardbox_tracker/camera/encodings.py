@@ -242,7 +242,6 @@ class Levels:
     """
 
     def __init__(self) -> None:
-        """Begin without a scale."""
         self.text, self.changes = "", 0
         self._low, self._width = 0, 0
 

@@ -101,7 +101,6 @@ class Extrinsics:
         return angle, float(np.linalg.norm(self.centre_m - other.centre_m))
 
     def __str__(self) -> str:
-        """Return distance and angle between the cameras, and the source."""
         angle = np.degrees(np.linalg.norm(cv2.Rodrigues(self.rotation)[0]))
         text = f"{np.linalg.norm(self.translation_m):.3f} m and {angle:.1f} degrees apart"
         return f"{text} ({self.source})" if self.source else text

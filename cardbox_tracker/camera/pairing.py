@@ -79,7 +79,6 @@ class Arrivals(Generic[T]):
     """
 
     def __init__(self, count: int, tolerance_ns: int) -> None:
-        """Start with ``count`` streams and no items."""
         self.tolerance_ns = tolerance_ns
         self.late = [0] * count
         self._items: list[deque[tuple[int, T]]] = [deque() for _ in range(count)]

@@ -53,7 +53,6 @@ class StampSequence:
     """
 
     def __init__(self) -> None:
-        """Start before the first image."""
         self._last_ns: int | None = None
         # Last stamp before the jump.
         self._left_ns: int | None = None
@@ -236,7 +235,6 @@ class RecordedStamps:
     """
 
     def __init__(self) -> None:
-        """Begin before the first message."""
         self.statistics = StreamStatistics(remembered=None)
         self._last: tuple[int, int] | None = None
         self._ahead_ns = 0

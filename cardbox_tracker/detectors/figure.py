@@ -36,7 +36,6 @@ class Figure:
     """
 
     def __init__(self, joints: Joints) -> None:
-        """Take the joints."""
         self._at = joints
         shoulders, hips = self._pair("shoulder"), self._pair("hip")
         self._neck, self._hips = np.mean(shoulders, axis=0), np.mean(hips, axis=0)

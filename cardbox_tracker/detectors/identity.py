@@ -127,7 +127,6 @@ class Identity:
     """
 
     def __init__(self) -> None:
-        """Begin without a person."""
         self.forget()
 
     def forget(self) -> None:

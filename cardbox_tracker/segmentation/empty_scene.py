@@ -30,7 +30,6 @@ class BackgroundModel:
     chroma: ChromaModel | None = None
 
     def __post_init__(self) -> None:
-        """Check the shapes."""
         check_array("mean", self.mean, (ANY, ANY), np.float32)
         check_array("stddev", self.stddev, self.mean.shape, np.float32)
         if self.chroma is not None:
@@ -43,7 +42,6 @@ class BackgroundLearner:
     """Averages images of the empty scene, one at a time."""
 
     def __init__(self) -> None:
-        """Start with nothing learned."""
         self._brightness = _Moments()
         self._chroma = _Moments()
 

@@ -63,7 +63,6 @@ class SceneFit:
         return not self.is_moved and self.in_place >= _ENOUGH * self.tiles
 
     def __str__(self) -> str:
-        """Return a description of the result, for messages."""
         if self.is_moved:
             right, down = self.shift_px
             return f"the camera was moved: the scene is shifted by about ({right}, {down}) px"

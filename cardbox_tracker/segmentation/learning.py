@@ -17,7 +17,6 @@ class Learning:
     """Learns from every image, regardless of its content (``always``)."""
 
     def __init__(self, images: int) -> None:
-        """Start without images; ``images`` images are enough."""
         self.images = images
         self._learner = BackgroundLearner()
 
@@ -57,7 +56,6 @@ class StillLearning(Learning):
     """
 
     def __init__(self, images: int) -> None:
-        """Start without images; ``images`` images of a still scene are enough."""
         super().__init__(images)
         self._motion = SceneMotion(images)
         self._moving = 0.0
@@ -93,7 +91,6 @@ class PersonInViewLearning(Learning):
     """Learns the scene around a person, and the rest once they step aside (``person_in_view``)."""
 
     def __init__(self, images: int) -> None:
-        """Start without images; every pixel is learned from ``images`` images."""
         super().__init__(images)
         self._motion = SceneMotion(images)
         self._scene = PartialScene()

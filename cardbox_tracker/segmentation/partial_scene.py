@@ -32,7 +32,6 @@ class PartialScene:
     """Combines models of the scene, each of which is valid outside the person."""
 
     def __init__(self) -> None:
-        """Start with nothing seen."""
         self._model: BackgroundModel | None = None
         self._known: Mask | None = None
         self._first = np.empty((0, 0), np.float32)
@@ -56,7 +55,12 @@ class PartialScene:
             return
         left = bodies(changed_pixels(self._first, model.mean) & ~self._known)
         new = ~self._known & ~body & (left | ~_touching(~self._known, body))
-        self._model = _merged(self._model, model, new, self._known & ~body)
+        both, level = self._known & ~body, 1.0
+        if both.any():
+            # The new part is put into the light of the known one.
+            level = float(np.median(self._model.mean[both] / np.maximum(model.mean[both], 1.0)))
+        light = np.full(new.shape, level, np.float32)
+        self._model = merged(self._model, model, new, light)
         self._known = self._known | new
 
     def model(self) -> BackgroundModel:
@@ -113,19 +117,8 @@ def _disk(radius_px: float) -> NDArray[np.uint8]:
 
 
 def _resized(mask: Mask, size: tuple[int, ...]) -> Mask:
-    """Return the mask at another size (width, height); a pixel is set if any part of it is."""
     whole = cv2.resize(mask.astype(np.float32), (size[0], size[1]), interpolation=cv2.INTER_AREA)
     return np.asarray(whole > 0, np.bool_)
-
-
-def _merged(
-    known: BackgroundModel, other: BackgroundModel, new: Mask, both: Mask
-) -> BackgroundModel:
-    """Return ``known`` with the pixels ``new`` taken from ``other``, in the light of ``known``."""
-    level = 1.0
-    if both.any():
-        level = float(np.median(known.mean[both] / np.maximum(other.mean[both], 1.0)))
-    return merged(known, other, new, np.full(new.shape, level, np.float32))
 
 
 def merged(

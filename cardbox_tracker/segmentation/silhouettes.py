@@ -121,11 +121,6 @@ class SilhouettePipeline:
         if self._extractor is not None:
             self._extractor.restart()
 
-    @property
-    def light(self) -> float:
-        """Brightness of the scene in the last image relative to the learned background."""
-        return 1.0 if self._extractor is None else self._extractor.gain
-
     def drift(self, image: ImageArray) -> float:
         """Return the median difference from the background, grey levels; 0 without one."""
         if self._extractor is None:

@@ -172,7 +172,6 @@ class BackgroundNode(CardboxNode):
     def _prepare(
         self, header: Header, pipeline: SilhouettePipeline, image: conversions.ImageArray
     ) -> None:
-        """Continue with the previous background, or learn a new one."""
         done = self._kept.resume(pipeline, image)
         if not done:
             pipeline.learning.add(image)

@@ -143,7 +143,6 @@ class SilhouetteOutputs:
     """Publishes silhouettes, images and camera; ``covered`` is the last one's foreground share."""
 
     def __init__(self, node: CardboxNode) -> None:
-        """Advertise the topics for ``node``."""
         self.covered = 0.0
         self._node = node
         self._silhouettes = node.advertise_inside(Image, "silhouette", qos.SILHOUETTE)

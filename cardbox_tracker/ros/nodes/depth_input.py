@@ -69,7 +69,6 @@ class DepthCut:
     """Pairs images with depth, the last ``depth_m``, and cuts out pixels nearer than a limit."""
 
     def __init__(self, node: CardboxNode, topic: str, send: Send) -> None:
-        """Subscribe with ``node`` to depth images on ``topic``; ``send`` receives silhouettes."""
         self._node, self._topic = node, node.resolve(topic)
         self._send = send
         self.depth_m: DepthImage = np.empty((0, 0), np.float32)

@@ -49,7 +49,6 @@ class CameraPitch:
     """Looks for the pitch until a standing person shows it, and latches it."""
 
     def __init__(self, node: CardboxNode) -> None:
-        """Advertise ``~/camera_pitch`` for ``node``."""
         self._node = node
         self._publisher = node.advertise(Float64, "~/camera_pitch", qos.LATCHED)
         # A try takes as long as several images.
@@ -82,7 +81,6 @@ class CameraPitch:
         self._every *= 2
 
     def _use(self, shown: PeopleCamera | None) -> None:
-        """Latch the pitch if it is sure."""
         if shown is None:
             return
         pitch_rad, stddev_rad = float(shown.values[0]), math.sqrt(shown.covariance[0, 0])
@@ -202,7 +200,6 @@ class DetectorNode(CardboxNode):
         return [] if person is None else [person]
 
     def _is_due(self, at_ns: int) -> bool:
-        """Return whether to look at the image with this stamp, as ``rate_hz`` says."""
         rate_hz = self.parameters.value.rate_hz
         if rate_hz > 0.0 and at_ns and self._silhouettes is None:
             # The image nearest to the time is taken, not the first one after it.

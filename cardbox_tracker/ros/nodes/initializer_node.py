@@ -49,7 +49,6 @@ class InitializerNode(CardboxNode):
     """Captures reference silhouettes and measures the person in them."""
 
     def __init__(self, **options: Any) -> None:
-        """Subscribe to silhouettes; publish the body of ``model_file`` if there is one."""
         super().__init__("initializer", **options)
         self.parameters = LiveParameters(self, InitializerParameters)
         self._camera: Camera | None = None
@@ -225,7 +224,6 @@ class GuideOutputs:
     """
 
     def __init__(self, node: CardboxNode) -> None:
-        """Advertise the topics for ``node``."""
         self._prompt: Prompt | None = None
         self._guide: Guide | None = None
         self._status = node.advertise(String, "~/status", qos.LATCHED_LINES)

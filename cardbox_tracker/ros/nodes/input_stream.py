@@ -10,6 +10,7 @@ import numpy as np
 from sensor_msgs.msg import Image
 
 from cardbox_tracker.camera.stamps import StampOrder, StreamStatistics
+from cardbox_tracker.ros.messages.conversions import stamp_ns
 
 # A paused camera falls behind, so stamps are compared only while both cameras send.
 _RECENT_S = 0.5
@@ -72,7 +73,6 @@ class ClockDifference:
     """
 
     def __init__(self, first: InputStream, other: InputStream) -> None:
-        """Compare ``other`` with ``first``."""
         self._first, self._other = first, other
         self._found: deque[tuple[float, float]] = deque(maxlen=_COMPARED)
 
@@ -121,6 +121,10 @@ class RecentImages:
         image = self._images.popleft()
         self._bytes -= len(image.data)
         return image
+
+    def at(self, at_ns: int) -> Image | None:
+        """Return the latest image with a stamp, ns; None if there is none."""
+        return next((one for one in reversed(self) if stamp_ns(one.header.stamp) == at_ns), None)
 
     def __len__(self) -> int:
         return len(self._images)

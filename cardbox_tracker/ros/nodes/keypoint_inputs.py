@@ -61,7 +61,6 @@ class KeypointTopic:
     """
 
     def __init__(self, node: CardboxNode, name: str, topic: str) -> None:
-        """Subscribe with ``node`` to ``topic``; ``name`` stands in the diagnostics."""
         self.stream = InputStream(name, node.resolve(topic))
         self.size: Size | None = None
         self._node, self._topic = node, topic
@@ -235,7 +234,6 @@ class CameraKeypoints:
     """The points of one camera, and the calibration that leads from its image to silhouettes."""
 
     def __init__(self, node: CardboxNode, settings: TrackerParameters, camera: str) -> None:
-        """Subscribe with ``node`` for a ``camera`` by its namespace."""
         source, below = settings.keypoints, f"{camera.rstrip('/')}/" if camera else ""
         self.topic: KeypointTopic | None = None
         self._name = f"{camera.strip('/')} keypoints".lstrip()

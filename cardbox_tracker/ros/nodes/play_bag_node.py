@@ -145,7 +145,9 @@ class PlayBagNode(CardboxNode):
             )
         classes = message_classes(self._reader.topics, settings.topics, self.diagnostics.warn)
         self._publishers_of = {
-            name: self._advertise(name, of)
+            name: self.advertise(
+                of, name, qos.LATCHED if name.endswith(_LATCHED_ENDINGS) else qos.PLAYED
+            )
             for name, of in classes.items()
             if not self._is_own(name, of)
         }
@@ -163,10 +165,6 @@ class PlayBagNode(CardboxNode):
         if is_own:
             self.diagnostics.warn(f"not played: {name} is a topic of the player itself")
         return is_own
-
-    def _advertise(self, topic: str, of: Any) -> Publisher:
-        latched = topic.endswith(_LATCHED_ENDINGS)
-        return self.advertise(of, topic, qos.LATCHED if latched else qos.PLAYED)
 
     def play(self) -> None:
         """Play the bag to its end, or forever with ``loop``."""

@@ -63,7 +63,6 @@ class ReferenceCapture:
     """
 
     def __init__(self, topic: str) -> None:
-        """Begin without references; error texts name the ``topic`` of the silhouettes."""
         self.captured: dict[str, Silhouette] = {}
         self.images: dict[str, list[ImageArray]] = {}
         self._topic = topic
@@ -83,9 +82,7 @@ class ReferenceCapture:
 
     def behind(self, message: Image) -> Image | None:
         """Return the image of a silhouette, or None if it has not arrived."""
-        stamp = stamp_ns(message.header.stamp)
-        images = reversed(self._recent_images)
-        return next((image for image in images if stamp_ns(image.header.stamp) == stamp), None)
+        return self._recent_images.at(stamp_ns(message.header.stamp))
 
     @property
     def latest_ns(self) -> int | None:
@@ -216,7 +213,6 @@ class SecondCamera:
     """Captures the reference postures in the view of the second of several cameras."""
 
     def __init__(self, node: CardboxNode, settings: InitializerParameters) -> None:
-        """Subscribe with ``node``, the initializer, to the first two of its ``cameras``."""
         cameras = settings.cameras[:2]
         self._poses = CameraPoses(node, cameras, settings.extrinsics_file, lambda: None)
         self._recent = RecentImages(KEPT)

@@ -128,7 +128,6 @@ class RetargetNode(CardboxNode):
             self.diagnostics.made("command", image.stamp_ns)
 
     def _send(self, command: Command | None) -> None:
-        """Send the goal of an image, if it may be sent, and what the robot does."""
         if command is not None:
             nanoseconds = round(command.duration_s * 1e9)
             duration = Duration(sec=nanoseconds // 10**9, nanosec=nanoseconds % 10**9)

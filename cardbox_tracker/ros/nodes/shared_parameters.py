@@ -28,13 +28,6 @@ depth_parameter = partial(
     "position, with its field of view or a CameraInfo on TOPIC/camera_info; empty: none",
 )
 
-keypoints_parameter = partial(
-    at_start,
-    "",
-    "2D points of the person's joints: a topic, below each camera's namespace if there are "
-    "several, such as detector/keypoints, or a table FILE.csv (docs/detectors.md); empty: none",
-)
-
 camera_roll_parameter = partial(
     at_start,
     0.0,

@@ -35,7 +35,6 @@ class AllNodes:
     """The nodes of one camera, in the order of the data."""
 
     def __init__(self, source: str | None) -> None:
-        """Create the nodes, with the ``source`` of images if it is one of ``SOURCES``."""
         self.nodes: list[CardboxNode] = []
         self._player: PlayBagNode | None = None
         self._playing: threading.Thread | None = None

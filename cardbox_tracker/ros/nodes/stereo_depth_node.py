@@ -78,11 +78,10 @@ class StereoDepthNode(CardboxNode):
         }
         self._topics = {side: topic for side, (topic, _) in images.items()}
         self._kept = {side: RecentImages(_KEPT) for side in ("left", "right")}
-        for side in self._topics:
-            heard = partial(self._on_info, side)
-            self.subscribe_info(f"{side}/camera_info", heard)
-        for side, on_image in (("left", self._on_left), ("right", self._on_right)):
-            self.subscribe(images[side][1], images[side][0], on_image, qos.SENSOR_DATA)
+        for side in images:
+            self.subscribe_info(f"{side}/camera_info", partial(self._on_info, side))
+        for side, (topic, kind) in images.items():
+            self.subscribe(kind, topic, partial(self._on_image, side), qos.SENSOR_DATA)
         self.diagnostics.extra = lambda: {"known (% of the image)": f"{100 * self._known:.1f}"}
         self.diagnostics.advice = self._warnings
         self.diagnostics.remedy = "take smaller images, or fewer a second"
@@ -101,17 +100,12 @@ class StereoDepthNode(CardboxNode):
         if before is None or not conversions.is_same_info(before, message):
             self._pair = None
 
-    def _on_left(self, message: Image | CompressedImage, sent_ns: int) -> None:
-        if self.diagnostics.input.add(conversions.stamp_ns(message.header.stamp)).is_usable:
-            self._kept["left"].append(message)
-            self._match(sent_ns)
-
-    def _on_right(self, message: Image | CompressedImage, sent_ns: int) -> None:
-        self._kept["right"].append(message)
-        self._match(sent_ns)
-
-    def _match(self, sent_ns: int) -> None:
+    def _on_image(self, side: str, message: Image | CompressedImage, sent_ns: int) -> None:
         """Measure the latest pair of matching stamps, and drop older images."""
+        stamp_ns = conversions.stamp_ns(message.header.stamp)
+        if side == "left" and not self.diagnostics.input.add(stamp_ns).is_usable:
+            return
+        self._kept[side].append(message)
         tolerance_ns = 1e9 * self.parameters.value.tolerance_s
         for left in reversed(self._kept["left"]):
             stamp_ns = conversions.stamp_ns(left.header.stamp)

@@ -287,7 +287,6 @@ class TrackerNode(CardboxNode):
         self._build("new cameras" if others else "new camera")
 
     def _changed(self, settings: TrackerParameters) -> None:
-        """Apply changed parameters."""
         self._prepare(settings)
         if self._session is None:
             return
@@ -317,9 +316,8 @@ class TrackerNode(CardboxNode):
         self.diagnostics.say(reason, f"{reason}: tracking starts from the front reference posture")
 
     def _reset(self) -> str:
-        """Answer the service ``reset``."""
         if self._session is None:
-            missing = self._model_topic if not self._bodies else self._inputs.missing
+            missing = ", ".join(self._inputs.poses.missing) if self._bodies else self._model_topic
             raise CameraError(
                 f"nothing to reset: the tracker has not started, it waits for {missing}"
             )
@@ -327,14 +325,12 @@ class TrackerNode(CardboxNode):
         return "tracking starts again from the front reference posture"
 
     def _reset_person(self, number: int) -> str:
-        """Answer the service ``person_N/reset``."""
         if self._session is None:
             return self._reset()
         self._session.reset(number)
         return f"person {number} is sought again"
 
     def _wait(self) -> None:
-        """Report missing inputs."""
         if not self._bodies:
             self.diagnostics.wait_for(
                 f"a body model on {self._model_topic} (call initializer/initialize, or give "
@@ -343,7 +339,8 @@ class TrackerNode(CardboxNode):
         elif self._camera is None:
             self.diagnostics.wait_for(
                 f"silhouettes on {self._inputs.source} and their CameraInfo on "
-                f"{self._inputs.missing} (is the background node running, and has it learned?)"
+                f"{', '.join(self._inputs.poses.missing)} (is the background node running, and has "
+                "it learned?)"
             )
 
     def _on_input(self, lead: Received, received: Sequence[Received | None]) -> None:
@@ -354,7 +351,7 @@ class TrackerNode(CardboxNode):
         if not step.is_usable:
             return
         if self._session is None:
-            self._inputs.check()
+            self._inputs.poses.check()
             self._wait()
             text = "no body model yet: call initializer/initialize"
             self._outputs[0].waiting(lead.message, lead.image, text)
@@ -380,7 +377,6 @@ class TrackerNode(CardboxNode):
         self.diagnostics.made("joint states", conversions.stamp_ns(seen.header.stamp))
 
     def _warnings(self) -> dict[str, str]:
-        """Return warnings for the diagnostics."""
         remarks = [] if self._session is None else self._session.remarks(self._names)
         images = {f"images {number}": text for number, text in enumerate(remarks)}
         told = self._inputs.warnings()
@@ -391,7 +387,6 @@ class TrackerNode(CardboxNode):
         return told | images
 
     def _values(self) -> dict[str, str]:
-        """Return the values of the diagnostics."""
         first = None if self._session is None else self._session.trackers[0]
         ious = [] if first is None else first.camera_ious()
         used = {} if first is None else first.used_texts()

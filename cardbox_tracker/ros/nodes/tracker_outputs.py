@@ -63,7 +63,6 @@ class Rep155Outputs:
     def __init__(
         self, node: CardboxNode, settings: TrackerParameters, body_id: str, bodies: TrackedBodies
     ) -> None:
-        """Advertise the topics of the body ``body_id``."""
         self._id, self._bodies = body_id, bodies
         self._torso_place = settings.torso_place
         self._names = tuple(joint_names(body_id, settings.torso_place))
@@ -107,7 +106,6 @@ class TrackerOutputs:
         person: int | None = None,
         bodies: TrackedBodies | None = None,
     ) -> None:
-        """Advertise the topics for ``node``, of one ``person`` by number if there are several."""
         topics = outputs(settings.torso_place, settings.hands)
         space = "" if person is None else f"{person_space(person)[1:]}/"
         self._publishers = {

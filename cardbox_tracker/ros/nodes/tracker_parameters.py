@@ -21,7 +21,6 @@ from cardbox_tracker.ros.nodes.shared_parameters import (
     cameras_parameter,
     depth_parameter,
     extrinsics_parameter,
-    keypoints_parameter,
 )
 from cardbox_tracker.ros.runtime.parameter_fields import (
     RESTARTS,
@@ -130,7 +129,11 @@ class TrackerParameters(NodeParameters):
     cameras: list[str] = cameras_parameter()
     extrinsics_file: str = extrinsics_parameter()
     depth: str = depth_parameter()
-    keypoints: str = keypoints_parameter()
+    keypoints: str = at_start(
+        "",
+        "2D points of the person's joints: a topic, below each camera's namespace if there are "
+        "several, such as detector/keypoints, or a table FILE.csv (docs/detectors.md); empty: none",
+    )
     camera_roll_deg: float = camera_roll_parameter()
 
     @property
@@ -159,11 +162,10 @@ class TrackerParameters(NodeParameters):
             base = base.with_depth()
         if self.settings_file:
             base = read_settings(self.settings_file, base)
-        values = {name: getattr(self, name) for name in _CHANGEABLE}
         given = {
-            _CHANGEABLE[name]: value
-            for name, value in values.items()
-            if value != getattr(type(self), name)
+            path: getattr(self, name)
+            for name, path in _CHANGEABLE.items()
+            if getattr(self, name) != getattr(type(self), name)
         }
         try:
             return base.changed(nested(given))

@@ -44,7 +44,6 @@ class LogLimit:
     """
 
     def __init__(self, now_s: Callable[[], float] = time.monotonic) -> None:
-        """Measure time with ``now_s``, which returns seconds."""
         self._now_s = now_s
         self._spells: dict[str, _Spell] = {}
 
@@ -104,7 +103,6 @@ class NodeDiagnostics:
     """
 
     def __init__(self, node: Node) -> None:
-        """Publish the diagnostics of ``node`` from now on."""
         self.input = StreamStatistics()
         self.extra: Callable[[], dict[str, str]] = dict
         self.advice: Callable[[], dict[str, str]] = dict
@@ -160,8 +158,7 @@ class NodeDiagnostics:
 
     def working(self, sent_ns: int = 0) -> None:
         """Count an output; ``sent_ns`` is the send time of its input, ns since the epoch."""
-        if self._waiting or self._problem:
-            self._waiting = self._problem = ""
+        self._waiting = self._problem = ""
         self._published += 1
         if sent_ns > 0:
             latency_ns = time.time_ns() - sent_ns

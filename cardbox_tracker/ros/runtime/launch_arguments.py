@@ -150,7 +150,6 @@ def _arguments_of(file: str, command_line: Sequence[str]) -> Sequence[str]:
 
 
 def _parsed(kind: type, text: str) -> Value | None:
-    """Return ``text`` as ``kind``; None if it is not one."""
     if kind is bool:
         return {"true": True, "false": False}.get(text.lower())
     if kind is list:

@@ -57,7 +57,6 @@ class IntraProcessPublisher:
     """Publishes to the subscribers of this process in order, then to all others."""
 
     def __init__(self, publisher: Publisher, subscribers: list[Subscriber]) -> None:
-        """Publish to other processes with ``publisher``."""
         self._publisher = publisher
         self._subscribers = subscribers
 
@@ -178,8 +177,6 @@ class CardboxNode(Node):
         timer = self.create_timer(PERIOD_S, look, clock=steady)
 
     def _guarded(self, topic: str, callback: Callback) -> Callable[[Any, dict[str, Any]], None]:
-        """Return a callback of rclpy that reports the exceptions of ``callback``."""
-
         def guarded(message: Any, info: dict[str, Any]) -> None:
             try:
                 callback(message, int(info["source_timestamp"]))
@@ -224,13 +221,6 @@ class CardboxNode(Node):
         self.get_logger().debug(traceback.format_exc())
 
 
-def spin(node: CardboxNode) -> None:
-    """Spin the node until it is told to stop."""
-    executor = SingleThreadedExecutor(context=node.context)
-    executor.add_node(node)
-    executor.spin()
-
-
 def own_arguments(command_line: list[str]) -> list[str]:
     """Return a command line without program and ROS arguments; wrong ones end it with code 2."""
     try:
@@ -243,6 +233,12 @@ def own_arguments(command_line: list[str]) -> list[str]:
 
 def run_node(create: Callable[[], CardboxNode], args: list[str] | None = None) -> int:
     """Create a node and spin it until it is told to stop; return the process's exit code."""
+
+    def spin(node: CardboxNode) -> None:
+        executor = SingleThreadedExecutor(context=node.context)
+        executor.add_node(node)
+        executor.spin()
+
     return run(create, args, spin)
 
 

@@ -151,10 +151,7 @@ class LiveParameters(Generic[T]):
         return {p.name: _plain(p.value) for p in parameters if p.name in self._specs}
 
     def _validate(self, parameters: list[Parameter]) -> SetParametersResult:
-        changed = self._changed(parameters)
-        if not changed:
-            return SetParametersResult(successful=True)
-        problem = self._problem(changed)
+        problem = self._problem(self._changed(parameters))
         return SetParametersResult(successful=not problem, reason=problem)
 
     def _apply(self, parameters: list[Parameter]) -> None:

@@ -59,7 +59,6 @@ class Nodes:
     """Running nodes, each with its own log file."""
 
     def __init__(self, logs: Path) -> None:
-        """Write the log files into the folder ``logs``."""
         self._logs = logs
         self._processes: dict[str, subprocess.Popen[bytes]] = {}
 

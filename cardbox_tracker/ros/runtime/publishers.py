@@ -19,7 +19,6 @@ class SinglePublisher:
     """Watches topics that exactly one node should publish."""
 
     def __init__(self, node: Node, topics: tuple[str, ...]) -> None:
-        """Watch the resolved names ``topics``, to which ``node`` subscribes."""
         self._node = node
         # Numbers of checks without a publisher, of topics that never had one.
         self._absent = dict.fromkeys(topics, 0)
@@ -69,7 +68,6 @@ class TopicTypes:
     """Compares the message types of a node's topics with those of other nodes."""
 
     def __init__(self, node: Node) -> None:
-        """Begin without topics of ``node``; :meth:`add` adds one."""
         self._node = node
         self._types: dict[str, str] = {}
 
