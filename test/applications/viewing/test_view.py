@@ -211,6 +211,7 @@ def test_without_a_display_the_other_ways_are_named(
     ("words", "expected"),
     [
         (("nope",), r"there is no recording nope"),
+        (("--web", "n\udcffpe"), r"there is no recording n\Wudcffpe"),
         (("BAG", "--truth", "nope.json"), r"nope\.json"),
     ],
 )

@@ -114,6 +114,7 @@ WAYS = pytest.mark.parametrize("way", [live, recorded])
     [
         ([info()], info()),
         ([info(width=0, height=0, k=[0.0] * 9), info(k=[0.0] * 9), info()], info()),
+        ([info(k=[0.0] * 9, p=[*K[:3], 0.0, *K[3:6], 0.0, *K[6:], 0.0])], info()),
         ([info("plumb_bob", [*BENT, 0.0, 0.0, 0.0])], info("plumb_bob", BENT)),
         ([info("rational_polynomial", BENT)], info("plumb_bob", BENT)),
         ([info("plumb_bob", BENT[:2])], info("plumb_bob", [*BENT[:2], 0.0, 0.0, 0.0])),
