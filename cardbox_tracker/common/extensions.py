@@ -1,8 +1,9 @@
-"""What other packages add by entry points: detectors, and formats of exports."""
+"""What other packages add: detectors and formats by entry points, and optional libraries."""
 
 from __future__ import annotations
 
 from collections.abc import Container
+from importlib import import_module
 from importlib.metadata import EntryPoint, entry_points
 from typing import Any
 
@@ -41,3 +42,16 @@ def loaded(entry: EntryPoint) -> Any:
 
 def _place(entry: EntryPoint) -> str:
     return entry.dist.name if entry.dist else "the command line"
+
+
+def optional(name: str, needs: str, extra: str, instead: str = "") -> Any:
+    """Return a module that ``pip`` installs with an extra of this package, or raise CardboxError.
+
+    ``needs`` says what needs it, and ``instead`` what is possible without it.
+    """
+    try:
+        return import_module(name)
+    except ImportError as error:
+        raise CardboxError(
+            f"{needs} ({error}); install it with pip install 'cardbox_tracker[{extra}]'{instead}"
+        ) from None

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from cardbox_tracker.common.errors import CardboxError
+from cardbox_tracker.common.extensions import optional
 from cardbox_tracker.common.files import atomic_path
 from cardbox_tracker.person.hands import HAND_NAMES
 from cardbox_tracker.person.isb_angles import ANATOMICAL_NAMES, anatomical_angles
@@ -272,12 +272,6 @@ def _text(cell: Cell) -> str:
 
 def pyarrow_or_error() -> tuple[Any, Any]:
     """Return the modules pyarrow and pyarrow.parquet, or raise CardboxError."""
-    try:
-        import pyarrow
-        import pyarrow.parquet
-    except ImportError as error:
-        raise CardboxError(
-            f"a table in Parquet needs the library pyarrow ({error}); install it with "
-            "pip install 'cardbox_tracker[parquet]', or give a name that ends in .csv"
-        ) from None
-    return pyarrow, pyarrow.parquet
+    needs = "a table in Parquet needs the library pyarrow"
+    given = needs, "parquet", ", or give a name that ends in .csv"
+    return optional("pyarrow", *given), optional("pyarrow.parquet", *given)

@@ -15,7 +15,7 @@ from cardbox_tracker.applications.exporting.markers import ezc3d_or_error, write
 from cardbox_tracker.applications.exporting.mot import write_mot
 from cardbox_tracker.applications.exporting.motion import Motion, images_of_body
 from cardbox_tracker.common.errors import CardboxError
-from cardbox_tracker.common.extensions import EXPORTERS, extensions, loaded
+from cardbox_tracker.common.extensions import EXPORTERS, extensions, loaded, optional
 from cardbox_tracker.common.files import scene_beside, write_table
 from cardbox_tracker.measuring.scene import Scene, load_scene
 from cardbox_tracker.person.isb_angles import ISB_NAMES, isb_angles
@@ -111,13 +111,7 @@ class Result(Results):
         Unknown numbers are nan, unknown texts empty; ``stamp_ns`` is the only stamp. Raises
         CardboxError if pandas is not installed.
         """
-        try:
-            import pandas
-        except ImportError as error:
-            raise CardboxError(
-                f"to_pandas needs the library pandas ({error}); install it with "
-                "pip install 'cardbox_tracker[pandas]'"
-            ) from None
+        pandas = optional("pandas", "to_pandas needs the library pandas", "pandas")
         times = {"stamp_ns": self.stamp_ns, "time_s": self.time_s, "state": self.state}
         found = {**times, **self.numbers, **self.texts}
         return pandas.DataFrame({name: found[name] for name in units(*[True] * 3) if name in found})

@@ -18,7 +18,7 @@ from cardbox_tracker.applications.exporting.motion import (
     frames_of,
     in_reference,
 )
-from cardbox_tracker.common.errors import CardboxError
+from cardbox_tracker.common.extensions import optional
 from cardbox_tracker.common.files import atomic_path
 from cardbox_tracker.person.hands import WRIST_SHARE
 from cardbox_tracker.person.isb_angles import LABORATORY
@@ -139,11 +139,4 @@ def write_c3d(path: Path, motion: Motion, body: BodyModel | None) -> None:
 
 def ezc3d_or_error() -> Any:
     """Return the module ezc3d; raise CardboxError if it is not installed."""
-    try:
-        import ezc3d
-    except ImportError as error:
-        raise CardboxError(
-            f"C3D needs the library ezc3d ({error}); install it with "
-            "pip install 'cardbox_tracker[export]', or export --to trc"
-        ) from None
-    return ezc3d
+    return optional("ezc3d", "C3D needs the library ezc3d", "export", ", or export --to trc")

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib
 import json
 import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
@@ -13,10 +12,12 @@ from scipy.spatial.transform import Rotation
 
 from cardbox_tracker.applications.teleoperation.full_body import NAMES, FullBody
 from cardbox_tracker.common.errors import CardboxError, quoted
+from cardbox_tracker.common.extensions import optional
 from cardbox_tracker.person.sizes import FloatArray
 from cardbox_tracker.person.skeleton import rotation_z
 
 T = TypeVar("T")
+_EXTRA = "this stream needs the extra of pyzmq and msgpack", "teleoperation"
 
 
 def joints_packet(
@@ -33,17 +34,6 @@ def line(content: dict[str, Any]) -> bytes:
     return json.dumps(content, separators=(",", ":"), allow_nan=False).encode() + b"\n"
 
 
-def optional(name: str) -> Any:
-    """Return a module of the extra ``teleoperation``, or raise CardboxError."""
-    try:
-        return importlib.import_module(name)
-    except ImportError as error:
-        raise CardboxError(
-            f"this stream needs the Python packages pyzmq and msgpack ({error}); install them with "
-            "pip install 'cardbox_tracker[teleoperation]'"
-        ) from None
-
-
 def in_real_time(items: Iterable[T], rate_hz: float) -> Iterator[T]:
     """Yield ``items`` at a rate by the clock; one that is late does not delay the others."""
     begun_s = time.monotonic()
@@ -57,7 +47,7 @@ class ZmqSender:
 
     def __init__(self, address: str) -> None:
         """Listen on ``address``, such as ``tcp://127.0.0.1:5556``, or raise CardboxError."""
-        zmq = optional("zmq")
+        zmq = optional("zmq", *_EXTRA)
         self._context = zmq.Context()
         self._socket = self._context.socket(zmq.PUB)
         self._socket.linger = 0
@@ -138,7 +128,7 @@ def isaac_packet(body: FullBody, _: int) -> bytes:
         "joint_orientations": np.stack([-y, z, -x, w], axis=1).tolist(),
         "joint_valid": body.valid.tolist(),
     }
-    packed: bytes = optional("msgpack").packb(content)
+    packed: bytes = optional("msgpack", *_EXTRA).packb(content)
     return packed
 
 

@@ -23,6 +23,7 @@ from typing import Any
 from urllib.parse import quote
 
 from cardbox_tracker.common.errors import CardboxError
+from cardbox_tracker.common.extensions import optional
 from cardbox_tracker.common.files import atomic_path
 
 APPLICATION = "cardbox_tracker"
@@ -37,16 +38,10 @@ _TIMEOUT_S = 10.0
 
 def rerun() -> Any:
     """Return the module rerun, or raise CardboxError with the command that installs it."""
-    try:
-        import rerun as module
-        import rerun.blueprint
-        import rerun.urdf
-    except ImportError as error:
-        raise CardboxError(
-            f"the viewer needs the library rerun-sdk ({error}); install it with "
-            "pip install 'cardbox_tracker[view]' (170 MB)"
-        ) from None
-    return module
+    given = "the viewer needs the library rerun-sdk", "view", " (170 MB)"
+    for name in ("rerun.blueprint", "rerun.urdf"):
+        optional(name, *given)
+    return optional("rerun", *given)
 
 
 def rerun_program() -> tuple[str, ...]:

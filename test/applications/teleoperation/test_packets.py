@@ -102,7 +102,7 @@ def test_the_message_fills_isaac_teleops_full_body() -> None:
     pytest.importorskip("isaacteleop", reason="isaacteleop is not installed")
     types = import_module("isaacteleop.retargeting_engine.tensor_types")
     group_of = import_module("isaacteleop.retargeting_engine.interface").TensorGroup
-    found = sending.optional("msgpack").unpackb(sending.isaac_packet(body(), 0))
+    found = import_module("msgpack").unpackb(sending.isaac_packet(body(), 0))
     group = group_of(types.FullBodyInput())
     group[types.FullBodyInputIndex.JOINT_POSITIONS] = np.array(found["joint_positions"], "f4")
     group[types.FullBodyInputIndex.JOINT_ORIENTATIONS] = np.array(found["joint_orientations"], "f4")
