@@ -11,6 +11,7 @@ import os
 import re
 import struct
 from collections.abc import Callable, Iterator, Sequence
+from functools import partial
 from itertools import pairwise
 from pathlib import Path
 from types import SimpleNamespace
@@ -122,19 +123,10 @@ def limit_decompression() -> None:
     _READER.zstd = SimpleNamespace(decompress=unpack_zstd, open=LimitedFile)
 
 
-def unpack_zstd(data: bytes, size: int = MOST_BYTES) -> bytes:
-    """Decompress zstd frames of at most ``size`` bytes in all; raise BagError beyond."""
-    return _unpack(data, min(size, MOST_BYTES), _MCAP.zstd.ZstdDecompressor)
-
-
-def unpack_lz4(data: bytes, size: int = MOST_BYTES) -> bytes:
-    """Decompress lz4 frames of at most ``size`` bytes in all; raise BagError beyond."""
-    return _unpack(data, min(size, MOST_BYTES), lz4.frame.LZ4FrameDecompressor)
-
-
-def _unpack(data: bytes, most_bytes: int, decompressor: Callable[[], Any]) -> bytes:
+def _unpack(decompressor: Callable[[], Any], data: bytes, size: int = MOST_BYTES) -> bytes:
+    """Decompress frames of at most ``size`` bytes in all; raise BagError beyond."""
     parts: list[bytes] = []
-    left = most_bytes
+    left = most_bytes = min(size, MOST_BYTES)
     while data:
         frame = decompressor()
         parts.append(frame.decompress(data, max_length=left + 1))
@@ -145,6 +137,10 @@ def _unpack(data: bytes, most_bytes: int, decompressor: Callable[[], Any]) -> by
             raise BagError("a compressed part of it is cut off")
         data = frame.unused_data
     return b"".join(parts)
+
+
+unpack_zstd = partial(_unpack, _MCAP.zstd.ZstdDecompressor)
+unpack_lz4 = partial(_unpack, lz4.frame.LZ4FrameDecompressor)
 
 
 class LimitedFile(_MCAP.zstd.ZstdFile):  # type: ignore[misc]

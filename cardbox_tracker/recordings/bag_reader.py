@@ -42,6 +42,8 @@ IMAGE_TYPES = ("sensor_msgs/msg/Image", "sensor_msgs/msg/CompressedImage")
 CAMERA_INFO_TYPE = "sensor_msgs/msg/CameraInfo"
 # Transports of image_transport with images, the preferred one first.
 _TRANSPORTS = ("compressed", "zstd", "compressedDepth")
+# Usual image topics in a camera's namespace.
+_IMAGE_NAMES = ("image_raw", "image_raw/compressed", "image_rect", "image_rect_color", "image")
 _LEFT_OUT = MappingProxyType(
     {
         StampOrder.LATE: "of an earlier time",
@@ -83,7 +85,6 @@ class BagReader:
         self._infos: dict[str | None, tuple[Any, Calibration]] = {}
 
     def __enter__(self) -> BagReader:
-        """Open the recording."""
         path = self.path
         if not path.exists():
             raise BagError(f"there is no recording {path}; give a rosbag2 folder or file")
@@ -126,7 +127,6 @@ class BagReader:
         return self
 
     def __exit__(self, *_: object) -> None:
-        """Close the recording."""
         if self._reader is not None:
             with suppress(AnyReaderError, AssertionError):
                 self._reader.close()
@@ -194,7 +194,8 @@ class BagReader:
         )
         if len(found) > 1 and camera is not None:
             # Depth and further images of the same camera can have topics in this namespace.
-            found = [name for name in found if name in _image_names(folder)][:1] or found
+            usual = [name for name in found if name.removeprefix(folder) in _IMAGE_NAMES]
+            found = usual[:1] or found
         if len(found) != 1:
             where = f" below {folder}" if folder else ""
             advice = "" if folder or not found else "; choose one with --cameras NAMESPACE"
@@ -330,29 +331,25 @@ class BagReader:
         Raises BagError without a CameraInfo, and CameraError, with both topics, if the camera is
         not calibrated or its images have another shape.
         """
-        topic = self.image_topic(camera)
-        if self._given.is_calibrated:
-            return self._given_calibration(camera)
-        if CAMERA_INFO_TYPE not in self.topics.values():
+        topic, is_given = self.image_topic(camera), self._given.is_calibrated
+        if not is_given and CAMERA_INFO_TYPE not in self.topics.values():
             raise BagError(
                 f"{self.path} has 0 CameraInfo topics; expected one for {topic}."
                 " Record it with the images, or give --fov DEG or --calibration FILE"
             )
-        found = self._info(camera)[1]
+        found = None if is_given else self._info(camera)[1]
         for image in self.images(topic):
             with suppress(EncodingError):
                 height, width = image.as_sent.shape[:2]
+                if found is None:
+                    return self._given.calibrated(self.path, width, height, image.frame_id)
                 found.check_shape(width, height, topic, self.camera_info_topic(camera))
                 break
+        if found is None:
+            raise BagError(
+                f"{self.path} has no image on {topic} that can be decoded; record it again"
+            )
         return self._given.rolled(found)
-
-    def _given_calibration(self, camera: str | None) -> Calibration:
-        topic = self.image_topic(camera)
-        for image in self.images(topic):
-            with suppress(EncodingError):
-                height, width = image.as_sent.shape[:2]
-                return self._given.calibrated(self.path, width, height, image.frame_id)
-        raise BagError(f"{self.path} has no image on {topic} that can be decoded; record it again")
 
     def left_out(self, topic: str, used: Collection[str] = ()) -> list[str]:
         """Return the images that were not used, with the reasons, and other image topics."""
@@ -400,12 +397,6 @@ def chosen_transports(messages: Mapping[str, int]) -> list[str]:
         return not messages[topic], order.index(kind) if kind in order else len(order), topic
 
     return sorted(min(topics, key=partial(rank, base)) for base, topics in sorted(groups.items()))
-
-
-def _image_names(folder: str) -> tuple[str, ...]:
-    """Return the usual image topics of a camera's namespace, the preferred one first."""
-    raw = ("image_raw", "image_raw/compressed", "image_rect", "image_rect_color", "image")
-    return tuple(folder + name for name in raw)
 
 
 def _reason(error: Exception) -> str:

@@ -44,7 +44,11 @@ _LATCHED = Qos(
 
 
 class BagWriter:
-    """Context of a new recording, whose folder appears when the context ends without an error."""
+    """Context of a new recording, whose folder appears when the context ends without an error.
+
+    Attributes:
+        folder: temporary one of the recording; a file put here appears in the final folder.
+    """
 
     def __init__(
         self,
@@ -84,18 +88,12 @@ class BagWriter:
             self._folder = self._resources.enter_context(claim)
         except CardboxError as error:
             raise BagError(str(error)) from None
-        self._writer = Writer(
-            self._folder / self.path.name, version=9, storage_plugin=self._storage
-        )
+        self.folder = self._folder / self.path.name
+        self._writer = Writer(self.folder, version=9, storage_plugin=self._storage)
         if self._compress:
             self._writer.set_compression(CompressionMode.STORAGE, CompressionFormat.ZSTD)
         self._writer.open()
         return self
-
-    @property
-    def folder(self) -> Path:
-        """Temporary folder of the recording; a file put here appears in the final folder."""
-        return self._folder / self.path.name
 
     def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
         """Move the recording to its place, or remove it after an error."""

@@ -15,7 +15,6 @@ from numpy.typing import NDArray
 from cardbox_tracker.camera.encodings import MOST_PIXELS, Levels, decode_compressed
 from cardbox_tracker.common.errors import BagError, EncodingError
 from cardbox_tracker.common.files import UnreadableFileError, read_regular
-from cardbox_tracker.recordings.given_camera import GivenCamera
 from cardbox_tracker.recordings.image_recording import Film, RecordedImage
 
 SUFFIXES = (".jpg", ".jpeg", ".png")
@@ -60,18 +59,10 @@ class ImageFolder(Film):
     read.
     """
 
-    def __init__(self, path: Path, camera: GivenCamera) -> None:
-        """Store the path and the camera; the folder is read on entry."""
-        super().__init__(path, camera)
-        self._files: list[Path] = []
-        self._places: list[int] = []
-        self._levels = Levels()
-        self._first = path
-
     def __enter__(self) -> ImageFolder:
         """Read the names of the images, and the size of the first one that can be decoded."""
         self._files = image_files(self.path)
-        self._places = _numbered(self._files)
+        self._places, self._levels = _numbered(self._files), Levels()
         reason = ""
         for file in self._files:
             try:
@@ -80,7 +71,7 @@ class ImageFolder(Film):
                 reason = reason or f" ({error})"
                 continue
             self._set_size(width, height)
-            self._first = file
+            self._file = file
             break
         else:
             raise BagError(
@@ -105,10 +96,6 @@ class ImageFolder(Film):
             for kind, files in (("hidden files", hidden), ("files of other kinds", others))
             if files
         ] + (missing if lacking else [])
-
-    @property
-    def _file(self) -> Path:
-        return self._first
 
     def images(self, topic: str | None = None) -> Iterator[RecordedImage]:
         """Yield the images in order, at the given rate; missing numbers leave gaps."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection
+from collections.abc import Callable
 from dataclasses import dataclass
 from math import sqrt
 from pathlib import Path
@@ -62,8 +62,9 @@ class Film:
     start_ns = 0
 
     def __init__(self, path: Path, camera: GivenCamera) -> None:
-        """Store the path and the camera; the recording is read on entry."""
         self.path, self._given = path, camera
+        # The one that may tell the field of view.
+        self._file = path
         self.working_size, self.duration_s = (0, 0), 0.0
         self._size = self._stored = (0, 0)
 
@@ -90,16 +91,7 @@ class Film:
         self.image_topic(camera)
         return self._given.calibrated(self.path, *self._size, stored=self._stored, file=self._file)
 
-    def left_out(self, topic: str, used: Collection[str] = ()) -> list[str]:
-        """Return what of these images was not used, and why; topics in ``used`` are no reason."""
-        return []
-
     @property
     def remarks(self) -> list[str]:
         """Warnings about the field of view."""
         return self._given.remarks(self._file, *self._size)
-
-    @property
-    def _file(self) -> Path:
-        """The file that may tell the field of view."""
-        return self.path

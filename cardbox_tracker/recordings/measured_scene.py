@@ -47,7 +47,6 @@ class Spread(Generic[T]):
     """
 
     def __init__(self, most: int) -> None:
-        """Keep up to ``most`` items."""
         self._most, self._every, self._seen = most, 1, 0
         self.items: list[T] = []
 

@@ -146,11 +146,11 @@ class Metric:
         return "" if value is None else format(value, self.format)
 
 
-# The mean velocity over a longer gap is not that of the moment.
 _NECK = [JOINT_STATE_NAMES.index(name) for name in NECK_NAMES]
 _LEGS = slice(-len(LEG_NAMES), None)
 # Standard deviation of values all over their range.
 _ANY_LEGS = np.ptp(LEG_LIMITS, axis=1) / np.sqrt(12.0)
+# The mean velocity over a longer gap is not that of the moment.
 _LONGEST_NS = 1_000_000_000
 
 
@@ -248,17 +248,8 @@ def posture_from(joints: JointValues) -> FloatArray:
     return np.array([by_name[name] for name in JOINT_NAMES])
 
 
-def place_from(joints: JointValues) -> FloatArray | None:
-    """Return ``torso_x`` and ``torso_z`` (2,) from named joints; None if one is missing."""
-    return _all_of(joints, PLACE_NAMES)
-
-
-def neck_from(joints: JointValues) -> FloatArray | None:
-    """Return ``neck_yaw`` and ``neck_pitch`` (2,) from named joints; None if one is missing."""
-    return _all_of(joints, NECK_NAMES)
-
-
-def _all_of(joints: JointValues, names: Sequence[str]) -> FloatArray | None:
+def values_from(joints: JointValues, names: Sequence[str]) -> FloatArray | None:
+    """Return the values (n,) of ``names`` from named joints; None if one is missing."""
     by_name = positions_of(joints)
     return np.array([by_name[name] for name in names]) if by_name.keys() >= set(names) else None
 
@@ -286,10 +277,6 @@ def chances_of(message: Any) -> dict[str, tuple[str, float]]:
 def positions_of(joints: JointValues) -> dict[str, float]:
     """Return the joint values by name."""
     return dict(zip(joints.names, np.asarray(joints.values).tolist(), strict=True))
-
-
-def _keypoints(estimate: Estimate, _: Tracker) -> Points | None:
-    return None if estimate.keypoints_m is None else Points(estimate.keypoints_m)
 
 
 def _markers(estimate: Estimate, tracker: Tracker) -> Markers | None:
@@ -326,7 +313,11 @@ def outputs(torso_place: bool = True, hands: bool = True) -> tuple[Output, ...]:
             JointValues,
             lambda found, _: joint_deviations(found, torso_place),
         ),
-        Output("keypoints", Points, _keypoints),
+        Output(
+            "keypoints",
+            Points,
+            lambda found, _: None if found.keypoints_m is None else Points(found.keypoints_m),
+        ),
         # Markers stay visible until they are removed.
         Output("markers", Markers, _markers, absent=Markers(())),
     )

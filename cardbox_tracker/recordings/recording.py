@@ -88,6 +88,7 @@ class Recording:
     Attributes:
         names: namespaces of the cameras, the first camera's first; a single camera has "".
         sources: silhouettes of each camera.
+        first: the first camera, in whose frame the results are.
         others: the further cameras with their poses.
         measures_depth: True if there is depth from depth images or stereo.
     """
@@ -106,7 +107,7 @@ class Recording:
         two. Raises BagError if there are several streams, but fewer than two images, and
         CameraError if ``depth`` is ``stereo`` and they are no rectified pair.
         """
-        self.names, self.sources = tuple(names), tuple(sources)
+        self.names, self.sources, self.first = tuple(names), tuple(sources), sources[0]
         self.others = [
             OtherCamera(source.camera, there)
             for source, there in zip(self.sources[1:], extrinsics, strict=True)
@@ -128,11 +129,6 @@ class Recording:
             self._stereo = stereo_of_pair(self.first.camera, other.camera, other.extrinsics)
         is_alone = len(self.sources) == 1 and self._depth is None
         self._tolerance_ns = 0 if is_alone else self.first.period_ns() // 2
-
-    @property
-    def first(self) -> SilhouetteSource:
-        """The first camera, in whose frame the results are."""
-        return self.sources[0]
 
     def check_points(self) -> None:
         """Raise CardboxError if the given points of no camera could be used in any image."""

@@ -198,7 +198,6 @@ class _Rows:
         self._rows = []
 
     def results(self, bodies: Sequence[BodyModel | None]) -> Results:
-        """Return what was taken."""
         self._pack()
         nothing = np.zeros((0, len(self.names)))
         values = np.concatenate([nothing, *self._blocks])

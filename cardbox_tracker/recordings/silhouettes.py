@@ -9,7 +9,6 @@ from collections.abc import Callable, Collection, Iterator, Sequence
 from dataclasses import replace
 from functools import partial
 from itertools import islice, takewhile
-from pathlib import Path
 from tempfile import TemporaryFile
 from typing import BinaryIO, NamedTuple
 
@@ -118,6 +117,8 @@ class SilhouetteSource:
     """One camera of a recording: its silhouettes, at the working resolution.
 
     Attributes:
+        path: the recording.
+        start_ns: start time of the recording.
         topic: name of the images.
         frame_id: name of the camera's optical frame.
         camera: camera of the frames at the working resolution.
@@ -183,7 +184,7 @@ class SilhouetteSource:
         config: BackgroundConfig | None = None,
         learning: type[Learning] = Learning,
     ) -> None:
-        self._bag = bag
+        self._bag, self.path, self.start_ns = bag, bag.path, bag.start_ns
         self._broken: dict[int, str] = {}
         self._used = self._clock_ns = 0
         self.topic = bag.image_topic(camera)
@@ -198,7 +199,6 @@ class SilhouetteSource:
         self._full: tuple[tuple[int, int] | None, Rectifier | None] = None, None
 
     def _find_points(self, points: Detector | PointTable | None, camera: str | None) -> None:
-        """Use a source of points."""
         self.has_points = points is not None
         self._finds_people = points is not None and points.people > 0
         self._detector = self._started(points) if isinstance(points, Detector) else None
@@ -244,16 +244,6 @@ class SilhouetteSource:
         return "" if self._given is None else self._given.fault
 
     @property
-    def path(self) -> Path:
-        """The recording."""
-        return self._bag.path
-
-    @property
-    def start_ns(self) -> int:
-        """Start time of the recording."""
-        return self._bag.start_ns
-
-    @property
     def duration_s(self) -> float:
         """Seconds from the first to the last message of the recording."""
         return self._bag.duration_s
@@ -280,7 +270,6 @@ class SilhouetteSource:
         return self._pipeline.silhouette(prepared.image, prepared.stamp_ns)
 
     def _people(self, prepared: PreparedImage) -> tuple[ImagePoints, ...]:
-        """Return the points of all people in an image."""
         if self._given is not None:
             image = Image(prepared.stamp_ns, prepared.number, prepared.recorded.name)
             return tuple(self._given.all_in(image))
@@ -403,7 +392,7 @@ class SilhouetteSource:
             # Of several passes, the longest counts.
             used += 1
             self._used = max(self._used, used)
-            time_ns = image.stamp_ns + self._clock_ns - self._bag.start_ns
+            time_ns = image.stamp_ns + self._clock_ns - self.start_ns
             found = PreparedImage(image.stamp_ns, time_ns / 1e9, prepared, image, number - 1)
             keeps = keeps and self._keep(found)
             yield found

@@ -167,7 +167,6 @@ class Quality:
     """Observer of :func:`~cardbox_tracker.recordings.track.track_recording`; see :meth:`lines`."""
 
     def __init__(self) -> None:
-        """Begin without an image."""
         self._images = self._sure = self._sure_hands = self._sure_places = 0
         self._moments: list[_Moment] = []
         self._angles_rad: list[float] = []

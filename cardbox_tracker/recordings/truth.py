@@ -10,14 +10,12 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from cardbox_tracker.camera.camera import level_to_optical
 from cardbox_tracker.common.errors import CardboxError
 from cardbox_tracker.common.files import foreign, read_regular
+from cardbox_tracker.person.sizes import FloatArray
 from cardbox_tracker.person.skeleton import JOINT_NAMES, KEYPOINT_NAMES
-
-FloatArray = NDArray[np.float64]
 
 SHOULDERS = (0, 3)
 """Their places among the keypoints."""

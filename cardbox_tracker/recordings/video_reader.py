@@ -26,7 +26,6 @@ from cardbox_tracker.camera.film_headers import (
 from cardbox_tracker.camera.image_headers import check_pixels
 from cardbox_tracker.common.beside import results_ahead
 from cardbox_tracker.common.errors import BagError, EncodingError
-from cardbox_tracker.recordings.given_camera import GivenCamera
 from cardbox_tracker.recordings.image_recording import Film, RecordedImage
 
 FORMATS = "MP4, MOV, AVI, MKV or WebM"
@@ -47,13 +46,9 @@ class VideoReader(Film):
     raise BagError if the video cannot be read. The duration is the one that the file states.
     """
 
-    def __init__(self, path: Path, camera: GivenCamera) -> None:
-        """Store the path and the camera; the video is opened on entry."""
-        super().__init__(path, camera)
-        self._damaged, self._stated_s, self._end = 0, 0.0, ""
+    _damaged, _stated_s, _end = 0, 0.0, ""
 
     def __enter__(self) -> VideoReader:
-        """Open the video and read its first image."""
         if not self.path.is_file():
             raise BagError(f"there is no video {self.path}; give a file in {FORMATS}")
         with _opened(self.path) as capture:

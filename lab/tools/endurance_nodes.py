@@ -16,7 +16,8 @@ from sensor_msgs.msg import CameraInfo, Image, JointState
 from std_msgs.msg import String
 
 from cardbox_tracker.common.errors import CardboxError
-from cardbox_tracker.recordings.outputs import place_from, posture_from
+from cardbox_tracker.person.skeleton import PLACE_NAMES
+from cardbox_tracker.recordings.outputs import posture_from, values_from
 from cardbox_tracker.ros.messages.conversions import camera_info_message
 from cardbox_tracker.ros.messages.results import joint_values_of
 from cardbox_tracker.ros.runtime import qos
@@ -85,7 +86,7 @@ class Line:
             return
         number, sent_s, at_s = self._due.pop(stamp_ns)
         joints = joint_values_of(message)
-        found = Found(stamp_ns, posture_from(joints), place_from(joints))
+        found = Found(stamp_ns, posture_from(joints), values_from(joints, PLACE_NAMES))
         self.took_s.append(time.monotonic() - sent_s)
         self.errors_m.append(self._person.error_m(found, at_s))
         self.answered.add(number)

@@ -17,7 +17,7 @@ from cardbox_tracker.person.kinematics import pose
 from cardbox_tracker.person.legs import LEG_NAMES
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.posture import reference_posture
-from cardbox_tracker.person.skeleton import JOINT_NAMES, KeypointState
+from cardbox_tracker.person.skeleton import JOINT_NAMES, PLACE_NAMES, KeypointState
 from cardbox_tracker.recordings.outputs import (
     METRICS,
     OUTPUTS,
@@ -27,12 +27,11 @@ from cardbox_tracker.recordings.outputs import (
     Text,
     joint_deviations,
     joint_values,
-    neck_from,
     open_hands,
     open_hands_from,
     outputs,
-    place_from,
     posture_from,
+    values_from,
 )
 from cardbox_tracker.tracking.estimate import (
     LOST,
@@ -142,8 +141,6 @@ def test_the_neck_follows_and_has_deviations_if_it_was_seen() -> None:
     place = 0.25, -0.05, 0.4, -0.1, 0.02, 0.03
     np.testing.assert_array_equal(joints.values, [*POSTURE, *place, *NO_LEGS])
     np.testing.assert_array_equal(deviations.values[-12:-8], (0.1, 0.2, 0.002, 0.003))
-    np.testing.assert_array_equal(cast(Any, neck_from(joints)), (0.4, -0.1))
-    assert neck_from(JointValues(BODY_NAMES, np.zeros(14))) is None
 
 
 def test_without_the_place_there_are_the_twelve_joints() -> None:
@@ -258,11 +255,11 @@ def test_a_posture_is_found_by_names_in_any_order(order: list[int]) -> None:
     np.testing.assert_array_equal(posture_from(JointValues(names, values)), POSTURE)
 
 
-def test_the_place_is_found_by_its_names() -> None:
+def test_some_joints_are_found_by_their_names() -> None:
     names = ("torso_z", *JOINT_NAMES, "torso_x")
-    place = place_from(JointValues(names, np.array([-0.1, *POSTURE, 0.3])))
+    place = values_from(JointValues(names, np.array([-0.1, *POSTURE, 0.3])), PLACE_NAMES)
     np.testing.assert_array_equal(cast(Any, place), [0.3, -0.1])
-    assert place_from(JointValues(JOINT_NAMES, POSTURE)) is None
+    assert values_from(JointValues(JOINT_NAMES, POSTURE), PLACE_NAMES) is None
 
 
 def test_a_missing_joint_is_named() -> None:

@@ -29,7 +29,8 @@ from std_msgs.msg import String  # noqa: E402
 from std_srvs.srv import Trigger  # noqa: E402
 
 from cardbox_tracker.person.model_file import dumps_body_model, save_body_model  # noqa: E402
-from cardbox_tracker.recordings.outputs import place_from, posture_from  # noqa: E402
+from cardbox_tracker.person.skeleton import PLACE_NAMES  # noqa: E402
+from cardbox_tracker.recordings.outputs import posture_from, values_from  # noqa: E402
 from cardbox_tracker.ros.messages.conversions import (  # noqa: E402
     camera_info_message,
     image_message,
@@ -148,7 +149,7 @@ class Live:
             joints = joint_values_of(message)
             stamp = message.header.stamp
             stamp_ns = stamp.sec * S + stamp.nanosec
-            made.append(Found(stamp_ns, posture_from(joints), place_from(joints)))
+            made.append(Found(stamp_ns, posture_from(joints), values_from(joints, PLACE_NAMES)))
         return made
 
     def next_run(self) -> float:

@@ -17,6 +17,7 @@ from visualization_msgs.msg import Marker, MarkerArray
 from cardbox_tracker.common.errors import CardboxError, NotFiniteError
 from cardbox_tracker.measuring.config import InitializationResult, fit_text
 from cardbox_tracker.person.sizes import SIZE_NAMES, FloatArray
+from cardbox_tracker.person.skeleton import NECK_NAMES
 from cardbox_tracker.recordings.markers import MarkerShape, Rgba
 from cardbox_tracker.recordings.outputs import (
     LEVELS,
@@ -26,8 +27,8 @@ from cardbox_tracker.recordings.outputs import (
     Points,
     Text,
     Value,
-    neck_from,
     posture_from,
+    values_from,
 )
 
 
@@ -67,7 +68,7 @@ def neck_of(message: JointState) -> FloatArray | None:
 
     Raises NotFiniteError if a value is not a finite number.
     """
-    found = neck_from(joint_values_of(message))
+    found = values_from(joint_values_of(message), NECK_NAMES)
     return None if found is None else _finite(found, "joint states")
 
 
