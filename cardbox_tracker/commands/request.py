@@ -160,7 +160,6 @@ class Problems:
     """What is wrong with options, collected for one error; values of wrong ones do not matter."""
 
     def __init__(self, recording: Path, faults: Iterable[str] = ()) -> None:
-        """Begin with the ``faults`` that are known."""
         self._recording = recording
         self._missing: list[str] = []
         self._hints: list[str] = []
@@ -476,10 +475,16 @@ def inputs_of(options: argparse.Namespace) -> tuple[Path, ...]:
 def tracking_request(options: argparse.Namespace, faults: Iterable[str] = ()) -> TrackingRequest:
     """Return what the options of :func:`add_tracking` ask for."""
     from cardbox_tracker.detectors.detector import Detector
+    from cardbox_tracker.detectors.model_files import installed_hands
+    from cardbox_tracker.measuring.scene import load_scene
     from cardbox_tracker.search.config import PRESETS
 
     problems = Problems(options.recording, faults)
-    scene = _scene(options, problems)
+    scene = None
+    if options.scene is not None:
+        if options.model is not None:
+            problems.add("--scene and --model both have the camera's pitch: leave one of them out")
+        scene = problems.caught(lambda: load_scene(options.scene), None)
     if scene is not None:
         options = _with_camera(options, scene)
     recording = recording_request(options, problems)
@@ -496,27 +501,21 @@ def tracking_request(options: argparse.Namespace, faults: Iterable[str] = ()) ->
     if options.people is not None and options.preset != "default":
         problems.add(f"--people needs the preset default, not {options.preset}")
     config = problems.caught(lambda: _config(options, preset), preset)
-    hands = _hands(options, recording, problems)
+    has_detector = isinstance(recording.points, Detector)
+    hands = None
+    if getattr(options, "hands", False):
+        if not has_detector:
+            problems.add(
+                "--hands needs the detector's wrists and knuckles: give --detector mediapipe"
+            )
+        hands = problems.caught(installed_hands, None)
     # The option of this name of "cardbox rula" is a score.
-    if getattr(options, "legs", False) is True and not isinstance(recording.points, Detector):
+    if getattr(options, "legs", False) is True and not has_detector:
         problems.add("--legs needs the detector's knees and ankles: give --detector mediapipe")
     problems.check()
     return TrackingRequest(
         recording, person, options.preset, config, options.seed, inputs_of(options), hands
     )
-
-
-def _hands(
-    options: argparse.Namespace, recording: RecordingRequest, problems: Problems
-) -> Path | None:
-    from cardbox_tracker.detectors.detector import Detector
-    from cardbox_tracker.detectors.model_files import installed_hands
-
-    if not getattr(options, "hands", False):
-        return None
-    if not isinstance(recording.points, Detector):
-        problems.add("--hands needs the detector's wrists and knuckles: give --detector mediapipe")
-    return problems.caught(installed_hands, None)
 
 
 def _camera(options: argparse.Namespace, problems: Problems) -> GivenCamera:
@@ -614,16 +613,6 @@ def points_named(given: object) -> Detector | PointTable:
             "in a table, in a file of COCO, or in a folder of OpenPose (docs/detectors.md)"
         )
     return PointTable(path)
-
-
-def _scene(options: argparse.Namespace, problems: Problems) -> Scene | None:
-    from cardbox_tracker.measuring.scene import load_scene
-
-    if options.scene is None:
-        return None
-    if options.model is not None:
-        problems.add("--scene and --model both have the camera's pitch: leave one of them out")
-    return problems.caught(lambda: load_scene(options.scene), None)
 
 
 def _with_camera(options: argparse.Namespace, scene: Scene) -> argparse.Namespace:

@@ -93,7 +93,8 @@ def _truth_of(
         raise CardboxError(f"{results} is no bag; give one that 'cardbox track --bag' has written")
     with BagReader(results) as bag:
         stamps = results_in(bag, person).stamp_ns.tolist()
-    path = given or _truth_beside(results)
+    there = (folder / _TRUTH for folder in (results, results.parent))
+    path = given or next((file for file in there if file.is_file()), None)
     if path is None:
         return None
     frames = load_ground_truth(path).frames
@@ -104,11 +105,4 @@ def _truth_of(
             f"{path} has no true frame for an image of {results}; give the ground truth of its "
             "recording"
         )
-    return None
-
-
-def _truth_beside(bag: Path) -> Path | None:
-    for folder in (bag, bag.parent):
-        if (folder / _TRUTH).is_file():
-            return folder / _TRUTH
     return None
