@@ -18,13 +18,11 @@ from cardbox_tracker.camera.rasterisation import render
 from cardbox_tracker.common.errors import InitializationError
 from cardbox_tracker.measuring.config import InitializationConfig
 from cardbox_tracker.measuring.outline import filled
-from cardbox_tracker.measuring.references import POSTURE_TEXT, lateral_m, rounded_down
+from cardbox_tracker.measuring.references import POSTURE_TEXT, Silhouette, lateral_m, rounded_down
 from cardbox_tracker.person.cardbox import cardbox_patches
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.posture import REFERENCE_NAMES, reference_posture
 from cardbox_tracker.person.proportions import sizes_of_stature
-
-Silhouette = NDArray[np.uint8]
 
 LEAST_IOU, CLEARLY = 0.60, 0.10
 """Least IoU with the requested posture, and IoU by which another posture must be better."""

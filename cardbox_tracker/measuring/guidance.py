@@ -72,50 +72,46 @@ def measuring(fraction: float) -> Prompt:
     return Prompt("measuring", "Good. Measuring, you may relax", detail=f"{100 * fraction:.0f} %")
 
 
-class Guidance:
-    """Guides a person through the missing references."""
+def guide(
+    missing: Sequence[str],
+    side_turn: str,
+    count_down_s: int,
+    attempts: int,
+    show: Callable[[Prompt], None],
+    capture: Callable[[str], str],
+    wait: Callable[[float], None],
+) -> None:
+    """Guide a person through the ``missing`` references, each in up to ``attempts``.
 
-    def __init__(
-        self,
-        show: Callable[[Prompt], None],
-        capture: Callable[[str], str],
-        wait: Callable[[float], None],
-    ) -> None:
-        """Store the functions that show a prompt, capture a reference by name, and wait seconds.
-
-        ``capture`` returns a text or raises InitializationError; an error of ``wait`` ends the
-        guidance.
-        """
-        self._show, self._capture, self._wait = show, capture, wait
-
-    def run(self, missing: Sequence[str], side_turn: str, count_down_s: int, attempts: int) -> None:
-        """Capture each missing reference; raise InitializationError if all ``attempts`` fail."""
-        for name in missing:
-            words, detail = short_words(name, side_turn), instruction(name, side_turn)
-            for attempt in range(1, attempts + 1):
-                for left in range(count_down_s, 0, -1):
-                    self._show(Prompt(name, words, left, detail))
-                    self._wait(1.0)
-                self._show(Prompt(name, HOLD_STILL, detail="hold still"))
-                self._wait(_HOLD_S)
-                try:
-                    done = self._capture(name)
-                    self._show(Prompt(name, "Good.", detail=done, mood=GOOD))
-                    self._wait(_HOLD_S)
-                    break
-                except InitializationError as error:
-                    failed = f"not captured: {error}"
-                    self._show(Prompt(name, error.words, detail=failed, mood=BAD))
-                    if attempt == attempts:
-                        raise
-                    self._wait(_READ_S)
+    ``show`` shows a prompt, ``wait`` waits seconds, and ``capture`` captures a reference by name
+    and returns a text, or raises InitializationError. So does this after the last attempt; an error
+    of ``wait`` ends the guidance.
+    """
+    for name in missing:
+        words, detail = short_words(name, side_turn), instruction(name, side_turn)
+        for attempt in range(1, attempts + 1):
+            for left in range(count_down_s, 0, -1):
+                show(Prompt(name, words, left, detail))
+                wait(1.0)
+            show(Prompt(name, HOLD_STILL, detail="hold still"))
+            wait(_HOLD_S)
+            try:
+                done = capture(name)
+                show(Prompt(name, "Good.", detail=done, mood=GOOD))
+                wait(_HOLD_S)
+                break
+            except InitializationError as error:
+                failed = f"not captured: {error}"
+                show(Prompt(name, error.words, detail=failed, mood=BAD))
+                if attempt == attempts:
+                    raise
+                wait(_READ_S)
 
 
 class Cancellation:
     """Allows one initialization at a time; :meth:`cancel` and :meth:`stop` end its waits."""
 
     def __init__(self) -> None:
-        """Begin without a running initialization."""
         self._busy = threading.Lock()
         self._ended = threading.Event()
         self._is_stopped = False

@@ -15,9 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cardbox_tracker.camera.camera import Camera
-
-FloatArray = NDArray[np.float64]
-Silhouette = NDArray[np.uint8]
+from cardbox_tracker.measuring.references import Silhouette
+from cardbox_tracker.person.sizes import FloatArray
 
 _HEAD_ABOVE = 0.07
 """Height above the arms' axis, in spans, above which rows show the head."""

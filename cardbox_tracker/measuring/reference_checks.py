@@ -13,7 +13,6 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from cardbox_tracker.camera.camera import Camera
 from cardbox_tracker.common.errors import InitializationError
@@ -24,11 +23,9 @@ from cardbox_tracker.measuring.outline import (
     span_m,
     width_m,
 )
-from cardbox_tracker.measuring.references import POSTURE_TEXT, rounded_down, rounded_up
+from cardbox_tracker.measuring.references import POSTURE_TEXT, Silhouette, rounded_down, rounded_up
 from cardbox_tracker.measuring.skeleton import BREADTH_OF_SPAN
 from cardbox_tracker.person.posture import REFERENCE_NAMES
-
-Silhouette = NDArray[np.uint8]
 
 MIN_ARMS_TO_FRONT = 1.72
 """Least ratio of the widths of ``arms`` and ``front``."""

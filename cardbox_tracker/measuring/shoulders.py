@@ -11,13 +11,11 @@ shows it: the middle of the chest against the middle of the hips.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from cardbox_tracker.camera.camera import Camera
 from cardbox_tracker.measuring.outline import plane_points_m, row_heights_m
-
-FloatArray = NDArray[np.float64]
-Silhouette = NDArray[np.uint8]
+from cardbox_tracker.measuring.references import Silhouette
+from cardbox_tracker.person.sizes import FloatArray
 
 GIRDLE_RISE = 0.068
 """Lift of the shoulder joints from ``front`` to ``arms`` in shoulder breadths.

@@ -26,7 +26,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from cardbox_tracker.camera.camera import Camera
 from cardbox_tracker.measuring.outline import (
@@ -35,15 +34,13 @@ from cardbox_tracker.measuring.outline import (
     span_m,
     width_m,
 )
-from cardbox_tracker.measuring.references import lateral_m
+from cardbox_tracker.measuring.references import Silhouette, lateral_m
 from cardbox_tracker.measuring.shoulders import (
     robust_mean,
     shoulder_height_m,
     shoulders_forward_m,
 )
-
-FloatArray = NDArray[np.float64]
-Silhouette = NDArray[np.uint8]
+from cardbox_tracker.person.sizes import FloatArray
 
 KNUCKLES_SHARE = 0.876
 """Distance from shoulder to knuckles, divided by the distance from shoulder to fingertips.

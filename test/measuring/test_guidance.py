@@ -9,8 +9,8 @@ from cardbox_tracker.measuring.guidance import (
     BAD,
     GOOD,
     HOLD_STILL,
-    Guidance,
     Prompt,
+    guide,
     instruction,
     measuring,
     short_words,
@@ -41,13 +41,14 @@ class Room:
     def wait(self, duration_s: float) -> None:
         self.waited_s += duration_s
 
-    def guidance(self) -> Guidance:
-        return Guidance(self.steps.append, self.capture, self.wait)
+    def guide(self, missing: list[str], turn: str, count_down_s: int, attempts: int = 2) -> None:
+        ways = self.steps.append, self.capture, self.wait
+        guide(missing, turn, count_down_s, attempts, *ways)
 
 
 def test_only_missing_postures_are_guided_with_a_line_a_second() -> None:
     room = Room()
-    room.guidance().run(["side", "arms"], "right", count_down_s=3, attempts=2)
+    room.guide(["side", "arms"], "right", 3)
     assert room.captured == ["side", "arms"]
     assert [line.rsplit(": ", 1)[1] for line in room.lines[:3]] == ["3", "2", "1"]
     assert "turn a quarter to your right" in room.lines[0]
@@ -56,7 +57,7 @@ def test_only_missing_postures_are_guided_with_a_line_a_second() -> None:
 
 def test_a_failed_capture_says_why_and_is_tried_again() -> None:
     room = Room(failures=1)
-    room.guidance().run(["front"], "left", count_down_s=1, attempts=2)
+    room.guide(["front"], "left", 1)
     assert room.captured == ["front"]
     assert "front: not captured: nobody is in the image" in room.lines
     assert ("Step into the picture", BAD) in [(step.words, step.mood) for step in room.steps]
@@ -65,7 +66,7 @@ def test_a_failed_capture_says_why_and_is_tried_again() -> None:
 def test_it_gives_up_with_the_reason() -> None:
     room = Room(failures=9)
     with pytest.raises(InitializationError, match="nobody"):
-        room.guidance().run(["front"], "left", count_down_s=1, attempts=2)
+        room.guide(["front"], "left", 1)
     assert room.captured == []
 
 
@@ -76,7 +77,7 @@ def test_each_posture_has_an_instruction(name: str) -> None:
 
 def test_steps_have_their_posture_words_and_count() -> None:
     room = Room()
-    room.guidance().run(["front", "side", "arms"], "left", 3, 1)
+    room.guide(["front", "side", "arms"], "left", 3, 1)
     assert {step.name for step in room.steps} == {"front", "side", "arms"}
     words = short_words("front", "left")
     assert room.steps[:5] == [
@@ -98,7 +99,7 @@ def test_steps_as_lines() -> None:
 def test_what_is_said_is_short_and_said_once() -> None:
     """Every sentence when it begins, and the last three seconds, for who looks aside."""
     room = Room()
-    room.guidance().run(["front", "side"], "left", count_down_s=5, attempts=1)
+    room.guide(["front", "side"], "left", 5, 1)
     steps = [*room.steps, measuring(0.1), measuring(0.2)]
     heard = [spoken(before, step) for before, step in zip([None, *steps], steps, strict=False)]
     assert [words for words in heard if words] == [

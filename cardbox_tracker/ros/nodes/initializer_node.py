@@ -19,7 +19,7 @@ from cardbox_tracker.applications.drawing.guidance import Guide
 from cardbox_tracker.camera.camera import Camera
 from cardbox_tracker.common.errors import CardboxError, InitializationError
 from cardbox_tracker.common.progress import told
-from cardbox_tracker.measuring.guidance import Cancellation, Guidance, Prompt, measuring, spoken
+from cardbox_tracker.measuring.guidance import Cancellation, Prompt, guide, measuring, spoken
 from cardbox_tracker.measuring.saved_model import SavedModel
 from cardbox_tracker.measuring.scale import SCALE_REFERENCES
 from cardbox_tracker.person.model import BodyModel
@@ -150,9 +150,9 @@ class InitializerNode(CardboxNode):
             distance.check()
         before = dict(references.captured), dict(references.images)
         try:
-            Guidance(self._guide.show, self._capture, self._cancellation.wait).run(
-                references.missing, settings.side_turn, settings.count_down_s, settings.attempts
-            )
+            asked = settings.side_turn, settings.count_down_s, settings.attempts
+            ways = self._guide.show, self._capture, self._cancellation.wait
+            guide(references.missing, *asked, *ways)
             if (camera := self._camera) is None:
                 raise InitializationError(
                     f"no CameraInfo was received yet on {self._topic}/camera_info; take the "
