@@ -68,7 +68,6 @@ class Guide:
     """
 
     def __init__(self, camera: Camera, config: InitializationConfig) -> None:
-        """Prepare the guidance for a person before ``camera``."""
         self.camera, self.config = camera, config
         self._fit = LiveFit(camera, config)
 

@@ -117,7 +117,6 @@ class Declared(NamedTuple):
         return f"{self.name.replace('_', ' ')} {self.value}"
 
     def __str__(self) -> str:
-        """Return name and value, and whether it is the default."""
         return f"{self.words} (default)" if self.is_default else self.words
 
 

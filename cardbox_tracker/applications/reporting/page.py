@@ -48,7 +48,8 @@ def angles_plot(results: Results) -> bytes:
             np.degrees(values) for values in (results.of(joints), results.deviations_of(joints))
         )
         for joint, angle, deviation in zip(joints, angles.T, deviations.T, strict=True):
-            line = row.plot(time_s, angle, linewidth=1.2, label=_words(joint, name))[0]
+            label = joint.removeprefix(f"{name.split()[0]}_").replace("_", " ")
+            line = row.plot(time_s, angle, linewidth=1.2, label=label)[0]
             low, high = angle - deviation, angle + deviation
             row.fill_between(time_s, low, high, color=line.get_color(), alpha=0.15, linewidth=0)
         # Deviations of what is hardly seen would leave no room for the curves.
@@ -75,10 +76,6 @@ def _joints_of(group: str, results: Results) -> list[str]:
         if is_of_group and np.isfinite(results.of([name])).any():
             found.append(name)
     return found
-
-
-def _words(joint: str, group: str) -> str:
-    return joint.removeprefix(f"{group.split()[0]}_").replace("_", " ")
 
 
 def doubtful_spans(results: Results) -> list[tuple[float, float, str]]:

@@ -181,7 +181,6 @@ class _BoundedBuilder(Xml.TreeBuilder):
         raise CardboxError(f"{self._source} defines entities, which no URDF needs; remove them")
 
     def end(self, tag: str) -> Xml.Element:
-        """Count a level less."""
         self._counts["levels of nested elements"] -= 1
         return super().end(tag)
 
