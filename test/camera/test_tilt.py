@@ -39,7 +39,8 @@ def test_joints_keep_their_places(
     (found,) = tilted_states(state[None], body, other)
     assert other.camera_pose.pitch_rad == after_rad
     assert keypoints_m(other, found) == pytest.approx(keypoints_m(body, state), abs=1e-9)
-    assert abs(found[YAW] - state[YAW]) < np.pi
+    # A trunk beyond the horizontal turns by half a turn, either way.
+    assert abs(found[YAW] - state[YAW]) <= np.pi + 1e-9
 
 
 def test_who_stands_on_the_axis_by_hand() -> None:
