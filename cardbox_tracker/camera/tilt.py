@@ -42,9 +42,13 @@ def tilted_states(states: FloatArray, before: BodyModel, after: BodyModel) -> Fl
     found[:, TORSO_Z] = hips_m[:, 2] - after.placement.hip_height_m
     yaw, pitch, roll = (states[:, value] for value in (YAW, PITCH, ROLL))
     torso = turn @ rotation_z(yaw) @ rotation_y(pitch) @ rotation_x(roll)
-    found[:, PITCH] = -np.arcsin(np.clip(torso[:, 2, 0], -1.0, 1.0))
-    found[:, ROLL] = np.arctan2(torso[:, 2, 1], torso[:, 2, 2])
-    found[:, YAW] = np.arctan2(torso[:, 1, 0], torso[:, 0, 0])
+    # Of the two sets of angles, that with the nearer yaw: a trunk may bow beyond the horizontal.
+    ahead = np.cos(yaw) * torso[:, 0, 0] + np.sin(yaw) * torso[:, 1, 0]
+    side = np.where(ahead < 0.0, -1.0, 1.0)
+    level = side * np.hypot(torso[:, 0, 0], torso[:, 1, 0])
+    found[:, PITCH] = np.arctan2(-torso[:, 2, 0], level)
+    found[:, ROLL] = np.arctan2(side * torso[:, 2, 1], side * torso[:, 2, 2])
+    found[:, YAW] = np.arctan2(side * torso[:, 1, 0], side * torso[:, 0, 0])
     # Somebody who has turned around has a yaw beyond half a turn.
     found[:, YAW] += 2.0 * np.pi * np.rint((yaw - found[:, YAW]) / (2.0 * np.pi))
     return found
