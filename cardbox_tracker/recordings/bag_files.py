@@ -192,7 +192,9 @@ def paths_to_open(folder: Path) -> list[Path]:
         text = read_regular(metadata, MOST_METADATA_BYTES).decode("utf-8", "replace")
     except UnreadableFileError:
         return [folder]
-    if _UNKNOWN_STORAGE.search(text) or _OTHER_FORMAT.search(text):
+    # rosbags takes every path that ends in ".bag" for a file of ROS 1.
+    is_misnamed = folder.suffix == ".bag"
+    if is_misnamed or _UNKNOWN_STORAGE.search(text) or _OTHER_FORMAT.search(text):
         return files_of_one(folder) or [folder]
     return [folder]
 

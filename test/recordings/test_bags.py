@@ -77,6 +77,11 @@ def test_what_is_written_is_read_back(tmp_path: Path, storage: str) -> None:
         np.testing.assert_array_equal(last.position, COUNT - 1)
 
 
+def test_a_folder_may_be_named_like_a_file_of_ros_1(tmp_path: Path, storage: str) -> None:
+    with BagReader(record(tmp_path / "a.bag", storage)) as bag:
+        assert bag.count([IMAGE]) == COUNT
+
+
 def test_messages_come_in_the_order_of_their_time(tmp_path: Path, storage: str) -> None:
     order = np.random.default_rng(0).permutation(200)
     with BagWriter(tmp_path / "bag", storage) as bag:
