@@ -107,7 +107,7 @@ def test_a_process_that_is_killed_while_others_get_their_calls_is_told() -> None
 def test_leaving_before_the_end_is_silent(monkeypatch: pytest.MonkeyPatch) -> None:
     failed: list[threading.ExceptHookArgs] = []
     monkeypatch.setattr(threading, "excepthook", failed.append)
-    for count in (0, 5):
+    for count in (0, 1, 5, 11):
         with results_of(time.sleep, [0.002 * (i % 3) for i in range(60)], 2) as found:
             for _ in islice(found, count):
                 pass

@@ -17,7 +17,12 @@ from cardbox_tracker.person.kinematics import pose
 from cardbox_tracker.person.legs import LEG_NAMES
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.posture import reference_posture
-from cardbox_tracker.person.skeleton import JOINT_NAMES, PLACE_NAMES, KeypointState
+from cardbox_tracker.person.skeleton import (
+    JOINT_NAMES,
+    NECK_NAMES,
+    PLACE_NAMES,
+    KeypointState,
+)
 from cardbox_tracker.recordings.outputs import (
     METRICS,
     OUTPUTS,
@@ -141,6 +146,8 @@ def test_the_neck_follows_and_has_deviations_if_it_was_seen() -> None:
     place = 0.25, -0.05, 0.4, -0.1, 0.02, 0.03
     np.testing.assert_array_equal(joints.values, [*POSTURE, *place, *NO_LEGS])
     np.testing.assert_array_equal(deviations.values[-12:-8], (0.1, 0.2, 0.002, 0.003))
+    np.testing.assert_array_equal(cast(Any, values_from(joints, NECK_NAMES)), (0.4, -0.1))
+    assert values_from(JointValues(BODY_NAMES, np.zeros(14)), NECK_NAMES) is None
 
 
 def test_without_the_place_there_are_the_twelve_joints() -> None:
