@@ -145,7 +145,7 @@ def track_folder(options: argparse.Namespace) -> None:
     for row in rows.values():
         if row.status == FAILED:
             _remove(output, row.recording)
-    write_table(output / SUMMARY, Row._fields, sorted(rows.values()))
+    _write_rows(output / SUMMARY, rows.values())
     for name, lines in sorted(remarks.items()):
         for line in lines:
             print(f"{name}: {line.removeprefix('cardbox: ')}", file=sys.stderr)
@@ -221,7 +221,7 @@ def _track_all(
 ) -> dict[str, list[str]]:
     """Track, and add each row to ``rows`` and to the summary; return printed lines by name."""
     # Rows of former settings go first, because their results are replaced one by one.
-    write_table(output / SUMMARY, Row._fields, sorted(rows.values()))
+    _write_rows(output / SUMMARY, rows.values())
     remarks: dict[str, list[str]] = {}
     if not jobs:
         return remarks
@@ -241,7 +241,7 @@ def _track_all(
                     if row.status == TRACKED:
                         _publish(job, output)
                     rows[job.name], remarks[job.name] = row, lines
-                    write_table(output / SUMMARY, Row._fields, sorted(rows.values()))
+                    _write_rows(output / SUMMARY, rows.values())
                 show(number / len(prepared))
     return remarks
 
@@ -320,6 +320,10 @@ def _read_rows(path: Path) -> dict[str, Row]:
             raise ValueError("it has other columns")
         rows = [Row(*row) for row in cells]
     return {row.recording: row for row in rows}
+
+
+def _write_rows(path: Path, rows: Iterable[Row]) -> None:
+    write_table(path, Row._fields, sorted(rows))
 
 
 def _table(rows: Sequence[Row]) -> Iterator[str]:

@@ -42,10 +42,13 @@ def done_beside(call: Callable[..., object]) -> Iterator[Callable[..., None]]:
 
     def unless_failed(*given: object) -> None:
         nonlocal failed
-        if not failed:
-            failed = True
+        if failed:
+            return
+        try:
             call(*given)
-            failed = False
+        except BaseException:
+            failed = True
+            raise
 
     with _worker() as pool:
         waiting = deque[Future[object]]()

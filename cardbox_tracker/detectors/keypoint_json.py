@@ -150,6 +150,7 @@ def _listed(numbers: Iterable[int]) -> str:
 def _named(
     values: Any, place: str, layouts: dict[int, tuple[str, ...]] = LAYOUTS
 ) -> list[NamedPoint]:
+    """Return the points of a flat list of columns, rows and scores."""
     is_list = isinstance(values, list)
     names: Sequence[str] | None = layouts.get(len(values) // 3) if is_list else None
     if names is None or len(values) % 3:

@@ -42,7 +42,7 @@ TURNING_LIMITS: FloatArray = np.array([joint.limits for joint in joints_of(Group
 """Shape (12, 2): lowest and highest value of each joint, rad (metres for ``torso_y``), of a person
 who also turns with the feet, to walk, to look aside, or around."""
 JOINT_LIMITS: FloatArray = TURNING_LIMITS.copy()
-"""Shape (12, 2): the same of a person who stands."""
+"""Shape (12, 2): the same of a person who stands, with which the paper's filter searches."""
 JOINT_LIMITS[PITCH, 1] = np.radians(90.0)
 JOINT_LIMITS[YAW] = np.radians([-60.0, 60.0])
 TURNING_LIMITS.setflags(write=False)

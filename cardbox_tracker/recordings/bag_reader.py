@@ -331,25 +331,29 @@ class BagReader:
         Raises BagError without a CameraInfo, and CameraError, with both topics, if the camera is
         not calibrated or its images have another shape.
         """
-        topic, is_given = self.image_topic(camera), self._given.is_calibrated
-        if not is_given and CAMERA_INFO_TYPE not in self.topics.values():
+        topic = self.image_topic(camera)
+        if self._given.is_calibrated:
+            return self._given_calibration(camera)
+        if CAMERA_INFO_TYPE not in self.topics.values():
             raise BagError(
                 f"{self.path} has 0 CameraInfo topics; expected one for {topic}."
                 " Record it with the images, or give --fov DEG or --calibration FILE"
             )
-        found = None if is_given else self._info(camera)[1]
+        found = self._info(camera)[1]
         for image in self.images(topic):
             with suppress(EncodingError):
                 height, width = image.as_sent.shape[:2]
-                if found is None:
-                    return self._given.calibrated(self.path, width, height, image.frame_id)
                 found.check_shape(width, height, topic, self.camera_info_topic(camera))
                 break
-        if found is None:
-            raise BagError(
-                f"{self.path} has no image on {topic} that can be decoded; record it again"
-            )
         return self._given.rolled(found)
+
+    def _given_calibration(self, camera: str | None) -> Calibration:
+        topic = self.image_topic(camera)
+        for image in self.images(topic):
+            with suppress(EncodingError):
+                height, width = image.as_sent.shape[:2]
+                return self._given.calibrated(self.path, width, height, image.frame_id)
+        raise BagError(f"{self.path} has no image on {topic} that can be decoded; record it again")
 
     def left_out(self, topic: str, used: Collection[str] = ()) -> list[str]:
         """Return the images that were not used, with the reasons, and other image topics."""

@@ -117,6 +117,7 @@ def _disk(radius_px: float) -> NDArray[np.uint8]:
 
 
 def _resized(mask: Mask, size: tuple[int, ...]) -> Mask:
+    """Return the mask at another size (width, height); a pixel is set if any part of it is."""
     whole = cv2.resize(mask.astype(np.float32), (size[0], size[1]), interpolation=cv2.INTER_AREA)
     return np.asarray(whole > 0, np.bool_)
 

@@ -24,7 +24,7 @@ from cardbox_tracker.tracking.estimate import Estimate
 
 # Rate of a video of a single image.
 _USUAL_HZ = 15.0
-# Files are about as large as with superfast and crf 23, in half of the time.
+# It takes half of the time of superfast with crf 23, and files are 1.1 to 1.6 times as large.
 _H264 = {"preset": "ultrafast", "crf": "25"}
 
 

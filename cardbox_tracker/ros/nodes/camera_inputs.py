@@ -120,7 +120,7 @@ class CameraInputs:
 
     :class:`ImagePairing` pairs each silhouette with its image. With several cameras or depth
     images, :class:`~cardbox_tracker.camera.pairing.Arrivals` then synchronizes the streams by their
-    stamps. ``poses`` has the cameras.
+    stamps.
     """
 
     def __init__(
@@ -161,7 +161,7 @@ class CameraInputs:
             profile = qos.SILHOUETTE if len(self._streams) == 1 else qos.SILHOUETTE_INPUT
             node.subscribe(Image, topic, pairing.add_silhouette, profile)
         # Of messages that arrive together, silhouettes are taken before their CameraInfo.
-        self.poses = CameraPoses(node, cameras, settings.extrinsics_file, self._on_poses)
+        self._poses = CameraPoses(node, cameras, settings.extrinsics_file, self._on_poses)
         if settings.depth:
             self._depth_input = DepthInput(node, settings.depth, self._on_depth)
         self._keypoints = KeypointInputs(node, settings)
@@ -172,13 +172,22 @@ class CameraInputs:
         """Topics of the silhouettes."""
         return ", ".join(stream.topic for stream in self._streams[: self._count])
 
+    @property
+    def missing(self) -> str:
+        """Topics of CameraInfo on which nothing was received yet."""
+        return ", ".join(self._poses.missing)
+
+    def check(self) -> None:
+        """Raise CameraError if all cameras are known, but not their poses."""
+        self._poses.check()
+
     def wait_for_images(self, waits: bool) -> None:
         """Set whether silhouettes wait for their images."""
         for pairing in self._pairings:
             pairing.waits = waits
 
     def _on_poses(self) -> None:
-        self._changed(self.poses.first, self.poses.others)
+        self._changed(self._poses.first, self._poses.others)
 
     def _on_depth(self, message: Any, sent_ns: int) -> None:
         self._add(self._count, message, None, sent_ns)
@@ -213,10 +222,10 @@ class CameraInputs:
 
         Raises CameraError if no silhouette can be read.
         """
-        first = self.poses.first
+        first = self._poses.first
         assert first is not None
         lead, messages = self._lead_of(received), received[: self._count]
-        cameras = [first, *(other.camera for other in self.poses.others)]
+        cameras = [first, *(other.camera for other in self._poses.others)]
         streams = self._streams[: self._count]
         observations = [
             self._with_points(number, one, Observation(*_picture(stream, one, camera)), camera)
@@ -232,7 +241,7 @@ class CameraInputs:
         observations[0] = observations[0].having(depth_m=depth_m, stamp_ns=stamp_ns)
         header = lead.message.header
         if received[0] is None:
-            header = Header(stamp=header.stamp, frame_id=self.poses.frame_id)
+            header = Header(stamp=header.stamp, frame_id=self._poses.frame_id)
         return ObservationSet(
             header,
             [

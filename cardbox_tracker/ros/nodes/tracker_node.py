@@ -317,7 +317,7 @@ class TrackerNode(CardboxNode):
 
     def _reset(self) -> str:
         if self._session is None:
-            missing = ", ".join(self._inputs.poses.missing) if self._bodies else self._model_topic
+            missing = self._inputs.missing if self._bodies else self._model_topic
             raise CameraError(
                 f"nothing to reset: the tracker has not started, it waits for {missing}"
             )
@@ -339,8 +339,7 @@ class TrackerNode(CardboxNode):
         elif self._camera is None:
             self.diagnostics.wait_for(
                 f"silhouettes on {self._inputs.source} and their CameraInfo on "
-                f"{', '.join(self._inputs.poses.missing)} (is the background node running, and has "
-                "it learned?)"
+                f"{self._inputs.missing} (is the background node running, and has it learned?)"
             )
 
     def _on_input(self, lead: Received, received: Sequence[Received | None]) -> None:
@@ -351,7 +350,7 @@ class TrackerNode(CardboxNode):
         if not step.is_usable:
             return
         if self._session is None:
-            self._inputs.poses.check()
+            self._inputs.check()
             self._wait()
             text = "no body model yet: call initializer/initialize"
             self._outputs[0].waiting(lead.message, lead.image, text)
