@@ -124,10 +124,10 @@ class PoseNetwork:
         several: number of images with several people, of those that were searched for them.
     """
 
-    def __init__(self, detector: Path, landmarks: Path) -> None:
+    def __init__(self, detector: Path, landmarks: Path, threads: int = 1) -> None:
         """Load both networks; CardboxError without LiteRT, or if a file is missing or damaged."""
-        self._detect = Network(detector)
-        self._locate = Network(landmarks)
+        self._detect = Network(detector, threads)
+        self._locate = Network(landmarks, threads)
         self.choose: Choose | None = None
         self.forget()
 
@@ -234,9 +234,9 @@ class PoseNetwork:
 
 
 class Network:
-    """One network file on one thread."""
+    """One network file."""
 
-    def __init__(self, path: Path) -> None:
+    def __init__(self, path: Path, threads: int = 1) -> None:
         """Load it; CardboxError without LiteRT, or if the file is missing or damaged."""
         try:
             from ai_edge_litert.interpreter import Interpreter
@@ -247,7 +247,7 @@ class Network:
             ) from None
         try:
             with _silent():
-                self._run: Any = Interpreter(str(path), num_threads=1)
+                self._run: Any = Interpreter(str(path), num_threads=threads)
                 self._run.allocate_tensors()
         except (ValueError, OSError, RuntimeError) as error:
             raise CardboxError(
@@ -262,6 +262,14 @@ class Network:
         self._run.set_tensor(self._input, image[None])
         self._run.invoke()
         return [self._run.get_tensor(index) for index in self._outputs]
+
+
+def threads_for_films() -> int:
+    """Return how many threads a network has while a film is tracked: two, if there are as many.
+
+    A process that has others beside it limits OpenCV's threads, and so these, to one.
+    """
+    return min(2, cv2.getNumThreads())
 
 
 @contextmanager

@@ -9,6 +9,7 @@ is usual, decide. In the same way people who lean aside show no roll.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
 from itertools import pairwise
 from typing import Any, NamedTuple
 
@@ -97,7 +98,12 @@ def scene_camera(
         roll_rad: clockwise roll that is given; None for none.
     """
     usual_roll = (0.0, _ROLLED) if roll_rad is None else (roll_rad, GIVEN_STDDEV)
-    shown = people_camera(people, statures_m, camera, (USUAL_PITCH, PITCH_PRIOR), usual_roll)
+    with ThreadPoolExecutor(1) as beside:
+        edges = beside.submit(edge_likelihoods, [picture for _, picture in pictures], camera)
+        shown = people_camera(people, statures_m, camera, (USUAL_PITCH, PITCH_PRIOR), usual_roll)
+        # Without points, nothing tells the people from the background.
+        moves = len(people) > 0 and camera_moves(people, pictures, camera)
+        likelihoods = edges.result()
     pitches, rolls = np.meshgrid(PITCHES_RAD, ROLLS_RAD, indexing="ij")
     if roll_rad is None:
         of_roll = (1 - _ROLLED_SHARE) * _normal(rolls, 0.0, _LEVEL)
@@ -117,7 +123,6 @@ def scene_camera(
         leaning = _normal(rolls, roll, _ROLLED) * _normal(pitches, pitch, stddev[0])
         lean_aside = _LEAN_ASIDE if shown.shows_feet else _LEAN_ASIDE_CUT
         chances = of_roll * ((1 - lean_aside) * upright + lean_aside * leaning)
-    likelihoods = edge_likelihoods([picture for _, picture in pictures], camera)
     # How much likelier the lines are than if they meant nothing.
     lines = np.exp(likelihoods - likelihoods.max())
     lines /= (lines * of_roll).sum() / of_roll.sum()
@@ -149,8 +154,7 @@ def scene_camera(
             f"people show {_degrees(by_people)}; {_degrees((pitch, pitch_stddev))} is used, so "
             "give --camera-pitch-deg if it is known"
         )
-    # Without points, nothing tells the people from the background.
-    if people and camera_moves(people, pictures, camera):
+    if moves:
         pitch_stddev = float(np.hypot(pitch_stddev, _MOVING))
         remarks.append(
             "the background moves, so the camera does not stand still; postures are those of one "

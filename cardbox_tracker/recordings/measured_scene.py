@@ -50,10 +50,13 @@ class Spread(Generic[T]):
         self._most, self._every, self._seen = most, 1, 0
         self.items: list[T] = []
 
-    def add(self, make: Callable[[], T]) -> None:
-        """Take the next item, which is made only if it is kept."""
+    def add(self, make: Callable[[], T | None]) -> None:
+        """Take the next item, which is made only if it is due; None lets the one after it be."""
         if self._seen % self._every == 0:
-            self.items.append(make())
+            item = make()
+            if item is None:
+                return
+            self.items.append(item)
         self._seen += 1
         if len(self.items) > self._most:
             del self.items[1::2]
@@ -80,13 +83,17 @@ def watch(recording: Recording, start_s: float = 0.0, end_s: float = math.inf) -
     people: list[_Person] = []
     for taken in recording.frames(start_s, end_s):
         frame = taken.first
-        if upper_body(frame.silhouette, _is_detected(frame)) is not None:
-            frames.add(partial(frame._replace, recorded=None))
+        frames.add(partial(_whole, frame))
         pictures.add(partial(_picture, taken))
         _assign(people, frame, taken.time_s)
     for source in recording.sources:
         source.has_pictures = False
     return Watched(frames.items, pictures.items, [one.seen for one in people])
+
+
+def _whole(frame: RecordedFrame) -> RecordedFrame | None:
+    seen = upper_body(frame.silhouette, _is_detected(frame))
+    return None if seen is None else frame._replace(recorded=None)
 
 
 def _picture(taken: FrameSet) -> Picture:

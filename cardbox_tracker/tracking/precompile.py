@@ -9,8 +9,10 @@ from __future__ import annotations
 import json
 import logging
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from importlib import import_module
 from pathlib import Path
+from threading import Thread
 from typing import Any
 
 import numba
@@ -47,13 +49,17 @@ _LOG = logging.getLogger(__name__)
 
 
 def compile_for_films() -> None:
-    """Compile what films need with the preset ``default`` on all cores, unless it has been done."""
+    """Compile what films need with the preset ``default`` on all cores, unless it has been done.
+
+    What has been compiled is loaded beside, by a thread, while images are read.
+    """
     if compiling.FOLDER is None:
         return
     done = compiling.FOLDER / f"films-numba-{numba.__version__}"
-    if done.exists():
-        return
     listed = json.loads(FILM_KERNELS.read_text(encoding="utf-8"))
+    if done.exists():
+        Thread(target=_load, args=(listed,), daemon=True).start()
+        return
     try:
         with (
             progress_bar("compile, the first time only") as show,
@@ -64,6 +70,13 @@ def compile_for_films() -> None:
         done.touch()
     except (CardboxError, OSError) as error:
         _LOG.warning("the first images wait for code that could not be compiled: %s", error)
+
+
+def _load(listed: Mapping[str, Mapping[str, Sequence[Any]]]) -> None:
+    # The call that needs damaged code finds it.
+    with suppress(*compiling.DAMAGED):
+        for part in listed.items():
+            compile_each(part)
 
 
 def compile_each(part: tuple[str, Mapping[str, Sequence[Any]]]) -> None:

@@ -8,7 +8,7 @@ import pytest
 
 from cardbox_tracker.detectors.figure import figure_of_points
 from cardbox_tracker.detectors.image_points import POINT_NAMES, ImagePoints
-from cardbox_tracker.recordings.measured_scene import _assign, _Person
+from cardbox_tracker.recordings.measured_scene import Spread, _assign, _Person
 from cardbox_tracker.recordings.silhouettes import RecordedFrame
 
 RED, BLUE = (40, 40, 220), (220, 60, 40)
@@ -59,3 +59,17 @@ def test_who_comes_after_two_seconds_is_a_new_person() -> None:
     for time_s in (0.0, 0.1, 2.1):
         _assign(people, frame((160.0, RED), found=1), time_s)
     assert [[time_s for time_s, _ in person.seen] for person in people] == [[0.0, 0.1], [2.1]]
+
+
+def test_items_that_are_left_out_do_not_count_where_one_is_due() -> None:
+    spread, made = Spread[int](2), list[int]()
+    for item in (0, 1, 2, 3, 4, 0, 5):
+
+        def make(item: int = item) -> int | None:
+            made.append(item)
+            return item or None
+
+        spread.add(make)
+    # After 1, 2 and 3, every second one is due, and 4 is the third.
+    assert made == [0, 1, 2, 3, 0, 5]
+    assert spread.items == [1, 5]

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import sys
 from pathlib import Path
+from queue import Queue
 
 import numpy as np
 import pytest
@@ -125,6 +126,10 @@ def test_what_films_need_is_compiled_once(tmp_path: Path, monkeypatch: pytest.Mo
     monkeypatch.setattr(precompile.compiling, "FOLDER", tmp_path)
     monkeypatch.setattr(precompile, "cores", lambda: 1)
     monkeypatch.setattr(precompile, "compile_each", done.append)
+    loaded = Queue[dict[str, object]]()
+    monkeypatch.setattr(precompile, "_load", loaded.put)
     for _ in range(2):
         compile_for_films()
     assert done == [*json.loads(FILM_KERNELS.read_text()).items()]
+    assert loaded.get(timeout=60.0) == dict(done)
+    assert loaded.empty()

@@ -210,13 +210,12 @@ def _draw_bone(
 ) -> None:
     """Draw a line between two pixels, with dashes if the keypoint at its end is hidden."""
     colour = _BONE_BGR.get(state, SKELETON_BGR)
-    parts = [(0.0, 1.0)]
+    shares = np.array([[0.0, 1.0]])
     if state is KeypointState.HIDDEN:
         dashes = max(2, round(float(np.linalg.norm(end - begin)) / (6 * thickness)))
-        parts = [(number / dashes, (number + 0.5) / dashes) for number in range(dashes)]
-    for shares in parts:
-        line = _subpixels(np.array([begin + share * (end - begin) for share in shares]))
-        cv2.polylines(canvas, [line], False, colour, thickness, cv2.LINE_AA, _SHIFT)
+        shares = (np.arange(dashes)[:, None] + [0.0, 0.5]) / dashes
+    lines = [*_subpixels(begin + shares[..., None] * (end - begin))]
+    cv2.polylines(canvas, lines, False, colour, thickness, cv2.LINE_AA, _SHIFT)
 
 
 def _draw_gaze(canvas: ImageArray, camera: Camera, line_m: FloatArray) -> None:
