@@ -289,7 +289,7 @@ class Session:
         restarted = [tracker.configure(config) for tracker in self.trackers]
         return any(restarted)
 
-    def track(self, observations: Observations | Observation) -> list[Estimate]:
+    def track(self, observations: Observations | Observation | Silhouette) -> list[Estimate]:
         """Estimate the postures of all people at one time, in the order of their numbers.
 
         Of several people, silhouettes show all of them, and the channel ``people`` has the joints
