@@ -223,7 +223,7 @@ class SilhouetteSource:
             self.camera.width / calibration.width,
             self.camera.height / calibration.height,
         )
-        return KeptDetections(detector.start(across, down), detector.people > 0)
+        return KeptDetections(detector.start(across, down))
 
     def _looked_at(self, prepared: PreparedImage, start_s: float = -math.inf) -> PreparedImage:
         """Return an image with whom the detector finds in it, if it is not before ``start_s``."""

@@ -1,15 +1,15 @@
 """One call for people, cameras and channels: one person before one camera is a list of one.
 
-A session of one person gives all that the cameras show to one tracker. Sizes that are not known are
-measured beside it, in a few images; each new version of the body is tracked from its image on, with
-the posture that was found so far. Of several people, each image shows a
-few *figures*: people whose joints a detector has found, or regions of the silhouette that are
-apart. In each camera they are assigned to the known people by place and by the colours of the
-trunk; in a further camera also by where the lines of sight meet, and whom the camera has missed by
-the last posture. Somebody who has left keeps the identity and is known by the colours alone. Each
-tracker gets the pixels that are nearest to its person's figure. Pixels of others do not count for
-it, because they may hide the person. Somebody whom others hide in all cameras stays where they
-were, and is ``uncertain``, with ``hidden`` keypoints.
+A session of one person gives all that the cameras show to one tracker. Unknown sizes are measured
+beside it, in a few images; each new version of the body is tracked from its image on, with the
+posture that was found so far. Of several people, each image shows a few *figures*: people whose
+joints a detector has found, or regions of the silhouette that are apart. In each camera they are
+assigned to the known people by place and by the colours of the trunk; in a further camera also by
+where the lines of sight meet, and whom the camera has missed by the last posture. Somebody who has
+left keeps the identity and is known by the colours alone. Each tracker gets the pixels that are
+nearest to its person's figure. Pixels of others do not count for it, because they may hide the
+person. Somebody whom others hide in all cameras stays where they were, and is ``uncertain``, with
+``hidden`` keypoints.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ import cv2
 import numpy as np
 
 from cardbox_tracker.camera.camera import Camera
-from cardbox_tracker.camera.tilt import tilted_states
+from cardbox_tracker.camera.tilt import tilted_body, tilted_states
 from cardbox_tracker.camera.view import OtherCamera
 from cardbox_tracker.detectors.figure import Figure, figure_of_points
 from cardbox_tracker.detectors.identity import (
@@ -46,9 +46,7 @@ from cardbox_tracker.person.sizes import FloatArray
 from cardbox_tracker.person.skeleton import KeypointState
 from cardbox_tracker.search.config import TrackerConfig
 from cardbox_tracker.search.doubt import doubted
-from cardbox_tracker.terms.joint_points import projected
-from cardbox_tracker.terms.joint_points_kernels import ELBOW, HIPS, POINTS_OF_ARM, SHOULDER, WRIST
-from cardbox_tracker.terms.term import Image, Posed, Silhouette
+from cardbox_tracker.terms.term import Image, Silhouette
 from cardbox_tracker.tracking.camera_agreement import CameraAgreement
 from cardbox_tracker.tracking.estimate import LOST, NO_PERSON, UNCERTAIN, Estimate
 from cardbox_tracker.tracking.hands import Look
@@ -80,12 +78,6 @@ _USUAL_NS = 66_666_667
 # Deviation of the gap between lines of sight to the middle of a trunk, m; length of a trunk, m, and
 # relative deviation of that which the place where they meet gives.
 _GAP_M, _TRUNK_M, _TRUNK = 0.15, 0.5, 0.4
-# Points of a figure by their rows in :func:`projected`.
-_PROJECTED = {
-    f"{side}_{name}": first + row
-    for side, first in (("left", 0), ("right", POINTS_OF_ARM))
-    for name, row in (("shoulder", SHOULDER), ("elbow", ELBOW), ("wrist", WRIST))
-} | {"left_hip": HIPS, "right_hip": HIPS}
 
 
 class Shown(NamedTuple):
@@ -139,7 +131,8 @@ class _Person:
         self._time_s += first.interval_s
         is_detected = first.points is not None and first.points.are_certain
         if measuring.see(first.silhouette, first.image, self._time_s, is_detected):
-            frames = tracker.use(measuring.body, frames, is_new_start)
+            tracker.use(measuring.body, first.stamp_ns, is_new_start)
+            frames = tracker.again(frames)
         if only_measures:
             return Estimate(LOST)
         estimate = tracker.follow(frames)
@@ -151,7 +144,7 @@ class _Person:
     def tilt(self, guess: BodyModel, stamp_ns: int) -> None:
         """See :meth:`Session.tilt`."""
         before, last, state = self.tracker.body, self.estimate, self.state()
-        self.tracker.tilt(guess.camera_pose, stamp_ns)
+        self.tracker.use(tilted_body(before, guess.camera_pose), stamp_ns)
         if self._measuring is not None:
             self._measuring.tilt(guess)
         if state is not None:
@@ -178,15 +171,8 @@ class _Person:
 
     def expected(self, camera: int) -> Figure | None:
         """Return the figure of the last posture in a camera; None without one."""
-        state, there = self.state(), self.tracker.cameras[camera]
-        if state is None:
-            return None
-        if there.view is not None:
-            state = there.view.states(state)
-        px = projected(Posed(there.posable, state[None]))[:, :2]
-        if there.view is not None:
-            px = px @ there.view.raw_px[:, :2].T + there.view.raw_px[:, 2]
-        return Figure({name: px[row] for name, row in _PROJECTED.items()})
+        state = self.state()
+        return None if state is None else self.tracker.cameras[camera].figure(state)
 
 
 class Session:
@@ -276,7 +262,7 @@ class Session:
     def tilt(self, bodies: Sequence[BodyModel], stamp_ns: int) -> None:
         """Go on before the same camera with the pitch of ``bodies``, from the image of a stamp on.
 
-        Each person keeps number, sizes and place in the image, see :meth:`.Tracker.tilt`.
+        Each person keeps number, sizes and place in the image, see :meth:`.Tracker.use`.
         ``bodies`` are those that were given, with the other pitch.
         """
         self._bodies = tuple(bodies)

@@ -18,7 +18,7 @@ from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.sizes import FloatArray
 from cardbox_tracker.search.config import TrackerConfig
 from cardbox_tracker.terms.joint_points import projected
-from cardbox_tracker.terms.joint_points_kernels import HIPS, POINTS_OF_ARM, SHOULDER
+from cardbox_tracker.terms.joint_points_kernels import ELBOW, HIPS, POINTS_OF_ARM, SHOULDER, WRIST
 from cardbox_tracker.terms.kernel_arguments import body_tuple
 from cardbox_tracker.terms.silhouette import rows_above_hips
 from cardbox_tracker.terms.term import (
@@ -47,6 +47,12 @@ _WINDOW, _LEAST, _EVERY = 15, 6, 3
 # Mean surpluses below which depth is refused, and above which it is taken again; depth of the
 # same view has 0.5 and more, also from a pair of cameras.
 _OTHER_VIEW, _SAME_VIEW = 0.25, 0.35
+# Points of a figure by their rows in :func:`projected`.
+_PROJECTED = {
+    f"{side}_{name}": first + row
+    for side, first in (("left", 0), ("right", POINTS_OF_ARM))
+    for name, row in (("shoulder", SHOULDER), ("elbow", ELBOW), ("wrist", WRIST))
+} | {"left_hip": HIPS, "right_hip": HIPS}
 
 
 def surplus_of_jumps(silhouette: Silhouette, depth_m: DepthImage) -> float | None:
@@ -214,6 +220,14 @@ class TrackedCamera:
             drawn = np.asarray(cv2.warpAffine(drawn, self.view.raw_px, self._size[::-1]), np.uint8)
         return drawn
 
+    def figure(self, state: FloatArray) -> Figure:
+        """Return the figure, in the image as it comes, of a state (14,) for the first camera."""
+        there = state if self.view is None else self.view.states(state)
+        px = projected(Posed(self.posable, there[None]))[:, :2]
+        if self.view is not None:
+            px = px @ self.view.raw_px[:, :2].T + self.view.raw_px[:, 2]
+        return Figure({name: px[row] for name, row in _PROJECTED.items()})
+
     def frame(
         self,
         observation: Observation | None,
@@ -272,10 +286,7 @@ class TrackedCamera:
             return self._sees_other
         if frame.points is not None and not frame.points.is_empty:
             return False
-        there = projected(Posed(self.posable, state[None]))[:, :2]
-        joints = {"left_shoulder": there[SHOULDER], "left_hip": there[HIPS]}
-        joints |= {"right_shoulder": there[POINTS_OF_ARM + SHOULDER], "right_hip": there[HIPS]}
-        figure, silhouette = Figure(joints), frame.silhouette
+        figure, silhouette = self.figure(state), frame.silhouette
         trunk = figure.trunk(silhouette.shape)
         is_seen, colours = (trunk & silhouette).any(), colours_in(frame.image, trunk)
         return not is_seen or not self.identity.is_same(figure, colours, now_ns)

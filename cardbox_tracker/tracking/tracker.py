@@ -11,28 +11,19 @@ from types import MappingProxyType
 import numpy as np
 
 from cardbox_tracker.camera.camera import Camera
-from cardbox_tracker.camera.tilt import tilted_body, tilted_states
+from cardbox_tracker.camera.tilt import tilted_states
 from cardbox_tracker.camera.view import OtherCamera, View
 from cardbox_tracker.common.settings import restarts
 from cardbox_tracker.measuring.people_camera import FOUND_STDDEV
 from cardbox_tracker.person.kinematics import clavicles
-from cardbox_tracker.person.model import BodyModel, CameraPose
-from cardbox_tracker.person.posture import (
-    LEFT_ARM,
-    RIGHT_ARM,
-    TURNING_LIMITS,
-    TURNS,
-)
+from cardbox_tracker.person.model import BodyModel
+from cardbox_tracker.person.posture import LEFT_ARM, RIGHT_ARM, TURNING_LIMITS, TURNS
 from cardbox_tracker.person.sizes import FloatArray
 from cardbox_tracker.search.config import TrackerConfig
 from cardbox_tracker.search.cycles import Cycles
 from cardbox_tracker.search.doubt import doubted
 from cardbox_tracker.search.particles import Particles, likely_postures
-from cardbox_tracker.search.pose_filter import (
-    MakeFilter,
-    PoseFilter,
-    Presence,
-)
+from cardbox_tracker.search.pose_filter import MakeFilter, PoseFilter, Presence
 from cardbox_tracker.search.whole_body import WholeBodyFilter
 from cardbox_tracker.terms.compiled import CompiledSilhouette
 from cardbox_tracker.terms.inner_cue import InnerCueTerm
@@ -40,13 +31,7 @@ from cardbox_tracker.terms.silhouette import SilhouetteTerm
 from cardbox_tracker.terms.term import USUAL_INTERVAL_S, Frame, Image, Posed, Silhouette
 from cardbox_tracker.tracking.camera_agreement import CameraAgreement
 from cardbox_tracker.tracking.camera_faults import CameraFaults
-from cardbox_tracker.tracking.estimate import (
-    LOST,
-    NO_PERSON,
-    TRACKING,
-    UNCERTAIN,
-    Estimate,
-)
+from cardbox_tracker.tracking.estimate import LOST, NO_PERSON, TRACKING, UNCERTAIN, Estimate
 from cardbox_tracker.tracking.facing import Facing
 from cardbox_tracker.tracking.hands import HandReader, Look
 from cardbox_tracker.tracking.head import HeadTracker
@@ -60,8 +45,6 @@ FILTERS: MappingProxyType[str, MakeFilter] = MappingProxyType(
 )
 """Filter classes by the values of ``TrackerConfig.filter``."""
 
-# Frames without anybody after which another person is expected.
-_ABSENT_FRAMES = 5
 # A model that overlaps the silhouette less than this is somewhere else.
 _TOUCHING_IOU = 0.05
 # A joint is at its limit within this angle, rad.
@@ -127,10 +110,21 @@ class Tracker:
             self.agreement = CameraAgreement(self.body, self.camera, views, self.agreement)
         self._legs = LegReader(self.body, self.camera)
 
-    def _use(self, body: BodyModel, stamp_ns: int | None, is_new_start: bool = False) -> None:
-        """Track the next version of the body from the image of a stamp on."""
-        body = replace(body, version=self.body.version + 1, stamp_ns=stamp_ns or 0)
+    def use(self, body: BodyModel, stamp_ns: int | None = None, is_new_start: bool = False) -> None:
+        """Track the next version of the body from the image of a stamp on.
+
+        The posture goes on, at the same place in the image if the camera's pitch is another one,
+        unless ``is_new_start`` says that it is somebody else, or the filter is the paper's.
+        """
+        before, pose = self.body, body.camera_pose
+        body = replace(body, version=before.version + 1, stamp_ns=stamp_ns or 0)
         self.body = self.config.with_shoulders(body)
+        moved = partial(tilted_states, before=before, after=self.body)
+        is_tilted = pose != before.camera_pose
+        if is_tilted:
+            self.camera = self.camera.with_pitch(pose.pitch_rad)
+            self._place = PlaceWatch(self.body, self.camera)
+            self._before = None if self._before is None else moved(self._before[None])[0]
         self._silhouette = CompiledSilhouette(self.body, self.camera)
         for camera in self.cameras:
             camera.use(self.body, self.camera, self.config)
@@ -140,19 +134,8 @@ class Tracker:
             return
         self._filter.use(self._silhouette, self.views)
         self._head = HeadTracker(self.body, self.camera)
-
-    def use(
-        self, body: BodyModel, frames: Sequence[Frame], is_new_start: bool = False
-    ) -> list[Frame]:
-        """Track another version of the body from :meth:`frames` on; return them for this version.
-
-        The posture goes on, unless ``is_new_start`` says that it is somebody else, or the filter
-        is the paper's.
-        """
-        first, *others = frames
-        self._use(body, first.stamp_ns, is_new_start)
-        before = None if self._before is None else first.before
-        return [self.cameras[0].counted(first.changed(before=before)), *others]
+        if is_tilted:
+            self._filter.move(moved)
 
     def reset(self) -> None:
         """Forget the posture; the next frame is tracked from the front reference posture."""
@@ -173,21 +156,6 @@ class Tracker:
         self._particles: Particles | None = None
         # State (14,) of the previous frame for the terms.
         self._before: FloatArray | None = None
-
-    def tilt(self, pose: CameraPose, stamp_ns: int = 0) -> None:
-        """Go on before the same camera with the pitch of ``pose``, from the image of a stamp on.
-
-        The person stays in the same place of the image, as a new version of the body.
-        """
-        before, body = self.body, tilted_body(self.body, pose)
-        moved = partial(tilted_states, before=before, after=body)
-        self.camera = self.camera.with_pitch(pose.pitch_rad)
-        self._place = PlaceWatch(body, self.camera)
-        if self._before is not None:
-            self._before = moved(self._before[None])[0]
-        self._use(body, stamp_ns)
-        if isinstance(self._filter, WholeBodyFilter):
-            self._filter.move(moved)
 
     def configure(self, config: TrackerConfig) -> bool:
         """Use other settings from the next frame on; return whether tracking starts again."""
@@ -273,16 +241,24 @@ class Tracker:
             frames = self.faults.agreeing(frames, self.agreement)
         return frames
 
+    def again(self, frames: Sequence[Frame]) -> list[Frame]:
+        """Return :meth:`frames` that were made before :meth:`use` for the present body."""
+        first, *others = frames
+        before = None if self._before is None else first.before
+        return [self.cameras[0].counted(first.changed(before=before)), *others]
+
     def follow(self, frames: Sequence[Frame]) -> Estimate:
         """Return the estimate of the posture in :meth:`frames`."""
         estimate, first = self._found(frames), self.cameras[0]
         state = None if estimate.posture is None else self._before
+        is_doubtful = state is not None and self._is_doubtful(frames[0], state)
         if self._is_alone and first.shows_other(frames[0], state, self._now_ns):
             estimate = Estimate(LOST)
             if state is not None:
                 self._before = None
                 self._filter.forget()
-        estimate = self._doubted(self._place.placed(estimate, self.body, frames))
+        estimate = self._place.placed(estimate, self.body, frames)
+        estimate = self._doubted(estimate, is_doubtful)
         self._count(frames, estimate)
         estimate = self._legs.see(frames[0], self._head.see(frames[0], estimate))
         if self._hands is None:
@@ -292,17 +268,17 @@ class Tracker:
         self.used["hands"] = self.used.get("hands", 0) + any(estimate.hands or ())
         return estimate
 
-    def _doubted(self, estimate: Estimate) -> Estimate:
-        """Return an estimate as unsure as body, pitch, distance, person and limits of joints."""
+    def _doubted(self, estimate: Estimate, is_doubtful: bool) -> Estimate:
+        """Return an estimate that is no surer than body, pitch, distance, person and limits."""
         state, states, posture = estimate.state, estimate.keypoint_states, estimate.posture
-        is_other = self._is_alone and self.cameras[0].identity.is_doubtful
-        is_unsure = is_other or self._place.is_too_large
+        is_doubtful = is_doubtful or self._place.is_too_large
+        is_doubtful |= self._is_alone and self.cameras[0].identity.is_doubtful
         if self.config.has_several_views and posture is not None:
-            is_unsure = is_unsure or is_at_two_limits(posture)
+            is_doubtful |= is_at_two_limits(posture)
         is_tilt_unknown = self.body.camera_pose.pitch_stddev_rad > FOUND_STDDEV
-        if state == TRACKING and (is_unsure or is_tilt_unknown or self.body.unknown):
+        if state == TRACKING and (is_doubtful or is_tilt_unknown or self.body.unknown):
             state = UNCERTAIN
-        if is_unsure and states is not None:
+        if is_doubtful and states is not None:
             states = doubted(states)
         return replace(estimate, state=state, keypoint_states=states)
 
@@ -368,14 +344,10 @@ class Tracker:
             return Estimate(LOST)
         if self.agreement is not None and fit.offset_m is not None:
             self.agreement.see(self._before, frames)
-        judged, is_doubtful = fit.judged, self._is_doubtful(frames[0])
-        states = None if judged is None else judged.states
-        if is_doubtful and states is not None:
-            states = doubted(states)
-        is_uncertain = is_doubtful or (judged is not None and judged.is_uncertain)
+        judged = fit.judged
         clavicles_m, clavicles_stddev_m = clavicles(self.body, fit.posture, fit.posture_stddev)
         return Estimate(
-            UNCERTAIN if is_uncertain else TRACKING,
+            UNCERTAIN if judged is not None and judged.is_uncertain else TRACKING,
             fit.posture,
             fit.posture_stddev,
             fit.keypoints_m,
@@ -383,17 +355,17 @@ class Tracker:
             fit.iou,
             fit.offset_m,
             fit.offset_stddev_m,
-            keypoint_states=states,
+            keypoint_states=None if judged is None else judged.states,
             keypoint_chances=None if judged is None else judged.chances,
             evidence=None if judged is None else judged.evidence,
             clavicles_m=clavicles_m,
             clavicles_stddev_m=clavicles_stddev_m,
         )
 
-    def _is_doubtful(self, frame: Frame) -> bool:
+    def _is_doubtful(self, frame: Frame, state: FloatArray) -> bool:
         """Return whether poses of cameras, or a person's back, make the whole result doubtful."""
-        if self._facing is not None and self._before is not None:
-            self._facing.see(frame, Posed(self.cameras[0].posable, self._before[None]))
+        if self._facing is not None:
+            self._facing.see(frame, Posed(self.cameras[0].posable, state[None]))
             return self._facing.shows_back
         return self.faults.is_contradicted
 

@@ -198,9 +198,7 @@ def test_a_body_is_measured_without_a_search_for_its_posture(
 
 def test_a_tracker_alone_refuses_a_body_that_a_session_measures() -> None:
     track = Tracker(body_from_proportions(1.75, distance_m=2.0), CAMERA, default_preset())
-    with pytest.raises(
-        ValueError, match=r"\(hip_height_m, .*Session\(\[body\], camera"
-    ):
+    with pytest.raises(ValueError, match=r"\(hip_height_m, .*Session\(\[body\], camera"):
         track.track(silhouette(person(1.75, -0.62)))
 
 
