@@ -207,13 +207,15 @@ class TrackedCamera:
     def _select(self, config: TrackerConfig) -> None:
         self._region = PersonRegion(self._body, self._camera) if config.select_person else None
 
+    def _here(self, state: FloatArray) -> FloatArray:
+        """Return a state (14,) for the first camera as one for this camera."""
+        return state if self.view is None else self.view.states(state)
+
     def drawn(self, state: FloatArray) -> Silhouette:
         """Return the pixels (H, W), 0 or 255, of a state (14,) for the first camera, coarsely."""
         if self._drawer is None:
             self._drawer = PersonDrawer(self._body, self._camera)
-        if self.view is not None:
-            state = self.view.states(state)
-        cells, side = self._drawer.masks(state, 0.0).core, self._drawer.cell_px
+        cells, side = self._drawer.masks(self._here(state), 0.0).core, self._drawer.cell_px
         pixels = np.repeat(np.repeat(cells, side, axis=0), side, axis=1)
         drawn: Silhouette = 255 * pixels[: self._camera.height, : self._camera.width]
         if self.view is not None and self.view.turn is not None:
@@ -222,8 +224,7 @@ class TrackedCamera:
 
     def figure(self, state: FloatArray) -> Figure:
         """Return the figure, in the image as it comes, of a state (14,) for the first camera."""
-        there = state if self.view is None else self.view.states(state)
-        px = projected(Posed(self.posable, there[None]))[:, :2]
+        px = projected(Posed(self.posable, self._here(state)[None]))[:, :2]
         if self.view is not None:
             px = px @ self.view.raw_px[:, :2].T + self.view.raw_px[:, 2]
         return Figure({name: px[row] for name, row in _PROJECTED.items()})
@@ -243,8 +244,7 @@ class TrackedCamera:
         of points without a stamp. Raises ValueError if data do not fit the camera, see
         :data:`~.observation.CHANNELS`.
         """
-        if before is not None and self.view is not None:
-            before = self.view.states(before)
+        before = None if before is None else self._here(before)
         self.picture = None if observation is None else observation.picture
         channels, camera = self._channels(observation), self._camera
         self.given |= channels.keys()

@@ -250,11 +250,12 @@ class Tracker:
     def follow(self, frames: Sequence[Frame]) -> Estimate:
         """Return the estimate of the posture in :meth:`frames`."""
         estimate, first = self._found(frames), self.cameras[0]
-        state = None if estimate.posture is None else self._before
-        is_doubtful = state is not None and self._is_doubtful(frames[0], state)
-        if self._is_alone and first.shows_other(frames[0], state, self._now_ns):
+        is_found = estimate.posture is not None
+        is_doubtful = is_found and self._is_doubtful(frames[0])
+        found = self._before if is_found else None
+        if self._is_alone and first.shows_other(frames[0], found, self._now_ns):
             estimate = Estimate(LOST)
-            if state is not None:
+            if is_found:
                 self._before = None
                 self._filter.forget()
         estimate = self._place.placed(estimate, self.body, frames)
@@ -362,10 +363,10 @@ class Tracker:
             clavicles_stddev_m=clavicles_stddev_m,
         )
 
-    def _is_doubtful(self, frame: Frame, state: FloatArray) -> bool:
+    def _is_doubtful(self, frame: Frame) -> bool:
         """Return whether poses of cameras, or a person's back, make the whole result doubtful."""
-        if self._facing is not None:
-            self._facing.see(frame, Posed(self.cameras[0].posable, state[None]))
+        if self._facing is not None and self._before is not None:
+            self._facing.see(frame, Posed(self.cameras[0].posable, self._before[None]))
             return self._facing.shows_back
         return self.faults.is_contradicted
 
