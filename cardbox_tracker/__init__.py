@@ -49,6 +49,7 @@ if TYPE_CHECKING:
     from cardbox_tracker.terms.depth import Depth
     from cardbox_tracker.tracking.estimate import Estimate
     from cardbox_tracker.tracking.observation import Observation
+    from cardbox_tracker.tracking.session import Session
     from cardbox_tracker.tracking.tracker import Tracker
 
 __version__ = "0.1.0"
@@ -81,6 +82,7 @@ __all__ = [
     "OtherCamera",
     "Result",
     "RosMissingError",
+    "Session",
     "SilhouetteExtractor",
     "Tracker",
     "TrackerConfig",
@@ -118,6 +120,7 @@ _MODULES = {
     "measuring.measure": ("initialize_body",),
     "tracking.estimate": ("Estimate",),
     "tracking.observation": ("Observation",),
+    "tracking.session": ("Session",),
     "tracking.tracker": ("Tracker",),
     "segmentation.background": ("SilhouetteExtractor",),
     "segmentation.background_config": ("BackgroundConfig",),

@@ -48,6 +48,7 @@ PUBLIC = {
     "PRESETS",
     "Result",
     "RosMissingError",
+    "Session",
     "SilhouetteExtractor",
     "Tracker",
     "TrackerConfig",

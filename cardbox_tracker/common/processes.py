@@ -19,6 +19,7 @@ from warnings import catch_warnings, simplefilter
 
 from cardbox_tracker.common import interrupts
 from cardbox_tracker.common.errors import CardboxError, cut
+from cardbox_tracker.common.extensions import optional
 
 A = TypeVar("A")
 R = TypeVar("R")
@@ -76,25 +77,18 @@ def results_of(
 
 @contextmanager
 def _cluster(scheduler: str) -> Iterator[None]:
-    try:
-        from distributed import Client
-        from distributed.comm import connect
-    except ImportError as error:
-        raise CardboxError(
-            f"--scheduler needs Dask ({error}); install it with "
-            "pip install 'cardbox_tracker[cluster]'"
-        ) from None
+    dask = optional("distributed", "--scheduler needs Dask", "cluster")
 
     async def greet() -> None:
         # The client waits for longer if a server is silent.
-        comm = await asyncio.wait_for(connect(scheduler, timeout=_CONNECT_S), _CONNECT_S)
+        comm = await asyncio.wait_for(dask.comm.connect(scheduler, timeout=_CONNECT_S), _CONNECT_S)
         await comm.close()
 
     # Dask logs what else a server answers.
     logging.disable()
     try:
         asyncio.run(greet())
-        client = Client(scheduler, timeout=_CONNECT_S, set_as_default=True)
+        client = dask.Client(scheduler, timeout=_CONNECT_S, set_as_default=True)
     except Exception as error:
         # What other servers answer raises errors of any type.
         raise CardboxError(

@@ -29,8 +29,7 @@ class Detector(NamedTuple):
     models: ModelFiles | OwnModel  #: its network files, or the class of one's own
     #: whom to follow, px of the camera's own image; None for the most certain person.
     person: PersonChoice | None = None
-    #: number of people whom it finds at most, see :meth:`PersonDetector.all_in`; 0 for the one whom
-    #: it follows.
+    #: number of people whom it finds at most; 0 for the one whom it follows.
     people: int = 0
 
     @classmethod
@@ -50,7 +49,7 @@ class Detector(NamedTuple):
             network = PoseNetwork(*self.models, threads)
         if self.person is not None:
             network.choose = self.person.scaled(across, down)
-        return PersonDetector(network, PeopleNetwork(network, self.people))
+        return PersonDetector(network, PeopleNetwork(network, self.people) if self.people else None)
 
 
 class PersonDetector:
@@ -75,8 +74,10 @@ class PersonDetector:
         return found
 
     def all_in(self, stamp_ns: int, image: Image) -> list[Detection]:
-        """Return all people in an image as above, of a time, ns."""
-        assert self._people is not None
+        """Return all people in an image as above, or the one who is followed, of a time, ns."""
+        if self._people is None:
+            person = self(image, stamp_ns)
+            return [] if person is None else [person]
         own = self._network if isinstance(self._network, OwnNetwork) else None
         found = own.people_in(color(image)) if own else self._people(color(image), stamp_ns)
         self.missed += not found
@@ -110,9 +111,9 @@ class KeptDetections:
     temporary file keeps what they find, masks with one bit a pixel.
     """
 
-    def __init__(self, detector: PersonDetector, finds_people: bool) -> None:
-        """Use a detector for the images of a recording, of one person or of all people."""
-        self.detector, self._finds_people = detector, finds_people
+    def __init__(self, detector: PersonDetector) -> None:
+        """Use a detector for the images of a recording."""
+        self.detector = detector
         self._span: tuple[float, float] | None = None
         self._is_whole = False
         self._places: dict[int, int] = {}
@@ -139,11 +140,7 @@ class KeptDetections:
         if number in self._places:
             self._file.seek(self._places[number])
             return [_unpacked(*one) for one in pickle.load(self._file)]
-        if self._finds_people:
-            found = self.detector.all_in(stamp_ns, image)
-        else:
-            person = self.detector(image, stamp_ns)
-            found = [] if person is None else [person]
+        found = self.detector.all_in(stamp_ns, image)
         self._file.seek(0, 2)
         self._places[number] = self._file.tell()
         pickle.dump([_packed(one) for one in found], self._file)

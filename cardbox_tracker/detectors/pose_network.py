@@ -23,6 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cardbox_tracker.common.errors import CardboxError
+from cardbox_tracker.common.extensions import optional
 from cardbox_tracker.detectors.figure import Figure
 from cardbox_tracker.detectors.identity import Identity, colours_in
 from cardbox_tracker.detectors.image_points import (
@@ -238,13 +239,8 @@ class Network:
 
     def __init__(self, path: Path, threads: int = 1) -> None:
         """Load it; CardboxError without LiteRT, or if the file is missing or damaged."""
-        try:
-            from ai_edge_litert.interpreter import Interpreter
-        except ImportError as error:
-            raise CardboxError(
-                f"the detector needs ai-edge-litert ({error}); install it with "
-                "pip install 'cardbox_tracker[detector]'"
-            ) from None
+        needed = "ai_edge_litert.interpreter", "the detector needs ai-edge-litert", "detector"
+        Interpreter = optional(*needed).Interpreter
         try:
             with _silent():
                 self._run: Any = Interpreter(str(path), num_threads=threads)

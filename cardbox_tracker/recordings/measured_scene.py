@@ -30,7 +30,6 @@ from cardbox_tracker.recordings.recording import FrameSet, Recording
 from cardbox_tracker.recordings.silhouettes import RecordedFrame
 from cardbox_tracker.search.config import TrackerConfig
 from cardbox_tracker.tracking.session import Session
-from cardbox_tracker.tracking.tracker import BodyTracker, Tracker
 
 T = TypeVar("T")
 
@@ -181,7 +180,7 @@ def seen_people(
     given = guesses, recording.first.camera, config, rng, recording.others, most
     # One camera's points tell who is who, but regions and other cameras need postures.
     is_enough = recording.first.has_points and not recording.others
-    session = Session(*given, make_tracker=BodyTracker if is_enough else Tracker)
+    session = Session(*given, only_measures=is_enough)
     for taken in recording.frames(start_s, end_s):
         session.track(taken.observations)
     bodies = [replace(tracker.body, version=0, stamp_ns=0) for tracker in session.trackers]

@@ -223,8 +223,7 @@ class SilhouetteSource:
             self.camera.width / calibration.width,
             self.camera.height / calibration.height,
         )
-        started = detector.start(across, down, threads_for_films())
-        return KeptDetections(started, detector.people > 0)
+        return KeptDetections(detector.start(across, down, threads_for_films()))
 
     def _looked_at(self, prepared: PreparedImage, start_s: float = -math.inf) -> PreparedImage:
         """Return an image with whom the detector finds in it, if it is not before ``start_s``."""

@@ -53,16 +53,10 @@ class GroundTruth:
     side_turn: str  #: direction in which the person turned for the side reference
     #: namespaces of several cameras, the first camera's first; empty with one.
     cameras: tuple[str, ...] = ()
-    is_rectified: bool = False  #: True if the first two cameras are a rectified pair
     stature_m: float | None = None  #: height of the person; None if unknown
     #: topic of depth images with the first camera's field of view; None without.
     depth_topic: str | None = None
     source: str = ""  #: origin and licence of the recording; empty if the file does not say
-
-    @property
-    def to_optical(self) -> FloatArray:
-        """Rotation (3, 3) from the level reference frame into the camera's optical frame."""
-        return level_to_optical(np.radians(self.pitch_deg))
 
 
 def load_ground_truth(path: str | os.PathLike[str], camera: str | None = None) -> GroundTruth:
@@ -107,7 +101,6 @@ def load_ground_truth(path: str | os.PathLike[str], camera: str | None = None) -
             float(data["camera"]["pitch_down_deg"]),
             str(data["side_posture_turns_to"]),
             tuple(str(camera["name"]) for camera in data.get("cameras", ())),
-            "baseline_m" in str(data.get("cameras", ())),
             None if stature_m is None else float(stature_m),
             data.get("depth_topic"),
             str(data.get("source", "")),

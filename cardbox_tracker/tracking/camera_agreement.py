@@ -33,7 +33,7 @@ from cardbox_tracker.measuring.silhouette_tangents import (
 )
 from cardbox_tracker.person.model import MEASURED, BodyModel
 from cardbox_tracker.person.sizes import FloatArray
-from cardbox_tracker.terms.term import Silhouette
+from cardbox_tracker.terms.term import Frame
 
 DOUBTFUL_DEG, DOUBTFUL_ROLL_DEG = 0.85, 1.5
 """Pitch or yaw, and roll, beyond which extrinsics are reported as wrong."""
@@ -53,7 +53,10 @@ _TOPS_EVERY, _TOPS, _SURE_DEG = 6, 70, 0.5
 
 
 class CameraAgreement:
-    """Compares extrinsics with silhouettes; :meth:`check` takes as long as about 100 frames."""
+    """Compares extrinsics with silhouettes; :meth:`check` takes as long as about 100 frames.
+
+    Frames in which others hide pixels of the person show no outline, so they do not count.
+    """
 
     def __init__(
         self,
@@ -67,39 +70,43 @@ class CameraAgreement:
         ``body`` was measured by the first camera. ``earlier`` is a comparison of the same cameras
         with another body; tops need no body, so their samples remain.
         """
-        self._body, self._first, self._views = body, first, tuple(views)
+        self._body, self._first, self.views = body, first, tuple(views)
         self._kept = [deque[Sighting](maxlen=_WINDOW) for _ in views]
-        self._missing = [_WINDOW] * len(self._views)
+        self._missing = [_WINDOW] * len(self.views)
         self._frames = 0
         self._found = [deque[float](maxlen=_REMEMBERED) for _ in views]
         self._tops = [TopTangents(first, view.camera, most=_TOPS) for view in views]
         self._rolls = [deque[float](maxlen=_REMEMBERED) for _ in views]
         self._directions: list[PoseDirection] = (
-            [PoseDirection(first, v.camera, self._upright(v), v.roll_rad) for v in self._views]
+            [PoseDirection(first, v.camera, self._upright(v), v.roll_rad) for v in self.views]
             if earlier is None
             else earlier._directions
         )
 
-    def look(self, first: Silhouette, others: Sequence[Silhouette | None]) -> None:
-        """Compare silhouettes (H, W), upright, None if missing, whether or not a posture fits."""
-        for direction, other in zip(self._directions, others, strict=False):
-            if other is not None:
-                direction.see(first, other)
+    def look(self, frames: Sequence[Frame]) -> bool:
+        """Compare upright frames, whether or not a posture fits; return whether they count."""
+        first, *others = frames
+        if not _are_whole(frames):
+            return False
+        for direction, other in zip(self._directions, others, strict=True):
+            direction.see(first.silhouette, other.silhouette)
+        return True
 
     @property
     def are_contradicted(self) -> list[bool]:
         """Whether the silhouettes show a gross error of the pose of each further camera."""
         return [direction.fault is not None for direction in self._directions]
 
-    def see(
-        self, state: FloatArray, first: Silhouette, others: Sequence[Silhouette | None]
-    ) -> None:
-        """Add a tracked frame: state (14,) for the first camera; silhouettes as in :meth:`look`."""
+    def see(self, state: FloatArray, frames: Sequence[Frame]) -> None:
+        """Add tracked frames, as for :meth:`look`: state (14,) for the first camera."""
+        if not _are_whole(frames):
+            return
+        first, *others = (frame.silhouette for frame in frames)
         self._frames += 1
         if self._frames % _TOPS_EVERY or not np.any(first):
             return
         for number, other in enumerate(others):
-            if other is None or not np.any(other):
+            if not np.any(other):
                 continue
             self._tops[number].add(first, other)
             if self._frames % _EVERY == 0:
@@ -113,7 +120,7 @@ class CameraAgreement:
 
     def check(self, is_last: bool = False) -> None:
         """Estimate rotations of cameras with a full window, of others too if no frames follow."""
-        for number, view in enumerate(self._views):
+        for number, view in enumerate(self.views):
             is_enough = is_last and not self._found[number] and len(self._kept[number]) >= _LEAST
             if self._missing[number] > 0 and not is_enough:
                 continue
@@ -183,6 +190,11 @@ class CameraAgreement:
         """Return the pose of a camera without its roll."""
         axes = view.level_axes() @ self._first.reference_to_optical_rotation().T
         return Extrinsics(axes, view.camera.reference_to_optical_rotation() @ view.offset_m)
+
+
+def _are_whole(frames: Sequence[Frame]) -> bool:
+    # What others hide is missing in the outline, and networks mix people.
+    return all(frame["covered"] is None for frame in frames)
 
 
 def _gross(name: str, direction: PoseDirection) -> str:

@@ -19,6 +19,8 @@ from numpy.typing import NDArray
 
 from cardbox_tracker.camera.camera import Camera
 from cardbox_tracker.detectors.image_points import POINT_INDEX, ImagePoints
+from cardbox_tracker.terms.term import Frame
+from cardbox_tracker.tracking.camera_agreement import CameraAgreement
 from cardbox_tracker.tracking.observation import Observation
 
 FROZEN = (
@@ -52,11 +54,17 @@ _SHOULDERS = [POINT_INDEX["left_shoulder"], POINT_INDEX["right_shoulder"]]
 
 
 class CameraFaults:
-    """Compares each camera's images with others; ``left_out`` counts unused ones by the reason."""
+    """Compares each camera's images with others.
+
+    Attributes:
+        left_out: number of images of each camera that are not used, by the reason.
+        is_contradicted: whether two cameras contradict each other: nobody knows which one is wrong.
+    """
 
     def __init__(self, count: int) -> None:
         """Begin without images of ``count`` cameras."""
         self.left_out = [Counter[str]() for _ in range(count)]
+        self.is_contradicted = False
         self._told_ns: list[dict[str, int]] = [{} for _ in range(count)]
         self._now_ns = 0
         self._last: list[NDArray[Any] | None] = [None] * count
@@ -97,6 +105,31 @@ class CameraFaults:
             self.leave_out(number, FROZEN)
             seen[number] = None
         return seen
+
+    def agreeing(self, frames: Sequence[Frame], agreement: CameraAgreement) -> list[Frame]:
+        """Return the frames of one time, empty ones of cameras that contradict the others.
+
+        If all of several further cameras contradict the first one, that is left out.
+        """
+        is_whole = agreement.look(frames)
+        before_rad = facing_rad(frames[0].points, frames[0].camera) if is_whole else np.nan
+        reasons = [POSE if fault else "" for fault in agreement.are_contradicted]
+        for number, (frame, view) in enumerate(zip(frames[1:], agreement.views, strict=True)):
+            turned_rad = facing_rad(frame.points, frame.camera) + view.yaw_rad - before_rad
+            if self.is_turned(number + 1, turned_rad):
+                reasons[number] = reasons[number] or TURNED
+        self.is_contradicted = len(reasons) == 1 and bool(reasons[0])
+        wrong = ["", *reasons]
+        if len(reasons) > 1 and all(reasons):
+            wrong = [reasons[0], *[""] * len(reasons)]
+        kept = []
+        for number, (frame, reason) in enumerate(zip(frames, wrong, strict=True)):
+            if reason and frame.foreground_px:
+                self.leave_out(number, reason)
+                channels = {"silhouette": np.zeros_like(frame.silhouette)}
+                frame = frame.changed(channels=channels, foreground_px=0)
+            kept.append(frame)
+        return kept
 
     def leave_out(self, camera: int, reason: str) -> None:
         """Count an image that is not used."""

@@ -152,6 +152,40 @@ Observations = Sequence[Observation | None]
 """One observation for each camera, the first camera first; None for a camera without data."""
 
 
+def listed(
+    given: Observations | Observation | Silhouette,
+    cameras: int,
+    image: Image | None = None,
+    stamp_ns: int | None = None,
+) -> Observations:
+    """Return what was given for up to this number of cameras, as :meth:`.Tracker.track` takes it.
+
+    Raises ValueError if the types or the number of observations are impossible.
+    """
+    if isinstance(given, np.ndarray):
+        given = Observation(given, image, stamp_ns=stamp_ns)
+    elif image is not None or stamp_ns is not None:
+        raise ValueError("give image and stamp_ns in the observations, not beside them")
+    if isinstance(given, Observation):
+        given = (given,)
+    if not isinstance(given, Sequence):
+        raise ValueError(
+            f"the observations are of the type {type(given).__name__}; expected a silhouette as a "
+            "numpy array, an Observation, or a list with one for each camera"
+        )
+    if not 1 <= len(given) <= cameras:
+        raise ValueError(
+            f"there are {len(given)} observations; expected one for each of {cameras} cameras"
+        )
+    for one in given:
+        if one is not None and not isinstance(one, Observation):
+            raise ValueError(
+                f"an observation is of the type {type(one).__name__}; expected an Observation, "
+                "such as Observation(silhouette), or None"
+            )
+    return given
+
+
 def stamp_of(observations: Observations) -> int | None:
     """Return the stamp of the first camera, or else the earliest one, ns; None if none is known."""
     first, *others = (None if one is None else one.stamp_ns for one in observations)

@@ -16,6 +16,8 @@ or a further camera.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import replace
 from itertools import pairwise
 from math import erfc, hypot, log, sqrt, tan
 
@@ -25,7 +27,7 @@ from cardbox_tracker.camera.camera import Camera
 from cardbox_tracker.detectors.image_points import POINT_INDEX, ImagePoints
 from cardbox_tracker.person.kinematics import pose
 from cardbox_tracker.person.model import MEASURED, BodyModel
-from cardbox_tracker.person.posture import N_JOINTS, TORSO_Y
+from cardbox_tracker.person.posture import N_JOINTS, PITCH, TORSO_Y
 from cardbox_tracker.search.doubt import FAR_M
 from cardbox_tracker.terms.term import Frame
 from cardbox_tracker.tracking.estimate import Estimate, Place
@@ -114,6 +116,19 @@ class PlaceWatch:
         self._first_ns: int | None = None
         self._apart_m = 0.0
         self.contradiction, self.is_too_large = "", False
+
+    def placed(self, estimate: Estimate, body: BodyModel, frames: Sequence[Frame]) -> Estimate:
+        """Return an estimate with its place, which no deviation of it is surer than."""
+        is_alone = not any(frame.foreground_px for frame in frames[1:])
+        place = self.see(estimate, body, frames[0], is_alone)
+        if place is None or estimate.posture_stddev is None or estimate.offset_stddev_m is None:
+            return estimate
+        stddev = estimate.posture_stddev.copy()
+        stddev[TORSO_Y] = np.hypot(stddev[TORSO_Y], place.stddev_m[1])
+        # The trunk leans in the level frame, which the camera's pitch defines.
+        stddev[PITCH] = np.hypot(stddev[PITCH], body.camera_pose.pitch_stddev_rad)
+        moved_m = np.hypot(estimate.offset_stddev_m, place.stddev_m[[0, 2]])
+        return replace(estimate, posture_stddev=stddev, offset_stddev_m=moved_m, place=place)
 
     def see(
         self, estimate: Estimate, body: BodyModel, frame: Frame, is_alone: bool = True

@@ -1,18 +1,21 @@
 """One call for people, cameras and channels: one person before one camera is a list of one.
 
-A session of one person gives all that the cameras show to one tracker. Otherwise each image shows a
-few *figures*: people whose joints a detector has found, or regions of the silhouette that are
-apart. In each camera they are assigned to the known people by place and by the colours of the
-trunk; in a further camera also by where the lines of sight meet, and whom the camera has missed by
-the last posture. Somebody who has left keeps the identity and is known by the colours alone. Each
-tracker gets the pixels that are nearest to its person's figure. Pixels of others do not count for
-it, because they may hide the person. Somebody whom others hide in all cameras stays where they
-were, and is ``uncertain``, with ``hidden`` keypoints.
+A session of one person gives all that the cameras show to one tracker. Unknown sizes are measured
+beside it, in a few images; each new version of the body is tracked from its image on, with the
+posture that was found so far. Of several people, each image shows a few *figures*: people whose
+joints a detector has found, or regions of the silhouette that are apart. In each camera they are
+assigned to the known people by place and by the colours of the trunk; in a further camera also by
+where the lines of sight meet, and whom the camera has missed by the last posture. Somebody who has
+left keeps the identity and is known by the colours alone. Each tracker gets the pixels that are
+nearest to its person's figure. Pixels of others do not count for it, because they may hide the
+person. Somebody whom others hide in all cameras stays where they were, and is ``uncertain``, with
+``hidden`` keypoints.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Container, Iterator, Mapping, Sequence
+from collections.abc import Container, Iterator, Mapping, Sequence
+from concurrent.futures import Executor
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -20,7 +23,7 @@ import cv2
 import numpy as np
 
 from cardbox_tracker.camera.camera import Camera
-from cardbox_tracker.camera.tilt import tilted_states
+from cardbox_tracker.camera.tilt import tilted_body, tilted_states
 from cardbox_tracker.camera.view import OtherCamera
 from cardbox_tracker.detectors.figure import Figure, figure_of_points
 from cardbox_tracker.detectors.identity import (
@@ -36,24 +39,25 @@ from cardbox_tracker.detectors.identity import (
     unlike,
 )
 from cardbox_tracker.detectors.image_points import ImagePoints
+from cardbox_tracker.measuring.seen_body import SeenBody
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.posture import PLACE, POSTURE
 from cardbox_tracker.person.sizes import FloatArray
 from cardbox_tracker.person.skeleton import KeypointState
 from cardbox_tracker.search.config import TrackerConfig
 from cardbox_tracker.search.doubt import doubted
-from cardbox_tracker.terms.joint_points import projected
-from cardbox_tracker.terms.joint_points_kernels import ELBOW, HIPS, POINTS_OF_ARM, SHOULDER, WRIST
-from cardbox_tracker.terms.term import Image, Posed, Silhouette
+from cardbox_tracker.terms.term import Image, Silhouette
 from cardbox_tracker.tracking.camera_agreement import CameraAgreement
 from cardbox_tracker.tracking.estimate import LOST, NO_PERSON, UNCERTAIN, Estimate
 from cardbox_tracker.tracking.hands import Look
-from cardbox_tracker.tracking.observation import Observation, Observations, stamp_of
+from cardbox_tracker.tracking.observation import Observation, Observations, listed, stamp_of
 from cardbox_tracker.tracking.tracker import Tracker
 
 MOST_PEOPLE = 6
 """People that are tracked if their number is not given."""
 
+# Images without anybody after which another person is measured.
+_EMPTY_IMAGES = 5
 # Change of that distance that changes the odds of being the same person by a factor of e.
 _ALIKE_SPREAD = 0.07
 # Images in a row with the colours of somebody else after which a person is given up.
@@ -74,12 +78,6 @@ _USUAL_NS = 66_666_667
 # Deviation of the gap between lines of sight to the middle of a trunk, m; length of a trunk, m, and
 # relative deviation of that which the place where they meet gives.
 _GAP_M, _TRUNK_M, _TRUNK = 0.15, 0.5, 0.4
-# Points of a figure by their rows in :func:`projected`.
-_PROJECTED = {
-    f"{side}_{name}": first + row
-    for side, first in (("left", 0), ("right", POINTS_OF_ARM))
-    for name, row in (("shoulder", SHOULDER), ("elbow", ELBOW), ("wrist", WRIST))
-} | {"left_hip": HIPS, "right_hip": HIPS}
 
 
 class Shown(NamedTuple):
@@ -113,14 +111,46 @@ class _Sight:
 
 
 class _Person:
-    """One identity."""
+    """One identity, whose body is measured unless it is known."""
 
-    def __init__(self, number: int | None, tracker: Tracker) -> None:
-        self.number, self.tracker = number or 1, tracker
+    def __init__(self, number: int | None, tracker: Tracker, measuring: SeenBody | None) -> None:
+        self.number, self.tracker, self._measuring = number or 1, tracker, measuring
         self.estimate = Estimate(NO_PERSON, person=number)
         self.sights = [_Sight() for _ in tracker.cameras]
         self.fitted_ns = self.others_images = 0
         self.chance = 1.0
+        self._time_s = 0.0
+
+    def track(self, observations: Observations, only_measures: bool = False) -> Estimate:
+        """Return the estimate by the newest version of the body, which these images may show."""
+        tracker, measuring = self.tracker, self._measuring
+        if measuring is None:
+            return Estimate(LOST) if only_measures else tracker.track(observations)
+        frames = tracker.frames(observations)
+        first, is_new_start = frames[0], bool(measuring.body.unknown)
+        self._time_s += first.interval_s
+        is_detected = first.points is not None and first.points.are_certain
+        if measuring.see(first.silhouette, first.image, self._time_s, is_detected):
+            tracker.use(measuring.body, first.stamp_ns, is_new_start)
+            frames = tracker.again(frames)
+        if only_measures:
+            return Estimate(LOST)
+        estimate = tracker.follow(frames)
+        if tracker.empty == _EMPTY_IMAGES:
+            # The next one may be somebody else.
+            measuring.forget()
+        return estimate
+
+    def tilt(self, guess: BodyModel, stamp_ns: int) -> None:
+        """See :meth:`Session.tilt`."""
+        before, last, state = self.tracker.body, self.estimate, self.state()
+        self.tracker.use(tilted_body(before, guess.camera_pose), stamp_ns)
+        if self._measuring is not None:
+            self._measuring.tilt(guess)
+        if state is not None:
+            (state,) = tilted_states(state[None], before, self.tracker.body)
+            offset_m = None if last.offset_m is None else state[PLACE]
+            self.estimate = replace(last, posture=state[POSTURE], offset_m=offset_m)
 
     @property
     def seen_ns(self) -> int | None:
@@ -141,15 +171,8 @@ class _Person:
 
     def expected(self, camera: int) -> Figure | None:
         """Return the figure of the last posture in a camera; None without one."""
-        state, there = self.state(), self.tracker.cameras[camera]
-        if state is None:
-            return None
-        if there.view is not None:
-            state = there.view.states(state)
-        px = projected(Posed(there.posable, state[None]))[:, :2]
-        if there.view is not None:
-            px = px @ there.view.raw_px[:, :2].T + there.view.raw_px[:, 2]
-        return Figure({name: px[row] for name, row in _PROJECTED.items()})
+        state = self.state()
+        return None if state is None else self.tracker.cameras[camera].figure(state)
 
 
 class Session:
@@ -164,36 +187,43 @@ class Session:
         others: Sequence[OtherCamera] = (),
         people: int | None = None,
         look: Look | None = None,
-        make_tracker: Callable[..., Tracker] = Tracker,
+        beside: Executor | None = None,
+        only_measures: bool = False,
     ) -> None:
         """Set up for people who may come, with the body of each in the order of their numbers.
 
         The last body is also that of further people; they are numbered as they come, and from left
         to right if they come together. ``people`` is their number, 0 for up to ``MOST_PEOPLE``;
-        None for one without a number, to whom everything belongs that the cameras show. The other
-        arguments are those of :class:`~.tracker.Tracker`.
+        None for one without a number, to whom everything belongs that the cameras show. Unknown
+        values of a body are measured, see :class:`~cardbox_tracker.measuring.seen_body.SeenBody`;
+        ``beside`` does so while tracking goes on, and with ``only_measures`` nobody is tracked. The
+        other arguments are those of :class:`~.tracker.Tracker`.
         """
         self._bodies, self._camera = tuple(bodies), camera
         self.config = config or TrackerConfig()
         self._rng, self._others = rng or np.random.default_rng(0), tuple(others)
-        self._look, self._is_alone, self._make = look, people is None, make_tracker
-        self._most = people or MOST_PEOPLE
+        self._look, self._is_alone, self._beside = look, people is None, beside
+        self._only_measures, self._most = only_measures, people or MOST_PEOPLE
         self._people: list[_Person] = []
         # Images in a row with somebody new, by camera.
         self._new = [0] * (1 + len(self._others))
         self._last_ns: int | None = None
-        if self._is_alone:
-            tracker = make_tracker(bodies[0], camera, config, rng, others=self._others, look=look)
-            self._people.append(_Person(None, tracker))
-        for _ in range(people or 0):
-            self._add()
+        for number in [None] if people is None else range(1, people + 1):
+            self._add(number)
 
-    def _add(self) -> _Person:
-        number = len(self._people) + 1
-        body = self._bodies[min(number, len(self._bodies)) - 1]
-        given = body, self._camera, self.config, self._rng.spawn(1)[0]
-        tracker = self._make(*given, others=self._others, look=self._look)
-        self._people.append(_Person(number, tracker))
+    def _add(self, number: int | None) -> _Person:
+        body = self._bodies[min(number or 1, len(self._bodies)) - 1]
+        rng = self._rng if number is None else self._rng.spawn(1)[0]
+        measuring = None
+        if body.unknown:
+            # The paper's filter cannot go on with another version of a body.
+            pause_s = 1.0 if self.config.has_several_views else np.inf
+            camera = self._camera.with_pitch(body.camera_pose.pitch_rad)
+            given = body, camera, self.config, rng.spawn(1)[0], pause_s, self._beside
+            measuring = SeenBody(*given)
+        given = body, self._camera, self.config, rng
+        tracker = Tracker(*given, others=self._others, look=self._look)
+        self._people.append(_Person(number, tracker, measuring))
         return self._people[-1]
 
     @property
@@ -232,17 +262,12 @@ class Session:
     def tilt(self, bodies: Sequence[BodyModel], stamp_ns: int) -> None:
         """Go on before the same camera with the pitch of ``bodies``, from the image of a stamp on.
 
-        Each person keeps number, sizes and place in the image, see :meth:`.Tracker.tilt`.
+        Each person keeps number, sizes and place in the image, see :meth:`.Tracker.use`.
         ``bodies`` are those that were given, with the other pitch.
         """
         self._bodies = tuple(bodies)
         for person in self._people:
-            before, last, state = person.tracker.body, person.estimate, person.state()
-            person.tracker.tilt(bodies[min(person.number, len(bodies)) - 1], stamp_ns)
-            if state is not None:
-                (state,) = tilted_states(state[None], before, person.tracker.body)
-                offset_m = None if last.offset_m is None else state[PLACE]
-                person.estimate = replace(last, posture=state[POSTURE], offset_m=offset_m)
+            person.tilt(bodies[min(person.number, len(bodies)) - 1], stamp_ns)
 
     def configure(self, config: TrackerConfig) -> bool:
         """Use other settings from now on; return whether tracking starts again, see Tracker."""
@@ -250,19 +275,18 @@ class Session:
         restarted = [tracker.configure(config) for tracker in self.trackers]
         return any(restarted)
 
-    def track(self, observations: Observations | Observation) -> list[Estimate]:
+    def track(self, observations: Observations | Observation | Silhouette) -> list[Estimate]:
         """Estimate the postures of all people at one time, in the order of their numbers.
 
         Of several people, silhouettes show all of them, and the channel ``people`` has the joints
         of each whom a detector finds; without it there is no detector. Takes and raises what
         :meth:`.Tracker.track` does.
         """
+        observations = listed(observations, 1 + len(self._others))
         if self._is_alone:
             (person,) = self._people
-            person.estimate = person.tracker.track(observations)
+            person.estimate = person.track(observations, self._only_measures)
             return [person.estimate]
-        if isinstance(observations, Observation):
-            observations = (observations,)
         stamp_ns = stamp_of(observations)
         if stamp_ns is None:
             stamp_ns = 0 if self._last_ns is None else self._last_ns + _USUAL_NS
@@ -413,7 +437,7 @@ class Session:
         largest = sorted(free, key=lambda number: -sizes[free.index(number)])[:room]
         added = {}
         for number in sorted(largest, key=lambda number: _middle(shown[number].pixels)):
-            person = waiting.pop(0) if waiting else self._add()
+            person = waiting.pop(0) if waiting else self._add(len(self._people) + 1)
             person.sights[camera].colours = colours[number]
             added[person.number] = number
         self._new[camera] = 0
@@ -523,12 +547,11 @@ class Session:
         # A camera that misses the person, whom another one shows, tells nothing.
         least = min(one.is_missed for one in there)
         used = [one is not None and one.is_missed == least for one in shares]
-        found = person.tracker.track(
-            [
-                one.seen if one is not None and is_used else Observation(stamp_ns=now_ns)
-                for one, is_used in zip(shares, used, strict=True)
-            ]
-        )
+        given = [
+            one.seen if one is not None and is_used else Observation(stamp_ns=now_ns)
+            for one, is_used in zip(shares, used, strict=True)
+        ]
+        found = person.track(given, self._only_measures)
         found = replace(found, person=person.number, person_chance=person.chance)
         if found.posture is not None:
             person.fitted_ns = now_ns

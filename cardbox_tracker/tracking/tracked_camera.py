@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import deque
+from collections.abc import Callable
 from typing import Any
 
 import cv2
@@ -11,12 +12,24 @@ from numpy.typing import NDArray
 
 from cardbox_tracker.camera.camera import Camera
 from cardbox_tracker.camera.view import OtherCamera, View
+from cardbox_tracker.detectors.figure import Figure, figure_of_points
+from cardbox_tracker.detectors.identity import Identity, colours_in
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.sizes import FloatArray
 from cardbox_tracker.search.config import TrackerConfig
+from cardbox_tracker.terms.joint_points import projected
+from cardbox_tracker.terms.joint_points_kernels import ELBOW, HIPS, POINTS_OF_ARM, SHOULDER, WRIST
 from cardbox_tracker.terms.kernel_arguments import body_tuple
 from cardbox_tracker.terms.silhouette import rows_above_hips
-from cardbox_tracker.terms.term import USUAL_INTERVAL_S, DepthImage, Frame, Posed, Silhouette, Term
+from cardbox_tracker.terms.term import (
+    USUAL_INTERVAL_S,
+    DepthImage,
+    Frame,
+    Image,
+    Posed,
+    Silhouette,
+    Term,
+)
 from cardbox_tracker.tracking.observation import CHANNELS, Observation
 from cardbox_tracker.tracking.person_masks import PersonDrawer
 from cardbox_tracker.tracking.person_region import PersonRegion
@@ -34,6 +47,12 @@ _WINDOW, _LEAST, _EVERY = 15, 6, 3
 # Mean surpluses below which depth is refused, and above which it is taken again; depth of the
 # same view has 0.5 and more, also from a pair of cameras.
 _OTHER_VIEW, _SAME_VIEW = 0.25, 0.35
+# Points of a figure by their rows in :func:`projected`.
+_PROJECTED = {
+    f"{side}_{name}": first + row
+    for side, first in (("left", 0), ("right", POINTS_OF_ARM))
+    for name, row in (("shoulder", SHOULDER), ("elbow", ELBOW), ("wrist", WRIST))
+} | {"left_hip": HIPS, "right_hip": HIPS}
 
 
 def surplus_of_jumps(silhouette: Silhouette, depth_m: DepthImage) -> float | None:
@@ -137,6 +156,9 @@ class TrackedCamera:
         posable: the body before this camera, as argument of the kernels.
         terms: terms of its cost in addition to the silhouette.
         depth: check that its depth images show the view of its silhouettes.
+        identity: who is followed in its images.
+        given: names of the channels that had data so far.
+        picture: returns the last image at its full resolution; None without one.
     """
 
     def __init__(
@@ -148,19 +170,26 @@ class TrackedCamera:
     ) -> None:
         """Prepare for ``body`` before ``first``, with its pitch; ``other`` is a further camera.
 
-        Call :meth:`reset` before the first frame. Raises CameraError if the person is not in front.
+        Raises CameraError if the person is not in front.
         """
-        self.view = None if other is None else View.of(body, first, other)
+        self._other = other
         raw = first if other is None else other.camera
         self._size = raw.height, raw.width
         self._name = "the first camera" if other is None else "a further camera"
+        self.identity, self.given, self._sees_other = Identity(), set[str](), False
+        self.picture: Callable[[], Image] | None = None
+        self.use(body, first, config)
+
+    def use(self, body: BodyModel, first: Camera, config: TrackerConfig) -> None:
+        """Go on with another version of the body, as at the start; the person is the same."""
+        self.view = None if self._other is None else View.of(body, first, self._other)
         self._body = body if self.view is None else self.view.body
         self._camera = first if self.view is None else self.view.camera
         # The cost of a further camera limits the rows where the person is found.
         self._rows = rows_above_hips(body, first) if self.view is None else self._camera.height
         self.posable = body_tuple(self._body, self._camera)
         self.configure(config)
-        self._region: PersonRegion | None = None
+        self._select(config)
         self._drawer: PersonDrawer | None = None
         self.depth = DepthAgreement()
 
@@ -170,21 +199,35 @@ class TrackedCamera:
         self.terms: list[Term] = [term for term in built if term is not None]
 
     def reset(self, config: TrackerConfig) -> None:
-        """Forget the region of the person in the images."""
+        """Forget the person, and their region in the images."""
+        self.identity.forget()
+        self._sees_other = False
+        self._select(config)
+
+    def _select(self, config: TrackerConfig) -> None:
         self._region = PersonRegion(self._body, self._camera) if config.select_person else None
+
+    def _here(self, state: FloatArray) -> FloatArray:
+        """Return a state (14,) for the first camera as one for this camera."""
+        return state if self.view is None else self.view.states(state)
 
     def drawn(self, state: FloatArray) -> Silhouette:
         """Return the pixels (H, W), 0 or 255, of a state (14,) for the first camera, coarsely."""
         if self._drawer is None:
             self._drawer = PersonDrawer(self._body, self._camera)
-        if self.view is not None:
-            state = self.view.states(state)
-        cells, side = self._drawer.masks(state, 0.0).core, self._drawer.cell_px
+        cells, side = self._drawer.masks(self._here(state), 0.0).core, self._drawer.cell_px
         pixels = np.repeat(np.repeat(cells, side, axis=0), side, axis=1)
         drawn: Silhouette = 255 * pixels[: self._camera.height, : self._camera.width]
         if self.view is not None and self.view.turn is not None:
             drawn = np.asarray(cv2.warpAffine(drawn, self.view.raw_px, self._size[::-1]), np.uint8)
         return drawn
+
+    def figure(self, state: FloatArray) -> Figure:
+        """Return the figure, in the image as it comes, of a state (14,) for the first camera."""
+        px = projected(Posed(self.posable, self._here(state)[None]))[:, :2]
+        if self.view is not None:
+            px = px @ self.view.raw_px[:, :2].T + self.view.raw_px[:, 2]
+        return Figure({name: px[row] for name, row in _PROJECTED.items()})
 
     def frame(
         self,
@@ -192,16 +235,19 @@ class TrackedCamera:
         before: FloatArray | None,
         is_sure: bool,
         interval_s: float = USUAL_INTERVAL_S,
+        now_ns: int = 0,
     ) -> Frame:
-        """Return the frame of an observation: upright, with the person's part of the silhouette.
+        """Return the frame of an observation: upright, with the person's silhouette and points.
 
         It is empty without a silhouette. ``before`` is the state (14,) of the previous frame for
-        the first camera, None at first, and ``is_sure`` whether it fitted. Raises ValueError if
-        data do not fit the camera, see :data:`~.observation.CHANNELS`.
+        the first camera, None at first, and ``is_sure`` whether it fitted. ``now_ns`` is the time
+        of points without a stamp. Raises ValueError if data do not fit the camera, see
+        :data:`~.observation.CHANNELS`.
         """
-        if before is not None and self.view is not None:
-            before = self.view.states(before)
+        before = None if before is None else self._here(before)
+        self.picture = None if observation is None else observation.picture
         channels, camera = self._channels(observation), self._camera
+        self.given |= channels.keys()
         if "silhouette" not in channels:
             nothing = np.zeros((camera.height, camera.width), np.uint8)
             channels = {"silhouette": nothing}
@@ -209,18 +255,41 @@ class TrackedCamera:
             channels["silhouette"] = self._region.select(
                 channels["silhouette"], before, is_sure, channels.get("image")
             )
-        silhouette = channels["silhouette"]
+        silhouette, points = channels["silhouette"], channels.get("points")
         if self.depth.accepted(silhouette, channels.get("depth_m")) is None:
             channels.pop("depth_m", None)
-        return Frame(
-            camera,
-            channels,
-            self._rows,
-            cv2.countNonZero(np.ascontiguousarray(silhouette[: self._rows])),
-            None if before is None else Posed(self.posable, before[None]),
-            interval_s,
-            None if observation is None else observation.stamp_ns,
-        )
+        self._sees_other = False
+        if points is not None and not points.is_empty:
+            figure = figure_of_points(points)
+            # The silhouette lacks whoever is far from the last posture.
+            colours = colours_in(channels.get("image"), figure.trunk(silhouette.shape))
+            seen_ns = now_ns if points.stamp_ns is None else points.stamp_ns
+            if not self.identity.is_same(figure, colours, seen_ns):
+                self._sees_other = True
+                del channels["points"]
+        posed = None if before is None else Posed(self.posable, before[None])
+        stamp_ns = None if observation is None else observation.stamp_ns
+        return self.counted(Frame(camera, channels, 0, 0, posed, interval_s, stamp_ns))
+
+    def counted(self, frame: Frame) -> Frame:
+        """Return a frame with the rows above the hips of the body, and the foreground in them."""
+        upper = np.ascontiguousarray(frame.silhouette[: self._rows])
+        return frame.changed(rows=self._rows, foreground_px=cv2.countNonZero(upper))
+
+    def shows_other(self, frame: Frame, state: FloatArray | None, now_ns: int) -> bool:
+        """Return whether the person in the first camera's last frame is somebody else.
+
+        That is so if its points were those of somebody else and there is no ``state`` (14,). A
+        state without points must be where the person can be, with their colours.
+        """
+        if self.identity.is_new or state is None:
+            return self._sees_other
+        if frame.points is not None and not frame.points.is_empty:
+            return False
+        figure, silhouette = self.figure(state), frame.silhouette
+        trunk = figure.trunk(silhouette.shape)
+        is_seen, colours = (trunk & silhouette).any(), colours_in(frame.image, trunk)
+        return not is_seen or not self.identity.is_same(figure, colours, now_ns)
 
     def _channels(self, observation: Observation | None) -> dict[str, Any]:
         """Return the data of all channels, checked and turned upright."""

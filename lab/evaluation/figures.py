@@ -208,4 +208,4 @@ def _true_joint_height_m(session: RecordedSession) -> float:
     ]
     if not shoulders:
         return float("nan")
-    return float(np.median((np.array(shoulders) @ session.truth.to_optical)[:, 2]))
+    return float(np.median((np.array(shoulders) @ session.to_optical)[:, 2]))

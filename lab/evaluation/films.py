@@ -101,7 +101,7 @@ def make_film(folder: Path, shape: str, path: Path) -> Film:
             # An upright phone points at the person.
             there = session.keypoints_m.mean(axis=1) @ lens.k.T
             column = float(np.median(there[:, 0] / there[:, 2]))
-        down = -session.truth.to_optical[:, 2]
+        down = -session.to_optical[:, 2]
         turn = _turn(lens.k, (column, (lens.height - 1) / 2), down)
         size = (width, height)
         maps = cv2.initUndistortRectifyMap(lens.k, lens.distortion, turn, k, size, cv2.CV_32FC1)

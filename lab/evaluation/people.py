@@ -51,8 +51,8 @@ def torso_angles(session: RecordedSession) -> FloatArray:
     left, right = SHOULDERS
     breadth = session.keypoints_m[:, left] - session.keypoints_m[:, right]
     axis = session.keypoints_m[:, SHOULDERS].mean(axis=1) - hips_m
-    up = _unit(axis @ session.truth.to_optical)
-    aside = breadth @ session.truth.to_optical
+    up = _unit(axis @ session.to_optical)
+    aside = breadth @ session.to_optical
     aside = _unit(aside - (aside * up).sum(axis=1, keepdims=True) * up)
     front = np.cross(aside, up)
     return np.column_stack(

@@ -94,7 +94,7 @@ def ways_of(folder: Path, plan: Plan) -> list[Way]:
 def _with_references(session: RecordedSession) -> list[tuple[tuple[str, ...], str | None]]:
     truth = session.truth
     alone = truth.cameras if len(truth.cameras) > 1 else ()
-    has_depth = truth.is_rectified or truth.depth_topic is not None
+    has_depth = session.is_rectified or truth.depth_topic is not None
     return [((), only) for only in (None, *alone, *([WITH_DEPTH] if has_depth else []))]
 
 

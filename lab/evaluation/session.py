@@ -20,6 +20,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from cardbox_tracker.camera.camera import level_to_optical
 from cardbox_tracker.common.errors import CardboxError, cut
 from cardbox_tracker.common.files import UnreadableFileError, read_regular
 from cardbox_tracker.recordings.silhouettes import TimeSpan
@@ -60,6 +61,7 @@ class RecordedSession:
         mediapipe_ms: MediaPipe's time for an image, ms; None where it was not measured.
         hips_m: true middle of the hips, (n, 3), metres in the optical frame; nan where unknown.
             None if no image has it.
+        is_rectified: whether the first two cameras that track are a rectified pair.
     """
 
     name: str
@@ -75,6 +77,12 @@ class RecordedSession:
     mediapipe: dict[str, float]
     mediapipe_ms: float | None
     hips_m: FloatArray | None = None
+    is_rectified: bool = False
+
+    @property
+    def to_optical(self) -> FloatArray:
+        """Rotation (3, 3) from the level reference frame into the camera's optical frame."""
+        return level_to_optical(np.radians(self.truth.pitch_deg))
 
     @property
     def has_references(self) -> bool:
@@ -94,7 +102,9 @@ def load_session(folder: str | os.PathLike[str], cameras: Sequence[str] = ()) ->
         CardboxError: the folder is not a session; the text names the missing part.
     """
     path = Path(folder)
-    truth = load_ground_truth(path / "ground_truth.json")
+    file = path / "ground_truth.json"
+    truth = load_ground_truth(file)
+    pair = truth.cameras[:2] if "baseline_m" in file.read_text(encoding="utf-8") else None
     if cameras:
         truth = _with_cameras(path, truth, cameras)
     _check_segments(path, truth)
@@ -120,6 +130,7 @@ def load_session(folder: str | os.PathLike[str], cameras: Sequence[str] = ()) ->
         ).reshape(-1, 3),
         *_mediapipe(path / "peer_mediapipe.json", truth.cameras),
         np.array(hips) if np.isfinite(hips).any() else None,
+        truth.cameras[:2] == pair,
     )
 
 
@@ -131,8 +142,7 @@ def _with_cameras(path: Path, truth: GroundTruth, cameras: Sequence[str]) -> Gro
             f"{', '.join(truth.cameras) or 'none: it has a single camera without a name'}"
         )
     seen = load_ground_truth(path / "ground_truth.json", cameras[0])
-    is_pair = truth.is_rectified and tuple(cameras[:2]) == truth.cameras[:2]
-    return replace(seen, cameras=tuple(cameras), is_rectified=is_pair)
+    return replace(seen, cameras=tuple(cameras))
 
 
 def _check_segments(path: Path, truth: GroundTruth) -> None:

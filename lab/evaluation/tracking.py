@@ -23,6 +23,7 @@ from cardbox_tracker.recordings.truth import GroundTruth
 from cardbox_tracker.search.config import TrackerConfig
 from cardbox_tracker.tracking.estimate import Estimate
 from cardbox_tracker.tracking.observation import Observation
+from cardbox_tracker.tracking.session import Session
 from cardbox_tracker.tracking.tracker import Tracker
 from lab.evaluation.recovery import Recovery, measure_recovery
 from lab.evaluation.session import RecordedSession
@@ -165,8 +166,8 @@ def track_session(
         bodies = [
             _measure(session, source.first, seed) if body is None else (body, "") for seed in seeds
         ]
-        trackers = [
-            Tracker(tracked, camera, config, np.random.default_rng(seed), others=source.others)
+        followed = [
+            Session([tracked], camera, config, np.random.default_rng(seed), source.others)
             if tracked
             else None
             for (tracked, _), seed in zip(bodies, seeds, strict=True)
@@ -186,14 +187,14 @@ def track_session(
                     zip(source.names, taken.observations, strict=True)
                 )
             ]
-            for seed, tracker, estimates, spent in zip(seeds, trackers, found, times, strict=True):
-                if tracker is None:
+            for seed, one, estimates, spent in zip(seeds, followed, found, times, strict=True):
+                if one is None:
                     continue
                 start = time.thread_time()
-                estimates[stamp_ns] = tracker.track(seen)
+                (estimates[stamp_ns],) = one.track(seen)
                 spent.append(1e3 * (time.thread_time() - start))
                 if observe is not None:
-                    observe(seed, stamp_ns, estimates[stamp_ns], tracker)
+                    observe(seed, stamp_ns, estimates[stamp_ns], one.trackers[0])
     return [
         replace(
             run_of(session, tracked, failure, estimates, spent),

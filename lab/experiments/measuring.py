@@ -14,14 +14,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from cardbox_tracker.applications.simulation.person import random_body
 from cardbox_tracker.applications.simulation.renderer import Renderer
 from cardbox_tracker.applications.simulation.session import session_camera
 from cardbox_tracker.measuring.config import InitializationConfig
 from cardbox_tracker.measuring.measure import initialize_body
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.posture import N_JOINTS, REFERENCE_NAMES, reference_posture
-from cardbox_tracker.person.sizes import DEFAULT_SIZES, SIZE_NAMES, SUBSETS
+from cardbox_tracker.person.sizes import DEFAULT_SIZES, SIZE_LIMITS, SIZE_NAMES, SUBSETS
 from lab.experiments.parallel import Call
 
 FloatArray = NDArray[np.float64]
@@ -35,6 +34,17 @@ POSTURE_MISS_DEG = 2.0
 
 ROUNDS = 60
 """Length of the curves of cost against rounds; a shorter search keeps its last cost."""
+
+
+def random_body(rng: np.random.Generator, distance_m: float = 2.0) -> BodyModel:
+    """Return a person of random stature (1.55 to 1.9 m) and proportions."""
+    stature = rng.uniform(0.9, 1.1)
+    sizes = DEFAULT_SIZES * stature * rng.normal(1.0, 0.07, len(DEFAULT_SIZES))
+    return BodyModel.of(
+        np.clip(sizes, SIZE_LIMITS[:, 0], SIZE_LIMITS[:, 1]),
+        distance_m=distance_m,
+        hip_height_m=-0.51 * distance_m / 2.0,
+    )
 
 
 def person_calls(bodies: int, seed: int) -> list[Call]:

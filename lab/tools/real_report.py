@@ -30,7 +30,7 @@ from cardbox_tracker.search.config import default_preset
 from cardbox_tracker.terms.whole_body import WholeBodyCost, iou_of
 from cardbox_tracker.tracking.estimate import Estimate
 from cardbox_tracker.tracking.observation import Observation
-from cardbox_tracker.tracking.tracker import Tracker
+from cardbox_tracker.tracking.session import Session
 from lab.evaluation.people_report import replaced
 from lab.tools.real_frames import LANDMARKS, Frames, read_frames
 from lab.tools.real_sheet import contact_sheet
@@ -115,26 +115,26 @@ def track(frames: Frames, variant: Variant, stature_m: float, distance_m: float,
     count = len(frames.clips)
     errors, iou = np.full((count, len(LANDMARKS)), np.nan), np.full(count, np.nan)
     estimates, bodies = [], []
-    tracker = None
+    session = None
     for i, clip in enumerate(frames.clips):
         silhouette = _silhouette(frames, variant, i)
-        if tracker is None or (variant.anew and clip != frames.clips[i - 1]):
+        if session is None or (variant.anew and clip != frames.clips[i - 1]):
             body = body_from_proportions(stature_m, distance_m if variant.distance else None)
             if not variant.fits:
                 body = _placed(body.with_values(unknown=()), silhouette, camera)
-            tracker = Tracker(body, camera, config, np.random.default_rng(seed))
+            session = Session([body], camera, config, np.random.default_rng(seed))
         image = frames.images[i] if variant.colors else None
         points = frames.points[i] if variant.points else None
         stamp_ns = int(frames.stamps_ns[i])
         seen = Observation(silhouette, image, stamp_ns=stamp_ns, points=points)
-        estimate = tracker.track(seen)
+        (estimate,) = session.track(seen)
         estimates.append(estimate)
-        bodies.append(tracker.body)
+        bodies.append(session.trackers[0].body)
         if estimate.posture is None or estimate.keypoints_m is None:
             continue
         away = projected(estimate.keypoints_m, camera) - frames.landmarks_px[i]
         errors[i] = np.hypot(away[:, 0], away[:, 1])
-        cost = WholeBodyCost(tracker.body, camera, config.whole_body.cost)
+        cost = WholeBodyCost(bodies[-1], camera, config.whole_body.cost)
         iou[i] = _iou(cost, estimate, frames.masks[i])
     return Run(estimates, bodies, errors, iou)
 

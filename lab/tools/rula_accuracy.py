@@ -208,7 +208,7 @@ def load(folder: Path) -> RecordedSession:
         return session
     session = load_session(folder, session.truth.cameras[:1])
     if session.hips_m is None:
-        down = -session.truth.to_optical[:, 2]
+        down = -session.to_optical[:, 2]
         session = replace(session, hips_m=session.keypoints_m[:, SHOULDERS].mean(axis=1) + down)
     return replace(session, torso_rad=torso_angles(session))
 

@@ -30,6 +30,7 @@ from cardbox_tracker.person.model import PROPORTIONS, BodyModel
 from cardbox_tracker.person.posture import reference_posture
 from cardbox_tracker.person.skeleton import KeypointState
 from cardbox_tracker.search.config import default_preset
+from cardbox_tracker.terms.term import Frame, Silhouette
 from cardbox_tracker.tracking import camera_calibration
 from cardbox_tracker.tracking.camera_agreement import CameraAgreement
 from cardbox_tracker.tracking.camera_calibration import MovingFrame, calibrated_camera
@@ -154,15 +155,19 @@ def test_only_the_latest_silhouettes_count() -> None:
     np.testing.assert_array_equal(latest.heights(TRUE), last)
 
 
+def framed(*silhouettes: Silhouette) -> list[Frame]:
+    return [Frame(CAMERA, {"silhouette": one}, CAMERA.height, 1) for one in silhouettes]
+
+
 def agreement(extrinsics: Extrinsics, count: int, body: BodyModel = BODY) -> CameraAgreement:
     view = View.of(body, CAMERA, OtherCamera(OTHER, extrinsics))
     asked = CameraAgreement(body, CAMERA, [view])
     frames = sightings(waving(count))
     for frame in frames:
         for _ in range(12):
-            other = view.upright(frame.other, is_mask=True)
-            asked.look(frame.first, [other])
-            asked.see(frame.state, frame.first, [other])
+            shown = framed(frame.first, view.upright(frame.other, is_mask=True))
+            asked.look(shown)
+            asked.see(frame.state, shown)
     return asked
 
 
@@ -222,8 +227,19 @@ def test_nothing_is_said_of_a_camera_before_a_window_of_frames() -> None:
     short.check(is_last=True)
     assert short.turned_deg != [None]
     # One that never sees the person is not waited for.
-    asked.see(waving(1)[0], np.full((240, 320), 255, np.uint8), [None])
+    full = np.full((240, 320), 255, np.uint8)
+    asked.see(waving(1)[0], framed(full, np.zeros_like(full)))
     assert not asked.is_due
+
+
+def test_frames_in_which_others_hide_pixels_do_not_count() -> None:
+    full = np.full((240, 320), 255, np.uint8)
+    hidden = [one.changed(channels={**one.channels, "covered": full}) for one in framed(full, full)]
+    asked = agreement(TRUE, 1)
+    before = asked._frames
+    assert not asked.look(hidden)
+    asked.see(waving(1)[0], hidden)
+    assert asked._frames == before
 
 
 def test_extrinsics_are_found_without_a_board(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -333,7 +349,7 @@ def looked(extrinsics: Extrinsics) -> CameraAgreement:
     view = View.of(BODY, CAMERA, OtherCamera(OTHER, extrinsics))
     asked = CameraAgreement(BODY, CAMERA, [view])
     for frame in sightings(waving(12)):
-        asked.look(frame.first, [view.upright(frame.other, is_mask=True)])
+        assert asked.look(framed(frame.first, view.upright(frame.other, is_mask=True)))
     return asked
 
 

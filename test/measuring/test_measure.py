@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from cardbox_tracker.applications.simulation.person import FINGER_REACH, random_body
+from cardbox_tracker.applications.simulation.person import FINGER_REACH
 from cardbox_tracker.applications.simulation.renderer import Renderer
 from cardbox_tracker.applications.simulation.session import session_camera
 from cardbox_tracker.camera.rasterisation import render
@@ -25,6 +25,7 @@ from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.posture import REFERENCE_NAMES, reference_posture
 from cardbox_tracker.person.sizes import SIZE_INDEX, SIZE_LIMITS, SUBSETS
 from cardbox_tracker.terms.silhouette import rows_above_hips
+from lab.experiments.measuring import random_body
 
 CAMERA = session_camera()
 BODIES = 8

@@ -20,9 +20,9 @@ from cardbox_tracker.person.posture import reference_posture
 from cardbox_tracker.person.proportions import body_from_proportions, sizes_of_stature
 from cardbox_tracker.person.sizes import SIZE_INDEX
 from cardbox_tracker.search.config import default_preset
-from cardbox_tracker.tracking.estimate import LOST, TRACKING, UNCERTAIN
-from cardbox_tracker.tracking.observation import Observation
-from cardbox_tracker.tracking.tracker import BodyTracker, Tracker
+from cardbox_tracker.tracking.estimate import LOST, TRACKING, UNCERTAIN, Estimate
+from cardbox_tracker.tracking.session import Session
+from cardbox_tracker.tracking.tracker import Tracker
 
 CAMERA = Camera(320, 240, 300.0, 300.0, 159.5, 119.5)
 NOBODY = np.zeros((240, 320), np.uint8)
@@ -46,15 +46,32 @@ def silhouette(body: BodyModel, raised_rad: float = 0.0) -> np.ndarray:
     return seen
 
 
-def tracker(**given: float) -> Tracker:
-    guess = body_from_proportions(1.75, **given)  # type: ignore[arg-type]
-    return Tracker(guess, CAMERA, default_preset(), np.random.default_rng(1))
+class Followed:
+    """A session of one person, who is measured."""
+
+    def __init__(self, only_measures: bool = False, **given: float) -> None:
+        guess = body_from_proportions(1.75, **given)  # type: ignore[arg-type]
+        given_all = [guess], CAMERA, default_preset(), np.random.default_rng(1)
+        self._session = Session(*given_all, only_measures=only_measures)
+
+    def track(self, silhouette: np.ndarray) -> Estimate:
+        (found,) = self._session.track(silhouette)
+        return found
+
+    @property
+    def body(self) -> BodyModel:
+        return self._session.trackers[0].body
+
+    @property
+    def age(self) -> int:
+        age: int = self._session.trackers[0].filter._age  # type: ignore[attr-defined]
+        return age
 
 
 @pytest.mark.parametrize("raised_rad", [0.0, 1.0])
 def test_height_and_breadth_are_found_at_first_sight(raised_rad: float) -> None:
     true = person(1.75, -0.62, BROAD)
-    track = tracker(distance_m=2.0)
+    track = Followed(distance_m=2.0)
     guessed = track.body.size("waist_width")
     estimate = track.track(silhouette(true, raised_rad))
     assert track.body.unknown == ()
@@ -69,13 +86,13 @@ def test_height_and_breadth_are_found_at_first_sight(raised_rad: float) -> None:
 
 
 def test_a_distance_that_is_not_given_is_found_roughly() -> None:
-    track = tracker()
+    track = Followed()
     track.track(silhouette(person(1.75, -0.6)))
     assert track.body.placement.distance_m == pytest.approx(2.0, rel=0.25)
 
 
 def test_what_was_given_is_kept() -> None:
-    track = tracker(distance_m=2.0, hip_height_m=-0.6, shoulder_breadth_m=0.4)
+    track = Followed(distance_m=2.0, hip_height_m=-0.6, shoulder_breadth_m=0.4)
     track.track(silhouette(person(1.75, -0.6)))
     assert track.body.size("shoulder_breadth") == pytest.approx(0.4)
     assert track.body.placement.distance_m == pytest.approx(2.0)
@@ -83,7 +100,7 @@ def test_what_was_given_is_kept() -> None:
 
 
 def test_until_somebody_is_seen_whole_nothing_is_sure() -> None:
-    track = tracker(distance_m=2.0)
+    track = Followed(distance_m=2.0)
     beheaded = silhouette(person(1.75, 0.2))
     assert beheaded[0].any()
     assert track.track(NOBODY).state == "no_person"
@@ -92,7 +109,7 @@ def test_until_somebody_is_seen_whole_nothing_is_sure() -> None:
 
 
 def test_the_next_person_is_fitted_after_the_image_was_empty() -> None:
-    track = tracker(distance_m=2.0)
+    track = Followed(distance_m=2.0)
     first, second = person(1.75, -0.62, BROAD), person(1.75, -0.62, 1 / BROAD)
     track.track(silhouette(first))
     fitted = track.body
@@ -113,7 +130,7 @@ def test_what_does_not_fit_is_not_tried_with_every_image(monkeypatch: pytest.Mon
         raise InitializationError("nothing fits")
 
     monkeypatch.setattr(seen_body, "fit_first_sight", refuse)
-    track = tracker(distance_m=2.0)
+    track = Followed(distance_m=2.0)
     seen = silhouette(person(1.75, -0.62))
     for _ in range(50):
         track.track(seen)
@@ -173,12 +190,16 @@ def test_further_fits_are_made_beside_and_count_when_they_are_done(
 def test_a_body_is_measured_without_a_search_for_its_posture(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr(Tracker, "_follow", Mock(side_effect=AssertionError))
-    good, guess = person(1.75, -0.62), body_from_proportions(1.75, distance_m=2.0)
-    given = CAMERA, default_preset(), np.random.default_rng(1)
-    track = BodyTracker(guess, *given)
-    assert track.track(Observation(silhouette(good), stamp_ns=0)).state == LOST
+    monkeypatch.setattr(Tracker, "follow", Mock(side_effect=AssertionError))
+    track = Followed(only_measures=True, distance_m=2.0)
+    assert track.track(silhouette(person(1.75, -0.62))).state == LOST
     assert not track.body.unknown
+
+
+def test_a_tracker_alone_refuses_a_body_that_a_session_measures() -> None:
+    track = Tracker(body_from_proportions(1.75, distance_m=2.0), CAMERA, default_preset())
+    with pytest.raises(ValueError, match=r"\(hip_height_m, .*Session\(\[body\], camera"):
+        track.track(silhouette(person(1.75, -0.62)))
 
 
 @pytest.mark.parametrize(
@@ -203,16 +224,16 @@ def test_a_new_version_of_the_body_goes_on_with_the_posture(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     true = person(1.75, -0.62)
-    track = tracker(distance_m=2.0)
+    track = Followed(distance_m=2.0)
     seen = silhouette(true, 1.0)
     for _ in range(10):
         found = track.track(seen)
-    first, age = track.body, track.filter._age  # type: ignore[attr-defined]
+    first, age = track.body, track.age
     for _ in range(8):
         found = track.track(seen)
     assert track.body is not first
     assert track.body.placement == first.placement
-    assert track.filter._age == age + 8  # type: ignore[attr-defined]
+    assert track.age == age + 8
     assert found.posture is not None
     assert found.posture[4] == pytest.approx(np.radians(20) + 1.0, abs=0.3)
 
@@ -227,7 +248,7 @@ def test_the_same_seed_gives_the_same_body() -> None:
     seen = silhouette(person(1.75, -0.62))
     bodies = []
     for _ in range(2):
-        track = tracker(distance_m=2.0)
+        track = Followed(distance_m=2.0)
         track.track(seen)
         bodies.append(track.body)
     assert bodies[0] == bodies[1]

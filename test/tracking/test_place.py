@@ -163,7 +163,7 @@ def test_a_contradiction_lasts_until_the_sources_agree(first: float, is_told: bo
 
 
 def test_a_body_that_is_too_large_makes_the_shape_uncertain() -> None:
-    tracker = Tracker(TALL, CAMERA, default_preset())
+    tracker = Tracker(TALL.with_values(unknown=()), CAMERA, default_preset())
     shown = render(cardbox_patches(TALL, reference_posture("front")), CAMERA)
     sure = tracker.track(shown)
     tracker._place.is_too_large = True

@@ -15,7 +15,6 @@ from numpy.typing import NDArray
 from cardbox_tracker.person.kinematics import PosedBodies, pose
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.parts import body_parts
-from cardbox_tracker.person.sizes import DEFAULT_SIZES, SIZE_LIMITS
 from cardbox_tracker.person.skeleton import POINT_NAMES
 
 FloatArray = NDArray[np.float64]
@@ -98,17 +97,6 @@ def girdle_lift_m(breadth_m: float, elevation_rad: FloatArray) -> FloatArray:
     rise_rad = _CLAVICLE_RISE * np.maximum(0.0, np.asarray(elevation_rad) - _SETTING_RAD)
     lift: FloatArray = _CLAVICLE_OF_BREADTH * breadth_m * np.sin(rise_rad)
     return lift
-
-
-def random_body(rng: np.random.Generator, distance_m: float = 2.0) -> BodyModel:
-    """Return a person of random stature (1.55 to 1.9 m) and proportions."""
-    stature = rng.uniform(0.9, 1.1)
-    sizes = DEFAULT_SIZES * stature * rng.normal(1.0, 0.07, len(DEFAULT_SIZES))
-    return BodyModel.of(
-        np.clip(sizes, SIZE_LIMITS[:, 0], SIZE_LIMITS[:, 1]),
-        distance_m=distance_m,
-        hip_height_m=-0.51 * distance_m / 2.0,
-    )
 
 
 def _trunk(body: BodyModel, frames: PosedBodies) -> VolumePart:

@@ -179,7 +179,7 @@ class DetectorNode(CardboxNode):
             return
         began_s = time.perf_counter()
         image = pipeline.prepare(full)
-        found = self._found(stamp_ns(header.stamp), image)
+        found = self._person.all_in(stamp_ns(header.stamp), image)
         self._took_ms.append(1e3 * (time.perf_counter() - began_s))
         self._send_points(header, found, pipeline)
         if len(found) == 1:
@@ -191,13 +191,6 @@ class DetectorNode(CardboxNode):
                 silhouette |= one.silhouette()
             self._silhouettes.send(header, silhouette, pipeline.camera, self._images.info)
         self.diagnostics.working(sent_ns)
-
-    def _found(self, at_ns: int, image: ImageArray) -> list[Detection]:
-        """Return the people in an image, or the one who is followed."""
-        if self.parameters.value.people:
-            return self._person.all_in(at_ns, image)
-        person = self._person(image, at_ns)
-        return [] if person is None else [person]
 
     def _is_due(self, at_ns: int) -> bool:
         rate_hz = self.parameters.value.rate_hz

@@ -38,7 +38,6 @@ from cardbox_tracker.tracking.camera_agreement import AgreementWatch
 from cardbox_tracker.tracking.estimate import LOST, NO_PERSON, UNCERTAIN, Estimate
 from cardbox_tracker.tracking.precompile import compile_all
 from cardbox_tracker.tracking.session import Session
-from cardbox_tracker.tracking.tracker import Tracker
 
 _REASONS = {
     NO_PERSON: "nobody is in the image",
@@ -307,10 +306,9 @@ class TrackerNode(CardboxNode):
         settings = self.parameters.value
         rng = np.random.default_rng(settings.seed)
         people = settings.people or None
-        given = settings.config(), rng, self._others, people, self._look
         # A fit takes as long as several images.
-        make = partial(Tracker, beside=self._beside)
-        self._session = Session(self._bodies, self._camera, *given, make_tracker=make)
+        given = settings.config(), rng, self._others, people, self._look, self._beside
+        self._session = Session(self._bodies, self._camera, *given)
         for report, tracker in zip(self._reports, self._session.trackers, strict=True):
             report.start(tracker.body)
         self.diagnostics.say(reason, f"{reason}: tracking starts from the front reference posture")

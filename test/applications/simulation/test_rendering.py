@@ -9,12 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from cardbox_tracker.applications.simulation.person import (
-    SHIRT,
-    SKIN,
-    person_frames,
-    random_body,
-)
+from cardbox_tracker.applications.simulation.person import SHIRT, SKIN, person_frames
 from cardbox_tracker.applications.simulation.renderer import Renderer
 from cardbox_tracker.applications.simulation.session import session_camera
 from cardbox_tracker.camera.camera import Camera
@@ -22,6 +17,7 @@ from cardbox_tracker.person.cardbox import cardbox_patches
 from cardbox_tracker.person.kinematics import pose
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.posture import reference_posture
+from lab.experiments.measuring import random_body
 
 BODY = BodyModel.of(hip_height_m=-0.51)
 CAMERA = session_camera()

@@ -33,6 +33,7 @@ from cardbox_tracker.ros.messages.conversions import (  # noqa: E402
 )
 from cardbox_tracker.ros.nodes import tracker_node  # noqa: E402
 from cardbox_tracker.ros.runtime import qos  # noqa: E402
+from cardbox_tracker.tracking import session  # noqa: E402
 from cardbox_tracker.tracking.estimate import LOST, TRACKING, UNCERTAIN, Estimate  # noqa: E402
 from cardbox_tracker.tracking.tracker import Tracker  # noqa: E402
 
@@ -136,7 +137,7 @@ class Graph:
 @pytest.fixture
 def make(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Callable[..., Graph]]:
     """Return a function that starts a tracker node with a measured person."""
-    monkeypatch.setattr(tracker_node, "Tracker", Told)
+    monkeypatch.setattr(session, "Tracker", Told)
     save_body_model(BODY, tmp_path / "person.yaml")
     made: list[Graph] = []
 
