@@ -67,19 +67,25 @@ def atomic_path(path: str | os.PathLike[str]) -> Iterator[Path]:
             yield temporary
         return
     target = resolved(path)
-    with claimed_name(target, is_folder=False) as temporary:
-        try:
-            yield temporary
-            with contextlib.suppress(OSError):
-                # The new file keeps the permissions of the previous one.
-                os.chmod(temporary, stat.S_IMODE(target.stat().st_mode))
-            os.replace(temporary, target)
-        except OSError as error:
-            if error.errno not in _FULL:
-                raise
-            raise CardboxError(
-                f"cannot write {target}: {error.strerror}; make room, or give another folder"
-            ) from None
+    with claimed_name(target, is_folder=False) as temporary, room_for(target):
+        yield temporary
+        with contextlib.suppress(OSError):
+            # The new file keeps the permissions of the previous one.
+            os.chmod(temporary, stat.S_IMODE(target.stat().st_mode))
+        os.replace(temporary, target)
+
+
+@contextmanager
+def room_for(target: Path) -> Iterator[None]:
+    """Turn the error of a full disk, a quota or a limit into CardboxError that names ``target``."""
+    try:
+        yield
+    except OSError as error:
+        if error.errno not in _FULL:
+            raise
+        raise CardboxError(
+            f"cannot write {target}: {error.strerror}; make room, or give another folder"
+        ) from None
 
 
 @contextmanager

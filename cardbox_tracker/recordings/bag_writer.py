@@ -25,7 +25,7 @@ from rosbags.typesys import Stores, get_typestore
 
 from cardbox_tracker.camera.camera import Camera
 from cardbox_tracker.common.errors import BagError, CardboxError
-from cardbox_tracker.common.files import claimed_name
+from cardbox_tracker.common.files import claimed_name, room_for
 
 STORAGES = {"mcap": StoragePlugin.MCAP, "sqlite3": StoragePlugin.SQLITE3}
 
@@ -95,10 +95,10 @@ class BagWriter:
         self._writer.open()
         return self
 
-    def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
+    def __exit__(self, kind: type[BaseException] | None, *error: Any) -> None:
         """Move the recording to its place, or remove it after an error."""
-        with self._resources:
-            self._writer.close()
+        with self._resources, room_for(self.path):
+            self._writer.__exit__(kind, *error)
             if kind is None:
                 if self.path.exists():
                     # The temporary folder is removed with the replaced recording in it.
@@ -133,7 +133,7 @@ class BagWriter:
         self.write_raw(topic, name, self._store.serialize_cdr(message, name), stamp_ns)
 
     def write_raw(self, topic: str, msgtype: str, raw: bytes | memoryview, stamp_ns: int) -> None:
-        """Write the CDR bytes of a message."""
+        """Write the CDR bytes of a message; raise CardboxError if the disk is full."""
         connection = self._connections.get(topic)
         if connection is None:
             profiles = [_LATCHED] if topic in self._latched else []
@@ -141,7 +141,8 @@ class BagWriter:
                 topic, msgtype, typestore=self._store, offered_qos_profiles=profiles
             )
             self._connections[topic] = connection
-        self._writer.write(connection, stamp_ns, raw)
+        with room_for(self.path):
+            self._writer.write(connection, stamp_ns, raw)
 
     def write_stamped(
         self, topic: str, kind: str, stamp_ns: int, frame_id: str, **values: Any

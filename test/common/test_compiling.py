@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import itertools
+import json
 import os
 import shutil
 import subprocess
 import sys
 import tempfile
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import numba
@@ -58,19 +60,55 @@ def package(tmp_path: Path) -> Path:
     return folder
 
 
-def run(package: Path, program: str, **environment: str) -> tuple[str, str]:
-    """Run a program in a new interpreter; return its output and its warnings."""
-    values = {**os.environ, "PYTHONPATH": str(package.parent), "PYTHONDONTWRITEBYTECODE": "1"}
+# A process with numba and nothing of the package, of which a copy runs each program.
+SERVER = """
+import json, os, sys, traceback
+import numba
+numba.njit(lambda x: x)(1)
+for line in sys.stdin:
+    folder, program, environment, *outputs = json.loads(line)
+    if copy := os.fork():
+        print(os.waitstatus_to_exitcode(os.waitpid(copy, 0)[1]), flush=True)
+        continue
+    for number, path in enumerate(outputs, 1):
+        os.dup2(os.open(path, os.O_WRONLY | os.O_CREAT | os.O_TRUNC), number)
+    os.environ.update(environment)
+    numba.config.reload_config()
+    sys.path[0] = folder
+    try:
+        exec(program)
+    except BaseException:
+        traceback.print_exc()
+        os._exit(1)
+    sys.stdout.flush()
+    os._exit(0)
+"""
+
+
+@pytest.fixture(scope="module")
+def server() -> Iterator[subprocess.Popen[str]]:
+    values = {**os.environ, "PYTHONDONTWRITEBYTECODE": "1"}
     values.pop("NUMBA_CACHE_DIR", None)
-    done = subprocess.run(
-        [sys.executable, "-c", program],
-        env=values | environment,
-        cwd=package.parent,
-        capture_output=True,
-        text=True,
-    )
-    assert done.returncode == 0, done.stderr
-    return done.stdout, done.stderr
+    command, pipe = [sys.executable, "-c", SERVER], subprocess.PIPE
+    with subprocess.Popen(command, stdin=pipe, stdout=pipe, env=values, text=True) as started:
+        yield started
+
+
+@pytest.fixture
+def run(package: Path, server: subprocess.Popen[str]) -> Callable[..., tuple[str, str]]:
+    """Return what runs a program with the package, and returns its output and its warnings."""
+
+    def run(program: str, **environment: str) -> tuple[str, str]:
+        assert server.stdin is not None and server.stdout is not None
+        outputs = [package.parent / name for name in ("out", "said")]
+        request = [str(package.parent), program, environment, *map(str, outputs)]
+        print(json.dumps(request), file=server.stdin, flush=True)
+        code = int(server.stdout.readline())
+        out, said = (path.read_text() for path in outputs)
+        assert code == 0, said
+        return out, said
+
+    return run
 
 
 USE = """
@@ -79,19 +117,19 @@ print(double(21), sum(double.stats.cache_hits.values()))
 """
 
 
-def test_code_is_kept_until_a_source_changes(package: Path) -> None:
-    assert run(package, USE) == ("42 0\n", "")
+def test_code_is_kept_until_a_source_changes(package: Path, run: Callable) -> None:
+    assert run(USE) == ("42 0\n", "")
     (package / "other.py").write_text("CHANGED = True")
-    assert run(package, USE) == ("42 1\n", ""), "no kernel contains the other file"
+    assert run(USE) == ("42 1\n", ""), "no kernel contains the other file"
     for name, old, new in (
         ("callee", "TWICE * x", "TWICE * x + 1"),
         ("factor", "2", "3"),
     ):
         path = package / f"{name}.py"
         path.write_text(path.read_text().replace(old, new))
-        out, _ = run(package, USE)
+        out, _ = run(USE)
         assert out == ("43 0\n" if name == "callee" else "64 0\n")
-    assert run(package, USE) == ("64 1\n", "")
+    assert run(USE) == ("64 1\n", "")
 
 
 def test_only_the_last_folders_are_kept(package: Path) -> None:
@@ -116,10 +154,10 @@ except IndexError:
 """
 
 
-def test_code_with_bounds_checks_is_kept_apart(package: Path) -> None:
+def test_code_with_bounds_checks_is_kept_apart(package: Path, run: Callable) -> None:
     for _ in range(2):
-        assert run(package, BOUNDS, NUMBA_BOUNDSCHECK="0") == ("0.0\n", "")
-        assert run(package, BOUNDS, NUMBA_BOUNDSCHECK="1") == ("refused\n", "")
+        assert run(BOUNDS, NUMBA_BOUNDSCHECK="0") == ("0.0\n", "")
+        assert run(BOUNDS, NUMBA_BOUNDSCHECK="1") == ("refused\n", "")
     kept = [path.parent for path in package.rglob("*.read-*.nbc")]
     assert len(kept) == len(set(kept)) == 2, "neither replaces the other"
 
@@ -136,16 +174,16 @@ print(double(21), len(list(compiling.FOLDER.rglob("*.double-*"))))
 
 
 @pytest.mark.promise("No compiled code is run that is damaged or that others may have written")
-def test_a_file_that_was_cut_off_is_made_again(package: Path) -> None:
-    run(package, USE)
+def test_a_file_that_was_cut_off_is_made_again(package: Path, run: Callable) -> None:
+    run(USE)
     for ending, part in itertools.product((".nbi", ".nbc"), (0.0, 0.5)):
         (file,) = package.rglob(f"*.double-*{ending}")
         whole = file.read_bytes()
         file.write_bytes(whole[: int(part * len(whole))])
-        out, said = run(package, DAMAGED)
+        out, said = run(DAMAGED)
         assert out == "42 2\n", "it was kept again"
         assert "damaged" in said and str(file.parents[1]) in said and "Traceback" not in said
-    assert run(package, USE) == ("42 1\n", "")
+    assert run(USE) == ("42 1\n", "")
 
 
 FULL = """
@@ -156,12 +194,12 @@ caching.IndexDataCacheFile._open_for_write = full
 """
 
 
-def test_a_full_disk_does_not_end_it(package: Path) -> None:
+def test_a_full_disk_does_not_end_it(package: Path, run: Callable) -> None:
     """The function calls another one, which cannot be kept either; this is said once."""
-    out, said = run(package, FULL + USE)
+    out, said = run(FULL + USE)
     assert out == "42 0\n"
     assert said.count("No space left on device") == 1 and "Traceback" not in said
-    assert run(package, USE) == ("42 0\n", "")
+    assert run(USE) == ("42 0\n", "")
 
 
 @pytest.fixture
@@ -175,21 +213,21 @@ def places(package: Path, tmp_path: Path) -> dict[str, str]:
     }
 
 
-def test_the_users_folder_comes_first(package: Path, tmp_path: Path) -> None:
-    run(package, USE, NUMBA_CACHE_DIR=str(tmp_path / "mine"))
+def test_the_users_folder_comes_first(package: Path, run: Callable, tmp_path: Path) -> None:
+    run(USE, NUMBA_CACHE_DIR=str(tmp_path / "mine"))
     assert list((tmp_path / "mine").glob("cardbox_tracker-*/**/*.double-*.nbc"))
     assert not (package / "__pycache__").exists()
 
 
 def test_a_package_that_is_read_only_is_kept_elsewhere(
-    package: Path, places: dict[str, str], tmp_path: Path
+    package: Path, run: Callable, places: dict[str, str], tmp_path: Path
 ) -> None:
-    assert run(package, USE, **places) == ("42 0\n", "")
-    assert run(package, USE, **places) == ("42 1\n", "")
+    assert run(USE, **places) == ("42 0\n", "")
+    assert run(USE, **places) == ("42 1\n", "")
     (kept,) = (tmp_path / "temporary").glob("cardbox_tracker-*")
     assert kept.stat().st_mode & 0o077 == 0
     home = {"XDG_CACHE_HOME": str(tmp_path / "cache")}
-    assert run(package, USE, **places | home) == ("42 0\n", "")
+    assert run(USE, **places | home) == ("42 0\n", "")
     assert list((tmp_path / "cache").rglob("*.nbc"))
 
 
@@ -198,6 +236,7 @@ def test_a_package_that_is_read_only_is_kept_elsewhere(
 def test_a_folder_that_somebody_planted_is_not_used(
     planted: str,
     package: Path,
+    run: Callable,
     places: dict[str, str],
     tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch,
@@ -220,7 +259,7 @@ def test_a_folder_that_somebody_planted_is_not_used(
         somebody = os.geteuid() + 1
         folder.rename(folder.with_name(folder.name.replace(f"-{somebody - 1}-", f"-{somebody}-")))
         program = f"import os\nos.geteuid = lambda: {somebody}\n{USE}"
-    out, said = run(package, program, **places)
+    out, said = run(program, **places)
     assert out == "42 0\n"
     assert "set NUMBA_CACHE_DIR" in said
     assert not list(tmp_path.rglob("*.nb?"))
@@ -240,4 +279,4 @@ def test_what_needs_no_compiled_code_does_not_load_the_compiler(command: str) ->
         "import cardbox_tracker.person.urdf, cardbox_tracker.person.model_file\n"
         "assert 'numba' not in sys.modules"
     )
-    run(ROOT / "cardbox_tracker", code)
+    subprocess.run([sys.executable, "-c", code], cwd=ROOT, check=True)

@@ -31,7 +31,7 @@ from cardbox_tracker.person.posture import reference_posture
 from cardbox_tracker.person.skeleton import KeypointState
 from cardbox_tracker.search.config import default_preset
 from cardbox_tracker.terms.term import Frame, Silhouette
-from cardbox_tracker.tracking import camera_calibration
+from cardbox_tracker.tracking import camera_agreement, camera_calibration
 from cardbox_tracker.tracking.camera_agreement import CameraAgreement
 from cardbox_tracker.tracking.camera_calibration import MovingFrame, calibrated_camera
 from cardbox_tracker.tracking.estimate import TRACKING, Estimate
@@ -52,6 +52,12 @@ def aside(angle_rad: float = 1.0) -> Extrinsics:
 
 
 TRUE = aside()
+
+
+@pytest.fixture
+def one_step(monkeypatch: pytest.MonkeyPatch) -> None:
+    """For tests of what does not depend on how exactly the turn of a camera is estimated."""
+    monkeypatch.setattr(camera_agreement, "_STEPS", 1)
 
 
 def sightings(
@@ -200,7 +206,11 @@ def test_wrong_sizes_of_a_person_by_stature_are_no_wrong_extrinsics() -> None:
         assert 0.85 < right.turned_deg[0] < 6.0
     assert len(said[0]) == 1
     assert said[1] == []
-    # The heights of head and hands need no sizes.
+
+
+def test_a_wrong_height_is_told_of_a_person_by_stature(one_step: None) -> None:
+    """The heights of head and hands need no sizes."""
+    guessed = BODY.with_values(sizes=1.1 * BODY.sizes, source=PROPORTIONS)
     up = np.array([np.radians(2.0), *[0.0] * 5])
     wrong = agreement(moved_by(TRUE, up), 15, guessed)
     wrong.check()
@@ -208,14 +218,14 @@ def test_wrong_sizes_of_a_person_by_stature_are_no_wrong_extrinsics() -> None:
     assert "2.0 degrees in height" in text
 
 
-def test_a_camera_that_is_turned_about_its_own_axis_is_told() -> None:
+def test_a_camera_that_is_turned_about_its_own_axis_is_told(one_step: None) -> None:
     rolled = agreement(moved_by(TRUE, np.array([0.0, 0.0, np.radians(3.0), 0.0, 0.0, 0.0])), 15)
     rolled.check()
     assert rolled.rolled_deg[0] == pytest.approx(-3.0, abs=0.8)
     assert any("about its own axis" in text for text in rolled.remarks(["cam1"]))
 
 
-def test_nothing_is_said_of_a_camera_before_a_window_of_frames() -> None:
+def test_nothing_is_said_of_a_camera_before_a_window_of_frames(one_step: None) -> None:
     asked = agreement(TRUE, 5)
     assert not asked.is_due
     asked.check()
@@ -260,6 +270,12 @@ def test_extrinsics_are_found_without_a_board(monkeypatch: pytest.MonkeyPatch) -
     moving = [
         MovingFrame((one.first, one.other), (None, None)) for one in sightings(waving(16, 0.1))
     ]
+
+    def guessed(*given: object) -> Extrinsics:
+        assert given == (BODY, CAMERA, OTHER, references, "left")
+        return guess
+
+    monkeypatch.setattr(camera_calibration, "guessed_extrinsics", guessed)
     found = calibrated_camera(BODY, (CAMERA, OTHER), references, moving)
     angle_rad, away_m = found.extrinsics.difference(TRUE)
     assert np.degrees(angle_rad) < 6.0

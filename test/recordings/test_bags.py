@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import os
+import resource
 import shutil
 from pathlib import Path
 from types import SimpleNamespace
@@ -15,7 +16,7 @@ import pytest
 import yaml
 
 from cardbox_tracker.camera.camera import Camera
-from cardbox_tracker.common.errors import BagError, CameraError
+from cardbox_tracker.common.errors import BagError, CameraError, CardboxError
 from cardbox_tracker.person.skeleton import JOINT_NAMES
 from cardbox_tracker.recordings.bag_reader import BagReader
 from cardbox_tracker.recordings.bag_writer import STORAGES, BagWriter
@@ -313,6 +314,22 @@ def test_an_error_leaves_nothing_behind(tmp_path: Path, storage: str) -> None:
         bag.write_string("/text", START_NS, "x")
         raise RuntimeError
     assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("count", [2, 200])
+def test_a_full_disk_is_told_with_the_path_of_the_bag(tmp_path: Path, count: int) -> None:
+    """A limit of the size stands for the disk, met by a chunk on the way or at the end."""
+    path, noise = tmp_path / "bag", np.random.default_rng(0).bytes(20_000)
+    before = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (10_000, before[1]))
+    try:
+        told = rf"cannot write {path}: File too large; make room"
+        with pytest.raises(CardboxError, match=told), BagWriter(path) as bag:
+            for number in range(count):
+                bag.write_compressed("/image/compressed", stamp(number), "camera", noise)
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, before)
+    assert not list(tmp_path.iterdir())
 
 
 def test_an_error_keeps_the_recording_that_was_there(tmp_path: Path) -> None:

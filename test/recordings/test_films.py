@@ -5,6 +5,7 @@ from __future__ import annotations
 import struct
 from pathlib import Path
 
+import av
 import cv2
 import numpy as np
 import pytest
@@ -53,6 +54,23 @@ def test_the_length_of_a_film_is_what_it_shows(tmp_path: Path, share: float) -> 
 def test_the_stated_length_counts_from_the_first_image(tmp_path: Path, suffix: str) -> None:
     with open_images(film(tmp_path / f"a.{suffix}"), FOV) as video:
         assert video.duration_s == pytest.approx(29 / 15, abs=1e-3)
+
+
+def test_a_webm_that_states_1000_images_a_second_is_whole(tmp_path: Path) -> None:
+    """Browsers write the clock of the file as the rate: 30 images of 33 ms are no lack of 928."""
+    with av.open(str(tmp_path / "a.webm"), "w") as file:
+        stream = file.add_stream("libvpx", 1000)
+        stream.width, stream.height = 64, 48
+        for number in range(30):
+            image = av.VideoFrame.from_ndarray(np.full((48, 64, 3), number, np.uint8), "bgr24")
+            image.pts = 33 * number
+            file.mux(stream.encode(image))
+        file.mux(stream.encode())
+    with open_images(tmp_path / "a.webm", FOV) as video:
+        stamps_ns = [image.stamp_ns for image in video.images()]
+        np.testing.assert_allclose(stamps_ns, 33e6 * np.arange(30), atol=1e3)
+        assert video.duration_s == pytest.approx(0.957)
+        assert video.remarks == [] and video.left_out("") == []
 
 
 @pytest.mark.parametrize(
