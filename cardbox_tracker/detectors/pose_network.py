@@ -104,7 +104,7 @@ class Detection(NamedTuple):
 
     def silhouette(self) -> NDArray[np.uint8]:
         """Return the silhouette (H, W), 255 where a pixel more likely shows the person, else 0."""
-        return np.where(self.mask >= _LEAST_MASK, 255, 0).astype(np.uint8)
+        return np.asarray(np.uint8(255) * (self.mask >= _LEAST_MASK))
 
 
 def figure_of(found: Detection) -> Figure:
@@ -321,7 +321,9 @@ def _square_of(centre: FloatArray, rim: FloatArray) -> Square:
 
 def cut_out(image: ColorImage, square: Square, size: int, border: int) -> NDArray[np.float32]:
     """Return a square of the image at ``size`` pixels, values 0 to 1."""
-    return _warped(image, square, size, border).astype(np.float32) / 255.0
+    cut = _warped(image, square, size, border).astype(np.float32)
+    cut /= 255.0
+    return cut
 
 
 def _warped(image: ColorImage, square: Square, size: int, border: int) -> NDArray[np.uint8]:
@@ -373,9 +375,9 @@ def _mask_in_image(
 ) -> NDArray[np.uint8]:
     """Return the network's mask, whose values are logits, in the image, (H, W)."""
     matrix = _to_image(square, len(logits))
-    mask = cv2.warpAffine(_chance(logits), matrix, (shape[1], shape[0]))
-    pixels: NDArray[np.uint8] = np.rint(255.0 * mask).astype(np.uint8)
-    return pixels
+    mask = np.asarray(cv2.warpAffine(_chance(logits), matrix, (shape[1], shape[0])))
+    mask *= 255.0
+    return np.rint(mask, out=mask).astype(np.uint8)
 
 
 def _chance(logits: NDArray[Any]) -> FloatArray:

@@ -153,7 +153,7 @@ def silhouette_within(depth_m: DepthImage, within_m: float) -> NDArray[np.uint8]
     below the hips, which does not count.
     """
     is_known = np.isfinite(depth_m) & (depth_m > 0)
-    near = np.where(is_known & (depth_m < within_m), 255, 0).astype(np.uint8)
+    near = np.uint8(255) * (is_known & (depth_m < within_m))
     width = max(3, round(_GAP * depth_m.shape[1]) | 1)
     closed = cv2.morphologyEx(near, cv2.MORPH_CLOSE, np.ones((width, width), np.uint8))
     near[~is_known & (np.asarray(closed) > 0)] = 255
