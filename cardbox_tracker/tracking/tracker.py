@@ -124,7 +124,8 @@ class Tracker:
         if is_tilted:
             self.camera = self.camera.with_pitch(pose.pitch_rad)
             self._place = PlaceWatch(self.body, self.camera)
-            self._before = None if self._before is None else moved(self._before[None])[0]
+            if self._before is not None:
+                self._before = moved(self._before[None])[0]
         self._silhouette = CompiledSilhouette(self.body, self.camera)
         for camera in self.cameras:
             camera.use(self.body, self.camera, self.config)
