@@ -110,6 +110,26 @@ class Tracker:
             self.agreement = CameraAgreement(self.body, self.camera, views, self.agreement)
         self._legs = LegReader(self.body, self.camera)
 
+    def reset(self) -> None:
+        """Forget the posture; the next frame is tracked from the front reference posture."""
+        make_filter = self._make_filter or FILTERS[self.config.filter]
+        for camera in self.cameras:
+            camera.reset(self.config)
+        self._now_ns = 0
+        rng = self._rng.spawn(1)[0]
+        self._filter = make_filter(self.config, self._silhouette, rng, self.views)
+        self._head = HeadTracker(self.body, self.camera)
+        self._legs.forget()
+        self._hands = None if self._look is None else HandReader(self._look)
+        # The outlines of several cameras determine the direction; the paper has no such doubt.
+        has_doubt = self.config.has_several_views and self._is_alone
+        self._facing = Facing(self.body) if has_doubt else None
+        self._poor_frames = 0
+        self._last_ns: int | None = None
+        self._particles: Particles | None = None
+        # State (14,) of the previous frame for the terms.
+        self._before: FloatArray | None = None
+
     def use(self, body: BodyModel, stamp_ns: int | None = None, is_new_start: bool = False) -> None:
         """Track the next version of the body from the image of a stamp on.
 
@@ -137,26 +157,6 @@ class Tracker:
         self._head = HeadTracker(self.body, self.camera)
         if is_tilted:
             self._filter.move(moved)
-
-    def reset(self) -> None:
-        """Forget the posture; the next frame is tracked from the front reference posture."""
-        make_filter = self._make_filter or FILTERS[self.config.filter]
-        for camera in self.cameras:
-            camera.reset(self.config)
-        self._now_ns = 0
-        rng = self._rng.spawn(1)[0]
-        self._filter = make_filter(self.config, self._silhouette, rng, self.views)
-        self._head = HeadTracker(self.body, self.camera)
-        self._legs.forget()
-        self._hands = None if self._look is None else HandReader(self._look)
-        # The outlines of several cameras determine the direction; the paper has no such doubt.
-        has_doubt = self.config.has_several_views and self._is_alone
-        self._facing = Facing(self.body) if has_doubt else None
-        self._poor_frames = 0
-        self._last_ns: int | None = None
-        self._particles: Particles | None = None
-        # State (14,) of the previous frame for the terms.
-        self._before: FloatArray | None = None
 
     def configure(self, config: TrackerConfig) -> bool:
         """Use other settings from the next frame on; return whether tracking starts again."""
