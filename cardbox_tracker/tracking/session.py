@@ -219,8 +219,8 @@ class Session:
             # The paper's filter cannot go on with another version of a body.
             pause_s = 1.0 if self.config.has_several_views else np.inf
             camera = self._camera.with_pitch(body.camera_pose.pitch_rad)
-            given = body, camera, self.config, rng.spawn(1)[0], pause_s, self._beside
-            measuring = SeenBody(*given)
+            fits = rng.spawn(1)[0]
+            measuring = SeenBody(body, camera, self.config, fits, pause_s, self._beside)
         given = body, self._camera, self.config, rng
         tracker = Tracker(*given, others=self._others, look=self._look)
         self._people.append(_Person(number, tracker, measuring))

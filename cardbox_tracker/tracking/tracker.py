@@ -110,33 +110,6 @@ class Tracker:
             self.agreement = CameraAgreement(self.body, self.camera, views, self.agreement)
         self._legs = LegReader(self.body, self.camera)
 
-    def use(self, body: BodyModel, stamp_ns: int | None = None, is_new_start: bool = False) -> None:
-        """Track the next version of the body from the image of a stamp on.
-
-        The posture goes on, at the same place in the image if the camera's pitch is another one,
-        unless ``is_new_start`` says that it is somebody else, or the filter is the paper's.
-        """
-        before, pose = self.body, body.camera_pose
-        body = replace(body, version=before.version + 1, stamp_ns=stamp_ns or 0)
-        self.body = self.config.with_shoulders(body)
-        moved = partial(tilted_states, before=before, after=self.body)
-        is_tilted = pose != before.camera_pose
-        if is_tilted:
-            self.camera = self.camera.with_pitch(pose.pitch_rad)
-            self._place = PlaceWatch(self.body, self.camera)
-            self._before = None if self._before is None else moved(self._before[None])[0]
-        self._silhouette = CompiledSilhouette(self.body, self.camera)
-        for camera in self.cameras:
-            camera.use(self.body, self.camera, self.config)
-        self._compare()
-        if is_new_start or not isinstance(self._filter, WholeBodyFilter):
-            self.reset()
-            return
-        self._filter.use(self._silhouette, self.views)
-        self._head = HeadTracker(self.body, self.camera)
-        if is_tilted:
-            self._filter.move(moved)
-
     def reset(self) -> None:
         """Forget the posture; the next frame is tracked from the front reference posture."""
         make_filter = self._make_filter or FILTERS[self.config.filter]
@@ -156,6 +129,34 @@ class Tracker:
         self._particles: Particles | None = None
         # State (14,) of the previous frame for the terms.
         self._before: FloatArray | None = None
+
+    def use(self, body: BodyModel, stamp_ns: int | None = None, is_new_start: bool = False) -> None:
+        """Track the next version of the body from the image of a stamp on.
+
+        The posture goes on, at the same place in the image if the camera's pitch is another one,
+        unless ``is_new_start`` says that it is somebody else, or the filter is the paper's.
+        """
+        before, pose = self.body, body.camera_pose
+        body = replace(body, version=before.version + 1, stamp_ns=stamp_ns or 0)
+        self.body = self.config.with_shoulders(body)
+        moved = partial(tilted_states, before=before, after=self.body)
+        is_tilted = pose != before.camera_pose
+        if is_tilted:
+            self.camera = self.camera.with_pitch(pose.pitch_rad)
+            self._place = PlaceWatch(self.body, self.camera)
+            if self._before is not None:
+                self._before = moved(self._before[None])[0]
+        self._silhouette = CompiledSilhouette(self.body, self.camera)
+        for camera in self.cameras:
+            camera.use(self.body, self.camera, self.config)
+        self._compare()
+        if is_new_start or not isinstance(self._filter, WholeBodyFilter):
+            self.reset()
+            return
+        self._filter.use(self._silhouette, self.views)
+        self._head = HeadTracker(self.body, self.camera)
+        if is_tilted:
+            self._filter.move(moved)
 
     def configure(self, config: TrackerConfig) -> bool:
         """Use other settings from the next frame on; return whether tracking starts again."""

@@ -12,6 +12,7 @@ import numpy as np
 from cardbox_tracker.search import doubt, whole_body
 from cardbox_tracker.search.config import default_preset
 from cardbox_tracker.search.whole_body import STAGES, WholeBodyFilter
+from cardbox_tracker.tracking.tracked_camera import TrackedCamera
 from cardbox_tracker.tracking.tracker import Tracker
 from lab.benchmarks.scene import BenchmarkScene
 from lab.benchmarks.tools import WARM_UP, summary
@@ -19,7 +20,7 @@ from lab.benchmarks.tools import WARM_UP, summary
 WHOLE = "the whole frame"
 # No part contains another one, so that the rest is the difference to the whole.
 _PARTS: dict[str, tuple[Any, str]] = {
-    "region of the person": (Tracker, "_frames_of"),
+    "region of the person": (TrackedCamera, "frame"),
     "silhouette as bits, presence": (WholeBodyFilter, "look"),
     "place of the person": (WholeBodyFilter, "_observe"),
     "refinement": (WholeBodyFilter, "_refined"),

@@ -45,6 +45,7 @@ from cardbox_tracker.tracking.hands import HandReader
 from cardbox_tracker.tracking.head import HeadTracker
 from cardbox_tracker.tracking.legs import LegReader
 from cardbox_tracker.tracking.session import Session
+from cardbox_tracker.tracking.tracked_camera import TrackedCamera
 from cardbox_tracker.tracking.tracker import Tracker
 from lab.benchmarks.report import write_report
 from lab.evaluation.results import commit, read_json, write_json
@@ -62,7 +63,7 @@ STEPS: Mapping[str, Sequence[tuple[Any, str]]] = {
     "camera of the scene": [(scene, "found_camera")],
     "bodies of the scene": [(scene, "seen_person"), (scene, "seen_people")],
     "assignment of people": [(Session, "track")],
-    "frame": [(Tracker, "_frames_of")],
+    "frame": [(TrackedCamera, "frame")],
     "search": [(WholeBodyFilter, "look"), (WholeBodyFilter, "follow")],
     "refiner": [(WholeBodyFilter, "_refined")],
     "doubt": [(Doubt, "judge")],

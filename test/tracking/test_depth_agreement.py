@@ -89,7 +89,7 @@ def test_a_tracker_tells_depth_of_another_view_and_does_not_use_it() -> None:
         wrong.track(Observation(mask, depth_m=depth_m))
     (text,) = wrong.remarks()
     assert "another view" in text
-    frame = wrong._frames_of([Observation(mask, depth_m=depth_m)])[0]
+    frame = wrong.frames([Observation(mask, depth_m=depth_m)])[0]
     assert frame.depth_m is None
     for _ in range(20):
         without.track(Observation(mask))
