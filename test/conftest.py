@@ -9,6 +9,7 @@ import itertools
 import os
 import signal
 import socket
+import sys
 import warnings
 import zlib
 from collections import deque
@@ -36,6 +37,10 @@ with contextlib.suppress(ImportError), warnings.catch_warnings():
     # What rclpy imports with the first message uses modules that Python has deprecated.
     warnings.simplefilter("ignore", DeprecationWarning)
     importlib.import_module("lark")
+
+# Otherwise each process of a run would compile 800 files of the tests and the package anew.
+os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
+sys.dont_write_bytecode = False
 
 # How long an example takes says nothing of the program on a busy machine.
 settings.register_profile("untimed", deadline=None)
