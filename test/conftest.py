@@ -14,6 +14,7 @@ import warnings
 import zlib
 from collections import deque
 from collections.abc import Callable, Iterator
+from pathlib import Path
 from typing import Any
 
 # As in the programs, before NumPy is imported; processes that tests start inherit it.
@@ -57,6 +58,7 @@ settings.load_profile("long" if "RELIABILITY_EXAMPLES" in os.environ else "untim
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
     signal.signal(signal.SIGINT, signal.default_int_handler)
 
+TESTS = Path(__file__).parent
 # One more than the cores of a small machine, since the tests with nodes mostly wait.
 PROCESSES = 3
 WORKER = int(os.environ.get("PYTEST_XDIST_WORKER", "gw0")[2:])
@@ -90,11 +92,17 @@ def pytest_cmdline_main(config: pytest.Config) -> None:
         config.option.loadscopereorder = False
 
 
+def pytest_pycollect_makemodule(module_path: Path) -> None:
+    """Skip the tests of nodes where ROS is not installed; they import it."""
+    if module_path.relative_to(TESTS).parts[0] in ("ros", "system"):
+        pytest.importorskip("rclpy", reason="rclpy is not installed")
+
+
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """Put files that take longest first, and spread those that wait, so that no core is idle."""
     if not items or not hasattr(items[0].config, "workerinput"):
         return
-    folder = {i.path: i.path.relative_to(i.config.rootpath / "test").parts[0] for i in items}
+    folder = {i.path: i.path.relative_to(TESTS).parts[0] for i in items}
     waiting = [path for path in folder if folder[path] == "system"]
     order = {name: rank for rank, name in enumerate(LONGEST)}
     computing = sorted(

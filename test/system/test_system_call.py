@@ -8,14 +8,11 @@ import sys
 from typing import Any
 
 import pytest
+from std_msgs.msg import String
+from std_srvs.srv import Trigger
 
-rclpy = pytest.importorskip("rclpy", reason="rclpy is not installed")
-
-from std_msgs.msg import String  # noqa: E402
-from std_srvs.srv import Trigger  # noqa: E402
-
-from cardbox_tracker.commands.main import main  # noqa: E402
-from cardbox_tracker.ros.runtime import qos  # noqa: E402
+from cardbox_tracker.commands.main import main
+from cardbox_tracker.ros.runtime import qos
 
 CALL = """
 import sys

@@ -9,13 +9,10 @@ from typing import Any
 import cv2
 import numpy as np
 import pytest
+from sensor_msgs.msg import CameraInfo, Image
 
-rclpy = pytest.importorskip("rclpy", reason="rclpy is not installed")
-
-from sensor_msgs.msg import CameraInfo, Image  # noqa: E402
-
-from cardbox_tracker.ros.messages.conversions import stamp_ns  # noqa: E402
-from cardbox_tracker.ros.runtime import qos  # noqa: E402
+from cardbox_tracker.ros.messages.conversions import stamp_ns
+from cardbox_tracker.ros.runtime import qos
 
 CALIBRATION = """\
 image_width: 64

@@ -9,15 +9,12 @@ from typing import Any
 
 import numpy as np
 import pytest
+from sensor_msgs.msg import CameraInfo, Image
+from std_msgs.msg import String
 
-rclpy = pytest.importorskip("rclpy", reason="rclpy is not installed")
-
-from sensor_msgs.msg import CameraInfo, Image  # noqa: E402
-from std_msgs.msg import String  # noqa: E402
-
-from cardbox_tracker.recordings.bag_writer import BagWriter  # noqa: E402
-from cardbox_tracker.ros.messages.conversions import stamp_ns  # noqa: E402
-from cardbox_tracker.ros.runtime import qos  # noqa: E402
+from cardbox_tracker.recordings.bag_writer import BagWriter
+from cardbox_tracker.ros.messages.conversions import stamp_ns
+from cardbox_tracker.ros.runtime import qos
 
 START_NS = 1_700_000_000_000_000_000
 PERIOD_NS = 50_000_000
