@@ -1,4 +1,4 @@
-"""What all tests share: two processes for a whole run, a ROS domain for each graph of nodes."""
+"""What all tests share: three processes for a whole run, a ROS domain for each graph of nodes."""
 
 from __future__ import annotations
 
@@ -9,11 +9,16 @@ import itertools
 import os
 import signal
 import socket
+import sys
 import warnings
 import zlib
 from collections import deque
 from collections.abc import Callable, Iterator
+from pathlib import Path
 from typing import Any
+
+# As in the programs, before NumPy is imported; processes that tests start inherit it.
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 import numpy as np
 import pytest
@@ -34,6 +39,10 @@ with contextlib.suppress(ImportError), warnings.catch_warnings():
     warnings.simplefilter("ignore", DeprecationWarning)
     importlib.import_module("lark")
 
+# Otherwise each process of a run would compile 800 files of the tests and the package anew.
+os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
+sys.dont_write_bytecode = False
+
 # How long an example takes says nothing of the program on a busy machine.
 settings.register_profile("untimed", deadline=None)
 settings.register_profile(
@@ -49,33 +58,27 @@ settings.load_profile("long" if "RELIABILITY_EXAMPLES" in os.environ else "untim
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
     signal.signal(signal.SIGINT, signal.default_int_handler)
 
-# As in the programs; the processes of the tests, and what they start, inherit it.
-os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-
-PROCESSES = 2
+TESTS = Path(__file__).parent
+# One more than the cores of a small machine, since the tests with nodes mostly wait.
+PROCESSES = 3
 WORKER = int(os.environ.get("PYTEST_XDIST_WORKER", "gw0")[2:])
 # Above 101, domains collide with ephemeral ports.
 MOST_DOMAINS = 100
 
-# These take longest; begun first, none of them is left over at the end for one process alone.
+# These compute longest; begun first, none of them is left over at the end for one process alone.
 LONGEST = (
-    "system",
-    "tracking",
-    "measuring",
-    "search",
-    "terms",
-    "lab",
-    "applications",
-    "ros",
-    "recordings",
+    *("test_project_files.py", "test_package.py", "tracking", "measuring", "commands"),
+    *("reliability", "lab", "search", "terms", "applications", "ros", "recordings"),
 )
+# Files that compute between two files of tests that wait for nodes.
+BETWEEN = 10
 
 
 @pytest.hookimpl(tryfirst=True)
 def pytest_cmdline_main(config: pytest.Config) -> None:
     """Divide a run of all files among processes; whoever names files or -n decides themselves.
 
-    Much of the time is spent waiting for nodes. Files stay whole, since their tests share graphs.
+    Files stay whole, since their tests share graphs.
     """
     if (
         config.pluginmanager.hasplugin("xdist")
@@ -89,15 +92,25 @@ def pytest_cmdline_main(config: pytest.Config) -> None:
         config.option.loadscopereorder = False
 
 
+def pytest_pycollect_makemodule(module_path: Path) -> None:
+    """Skip the tests of nodes where ROS is not installed; they import it."""
+    if module_path.relative_to(TESTS).parts[0] in ("ros", "system"):
+        pytest.importorskip("rclpy", reason="rclpy is not installed")
+
+
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Put the folders that take longest first."""
-
-    def rank(item: pytest.Item) -> int:
-        folder = item.path.relative_to(item.config.rootpath / "test").parts[0]
-        return LONGEST.index(folder) if folder in LONGEST else len(LONGEST)
-
-    if items and hasattr(items[0].config, "workerinput"):
-        items.sort(key=rank)
+    """Put files that take longest first, and spread those that wait, so that no core is idle."""
+    if not items or not hasattr(items[0].config, "workerinput"):
+        return
+    folder = {i.path: i.path.relative_to(TESTS).parts[0] for i in items}
+    waiting = [path for path in folder if folder[path] == "system"]
+    order = {name: rank for rank, name in enumerate(LONGEST)}
+    computing = sorted(
+        folder.keys() - set(waiting), key=lambda path: (order.get(folder[path], len(order)), path)
+    )
+    places = {path: float(BETWEEN * place) for place, path in enumerate(waiting)}
+    places |= {path: place + 0.5 for place, path in enumerate(computing)}
+    items.sort(key=lambda item: places[item.path])
 
 
 @pytest.hookimpl(wrapper=True)

@@ -84,8 +84,7 @@ class BagWriter:
         """Open a temporary folder beside the target; raise BagError if it cannot be written."""
         self._resources = ExitStack()
         try:
-            claim = claimed_name(self.path, is_folder=True)
-            self._folder = self._resources.enter_context(claim)
+            self._folder = self._resources.enter_context(claimed_name(self.path, is_folder=True))
         except CardboxError as error:
             raise BagError(str(error)) from None
         self.folder = self._folder / self.path.name

@@ -318,7 +318,7 @@ def test_the_cameras_pitch_is_found_from_the_recording(
 
     rolls: list[float] = []
     monkeypatch.setattr("cardbox_tracker.recordings.recording.DetectorSilhouetteSource", opened)
-    words = ("--fov", fov, "--stature", 1.72, "--start", 16, "--detector", "mediapipe")
+    words = ("--fov", fov, "--stature", 1.72, "--start=16", "--end=17.5", "--detector=mediapipe")
     done = cardbox("track", film, *words)
     assert done.code == 0, done.err
     for part in expected:

@@ -60,12 +60,23 @@ def recordings(files: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
+@pytest.fixture(scope="module")
+def both(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return where the results of two processes are to be."""
+    return tmp_path_factory.mktemp("results") / "both"
+
+
 def test_two_processes_write_the_bytes_of_one_after_the_other(
-    files: Path, recordings: Path, tmp_path: Path, cardbox: Callable
+    files: Path,
+    recordings: Path,
+    both: Path,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    cardbox: Callable,
 ) -> None:
-    given = words(files)
-    alone, both = tmp_path / "alone", tmp_path / "both"
-    many = cardbox("track", recordings, *given, "--output", both, "--jobs=2", "--formats", "bag")
+    monkeypatch.chdir(recordings.parent)
+    given, alone, folder = words(files), tmp_path / "alone", recordings.name
+    many = cardbox("track", folder, *given, "--output", both, "--jobs=2", "--formats", "bag")
     for name, start in (("a", "15.6"), ("anna/b", "17")):
         (alone / name).parent.mkdir(parents=True, exist_ok=True)
         outputs = (f"--csv={alone / name}.csv", f"--bag={alone / name}.bag")
@@ -98,23 +109,22 @@ def scheduler() -> Iterator[Any]:
 def test_a_dask_cluster_writes_the_same_bytes(
     files: Path,
     recordings: Path,
+    both: Path,
     tmp_path: Path,
     scheduler: Any,
     monkeypatch: pytest.MonkeyPatch,
     cardbox: Callable,
 ) -> None:
     """Paths are relative to the folder of the command, not to that of the workers."""
-    monkeypatch.chdir(tmp_path)
-    folder = Path(os.path.relpath(recordings))
-    (alone, both), given = ("alone", "both"), words(files)
-    here = cardbox("track", folder, *given, "--output", alone, "--jobs=1")
-    address = ("--scheduler", scheduler.scheduler_address)
-    there = cardbox("track", folder, *given, "--output", both, *address)
-    assert here.code == there.code == 1, there.err
+    monkeypatch.chdir(recordings.parent)
+    given = (*words(files), "--formats=bag", "--scheduler", scheduler.scheduler_address)
+    output = os.path.relpath(tmp_path / "there")
+    there = cardbox("track", recordings.name, *given, "--output", output)
+    assert there.code == 1, there.err
     assert "2 of 4 recordings failed\n  cut, cut2: cannot read" in there.err
-    assert results(tmp_path / both) == results(tmp_path / alone)
+    assert results(tmp_path / "there") == results(both)
     monkeypatch.setattr(track_folder, "digest_of_program", lambda: "another")
-    there = cardbox("track", folder, *given, "--output", "other", *address)
+    there = cardbox("track", recordings.name, *given, "--output", output)
     assert "another version of the package" in there.err
 
 
@@ -368,7 +378,7 @@ def test_ctrl_c_ends_all_processes_without_a_traceback(files: Path, tmp_path: Pa
     for number in range(8):
         shutil.copytree(files / "session", folder / f"{number}")
     command = [sys.executable, "-m", "cardbox_tracker.start", "cardbox", "track", str(folder)]
-    given = [*words(files), "--effort=4", "--jobs=2", f"--output={out}"]
+    given = [*words(files), "--jobs=2", f"--output={out}"]
     with subprocess.Popen(
         command + given, stderr=subprocess.PIPE, start_new_session=True, text=True
     ) as process:

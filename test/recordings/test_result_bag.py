@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib.util
+import json
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -121,11 +122,11 @@ def test_type_hashes_are_those_of_the_installed_messages(
 
 def installed_hash(kind: str) -> str:
     package, _, name = kind.split("/")
-    share = Path(importlib.import_module(package).__file__ or "").parents[4]
-    found = sorted(share.rglob(f"share/{package}/msg/{name}.json"))
-    if not found:
+    prefix = Path(importlib.import_module(package).__file__ or "").parents[4]
+    found = prefix / "share" / package / "msg" / f"{name}.json"
+    if not found.exists():
         pytest.skip("the message packages are installed without their descriptions")
-    hashes = yaml.safe_load(found[0].read_text())["type_hashes"]
+    hashes = json.loads(found.read_text())["type_hashes"]
     return str(next(h["hash_string"] for h in hashes if h["type_name"] == kind))
 
 

@@ -3,7 +3,7 @@
 ``test_kernels.py`` runs this program, because what such an array may cause ends a process. A line
 of the input is JSON: ``call``, ``size``, ``numbers``, and ``arrays``, each with the keys of
 :func:`array_of`. The answer is a line: empty if the function returned or refused the arrays in
-words, else the error.
+words, else the error; and how many of the arrays it took.
 """
 
 from __future__ import annotations
@@ -101,12 +101,11 @@ def array_of(shape: tuple[int, ...], kind: str, content: str, seed: int, layout:
     return array
 
 
-def taker(described: list[dict[str, Any]], size: tuple[int, int]) -> Take:
+def taker(queue: Iterator[dict[str, Any]], size: tuple[int, int]) -> Take:
     """Return what makes the next described array.
 
     The shape and type that a function expects hold unless the description has others.
     """
-    queue = iter(described)
 
     def take(
         kind: str = "u1", shape: tuple[int, ...] | None = None, more: tuple[int, ...] = ()
@@ -304,10 +303,10 @@ CALLS: dict[str, Callable[[Take, Iterator[int]], Any]] = {
 }
 
 
-def answer(described: dict[str, Any]) -> str:
+def answer(described: dict[str, Any], queue: Iterator[dict[str, Any]]) -> str:
     """Call a function; return the text of an error that is no refusal."""
     size = tuple(described["size"])
-    take: Any = partial(taker(described["arrays"], size))
+    take: Any = partial(taker(queue, size))
     take.size = size
     try:
         CALLS[described["call"]](take, iter(described["numbers"]))
@@ -323,7 +322,11 @@ def main() -> None:
     answers = os.fdopen(os.dup(1), "w")
     os.dup2(2, 1)
     for line in sys.stdin:
-        print(json.dumps(answer(json.loads(line))), file=answers, flush=True)
+        described = json.loads(line)
+        queue = iter(described["arrays"])
+        error = answer(described, queue)
+        taken = len(described["arrays"]) - len(list(queue))
+        print(json.dumps((error, taken)), file=answers, flush=True)
 
 
 if __name__ == "__main__":

@@ -8,8 +8,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-pytest.importorskip("rclpy", reason="rclpy is not installed")
-
 from lab.tools.fault_nodes import InsideNodes
 from lab.tools.fault_scene import FAULTS, START_NS, Found, Person, S, even, judge, run_of
 

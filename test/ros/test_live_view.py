@@ -7,15 +7,13 @@ from typing import Any
 
 import numpy as np
 import pytest
+import rclpy
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
+from geometry_msgs.msg import Point, Pose, PoseArray
+from sensor_msgs.msg import Image, JointState
+from std_msgs.msg import String
 
-rclpy = pytest.importorskip("rclpy", reason="rclpy is not installed")
-
-from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus  # noqa: E402
-from geometry_msgs.msg import Point, Pose, PoseArray  # noqa: E402
-from sensor_msgs.msg import Image, JointState  # noqa: E402
-from std_msgs.msg import String  # noqa: E402
-
-from cardbox_tracker.ros import live_view  # noqa: E402
+from cardbox_tracker.ros import live_view
 
 TOPICS = {
     *("body_model", "tracking_state", "joint_states", "joint_states_stddev", "keypoints"),

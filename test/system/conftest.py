@@ -218,6 +218,12 @@ class Graph:
         logs = "\n".join(f"--- {p.log.name}\n{p.text()[-1500:]}" for p in self.processes)
         raise AssertionError(f"{what}: not within {timeout_s:g} s\n{logs}")
 
+    def ended(self, process: Process) -> int | None:
+        """Wait until a process ends by itself, and return its exit code."""
+        self.wait(lambda: process.poll() is not None, f"the end of {process.log.name}")
+        self.processes.remove(process)
+        return process.code
+
     def spin(self, duration_s: float) -> None:
         """Spin for a while."""
         end = time.monotonic() + duration_s

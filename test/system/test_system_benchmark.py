@@ -6,8 +6,6 @@ from pathlib import Path
 
 import pytest
 
-pytest.importorskip("rclpy", reason="rclpy is not installed")
-
 from lab.benchmarks import nodes as benchmark_nodes
 
 

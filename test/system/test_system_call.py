@@ -8,13 +8,11 @@ import sys
 from typing import Any
 
 import pytest
+from std_msgs.msg import String
+from std_srvs.srv import Trigger
 
-rclpy = pytest.importorskip("rclpy", reason="rclpy is not installed")
-
-from std_msgs.msg import String  # noqa: E402
-from std_srvs.srv import Trigger  # noqa: E402
-
-from cardbox_tracker.ros.runtime import qos  # noqa: E402
+from cardbox_tracker.commands.main import main
+from cardbox_tracker.ros.runtime import qos
 
 CALL = """
 import sys
@@ -72,11 +70,9 @@ def test_a_refusal_is_told_in_the_nodes_own_words(graph: Any) -> None:
 
 
 @pytest.mark.parametrize("name", ["", "no name", "//do"])
-def test_what_is_no_name_of_a_service_is_told(graph: Any, name: str) -> None:
-    result = called(graph, name)
-    assert result.returncode == 1
-    assert f"{name!r} is not a valid name" in result.stderr
-    assert "Traceback" not in result.stderr
+def test_what_is_no_name_of_a_service_is_told(name: str, capsys: pytest.CaptureFixture) -> None:
+    assert main(["call", name]) == 1
+    assert f"{name!r} is not a valid name" in capsys.readouterr().err
 
 
 @pytest.mark.slow

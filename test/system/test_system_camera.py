@@ -9,13 +9,10 @@ from typing import Any
 import cv2
 import numpy as np
 import pytest
+from sensor_msgs.msg import CameraInfo, Image
 
-rclpy = pytest.importorskip("rclpy", reason="rclpy is not installed")
-
-from sensor_msgs.msg import CameraInfo, Image  # noqa: E402
-
-from cardbox_tracker.ros.messages.conversions import stamp_ns  # noqa: E402
-from cardbox_tracker.ros.runtime import qos  # noqa: E402
+from cardbox_tracker.ros.messages.conversions import stamp_ns
+from cardbox_tracker.ros.runtime import qos
 
 CALIBRATION = """\
 image_width: 64
@@ -103,41 +100,29 @@ def test_a_video_has_its_own_rate_unless_another_one_is_given(
         ({"file": "/nowhere.mp4"}, ("no video /nowhere.mp4",)),
         ({"file": __file__}, ("OpenCV cannot read", "ffmpeg")),
         ({"device": "''"}, ("both empty",)),
+        ({"file": "VIDEO", "calibration_file": "/nowhere.yaml"}, ("/nowhere.yaml",)),
     ],
 )
 def test_a_source_that_cannot_be_opened_says_what_to_do(
-    graph: Any, parameters: dict[str, str], words: tuple[str, ...]
+    graph: Any, video: Path, parameters: dict[str, str], words: tuple[str, ...]
 ) -> None:
-    process = graph.start("camera", **parameters)
-    graph.wait(lambda: process.poll() is not None, "the end of the process")
-    graph.processes.remove(process)
-    assert process.code == 1
+    given = {name: value.replace("VIDEO", str(video)) for name, value in parameters.items()}
+    process = graph.start("camera", **given)
+    assert graph.ended(process) == 1
     for word in words:
         assert word in process.text()
     assert "Traceback" not in process.text()
 
 
-def test_an_unreadable_calibration_is_named(graph: Any, video: Path) -> None:
-    process = graph.start("camera", file=video, calibration_file="/nowhere.yaml")
-    graph.wait(lambda: process.poll() is not None, "the end of the process")
-    graph.processes.remove(process)
-    assert process.code == 1
-    assert "/nowhere.yaml" in process.text() and "Traceback" not in process.text()
-
-
 def test_devices_are_listed_without_a_graph(graph: Any) -> None:
     process = graph.start("camera", "--list")
-    graph.wait(lambda: process.poll() is not None, "the end of the process")
-    graph.processes.remove(process)
-    assert process.code == 0
+    assert graph.ended(process) == 0
     assert "video" in process.text() and "Traceback" not in process.text()
 
 
 def test_an_unknown_option_is_told_without_a_traceback(graph: Any) -> None:
     for name, wrong in (("camera", "--lst"), ("play_bag", "--rate=fast"), ("cardbox_nodes", "x")):
         process = graph.start(name, wrong)
-        graph.wait(lambda process=process: process.poll() is not None, "the end")
-        graph.processes.remove(process)
-        assert process.code == 2
+        assert graph.ended(process) == 2
         assert wrong.split("=")[-1] in process.text() and "usage:" in process.text()
         assert "Traceback" not in process.text()

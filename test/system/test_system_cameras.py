@@ -11,17 +11,13 @@ from typing import Any
 import numpy as np
 import pytest
 import yaml
+from geometry_msgs.msg import PoseArray
+from sensor_msgs.msg import CameraInfo, Image, JointState
+from std_msgs.msg import Header, String
 
 from cardbox_tracker.person.model_file import loads_body_model, save_body_model
-
-rclpy = pytest.importorskip("rclpy", reason="rclpy is not installed")
-
-from geometry_msgs.msg import PoseArray  # noqa: E402
-from sensor_msgs.msg import CameraInfo, Image, JointState  # noqa: E402
-from std_msgs.msg import Header, String  # noqa: E402
-
-from cardbox_tracker.ros.messages.conversions import camera_info_message, image_message  # noqa: E402
-from cardbox_tracker.ros.runtime import qos  # noqa: E402
+from cardbox_tracker.ros.messages.conversions import camera_info_message, image_message
+from cardbox_tracker.ros.runtime import qos
 
 LEARN_IMAGES = 10
 LATERAL_M = {"left": -0.35, "right": 0.3}

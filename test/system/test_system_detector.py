@@ -7,26 +7,23 @@ from typing import Any
 
 import numpy as np
 import pytest
+import rclpy
+from diagnostic_msgs.msg import DiagnosticArray
+from geometry_msgs.msg import Point32, Polygon, PolygonStamped
+from sensor_msgs.msg import CameraInfo, Image, JointState
+from std_msgs.msg import Header
 
+from cardbox_tracker.detectors.detector import PersonDetector
 from cardbox_tracker.detectors.pose_network import LANDMARKS, Detection
 from cardbox_tracker.person.kinematics import pose
 from cardbox_tracker.person.model_file import save_body_model
 from cardbox_tracker.person.posture import reference_posture
-
-rclpy = pytest.importorskip("rclpy", reason="rclpy is not installed")
-
-from diagnostic_msgs.msg import DiagnosticArray  # noqa: E402
-from geometry_msgs.msg import Point32, Polygon, PolygonStamped  # noqa: E402
-from sensor_msgs.msg import CameraInfo, Image, JointState  # noqa: E402
-from std_msgs.msg import Header  # noqa: E402
-
-from cardbox_tracker.detectors.detector import PersonDetector  # noqa: E402
-from cardbox_tracker.ros.messages.conversions import (  # noqa: E402
+from cardbox_tracker.ros.messages.conversions import (
     camera_info_message,
     image_message,
 )
-from cardbox_tracker.ros.nodes.detector_node import DetectorNode  # noqa: E402
-from cardbox_tracker.ros.runtime import qos  # noqa: E402
+from cardbox_tracker.ros.nodes.detector_node import DetectorNode
+from cardbox_tracker.ros.runtime import qos
 
 JOINTS = [f"{side}_{name}" for side in ("left", "right") for name in ("shoulder", "elbow", "wrist")]
 

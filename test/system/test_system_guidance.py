@@ -6,18 +6,15 @@ from typing import Any
 
 import numpy as np
 import pytest
+from diagnostic_msgs.msg import DiagnosticStatus
+from sensor_msgs.msg import CameraInfo, Image
+from std_msgs.msg import Bool, Header, String
+from std_srvs.srv import Trigger
 
-rclpy = pytest.importorskip("rclpy", reason="rclpy is not installed")
-
-from diagnostic_msgs.msg import DiagnosticStatus  # noqa: E402
-from sensor_msgs.msg import CameraInfo, Image  # noqa: E402
-from std_msgs.msg import Bool, Header, String  # noqa: E402
-from std_srvs.srv import Trigger  # noqa: E402
-
-from cardbox_tracker.applications.drawing.guidance import FIT_BGR  # noqa: E402
-from cardbox_tracker.ros.messages.conversions import camera_info_message, image_message  # noqa: E402
-from cardbox_tracker.ros.messages.results import mean_iou_of  # noqa: E402
-from cardbox_tracker.ros.runtime import qos  # noqa: E402
+from cardbox_tracker.applications.drawing.guidance import FIT_BGR
+from cardbox_tracker.ros.messages.conversions import camera_info_message, image_message
+from cardbox_tracker.ros.messages.results import mean_iou_of
+from cardbox_tracker.ros.runtime import qos
 
 
 class Person:

@@ -23,14 +23,13 @@ import yaml
 from cardbox_tracker.person.model_file import save_body_model
 from cardbox_tracker.recordings.bag_writer import BagWriter
 
-rclpy = pytest.importorskip("rclpy", reason="rclpy is not installed")
 pytest.importorskip("launch_ros", reason="launch_ros is not installed (not on PyPI)")
 pytest.importorskip("ros2launch", reason="ros2launch is not installed (not on PyPI)")
 
-from sensor_msgs.msg import Image, JointState  # noqa: E402
+from sensor_msgs.msg import Image, JointState
 
-from cardbox_tracker.ros.runtime import qos  # noqa: E402
-from cardbox_tracker.segmentation.background_config import BackgroundConfig  # noqa: E402
+from cardbox_tracker.ros.runtime import qos
+from cardbox_tracker.segmentation.background_config import BackgroundConfig
 
 EMPTY = BackgroundConfig().learn_images + 30
 FRONT = 120

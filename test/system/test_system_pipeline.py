@@ -13,27 +13,23 @@ from xml.etree import ElementTree as Xml
 
 import numpy as np
 import pytest
+from diagnostic_msgs.msg import DiagnosticArray
+from geometry_msgs.msg import PoseArray
 from numpy.typing import NDArray
+from rcl_interfaces.srv import GetParameters, SetParametersAtomically
+from rclpy.parameter import Parameter
+from sensor_msgs.msg import CameraInfo, Image, JointState
+from std_msgs.msg import Header, String
+from visualization_msgs.msg import Marker, MarkerArray
 
 from cardbox_tracker.person.kinematics import pose
 from cardbox_tracker.person.legs import LEG_NAMES
 from cardbox_tracker.person.model_file import loads_body_model
 from cardbox_tracker.person.posture import N_STATE, reference_posture
 from cardbox_tracker.person.skeleton import JOINT_NAMES, JOINT_STATE_NAMES
+from cardbox_tracker.ros.messages.conversions import camera_info_message, image_message
+from cardbox_tracker.ros.runtime import qos
 from cardbox_tracker.tracking.estimate import Estimate
-
-rclpy = pytest.importorskip("rclpy", reason="rclpy is not installed")
-
-from diagnostic_msgs.msg import DiagnosticArray  # noqa: E402
-from geometry_msgs.msg import PoseArray  # noqa: E402
-from rcl_interfaces.srv import GetParameters, SetParametersAtomically  # noqa: E402
-from rclpy.parameter import Parameter  # noqa: E402
-from sensor_msgs.msg import CameraInfo, Image, JointState  # noqa: E402
-from std_msgs.msg import Header, String  # noqa: E402
-from visualization_msgs.msg import Marker, MarkerArray  # noqa: E402
-
-from cardbox_tracker.ros.messages.conversions import camera_info_message, image_message  # noqa: E402
-from cardbox_tracker.ros.runtime import qos  # noqa: E402
 
 LEARN_IMAGES = 10
 ALL_NAMES = (*JOINT_STATE_NAMES, *LEG_NAMES)

@@ -4,17 +4,14 @@ from __future__ import annotations
 
 from typing import Any
 
-import pytest
+import rclpy
+from diagnostic_msgs.msg import DiagnosticStatus
+from rclpy.context import Context
+from sensor_msgs.msg import CompressedImage, Image, JointState
+from std_msgs.msg import Header
 
-rclpy = pytest.importorskip("rclpy", reason="rclpy is not installed")
-
-from diagnostic_msgs.msg import DiagnosticStatus  # noqa: E402
-from rclpy.context import Context  # noqa: E402
-from sensor_msgs.msg import CompressedImage, Image, JointState  # noqa: E402
-from std_msgs.msg import Header  # noqa: E402
-
-from cardbox_tracker.ros.messages.conversions import image_message  # noqa: E402
-from cardbox_tracker.ros.runtime import qos  # noqa: E402
+from cardbox_tracker.ros.messages.conversions import image_message
+from cardbox_tracker.ros.runtime import qos
 
 
 def is_reported(graph: Any, words: str) -> bool:

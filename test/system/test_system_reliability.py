@@ -19,29 +19,26 @@ from typing import Any
 
 import numpy as np
 import pytest
+from rcl_interfaces.srv import SetParameters
+from rclpy.parameter import Parameter
+from sensor_msgs.msg import CameraInfo, Image, JointState
+from std_msgs.msg import String
+from std_srvs.srv import Trigger
 
-rclpy = pytest.importorskip("rclpy", reason="rclpy is not installed")
-
-from rcl_interfaces.srv import SetParameters  # noqa: E402
-from rclpy.parameter import Parameter  # noqa: E402
-from sensor_msgs.msg import CameraInfo, Image, JointState  # noqa: E402
-from std_msgs.msg import String  # noqa: E402
-from std_srvs.srv import Trigger  # noqa: E402
-
-from cardbox_tracker.person.model_file import dumps_body_model, save_body_model  # noqa: E402
-from cardbox_tracker.person.skeleton import PLACE_NAMES  # noqa: E402
-from cardbox_tracker.recordings.outputs import posture_from, values_from  # noqa: E402
-from cardbox_tracker.ros.messages.conversions import (  # noqa: E402
+from cardbox_tracker.person.model_file import dumps_body_model, save_body_model
+from cardbox_tracker.person.skeleton import PLACE_NAMES
+from cardbox_tracker.recordings.outputs import posture_from, values_from
+from cardbox_tracker.ros.messages.conversions import (
     camera_info_message,
     image_message,
 )
-from cardbox_tracker.ros.messages.results import joint_values_of  # noqa: E402
-from cardbox_tracker.ros.runtime import qos  # noqa: E402
-from cardbox_tracker.search.config import default_preset  # noqa: E402
-from cardbox_tracker.tracking.tracker import Tracker  # noqa: E402
-from lab.tools.endurance_record import resources_of  # noqa: E402
-from lab.tools.fault_nodes import header_of  # noqa: E402
-from lab.tools.fault_scene import (  # noqa: E402
+from cardbox_tracker.ros.messages.results import joint_values_of
+from cardbox_tracker.ros.runtime import qos
+from cardbox_tracker.search.config import default_preset
+from cardbox_tracker.tracking.tracker import Tracker
+from lab.tools.endurance_record import resources_of
+from lab.tools.fault_nodes import header_of
+from lab.tools.fault_scene import (
     EMPTY,
     FAULTS,
     START_NS,

@@ -10,20 +10,16 @@ from typing import Any
 
 import numpy as np
 import pytest
+from sensor_msgs.msg import CameraInfo, Image, JointState
+from std_msgs.msg import Header, String
+from std_srvs.srv import SetBool
 
 from cardbox_tracker.applications.retargeting.robot import load_robot
 from cardbox_tracker.person.model_file import save_body_model
 from cardbox_tracker.person.posture import reference_posture
 from cardbox_tracker.person.skeleton import JOINT_NAMES
-
-rclpy = pytest.importorskip("rclpy", reason="rclpy is not installed")
-
-from sensor_msgs.msg import CameraInfo, Image, JointState  # noqa: E402
-from std_msgs.msg import Header, String  # noqa: E402
-from std_srvs.srv import SetBool  # noqa: E402
-
-from cardbox_tracker.ros.messages.conversions import camera_info_message, image_message  # noqa: E402
-from cardbox_tracker.ros.runtime import qos  # noqa: E402
+from cardbox_tracker.ros.messages.conversions import camera_info_message, image_message
+from cardbox_tracker.ros.runtime import qos
 
 CONFIG = Path(__file__).parents[2] / "config"
 ARM = CONFIG / "example_arm.urdf"

@@ -9,18 +9,15 @@ from typing import Any
 
 import numpy as np
 import pytest
+from diagnostic_msgs.msg import DiagnosticStatus
+from geometry_msgs.msg import PoseArray
+from sensor_msgs.msg import Image, JointState
+from std_msgs.msg import String
 
-rclpy = pytest.importorskip("rclpy", reason="rclpy is not installed")
-
-from diagnostic_msgs.msg import DiagnosticStatus  # noqa: E402
-from geometry_msgs.msg import PoseArray  # noqa: E402
-from sensor_msgs.msg import Image, JointState  # noqa: E402
-from std_msgs.msg import String  # noqa: E402
-
-from cardbox_tracker.applications.simulation.session import synthesize_session  # noqa: E402
-from cardbox_tracker.ros.messages.conversions import stamp_ns  # noqa: E402
-from cardbox_tracker.ros.messages.results import mean_iou_of  # noqa: E402
-from cardbox_tracker.ros.runtime import qos  # noqa: E402
+from cardbox_tracker.applications.simulation.session import synthesize_session
+from cardbox_tracker.ros.messages.conversions import stamp_ns
+from cardbox_tracker.ros.messages.results import mean_iou_of
+from cardbox_tracker.ros.runtime import qos
 
 DATA = Path(__file__).resolve().parents[3] / "shared" / "data"
 KEYPOINTS = tuple(

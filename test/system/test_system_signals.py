@@ -13,8 +13,6 @@ from typing import Any
 
 import pytest
 
-pytest.importorskip("rclpy", reason="rclpy is not installed")
-
 from cardbox_tracker.start import NODES
 
 _LIMIT_S = 60.0

@@ -10,21 +10,17 @@ from typing import Any
 import numpy as np
 import pytest
 import yaml
+from diagnostic_msgs.msg import DiagnosticArray
+from geometry_msgs.msg import PoseArray
+from sensor_msgs.msg import Image, JointState
+from std_msgs.msg import String
 
 from cardbox_tracker.camera.camera import Camera
 from cardbox_tracker.person.model_file import loads_body_model, save_body_model
 from cardbox_tracker.recordings.bag_writer import BagWriter
+from cardbox_tracker.ros.messages.conversions import stamp_ns
+from cardbox_tracker.ros.runtime import qos
 from lab.evaluation.session import load_session
-
-rclpy = pytest.importorskip("rclpy", reason="rclpy is not installed")
-
-from diagnostic_msgs.msg import DiagnosticArray  # noqa: E402
-from geometry_msgs.msg import PoseArray  # noqa: E402
-from sensor_msgs.msg import Image, JointState  # noqa: E402
-from std_msgs.msg import String  # noqa: E402
-
-from cardbox_tracker.ros.messages.conversions import stamp_ns  # noqa: E402
-from cardbox_tracker.ros.runtime import qos  # noqa: E402
 
 EMPTY, SEEN = 12, 60
 # The second camera lacks these images of the person.

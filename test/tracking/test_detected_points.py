@@ -74,14 +74,14 @@ def moved(points: ImagePoints, across_px: float) -> ImagePoints:
 class Scene:
     """The hidden hand, its silhouettes, and what a detector without errors finds."""
 
-    def __init__(self, detected: Detect, body: BodyModel = MEASURED, fps: float = 15.0) -> None:
-        self.body, self._fps, self._detected = body, fps, detected
+    def __init__(self, detected: Detect, body: BodyModel = MEASURED) -> None:
+        self.body, self.fps, self._detected = body, 15.0, detected
 
     def stamp_ns(self, number: int) -> int:
-        return BEGIN_NS + round(number * 1e9 / self._fps)
+        return BEGIN_NS + round(number * 1e9 / self.fps)
 
     def posture(self, number: int) -> np.ndarray:
-        return hidden(number / self._fps)
+        return hidden(number / self.fps)
 
     def points(self, number: int) -> ImagePoints:
         posture = self.posture(number)
@@ -142,53 +142,43 @@ def is_tracked(found: tuple[np.ndarray, list[Estimate]], body: BodyModel) -> boo
     return {one.state for one in estimates} <= {TRACKING, UNCERTAIN} and sum(sure) >= least
 
 
-both = pytest.mark.parametrize("body", BODIES.values(), ids=BODIES)
+@pytest.fixture(params=BODIES.values(), ids=BODIES)
+def scene(request: pytest.FixtureRequest, detected: Detect) -> Scene:
+    return Scene(detected, request.param)
 
 
-@both
-def test_a_hand_before_the_torso_is_found_with_points_only(
-    detected: Detect, body: BodyModel
-) -> None:
-    scene = Scene(detected, body)
+def test_a_hand_before_the_torso_is_found_with_points_only(scene: Scene) -> None:
     without, found = scene.track(lambda number: None), scene.track(scene.points)
-    assert is_tracked(found, body)
+    assert is_tracked(found, scene.body)
     assert of_hand(found) < 3.0
     assert of_hand(without) > 2.0 * of_hand(found)
     # The others are no worse than without.
     assert found[0][12:].mean(axis=0).max() < 3.0
 
 
-@both
-def test_points_that_come_a_tenth_of_a_second_late_help(detected: Detect, body: BodyModel) -> None:
+def test_points_that_come_a_tenth_of_a_second_late_help(scene: Scene) -> None:
     """The hand moves by up to 7 px in this time."""
-    scene = Scene(detected, body, 30.0)
+    scene.fps = 30.0
     late = scene.track(lambda number: scene.points(number - 3) if number >= 3 else None, count=60)
     without = scene.track(lambda number: None, count=60)
     assert of_hand(late, 20) < 6.0
     assert of_hand(late, 20) < 0.7 * of_hand(without, 20)
 
 
-@both
-def test_points_at_5_hz_help_images_at_30_hz(detected: Detect, body: BodyModel) -> None:
-    scene = Scene(detected, body, 30.0)
+def test_points_at_5_hz_help_images_at_30_hz(scene: Scene) -> None:
+    scene.fps = 30.0
     seldom = scene.track(lambda number: None if number % 6 else scene.points(number), count=60)
     assert of_hand(seldom, 20) < 4.0
 
 
-@both
-def test_a_time_without_points_is_bridged_and_over_with_the_first_one(
-    detected: Detect, body: BodyModel
-) -> None:
-    scene = Scene(detected, body)
+def test_a_time_without_points_is_bridged_and_over_with_the_first_one(scene: Scene) -> None:
     gap = scene.track(lambda number: None if 15 <= number < 25 else scene.points(number))
-    assert is_tracked(gap, body)
+    assert is_tracked(gap, scene.body)
     assert gap[0][15:17, HAND].max() < 6.0
     assert gap[0][27:, HAND].max() < 6.0
 
 
-@both
-def test_left_and_right_may_be_exchanged_in_some_frames(detected: Detect, body: BodyModel) -> None:
-    scene = Scene(detected, body)
+def test_left_and_right_may_be_exchanged_in_some_frames(scene: Scene) -> None:
 
     def given(number: int) -> ImagePoints:
         points = scene.points(number)
@@ -198,28 +188,24 @@ def test_left_and_right_may_be_exchanged_in_some_frames(detected: Detect, body: 
     np.testing.assert_array_equal(scene.track(given)[0], scene.track(scene.points)[0])
 
 
-@both
 @pytest.mark.parametrize("across_px", [-45.0, 60.0])
 def test_points_of_somebody_else_for_some_frames_are_not_followed(
-    detected: Detect, body: BodyModel, across_px: float
+    scene: Scene, across_px: float
 ) -> None:
     """Half a metre and more beside the person."""
-    scene = Scene(detected, body)
 
     def given(number: int) -> ImagePoints:
         points = scene.points(number)
         return moved(points, across_px) if 15 <= number < 20 else points
 
     found = scene.track(given)
-    assert is_tracked(found, body)
+    assert is_tracked(found, scene.body)
     others = [0, 1, 3, 4, 5]
     assert found[0][12:, others].max() < 8.0
     assert found[0][22:, HAND].max() < 6.0
 
 
-@both
-def test_some_joints_may_be_unknown(detected: Detect, body: BodyModel) -> None:
-    scene = Scene(detected, body)
+def test_some_joints_may_be_unknown(scene: Scene) -> None:
     arm = [POINT_INDEX[f"left_{name}"] for name in ("elbow", "wrist", "index", "little_finger")]
 
     def given(number: int) -> ImagePoints:
@@ -231,12 +217,8 @@ def test_some_joints_may_be_unknown(detected: Detect, body: BodyModel) -> None:
     assert of_hand(scene.track(given)) < 3.5
 
 
-@both
 @pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf, -400.0, 999_999.0, 1e300])
-def test_impossible_places_of_a_joint_change_little(
-    detected: Detect, body: BodyModel, value: float
-) -> None:
-    scene = Scene(detected, body)
+def test_impossible_places_of_a_joint_change_little(scene: Scene, value: float) -> None:
 
     def given(number: int) -> ImagePoints:
         points = scene.points(number)
@@ -249,12 +231,9 @@ def test_impossible_places_of_a_joint_change_little(
     assert found[0][12:].max() < 12.0
 
 
-@both
 @pytest.mark.parametrize("value", [np.nan, np.inf, -1e5, 1e300])
-def test_points_of_which_none_is_possible_are_as_none(
-    detected: Detect, body: BodyModel, value: float
-) -> None:
-    scene, count = Scene(detected, body), len(POINT_NAMES)
+def test_points_of_which_none_is_possible_are_as_none(scene: Scene, value: float) -> None:
+    count = len(POINT_NAMES)
     wrong = ImagePoints(np.full((count, 2), value), np.ones(count))
     with_space = replace(wrong, spatial_m=np.full((count, 3), value))
     # From a first frame on, so that the person's place is known; 9 frames are no long time.
@@ -282,12 +261,10 @@ def aside(person: np.ndarray) -> np.ndarray:
     return np.roll(person, 25, axis=1)
 
 
-@both
 @pytest.mark.parametrize("wrong", [half, with_block, aside])
 def test_good_points_win_against_a_wrong_silhouette(
-    detected: Detect, body: BodyModel, wrong: Callable[[np.ndarray], np.ndarray]
+    scene: Scene, wrong: Callable[[np.ndarray], np.ndarray]
 ) -> None:
-    scene = Scene(detected, body)
 
     def seen(number: int, person: np.ndarray) -> np.ndarray:
         return wrong(person) if number >= 15 else person
@@ -310,7 +287,7 @@ def beside() -> OtherCamera:
 
 
 @pytest.mark.parametrize("seeing", [(0,), (1,), (0, 1)])
-@both
+@pytest.mark.parametrize("body", BODIES.values(), ids=BODIES)
 def test_points_of_one_camera_of_two_are_enough(
     detected: Detect, body: BodyModel, seeing: tuple[int, ...]
 ) -> None:
@@ -415,7 +392,7 @@ def values(estimate: Estimate) -> list[bytes | None]:
     return [None if one is None else one.tobytes() for one in arrays]
 
 
-@both
+@pytest.mark.parametrize("body", BODIES.values(), ids=BODIES)
 def test_without_points_the_term_changes_no_byte(body: BodyModel) -> None:
     usual = default_preset()
     assert len(usual.terms) == 2
@@ -428,9 +405,7 @@ def test_without_points_the_term_changes_no_byte(body: BodyModel) -> None:
         assert first.posture is not None
 
 
-@both
-def test_the_same_points_give_the_same_bytes(detected: Detect, body: BodyModel) -> None:
-    scene = Scene(detected, body)
+def test_the_same_points_give_the_same_bytes(scene: Scene) -> None:
     first, second = (scene.track(scene.points, count=8)[1] for _ in range(2))
     assert [values(one) for one in first] == [values(one) for one in second]
 

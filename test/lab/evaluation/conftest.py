@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from cardbox_tracker.applications.simulation.session import synthesize_session
+from cardbox_tracker.applications.simulation.session import SessionFormat, synthesize_session
 
 STATURE_M = 1.72
 
@@ -18,7 +18,7 @@ def unmeasured(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A session as those of real people: an empty scene, motions, and no reference postures."""
     folder = tmp_path_factory.mktemp("people") / "waves"
     folder.mkdir()
-    synthesize_session(folder / "bag", "wave", 1)
+    synthesize_session(folder / "bag", "wave", 1, SessionFormat(fps=8.0))
     data = json.loads((folder / "bag" / "ground_truth.json").read_text())
     (folder / "ground_truth.json").write_text(json.dumps(without_references(data)))
     return folder

@@ -8,9 +8,6 @@ from typing import Any
 
 import pytest
 import yaml
-
-pytest.importorskip("rclpy", reason="rclpy is not installed")
-
 from rclpy.serialization import serialize_message
 
 from cardbox_tracker.person.legs import LEG_NAMES

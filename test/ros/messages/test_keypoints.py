@@ -8,9 +8,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-
-pytest.importorskip("rclpy", reason="rclpy is not installed")
-
 from geometry_msgs.msg import Point32, Polygon, PolygonStamped
 from std_msgs.msg import Header
 

@@ -8,26 +8,23 @@ from typing import Any
 
 import numpy as np
 import pytest
+from builtin_interfaces.msg import Time
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.qos import QoSProfile
+from sensor_msgs.msg import CameraInfo
+from std_msgs.msg import Header
 
-rclpy = pytest.importorskip("rclpy", reason="rclpy is not installed")
-
-from builtin_interfaces.msg import Time  # noqa: E402
-from rclpy.executors import SingleThreadedExecutor  # noqa: E402
-from rclpy.qos import QoSProfile  # noqa: E402
-from sensor_msgs.msg import CameraInfo  # noqa: E402
-from std_msgs.msg import Header  # noqa: E402
-
-from cardbox_tracker.camera.camera import Camera  # noqa: E402
-from cardbox_tracker.ros.messages.conversions import (  # noqa: E402
+from cardbox_tracker.camera.camera import Camera
+from cardbox_tracker.ros.messages.conversions import (
     camera_info_message,
     image_message,
 )
-from cardbox_tracker.ros.nodes.background_node import BackgroundNode  # noqa: E402
-from cardbox_tracker.ros.nodes.camera_images import CameraImages  # noqa: E402
-from cardbox_tracker.ros.nodes.stereo_depth_node import StereoDepthNode  # noqa: E402
-from cardbox_tracker.ros.nodes.tracker_node import TrackerNode  # noqa: E402
-from cardbox_tracker.ros.runtime import qos  # noqa: E402
-from cardbox_tracker.ros.runtime.node import CardboxNode  # noqa: E402
+from cardbox_tracker.ros.nodes.background_node import BackgroundNode
+from cardbox_tracker.ros.nodes.camera_images import CameraImages
+from cardbox_tracker.ros.nodes.stereo_depth_node import StereoDepthNode
+from cardbox_tracker.ros.nodes.tracker_node import TrackerNode
+from cardbox_tracker.ros.runtime import qos
+from cardbox_tracker.ros.runtime.node import CardboxNode
 
 CAMERA = Camera(160, 120, 150.0, 150.0, 79.5, 59.5)
 

@@ -8,23 +8,20 @@ from typing import Any
 import cv2
 import numpy as np
 import pytest
+from builtin_interfaces.msg import Time
+from sensor_msgs.msg import CameraInfo, CompressedImage
+from std_msgs.msg import Header
 
-rclpy = pytest.importorskip("rclpy", reason="rclpy is not installed")
-
-from builtin_interfaces.msg import Time  # noqa: E402
-from sensor_msgs.msg import CameraInfo, CompressedImage  # noqa: E402
-from std_msgs.msg import Header  # noqa: E402
-
-from cardbox_tracker.camera.camera import Camera  # noqa: E402
-from cardbox_tracker.common.errors import CameraError  # noqa: E402
-from cardbox_tracker.ros.messages.conversions import (  # noqa: E402
+from cardbox_tracker.camera.camera import Camera
+from cardbox_tracker.common.errors import CameraError
+from cardbox_tracker.ros.messages.conversions import (
     camera_info_message,
     image_message,
 )
-from cardbox_tracker.ros.nodes import camera_poses, input_stream  # noqa: E402
-from cardbox_tracker.ros.nodes.camera_inputs import CameraInputs, ObservationSet  # noqa: E402
-from cardbox_tracker.ros.nodes.camera_poses import CameraPoses  # noqa: E402
-from cardbox_tracker.ros.nodes.tracker_parameters import TrackerParameters  # noqa: E402
+from cardbox_tracker.ros.nodes import camera_poses, input_stream
+from cardbox_tracker.ros.nodes.camera_inputs import CameraInputs, ObservationSet
+from cardbox_tracker.ros.nodes.camera_poses import CameraPoses
+from cardbox_tracker.ros.nodes.tracker_parameters import TrackerParameters
 
 CAMERA = Camera(64, 48, 60.0, 60.0, 31.5, 23.5)
 S = 1_000_000_000

@@ -7,16 +7,13 @@ from typing import Any
 
 import numpy as np
 import pytest
+from builtin_interfaces.msg import Time
+from std_msgs.msg import Header
 
-rclpy = pytest.importorskip("rclpy", reason="rclpy is not installed")
-
-from builtin_interfaces.msg import Time  # noqa: E402
-from std_msgs.msg import Header  # noqa: E402
-
-from cardbox_tracker.camera.camera import Camera  # noqa: E402
-from cardbox_tracker.common.errors import EncodingError  # noqa: E402
-from cardbox_tracker.ros.messages.conversions import image_message  # noqa: E402
-from cardbox_tracker.ros.nodes.depth_input import DepthCut  # noqa: E402
+from cardbox_tracker.camera.camera import Camera
+from cardbox_tracker.common.errors import EncodingError
+from cardbox_tracker.ros.messages.conversions import image_message
+from cardbox_tracker.ros.nodes.depth_input import DepthCut
 
 CAMERA = Camera(64, 48, 60.0, 60.0, 31.5, 23.5)
 

@@ -8,28 +8,25 @@ from typing import Any
 import cv2
 import numpy as np
 import pytest
+from builtin_interfaces.msg import Time
+from std_msgs.msg import Header
 
-rclpy = pytest.importorskip("rclpy", reason="rclpy is not installed")
-
-from builtin_interfaces.msg import Time  # noqa: E402
-from std_msgs.msg import Header  # noqa: E402
-
-from cardbox_tracker.camera.camera import Camera  # noqa: E402
-from cardbox_tracker.common.errors import InitializationError  # noqa: E402
-from cardbox_tracker.measuring.config import (  # noqa: E402
+from cardbox_tracker.camera.camera import Camera
+from cardbox_tracker.common.errors import InitializationError
+from cardbox_tracker.measuring.config import (
     InitializationConfig,
     InitializationResult,
 )
-from cardbox_tracker.measuring.scale import scaled  # noqa: E402
-from cardbox_tracker.person.model import BodyModel  # noqa: E402
-from cardbox_tracker.person.posture import reference_posture  # noqa: E402
-from cardbox_tracker.ros.messages.conversions import image_message  # noqa: E402
-from cardbox_tracker.ros.nodes.reference_capture import (  # noqa: E402
+from cardbox_tracker.measuring.scale import scaled
+from cardbox_tracker.person.model import BodyModel
+from cardbox_tracker.person.posture import reference_posture
+from cardbox_tracker.ros.messages.conversions import image_message
+from cardbox_tracker.ros.nodes.reference_capture import (
     DepthDistance,
     ReferenceCapture,
 )
-from cardbox_tracker.terms.whole_body import WholeBodyCost  # noqa: E402
-from cardbox_tracker.terms.whole_body_config import WholeBodyCostConfig  # noqa: E402
+from cardbox_tracker.terms.whole_body import WholeBodyCost
+from cardbox_tracker.terms.whole_body_config import WholeBodyCostConfig
 
 CAMERA = Camera(160, 120, 150.0, 150.0, 79.5, 59.5)
 BODY = BodyModel.of(hip_height_m=-0.4)

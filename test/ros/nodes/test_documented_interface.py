@@ -13,36 +13,34 @@ from unittest.mock import DEFAULT, patch
 import cv2
 import numpy as np
 import pytest
+import rclpy
 import yaml
+from rclpy.parameter import Parameter
+from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 
-rclpy = pytest.importorskip("rclpy", reason="rclpy is not installed")
-
-from rclpy.parameter import Parameter  # noqa: E402
-from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy  # noqa: E402
-
-from cardbox_tracker.applications.simulation.session import session_camera  # noqa: E402
-from cardbox_tracker.detectors.detector import PersonDetector  # noqa: E402
-from cardbox_tracker.person.legs import LEG_NAMES  # noqa: E402
-from cardbox_tracker.person.model import BodyModel  # noqa: E402
-from cardbox_tracker.person.skeleton import JOINT_NAMES, JOINT_STATE_NAMES  # noqa: E402
-from cardbox_tracker.person.urdf import (  # noqa: E402
+from cardbox_tracker.applications.simulation.session import session_camera
+from cardbox_tracker.detectors.detector import PersonDetector
+from cardbox_tracker.person.legs import LEG_NAMES
+from cardbox_tracker.person.model import BodyModel
+from cardbox_tracker.person.skeleton import JOINT_NAMES, JOINT_STATE_NAMES
+from cardbox_tracker.person.urdf import (
     ROOT_LINK,
     LinkTransforms,
     urdf_from_body,
 )
-from cardbox_tracker.recordings.bag_writer import BagWriter  # noqa: E402
-from cardbox_tracker.ros.nodes import tracker_node  # noqa: E402
-from cardbox_tracker.ros.nodes.background_node import BackgroundNode  # noqa: E402
-from cardbox_tracker.ros.nodes.camera_node import CameraNode  # noqa: E402
-from cardbox_tracker.ros.nodes.detector_node import DetectorNode  # noqa: E402
-from cardbox_tracker.ros.nodes.initializer_node import InitializerNode  # noqa: E402
-from cardbox_tracker.ros.nodes.play_bag_node import PlayBagNode  # noqa: E402
-from cardbox_tracker.ros.nodes.retarget_node import RetargetNode  # noqa: E402
-from cardbox_tracker.ros.nodes.rula_node import RulaNode  # noqa: E402
-from cardbox_tracker.ros.nodes.stereo_depth_node import StereoDepthNode  # noqa: E402
-from cardbox_tracker.ros.nodes.teleoperation_node import TeleoperationNode  # noqa: E402
-from cardbox_tracker.ros.nodes.tracker_node import TrackerNode  # noqa: E402
-from cardbox_tracker.ros.runtime.command_line import SERVICE, entries  # noqa: E402
+from cardbox_tracker.recordings.bag_writer import BagWriter
+from cardbox_tracker.ros.nodes import tracker_node
+from cardbox_tracker.ros.nodes.background_node import BackgroundNode
+from cardbox_tracker.ros.nodes.camera_node import CameraNode
+from cardbox_tracker.ros.nodes.detector_node import DetectorNode
+from cardbox_tracker.ros.nodes.initializer_node import InitializerNode
+from cardbox_tracker.ros.nodes.play_bag_node import PlayBagNode
+from cardbox_tracker.ros.nodes.retarget_node import RetargetNode
+from cardbox_tracker.ros.nodes.rula_node import RulaNode
+from cardbox_tracker.ros.nodes.stereo_depth_node import StereoDepthNode
+from cardbox_tracker.ros.nodes.teleoperation_node import TeleoperationNode
+from cardbox_tracker.ros.nodes.tracker_node import TrackerNode
+from cardbox_tracker.ros.runtime.command_line import SERVICE, entries
 
 ROOT = Path(__file__).parents[3]
 NODES = (

@@ -5,24 +5,20 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-import pytest
+from builtin_interfaces.msg import Time
+from sensor_msgs.msg import Image
+from std_msgs.msg import Header, String
 
-rclpy = pytest.importorskip("rclpy", reason="rclpy is not installed")
-
-from builtin_interfaces.msg import Time  # noqa: E402
-from sensor_msgs.msg import Image  # noqa: E402
-from std_msgs.msg import Header, String  # noqa: E402
-
-from cardbox_tracker.camera.camera import Camera  # noqa: E402
-from cardbox_tracker.camera.rasterisation import render  # noqa: E402
-from cardbox_tracker.person.cardbox import cardbox_patches  # noqa: E402
-from cardbox_tracker.person.kinematics import pose  # noqa: E402
-from cardbox_tracker.person.model import BodyModel  # noqa: E402
-from cardbox_tracker.person.model_file import dumps_body_model  # noqa: E402
-from cardbox_tracker.person.posture import reference_posture  # noqa: E402
-from cardbox_tracker.ros.messages.conversions import camera_info_message  # noqa: E402
-from cardbox_tracker.ros.nodes.initializer_node import InitializerNode  # noqa: E402
-from cardbox_tracker.ros.nodes.tracker_node import TrackerNode  # noqa: E402
+from cardbox_tracker.camera.camera import Camera
+from cardbox_tracker.camera.rasterisation import render
+from cardbox_tracker.person.cardbox import cardbox_patches
+from cardbox_tracker.person.kinematics import pose
+from cardbox_tracker.person.model import BodyModel
+from cardbox_tracker.person.model_file import dumps_body_model
+from cardbox_tracker.person.posture import reference_posture
+from cardbox_tracker.ros.messages.conversions import camera_info_message
+from cardbox_tracker.ros.nodes.initializer_node import InitializerNode
+from cardbox_tracker.ros.nodes.tracker_node import TrackerNode
 
 CAMERA = Camera(96, 72, 99.0, 99.0, 47.5, 35.5)
 BODY = BodyModel()

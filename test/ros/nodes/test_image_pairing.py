@@ -9,36 +9,33 @@ from typing import Any
 
 import numpy as np
 import pytest
+from builtin_interfaces.msg import Time
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.parameter import Parameter
+from sensor_msgs.msg import CameraInfo, Image
+from std_msgs.msg import Header
 
-rclpy = pytest.importorskip("rclpy", reason="rclpy is not installed")
-
-from builtin_interfaces.msg import Time  # noqa: E402
-from rclpy.executors import SingleThreadedExecutor  # noqa: E402
-from rclpy.parameter import Parameter  # noqa: E402
-from sensor_msgs.msg import CameraInfo, Image  # noqa: E402
-from std_msgs.msg import Header  # noqa: E402
-
-from cardbox_tracker.camera.camera import Camera  # noqa: E402
-from cardbox_tracker.camera.rasterisation import render  # noqa: E402
-from cardbox_tracker.common.errors import CameraError  # noqa: E402
-from cardbox_tracker.measuring.config import (  # noqa: E402
+from cardbox_tracker.camera.camera import Camera
+from cardbox_tracker.camera.rasterisation import render
+from cardbox_tracker.common.errors import CameraError
+from cardbox_tracker.measuring.config import (
     InitializationConfig,
 )
-from cardbox_tracker.person.appearance import Appearance  # noqa: E402
-from cardbox_tracker.person.cardbox import cardbox_patches  # noqa: E402
-from cardbox_tracker.person.model import BodyModel  # noqa: E402
-from cardbox_tracker.person.model_file import save_body_model  # noqa: E402
-from cardbox_tracker.person.posture import reference_posture  # noqa: E402
-from cardbox_tracker.ros.messages import conversions  # noqa: E402
-from cardbox_tracker.ros.nodes.background_node import BackgroundNode  # noqa: E402
-from cardbox_tracker.ros.nodes.camera_inputs import ImagePairing  # noqa: E402
-from cardbox_tracker.ros.nodes.reference_capture import ReferenceCapture  # noqa: E402
-from cardbox_tracker.ros.nodes.tracker_node import TrackerNode  # noqa: E402
-from cardbox_tracker.ros.runtime import qos  # noqa: E402
-from cardbox_tracker.ros.runtime.node import IntraProcess  # noqa: E402
-from cardbox_tracker.tracking.estimate import Estimate  # noqa: E402
-from cardbox_tracker.tracking.observation import Observation  # noqa: E402
-from cardbox_tracker.tracking.tracker import Tracker  # noqa: E402
+from cardbox_tracker.person.appearance import Appearance
+from cardbox_tracker.person.cardbox import cardbox_patches
+from cardbox_tracker.person.model import BodyModel
+from cardbox_tracker.person.model_file import save_body_model
+from cardbox_tracker.person.posture import reference_posture
+from cardbox_tracker.ros.messages import conversions
+from cardbox_tracker.ros.nodes.background_node import BackgroundNode
+from cardbox_tracker.ros.nodes.camera_inputs import ImagePairing
+from cardbox_tracker.ros.nodes.reference_capture import ReferenceCapture
+from cardbox_tracker.ros.nodes.tracker_node import TrackerNode
+from cardbox_tracker.ros.runtime import qos
+from cardbox_tracker.ros.runtime.node import IntraProcess
+from cardbox_tracker.tracking.estimate import Estimate
+from cardbox_tracker.tracking.observation import Observation
+from cardbox_tracker.tracking.tracker import Tracker
 
 BODY = BodyModel.of(distance_m=2.3, hip_height_m=-0.45)
 CAMERA = Camera(320, 240, 300.0, 300.0, 159.5, 119.5)

@@ -6,10 +6,6 @@ from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
-import pytest
-
-pytest.importorskip("rclpy", reason="rclpy is not installed")
-
 from std_msgs.msg import Header
 
 from cardbox_tracker.camera.camera import Camera

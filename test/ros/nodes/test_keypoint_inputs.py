@@ -9,26 +9,24 @@ from typing import Any
 
 import numpy as np
 import pytest
+import rclpy
+from builtin_interfaces.msg import Time
+from geometry_msgs.msg import Point32, Polygon, PolygonStamped, PoseArray
+from rclpy.context import Context
+from rclpy.qos import QoSProfile
+from sensor_msgs.msg import Image
+from std_msgs.msg import Header
 
-rclpy = pytest.importorskip("rclpy", reason="rclpy is not installed")
-
-from builtin_interfaces.msg import Time  # noqa: E402
-from geometry_msgs.msg import Point32, Polygon, PolygonStamped, PoseArray  # noqa: E402
-from rclpy.context import Context  # noqa: E402
-from rclpy.qos import QoSProfile  # noqa: E402
-from sensor_msgs.msg import Image  # noqa: E402
-from std_msgs.msg import Header  # noqa: E402
-
-from cardbox_tracker.camera.camera import Camera  # noqa: E402
-from cardbox_tracker.common.errors import CardboxError  # noqa: E402
-from cardbox_tracker.detectors.image_points import POINT_INDEX, ImagePoints  # noqa: E402
-from cardbox_tracker.ros.messages.conversions import camera_info_message, image_message  # noqa: E402
-from cardbox_tracker.ros.nodes import input_stream, keypoint_inputs  # noqa: E402
-from cardbox_tracker.ros.nodes.camera_inputs import CameraInputs, ObservationSet  # noqa: E402
-from cardbox_tracker.ros.nodes.keypoint_inputs import KeypointInputs  # noqa: E402
-from cardbox_tracker.ros.nodes.tracker_parameters import TrackerParameters  # noqa: E402
-from cardbox_tracker.ros.runtime import qos  # noqa: E402
-from cardbox_tracker.ros.runtime.node import CardboxNode  # noqa: E402
+from cardbox_tracker.camera.camera import Camera
+from cardbox_tracker.common.errors import CardboxError
+from cardbox_tracker.detectors.image_points import POINT_INDEX, ImagePoints
+from cardbox_tracker.ros.messages.conversions import camera_info_message, image_message
+from cardbox_tracker.ros.nodes import input_stream, keypoint_inputs
+from cardbox_tracker.ros.nodes.camera_inputs import CameraInputs, ObservationSet
+from cardbox_tracker.ros.nodes.keypoint_inputs import KeypointInputs
+from cardbox_tracker.ros.nodes.tracker_parameters import TrackerParameters
+from cardbox_tracker.ros.runtime import qos
+from cardbox_tracker.ros.runtime.node import CardboxNode
 
 MS = 1_000_000
 T = 10_000 * MS

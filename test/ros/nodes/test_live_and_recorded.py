@@ -9,22 +9,19 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import pytest
+from builtin_interfaces.msg import Time
+from rclpy.serialization import serialize_message
+from sensor_msgs.msg import CameraInfo, Image
+from std_msgs.msg import Header
 
-rclpy = pytest.importorskip("rclpy", reason="rclpy is not installed")
-
-from builtin_interfaces.msg import Time  # noqa: E402
-from rclpy.serialization import serialize_message  # noqa: E402
-from sensor_msgs.msg import CameraInfo, Image  # noqa: E402
-from std_msgs.msg import Header  # noqa: E402
-
-from cardbox_tracker.camera.camera import Calibration  # noqa: E402
-from cardbox_tracker.common.errors import CardboxError  # noqa: E402
-from cardbox_tracker.recordings.bag_writer import BagWriter  # noqa: E402
-from cardbox_tracker.recordings.given_camera import GivenCamera  # noqa: E402
-from cardbox_tracker.recordings.open_images import open_images  # noqa: E402
-from cardbox_tracker.ros.nodes.camera_images import CameraImages  # noqa: E402
-from cardbox_tracker.ros.runtime.node import CardboxNode  # noqa: E402
-from cardbox_tracker.segmentation.silhouettes import SilhouettePipeline  # noqa: E402
+from cardbox_tracker.camera.camera import Calibration
+from cardbox_tracker.common.errors import CardboxError
+from cardbox_tracker.recordings.bag_writer import BagWriter
+from cardbox_tracker.recordings.given_camera import GivenCamera
+from cardbox_tracker.recordings.open_images import open_images
+from cardbox_tracker.ros.nodes.camera_images import CameraImages
+from cardbox_tracker.ros.runtime.node import CardboxNode
+from cardbox_tracker.segmentation.silhouettes import SilhouettePipeline
 
 K = [165.0, 0.0, 79.5, 0.0, 165.0, 59.5, 0.0, 0.0, 1.0]
 BENT = [-0.03, 0.035, -0.0001, -0.0001, -0.012]

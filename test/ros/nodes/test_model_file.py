@@ -10,21 +10,19 @@ from unittest.mock import Mock
 
 import numpy as np
 import pytest
+import rclpy
+from rclpy.context import Context
+from rclpy.parameter import Parameter
 
-rclpy = pytest.importorskip("rclpy", reason="rclpy is not installed")
-
-from rclpy.context import Context  # noqa: E402
-from rclpy.parameter import Parameter  # noqa: E402
-
-from cardbox_tracker.camera.camera import Camera  # noqa: E402
-from cardbox_tracker.common.errors import CardboxError  # noqa: E402
-from cardbox_tracker.measuring.config import InitializationResult  # noqa: E402
-from cardbox_tracker.person.model import BodyModel  # noqa: E402
-from cardbox_tracker.person.model_file import load_body_model  # noqa: E402
-from cardbox_tracker.person.posture import REFERENCE_NAMES  # noqa: E402
-from cardbox_tracker.ros.nodes import initializer_node, reference_capture  # noqa: E402
-from cardbox_tracker.ros.nodes.camera_node import CameraNode  # noqa: E402
-from cardbox_tracker.ros.nodes.tracker_node import TrackerNode  # noqa: E402
+from cardbox_tracker.camera.camera import Camera
+from cardbox_tracker.common.errors import CardboxError
+from cardbox_tracker.measuring.config import InitializationResult
+from cardbox_tracker.person.model import BodyModel
+from cardbox_tracker.person.model_file import load_body_model
+from cardbox_tracker.person.posture import REFERENCE_NAMES
+from cardbox_tracker.ros.nodes import initializer_node, reference_capture
+from cardbox_tracker.ros.nodes.camera_node import CameraNode
+from cardbox_tracker.ros.nodes.tracker_node import TrackerNode
 
 BODY = BodyModel.of(distance_m=2.3)
 

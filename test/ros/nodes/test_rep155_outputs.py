@@ -9,9 +9,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-
-pytest.importorskip("rclpy", reason="rclpy is not installed")
-
 from rclpy.qos import DurabilityPolicy
 from std_msgs.msg import Header
 

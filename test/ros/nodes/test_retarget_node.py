@@ -11,19 +11,16 @@ from typing import Any
 
 import numpy as np
 import pytest
+from rclpy.time import Time
+from sensor_msgs.msg import JointState
+from std_msgs.msg import Bool, String
 
-rclpy = pytest.importorskip("rclpy", reason="rclpy is not installed")
-
-from rclpy.time import Time  # noqa: E402
-from sensor_msgs.msg import JointState  # noqa: E402
-from std_msgs.msg import Bool, String  # noqa: E402
-
-from cardbox_tracker.applications.retargeting.robot import load_robot  # noqa: E402
-from cardbox_tracker.common.errors import CardboxError  # noqa: E402
-from cardbox_tracker.person.model_file import dumps_body_model  # noqa: E402
-from cardbox_tracker.person.proportions import body_from_proportions  # noqa: E402
-from cardbox_tracker.ros.nodes import retarget_node  # noqa: E402
-from cardbox_tracker.ros.nodes.retarget_node import RetargetNode  # noqa: E402
+from cardbox_tracker.applications.retargeting.robot import load_robot
+from cardbox_tracker.common.errors import CardboxError
+from cardbox_tracker.person.model_file import dumps_body_model
+from cardbox_tracker.person.proportions import body_from_proportions
+from cardbox_tracker.ros.nodes import retarget_node
+from cardbox_tracker.ros.nodes.retarget_node import RetargetNode
 
 CONFIG = Path(__file__).parents[3] / "config"
 MODEL = String(data=dumps_body_model(body_from_proportions(1.75, 2.0, 0.4, 0.0)))

@@ -6,16 +6,13 @@ from typing import Any
 
 import numpy as np
 import pytest
+from diagnostic_msgs.msg import DiagnosticStatus
+from sensor_msgs.msg import JointState
+from std_msgs.msg import String
 
-rclpy = pytest.importorskip("rclpy", reason="rclpy is not installed")
-
-from diagnostic_msgs.msg import DiagnosticStatus  # noqa: E402
-from sensor_msgs.msg import JointState  # noqa: E402
-from std_msgs.msg import String  # noqa: E402
-
-from cardbox_tracker.person.model_file import dumps_body_model  # noqa: E402
-from cardbox_tracker.person.proportions import body_from_proportions  # noqa: E402
-from cardbox_tracker.ros.nodes.rula_node import RulaNode  # noqa: E402
+from cardbox_tracker.person.model_file import dumps_body_model
+from cardbox_tracker.person.proportions import body_from_proportions
+from cardbox_tracker.ros.nodes.rula_node import RulaNode
 
 MODEL = String(data=dumps_body_model(body_from_proportions(1.75, 2.0, 0.4, 0.0)))
 

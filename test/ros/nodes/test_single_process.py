@@ -7,8 +7,6 @@ from typing import Any
 
 import pytest
 
-pytest.importorskip("rclpy", reason="rclpy is not installed")
-
 from cardbox_tracker.common.errors import CardboxError
 from cardbox_tracker.ros.nodes import single_process
 

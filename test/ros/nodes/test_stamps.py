@@ -8,26 +8,23 @@ from typing import Any
 
 import numpy as np
 import pytest
+from builtin_interfaces.msg import Time
+from rclpy.parameter import Parameter
+from sensor_msgs.msg import Image
+from std_msgs.msg import Header
 
-rclpy = pytest.importorskip("rclpy", reason="rclpy is not installed")
-
-from builtin_interfaces.msg import Time  # noqa: E402
-from rclpy.parameter import Parameter  # noqa: E402
-from sensor_msgs.msg import Image  # noqa: E402
-from std_msgs.msg import Header  # noqa: E402
-
-from cardbox_tracker.camera.camera import Camera  # noqa: E402
-from cardbox_tracker.person.model import BodyModel  # noqa: E402
-from cardbox_tracker.person.model_file import save_body_model  # noqa: E402
-from cardbox_tracker.ros.messages.conversions import (  # noqa: E402
+from cardbox_tracker.camera.camera import Camera
+from cardbox_tracker.person.model import BodyModel
+from cardbox_tracker.person.model_file import save_body_model
+from cardbox_tracker.ros.messages.conversions import (
     camera_info_message,
     image_message,
     stamp_ns,
 )
-from cardbox_tracker.ros.nodes.camera_inputs import ImagePairing  # noqa: E402
-from cardbox_tracker.ros.nodes.tracker_node import TrackerNode  # noqa: E402
-from cardbox_tracker.tracking.estimate import Estimate  # noqa: E402
-from cardbox_tracker.tracking.tracker import Tracker  # noqa: E402
+from cardbox_tracker.ros.nodes.camera_inputs import ImagePairing
+from cardbox_tracker.ros.nodes.tracker_node import TrackerNode
+from cardbox_tracker.tracking.estimate import Estimate
+from cardbox_tracker.tracking.tracker import Tracker
 
 CAMERA = Camera(160, 120, 150.0, 150.0, 79.5, 59.5)
 EMPTY = np.zeros((120, 160), np.uint8)

@@ -6,19 +6,16 @@ from typing import Any
 
 import numpy as np
 import pytest
+from builtin_interfaces.msg import Time
+from diagnostic_msgs.msg import DiagnosticStatus
+from std_msgs.msg import Header
 
-rclpy = pytest.importorskip("rclpy", reason="rclpy is not installed")
-
-from builtin_interfaces.msg import Time  # noqa: E402
-from diagnostic_msgs.msg import DiagnosticStatus  # noqa: E402
-from std_msgs.msg import Header  # noqa: E402
-
-from cardbox_tracker.camera.camera import Camera  # noqa: E402
-from cardbox_tracker.ros.messages.conversions import (  # noqa: E402
+from cardbox_tracker.camera.camera import Camera
+from cardbox_tracker.ros.messages.conversions import (
     camera_info_message,
     image_message,
 )
-from cardbox_tracker.ros.nodes.stereo_depth_node import StereoDepthNode  # noqa: E402
+from cardbox_tracker.ros.nodes.stereo_depth_node import StereoDepthNode
 
 CAMERA = Camera(320, 240, 250.0, 250.0, 159.5, 119.5)
 BASELINE_M, DEPTH_M = 0.12, 1.5

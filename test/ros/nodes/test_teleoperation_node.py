@@ -9,15 +9,12 @@ from typing import Any
 
 import numpy as np
 import pytest
+from std_msgs.msg import String
 
-rclpy = pytest.importorskip("rclpy", reason="rclpy is not installed")
-
-from std_msgs.msg import String  # noqa: E402
-
-from cardbox_tracker.common.errors import CardboxError  # noqa: E402
-from cardbox_tracker.person.model_file import dumps_body_model  # noqa: E402
-from cardbox_tracker.person.proportions import body_from_proportions  # noqa: E402
-from cardbox_tracker.ros.nodes.teleoperation_node import TeleoperationNode  # noqa: E402
+from cardbox_tracker.common.errors import CardboxError
+from cardbox_tracker.person.model_file import dumps_body_model
+from cardbox_tracker.person.proportions import body_from_proportions
+from cardbox_tracker.ros.nodes.teleoperation_node import TeleoperationNode
 
 MODEL = String(data=dumps_body_model(body_from_proportions(1.75, 2.0, 0.4, 0.0)))
 RIGHT_HAND = 23

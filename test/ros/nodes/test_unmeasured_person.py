@@ -7,9 +7,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-
-pytest.importorskip("rclpy", reason="rclpy is not installed")
-
 from builtin_interfaces.msg import Time
 from std_msgs.msg import Float64, Header, String
 

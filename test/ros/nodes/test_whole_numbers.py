@@ -10,8 +10,6 @@ from typing import Any
 import pytest
 import yaml
 
-pytest.importorskip("rclpy", reason="rclpy is not installed")
-
 from cardbox_tracker.ros.runtime.parameters import LiveParameters
 from lab.tools.parameter_docs import NODES
 

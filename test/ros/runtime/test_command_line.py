@@ -6,8 +6,6 @@ import importlib
 
 import pytest
 
-pytest.importorskip("rclpy", reason="rclpy is not installed")
-
 from cardbox_tracker.ros.runtime import command_line
 from cardbox_tracker.ros.runtime.command_line import entries
 from lab.tools.parameter_docs import NODES as PARAMETERS

@@ -7,15 +7,12 @@ from collections.abc import Callable, Iterator
 from typing import Any
 
 import pytest
+from rclpy.executors import SingleThreadedExecutor
+from std_msgs.msg import String
 
-rclpy = pytest.importorskip("rclpy", reason="rclpy is not installed")
-
-from rclpy.executors import SingleThreadedExecutor  # noqa: E402
-from std_msgs.msg import String  # noqa: E402
-
-from cardbox_tracker.common.errors import CardboxError  # noqa: E402
-from cardbox_tracker.ros.runtime import qos  # noqa: E402
-from cardbox_tracker.ros.runtime.node import CardboxNode, IntraProcess  # noqa: E402
+from cardbox_tracker.common.errors import CardboxError
+from cardbox_tracker.ros.runtime import qos
+from cardbox_tracker.ros.runtime.node import CardboxNode, IntraProcess
 
 
 @pytest.fixture

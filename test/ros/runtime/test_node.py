@@ -6,18 +6,16 @@ import gc
 import time
 
 import pytest
+import rclpy
+from rclpy.context import Context
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.qos import QoSProfile
+from std_msgs.msg import String
+from std_srvs.srv import Trigger
 
-rclpy = pytest.importorskip("rclpy", reason="rclpy is not installed")
-
-from rclpy.context import Context  # noqa: E402
-from rclpy.executors import SingleThreadedExecutor  # noqa: E402
-from rclpy.qos import QoSProfile  # noqa: E402
-from std_msgs.msg import String  # noqa: E402
-from std_srvs.srv import Trigger  # noqa: E402
-
-from cardbox_tracker.common.errors import CardboxError  # noqa: E402
-from cardbox_tracker.ros.runtime import qos  # noqa: E402
-from cardbox_tracker.ros.runtime.node import CardboxNode, own_arguments, run  # noqa: E402
+from cardbox_tracker.common.errors import CardboxError
+from cardbox_tracker.ros.runtime import qos
+from cardbox_tracker.ros.runtime.node import CardboxNode, own_arguments, run
 
 
 class Nothing:

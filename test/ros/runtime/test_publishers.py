@@ -6,13 +6,9 @@ import time
 from collections.abc import Callable
 from typing import Any
 
-import pytest
+from std_msgs.msg import String
 
-rclpy = pytest.importorskip("rclpy", reason="rclpy is not installed")
-
-from std_msgs.msg import String  # noqa: E402
-
-from cardbox_tracker.ros.runtime.publishers import PATIENCE, SinglePublisher  # noqa: E402
+from cardbox_tracker.ros.runtime.publishers import PATIENCE, SinglePublisher
 
 WAIT_S = 30.0
 
