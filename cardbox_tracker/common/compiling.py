@@ -26,9 +26,12 @@ from contextlib import suppress
 from functools import cache, partial
 from pathlib import Path
 from pickle import UnpicklingError
+from types import SimpleNamespace
 from typing import Any, TypeVar
 
 import numba
+from numba.core.codegen import JITCodeLibrary
+from numba.core.compiler import Compiler
 
 import cardbox_tracker
 
@@ -145,17 +148,49 @@ def _save(save: Callable[..., None], *compiled: Any) -> None:
 _warn_once = cache(_LOG.warning)
 
 
+class _PartOfCallers(JITCodeLibrary):
+    """The code of a function that becomes machine code only within its callers."""
+
+    # There is no machine code into which numba could write the place of constants.
+    codegen = SimpleNamespace(set_env=lambda *_: None)
+
+    def _optimize_final_module(self) -> None:
+        """Leave that to the callers, which would do it again."""
+
+    def _finalize_final_module(self) -> None:
+        self._finalize_dynamic_globals()
+        self._finalized = True
+
+    def get_pointer_to_function(self, _: str) -> int:
+        return 0
+
+
+class _PartCompiler(Compiler):
+    def compile_extra(self, function: Callable[..., Any]) -> Any:
+        codegen = self.state.targetctx.codegen()
+        self.state.library = _PartOfCallers(codegen, function.__qualname__)
+        return super().compile_extra(function)
+
+
 def _refuse(function: Callable[..., Any], *_: Any) -> None:
     raise TypeError(f"{function.__qualname__} is for compiled functions; Python cannot call it")
+
+
+def _without_constants(template: Callable[..., Any], places: Any, names: dict[str, Any]) -> Any:
+    kinds = {name: numba.types.unliteral(kind) for name, kind in names.items()}
+    return template(tuple(map(numba.types.unliteral, places)), kinds)
 
 
 def njit(**options: Any) -> Callable[[F], F]:
     """Return ``numba.njit`` with ``options``, a folder for its code and no interpreter lock.
 
-    Without a wrapper for Python (``no_cpython_wrapper``), a function compiles faster, and calls
-    from Python raise TypeError. No function gets numba's wrapper for C.
+    Without a wrapper for Python (``no_cpython_wrapper``), a function has code in its callers only,
+    and calls from Python raise TypeError. No function gets numba's wrapper for C.
     """
+    is_part = "no_cpython_wrapper" in options
     options |= {"nogil": True, "error_model": "numpy", "no_cfunc_wrapper": True}
+    if is_part:
+        options |= {"pipeline_class": _PartCompiler}
     compiled: Any = partial(numba.njit, **options)
 
     def decorate(function: F) -> F:
@@ -163,14 +198,16 @@ def njit(**options: Any) -> Callable[[F], F]:
         with _LOCK:
             before, _CONFIG.CACHE_DIR = _CONFIG.CACHE_DIR, str(FOLDER)
             try:
-                made: F = compiled(cache=FOLDER is not None)(function)
+                made: F = compiled(cache=FOLDER is not None and not is_part)(function)
             except RuntimeError:  # the function has no file, or the folder is full
                 made = compiled()(function)
             finally:
                 _CONFIG.CACHE_DIR = before
         kept: Any = made
         kept._cache.save_overload = partial(_save, kept._cache.save_overload)
-        if "no_cpython_wrapper" in options:
+        # numba would compile a version for each constant.
+        kept.get_call_template = partial(_without_constants, kept.get_call_template)
+        if is_part:
             # numba would call a null pointer.
             kept._insert = lambda *_: None
             kept._compile_for_args = partial(_refuse, function)

@@ -25,6 +25,7 @@ A = TypeVar("A")
 R = TypeVar("R")
 
 _CONNECT_S = 10.0
+_ENDED = "a process ended unexpectedly, perhaps because the memory was full"
 # PR_SET_PDEATHSIG of <linux/prctl.h>.
 _DEATH_SIGNAL = 1
 _TAKEN_UP_S = 0.05
@@ -32,12 +33,16 @@ _TAKEN_UP_S = 0.05
 
 
 def _called(parent: int, function: Callable[[A], R], argument: A) -> R:
+    _end_with(parent)
+    return function(argument)
+
+
+def _end_with(parent: int) -> None:
     if os.getpid() != parent and sys.platform.startswith("linux"):
         # The kernel ends this process with its parent, also if that is killed.
         ctypes.CDLL(None).prctl(_DEATH_SIGNAL, signal.SIGKILL)
         if os.getppid() != parent:
             os._exit(1)
-    return function(argument)
 
 
 def cores() -> int:
@@ -45,6 +50,49 @@ def cores() -> int:
     from joblib import cpu_count
 
     return int(cpu_count())
+
+
+def shared_calls(
+    function: Callable[[A], object], arguments: Sequence[A], jobs: int
+) -> Iterator[float]:
+    """Call a function for what it writes, with each argument, in this process and copies of it.
+
+    Copies have all that this one has loaded. The ``jobs`` processes take up to 256 arguments in
+    their order; after each call of this one, the fraction that has been taken is yielded. Leaving
+    before the end, as by Ctrl-C, ends the copies. Raises CardboxError if one failed.
+    """
+    waiting, given = os.pipe()
+    os.write(given, bytes(range(len(arguments))))
+    os.close(given)
+    parent, copies = os.getpid(), list[int]()
+    try:
+        # Copies never receive SIGINT.
+        with interrupts.withheld():
+            while len(copies) + 1 < min(jobs, len(arguments)):
+                if copy := os.fork():
+                    copies.append(copy)
+                    continue
+                code = 1
+                try:
+                    _end_with(parent)
+                    while number := os.read(waiting, 1):
+                        function(arguments[number[0]])
+                    code = 0
+                finally:
+                    os._exit(code)
+        while number := os.read(waiting, 1):
+            function(arguments[number[0]])
+            yield number[0] / len(arguments)
+        while copies:
+            _, code = os.waitpid(copies[-1], 0)
+            copies.pop()
+            if code:
+                raise CardboxError(_ENDED)
+    finally:
+        os.close(waiting)
+        for copy in copies:
+            os.kill(copy, signal.SIGKILL)
+            os.waitpid(copy, 0)
 
 
 @contextmanager
@@ -149,7 +197,4 @@ def _told() -> Iterator[None]:
         # The second one is Dask's, which may not be installed.
         if not isinstance(error, BrokenExecutor) and type(error).__name__ != "KilledWorker":
             raise
-        raise CardboxError(
-            "a process ended unexpectedly, perhaps because the memory was full; give a smaller "
-            "--jobs"
-        ) from None
+        raise CardboxError(f"{_ENDED}; give a smaller --jobs") from None

@@ -42,7 +42,10 @@ def least_of(ratings: Floats, count: int) -> Indices:
 @kernel
 def spread_of_arm(joints_m: Floats, ratings: Floats, spread: float) -> tuple[float, float]:
     """Return weighted deviations of elbow and hand, m, of arms with ``joints_m`` (N, 3, 3)."""
-    best = ratings.min()
+    best = np.inf
+    for rating in ratings:
+        if rating < best:
+            best = rating
     total = 0.0
     sums, squares = np.zeros((3, 3)), np.zeros((3, 3))
     for i in range(joints_m.shape[0]):

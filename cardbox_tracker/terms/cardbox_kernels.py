@@ -160,7 +160,7 @@ def trunk_costs(
     """Write the costs (N,) of trunks (N, 4), given the cost ``base`` of drawing nothing."""
     model = cardbox_of(cardbox)
     rows, width = row_sums.shape[0], row_sums.shape[1] - 1
-    work = new_workspace(int(TRUNK_PATCHES), rows)
+    work = new_workspace(TRUNK_PATCHES, rows)
     _shape_trunk(model.parts, work.shape)
     for i in range(postures.shape[0]):
         torso_pose(postures[i], model.place, model.camera, work.torso, work.hip)
@@ -174,7 +174,7 @@ def cover_trunk(torso: Floats, cardbox: CardboxTuple, row_sums: RowSums, covered
     """Write the row sums outside of a trunk (4,) to ``covered``; return the gain of the trunk."""
     model = cardbox_of(cardbox)
     rows, width = row_sums.shape[0], row_sums.shape[1] - 1
-    work = new_workspace(int(TRUNK_PATCHES), rows)
+    work = new_workspace(TRUNK_PATCHES, rows)
     _shape_trunk(model.parts, work.shape)
     torso_pose(torso, model.place, model.camera, work.torso, work.hip)
     _place_trunk(work)
@@ -187,7 +187,7 @@ def cover_arms(posture: Floats, cardbox: CardboxTuple, row_sums: RowSums, covere
     """Write the row sums outside of the arms of a posture (12,); return the gain of the arms."""
     model = cardbox_of(cardbox)
     rows, width = row_sums.shape[0], row_sums.shape[1] - 1
-    work = new_workspace(int(2 * ARM_PATCHES), rows)
+    work = new_workspace(2 * ARM_PATCHES, rows)
     torso_pose(posture, model.place, model.camera, work.torso, work.hip)
     for arm in range(2):
         first = ARM_PATCHES * arm
@@ -210,7 +210,7 @@ def arm_costs(
     """Write the costs (N,) of arms (N, 4) beside a trunk (4,), given its row sums and its cost."""
     model = cardbox_of(cardbox)
     rows, width = covered.shape[0], covered.shape[1] - 1
-    work = new_workspace(int(ARM_PATCHES), rows)
+    work = new_workspace(ARM_PATCHES, rows)
     _shape_arm(model.parts, 0, work.shape)
     torso_pose(torso, model.place, model.camera, work.torso, work.hip)
     for i in range(postures.shape[0]):
@@ -231,7 +231,7 @@ def full_costs(
     """Write costs and drawn areas (N,), px, of whole postures (N, 12)."""
     model = cardbox_of(cardbox)
     rows, width = row_sums.shape[0], row_sums.shape[1] - 1
-    work = new_workspace(int(_BODY_PATCHES), rows)
+    work = new_workspace(_BODY_PATCHES, rows)
     _shape_body(model.parts, work.shape)
     for i in range(postures.shape[0]):
         _place_body(work, postures[i], model)
@@ -247,7 +247,7 @@ def body_costs(
 ) -> None:
     """Write the costs (N,) of N ``bodies`` at one place in the N ``postures`` (N, 12)."""
     rows, width = row_sums.shape[0], row_sums.shape[1] - 1
-    work = new_workspace(int(_BODY_PATCHES), rows)
+    work = new_workspace(_BODY_PATCHES, rows)
     parts, shoulders, place, camera = bodies
     for i in range(postures.shape[0]):
         model = cardbox_of((parts[i], shoulders[i], place, camera))

@@ -259,7 +259,11 @@ def residuals(states: Floats, body: BodyTuple, evidence: EvidenceTuple, found: F
             for d in range(N_STATE):
                 if moves(d, _SEGMENT[i]):
                     write_velocity(twists[d], points[i], moved[i, :, d])
-        moved[NECK] = 0.5 * (moved[SHOULDER] + moved[POINTS_OF_ARM + SHOULDER])
+        # An assignment of arrays would compile for longer than all the rest of this function.
+        for c in range(3):
+            for d in range(N_STATE):
+                other = moved[POINTS_OF_ARM + SHOULDER, c, d]
+                moved[NECK, c, d] = 0.5 * (moved[SHOULDER, c, d] + other)
         costs[n] = 0.0
         for i in range(N_POINTS):
             u, v = residual(i, points, of.camera, seen) if seen.points[i, 2] > 0.0 else (0.0, 0.0)

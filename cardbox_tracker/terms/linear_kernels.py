@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from math import sqrt
 
-from cardbox_tracker.common.compiling import kernel
+from cardbox_tracker.common.compiling import borrowing_kernel
 from cardbox_tracker.terms.kernel_arguments import Floats
 
 
-@kernel
+@borrowing_kernel
 def solve(matrix: Floats, right: Floats) -> None:
     """Solve a linear system in place by a Cholesky decomposition; ``right`` (n,) is the solution.
 
@@ -31,7 +31,7 @@ def solve(matrix: Floats, right: Floats) -> None:
         right[i] /= matrix[i, i]
 
 
-@kernel
+@borrowing_kernel
 def write_normal(jacobian: Floats, residuals: Floats, matrix: Floats, right: Floats) -> None:
     """Write the normal equations, (m, m) and (m,), of residuals (n,) with a Jacobian (n, m)."""
     count, size = jacobian.shape

@@ -75,10 +75,7 @@ class Workspace(NamedTuple):
 
 @inlined_allocation
 def new_workspace(patches: int, rows: int) -> Workspace:
-    """Return the workspace for a number of patches and rows; ``shape`` is zero.
-
-    numba compiles a version for each constant; callers pass ``int(CONSTANT)``, which is none.
-    """
+    """Return the workspace for a number of patches and rows; ``shape`` is zero."""
     return Workspace(
         shape=np.zeros((3, 4 * patches)),
         corners=np.zeros((3, 4 * patches)),

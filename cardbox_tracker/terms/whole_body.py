@@ -200,10 +200,9 @@ class WholeBodyCost:
         """Rate torsos (N,); the arms of the state ``arms_of`` keep their place in the image."""
         self._beside_arm = None
         gain = kernels.cover(arms_of, _BOTH_ARMS, self.body, self.counted, self._seen, self._beside)
-        ratings = np.empty(len(states))
         seen = self._by(self._beside, self.silhouette_px + gain)
-        kernels.rate_trunks(states, self.body, *seen, ratings)
-        return self._with_terms(ratings, states, TRUNK, arms_of)
+        rated = self._rated(states, (True, False), seen)
+        return self._with_terms(rated.ratings, states, TRUNK, arms_of)
 
     def fix_torso(self, torso: FloatArray) -> None:
         """Rate arms beside the trunk of the state ``torso`` (14,) from now on."""
@@ -268,20 +267,29 @@ class WholeBodyCost:
 
     def pairs(self, states: FloatArray, into: Ratings | None = None) -> Ratings:
         """Rate whole states (N, 14), N > 0, with the trunk of :meth:`fix_torso`, as ``bodies``."""
-        ratings, joints_m, keypoints_m = into or _new_ratings(len(states))
-        points = joints_m, keypoints_m
-        kernels.rate_pairs(states, self.body, *self._by_arms, ratings, points)
-        self._with_terms(ratings, states)
-        return Ratings(ratings, *points)
+        rated = self._rated(states, (False, True), self._by_arms, into)
+        self._with_terms(rated.ratings, states)
+        return Ratings(rated.ratings, *rated.points)
 
     def bodies(self, states: FloatArray, into: Ratings | None = None) -> Bodies:
         """Rate whole states (N, 14); ratings and points are written to ``into`` if it is given."""
-        ratings, joints_m, keypoints_m = into or _new_ratings(len(states))
-        costs_px, areas_px = pixels = np.empty(len(states)), np.empty(len(states))
-        points = joints_m, keypoints_m
-        kernels.rate_bodies(states, self.body, *self._by_body, ratings, pixels, points)
-        self._with_terms(ratings, states)
-        return Bodies(ratings, costs_px, areas_px, Points(*points))
+        rated = self._rated(states, (True, True), self._by_body, into)
+        self._with_terms(rated.ratings, states)
+        return rated
+
+    def _rated(
+        self,
+        states: FloatArray,
+        drawn: tuple[bool, bool],
+        seen: tuple[ObservedTuple, priors.PriorTuple],
+        into: Ratings | None = None,
+    ) -> Bodies:
+        """Rate states (N, 14) without further terms; ``drawn`` are trunks and arms."""
+        n = len(states)
+        into = into or Ratings(np.empty(n), np.empty((n, 6, 3)), np.empty((n, 6, 3)))
+        pixels, points = (np.empty(n), np.empty(n)), (into.joints_m, into.keypoints_m)
+        kernels.rate_bodies(states, drawn, self.body, *seen, into.ratings, pixels, points)
+        return Bodies(into.ratings, *pixels, Points(*points))
 
     def keypoints(self, state: FloatArray) -> FloatArray:
         """Return the keypoints (6, 3) of a state (14,), metres in the optical frame."""
@@ -309,11 +317,6 @@ class WholeBodyCost:
         moved = *self.body[:3], place_of(body), intrinsics_of(camera)
         corners_of_body(state, moved, corners_m)
         return corners_m
-
-
-def _new_ratings(count: int) -> Ratings:
-    """Allocate the ratings of ``count`` states."""
-    return Ratings(np.empty(count), np.empty((count, 6, 3)), np.empty((count, 6, 3)))
 
 
 def iou_of(silhouette_px: float, model_px: float, differing_px: float) -> float:

@@ -34,7 +34,6 @@ from cardbox_tracker.terms.bit_masks import Masks, cover_masks, new_masks, sum_m
 from cardbox_tracker.terms.bit_planes import Planes
 from cardbox_tracker.terms.body_outline import (
     ARM_PATCHES,
-    BODY_PATCHES,
     TRUNK_PATCHES,
     place_arm,
     place_trunk,
@@ -124,29 +123,6 @@ def _place_arms(
 
 
 @kernel
-def rate_trunks(
-    states: Floats, body: BodyTuple, observed: ObservedTuple, prior: PriorTuple, ratings: Floats
-) -> None:
-    """Write ratings (N,) of the trunks of states (N, 14)."""
-    seen, given = Observed(*observed), Prior(*prior)
-    scratch = new_scratch(int(TRUNK_PATCHES), seen, given)
-    _rate_trunks(states, body_of(body), seen, given, scratch, ratings)
-
-
-@borrowing_kernel
-def _rate_trunks(
-    states: Floats, of: Body, seen: Observed, given: Prior, scratch: Scratch, ratings: Floats
-) -> None:
-    work = scratch.work
-    for i in range(states.shape[0]):
-        state_pose(states[i], of.place, of.camera, work.torso, work.hip)
-        place_trunk(work, of.drawn)
-        has_cuts = draw(work, of.camera, seen.rows, seen.width)
-        gain = sum_masks(work, has_cuts, seen.width, seen.planes, scratch.masks)[0]
-        ratings[i] = (seen.base_px + gain) * seen.scale + torso_prior(states[i], given)
-
-
-@kernel
 def rate_arms(
     arms: Floats,
     side: float,
@@ -163,7 +139,7 @@ def rate_arms(
     Shoulder, elbow and hand in the torso's frame are written to ``joints_m`` (N, 3, 3).
     """
     seen, given = Observed(*observed), Prior(*prior)
-    scratch = new_scratch(int(ARM_PATCHES), seen, given)
+    scratch = new_scratch(ARM_PATCHES, seen, given)
     _rate_arms(arms, side, torso, body_of(body), seen, given, scratch, ratings, joints_m)
 
 
@@ -195,6 +171,7 @@ def _rate_arms(
 @kernel
 def rate_bodies(
     states: Floats,
+    drawn: tuple[bool, bool],
     body: BodyTuple,
     observed: ObservedTuple,
     prior: PriorTuple,
@@ -204,18 +181,22 @@ def rate_bodies(
 ) -> None:
     """Write ratings (N,) of states (N, 14), their pixels, and the points of their arms.
 
+    ``drawn`` says whether trunks and arms are drawn. Without trunks, ``observed`` is the silhouette
+    with that of the first state drawn, which all states have; without arms, no points are written.
     ``body``, ``observed``, ``prior`` and ``points`` are fields of :class:`~.kernel_arguments.Body`,
     :class:`Observed`, :class:`~.body_priors.Prior` and :class:`Points`. ``pixels`` (N,) each are
     those in which model and silhouette differ, and of the model.
     """
     seen, given = Observed(*observed), Prior(*prior)
-    scratch = new_scratch(int(BODY_PATCHES), seen, given)
-    _rate_bodies(states, body_of(body), seen, given, scratch, ratings, pixels, Points(*points))
+    scratch = new_scratch(TRUNK_PATCHES * drawn[0] + 2 * ARM_PATCHES * drawn[1], seen, given)
+    of, into = body_of(body), Points(*points)
+    _rate_bodies(states, drawn, of, seen, given, scratch, ratings, pixels, into)
 
 
 @borrowing_kernel
 def _rate_bodies(
     states: Floats,
+    drawn: tuple[bool, bool],
     of: Body,
     seen: Observed,
     given: Prior,
@@ -226,55 +207,23 @@ def _rate_bodies(
 ) -> None:
     work = scratch.work
     costs_px, areas_px = pixels
+    has_trunk, has_arms = drawn
+    of_torso = 0.0
     for i in range(states.shape[0]):
-        state_pose(states[i], of.place, of.camera, work.torso, work.hip)
-        place_trunk(work, of.drawn)
-        rated = torso_prior(states[i], given)
-        rated = _place_arms(states, i, TRUNK_PATCHES, rated, of, given, scratch, points)
+        if has_trunk or i == 0:
+            state_pose(states[i], of.place, of.camera, work.torso, work.hip)
+            of_torso = torso_prior(states[i], given)
+        if has_trunk:
+            place_trunk(work, of.drawn)
+        rated = of_torso
+        if has_arms:
+            p = TRUNK_PATCHES * has_trunk
+            rated = _place_arms(states, i, p, rated, of, given, scratch, points)
         has_cuts = draw(work, of.camera, seen.rows, seen.width)
         gain, area = sum_masks(work, has_cuts, seen.width, seen.planes, scratch.masks)
         costs_px[i] = seen.base_px + gain
         areas_px[i] = area
         ratings[i] = costs_px[i] * seen.scale + rated
-
-
-@kernel
-def rate_pairs(
-    states: Floats,
-    body: BodyTuple,
-    observed: ObservedTuple,
-    prior: PriorTuple,
-    ratings: Floats,
-    points: PointsTuple,
-) -> None:
-    """Write ratings (N,) and points of states (N, 14) that all have the trunk of the first one.
-
-    ``observed`` is the silhouette with that trunk drawn, so only the arms are; see
-    :func:`rate_bodies`.
-    """
-    seen, given = Observed(*observed), Prior(*prior)
-    scratch = new_scratch(int(2 * ARM_PATCHES), seen, given)
-    _rate_pairs(states, body_of(body), seen, given, scratch, ratings, Points(*points))
-
-
-@borrowing_kernel
-def _rate_pairs(
-    states: Floats,
-    of: Body,
-    seen: Observed,
-    given: Prior,
-    scratch: Scratch,
-    ratings: Floats,
-    points: Points,
-) -> None:
-    work = scratch.work
-    state_pose(states[0], of.place, of.camera, work.torso, work.hip)
-    of_torso = torso_prior(states[0], given)
-    for i in range(states.shape[0]):
-        rated = _place_arms(states, i, 0, of_torso, of, given, scratch, points)
-        has_cuts = draw(work, of.camera, seen.rows, seen.width)
-        gain = sum_masks(work, has_cuts, seen.width, seen.planes, scratch.masks)[0]
-        ratings[i] = (seen.base_px + gain) * seen.scale + rated
 
 
 @kernel

@@ -22,7 +22,7 @@ from typing import NamedTuple
 import numpy as np
 
 from cardbox_tracker.camera.camera import Camera
-from cardbox_tracker.common.compiling import kernel
+from cardbox_tracker.common.compiling import borrowing_kernel, kernel
 from cardbox_tracker.detectors.image_points import POINT_INDEX, ImagePoints
 from cardbox_tracker.person.kinematics import pose
 from cardbox_tracker.person.model import BodyModel
@@ -155,7 +155,7 @@ def fit_neck(
     return Neck(np.clip(angles, NECK_LIMITS[:, 0], NECK_LIMITS[:, 1]), stddev)
 
 
-@kernel
+@borrowing_kernel
 def _residuals(
     values: Floats,
     torso: Floats,
@@ -165,6 +165,7 @@ def _residuals(
     px: Floats,
     lens: tuple[float, float, float, float],
     sigma_px: float,
+    at: Floats,
     residuals: Floats,
 ) -> None:
     """Write the residuals (2n + 6,) of values (6,), in standard deviations.
@@ -173,7 +174,7 @@ def _residuals(
     size. ``torso`` (3, 3) turns the torso's to the optical frame; rows of ``axes`` (3, 3) are the
     reference frame's axes and ``centre_m`` (3,) is the middle of the head there. A face of this
     size has the points ``face_m`` (n, 3), which are at ``px`` (n, 2) in the image, with the
-    deviation ``sigma_px``.
+    deviation ``sigma_px``; ``at`` (3,) is scratch.
     """
     cy, sy = cos(values[0]), sin(values[0])
     cp, sp = cos(values[1]), sin(values[1])
@@ -186,7 +187,6 @@ def _residuals(
         y, z = cr * y - sr * z, sr * y + cr * z
         x, z = cp * x + sp * z, cp * z - sp * x
         x, y = cy * x - sy * y, sy * x + cy * y
-        at = [0.0, 0.0, 0.0]
         for c in range(3):
             at[c] = centre_m[c] + values[3] * axes[1, c] + values[4] * axes[2, c]
             at[c] += torso[c, 0] * x + torso[c, 1] * y + torso[c, 2] * z
@@ -211,16 +211,16 @@ def _solve(
     count = 2 * face_m.shape[0] + 6
     here, above, jacobian = np.empty(count), np.empty(count), np.empty((count, 6))
     normal, step, best = np.empty((6, 6)), np.empty(6), np.empty(6)
-    least, kept = np.inf, np.empty((6, 6))
+    least, kept, at = np.inf, np.empty((6, 6)), np.empty(3)
     for start in range(_STARTS_RAD.shape[0]):
         values = np.zeros(6)
         values[0], values[1] = _STARTS_RAD[start, 0], _STARTS_RAD[start, 1]
         for number in range(_STEPS + 1):
-            _residuals(values, torso, axes, centre_m, face_m, px, lens, sigma_px, here)
+            _residuals(values, torso, axes, centre_m, face_m, px, lens, sigma_px, at, here)
             for j in range(6):
                 before = values[j]
                 values[j] = before + _DIFFERENCE
-                _residuals(values, torso, axes, centre_m, face_m, px, lens, sigma_px, above)
+                _residuals(values, torso, axes, centre_m, face_m, px, lens, sigma_px, at, above)
                 values[j] = before
                 for i in range(count):
                     jacobian[i, j] = (above[i] - here[i]) / _DIFFERENCE
@@ -235,7 +235,10 @@ def _solve(
             cost += here[i] ** 2
         if cost < least:
             least = cost
-            best[:], kept[:] = values, normal
+            for j in range(6):
+                best[j] = values[j]
+                for i in range(6):
+                    kept[i, j] = normal[i, j]
     # Priors add as many residuals as there are unknowns, so the points are the degrees of freedom.
     return best, sqrt(least / (2 * face_m.shape[0])), kept
 

@@ -10,7 +10,7 @@ from math import cos, exp, inf, isnan, sin, sqrt
 
 import numpy as np
 
-from cardbox_tracker.common.compiling import inlined_kernel, kernel
+from cardbox_tracker.common.compiling import borrowing_kernel, inlined_kernel, kernel
 from cardbox_tracker.person.legs import LEG_LIMITS
 from cardbox_tracker.terms.kernel_arguments import Floats
 from cardbox_tracker.terms.linear_kernels import solve, write_normal
@@ -77,7 +77,7 @@ def points_of(values: Floats, of: Person) -> Floats:
     return points_m
 
 
-@kernel
+@borrowing_kernel
 def _write_residuals(values: Floats, given: Given, points_m: Floats, residuals: Floats) -> float:
     """Write the residuals (34,) of values (12,), and return the sum of their squares."""
     of, (axes, (fx, fy, cx, cy)), (before, change, expected, root), shown = given

@@ -6,6 +6,7 @@ that track a film with the preset ``default`` need only a part, which several pr
 
 from __future__ import annotations
 
+import gc
 import json
 import logging
 from collections.abc import Mapping, Sequence
@@ -17,6 +18,8 @@ from typing import Any
 
 import numba
 import numpy as np
+from numba.core.compiler_lock import global_compiler_lock
+from numba.core.registry import cpu_target
 
 from cardbox_tracker.camera.camera import Camera
 from cardbox_tracker.camera.extrinsics import Extrinsics
@@ -24,7 +27,7 @@ from cardbox_tracker.camera.rasterisation import render
 from cardbox_tracker.camera.view import OtherCamera
 from cardbox_tracker.common import compiling
 from cardbox_tracker.common.errors import CardboxError
-from cardbox_tracker.common.processes import cores, results_of
+from cardbox_tracker.common.processes import cores, shared_calls
 from cardbox_tracker.common.progress import progress_bar
 from cardbox_tracker.detectors.image_points import POINT_NAMES, ImagePoints, LegPoints
 from cardbox_tracker.person.appearance import PARTS, Appearance, bins_of
@@ -60,13 +63,14 @@ def compile_for_films() -> None:
     if done.exists():
         Thread(target=_load, args=(listed,), daemon=True).start()
         return
+    # Copies of this process then need not load these.
+    cpu_target.typing_context.refresh()
+    cpu_target.target_context.refresh()
     try:
-        with (
-            progress_bar("compile, the first time only") as show,
-            results_of(compile_each, [*listed.items()], cores()) as results,
-        ):
-            for number, _ in enumerate(results, start=1):
-                show(number / len(listed))
+        # A copy would wait forever for another thread that compiles in this process.
+        with progress_bar("compile, the first time only") as show, global_compiler_lock:
+            for fraction in shared_calls(compile_each, [*listed.items()], cores()):
+                show(fraction)
         done.touch()
     except (CardboxError, OSError) as error:
         _LOG.warning("the first images wait for code that could not be compiled: %s", error)
@@ -83,9 +87,14 @@ def compile_each(part: tuple[str, Mapping[str, Sequence[Any]]]) -> None:
     """Compile kernels of one module in :data:`FILM_KERNELS`; most call the same other ones."""
     name, kernels = part
     module = import_module(f"cardbox_tracker.{name}")
-    for function, arguments in kernels.items():
-        kernel = getattr(module, function)
-        kernel.compile(tuple(kernel.typeof_pyval(_example(one)) for one in arguments))
+    # The search for garbage would take a sixth of the time; it follows.
+    gc.disable()
+    try:
+        for function, arguments in kernels.items():
+            kernel = getattr(module, function)
+            kernel.compile(tuple(kernel.typeof_pyval(_example(one)) for one in arguments))
+    finally:
+        gc.enable()
 
 
 def _example(argument: str | Sequence[Any]) -> Any:

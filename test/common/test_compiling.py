@@ -186,6 +186,28 @@ def test_a_file_that_was_cut_off_is_made_again(package: Path, run: Callable) -> 
     assert run(USE) == ("42 1\n", "")
 
 
+PARTS = """
+from cardbox_tracker.common import compiling
+
+@compiling.inlined_kernel
+def moved(x, by):
+    return x + by
+
+@compiling.kernel
+def move(x):
+    return moved(x, 1) + moved(moved(x, 20), by=x)
+"""
+
+
+def test_a_part_of_other_kernels_is_compiled_once_and_kept_within_them(package: Path) -> None:
+    """For each constant, numba would compile a version, and keep each in a file."""
+    (package / "parts.py").write_text(PARTS)
+    use = "from cardbox_tracker.parts import move, moved; print(move(5), len(moved.signatures))"
+    assert run(package, use) == ("36 1\n", "")
+    assert {path.name.split(".")[1].split("-")[0] for path in package.rglob("*.nbc")} == {"move"}
+    assert run(package, use) == ("36 0\n", ""), "kept code has the part"
+
+
 FULL = """
 from numba.core import caching
 def full(*_):

@@ -20,7 +20,7 @@ import pytest
 
 from cardbox_tracker.common import interrupts, processes
 from cardbox_tracker.common.errors import CardboxError
-from cardbox_tracker.common.processes import cores, results_of
+from cardbox_tracker.common.processes import cores, results_of, shared_calls
 
 ROOT = Path(__file__).parents[2]
 
@@ -83,6 +83,46 @@ def lives(process: int) -> bool:
     except OSError:
         return False
     return state != "Z"
+
+
+def test_copies_share_the_calls(tmp_path: Path) -> None:
+    def write(number: int) -> None:
+        time.sleep(0.05)
+        with Path(tmp_path, str(os.getpid())).open("a") as file:
+            file.write(f"{number}\n")
+
+    assert list(shared_calls(write, range(4), 1)) == [0.0, 0.25, 0.5, 0.75]
+    assert len(list(tmp_path.iterdir())) == 1
+    fractions = list(shared_calls(write, range(4, 16), 3))
+    assert fractions == sorted(fractions) and len(fractions) < 12
+    written = [path.read_text().split() for path in tmp_path.iterdir()]
+    assert len(written) == 3
+    assert sorted(int(number) for numbers in written for number in numbers) == [*range(16)]
+
+
+def test_a_copy_that_fails_is_told_and_leaving_ends_it(tmp_path: Path) -> None:
+    parent, copy = os.getpid(), tmp_path / "copy"
+
+    def fail(_: int) -> None:
+        if os.getpid() != parent:
+            raise ValueError
+        time.sleep(0.5)
+
+    def wait(_: int) -> None:
+        if os.getpid() != parent:
+            (tmp_path / "new").write_text(str(os.getpid()))
+            (tmp_path / "new").rename(copy)
+            time.sleep(600)
+        while not copy.exists():
+            time.sleep(0.01)
+
+    with pytest.raises(CardboxError, match="ended unexpectedly, perhaps because the memory"):
+        list(shared_calls(fail, range(9), 2))
+    calls = shared_calls(wait, range(9), 2)
+    next(calls)
+    assert lives(int(copy.read_text()))
+    calls.close()
+    assert not lives(int(copy.read_text()))
 
 
 class Late(list[int]):

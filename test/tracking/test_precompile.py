@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import os
+import subprocess
 import sys
 from pathlib import Path
 from queue import Queue
@@ -35,6 +37,7 @@ from cardbox_tracker.tracking.precompile import (
 )
 from cardbox_tracker.tracking.tracker import Tracker
 
+ROOT = Path(__file__).resolve().parents[2]
 FRONT = reference_posture("front")
 CAMERA = Camera(320, 240, 300.0, 300.0, 159.5, 119.5)
 
@@ -133,3 +136,24 @@ def test_what_films_need_is_compiled_once(tmp_path: Path, monkeypatch: pytest.Mo
     assert done == [*json.loads(FILM_KERNELS.read_text()).items()]
     assert loaded.get(timeout=60.0) == dict(done)
     assert loaded.empty()
+
+
+IN_COPIES = """
+import sys
+from pathlib import Path
+from cardbox_tracker.tracking import precompile
+precompile.FILM_KERNELS, precompile.cores = Path(sys.argv[1]), lambda: 2
+precompile.compile_for_films()
+"""
+
+
+def test_two_processes_keep_each_kernel_of_the_list(tmp_path: Path) -> None:
+    every = json.loads(FILM_KERNELS.read_text())
+    few = {name: every[name] for name in ("search.approach", "terms.arm_points", "search.refiner")}
+    (tmp_path / "few.json").write_text(json.dumps(few))
+    values = os.environ | {"NUMBA_CACHE_DIR": str(tmp_path), "PYTHONPATH": str(ROOT)}
+    command = [sys.executable, "-c", IN_COPIES, str(tmp_path / "few.json")]
+    subprocess.run(command, env=values, check=True, timeout=300)
+    kept = {path.name.split("-")[0].split(".", 1)[1] for path in tmp_path.rglob("*.nbc")}
+    assert kept == {kernel for kernels in few.values() for kernel in kernels}
+    assert len(list(tmp_path.rglob("films-numba-*"))) == 1
