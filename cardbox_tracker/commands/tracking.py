@@ -35,7 +35,6 @@ def track(
     from cardbox_tracker.commands.scene import measured_scene
     from cardbox_tracker.common.progress import progress_bar
     from cardbox_tracker.detectors.hand_network import HandNetwork
-    from cardbox_tracker.detectors.pose_network import threads_for_films
     from cardbox_tracker.measuring.scene import save_scene
     from cardbox_tracker.person.model_file import save_body_model
     from cardbox_tracker.recordings.track import Quality, track_recording
@@ -72,7 +71,7 @@ def track(
                 (*observers, lambda frame, *_: advance((frame.time_s - start_s) / total_s)),
                 person.end_s,
                 person.people,
-                None if request.hands is None else HandNetwork(request.hands, threads_for_films()),
+                None if request.hands is None else HandNetwork(request.hands),
             )
         remarks = [remark for remark in source.first.remarks if remark not in early]
         accounts = tuple(one.account for one in source.sources)

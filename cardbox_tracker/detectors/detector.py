@@ -37,8 +37,8 @@ class Detector(NamedTuple):
         """Return the installed detector; raise CardboxError if it is not installed."""
         return cls(installed_models())
 
-    def start(self, across: float = 1.0, down: float = 1.0, threads: int = 1) -> PersonDetector:
-        """Return a detector for the images of one camera, whose networks compute in ``threads``.
+    def start(self, across: float = 1.0, down: float = 1.0) -> PersonDetector:
+        """Return a detector for the images of one camera.
 
         Their width and height are the shares ``across`` and ``down`` of the camera's own image.
         Raises CardboxError if the networks cannot be loaded.
@@ -46,7 +46,7 @@ class Detector(NamedTuple):
         if isinstance(self.models, OwnModel):
             network: PoseNetwork = OwnNetwork(self.models.make())
         else:
-            network = PoseNetwork(*self.models, threads)
+            network = PoseNetwork(*self.models)
         if self.person is not None:
             network.choose = self.person.scaled(across, down)
         return PersonDetector(network, PeopleNetwork(network, self.people) if self.people else None)

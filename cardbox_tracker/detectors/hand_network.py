@@ -43,9 +43,9 @@ class HandPoints(NamedTuple):
 class HandNetwork:
     """Finds the points of a hand whose place is known."""
 
-    def __init__(self, path: Path, threads: int = 1) -> None:
+    def __init__(self, path: Path) -> None:
         """Load the network; raise CardboxError if LiteRT or the file is missing or damaged."""
-        self._locate = Network(path, threads)
+        self._locate = Network(path)
 
     def __call__(self, image: ColorImage, square: Square) -> HandPoints | None:
         """Return the hand in a square of an image (H, W, 3), bgr; the fingers point to its top."""

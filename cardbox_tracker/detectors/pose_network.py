@@ -72,6 +72,8 @@ _SQUARE_SCALE = 1.25
 # Two further outputs of the landmark network say where the next square is: centre and scale.
 _CENTRE, _SCALE = 33, 34
 _OUTPUTS = 39
+# With two threads, a network takes two thirds of the time.
+_THREADS = 2
 # A point moves to the centroid of its heat map in a window of this many cells.
 _HEAT_WINDOW, _LEAST_HEAT = 7, 0.5
 _CELLS = np.indices((_HEAT_WINDOW, _HEAT_WINDOW))[::-1].reshape(2, -1).T
@@ -125,10 +127,10 @@ class PoseNetwork:
         several: number of images with several people, of those that were searched for them.
     """
 
-    def __init__(self, detector: Path, landmarks: Path, threads: int = 1) -> None:
+    def __init__(self, detector: Path, landmarks: Path) -> None:
         """Load both networks; CardboxError without LiteRT, or if a file is missing or damaged."""
-        self._detect = Network(detector, threads)
-        self._locate = Network(landmarks, threads)
+        self._detect = Network(detector)
+        self._locate = Network(landmarks)
         self.choose: Choose | None = None
         self.forget()
 
@@ -237,12 +239,14 @@ class PoseNetwork:
 class Network:
     """One network file."""
 
-    def __init__(self, path: Path, threads: int = 1) -> None:
+    def __init__(self, path: Path) -> None:
         """Load it; CardboxError without LiteRT, or if the file is missing or damaged."""
         needed = "ai_edge_litert.interpreter", "the detector needs ai-edge-litert", "detector"
         Interpreter = optional(*needed).Interpreter
         try:
             with _silent():
+                # A process that has others beside it limits OpenCV to one thread.
+                threads = min(_THREADS, cv2.getNumThreads())
                 self._run: Any = Interpreter(str(path), num_threads=threads)
                 self._run.allocate_tensors()
         except (ValueError, OSError, RuntimeError) as error:
@@ -258,14 +262,6 @@ class Network:
         self._run.set_tensor(self._input, image[None])
         self._run.invoke()
         return [self._run.get_tensor(index) for index in self._outputs]
-
-
-def threads_for_films() -> int:
-    """Return how many threads a network has while a film is tracked: two, if there are as many.
-
-    A process that has others beside it limits OpenCV's threads, and so these, to one.
-    """
-    return min(2, cv2.getNumThreads())
 
 
 @contextmanager
@@ -375,7 +371,8 @@ def _mask_in_image(
 ) -> NDArray[np.uint8]:
     """Return the network's mask, whose values are logits, in the image, (H, W)."""
     matrix = _to_image(square, len(logits))
-    mask = np.asarray(cv2.warpAffine(_chance(logits), matrix, (shape[1], shape[0])))
+    mask = np.asarray(cv2.warpAffine(_chance(logits), matrix, (shape[1], shape[0])), np.float64)
+    # In place, since large arrays take long to be made.
     mask *= 255.0
     return np.rint(mask, out=mask).astype(np.uint8)
 

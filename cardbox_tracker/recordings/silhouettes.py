@@ -23,7 +23,7 @@ from cardbox_tracker.common.errors import BagError, CameraError, CardboxError, E
 from cardbox_tracker.detectors.detector import Detector, KeptDetections
 from cardbox_tracker.detectors.image_points import ImagePoints
 from cardbox_tracker.detectors.point_table import GivenPoints, Image, PointTable
-from cardbox_tracker.detectors.pose_network import Detection, image_points, threads_for_films
+from cardbox_tracker.detectors.pose_network import Detection, image_points
 from cardbox_tracker.recordings.image_recording import RecordedImage
 from cardbox_tracker.recordings.open_images import ImageRecording
 from cardbox_tracker.segmentation.background_config import BackgroundConfig
@@ -223,7 +223,7 @@ class SilhouetteSource:
             self.camera.width / calibration.width,
             self.camera.height / calibration.height,
         )
-        return KeptDetections(detector.start(across, down, threads_for_films()))
+        return KeptDetections(detector.start(across, down))
 
     def _looked_at(self, prepared: PreparedImage, start_s: float = -math.inf) -> PreparedImage:
         """Return an image with whom the detector finds in it, if it is not before ``start_s``."""

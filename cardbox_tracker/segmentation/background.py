@@ -201,7 +201,7 @@ class SilhouetteExtractor:
         config = self.config
         if not config.clean_up:
             difference = np.abs(brightness - self.model.mean)
-            return np.uint8(255) * ~(difference < self._limit)
+            return np.asarray(np.uint8(255) * ~(difference < self._limit))
         signed, score = self._scratch
         if self._light is None:
             self.gain = self._scene_gain(brightness)

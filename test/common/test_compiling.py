@@ -199,13 +199,15 @@ def move(x):
 """
 
 
-def test_a_part_of_other_kernels_is_compiled_once_and_kept_within_them(package: Path) -> None:
+def test_a_part_of_other_kernels_is_compiled_once_and_kept_within_them(
+    package: Path, run: Callable
+) -> None:
     """For each constant, numba would compile a version, and keep each in a file."""
     (package / "parts.py").write_text(PARTS)
     use = "from cardbox_tracker.parts import move, moved; print(move(5), len(moved.signatures))"
-    assert run(package, use) == ("36 1\n", "")
+    assert run(use) == ("36 1\n", "")
     assert {path.name.split(".")[1].split("-")[0] for path in package.rglob("*.nbc")} == {"move"}
-    assert run(package, use) == ("36 0\n", ""), "kept code has the part"
+    assert run(use) == ("36 0\n", ""), "kept code has the part"
 
 
 FULL = """

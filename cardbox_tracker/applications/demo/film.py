@@ -41,6 +41,7 @@ class StoredDetections(Detector):
 
 class _Replay(PersonDetector):
     remark = ""
+    _people = None
 
     def __init__(self, found: Sequence[Detection]) -> None:
         self._found = found
