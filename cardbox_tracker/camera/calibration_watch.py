@@ -10,11 +10,7 @@ from dataclasses import replace
 from typing import Any
 
 from cardbox_tracker.camera.camera import Calibration
-from cardbox_tracker.camera.camera_info import (
-    calibration_from_info,
-    info_array,
-    info_remark,
-)
+from cardbox_tracker.camera.camera_info import calibration_from_info, info_array, info_remark
 from cardbox_tracker.common.errors import CameraError
 
 LASTING = 30
