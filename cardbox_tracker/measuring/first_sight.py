@@ -46,6 +46,8 @@ at least stands where the silhouette is."""
 
 # Least share of the image of a person whom a detector finds.
 _LEAST_DETECTED = 0.001
+# Share of a person's rows in which a side of the image cuts them, from which it cuts the trunk.
+_CUT = 0.3
 # Distances that are tried if none is given, beside that of the body.
 _DISTANCES_M = 0.9 * 1.2 ** np.arange(9)
 _BREADTHS = [SIZE_INDEX[name] for name in BREADTHS]
@@ -66,15 +68,15 @@ _PRIOR = 0.003
 def upper_body(silhouette: Silhouette, is_detected: bool = False) -> Silhouette | None:
     """Return the person of a silhouette (H, W), 0 or 255, which is its largest region, or None.
 
-    It is None if the head is cut off, or the region is too large, or too small; whom a detector
-    finds may be smaller.
+    It is None if the head or a side is cut off, or the region is too large, or too small; whom a
+    detector finds may be smaller.
     """
     seen = filled(silhouette)
     share = np.count_nonzero(seen) / seen.size
     least = _LEAST_DETECTED if is_detected else MIN_PERSON_FRACTION
-    if not least <= share <= MAX_PERSON_FRACTION or seen[0].any():
-        return None
-    return seen
+    cut = max(np.count_nonzero(seen[:, 0]), np.count_nonzero(seen[:, -1]))
+    is_cut = seen[0].any() or cut > _CUT * np.count_nonzero(seen.any(axis=1))
+    return None if is_cut or not least <= share <= MAX_PERSON_FRACTION else seen
 
 
 @dataclass(frozen=True)

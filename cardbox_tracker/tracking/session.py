@@ -127,7 +127,8 @@ class _Person:
         if measuring is None:
             return Estimate(LOST) if only_measures else tracker.track(observations)
         frames = tracker.frames(observations)
-        first, is_new_start = frames[0], bool(measuring.body.unknown)
+        first = frames[0]
+        is_new_start = bool(measuring.body.unknown) or self.estimate.posture is None
         self._time_s += first.interval_s
         is_detected = first.points is not None and first.points.are_certain
         if measuring.see(first.silhouette, first.image, self._time_s, is_detected):
@@ -137,8 +138,10 @@ class _Person:
             return Estimate(LOST)
         estimate = tracker.follow(frames)
         if tracker.empty == _EMPTY_IMAGES:
-            # The next one may be somebody else.
+            # The next one may be somebody else, and stand elsewhere.
             measuring.forget()
+            if not tracker.body.unknown:
+                tracker.use(measuring.body, first.stamp_ns, is_new_start=True)
         return estimate
 
     def tilt(self, guess: BodyModel, stamp_ns: int) -> None:
