@@ -68,15 +68,18 @@ _PRIOR = 0.003
 def upper_body(silhouette: Silhouette, is_detected: bool = False) -> Silhouette | None:
     """Return the person of a silhouette (H, W), 0 or 255, which is its largest region, or None.
 
-    It is None if the head or a side is cut off, or the region is too large, or too small; whom a
-    detector finds may be smaller.
+    It is None if the head is cut off, or a side of the image cuts the trunk, as of somebody who
+    comes in, or the region is too large or too small; whom a detector finds may be smaller, and cut
+    by a side.
     """
     seen = filled(silhouette)
     share = np.count_nonzero(seen) / seen.size
     least = _LEAST_DETECTED if is_detected else MIN_PERSON_FRACTION
-    cut = max(np.count_nonzero(seen[:, 0]), np.count_nonzero(seen[:, -1]))
-    is_cut = seen[0].any() or cut > _CUT * np.count_nonzero(seen.any(axis=1))
-    return None if is_cut or not least <= share <= MAX_PERSON_FRACTION else seen
+    cut_px = max(np.count_nonzero(seen[:, 0]), np.count_nonzero(seen[:, -1]))
+    is_half = not is_detected and cut_px > _CUT * np.count_nonzero(seen.any(axis=1))
+    if is_half or not least <= share <= MAX_PERSON_FRACTION or seen[0].any():
+        return None
+    return seen
 
 
 @dataclass(frozen=True)

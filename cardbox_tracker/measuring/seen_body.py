@@ -123,27 +123,30 @@ class SeenBody:
             return False
         return True
 
-    def at(self, far: Distances) -> BodyModel:
-        """Return the body whose scale is the mean of the fits' and that by ``far``, distances in m.
+    def in_film(self, far: Distances | None) -> BodyModel:
+        """Return the body at the place of the first fit, where the film begins.
 
-        Both are weighted by their variances. A distance that is given stays.
+        Its scale is the mean of the fits' and that by ``far``, distances in m, weighted by their
+        variances. A distance that is given stays.
         """
+        body = self._median(self._fits[0].body) if self._fits else self.body
+        if far is None:
+            return body
         away = np.abs(np.subtract.outer(self._times_s, far.times_s))
         near = away.min(axis=1) < _SAME_IMAGE_S if len(self._fits) else np.zeros(0, bool)
         if not near.any() or "distance_m" not in self._guess.unknown:
-            return self.body
+            return body
         fitted = np.array([fit.body.placement.distance_m for fit in self._fits])
         ratios = np.log(far.distances[away.argmin(axis=1)] / fitted)[near]
         share = _SCALE**2 / (_SCALE**2 + far.stddev**2)
         try:
-            return scaled(self.body, float(np.exp(share * np.median(ratios))))
+            return scaled(body, float(np.exp(share * np.median(ratios))))
         except BodyModelError:
-            return self.body
+            return body
 
-    def _median(self) -> BodyModel:
-        """Return the median sizes, at the first place, with the colours of the best fit."""
+    def _median(self, place: BodyModel | None = None) -> BodyModel:
+        """Return the median sizes, the colours of the best fit, and its place or that of a body."""
         best = max(self._fits, key=lambda fit: fit.iou).body
         sizes = np.median([fit.body.sizes for fit in self._fits], axis=0)
-        first = self._fits[0].body
-        found = first.with_values(sizes=sizes, appearance=best.appearance)
+        found = (place or best).with_values(sizes=sizes, appearance=best.appearance)
         return replace(found, is_distance_found="distance_m" in self._guess.unknown)

@@ -154,7 +154,7 @@ def seen_person(
     seen = SeenBody(guess, camera, config, np.random.default_rng(seed), pause_s=0.0)
     for frame in watched.frames:
         seen.see(frame.silhouette, frame.image, frame.time_s, _is_detected(frame))
-    return seen.body if far is None else seen.at(far)
+    return seen.in_film(far)
 
 
 def _is_detected(frame: RecordedFrame) -> bool:

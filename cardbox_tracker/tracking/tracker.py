@@ -133,15 +133,16 @@ class Tracker:
     def use(self, body: BodyModel, stamp_ns: int | None = None, is_new_start: bool = False) -> None:
         """Track the next version of the body from the image of a stamp on.
 
-        The posture goes on, at the same place in the image if the camera's pitch is another one,
-        unless ``is_new_start`` says that it is somebody else, or the filter is the paper's.
+        The posture goes on, at the same place before the camera if its pitch or the placement is
+        another one, unless ``is_new_start`` says that it is somebody else or somewhere else, or
+        the filter is the paper's.
         """
         before, pose = self.body, body.camera_pose
         body = replace(body, version=before.version + 1, stamp_ns=stamp_ns or 0)
         self.body = self.config.with_shoulders(body)
         moved = partial(tilted_states, before=before, after=self.body)
-        is_tilted = pose != before.camera_pose
-        if is_tilted:
+        is_moved = (pose, body.placement) != (before.camera_pose, before.placement)
+        if is_moved:
             self.camera = self.camera.with_pitch(pose.pitch_rad)
             self._place = PlaceWatch(self.body, self.camera)
             if self._before is not None:
@@ -155,7 +156,7 @@ class Tracker:
             return
         self._filter.use(self._silhouette, self.views)
         self._head = HeadTracker(self.body, self.camera)
-        if is_tilted:
+        if is_moved:
             self._filter.move(moved)
 
     def configure(self, config: TrackerConfig) -> bool:

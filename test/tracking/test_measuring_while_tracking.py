@@ -117,6 +117,8 @@ def test_the_next_person_is_fitted_after_the_image_was_empty() -> None:
     assert track.body is fitted
     for _ in range(6):
         track.track(NOBODY)
+    # They may come in where the first one never was.
+    assert track.body.unknown
     track.track(silhouette(second))
     assert track.body is not fitted
     assert track.body.size("waist_width") < fitted.size("waist_width")
@@ -213,7 +215,7 @@ def test_a_body_is_as_large_as_the_person_is_far(
     seen = sights(monkeypatch, [(fitted, 0.9)])
     seen.see(silhouette(fitted), None, 0.0)
     far = Distances(np.array([at_s]), np.array([0.81 * fitted.placement.distance_m]), stddev)
-    found = seen.at(far)
+    found = seen.in_film(far)
     assert found.sizes == pytest.approx(scale * fitted.sizes, rel=1e-3)
     assert found.placement.distance_m == pytest.approx(
         scale * fitted.placement.distance_m, rel=1e-3
@@ -229,13 +231,42 @@ def test_a_new_version_of_the_body_goes_on_with_the_posture(
     for _ in range(10):
         found = track.track(seen)
     first, age = track.body, track.age
+    assert found.keypoints_m is not None
+    before_m = found.keypoints_m
     for _ in range(8):
         found = track.track(seen)
     assert track.body is not first
-    assert track.body.placement == first.placement
     assert track.age == age + 8
     assert found.posture is not None
+    assert found.keypoints_m == pytest.approx(before_m, abs=0.05)
     assert found.posture[4] == pytest.approx(np.radians(20) + 1.0, abs=0.3)
+
+
+def test_who_comes_in_at_a_side_is_measured_when_the_trunk_is_in_the_image() -> None:
+    track = Followed(distance_m=2.0)
+    true = person(1.75, -0.62)
+    for lateral_m in np.linspace(1.3, 0.0, 27):
+        # The side of the image is 1.07 m from its middle there; arms may be beyond it.
+        found = track.track(silhouette(true.with_values(lateral_m=lateral_m)))
+        assert bool(track.body.unknown) == (lateral_m > 0.87)
+    assert track.body.placement.hip_height_m == pytest.approx(-0.62, abs=0.05)
+    assert found.iou is not None
+    assert found.iou > 0.85
+
+
+def test_who_is_lost_is_sought_where_the_better_body_stands(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    true = person(1.75, -0.62)
+    wrong = true.with_values(distance_m=1.0, lateral_m=-1.2)
+    fits = iter([FirstSight(wrong, 0.65), FirstSight(true, 0.9)])
+    monkeypatch.setattr(seen_body, "fit_first_sight", lambda *_: next(fits))
+    track = Followed()
+    found = [track.track(silhouette(true)) for _ in range(17)]
+    assert found[14].posture is None
+    assert found[-1].iou is not None
+    assert found[-1].iou > 0.85
+    assert track.body.placement == true.placement
 
 
 def test_a_detected_person_may_be_small() -> None:
