@@ -93,7 +93,7 @@ class Rep155Outputs:
             others = place_of(estimate), head_joints(neck_of(estimate)), clavicles_of(estimate)
             values = np.concatenate([values, *others])
         joints = JointValues(self._names, values)
-        self._joints.publish(results.joint_state_message(header, joints))
+        self._joints.publish(results.message_of(header, joints))
 
 
 class TrackerOutputs:

@@ -218,7 +218,7 @@ def test_what_is_not_finite_becomes_no_message(make: Any, value: float) -> None:
 
 def test_joint_state_has_names_positions_and_header() -> None:
     posture = reference_posture("arms")
-    message = results.joint_state_message(HEADER, JointValues(JOINT_NAMES, posture))
+    message = results.message_of(HEADER, JointValues(JOINT_NAMES, posture))
     assert tuple(message.name) == JOINT_NAMES
     np.testing.assert_array_equal(message.position, posture)
     assert message.header.frame_id == "optical"
@@ -230,16 +230,14 @@ def test_joint_state_has_names_positions_and_header() -> None:
 
 def test_joint_state_has_velocities_where_they_are_known() -> None:
     moving = JointValues(("a", "b"), np.zeros(2), np.array([0.5, -2.0]))
-    assert list(results.joint_state_message(HEADER, moving).velocity) == [0.5, -2.0]
+    assert list(results.message_of(HEADER, moving).velocity) == [0.5, -2.0]
     with pytest.raises(NotFiniteError, match="velocities"):
-        results.joint_state_message(HEADER, moving._replace(velocities=np.array([0.0, np.inf])))
+        results.message_of(HEADER, moving._replace(velocities=np.array([0.0, np.inf])))
 
 
 def test_markers_are_the_patches_and_the_skeleton_in_the_optical_frame() -> None:
     body, posture = BodyModel(), reference_posture("front")
-    patches, skeleton = results.markers_message(
-        HEADER, Markers(marker_shapes(body, posture))
-    ).markers
+    patches, skeleton = results.message_of(HEADER, Markers(marker_shapes(body, posture))).markers
     corners = CAMERA.reference_to_optical(cardbox_patches(body, posture))
     assert (patches.type, len(patches.points), len(patches.colors)) == (
         Marker.TRIANGLE_LIST,
@@ -254,14 +252,14 @@ def test_markers_are_the_patches_and_the_skeleton_in_the_optical_frame() -> None
 
 def test_keypoints_are_poses_of_the_optical_frame() -> None:
     points = np.arange(18.0).reshape(6, 3)
-    message = results.points_message(HEADER, Points(points))
+    message = results.message_of(HEADER, Points(points))
     got = [(p.position.x, p.position.y, p.position.z) for p in message.poses]
     np.testing.assert_array_equal(got, points)
     assert all(pose.orientation.w == 1.0 for pose in message.poses)
 
 
 def test_no_markers_remove_those_before() -> None:
-    (marker,) = results.markers_message(HEADER, Markers(())).markers
+    (marker,) = results.message_of(HEADER, Markers(())).markers
     assert marker.action == Marker.DELETEALL
 
 
