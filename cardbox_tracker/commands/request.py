@@ -13,7 +13,7 @@ import os
 import shlex
 import sys
 from collections.abc import Callable, Iterable
-from contextlib import AbstractContextManager
+from contextlib import AbstractContextManager, suppress
 from dataclasses import dataclass
 from importlib.metadata import EntryPoint
 from pathlib import Path, PurePosixPath
@@ -25,6 +25,7 @@ from cardbox_tracker.commands.arguments import (
     add_preset,
     add_seed,
     between,
+    parsed,
     span,
     time,
 )
@@ -313,7 +314,7 @@ def add_tracking(parser: argparse.ArgumentParser, needs_recording: bool = True) 
     )
     add(
         "--stature",
-        type=_statures,
+        type=parsed(_statures, "metres, or those of each person as in 1.75,1.62"),
         metavar="M[,M...]",
         help="in place of --model: height of the person, metres, crown to floor; sizes are the "
         "mean ones of people of that stature. With --people, one for each of them in turn, or one "
@@ -360,7 +361,7 @@ def add_tracking(parser: argparse.ArgumentParser, needs_recording: bool = True) 
     add(
         "--set",
         action="append",
-        type=_setting,
+        type=parsed(_setting, "NAME=VALUE, such as lost_frames=10"),
         metavar="NAME=VALUE",
         help="another setting of the tracker by its name in docs/parameters.md, such as "
         "lost_frames=10; may be given several times",
@@ -375,23 +376,16 @@ def add_tracking(parser: argparse.ArgumentParser, needs_recording: bool = True) 
 
 
 def _statures(text: str) -> tuple[float, ...]:
-    try:
-        return tuple(map(float, text.split(",")))
-    except ValueError:
-        raise argparse.ArgumentTypeError(
-            f"expected metres, or those of each person as in 1.75,1.62, got {text!r}"
-        ) from None
+    return tuple(map(float, text.split(",")))
 
 
 def _count(text: str) -> int:
     from cardbox_tracker.tracking.session import MOST_PEOPLE
 
-    count = 0 if text == "auto" else int(text) if text.isdecimal() else -1
-    if not (text == "auto" or 1 <= count <= MOST_PEOPLE):
-        raise argparse.ArgumentTypeError(
-            f"expected auto or a number from 1 to {MOST_PEOPLE}, got {text!r}"
-        )
-    return count
+    if text == "auto":
+        return 0
+    expected = f"auto or a number from 1 to {MOST_PEOPLE}"
+    return parsed(int, expected, lambda count: 1 <= count <= MOST_PEOPLE)(text)
 
 
 def _person_choice(text: str) -> PersonChoice | int:
@@ -407,18 +401,14 @@ def _person_choice(text: str) -> PersonChoice | int:
 
 def _setting(text: str) -> tuple[str, bool | int | float | str]:
     """Parse ``NAME=VALUE``; a value is true or false, a number, or a text."""
-    name, equals, value = text.partition("=")
-    if not name or not equals:
-        raise argparse.ArgumentTypeError(
-            f"expected NAME=VALUE, such as lost_frames=10, got {text!r}"
-        )
+    name, _, value = text.partition("=")
+    if not name or "=" not in text:
+        raise ValueError
     if value in ("true", "false"):
         return name, value == "true"
     for kind in (int, float):
-        try:
+        with suppress(ValueError):
             return name, kind(value)
-        except ValueError:
-            continue
     return name, value
 
 
