@@ -19,7 +19,7 @@ from cardbox_tracker.commands.arguments import (
 from cardbox_tracker.commands.request import add_tracking, tracking_request
 from cardbox_tracker.commands.tracking import track
 from cardbox_tracker.common.errors import CardboxError
-from cardbox_tracker.common.files import atomic_path
+from cardbox_tracker.common.files import write_file
 
 if TYPE_CHECKING:
     from cardbox_tracker.applications.ergonomics.recording import MomentImages, RulaRow
@@ -105,8 +105,7 @@ def write_scores(options: argparse.Namespace, content: PageContent) -> None:
     if options.csv is not None:
         recording.write_csv(rows, options.csv, method)
     if options.plot is not None:
-        with atomic_path(options.plot) as temporary:
-            temporary.write_bytes(report.score_plot(rows, (), method))
+        write_file(options.plot, report.score_plot(rows, (), method))
     if options.html is not None:
         report.write_page(content, options.html)
     for path in outputs_of(options):

@@ -15,11 +15,11 @@ from cardbox_tracker.commands.request import FORMATS, TrackFiles, add_tracking, 
 from cardbox_tracker.commands.tracking import track
 from cardbox_tracker.common.errors import CardboxError
 from cardbox_tracker.common.files import (
-    atomic_path,
     body_beside,
     is_written_in_place,
     of_person,
     scene_beside,
+    write_file,
 )
 
 if TYPE_CHECKING:
@@ -178,8 +178,7 @@ def track_one(options: argparse.Namespace, show: Callable[[float], None] | None 
         compile_for_films()
     summary = track(replace(request, files=files, force=options.force), show=show)
     if options.json is not None:
-        with atomic_path(options.json) as temporary:
-            temporary.write_text(json.dumps(_account(summary), indent=1) + "\n", encoding="utf-8")
+        write_file(options.json, json.dumps(_account(summary), indent=1) + "\n")
     lines = [f"wrote {path}" for path in (*written, options.bag) if path is not None]
     more = _derived(options, summary, table, video, exports) if any(derived) else ()
     # If an export fails, what was written before it is told.
@@ -218,8 +217,7 @@ def _derived(
     if options.plot is not None:
         for number, results in people.items():
             path = of_person(options.plot, number, options.plot.suffix)
-            with atomic_path(path) as temporary:
-                temporary.write_bytes(angles_plot(results))
+            write_file(path, angles_plot(results))
             yield f"wrote {path}"
     if options.report is not None and video is not None:
         named = {f"Person {k}" if summary.people else "Person": one for k, one in people.items()}

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from cardbox_tracker.applications.drawing.overlay import draw_overlay
 from cardbox_tracker.camera.camera import Camera
 from cardbox_tracker.common.errors import CardboxError
-from cardbox_tracker.common.files import atomic_path
+from cardbox_tracker.common.files import write_file
 from cardbox_tracker.detectors.detector import Detector
 from cardbox_tracker.detectors.image_points import POINT_NAMES
 from cardbox_tracker.person.model import BodyModel
@@ -192,8 +192,7 @@ def main(arguments: list[str] | None = None) -> int:
     tiles = [tile for folder, count in shown for tile in tiles_of(folder, count)]
     picture = side_by_side(tiles, ATTRIBUTION)
     encoded = cv2.imencode(".jpg", picture, (cv2.IMWRITE_JPEG_QUALITY, _QUALITY))[1]
-    with atomic_path(options.output) as temporary:
-        temporary.write_bytes(encoded.tobytes())
+    write_file(options.output, encoded.tobytes())
     return 0
 
 

@@ -21,7 +21,7 @@ from cardbox_tracker.applications.drawing.overlay import ImageArray, draw_overla
 from cardbox_tracker.applications.simulation.motions import Segment, timeline
 from cardbox_tracker.applications.simulation.session import synthesize_session
 from cardbox_tracker.common.errors import CardboxError
-from cardbox_tracker.common.files import atomic_path
+from cardbox_tracker.common.files import make_folder, write_file
 from cardbox_tracker.common.progress import progress_bar
 from cardbox_tracker.measuring.config import InitializationConfig
 from cardbox_tracker.measuring.guidance import Prompt, short_words
@@ -51,10 +51,7 @@ def write_screenshots(
     Raises:
         CardboxError: the folder cannot be written.
     """
-    try:
-        output.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise CardboxError(f"cannot make the folder {output}: {error.strerror}") from None
+    make_folder(output)
     segments = {segment.name: segment for segment in reversed(timeline("all"))}
     with tempfile.TemporaryDirectory() as folder:
         session = Path(folder) / "session"
@@ -118,8 +115,7 @@ def _row(images: list[ImageArray]) -> ImageArray:
 
 def _write(path: Path, image: ImageArray) -> Path:
     data = cv2.imencode(".jpg", image, [cv2.IMWRITE_JPEG_QUALITY, _QUALITY])[1]
-    with atomic_path(path) as temporary:
-        temporary.write_bytes(data.tobytes())
+    write_file(path, data.tobytes())
     return path
 
 

@@ -24,7 +24,7 @@ from cardbox_tracker.applications.reporting.page import angles_plot
 from cardbox_tracker.applications.simulation.session import SessionFormat, synthesize_session
 from cardbox_tracker.camera.encodings import SentImage, decode_bgr
 from cardbox_tracker.common.errors import CardboxError
-from cardbox_tracker.common.files import atomic_path
+from cardbox_tracker.common.files import make_folder, write_file
 from cardbox_tracker.common.progress import progress_bar
 from cardbox_tracker.person.posture import REFERENCE_NAMES
 from cardbox_tracker.recordings.bag_reader import BagReader, stamp_ns_of
@@ -206,10 +206,7 @@ def run_demo(output: Path, preset: str, seed: int, cameras: int = 1) -> None:
     isolate()
     if cameras > 1 and not PRESETS[preset]().has_several_views:
         raise CardboxError(f"--preset {preset} is for one camera; leave it out with --cameras")
-    try:
-        output.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise CardboxError(f"cannot make the folder {output}: {error.strerror}") from None
+    make_folder(output)
     session = output / "session"
     with progress_bar("synthesize") as show:
         form = SessionFormat(cameras=cameras)
@@ -353,10 +350,8 @@ def write_report(output: Path, truth: GroundTruth, start_ns: int, run: dict[str,
     """Write all files about the bag in ``output`` and the values ``run``; print the table."""
     results = read_results(output / "bag")
     report = run | figures(results, truth, start_ns)
-    with atomic_path(output / "report.json") as path:
-        path.write_text(json.dumps(report, indent=2) + "\n", encoding="utf-8")
-    with atomic_path(output / "angles.png") as path:
-        path.write_bytes(angles_plot(results))
+    write_file(output / "report.json", json.dumps(report, indent=2) + "\n")
+    write_file(output / "angles.png", angles_plot(results))
     topic = "".join(f"/{name}" for name in [*truth.cameras][:1]) + "/overlay"
     with BagReader(output / "bag") as bag, video_file(output / "overlay.mp4", _VIDEO_HZ) as add:
         for image in map(bag.deserialize, bag.messages([topic])):

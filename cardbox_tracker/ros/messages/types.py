@@ -46,8 +46,7 @@ def optional_class(package: str, name: str) -> Any:
 @cache
 def class_of(kind: str) -> Any:
     """Return the class of a type such as ``std_msgs/msg/String`` that is installed."""
-    package, _, name = kind.split("/")
-    return getattr(importlib.import_module(f"{package}.msg"), name)
+    return optional_class(*kind.split("/msg/"))
 
 
 def new_message(kind: str, **fields: Any) -> Any:

@@ -8,8 +8,6 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from geometry_msgs.msg import PolygonStamped
-from rclpy.clock import Clock
-from rclpy.clock_type import ClockType
 from rclpy.subscription import Subscription
 from sensor_msgs.msg import CameraInfo
 from std_msgs.msg import Header
@@ -30,6 +28,7 @@ from cardbox_tracker.ros.messages.types import optional_class
 from cardbox_tracker.ros.nodes.input_stream import InputStream
 from cardbox_tracker.ros.nodes.tracker_parameters import TrackerParameters
 from cardbox_tracker.ros.runtime import qos
+from cardbox_tracker.ros.runtime.diagnostics import every_second
 from cardbox_tracker.ros.runtime.node import CardboxNode
 
 MOST_AGE_NS = 300_000_000
@@ -38,7 +37,6 @@ SAME_TIME_NS = 50_000_000
 """Points that are newer than the silhouette by at most this are of the same time."""
 
 _KEPT = 8
-_LOOK_S = 1.0
 _SILENT_S = 3.0
 # After so many consecutive messages of another time the clocks are in doubt.
 _IN_DOUBT = 5
@@ -73,8 +71,7 @@ class KeypointTopic:
         self._use(POLYGON_STAMPED, PolygonStamped)
         self._look()
         # The publisher may start later, or be replaced by one of another type.
-        steady = Clock(clock_type=ClockType.STEADY_TIME)
-        self._timer = node.create_timer(_LOOK_S, self._look, clock=steady)
+        self._timer = every_second(node, self._look)
 
     def take(self, at_ns: int, frame_id: str) -> Taken | None:
         """Return the newest points for a silhouette of this stamp and frame, once, or None."""
