@@ -37,18 +37,14 @@ def track(
     from cardbox_tracker.detectors.hand_network import HandNetwork
     from cardbox_tracker.measuring.scene import save_scene
     from cardbox_tracker.person.model_file import save_body_model
-    from cardbox_tracker.recordings.track import Quality, track_recording
+    from cardbox_tracker.recordings.track import track_recording
 
-    qualities: dict[int, Quality] = {}
     recording, person = request.recording, request.person
     start_s = person.start_s
     if person.model is not None and person.body.doubt:
         print(f"{person.model}: {person.body.doubt}")
     if person.people is not None:
         observers = tuple(partial(_of_person, person.number, observe) for observe in observers)
-
-    def judge(frame: RecordedFrame, estimate: Estimate, tracker: Tracker) -> None:
-        qualities.setdefault(estimate.person or 0, Quality())(frame, estimate, tracker)
 
     with measured_scene(recording, person, request.config, request.seed) as (source, scene):
         # Hands and the overlay are seen at the resolution of the recording.
@@ -58,8 +54,6 @@ def track(
         total_s = max(1e-9, min(source.first.duration_s, person.end_s) - start_s)
         with ExitStack() as stack:
             observers = (*_writers(request, source, stack), *observers)
-            if show is None:
-                observers = (*observers, judge)
             advance = show or stack.enter_context(progress_bar("track"))
             summary = track_recording(
                 source,
@@ -82,15 +76,15 @@ def track(
     print_remarks(remarks, summary.remarks)
     if show is None:
         print(f"assumed: {', '.join(summary.assumptions)}")
+        for line in summary.quality if person.people is None else ():
+            print(line)
         unseen = 0
-        for number, quality in sorted(qualities.items()):
-            if number and not summary.people[number].frames_tracked:
+        for number, one in summary.people.items():
+            if not one.frames_tracked:
                 unseen += 1
                 continue
-            if number:
-                one = summary.people[number]
-                print(f"person {number}: tracked {one.frames_tracked} of {one.frames} images")
-            print(*quality.lines(), sep="\n")
+            print(f"person {number}: tracked {one.frames_tracked} of {one.frames} images")
+            print(*one.quality, sep="\n")
         if unseen:
             print(f"{unseen} more, of {len(summary.people)} people, in no image")
         if summary.used_text:
