@@ -67,9 +67,8 @@ def run(options: argparse.Namespace) -> None:
     from cardbox_tracker.person.model_file import save_body_model
     from cardbox_tracker.recordings.initialize import (
         describe,
-        initialize_from_cameras,
+        initialize_at_scale,
         initialize_from_recording,
-        initialize_with_depth,
     )
 
     problems = Problems(options.recording)
@@ -101,10 +100,8 @@ def run(options: argparse.Namespace) -> None:
     with recording.open() as source, progress_bar("initialize") as show:
         if is_given:
             result = initialize_from_recording(source.first, spans, config, show)
-        elif source.measures_depth:
-            result = initialize_with_depth(source, spans, config, show)
         else:
-            result = initialize_from_cameras(source, spans, config, show)
+            result = initialize_at_scale(source, spans, config, show)
         remarks, accounts = source.first.remarks, [one.account for one in source.sources]
     print_remarks(remarks)
     roll_rad = recording.camera.stands_rad
