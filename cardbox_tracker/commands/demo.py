@@ -54,13 +54,13 @@ def _track_film(output: Path, seed: int) -> None:
     from cardbox_tracker.applications.reporting.page import space_view
     from cardbox_tracker.commands.request import (
         PersonRequest,
-        RecordingRequest,
         TrackFiles,
         TrackingRequest,
     )
     from cardbox_tracker.commands.tracking import track
     from cardbox_tracker.person.proportions import body_from_proportions
     from cardbox_tracker.recordings.given_camera import GivenCamera
+    from cardbox_tracker.recordings.recording import RecordingRequest
     from cardbox_tracker.recordings.result_reader import read_results
     from cardbox_tracker.search.config import PRESETS
     from cardbox_tracker.tracking.precompile import compile_for_films
@@ -70,7 +70,7 @@ def _track_film(output: Path, seed: int) -> None:
     print(f"film: {SOURCE}", flush=True)
     compile_for_films()
     detector, camera = film.detector, GivenCamera(film.fov_deg)
-    recording = RecordingRequest(film.path, detector, detector, (), None, None, camera)
+    recording = RecordingRequest(film.path, detector, points=detector, camera=camera)
     body = body_from_proportions(film.stature_m)
     table = output / "angles.csv"
     files = TrackFiles(table, output / "overlay.mp4", body=output / "angles.body.yaml")

@@ -13,7 +13,7 @@ import os
 import shlex
 import sys
 from collections.abc import Callable, Iterable
-from contextlib import AbstractContextManager, suppress
+from contextlib import suppress
 from dataclasses import dataclass
 from importlib.metadata import EntryPoint
 from pathlib import Path, PurePosixPath
@@ -40,7 +40,7 @@ if TYPE_CHECKING:
     from cardbox_tracker.measuring.scene import Scene
     from cardbox_tracker.person.model import BodyModel
     from cardbox_tracker.recordings.given_camera import GivenCamera
-    from cardbox_tracker.recordings.recording import Recording, Segmentation
+    from cardbox_tracker.recordings.recording import RecordingRequest, Segmentation
     from cardbox_tracker.recordings.silhouettes import TimeSpan
     from cardbox_tracker.search.config import TrackerConfig
 
@@ -65,42 +65,6 @@ _REPLACED = MappingProxyType(
         "calibration": ("fov",),
     }
 )
-
-
-@dataclass(frozen=True)
-class RecordingRequest:
-    """A recording to read."""
-
-    path: Path  #: bag, video, or folder of images
-    silhouettes: Segmentation  #: what tells the person from the scene
-    points: Detector | PointTable | None  #: source of the person's 2D points; None for no points
-    #: namespaces, the first camera's first; empty if the recording has one camera
-    cameras: tuple[str, ...]
-    extrinsics: Path | None  #: file of the poses of further cameras
-    depth: str | None  #: topic of depth images, or ``stereo``; None without depth
-    camera: GivenCamera  #: what the recording itself does not say about its camera
-
-    @property
-    def detector(self) -> Detector | None:
-        """The detector among the sources of silhouettes and points; None without one."""
-        from cardbox_tracker.detectors.detector import Detector
-
-        sources = self.silhouettes, self.points
-        return next((source for source in sources if isinstance(source, Detector)), None)
-
-    def open(self) -> AbstractContextManager[Recording]:
-        """Return the context of the open recording."""
-        from cardbox_tracker.recordings.recording import open_recording
-
-        return open_recording(
-            self.path,
-            self.silhouettes,
-            self.cameras,
-            self.extrinsics,
-            self.depth,
-            self.points,
-            self.camera,
-        )
 
 
 @dataclass(frozen=True)
@@ -417,7 +381,7 @@ def recording_request(options: argparse.Namespace, problems: Problems) -> Record
     from cardbox_tracker.camera.pairing import camera_names
     from cardbox_tracker.detectors.detector import Detector
     from cardbox_tracker.recordings.open_images import check_exists
-    from cardbox_tracker.recordings.recording import input_faults
+    from cardbox_tracker.recordings.recording import RecordingRequest
     from cardbox_tracker.tracking.session import MOST_PEOPLE
 
     path, depth = options.recording, options.depth
@@ -447,11 +411,13 @@ def recording_request(options: argparse.Namespace, problems: Problems) -> Record
             points = points._replace(people=people or MOST_PEOPLE)
     names: tuple[str, ...] = ()
     names = problems.caught(lambda: tuple(camera_names(options.cameras)), names)
-    for fault in input_faults(path, silhouettes, names, depth, camera):
+    given = path, silhouettes, names, options.extrinsics, depth, points, camera
+    request = RecordingRequest(*given)
+    for fault in request.faults():
         problems.add(fault)
     if options.extrinsics is not None and len(names) < 2:
         problems.add("--extrinsics has no effect with one camera: name several with --cameras")
-    return RecordingRequest(path, silhouettes, points, names, options.extrinsics, depth, camera)
+    return request
 
 
 def inputs_of(options: argparse.Namespace) -> tuple[Path, ...]:

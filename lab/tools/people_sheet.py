@@ -24,7 +24,7 @@ from cardbox_tracker.common.files import write_file
 from cardbox_tracker.detectors.detector import Detector
 from cardbox_tracker.detectors.image_points import POINT_NAMES
 from cardbox_tracker.person.model import BodyModel
-from cardbox_tracker.recordings.recording import open_recording
+from cardbox_tracker.recordings.recording import RecordingRequest
 from cardbox_tracker.recordings.silhouettes import RecordedFrame
 from cardbox_tracker.search.config import default_preset
 from cardbox_tracker.tracking.estimate import Estimate
@@ -174,7 +174,7 @@ def _frames(
 ) -> tuple[dict[int, RecordedFrame], Camera]:
     """Return the first camera's frames by stamp, with the detector's masks and points."""
     names = session.truth.cameras[:1]
-    with open_recording(session.bag, detector, names, points=detector) as source:
+    with RecordingRequest(session.bag, detector, names, points=detector).open() as source:
         return {f.stamp_ns: f for f in source.first.frames()}, source.first.camera
 
 
