@@ -46,7 +46,7 @@ def initialize_from_recording(
         frames = source.held(span, name)
         references[name] = average_silhouette([frame.silhouette for frame in frames])
         every = -(-len(frames) // _MOST_IMAGES)
-        images[name] = [frame.image for frame in frames[::every] if frame.image is not None]
+        images[name] = [frame.image for frame in frames[::every]]
     return initialize_body(references, source.camera, config, progress, images)
 
 

@@ -159,7 +159,7 @@ class Recording:
             elif depth is not None and depth[0] <= lead.stamp_ns + self._tolerance_ns:
                 there = depth[1]
             elif self._stereo is not None and None not in frames[:2]:
-                there = self._stereo(*(f.image for f in frames[:2] if f and f.image is not None))
+                there = self._stereo(*(frame.image for frame in frames[:2] if frame))
             stamp_ns, time_s, *_ = lead
             first = frames[0] or RecordedFrame(stamp_ns, time_s, black, black)
             picture = partial(self.first.full_picture, first)

@@ -124,7 +124,7 @@ class _ResultBag:
             bag.write_image("/silhouette", stamp, optical, frame.silhouette, "mono8")
             bag.write_camera_info("/silhouette/camera_info", stamp, optical, camera)
         if self._draw is not None:
-            overlay = self._draw(frame.picture, estimate, tracker)
+            overlay = self._draw(frame.image, estimate, tracker)
             bag.write_image(f"{self._space}/overlay", stamp, optical, overlay, "bgr8")
         for output, value in self._outputs.values(stamp, estimate, tracker):
             message = message_of(bag.new, bag.header(stamp, optical), value)

@@ -150,7 +150,7 @@ class TrackedFilm:
         stamp_ns = int(self.session.stamps_ns[number])
         frame, (body, estimate) = self._frames[stamp_ns], self._found[stamp_ns]
         heads = heads_in(frame, self._entries[stamp_ns], self._camera, self._width)
-        seen = hidden(frame.picture, frame.silhouette, heads)
+        seen = hidden(frame.image, frame.silhouette, heads)
         view = self._camera.with_pitch(body.camera_pose.pitch_rad)
         tile = draw_overlay(seen, body, view, estimate)
         for u, v in self._camera.project(self.session.keypoints_m[number]):

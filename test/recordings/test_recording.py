@@ -140,7 +140,6 @@ def test_depth_images_cut_out_the_person_without_a_background(two: Path, tmp_pat
         assert "/one/depth" in source.first.remarks[0]
         for frame in frames:
             assert frame.silhouette.shape == (source.first.camera.height, source.first.camera.width)
-            assert frame.image is not None
         # A quarter of the image's height times a third of its width is near.
         near = np.mean([np.count_nonzero(frame.silhouette) for frame in frames])
         assert near / frames[0].silhouette.size == pytest.approx(60 / 96 * 40 / 128, rel=0.05)
