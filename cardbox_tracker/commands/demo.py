@@ -10,9 +10,6 @@ from cardbox_tracker.commands.arguments import add_camera_count, add_preset, add
 from cardbox_tracker.common.errors import CardboxError, RosMissingError
 from cardbox_tracker.common.files import make_folder, write_file
 
-NAME = "demo"
-HELP = "track a film of a real person and show the error; with --live, run the nodes"
-
 _PRESET = "default"
 
 

@@ -22,8 +22,6 @@ from cardbox_tracker.commands.request import Problems, add_recording, inputs_of,
 if TYPE_CHECKING:
     from cardbox_tracker.measuring.config import InitializationConfig
 
-NAME = "initialize"
-HELP = "measure the person in a recording"
 
 # Initial distance of the search where depth images or two cameras measure it.
 _GUESSED_M = 2.0

@@ -17,9 +17,6 @@ from cardbox_tracker.commands.arguments import (
 )
 from cardbox_tracker.commands.rula import add_score_outputs, outputs_of, write_scores
 
-NAME = "reba"
-HELP = "score the strain on the whole body in a table of 'cardbox track --legs' (REBA)"
-
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of ``cardbox reba``."""

@@ -27,8 +27,6 @@ if TYPE_CHECKING:
     from cardbox_tracker.applications.ergonomics.rula import RulaConfig
     from cardbox_tracker.recordings.track import TrackSummary
 
-NAME = "rula"
-HELP = "score the strain on arms, neck and trunk in a recording (RULA)"
 HIDDEN_HEAD, _, NO_IMAGES = IMAGES = ("hidden-head", "shown", "none")
 
 _SIZES_FROM = {"measured": "reference postures", "proportions": "proportions of people"}

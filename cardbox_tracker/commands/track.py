@@ -26,8 +26,6 @@ if TYPE_CHECKING:
     from cardbox_tracker.applications.exporting.formats import Format
     from cardbox_tracker.recordings.track import TrackSummary
 
-NAME = "track"
-HELP = "follow the posture through a recording, or through all recordings of a folder"
 
 _OF_ONE = ("csv", "bag", "video", "json", "export", "plot", "report")
 _OF_MANY = ("output", "formats", "jobs", "scheduler")
