@@ -18,8 +18,9 @@ from dataclasses import dataclass
 from importlib.metadata import EntryPoint
 from pathlib import Path, PurePosixPath
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any, NamedTuple, NoReturn, TypeVar
+from typing import Any, NamedTuple, NoReturn, TypeVar
 
+from cardbox_tracker.camera.pairing import camera_names
 from cardbox_tracker.commands.arguments import (
     add_camera_pitch,
     add_preset,
@@ -30,19 +31,26 @@ from cardbox_tracker.commands.arguments import (
     time,
 )
 from cardbox_tracker.common.errors import CardboxError
+from cardbox_tracker.common.extensions import DETECTORS, extensions, loaded
 from cardbox_tracker.common.files import foreign, read_regular
 from cardbox_tracker.common.settings import NoEffectError, nested, settings_of
-
-if TYPE_CHECKING:
-    from cardbox_tracker.detectors.detector import Detector
-    from cardbox_tracker.detectors.person_choice import PersonChoice
-    from cardbox_tracker.detectors.point_table import PointTable
-    from cardbox_tracker.measuring.scene import Scene
-    from cardbox_tracker.person.model import BodyModel
-    from cardbox_tracker.recordings.given_camera import GivenCamera
-    from cardbox_tracker.recordings.recording import RecordingRequest, Segmentation
-    from cardbox_tracker.recordings.silhouettes import TimeSpan
-    from cardbox_tracker.search.config import TrackerConfig
+from cardbox_tracker.detectors.detector import MEDIAPIPE, Detector
+from cardbox_tracker.detectors.model_files import installed_hands
+from cardbox_tracker.detectors.own_network import OwnModel
+from cardbox_tracker.detectors.person_choice import PersonChoice
+from cardbox_tracker.detectors.point_table import PointTable
+from cardbox_tracker.measuring.scene import Scene, load_scene
+from cardbox_tracker.person.model import MEASURED, BodyModel
+from cardbox_tracker.person.model_file import load_body_model
+from cardbox_tracker.person.proportions import USUAL_STATURE_M, body_from_proportions
+from cardbox_tracker.recordings.given_camera import FOV_HINT, GivenCamera
+from cardbox_tracker.recordings.open_images import check_exists, is_bag, is_film, tells_lens
+from cardbox_tracker.recordings.other_silhouettes import PersonInView, Within
+from cardbox_tracker.recordings.recording import STEREO, RecordingRequest, Segmentation
+from cardbox_tracker.recordings.silhouettes import TimeSpan
+from cardbox_tracker.search.config import PRESETS, TrackerConfig, read_settings
+from cardbox_tracker.search.whole_body_config import WholeBodyConfig
+from cardbox_tracker.tracking.session import MOST_PEOPLE
 
 S = TypeVar("S")
 T = TypeVar("T")
@@ -266,8 +274,6 @@ def add_recording(parser: argparse.ArgumentParser, required: bool = True) -> Non
 
 def add_tracking(parser: argparse.ArgumentParser, needs_recording: bool = True) -> None:
     """Add the options for recording, person and settings, read by :func:`tracking_request`."""
-    from cardbox_tracker.search.whole_body_config import WholeBodyConfig
-
     add_recording(parser, needs_recording)
     add = parser.add_argument
     add(
@@ -344,8 +350,6 @@ def _statures(text: str) -> tuple[float, ...]:
 
 
 def _count(text: str) -> int:
-    from cardbox_tracker.tracking.session import MOST_PEOPLE
-
     if text == "auto":
         return 0
     expected = f"auto or a number from 1 to {MOST_PEOPLE}"
@@ -355,7 +359,6 @@ def _count(text: str) -> int:
 def _person_choice(text: str) -> PersonChoice | int:
     if text.isdecimal() and int(text) > 0:
         return int(text)
-    from cardbox_tracker.detectors.person_choice import PersonChoice
 
     try:
         return PersonChoice.parse(text)
@@ -378,12 +381,6 @@ def _setting(text: str) -> tuple[str, bool | int | float | str]:
 
 def recording_request(options: argparse.Namespace, problems: Problems) -> RecordingRequest:
     """Return what the options of :func:`add_recording` ask for; note what is wrong with them."""
-    from cardbox_tracker.camera.pairing import camera_names
-    from cardbox_tracker.detectors.detector import Detector
-    from cardbox_tracker.recordings.open_images import check_exists
-    from cardbox_tracker.recordings.recording import RecordingRequest
-    from cardbox_tracker.tracking.session import MOST_PEOPLE
-
     path, depth = options.recording, options.depth
     problems.caught(lambda: check_exists(path), None)
     camera = _camera(options, problems)
@@ -430,11 +427,6 @@ def inputs_of(options: argparse.Namespace) -> tuple[Path, ...]:
 
 def tracking_request(options: argparse.Namespace, faults: Iterable[str] = ()) -> TrackingRequest:
     """Return what the options of :func:`add_tracking` ask for."""
-    from cardbox_tracker.detectors.detector import Detector
-    from cardbox_tracker.detectors.model_files import installed_hands
-    from cardbox_tracker.measuring.scene import load_scene
-    from cardbox_tracker.search.config import PRESETS
-
     problems = Problems(options.recording, faults)
     scene = None
     if options.scene is not None:
@@ -475,9 +467,6 @@ def tracking_request(options: argparse.Namespace, faults: Iterable[str] = ()) ->
 
 
 def _camera(options: argparse.Namespace, problems: Problems) -> GivenCamera:
-    from cardbox_tracker.recordings.given_camera import FOV_HINT, GivenCamera
-    from cardbox_tracker.recordings.open_images import tells_lens
-
     roll_deg = options.camera_roll_deg
     roll_rad = None if roll_deg is None else math.radians(roll_deg)
     camera = GivenCamera(options.fov, options.calibration, roll_rad, options.fps, options.mirrored)
@@ -493,8 +482,6 @@ def _camera(options: argparse.Namespace, problems: Problems) -> GivenCamera:
 
 def _is_guessed(options: argparse.Namespace) -> bool:
     """Whether lens and stature that nothing tells are guessed, since a detector sees the person."""
-    from cardbox_tracker.recordings.open_images import is_film
-
     return options.detector is not None and is_film(options.recording)
 
 
@@ -502,11 +489,6 @@ def _silhouettes(
     options: argparse.Namespace, points: Detector | PointTable | None, problems: Problems
 ) -> Segmentation:
     """Return the source of the silhouettes that is given, or that fits the recording."""
-    from cardbox_tracker.detectors.detector import MEDIAPIPE, Detector
-    from cardbox_tracker.recordings.open_images import is_bag
-    from cardbox_tracker.recordings.other_silhouettes import PersonInView, Within
-    from cardbox_tracker.recordings.recording import STEREO
-
     chosen, within = options.silhouettes, options.within
     background: TimeSpan | None = options.background
     is_given = background is not None or within is not None
@@ -544,11 +526,6 @@ def _silhouettes(
 
 def points_named(given: object) -> Detector | PointTable:
     """Return the source of 2D points: a detector's name, a path, a class, or one's own detector."""
-    from cardbox_tracker.common.extensions import DETECTORS, extensions, loaded
-    from cardbox_tracker.detectors.detector import MEDIAPIPE, Detector
-    from cardbox_tracker.detectors.own_network import OwnModel
-    from cardbox_tracker.detectors.point_table import PointTable
-
     if not isinstance(given, str | Path):
         return Detector(OwnModel.of(given, f"the detector {type(given).__name__}"))
     if given == MEDIAPIPE:
@@ -573,8 +550,6 @@ def points_named(given: object) -> Detector | PointTable:
 
 def _with_camera(options: argparse.Namespace, scene: Scene) -> argparse.Namespace:
     """Return the options with what the scene says of a film's camera where they say nothing."""
-    from cardbox_tracker.recordings.open_images import is_film
-
     found, camera = copy.copy(options), scene.camera
     if is_film(options.recording) and options.fov is None and options.calibration is None:
         found.fov = math.degrees(camera.fov_rad.mean)
@@ -586,10 +561,6 @@ def _with_camera(options: argparse.Namespace, scene: Scene) -> argparse.Namespac
 def _person(
     options: argparse.Namespace, problems: Problems, scene: Scene | None = None
 ) -> PersonRequest:
-    from cardbox_tracker.person.model import MEASURED, BodyModel
-    from cardbox_tracker.person.model_file import load_body_model
-    from cardbox_tracker.person.proportions import USUAL_STATURE_M, body_from_proportions
-
     pitch_deg, body = options.camera_pitch_deg, BodyModel()
     others: list[BodyModel] = []
     if options.people is None and options.stature is not None and len(options.stature) > 1:
@@ -643,8 +614,6 @@ def _person(
 
 
 def _config(options: argparse.Namespace, preset: TrackerConfig) -> TrackerConfig:
-    from cardbox_tracker.search.config import read_settings
-
     config = preset if options.depth is None else preset.with_depth()
     if options.settings is not None:
         config = read_settings(options.settings, config)

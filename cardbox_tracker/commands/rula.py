@@ -6,9 +6,12 @@ import argparse
 from collections.abc import Sequence
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from cardbox_tracker import __version__
+from cardbox_tracker.applications.ergonomics import recording, report
+from cardbox_tracker.applications.ergonomics.recording import MomentImages, RulaObserver, RulaRow
+from cardbox_tracker.applications.ergonomics.report import PageContent
+from cardbox_tracker.applications.ergonomics.rula import RulaConfig
 from cardbox_tracker.commands.arguments import (
     add_force,
     add_settings,
@@ -20,12 +23,8 @@ from cardbox_tracker.commands.request import add_tracking, tracking_request
 from cardbox_tracker.commands.tracking import track
 from cardbox_tracker.common.errors import CardboxError
 from cardbox_tracker.common.files import write_file
-
-if TYPE_CHECKING:
-    from cardbox_tracker.applications.ergonomics.recording import MomentImages, RulaRow
-    from cardbox_tracker.applications.ergonomics.report import PageContent
-    from cardbox_tracker.applications.ergonomics.rula import RulaConfig
-    from cardbox_tracker.recordings.track import TrackSummary
+from cardbox_tracker.person.proportions import USUAL_STATURE_M
+from cardbox_tracker.recordings.track import TrackSummary
 
 HIDDEN_HEAD, _, NO_IMAGES = IMAGES = ("hidden-head", "shown", "none")
 
@@ -36,8 +35,6 @@ _LEAST_CLOCK_S = 1e9
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of ``cardbox rula``."""
-    from cardbox_tracker.applications.ergonomics.rula import RulaConfig
-
     add_tracking(parser)
     add_score_outputs(parser)
     parser.add_argument(
@@ -58,9 +55,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> None:
     """Track the person, score every image, and print times, part scores and declared inputs."""
-    from cardbox_tracker.applications.ergonomics.recording import MomentImages, RulaObserver
-    from cardbox_tracker.applications.ergonomics.rula import RulaConfig
-
     if options.html is None and (options.title is not None or options.images != IMAGES[0]):
         raise CardboxError("--images and --title change the page of --html; give --html OUT.html")
     request = tracking_request(options)
@@ -94,8 +88,6 @@ def outputs_of(options: argparse.Namespace) -> tuple[Path | None, ...]:
 
 def write_scores(options: argparse.Namespace, content: PageContent) -> None:
     """Print times, part scores and declared inputs, and write the files."""
-    from cardbox_tracker.applications.ergonomics import recording, report
-
     rows, config, method = content.rows, content.config, content.method
     shares = recording.score_shares(rows, config, method)
     for line in report.report_lines(recording.summarize(rows, method), shares, config, method):
@@ -118,9 +110,6 @@ def _content(
     summary: TrackSummary,
     images: MomentImages | None,
 ) -> PageContent:
-    from cardbox_tracker.applications.ergonomics.report import PageContent
-    from cardbox_tracker.person.proportions import USUAL_STATURE_M
-
     name = options.recording.resolve().name
     number = options.person if options.people is not None and options.person else 1
     statures = options.stature or (USUAL_STATURE_M,)

@@ -6,19 +6,25 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack
 from dataclasses import replace
 from functools import partial
-from typing import TYPE_CHECKING
 
+from cardbox_tracker.applications.drawing.overlay import draw_sharp_overlay
+from cardbox_tracker.applications.drawing.video import overlay_video
 from cardbox_tracker.commands.arguments import print_remarks
+from cardbox_tracker.commands.request import PersonRequest, TrackingRequest
+from cardbox_tracker.commands.scene import measured_scene
 from cardbox_tracker.common.files import body_of_person
-
-if TYPE_CHECKING:
-    from cardbox_tracker.commands.request import PersonRequest, TrackingRequest
-    from cardbox_tracker.measuring.scene import Scene
-    from cardbox_tracker.recordings.recording import Recording
-    from cardbox_tracker.recordings.silhouettes import RecordedFrame
-    from cardbox_tracker.recordings.track import Observer, TrackSummary
-    from cardbox_tracker.tracking.estimate import Estimate
-    from cardbox_tracker.tracking.tracker import Tracker
+from cardbox_tracker.common.progress import progress_bar
+from cardbox_tracker.detectors.hand_network import HandNetwork
+from cardbox_tracker.measuring.scene import Scene, save_scene
+from cardbox_tracker.person.model_file import save_body_model
+from cardbox_tracker.person.proportions import USUAL_STATURE_M
+from cardbox_tracker.recordings.given_camera import FOV_HINT, UNKNOWN_LENS
+from cardbox_tracker.recordings.recording import Recording
+from cardbox_tracker.recordings.result_bag import result_bag
+from cardbox_tracker.recordings.silhouettes import RecordedFrame
+from cardbox_tracker.recordings.track import Observer, TrackSummary, track_recording
+from cardbox_tracker.tracking.estimate import Estimate
+from cardbox_tracker.tracking.tracker import Tracker
 
 
 def track(
@@ -32,13 +38,6 @@ def track(
     without it, there are a progress bar and lines on assumptions and quality. Raises CardboxError
     if the recording cannot be read, or a result cannot be written.
     """
-    from cardbox_tracker.commands.scene import measured_scene
-    from cardbox_tracker.common.progress import progress_bar
-    from cardbox_tracker.detectors.hand_network import HandNetwork
-    from cardbox_tracker.measuring.scene import save_scene
-    from cardbox_tracker.person.model_file import save_body_model
-    from cardbox_tracker.recordings.track import track_recording
-
     recording, person = request.recording, request.person
     start_s = person.start_s
     if person.model is not None and person.body.doubt:
@@ -101,9 +100,6 @@ def track(
 
 def _with_unknown(remarks: Sequence[str], person: PersonRequest) -> list[str]:
     """Return remarks with one on an unknown stature, which also tells of an unknown lens."""
-    from cardbox_tracker.person.proportions import USUAL_STATURE_M
-    from cardbox_tracker.recordings.given_camera import FOV_HINT, UNKNOWN_LENS
-
     if person.stature_m is not None or person.model is not None:
         return [*remarks]
     others = [remark for remark in remarks if not remark.startswith(UNKNOWN_LENS)]
@@ -131,8 +127,6 @@ def _of_person(
 
 def _assumptions(request: TrackingRequest, scene: Scene) -> Iterator[str]:
     """Yield camera, place and stature with where they are from."""
-    from cardbox_tracker.person.proportions import USUAL_STATURE_M
-
     person = request.person
     yield from scene.words()
     source = "given" if person.model is None else f"from {person.model.name}"
@@ -151,10 +145,6 @@ def _assumptions(request: TrackingRequest, scene: Scene) -> Iterator[str]:
 
 def _writers(request: TrackingRequest, source: Recording, stack: ExitStack) -> Iterator[Observer]:
     """Yield what writes bag and video; they appear when ``stack`` is closed without an error."""
-    from cardbox_tracker.applications.drawing.overlay import draw_sharp_overlay
-    from cardbox_tracker.applications.drawing.video import overlay_video
-    from cardbox_tracker.recordings.result_bag import result_bag
-
     bag, video = request.files.bag, request.files.video
     if video is not None:
         yield stack.enter_context(overlay_video(video, source))
