@@ -126,9 +126,9 @@ class _ResultBag:
         if self._draw is not None:
             overlay = self._draw(frame.image, estimate, tracker)
             bag.write_image(f"{self._space}/overlay", stamp, optical, overlay, "bgr8")
-        for output, value in self._outputs.values(stamp, estimate, tracker):
+        for topic, value in self._outputs.values(stamp, estimate, tracker):
             message = message_of(bag.new, bag.header(stamp, optical), value)
-            bag.write(f"{self._space}/{output.topic}", message, stamp)
+            bag.write(f"{self._space}/{topic}", message, stamp)
         joints = joint_values(estimate)
         if joints is not None:
             transforms.write(stamp, positions_of(joints))

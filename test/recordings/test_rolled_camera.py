@@ -67,7 +67,7 @@ def test_keypoints_markers_and_links_are_in_one_frame(roll_deg: float) -> None:
         tracker.camera.reference_to_optical(level_m),
         clavicles_m=np.zeros(2),
     )
-    sent = {o.topic: value for o, value in OutputStream().values(0, estimate, tracker)}
+    sent = dict(OutputStream().values(0, estimate, tracker))
     keypoints = sent["keypoints"]
     assert isinstance(keypoints, Points)
     expected_m = level_m @ level_to_optical(0.2, np.radians(roll_deg)).T

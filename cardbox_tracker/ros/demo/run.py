@@ -29,7 +29,7 @@ from cardbox_tracker.common.progress import progress_bar
 from cardbox_tracker.person.posture import REFERENCE_NAMES
 from cardbox_tracker.recordings.bag_reader import BagReader, stamp_ns_of
 from cardbox_tracker.recordings.bag_writer import BagWriter
-from cardbox_tracker.recordings.outputs import OUTPUTS, positions_of
+from cardbox_tracker.recordings.outputs import TOPICS, positions_of
 from cardbox_tracker.recordings.result_bag import BagTransforms, result_writer
 from cardbox_tracker.recordings.result_reader import Results, read_results
 from cardbox_tracker.recordings.result_table import POINT_COLUMNS
@@ -50,7 +50,7 @@ _UNRELIABLE = QoSProfile(depth=100, reliability=ReliabilityPolicy.BEST_EFFORT)
 _OF_PERSON = {
     "body_model": (String, qos.LATCHED),
     "robot_description": (String, qos.LATCHED),
-    **{output.topic: (results.message_type(output.kind), qos.REPLAY) for output in OUTPUTS},
+    **{topic: (results.message_type(kind), qos.REPLAY) for topic, kind in TOPICS.items()},
 }
 _OF_CAMERA = {
     "silhouette": (Image, qos.REPLAY),

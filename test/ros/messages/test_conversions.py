@@ -22,7 +22,7 @@ from cardbox_tracker.person.posture import reference_posture
 from cardbox_tracker.person.skeleton import JOINT_NAMES, KeypointState
 from cardbox_tracker.recordings.markers import MarkerShape, marker_shapes
 from cardbox_tracker.recordings.outputs import (
-    OUTPUTS,
+    TOPICS,
     JointValues,
     KeypointStates,
     Markers,
@@ -276,7 +276,7 @@ def test_every_output_has_its_message() -> None:
     for value in values:
         message = results.message_of(HEADER, value)
         assert isinstance(message, results.message_type(type(value)))
-    assert {output.kind for output in OUTPUTS} <= {type(value) for value in values}
+    assert {*TOPICS.values()} <= {type(value) for value in values}
     (status,) = results.message_of(HEADER, states).status
     assert (status.name, status.message, status.level) == ("a", "lost", DiagnosticStatus.ERROR)
     assert status.values[0].value == "0.750"
