@@ -1,15 +1,13 @@
-"""The tracker's outputs for an image: topics, joints and figures.
+"""The tracker's outputs for an image: topics and joints.
 
-:mod:`.ros.messages.results` encodes them as messages of the nodes, :mod:`.recordings.result_bag`
-as messages of a bag, and :mod:`.recordings.result_table` as rows of a table. Add a joint to
-:mod:`.person.skeleton`, ``joint_values`` and ``joint_deviations``, a topic to ``TOPICS`` and
-``OutputStream``, and a number to ``METRICS``.
+:mod:`.recordings.messages` encodes them as messages of nodes and bags, and
+:mod:`.recordings.result_table` as rows of a table. Add a joint to :mod:`.person.skeleton`,
+``joint_values`` and ``joint_deviations``, and a topic to ``TOPICS`` and ``OutputStream``.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Any, NamedTuple
 
@@ -109,27 +107,6 @@ class Text(NamedTuple):
 
 
 Value = JointValues | Points | Markers | Text | KeypointStates
-
-
-@dataclass(frozen=True)
-class Metric:
-    """One number of an estimate."""
-
-    name: str  #: name of the column
-    unit: str  #: empty for a plain number
-    format: str  #: format specification of the number
-    #: the number of an estimate; None if it has no such number.
-    of: Callable[[Estimate], float | None]
-
-    @property
-    def label(self) -> str:
-        """Name with its unit for the diagnostics."""
-        return f"{self.name} ({self.unit})" if self.unit else self.name
-
-    def text(self, estimate: Estimate) -> str:
-        """Return the number as text; empty if there is no number."""
-        value = self.of(estimate)
-        return "" if value is None else format(value, self.format)
 
 
 _NECK = [JOINT_STATE_NAMES.index(name) for name in NECK_NAMES]
@@ -278,12 +255,6 @@ TOPICS: dict[str, type[Value]] = {
     "markers": Markers,
 }
 """Topics of the tracker in the order of publication, and the classes of their values."""
-
-METRICS: tuple[Metric, ...] = (
-    Metric("cost", "px", "d", lambda estimate: estimate.cost_px),
-    Metric("iou", "", ".4f", lambda estimate: estimate.iou),
-)
-"""Numbers that describe the fit of the model."""
 
 
 class OutputStream:

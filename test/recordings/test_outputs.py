@@ -25,7 +25,6 @@ from cardbox_tracker.person.skeleton import (
 )
 from cardbox_tracker.recordings import outputs
 from cardbox_tracker.recordings.outputs import (
-    METRICS,
     JointValues,
     Markers,
     OutputStream,
@@ -236,14 +235,6 @@ def test_without_the_place_velocities_are_those_of_the_twelve_joints() -> None:
     stream = OutputStream(torso_place=False)
     velocities_of(stream, 1.0, FOUND, TRACKER)
     assert velocities_of(stream, 1.1, PLACED, TRACKER).tolist() == [0.0] * 12
-
-
-def test_figures_as_text() -> None:
-    assert {metric.label: metric.text(FOUND) for metric in METRICS} == {
-        "cost (px)": "812",
-        "iou": "0.8765",
-    }
-    assert [metric.text(Estimate(LOST)) for metric in METRICS] == ["", ""]
 
 
 @given(st.permutations(range(12)))
