@@ -325,24 +325,18 @@ def _start_nodes(
 _VIDEO_HZ = 15.0
 
 
-def figures(results: Results, truth: GroundTruth, start_ns: int) -> dict[str, object]:
+def figures(results: Results, truth: GroundTruth, start_ns: int) -> dict[str, Any]:
     """Return the errors of the images from a stamp on, metres, and how many have a posture."""
     expected = {stamp for stamp in truth.frames if stamp >= start_ns}
     points_m = results.of(POINT_COLUMNS).reshape(-1, len(POINT_COLUMNS) // 3, 3)
     images = zip(results.stamp_ns.tolist(), results.state, points_m, strict=True)
     found = {s: (state, m) for s, state, m in images if s in expected and np.isfinite(m).all()}
-    error = tracking_error({stamp: m for stamp, (_, m) in found.items()}, truth)
     return {
         "cameras": max(1, len(truth.cameras)),
         "frames": len(expected),
         "frames_tracked": len(found),
         "frames_uncertain": sum(state == UNCERTAIN for state, _ in found.values()),
-        "mean_3d_error_m": error.mean_m,
-        "error_by_keypoint_m": error.by_keypoint_m,
-        "error_by_segment_m": error.by_segment_m,
-        "lateral_error_m": error.lateral_m,
-        "vertical_error_m": error.vertical_m,
-        "depth_error_m": error.depth_m,
+        **tracking_error({stamp: m for stamp, (_, m) in found.items()}, truth),
     }
 
 
