@@ -271,13 +271,8 @@ class CameraKeypoints:
         Of several people it chooses the one in the silhouette; points of a table join within
         ``tolerance_ns``.
         """
-        calibration, at_ns = self._watch.current, stamp_ns(header.stamp)
-        taken = self._taken(at_ns, header.frame_id, tolerance_ns)
-        self._images += 1
-        if taken is None or calibration is None:
-            return None
-        size = camera.width, camera.height
-        person = person_in(silhouette, [placed(one, calibration, size) for one in taken.persons])
+        found = self._placed(header, camera, tolerance_ns)
+        person = None if found is None else person_in(silhouette, found)
         if person is None:
             return None
         self._reason = why_not(silhouette, person)
@@ -285,20 +280,29 @@ class CameraKeypoints:
             self._beside += 1
             return None
         self._used, self._beside = self._used + 1, 0
-        return ImagePoints(person.px, person.scores, min(taken.stamp_ns, at_ns))
+        return person
 
     def people(self, header: Header, camera: Camera) -> list[ImagePoints] | None:
         """Return the points of all people in the image; None before a detector has found any."""
-        calibration, at_ns = self._watch.current, stamp_ns(header.stamp)
-        taken = self._taken(at_ns, header.frame_id, TOLERANCE_NS)
-        self._images += 1
-        if taken is None or calibration is None:
+        found = self._placed(header, camera, TOLERANCE_NS)
+        if found is None:
             # Once a detector has found people, regions of the silhouette are none.
             return [] if self._used else None
         self._used += 1
-        size, age_ns = (camera.width, camera.height), min(taken.stamp_ns, at_ns)
+        return [one for one in found if not one.is_empty]
+
+    def _placed(
+        self, header: Header, camera: Camera, tolerance_ns: int
+    ) -> list[ImagePoints] | None:
+        """Return the points of all persons in px of the silhouette; None if there are none yet."""
+        calibration, at_ns = self._watch.current, stamp_ns(header.stamp)
+        taken = self._taken(at_ns, header.frame_id, tolerance_ns)
+        self._images += 1
+        if taken is None or calibration is None:
+            return None
+        size, of_ns = (camera.width, camera.height), min(taken.stamp_ns, at_ns)
         found = (placed(one, calibration, size) for one in taken.persons)
-        return [ImagePoints(one.px, one.scores, age_ns) for one in found if not one.is_empty]
+        return [ImagePoints(one.px, one.scores, of_ns) for one in found]
 
     def _taken(self, at_ns: int, frame_id: str, tolerance_ns: int) -> Taken | None:
         if self.topic is not None:
