@@ -14,26 +14,9 @@ import numpy as np
 from cardbox_tracker.common.errors import NotFiniteError
 from cardbox_tracker.person.sizes import FloatArray
 from cardbox_tracker.recordings.markers import MarkerShape
-from cardbox_tracker.recordings.outputs import (
-    LEVELS,
-    JointValues,
-    KeypointStates,
-    Markers,
-    Points,
-    Text,
-    Value,
-)
+from cardbox_tracker.recordings.outputs import LEVELS, JointValues, KeypointStates, Value
 
 New = Callable[..., Any]
-
-MESSAGE_TYPES: dict[type[Value], str] = {
-    JointValues: "sensor_msgs/msg/JointState",
-    Points: "geometry_msgs/msg/PoseArray",
-    Markers: "visualization_msgs/msg/MarkerArray",
-    KeypointStates: "diagnostic_msgs/msg/DiagnosticArray",
-    Text: "std_msgs/msg/String",
-}
-"""Type of the message that carries a value."""
 
 # Constant of visualization_msgs/Marker; ADD is 0.
 _DELETE_ALL = 3
@@ -44,20 +27,14 @@ def message_of(new: New, header: Any, value: Value) -> Any:
 
     Raises NotFiniteError for a number that is not finite.
     """
-    kind, fields = MESSAGE_TYPES[type(value)], dict[str, Any]()
     match value:
         case JointValues(names, values, velocities):
             fields = {"name": list(names), "position": finite(values, "joint states")}
             if velocities is not None:
                 fields["velocity"] = finite(velocities, "velocities of the joints")
-        case Points(points_m):
-            fields["poses"] = [_pose(new, position=one) for one in _points(new, points_m)]
-        case Markers(shapes):
-            gone = {"header": header, "action": _DELETE_ALL, "pose": _pose(new)}
-            markers = [_marker(new, header, shape) for shape in shapes]
-            return new(kind, markers=markers or [new("visualization_msgs/msg/Marker", **gone)])
+            return new("sensor_msgs/msg/JointState", header=header, **fields)
         case KeypointStates():
-            fields["status"] = [
+            status = [
                 new(
                     "diagnostic_msgs/msg/DiagnosticStatus",
                     level=LEVELS[state],
@@ -70,9 +47,18 @@ def message_of(new: New, header: Any, value: Value) -> Any:
                 )
                 for name, state, texts in value.rows()
             ]
-        case Text(text):
-            return new(kind, data=text)
-    return new(kind, header=header, **fields)
+            return new("diagnostic_msgs/msg/DiagnosticArray", header=header, status=status)
+        case str():
+            return new("std_msgs/msg/String", data=value)
+        case np.ndarray():
+            poses = [_pose(new, position=one) for one in _points(new, value)]
+            return new("geometry_msgs/msg/PoseArray", header=header, poses=poses)
+    gone = {"header": header, "action": _DELETE_ALL, "pose": _pose(new)}
+    markers = [_marker(new, header, shape) for shape in value]
+    return new(
+        "visualization_msgs/msg/MarkerArray",
+        markers=markers or [new("visualization_msgs/msg/Marker", **gone)],
+    )
 
 
 def _marker(new: New, header: Any, shape: MarkerShape) -> Any:

@@ -88,25 +88,9 @@ class JointValues(NamedTuple):
     velocities: FloatArray | None = None
 
 
-class Points(NamedTuple):
-    """Points (n, 3), metres in the optical frame."""
-
-    points_m: FloatArray
-
-
-class Markers(NamedTuple):
-    """Shapes to show; without shapes, all earlier ones are removed."""
-
-    shapes: tuple[MarkerShape, ...]
-
-
-class Text(NamedTuple):
-    """A text."""
-
-    text: str
-
-
-Value = JointValues | Points | Markers | Text | KeypointStates
+Value = JointValues | KeypointStates | FloatArray | tuple[MarkerShape, ...] | str
+"""Joints, states, points (n, 3), metres in the optical frame, shapes to show instead of all earlier
+ones, or a text."""
 
 
 _NECK = [JOINT_STATE_NAMES.index(name) for name in NECK_NAMES]
@@ -242,19 +226,19 @@ def positions_of(joints: JointValues) -> dict[str, float]:
     return dict(zip(joints.names, np.asarray(joints.values).tolist(), strict=True))
 
 
-TOPICS: dict[str, type[Value]] = {
+TOPICS = {
     # The states come first, so that subscribers have them when the posture arrives.
-    "tracking_state": Text,
-    "keypoint_states": KeypointStates,
-    "place_state": KeypointStates,
-    "joint_states": JointValues,
+    "tracking_state": "std_msgs/msg/String",
+    "keypoint_states": "diagnostic_msgs/msg/DiagnosticArray",
+    "place_state": "diagnostic_msgs/msg/DiagnosticArray",
+    "joint_states": "sensor_msgs/msg/JointState",
     # Who waits for the deviations has the hands by then.
-    "hands": JointValues,
-    "joint_states_stddev": JointValues,
-    "keypoints": Points,
-    "markers": Markers,
+    "hands": "sensor_msgs/msg/JointState",
+    "joint_states_stddev": "sensor_msgs/msg/JointState",
+    "keypoints": "geometry_msgs/msg/PoseArray",
+    "markers": "visualization_msgs/msg/MarkerArray",
 }
-"""Topics of the tracker in the order of publication, and the classes of their values."""
+"""Topics of the tracker in the order of publication, and the types of their messages."""
 
 
 class OutputStream:
@@ -289,10 +273,10 @@ class OutputStream:
     ) -> Value | None:
         """Return the value of a topic; None if the estimate has none."""
         if topic == "tracking_state":
-            return Text(estimate.state)
+            return estimate.state
         if estimate.posture is None:
             # Markers stay visible until they are removed.
-            return Markers(()) if topic == "markers" and is_new else None
+            return () if topic == "markers" and is_new else None
         match topic:
             case "keypoint_states":
                 return keypoint_states(estimate)
@@ -305,9 +289,9 @@ class OutputStream:
             case "joint_states_stddev":
                 return joint_deviations(estimate, self._torso_place)
             case "keypoints":
-                return None if estimate.keypoints_m is None else Points(estimate.keypoints_m)
+                return estimate.keypoints_m
         body = estimate.placed(tracker.body)
-        return Markers(marker_shapes(body, estimate.posture, estimate.neck))
+        return marker_shapes(body, estimate.posture, estimate.neck)
 
     def _velocities(self, stamp_ns: int, estimate: Estimate, tracker: Tracker) -> FloatArray | None:
         """Return those of :func:`joint_values`, rad/s and m/s; None without an image before.

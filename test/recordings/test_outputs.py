@@ -24,11 +24,10 @@ from cardbox_tracker.person.skeleton import (
     KeypointState,
 )
 from cardbox_tracker.recordings import outputs
+from cardbox_tracker.recordings.messages import message_of
 from cardbox_tracker.recordings.outputs import (
     JointValues,
-    Markers,
     OutputStream,
-    Text,
     joint_deviations,
     joint_values,
     open_hands,
@@ -91,10 +90,10 @@ def topics(stream: OutputStream, estimate: Estimate, **options: Any) -> list[str
 def test_a_posture_is_all_topics_in_their_order() -> None:
     found = dict(OutputStream().values(STAMP_NS, FOUND, TRACKER))
     assert list(found) == TOPICS
-    kinds = {topic: type(value) for topic, value in found.items()}
+    kinds = {topic: message_of(lambda kind, **_: kind, None, found[topic]) for topic in found}
     assert kinds == {topic: outputs.TOPICS[topic] for topic in outputs.TOPICS if topic != "hands"}
     state, keypoints, place, joints, deviations, points, markers = cast(Any, list(found.values()))
-    assert state == Text(TRACKING)
+    assert state == TRACKING
     assert keypoints.names[:4] == ("left_shoulder", "left_elbow", "left_hand", "right_shoulder")
     assert (keypoints.states, keypoints.chances.tolist()) == (STATES, CHANCES.tolist())
     (row,) = place.rows()
@@ -111,8 +110,8 @@ def test_a_posture_is_all_topics_in_their_order() -> None:
     assert (joints.names, deviations.names) == (ALL_NAMES, (*BODY_NAMES, *CLAVICLES, *LEG_NAMES))
     np.testing.assert_array_equal(joints.values, [*POSTURE, *[0.0] * 14])
     np.testing.assert_array_equal(deviations.values[:16], [0.1] * 12 + [0.0] * 4)
-    assert points.points_m.shape == (6, 3)
-    patches, skeleton = markers.shapes
+    assert points.shape == (6, 3)
+    patches, skeleton = markers
     assert (patches.namespace, patches.kind, patches.points_m.shape) == ("patches", 11, (90, 3))
     assert len(patches.colors) == 90
     assert (skeleton.namespace, skeleton.kind, skeleton.points_m.shape) == ("skeleton", 5, (16, 3))
@@ -161,7 +160,7 @@ def test_markers_are_where_the_estimate_is() -> None:
         cast(Any, dict(OutputStream().values(STAMP_NS, e, TRACKER))["markers"])
         for e in (FOUND, PLACED)
     )
-    for before, after in zip(at_rest.shapes, moved.shapes, strict=True):
+    for before, after in zip(at_rest, moved, strict=True):
         shift = np.broadcast_to((0.0, 0.05, -0.25), after.points_m.shape)
         np.testing.assert_allclose(after.points_m - before.points_m, shift, atol=1e-12)
 
@@ -169,7 +168,7 @@ def test_markers_are_where_the_estimate_is() -> None:
 def test_an_uncertain_posture_is_sent_with_its_state() -> None:
     unsure = replace(FOUND, state=UNCERTAIN)
     found = list(OutputStream().values(STAMP_NS, unsure, TRACKER))
-    assert found[0] == ("tracking_state", Text("uncertain"))
+    assert found[0] == ("tracking_state", "uncertain")
     assert [topic for topic, _ in found] == TOPICS
 
 
@@ -179,8 +178,8 @@ def test_markers_go_once_when_the_posture_does(state: str) -> None:
     topics(stream, FOUND)
     gone = list(stream.values(STAMP_NS, Estimate(state), TRACKER))
     assert gone == [
-        ("tracking_state", Text(state)),
-        ("markers", Markers(())),
+        ("tracking_state", state),
+        ("markers", ()),
     ]
     assert topics(stream, Estimate(state)) == ["tracking_state"]
     assert topics(stream, FOUND) == TOPICS

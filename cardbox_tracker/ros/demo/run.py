@@ -36,6 +36,7 @@ from cardbox_tracker.recordings.result_table import POINT_COLUMNS
 from cardbox_tracker.recordings.truth import GroundTruth, load_ground_truth, tracking_error
 from cardbox_tracker.ros.messages import results
 from cardbox_tracker.ros.messages.results import mean_iou_of
+from cardbox_tracker.ros.messages.types import class_of
 from cardbox_tracker.ros.nodes.camera_poses import silhouettes_of
 from cardbox_tracker.ros.runtime import qos
 from cardbox_tracker.ros.runtime.processes import Nodes, compile_kernels, isolate, running_nodes
@@ -50,7 +51,7 @@ _UNRELIABLE = QoSProfile(depth=100, reliability=ReliabilityPolicy.BEST_EFFORT)
 _OF_PERSON = {
     "body_model": (String, qos.LATCHED),
     "robot_description": (String, qos.LATCHED),
-    **{topic: (results.message_type(kind), qos.REPLAY) for topic, kind in TOPICS.items()},
+    **{topic: (class_of(kind), qos.REPLAY) for topic, kind in TOPICS.items()},
 }
 _OF_CAMERA = {
     "silhouette": (Image, qos.REPLAY),

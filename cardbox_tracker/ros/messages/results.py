@@ -16,17 +16,12 @@ from cardbox_tracker.person.skeleton import NECK_NAMES
 from cardbox_tracker.recordings import messages
 from cardbox_tracker.recordings.messages import finite
 from cardbox_tracker.recordings.outputs import JointValues, Value, posture_from, values_from
-from cardbox_tracker.ros.messages.types import class_of, new_message
+from cardbox_tracker.ros.messages.types import new_message
 
 
 def message_of(header: Header, value: Value) -> Any:
     """Return the message of :func:`.recordings.messages.message_of`; it raises the same errors."""
     return messages.message_of(new_message, header, value)
-
-
-def message_type(kind: type[Value]) -> Any:
-    """Return the class of the messages that carry values of ``kind``."""
-    return class_of(messages.MESSAGE_TYPES[kind])
 
 
 def joint_values_of(message: JointState) -> JointValues:

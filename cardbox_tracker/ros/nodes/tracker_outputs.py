@@ -24,7 +24,7 @@ from cardbox_tracker.recordings.outputs import (
     place_of,
 )
 from cardbox_tracker.ros.messages import conversions, results
-from cardbox_tracker.ros.messages.types import optional_class
+from cardbox_tracker.ros.messages.types import class_of, optional_class
 from cardbox_tracker.ros.nodes.camera_inputs import ObservationSet
 from cardbox_tracker.ros.nodes.tracker_parameters import TrackerParameters
 from cardbox_tracker.ros.runtime import qos
@@ -107,7 +107,7 @@ class TrackerOutputs:
     ) -> None:
         space = "" if person is None else f"{person_space(person)[1:]}/"
         self._publishers = {
-            topic: node.advertise(results.message_type(kind), space + topic, qos.RESULT)
+            topic: node.advertise(class_of(kind), space + topic, qos.RESULT)
             for topic, kind in TOPICS.items()
             if settings.hands or topic != "hands"
         }
