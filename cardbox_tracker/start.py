@@ -123,18 +123,7 @@ def _run(name: str) -> int:
 
 
 # Functions of the console scripts in setup.py.
-cardbox = partial(_run, "cardbox")
-background = partial(_run, "background")
-initializer = partial(_run, "initializer")
-tracker = partial(_run, "tracker")
-camera = partial(_run, "camera")
-play_bag = partial(_run, "play_bag")
-detector = partial(_run, "detector")
-stereo_depth = partial(_run, "stereo_depth")
-rula = partial(_run, "rula")
-retarget = partial(_run, "retarget")
-teleoperation = partial(_run, "teleoperation")
-cardbox_nodes = partial(_run, "cardbox_nodes")
+globals().update({name: partial(_run, name) for name in (*NODES, "cardbox")})
 
 
 def main() -> int:

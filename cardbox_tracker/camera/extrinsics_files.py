@@ -23,7 +23,7 @@ from cardbox_tracker.camera.camera import Camera
 from cardbox_tracker.camera.camera_info import info_array
 from cardbox_tracker.camera.extrinsics import FARTHEST_M, Extrinsics
 from cardbox_tracker.common.errors import CameraError, cut
-from cardbox_tracker.common.files import atomic_path, foreign
+from cardbox_tracker.common.files import foreign, write_file
 from cardbox_tracker.common.small_yaml import parse_small_yaml, read_small_text
 
 # Two sources that differ by more do not belong to the same calibration.
@@ -229,8 +229,7 @@ def save_camchain(
             "rostopic": f"/{name.strip('/')}/image_raw",
         }
         chain[f"cam{number}"] = entry
-    with atomic_path(path) as temporary:
-        temporary.write_text(yaml.safe_dump(chain, default_flow_style=None), encoding="utf-8")
+    write_file(path, yaml.safe_dump(chain, default_flow_style=None))
 
 
 def _camchain(entries: Mapping[str, Mapping[str, Any]], name: str) -> dict[str, Extrinsics]:

@@ -7,6 +7,7 @@ import math
 import os
 import sys
 from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import suppress
 from dataclasses import fields
 from itertools import chain
 from pathlib import Path
@@ -30,66 +31,46 @@ REFERENCES = {
 """Reference postures by name, with the description for the person."""
 
 
-def span(text: str) -> TimeSpan:
-    """Parse a span ``T0:T1``, seconds from the start of the recording."""
+def parsed(
+    kind: Callable[[str], T], expected: str, is_right: Callable[[T], bool] = lambda _: True
+) -> Callable[[str], T]:
+    """Return a parser of ``kind`` that raises ArgumentTypeError unless the value ``is_right``."""
+
+    def parse(text: str) -> T:
+        with suppress(ValueError):
+            value = kind(text)
+            if is_right(value):
+                return value
+        raise argparse.ArgumentTypeError(f"expected {expected}, got {text!r}")
+
+    return parse
+
+
+def _span(text: str) -> TimeSpan:
     from cardbox_tracker.recordings.silhouettes import TimeSpan
 
-    try:
-        return TimeSpan.parse(text)
-    except ValueError:
-        raise argparse.ArgumentTypeError(
-            "expected T0:T1, seconds from the start of the recording with T0 before T1, "
-            f"got {text!r}"
-        ) from None
+    return TimeSpan.parse(text)
 
 
-def time(text: str) -> float:
-    """Parse a time in seconds from the start of the recording."""
-    value = _number(text)
-    if not 0.0 <= value < math.inf:
-        raise argparse.ArgumentTypeError(
-            f"expected seconds from the start of the recording, got {text!r}"
-        )
-    return value
+span = parsed(_span, "T0:T1, seconds from the start of the recording with T0 before T1")
+"""Parser of a span ``T0:T1``."""
+time = parsed(float, "seconds from the start of the recording", lambda one: 0.0 <= one < math.inf)
+"""Parser of a time."""
 
 
 def at_least(lowest: int) -> Callable[[str], int]:
-    """Return a parser of whole numbers of ``lowest`` or more, which raises ArgumentTypeError."""
-
-    def parse(text: str) -> int:
-        try:
-            value = int(text)
-        except ValueError:
-            value = lowest - 1
-        if value < lowest:
-            raise argparse.ArgumentTypeError(
-                f"expected a whole number of {lowest} or more, got {text!r}"
-            )
-        return value
-
-    return parse
+    """Return a parser of whole numbers of ``lowest`` or more."""
+    return parsed(int, f"a whole number of {lowest} or more", lambda one: one >= lowest)
 
 
 def between(lowest: float, highest: float) -> Callable[[str], float]:
     """Return a parser of numbers in a range, 0 excluded if it is the lowest."""
-    least = "a number above" if lowest == 0.0 else "a number from"
-
-    def parse(text: str) -> float:
-        value = _number(text)
-        if not lowest <= value <= highest or lowest == 0.0 == value:
-            raise argparse.ArgumentTypeError(
-                f"expected {least} {lowest:g} to {highest:g}, got {text!r}"
-            )
-        return value
-
-    return parse
-
-
-def _number(text: str) -> float:
-    try:
-        return float(text)
-    except ValueError:
-        return math.nan
+    least = "above" if lowest == 0.0 else "from"
+    return parsed(
+        float,
+        f"a number {least} {lowest:g} to {highest:g}",
+        lambda one: lowest <= one <= highest and not lowest == 0.0 == one,
+    )
 
 
 def add_references(parser: argparse.ArgumentParser) -> None:

@@ -8,9 +8,6 @@ from pathlib import Path
 
 from cardbox_tracker.commands.arguments import add_camera_pitch, add_force, check_outputs
 
-NAME = "body"
-HELP = "make a body model from a person's stature, without a recording"
-
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of ``cardbox body``."""

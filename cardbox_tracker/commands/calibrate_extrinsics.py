@@ -17,9 +17,6 @@ from cardbox_tracker.commands.arguments import (
 )
 from cardbox_tracker.commands.initialize import measuring_config
 
-NAME = "calibrate-extrinsics"
-HELP = "find where several cameras stand, from the person in a recording, without a board"
-
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of ``cardbox calibrate-extrinsics``."""

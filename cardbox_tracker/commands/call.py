@@ -6,9 +6,6 @@ import argparse
 
 from cardbox_tracker.common.errors import RosMissingError
 
-NAME = "call"
-HELP = "call a service of the running nodes, as 'ros2 service call' does"
-
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of ``cardbox call``."""

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import argparse
 import sys
-from dataclasses import dataclass
 from importlib import import_module
 from pathlib import Path
 from typing import Any
@@ -14,36 +12,14 @@ from cardbox_tracker.common.errors import CardboxError
 _PACKAGE = Path(__file__).parents[1]
 
 
-@dataclass
-class LabCommand:
-    """A subcommand whose arguments and work are in a module of ``lab/``."""
-
-    NAME: str
-    HELP: str
-    module: str  #: full name of the module
-    targets: str  #: quoted commands of ``make`` that do the same
-
-    def add_arguments(self, parser: argparse.ArgumentParser) -> None:
-        """Add the arguments."""
-        from_checkout(self.module, self.targets).add_arguments(parser)
-
-    def run(self, options: argparse.Namespace) -> None:
-        """Do the work."""
-        from_checkout(self.module, self.targets).run(options)
-
-
-BENCHMARK = LabCommand(
-    "benchmark",
-    "measure how fast the tracker is on this machine (in a checkout)",
-    "lab.benchmarks.command",
-    "'make benchmark'",
-)
-EVALUATE = LabCommand(
-    "evaluate",
-    "in a checkout: compare recorded sessions with their truth, or repeat the paper's experiments",
-    "lab.evaluation.command",
-    "'make experiments', 'make sessions' or 'make people'",
-)
+LAB = {
+    "benchmark": ("lab.benchmarks.command", "'make benchmark'"),
+    "evaluate": (
+        "lab.evaluation.command",
+        "'make experiments', 'make sessions' or 'make people'",
+    ),
+}
+"""Module of each of these subcommands, and the commands of ``make`` that do the same."""
 
 
 def from_checkout(module: str, targets: str) -> Any:

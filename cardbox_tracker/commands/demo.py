@@ -8,10 +8,7 @@ from pathlib import Path
 
 from cardbox_tracker.commands.arguments import add_camera_count, add_preset, add_seed
 from cardbox_tracker.common.errors import CardboxError, RosMissingError
-from cardbox_tracker.common.files import atomic_path
-
-NAME = "demo"
-HELP = "track a film of a real person and show the error; with --live, run the nodes"
+from cardbox_tracker.common.files import make_folder, write_file
 
 _PRESET = "default"
 
@@ -54,26 +51,23 @@ def _track_film(output: Path, seed: int) -> None:
     from cardbox_tracker.applications.reporting.page import space_view
     from cardbox_tracker.commands.request import (
         PersonRequest,
-        RecordingRequest,
         TrackFiles,
         TrackingRequest,
     )
     from cardbox_tracker.commands.tracking import track
     from cardbox_tracker.person.proportions import body_from_proportions
     from cardbox_tracker.recordings.given_camera import GivenCamera
+    from cardbox_tracker.recordings.recording import RecordingRequest
     from cardbox_tracker.recordings.result_reader import read_results
     from cardbox_tracker.search.config import PRESETS
     from cardbox_tracker.tracking.precompile import compile_for_films
 
-    try:
-        output.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise CardboxError(f"cannot make the folder {output}: {error.strerror}") from None
+    make_folder(output)
     film = DemoFilm.load()
     print(f"film: {SOURCE}", flush=True)
     compile_for_films()
     detector, camera = film.detector, GivenCamera(film.fov_deg)
-    recording = RecordingRequest(film.path, detector, detector, (), None, None, camera)
+    recording = RecordingRequest(film.path, detector, points=detector, camera=camera)
     body = body_from_proportions(film.stature_m)
     table = output / "angles.csv"
     files = TrackFiles(table, output / "overlay.mp4", body=output / "angles.body.yaml")
@@ -90,8 +84,7 @@ def _track_film(output: Path, seed: int) -> None:
         "error.png": film.error_plot(motion.time_s, ours_m, theirs_m),
     }
     for name, png in pictures.items():
-        with atomic_path(output / name) as temporary:
-            temporary.write_bytes(png)
+        write_file(output / name, png)
     compared = np.isfinite(ours_m) & np.isfinite(theirs_m)
     placed_m = film.errors_m(motion.keypoints_m, is_placed=True)
     pitch_rad = 0.0 if results.body is None else results.body.camera_pose.pitch_rad
@@ -104,8 +97,7 @@ def _track_film(output: Path, seed: int) -> None:
         "mediapipe_turned_error_m": float(turned_m[compared].mean()),
         "place_error_m": float(placed_m[compared].mean()),
     }
-    with atomic_path(output / "report.json") as temporary:
-        temporary.write_text(json.dumps(figures, indent=1) + "\n", encoding="utf-8")
+    write_file(output / "report.json", json.dumps(figures, indent=1) + "\n")
     shape_cm, theirs_cm, turned_cm, place_cm = (100 * value for value in [*figures.values()][2:])
     print(
         f"error of shoulders, elbows and hands in {compared.sum()} images with a reference: "

@@ -8,9 +8,6 @@ from pathlib import Path
 from cardbox_tracker.commands.arguments import add_force, add_results, check_outputs, results_of
 from cardbox_tracker.common.files import body_beside, body_of_person
 
-NAME = "export"
-HELP = "write results as TRC, MOT, BVH or C3D, or as joint angles of the ISB"
-
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of ``cardbox export``."""

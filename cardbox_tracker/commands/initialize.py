@@ -6,7 +6,6 @@ import argparse
 import math
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from cardbox_tracker.commands.arguments import (
     REFERENCES,
@@ -18,12 +17,16 @@ from cardbox_tracker.commands.arguments import (
     print_remarks,
 )
 from cardbox_tracker.commands.request import Problems, add_recording, inputs_of, recording_request
-
-if TYPE_CHECKING:
-    from cardbox_tracker.measuring.config import InitializationConfig
-
-NAME = "initialize"
-HELP = "measure the person in a recording"
+from cardbox_tracker.commands.scene import tilt_in
+from cardbox_tracker.common.progress import progress_bar
+from cardbox_tracker.measuring.config import InitializationConfig
+from cardbox_tracker.person.model import BodyModel
+from cardbox_tracker.person.model_file import save_body_model
+from cardbox_tracker.recordings.initialize import (
+    describe,
+    initialize_at_scale,
+    initialize_from_recording,
+)
 
 # Initial distance of the search where depth images or two cameras measure it.
 _GUESSED_M = 2.0
@@ -52,9 +55,6 @@ def measuring_config(
     options: argparse.Namespace, distance_m: float, pitch_rad: float
 ) -> InitializationConfig:
     """Return the settings of a measurement."""
-    from cardbox_tracker.measuring.config import InitializationConfig
-    from cardbox_tracker.person.model import BodyModel
-
     # The body model refuses an impossible distance or pitch by name.
     BodyModel.of(distance_m=distance_m, camera_pitch_rad=pitch_rad)
     return InitializationConfig(distance_m, pitch_rad, options.side_turn, seed=options.seed)
@@ -62,16 +62,6 @@ def measuring_config(
 
 def run(options: argparse.Namespace) -> None:
     """Measure the person, write the body model and print its sizes."""
-    from cardbox_tracker.common.progress import progress_bar
-    from cardbox_tracker.measuring.config import InitializationConfig
-    from cardbox_tracker.person.model_file import save_body_model
-    from cardbox_tracker.recordings.initialize import (
-        describe,
-        initialize_from_cameras,
-        initialize_from_recording,
-        initialize_with_depth,
-    )
-
     problems = Problems(options.recording)
     # The silhouettes alone are measured.
     recording = replace(recording_request(options, problems), points=None)
@@ -92,8 +82,6 @@ def run(options: argparse.Namespace) -> None:
     check_outputs((options.output,), options.force, inputs_of(options))
     spans = {name: getattr(options, name) for name in REFERENCES}
     if options.camera_pitch_deg is None and recording.detector is not None:
-        from cardbox_tracker.commands.scene import tilt_in
-
         pitch_rad, recording = tilt_in(recording, spans["front"])
         config = replace(config, camera_pitch_rad=pitch_rad)
     if is_given:
@@ -101,10 +89,8 @@ def run(options: argparse.Namespace) -> None:
     with recording.open() as source, progress_bar("initialize") as show:
         if is_given:
             result = initialize_from_recording(source.first, spans, config, show)
-        elif source.measures_depth:
-            result = initialize_with_depth(source, spans, config, show)
         else:
-            result = initialize_from_cameras(source, spans, config, show)
+            result = initialize_at_scale(source, spans, config, show)
         remarks, accounts = source.first.remarks, [one.account for one in source.sources]
     print_remarks(remarks)
     roll_rad = recording.camera.stands_rad

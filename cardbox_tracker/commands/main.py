@@ -8,69 +8,42 @@ import os
 import signal
 import sys
 from collections.abc import Container, Sequence
-from typing import Any, Protocol
+from importlib import import_module
+from typing import Any
 
 from cardbox_tracker import __version__
-from cardbox_tracker.commands import (
-    body,
-    calibrate_extrinsics,
-    call,
-    checkout,
-    demo,
-    detector,
-    export,
-    initialize,
-    reba,
-    retarget,
-    rula,
-    stream,
-    synthesize,
-    track,
-    urdf,
-    view,
-)
+from cardbox_tracker.commands.checkout import LAB, from_checkout
 from cardbox_tracker.common import interrupts
 from cardbox_tracker.common.errors import CardboxError, plain
 
-
-class Command(Protocol):
-    """A subcommand: a module of this folder, or an object, with these four names.
-
-    Slow imports are inside ``add_arguments`` and ``run``, so that ``cardbox --help`` is fast.
-    """
-
-    NAME: str  #: name that is typed after ``cardbox``
-    HELP: str  #: one line for ``cardbox --help``, without a capital letter or a full stop
-
-    def add_arguments(self, parser: argparse.ArgumentParser) -> None:
-        """Add the arguments of the subcommand to its ``parser``."""
-
-    def run(self, options: argparse.Namespace) -> None:
-        """Do the work and print the result; CardboxError if the user can correct the cause."""
-
-
 # The order is that of 'cardbox --help'.
-COMMANDS: tuple[Command, ...] = (
-    demo,
-    synthesize,
-    initialize,
-    body,
-    calibrate_extrinsics,
-    detector,
-    track,
-    view,
-    export,
-    rula,
-    reba,
-    retarget,
-    stream,
-    checkout.BENCHMARK,
-    urdf,
-    call,
-    checkout.EVALUATE,
-)
+COMMANDS = {
+    "demo": "track a film of a real person and show the error; with --live, run the nodes",
+    "synthesize": "record a synthetic person, with ground truth",
+    "initialize": "measure the person in a recording",
+    "body": "make a body model from a person's stature, without a recording",
+    "calibrate-extrinsics": "find where several cameras stand, from the person in a recording, "
+    "without a board",
+    "detector": "install the network files of the person detector, or check them",
+    "track": "follow the posture through a recording, or through all recordings of a folder",
+    "view": "show results in a viewer: image, body in 3D, plots, error, a slider for the time",
+    "export": "write results as TRC, MOT, BVH or C3D, or as joint angles of the ISB",
+    "rula": "score the strain on arms, neck and trunk in a recording (RULA)",
+    "reba": "score the strain on the whole body in a table of 'cardbox track --legs' (REBA)",
+    "retarget": "move a robot arm, given by its URDF, as the measured person moves theirs",
+    "stream": "stream results as 24 joints in real time, to programs that teleoperate robots",
+    "benchmark": "measure how fast the tracker is on this machine (in a checkout)",
+    "urdf": "print the robot description (URDF) of a measured person",
+    "call": "call a service of the running nodes, as 'ros2 service call' does",
+    "evaluate": "in a checkout: compare recorded sessions with their truth, or repeat the paper's "
+    "experiments",
+}
+"""Each subcommand with one line for ``cardbox --help``, without a capital letter or a full stop.
 
-_EVERY_COMMAND = tuple(command.NAME for command in COMMANDS)
+Its module, of this folder or of ``lab/``, has ``add_arguments(parser)`` and ``run(options)``, which
+does the work and prints the result, and raises CardboxError if the user can correct the cause.
+"""
+
 # A folder of recordings has many reasons.
 _MOST_OF_AN_ERROR = 20_000
 _DESCRIPTION = """\
@@ -136,11 +109,11 @@ def _interrupted(name: str) -> int:
     return 128 + number
 
 
-def build_parser(words: Container[str] = _EVERY_COMMAND) -> argparse.ArgumentParser:
+def build_parser(words: Container[str] = COMMANDS) -> argparse.ArgumentParser:
     """Return the parser of ``cardbox``.
 
-    Only the subcommand in the words of a command line gets its arguments, since their choices may
-    need slow imports; by default all do.
+    Only the subcommand in the words of a command line is imported and gets its arguments, so that
+    ``cardbox --help`` is fast; by default all do.
     """
     parser = argparse.ArgumentParser(
         prog="cardbox", formatter_class=_Formatter, description=_DESCRIPTION, epilog=_EPILOG
@@ -149,18 +122,23 @@ def build_parser(words: Container[str] = _EVERY_COMMAND) -> argparse.ArgumentPar
     group = parser.add_subparsers(
         dest="command", required=True, metavar="COMMAND", title="commands"
     )
-    for command in COMMANDS:
+    for name, text in COMMANDS.items():
+        description = f"{text[0].upper()}{text[1:]}."
         added = group.add_parser(
-            command.NAME,
-            help=command.HELP,
-            description=f"{command.HELP[0].upper()}{command.HELP[1:]}.",
-            formatter_class=_Formatter,
+            name, help=text, description=description, formatter_class=_Formatter
         )
-        added.set_defaults(run=command.run)
         added.register("action", None, _Once)
-        if command.NAME in words:
-            command.add_arguments(added)
+        if name in words:
+            module = _module(name)
+            module.add_arguments(added)
+            added.set_defaults(run=module.run)
     return parser
+
+
+def _module(name: str) -> Any:
+    if name in LAB:
+        return from_checkout(*LAB[name])
+    return import_module(f"cardbox_tracker.commands.{name.replace('-', '_')}")
 
 
 class _Once(argparse._StoreAction):

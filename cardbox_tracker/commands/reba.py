@@ -6,6 +6,8 @@ import argparse
 from pathlib import Path
 
 from cardbox_tracker import __version__
+from cardbox_tracker.applications.ergonomics.reba import REBA, RebaConfig, images_of, score_table
+from cardbox_tracker.applications.ergonomics.report import PageContent
 from cardbox_tracker.commands.arguments import (
     add_force,
     add_seed,
@@ -17,14 +19,9 @@ from cardbox_tracker.commands.arguments import (
 )
 from cardbox_tracker.commands.rula import add_score_outputs, outputs_of, write_scores
 
-NAME = "reba"
-HELP = "score the strain on the whole body in a table of 'cardbox track --legs' (REBA)"
-
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of ``cardbox reba``."""
-    from cardbox_tracker.applications.ergonomics.reba import RebaConfig
-
     add = parser.add_argument
     add("table", type=Path, metavar="TABLE.csv", help="table of 'cardbox track --legs --csv'")
     add_score_outputs(parser)
@@ -36,14 +33,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> None:
     """Score every image, and print times, part scores and declared inputs."""
-    from cardbox_tracker.applications.ergonomics.reba import (
-        REBA,
-        RebaConfig,
-        images_of,
-        score_table,
-    )
-    from cardbox_tracker.applications.ergonomics.report import PageContent
-
     check_outputs(outputs_of(options), options.force, inputs=(options.table,))
     config = settings_from(options, RebaConfig)
     results = results_of(options.table, options.person)

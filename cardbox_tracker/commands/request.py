@@ -13,35 +13,44 @@ import os
 import shlex
 import sys
 from collections.abc import Callable, Iterable
-from contextlib import AbstractContextManager
+from contextlib import suppress
 from dataclasses import dataclass
 from importlib.metadata import EntryPoint
 from pathlib import Path, PurePosixPath
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any, NamedTuple, NoReturn, TypeVar
+from typing import Any, NamedTuple, NoReturn, TypeVar
 
+from cardbox_tracker.camera.pairing import camera_names
 from cardbox_tracker.commands.arguments import (
     add_camera_pitch,
     add_preset,
     add_seed,
     between,
+    parsed,
     span,
     time,
 )
 from cardbox_tracker.common.errors import CardboxError
+from cardbox_tracker.common.extensions import DETECTORS, extensions, loaded
 from cardbox_tracker.common.files import foreign, read_regular
 from cardbox_tracker.common.settings import NoEffectError, nested, settings_of
-
-if TYPE_CHECKING:
-    from cardbox_tracker.detectors.detector import Detector
-    from cardbox_tracker.detectors.person_choice import PersonChoice
-    from cardbox_tracker.detectors.point_table import PointTable
-    from cardbox_tracker.measuring.scene import Scene
-    from cardbox_tracker.person.model import BodyModel
-    from cardbox_tracker.recordings.given_camera import GivenCamera
-    from cardbox_tracker.recordings.recording import Recording, Segmentation
-    from cardbox_tracker.recordings.silhouettes import TimeSpan
-    from cardbox_tracker.search.config import TrackerConfig
+from cardbox_tracker.detectors.detector import MEDIAPIPE, Detector
+from cardbox_tracker.detectors.model_files import installed_hands
+from cardbox_tracker.detectors.own_network import OwnModel
+from cardbox_tracker.detectors.person_choice import PersonChoice
+from cardbox_tracker.detectors.point_table import PointTable
+from cardbox_tracker.measuring.scene import Scene, load_scene
+from cardbox_tracker.person.model import MEASURED, BodyModel
+from cardbox_tracker.person.model_file import load_body_model
+from cardbox_tracker.person.proportions import USUAL_STATURE_M, body_from_proportions
+from cardbox_tracker.recordings.given_camera import FOV_HINT, GivenCamera
+from cardbox_tracker.recordings.open_images import check_exists, is_bag, is_film, tells_lens
+from cardbox_tracker.recordings.other_silhouettes import PersonInView, Within
+from cardbox_tracker.recordings.recording import STEREO, RecordingRequest, Segmentation
+from cardbox_tracker.recordings.silhouettes import TimeSpan
+from cardbox_tracker.search.config import PRESETS, TrackerConfig, read_settings
+from cardbox_tracker.search.whole_body_config import WholeBodyConfig
+from cardbox_tracker.tracking.session import MOST_PEOPLE
 
 S = TypeVar("S")
 T = TypeVar("T")
@@ -64,42 +73,6 @@ _REPLACED = MappingProxyType(
         "calibration": ("fov",),
     }
 )
-
-
-@dataclass(frozen=True)
-class RecordingRequest:
-    """A recording to read."""
-
-    path: Path  #: bag, video, or folder of images
-    silhouettes: Segmentation  #: what tells the person from the scene
-    points: Detector | PointTable | None  #: source of the person's 2D points; None for no points
-    #: namespaces, the first camera's first; empty if the recording has one camera
-    cameras: tuple[str, ...]
-    extrinsics: Path | None  #: file of the poses of further cameras
-    depth: str | None  #: topic of depth images, or ``stereo``; None without depth
-    camera: GivenCamera  #: what the recording itself does not say about its camera
-
-    @property
-    def detector(self) -> Detector | None:
-        """The detector among the sources of silhouettes and points; None without one."""
-        from cardbox_tracker.detectors.detector import Detector
-
-        sources = self.silhouettes, self.points
-        return next((source for source in sources if isinstance(source, Detector)), None)
-
-    def open(self) -> AbstractContextManager[Recording]:
-        """Return the context of the open recording."""
-        from cardbox_tracker.recordings.recording import open_recording
-
-        return open_recording(
-            self.path,
-            self.silhouettes,
-            self.cameras,
-            self.extrinsics,
-            self.depth,
-            self.points,
-            self.camera,
-        )
 
 
 @dataclass(frozen=True)
@@ -301,8 +274,6 @@ def add_recording(parser: argparse.ArgumentParser, required: bool = True) -> Non
 
 def add_tracking(parser: argparse.ArgumentParser, needs_recording: bool = True) -> None:
     """Add the options for recording, person and settings, read by :func:`tracking_request`."""
-    from cardbox_tracker.search.whole_body_config import WholeBodyConfig
-
     add_recording(parser, needs_recording)
     add = parser.add_argument
     add(
@@ -313,7 +284,7 @@ def add_tracking(parser: argparse.ArgumentParser, needs_recording: bool = True) 
     )
     add(
         "--stature",
-        type=_statures,
+        type=parsed(_statures, "metres, or those of each person as in 1.75,1.62"),
         metavar="M[,M...]",
         help="in place of --model: height of the person, metres, crown to floor; sizes are the "
         "mean ones of people of that stature. With --people, one for each of them in turn, or one "
@@ -360,7 +331,7 @@ def add_tracking(parser: argparse.ArgumentParser, needs_recording: bool = True) 
     add(
         "--set",
         action="append",
-        type=_setting,
+        type=parsed(_setting, "NAME=VALUE, such as lost_frames=10"),
         metavar="NAME=VALUE",
         help="another setting of the tracker by its name in docs/parameters.md, such as "
         "lost_frames=10; may be given several times",
@@ -375,29 +346,19 @@ def add_tracking(parser: argparse.ArgumentParser, needs_recording: bool = True) 
 
 
 def _statures(text: str) -> tuple[float, ...]:
-    try:
-        return tuple(map(float, text.split(",")))
-    except ValueError:
-        raise argparse.ArgumentTypeError(
-            f"expected metres, or those of each person as in 1.75,1.62, got {text!r}"
-        ) from None
+    return tuple(map(float, text.split(",")))
 
 
 def _count(text: str) -> int:
-    from cardbox_tracker.tracking.session import MOST_PEOPLE
-
-    count = 0 if text == "auto" else int(text) if text.isdecimal() else -1
-    if not (text == "auto" or 1 <= count <= MOST_PEOPLE):
-        raise argparse.ArgumentTypeError(
-            f"expected auto or a number from 1 to {MOST_PEOPLE}, got {text!r}"
-        )
-    return count
+    if text == "auto":
+        return 0
+    expected = f"auto or a number from 1 to {MOST_PEOPLE}"
+    return parsed(int, expected, lambda count: 1 <= count <= MOST_PEOPLE)(text)
 
 
 def _person_choice(text: str) -> PersonChoice | int:
     if text.isdecimal() and int(text) > 0:
         return int(text)
-    from cardbox_tracker.detectors.person_choice import PersonChoice
 
     try:
         return PersonChoice.parse(text)
@@ -407,29 +368,19 @@ def _person_choice(text: str) -> PersonChoice | int:
 
 def _setting(text: str) -> tuple[str, bool | int | float | str]:
     """Parse ``NAME=VALUE``; a value is true or false, a number, or a text."""
-    name, equals, value = text.partition("=")
-    if not name or not equals:
-        raise argparse.ArgumentTypeError(
-            f"expected NAME=VALUE, such as lost_frames=10, got {text!r}"
-        )
+    name, _, value = text.partition("=")
+    if not name or "=" not in text:
+        raise ValueError
     if value in ("true", "false"):
         return name, value == "true"
     for kind in (int, float):
-        try:
+        with suppress(ValueError):
             return name, kind(value)
-        except ValueError:
-            continue
     return name, value
 
 
 def recording_request(options: argparse.Namespace, problems: Problems) -> RecordingRequest:
     """Return what the options of :func:`add_recording` ask for; note what is wrong with them."""
-    from cardbox_tracker.camera.pairing import camera_names
-    from cardbox_tracker.detectors.detector import Detector
-    from cardbox_tracker.recordings.open_images import check_exists
-    from cardbox_tracker.recordings.recording import input_faults
-    from cardbox_tracker.tracking.session import MOST_PEOPLE
-
     path, depth = options.recording, options.depth
     problems.caught(lambda: check_exists(path), None)
     camera = _camera(options, problems)
@@ -457,11 +408,13 @@ def recording_request(options: argparse.Namespace, problems: Problems) -> Record
             points = points._replace(people=people or MOST_PEOPLE)
     names: tuple[str, ...] = ()
     names = problems.caught(lambda: tuple(camera_names(options.cameras)), names)
-    for fault in input_faults(path, silhouettes, names, depth, camera):
+    given = path, silhouettes, names, options.extrinsics, depth, points, camera
+    request = RecordingRequest(*given)
+    for fault in request.faults():
         problems.add(fault)
     if options.extrinsics is not None and len(names) < 2:
         problems.add("--extrinsics has no effect with one camera: name several with --cameras")
-    return RecordingRequest(path, silhouettes, points, names, options.extrinsics, depth, camera)
+    return request
 
 
 def inputs_of(options: argparse.Namespace) -> tuple[Path, ...]:
@@ -474,11 +427,6 @@ def inputs_of(options: argparse.Namespace) -> tuple[Path, ...]:
 
 def tracking_request(options: argparse.Namespace, faults: Iterable[str] = ()) -> TrackingRequest:
     """Return what the options of :func:`add_tracking` ask for."""
-    from cardbox_tracker.detectors.detector import Detector
-    from cardbox_tracker.detectors.model_files import installed_hands
-    from cardbox_tracker.measuring.scene import load_scene
-    from cardbox_tracker.search.config import PRESETS
-
     problems = Problems(options.recording, faults)
     scene = None
     if options.scene is not None:
@@ -519,9 +467,6 @@ def tracking_request(options: argparse.Namespace, faults: Iterable[str] = ()) ->
 
 
 def _camera(options: argparse.Namespace, problems: Problems) -> GivenCamera:
-    from cardbox_tracker.recordings.given_camera import FOV_HINT, GivenCamera
-    from cardbox_tracker.recordings.open_images import tells_lens
-
     roll_deg = options.camera_roll_deg
     roll_rad = None if roll_deg is None else math.radians(roll_deg)
     camera = GivenCamera(options.fov, options.calibration, roll_rad, options.fps, options.mirrored)
@@ -537,8 +482,6 @@ def _camera(options: argparse.Namespace, problems: Problems) -> GivenCamera:
 
 def _is_guessed(options: argparse.Namespace) -> bool:
     """Whether lens and stature that nothing tells are guessed, since a detector sees the person."""
-    from cardbox_tracker.recordings.open_images import is_film
-
     return options.detector is not None and is_film(options.recording)
 
 
@@ -546,11 +489,6 @@ def _silhouettes(
     options: argparse.Namespace, points: Detector | PointTable | None, problems: Problems
 ) -> Segmentation:
     """Return the source of the silhouettes that is given, or that fits the recording."""
-    from cardbox_tracker.detectors.detector import MEDIAPIPE, Detector
-    from cardbox_tracker.recordings.open_images import is_bag
-    from cardbox_tracker.recordings.other_silhouettes import PersonInView, Within
-    from cardbox_tracker.recordings.recording import STEREO
-
     chosen, within = options.silhouettes, options.within
     background: TimeSpan | None = options.background
     is_given = background is not None or within is not None
@@ -588,11 +526,6 @@ def _silhouettes(
 
 def points_named(given: object) -> Detector | PointTable:
     """Return the source of 2D points: a detector's name, a path, a class, or one's own detector."""
-    from cardbox_tracker.common.extensions import DETECTORS, extensions, loaded
-    from cardbox_tracker.detectors.detector import MEDIAPIPE, Detector
-    from cardbox_tracker.detectors.own_network import OwnModel
-    from cardbox_tracker.detectors.point_table import PointTable
-
     if not isinstance(given, str | Path):
         return Detector(OwnModel.of(given, f"the detector {type(given).__name__}"))
     if given == MEDIAPIPE:
@@ -617,8 +550,6 @@ def points_named(given: object) -> Detector | PointTable:
 
 def _with_camera(options: argparse.Namespace, scene: Scene) -> argparse.Namespace:
     """Return the options with what the scene says of a film's camera where they say nothing."""
-    from cardbox_tracker.recordings.open_images import is_film
-
     found, camera = copy.copy(options), scene.camera
     if is_film(options.recording) and options.fov is None and options.calibration is None:
         found.fov = math.degrees(camera.fov_rad.mean)
@@ -630,10 +561,6 @@ def _with_camera(options: argparse.Namespace, scene: Scene) -> argparse.Namespac
 def _person(
     options: argparse.Namespace, problems: Problems, scene: Scene | None = None
 ) -> PersonRequest:
-    from cardbox_tracker.person.model import MEASURED, BodyModel
-    from cardbox_tracker.person.model_file import load_body_model
-    from cardbox_tracker.person.proportions import USUAL_STATURE_M, body_from_proportions
-
     pitch_deg, body = options.camera_pitch_deg, BodyModel()
     others: list[BodyModel] = []
     if options.people is None and options.stature is not None and len(options.stature) > 1:
@@ -687,8 +614,6 @@ def _person(
 
 
 def _config(options: argparse.Namespace, preset: TrackerConfig) -> TrackerConfig:
-    from cardbox_tracker.search.config import read_settings
-
     config = preset if options.depth is None else preset.with_depth()
     if options.settings is not None:
         config = read_settings(options.settings, config)

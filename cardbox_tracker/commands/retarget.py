@@ -17,9 +17,6 @@ from cardbox_tracker.commands.arguments import (
 )
 from cardbox_tracker.common.errors import CardboxError
 
-NAME = "retarget"
-HELP = "move a robot arm, given by its URDF, as the measured person moves theirs"
-
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of ``cardbox retarget``."""

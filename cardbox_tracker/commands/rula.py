@@ -6,9 +6,12 @@ import argparse
 from collections.abc import Sequence
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from cardbox_tracker import __version__
+from cardbox_tracker.applications.ergonomics import recording, report
+from cardbox_tracker.applications.ergonomics.recording import MomentImages, RulaObserver, RulaRow
+from cardbox_tracker.applications.ergonomics.report import PageContent
+from cardbox_tracker.applications.ergonomics.rula import RulaConfig
 from cardbox_tracker.commands.arguments import (
     add_force,
     add_settings,
@@ -19,16 +22,10 @@ from cardbox_tracker.commands.arguments import (
 from cardbox_tracker.commands.request import add_tracking, tracking_request
 from cardbox_tracker.commands.tracking import track
 from cardbox_tracker.common.errors import CardboxError
-from cardbox_tracker.common.files import atomic_path
+from cardbox_tracker.common.files import write_file
+from cardbox_tracker.person.proportions import USUAL_STATURE_M
+from cardbox_tracker.recordings.track import TrackSummary
 
-if TYPE_CHECKING:
-    from cardbox_tracker.applications.ergonomics.recording import MomentImages, RulaRow
-    from cardbox_tracker.applications.ergonomics.report import PageContent
-    from cardbox_tracker.applications.ergonomics.rula import RulaConfig
-    from cardbox_tracker.recordings.track import TrackSummary
-
-NAME = "rula"
-HELP = "score the strain on arms, neck and trunk in a recording (RULA)"
 HIDDEN_HEAD, _, NO_IMAGES = IMAGES = ("hidden-head", "shown", "none")
 
 _SIZES_FROM = {"measured": "reference postures", "proportions": "proportions of people"}
@@ -38,8 +35,6 @@ _LEAST_CLOCK_S = 1e9
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of ``cardbox rula``."""
-    from cardbox_tracker.applications.ergonomics.rula import RulaConfig
-
     add_tracking(parser)
     add_score_outputs(parser)
     parser.add_argument(
@@ -60,9 +55,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> None:
     """Track the person, score every image, and print times, part scores and declared inputs."""
-    from cardbox_tracker.applications.ergonomics.recording import MomentImages, RulaObserver
-    from cardbox_tracker.applications.ergonomics.rula import RulaConfig
-
     if options.html is None and (options.title is not None or options.images != IMAGES[0]):
         raise CardboxError("--images and --title change the page of --html; give --html OUT.html")
     request = tracking_request(options)
@@ -96,8 +88,6 @@ def outputs_of(options: argparse.Namespace) -> tuple[Path | None, ...]:
 
 def write_scores(options: argparse.Namespace, content: PageContent) -> None:
     """Print times, part scores and declared inputs, and write the files."""
-    from cardbox_tracker.applications.ergonomics import recording, report
-
     rows, config, method = content.rows, content.config, content.method
     shares = recording.score_shares(rows, config, method)
     for line in report.report_lines(recording.summarize(rows, method), shares, config, method):
@@ -105,8 +95,7 @@ def write_scores(options: argparse.Namespace, content: PageContent) -> None:
     if options.csv is not None:
         recording.write_csv(rows, options.csv, method)
     if options.plot is not None:
-        with atomic_path(options.plot) as temporary:
-            temporary.write_bytes(report.score_plot(rows, (), method))
+        write_file(options.plot, report.score_plot(rows, (), method))
     if options.html is not None:
         report.write_page(content, options.html)
     for path in outputs_of(options):
@@ -121,9 +110,6 @@ def _content(
     summary: TrackSummary,
     images: MomentImages | None,
 ) -> PageContent:
-    from cardbox_tracker.applications.ergonomics.report import PageContent
-    from cardbox_tracker.person.proportions import USUAL_STATURE_M
-
     name = options.recording.resolve().name
     number = options.person if options.people is not None and options.person else 1
     statures = options.stature or (USUAL_STATURE_M,)

@@ -9,14 +9,14 @@ from dataclasses import replace
 
 from cardbox_tracker.camera.camera import Camera
 from cardbox_tracker.commands.arguments import print_remarks
-from cardbox_tracker.commands.request import PersonRequest, RecordingRequest
+from cardbox_tracker.commands.request import PersonRequest
 from cardbox_tracker.measuring.people_camera import PITCH_PRIOR, USUAL_PITCH
 from cardbox_tracker.measuring.scene import FOUND, GIVEN, USUAL, Scene, SceneCamera, Value
 from cardbox_tracker.measuring.scene_camera import FoundCamera, lens_of, scene_camera
 from cardbox_tracker.person.model import PLACEMENT, BodyModel
 from cardbox_tracker.person.proportions import USUAL_STATURE_M, USUAL_STDDEV_M
 from cardbox_tracker.recordings.measured_scene import Watched, seen_people, seen_person, watch
-from cardbox_tracker.recordings.recording import Recording
+from cardbox_tracker.recordings.recording import Recording, RecordingRequest
 from cardbox_tracker.recordings.silhouettes import TimeSpan
 from cardbox_tracker.search.config import TrackerConfig
 

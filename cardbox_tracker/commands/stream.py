@@ -8,9 +8,6 @@ from contextlib import closing, nullcontext
 
 from cardbox_tracker.commands.arguments import add_results, between, results_of
 
-NAME = "stream"
-HELP = "stream results as 24 joints in real time, to programs that teleoperate robots"
-
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of ``cardbox stream``."""

@@ -7,9 +7,6 @@ from pathlib import Path
 
 from cardbox_tracker.commands.arguments import add_camera_count, add_force, add_seed, check_outputs
 
-NAME = "synthesize"
-HELP = "record a synthetic person, with ground truth"
-
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of ``cardbox synthesize``."""

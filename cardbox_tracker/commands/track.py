@@ -8,26 +8,26 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
 from itertools import chain
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+from cardbox_tracker.applications.exporting.formats import Format, export, formats
+from cardbox_tracker.applications.reporting.page import angles_plot, write_page
 from cardbox_tracker.commands.arguments import add_force, at_least, check_outputs
 from cardbox_tracker.commands.request import FORMATS, TrackFiles, add_tracking, tracking_request
 from cardbox_tracker.commands.tracking import track
 from cardbox_tracker.common.errors import CardboxError
 from cardbox_tracker.common.files import (
-    atomic_path,
     body_beside,
     is_written_in_place,
     of_person,
     scene_beside,
+    write_file,
 )
-
-if TYPE_CHECKING:
-    from cardbox_tracker.applications.exporting.formats import Format
-    from cardbox_tracker.recordings.track import TrackSummary
-
-NAME = "track"
-HELP = "follow the posture through a recording, or through all recordings of a folder"
+from cardbox_tracker.recordings.open_images import is_one_recording, recordings_in
+from cardbox_tracker.recordings.result_reader import read_results
+from cardbox_tracker.recordings.result_table import check_table
+from cardbox_tracker.recordings.track import TrackSummary
+from cardbox_tracker.tracking.precompile import compile_for_films
 
 _OF_ONE = ("csv", "bag", "video", "json", "export", "plot", "report")
 _OF_MANY = ("output", "formats", "jobs", "scheduler")
@@ -112,8 +112,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> None:
     """Track the person and write the requested files."""
-    from cardbox_tracker.recordings.open_images import is_one_recording, recordings_in
-
     path = options.recording
     if not is_one_recording(path) and recordings_in(path, options.output):
         from cardbox_tracker.commands.track_folder import track_folder
@@ -128,8 +126,6 @@ def run(options: argparse.Namespace) -> None:
 
 
 def _formats(text: str) -> dict[str, Format]:
-    from cardbox_tracker.applications.exporting.formats import formats
-
     known, names = formats(), dict.fromkeys(text.split(","))
     if not known.keys() >= names.keys():
         raise argparse.ArgumentTypeError(
@@ -146,9 +142,6 @@ def _without_effect(options: argparse.Namespace, names: tuple[str, ...], what: s
 
 def track_one(options: argparse.Namespace, show: Callable[[float], None] | None = None) -> None:
     """Track one recording and write the requested files; see :func:`~.tracking.track`."""
-    from cardbox_tracker.recordings.result_table import check_table
-    from cardbox_tracker.tracking.precompile import compile_for_films
-
     faults = _without_effect(options, _OF_MANY, "which is one recording: give --csv")
     request = tracking_request(options, faults)
     recording = options.recording.resolve()
@@ -178,8 +171,7 @@ def track_one(options: argparse.Namespace, show: Callable[[float], None] | None 
         compile_for_films()
     summary = track(replace(request, files=files, force=options.force), show=show)
     if options.json is not None:
-        with atomic_path(options.json) as temporary:
-            temporary.write_text(json.dumps(_account(summary), indent=1) + "\n", encoding="utf-8")
+        write_file(options.json, json.dumps(_account(summary), indent=1) + "\n")
     lines = [f"wrote {path}" for path in (*written, options.bag) if path is not None]
     more = _derived(options, summary, table, video, exports) if any(derived) else ()
     # If an export fails, what was written before it is told.
@@ -209,17 +201,12 @@ def _derived(
     exports: Mapping[Format, Path],
 ) -> Iterator[str]:
     """Write what is made of the finished table, of several people files of each, and say it."""
-    from cardbox_tracker.applications.exporting.formats import export
-    from cardbox_tracker.applications.reporting.page import angles_plot, write_page
-    from cardbox_tracker.recordings.result_reader import read_results
-
     tracked = (number for number, one in summary.people.items() if one.frames_tracked)
     people = {number: read_results(table, number) for number in tracked} or {1: read_results(table)}
     if options.plot is not None:
         for number, results in people.items():
             path = of_person(options.plot, number, options.plot.suffix)
-            with atomic_path(path) as temporary:
-                temporary.write_bytes(angles_plot(results))
+            write_file(path, angles_plot(results))
             yield f"wrote {path}"
     if options.report is not None and video is not None:
         named = {f"Person {k}" if summary.people else "Person": one for k, one in people.items()}

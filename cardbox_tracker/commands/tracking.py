@@ -6,19 +6,25 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack
 from dataclasses import replace
 from functools import partial
-from typing import TYPE_CHECKING
 
+from cardbox_tracker.applications.drawing.overlay import draw_sharp_overlay
+from cardbox_tracker.applications.drawing.video import overlay_video
 from cardbox_tracker.commands.arguments import print_remarks
+from cardbox_tracker.commands.request import PersonRequest, TrackingRequest
+from cardbox_tracker.commands.scene import measured_scene
 from cardbox_tracker.common.files import body_of_person
-
-if TYPE_CHECKING:
-    from cardbox_tracker.commands.request import PersonRequest, TrackingRequest
-    from cardbox_tracker.measuring.scene import Scene
-    from cardbox_tracker.recordings.recording import Recording
-    from cardbox_tracker.recordings.silhouettes import RecordedFrame
-    from cardbox_tracker.recordings.track import Observer, TrackSummary
-    from cardbox_tracker.tracking.estimate import Estimate
-    from cardbox_tracker.tracking.tracker import Tracker
+from cardbox_tracker.common.progress import progress_bar
+from cardbox_tracker.detectors.hand_network import HandNetwork
+from cardbox_tracker.measuring.scene import Scene, save_scene
+from cardbox_tracker.person.model_file import save_body_model
+from cardbox_tracker.person.proportions import USUAL_STATURE_M
+from cardbox_tracker.recordings.given_camera import FOV_HINT, UNKNOWN_LENS
+from cardbox_tracker.recordings.recording import Recording
+from cardbox_tracker.recordings.result_bag import result_bag
+from cardbox_tracker.recordings.silhouettes import RecordedFrame
+from cardbox_tracker.recordings.track import Observer, TrackSummary, track_recording
+from cardbox_tracker.tracking.estimate import Estimate
+from cardbox_tracker.tracking.tracker import Tracker
 
 
 def track(
@@ -32,23 +38,12 @@ def track(
     without it, there are a progress bar and lines on assumptions and quality. Raises CardboxError
     if the recording cannot be read, or a result cannot be written.
     """
-    from cardbox_tracker.commands.scene import measured_scene
-    from cardbox_tracker.common.progress import progress_bar
-    from cardbox_tracker.detectors.hand_network import HandNetwork
-    from cardbox_tracker.measuring.scene import save_scene
-    from cardbox_tracker.person.model_file import save_body_model
-    from cardbox_tracker.recordings.track import Quality, track_recording
-
-    qualities: dict[int, Quality] = {}
     recording, person = request.recording, request.person
     start_s = person.start_s
     if person.model is not None and person.body.doubt:
         print(f"{person.model}: {person.body.doubt}")
     if person.people is not None:
         observers = tuple(partial(_of_person, person.number, observe) for observe in observers)
-
-    def judge(frame: RecordedFrame, estimate: Estimate, tracker: Tracker) -> None:
-        qualities.setdefault(estimate.person or 0, Quality())(frame, estimate, tracker)
 
     with measured_scene(recording, person, request.config, request.seed) as (source, scene):
         # Hands and the overlay are seen at the resolution of the recording.
@@ -58,8 +53,6 @@ def track(
         total_s = max(1e-9, min(source.first.duration_s, person.end_s) - start_s)
         with ExitStack() as stack:
             observers = (*_writers(request, source, stack), *observers)
-            if show is None:
-                observers = (*observers, judge)
             advance = show or stack.enter_context(progress_bar("track"))
             summary = track_recording(
                 source,
@@ -82,15 +75,15 @@ def track(
     print_remarks(remarks, summary.remarks)
     if show is None:
         print(f"assumed: {', '.join(summary.assumptions)}")
+        for line in summary.quality if person.people is None else ():
+            print(line)
         unseen = 0
-        for number, quality in sorted(qualities.items()):
-            if number and not summary.people[number].frames_tracked:
+        for number, one in summary.people.items():
+            if not one.frames_tracked:
                 unseen += 1
                 continue
-            if number:
-                one = summary.people[number]
-                print(f"person {number}: tracked {one.frames_tracked} of {one.frames} images")
-            print(*quality.lines(), sep="\n")
+            print(f"person {number}: tracked {one.frames_tracked} of {one.frames} images")
+            print(*one.quality, sep="\n")
         if unseen:
             print(f"{unseen} more, of {len(summary.people)} people, in no image")
         if summary.used_text:
@@ -107,9 +100,6 @@ def track(
 
 def _with_unknown(remarks: Sequence[str], person: PersonRequest) -> list[str]:
     """Return remarks with one on an unknown stature, which also tells of an unknown lens."""
-    from cardbox_tracker.person.proportions import USUAL_STATURE_M
-    from cardbox_tracker.recordings.given_camera import FOV_HINT, UNKNOWN_LENS
-
     if person.stature_m is not None or person.model is not None:
         return [*remarks]
     others = [remark for remark in remarks if not remark.startswith(UNKNOWN_LENS)]
@@ -137,8 +127,6 @@ def _of_person(
 
 def _assumptions(request: TrackingRequest, scene: Scene) -> Iterator[str]:
     """Yield camera, place and stature with where they are from."""
-    from cardbox_tracker.person.proportions import USUAL_STATURE_M
-
     person = request.person
     yield from scene.words()
     source = "given" if person.model is None else f"from {person.model.name}"
@@ -157,10 +145,6 @@ def _assumptions(request: TrackingRequest, scene: Scene) -> Iterator[str]:
 
 def _writers(request: TrackingRequest, source: Recording, stack: ExitStack) -> Iterator[Observer]:
     """Yield what writes bag and video; they appear when ``stack`` is closed without an error."""
-    from cardbox_tracker.applications.drawing.overlay import draw_sharp_overlay
-    from cardbox_tracker.applications.drawing.video import overlay_video
-    from cardbox_tracker.recordings.result_bag import result_bag
-
     bag, video = request.files.bag, request.files.video
     if video is not None:
         yield stack.enter_context(overlay_video(video, source))

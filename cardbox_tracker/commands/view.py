@@ -16,8 +16,6 @@ if TYPE_CHECKING:
     from cardbox_tracker.applications.viewing.scene import Scene
     from cardbox_tracker.recordings.truth import TrueFrame
 
-NAME = "view"
-HELP = "show results in a viewer: image, body in 3D, plots, error, a slider for the time"
 _TRUTH = "ground_truth.json"
 
 

@@ -75,6 +75,12 @@ def atomic_path(path: str | os.PathLike[str]) -> Iterator[Path]:
         os.replace(temporary, target)
 
 
+def write_file(path: str | os.PathLike[str], content: str | bytes) -> None:
+    """Write a text, in UTF-8, or bytes to :func:`atomic_path`."""
+    with atomic_path(path) as temporary:
+        temporary.write_bytes(content.encode() if isinstance(content, str) else content)
+
+
 @contextmanager
 def room_for(target: Path) -> Iterator[None]:
     """Turn the error of a full disk, a quota or a limit into CardboxError that names ``target``."""
@@ -144,6 +150,14 @@ def resolved(path: str | os.PathLike[str]) -> Path:
     if end.is_symlink():
         raise CardboxError(f"cannot write {target}: it is a circular link; remove it")
     return end
+
+
+def make_folder(path: Path) -> None:
+    """Make a folder unless there is one; raise CardboxError if that is not possible."""
+    try:
+        path.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise CardboxError(f"cannot make the folder {path}: {error.strerror}") from None
 
 
 def user_path(name: str) -> Path:

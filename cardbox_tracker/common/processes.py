@@ -106,7 +106,7 @@ def results_of(
     Leaving the context before the end, as by Ctrl-C, ends all at once. Raises CardboxError if a
     process ended unexpectedly, or there is no cluster of workers with one thread each.
     """
-    from joblib import parallel_config
+    from joblib import Parallel, delayed, parallel_config
 
     # Python's tracker of resources unblocks SIGINT when it starts, so it starts before.
     resource_tracker.ensure_running()
@@ -119,8 +119,27 @@ def results_of(
         else:
             stack.enter_context(_cluster(scheduler))
             stack.enter_context(parallel_config("dask"))
-        with _results(call, arguments, jobs if scheduler is None else -1) as results:
+        # loky's thread fails with a KeyError if it is ended while calls wait that it has not yet
+        # put into the queue of the processes: no more are given than the queue holds.
+        parallel = Parallel(
+            jobs if scheduler is None else -1,
+            return_as="generator_unordered",
+            batch_size=1,
+            pre_dispatch="2*n_jobs",
+            max_nbytes=None,
+        )
+        stack.enter_context(_told())
+        # A process may already end while others still get their calls.
+        with interrupts.withheld():
+            results = parallel(delayed(call)(argument) for argument in arguments)
+            time.sleep(_TAKEN_UP_S)
+        try:
             yield results
+        finally:
+            with catch_warnings():
+                # joblib advises to submit fewer calls when it is left before the end.
+                simplefilter("ignore", UserWarning)
+                results.close()
 
 
 @contextmanager
@@ -154,39 +173,6 @@ def _cluster(scheduler: str) -> Iterator[None]:
                 f"'dask worker {scheduler} --nworkers N --nthreads 1'"
             )
         yield
-
-
-@contextmanager
-def _results(
-    function: Callable[[A], R], arguments: Sequence[A], jobs: int
-) -> Iterator[Iterator[R]]:
-    from joblib import Parallel, delayed
-
-    # loky's thread fails with a KeyError if it is ended while calls wait that it has not yet put
-    # into the queue of the processes: no more are given than the queue holds.
-    parallel = Parallel(
-        jobs,
-        return_as="generator_unordered",
-        batch_size=1,
-        pre_dispatch="2*n_jobs",
-        max_nbytes=None,
-    )
-    # A process may already end while others still get their calls.
-    with interrupts.withheld(), _told():
-        results = parallel(delayed(function)(argument) for argument in arguments)
-        time.sleep(_TAKEN_UP_S)
-    try:
-        yield _checked(results)
-    finally:
-        with catch_warnings():
-            # joblib advises to submit fewer calls when it is left before the end.
-            simplefilter("ignore", UserWarning)
-            results.close()
-
-
-def _checked(results: Iterator[R]) -> Iterator[R]:
-    with _told():
-        yield from results
 
 
 @contextmanager

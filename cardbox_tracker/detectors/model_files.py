@@ -16,12 +16,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from cardbox_tracker.common.errors import CardboxError
-from cardbox_tracker.common.files import (
-    UnreadableFileError,
-    atomic_path,
-    read_regular,
-    regular_file,
-)
+from cardbox_tracker.common.files import UnreadableFileError, read_regular, regular_file, write_file
 
 REQUIREMENT = "mediapipe==0.10.21"
 """The one release whose wheel ships its models; Apache-2.0."""
@@ -128,8 +123,7 @@ def _extract(wheel: Path, folder: Path) -> None:
         ) from None
     folder.mkdir(parents=True, exist_ok=True)
     for name, content in contents.items():
-        with atomic_path(folder / name) as temporary:
-            temporary.write_bytes(content)
+        write_file(folder / name, content)
 
 
 def _member(archive: zipfile.ZipFile, file: ModelFile) -> bytes:

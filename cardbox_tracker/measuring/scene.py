@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 from cardbox_tracker.common.errors import CardboxError, quoted
-from cardbox_tracker.common.files import atomic_path, foreign
+from cardbox_tracker.common.files import foreign, write_file
 from cardbox_tracker.common.small_yaml import parse_small_yaml, read_small_text
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.model_file import dumps_body_model, loads_body_model
@@ -93,8 +93,7 @@ def dumps_scene(scene: Scene) -> str:
 
 def save_scene(scene: Scene, path: str | os.PathLike[str]) -> None:
     """Write a scene atomically; raise CardboxError if the file cannot be written."""
-    with atomic_path(path) as temporary:
-        temporary.write_text(dumps_scene(scene), encoding="utf-8")
+    write_file(path, dumps_scene(scene))
 
 
 def load_scene(path: str | os.PathLike[str]) -> Scene:

@@ -208,23 +208,6 @@ class BagWriter:
             velocity=np.zeros(0) if velocities is None else np.asarray(velocities, np.float64),
         )
 
-    def points(self, points_m: NDArray[np.float64]) -> list[Any]:
-        """Return points (n, 3), metres, as a list of geometry_msgs/Point."""
-        point = self._store.types["geometry_msgs/msg/Point"]
-        return [point(x=x, y=y, z=z) for x, y, z in np.asarray(points_m, np.float64).tolist()]
-
-    def pose(self, **values: Any) -> Any:
-        """Return a geometry_msgs/Pose without rotation."""
-        still = self.new("geometry_msgs/msg/Quaternion", w=1.0)
-        return self.new("geometry_msgs/msg/Pose", orientation=still, **values)
-
-    def write_pose_array(
-        self, topic: str, stamp_ns: int, frame_id: str, points_m: NDArray[np.float64]
-    ) -> None:
-        """Write points (n, 3), metres, as poses without rotation."""
-        poses = [self.pose(position=point) for point in self.points(points_m)]
-        self.write_stamped(topic, "geometry_msgs/msg/PoseArray", stamp_ns, frame_id, poses=poses)
-
     def write_string(self, topic: str, stamp_ns: int, text: str) -> None:
         """Write a std_msgs/String."""
         self.write(topic, self.new("std_msgs/msg/String", data=text), stamp_ns)

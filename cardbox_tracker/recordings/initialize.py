@@ -46,58 +46,35 @@ def initialize_from_recording(
         frames = source.held(span, name)
         references[name] = average_silhouette([frame.silhouette for frame in frames])
         every = -(-len(frames) // _MOST_IMAGES)
-        images[name] = [frame.image for frame in frames[::every] if frame.image is not None]
+        images[name] = [frame.image for frame in frames[::every]]
     return initialize_body(references, source.camera, config, progress, images)
 
 
-def initialize_from_cameras(
+def initialize_at_scale(
     recording: Recording,
     spans: Mapping[str, TimeSpan],
     config: InitializationConfig,
     progress: Callable[[float], None] | None = None,
 ) -> InitializationResult:
-    """Measure the person with the first camera, and the distance with the second one.
+    """Measure the person with the first camera, and the distance with depth or the second camera.
 
     The search for the distance begins at that of ``config``. Raises as
-    :func:`initialize_from_recording`, also if the silhouettes of the second camera do not fit the
-    person.
+    :func:`initialize_from_recording`, also if there are no depth images, or what measures the
+    distance does not fit the person.
     """
-    second = recording.sources[1]
-    references = {
-        name: average_silhouette([frame.silhouette for frame in second.held(spans[name], name)])
-        for name in SCALE_REFERENCES
-    }
-    scale = partial(measured_scale, other=recording.others[0], references=references)
-    return _measured_at_scale(recording.first, spans, config, progress, scale)
+    scale: Callable[[BodyModel, Camera], float]
+    if recording.measures_depth:
+        seen = {name: _depth_reference(recording, spans[name], name) for name in SCALE_REFERENCES}
+        scale = partial(depth_scale, references=seen)
+    else:
+        held = {name: recording.sources[1].held(spans[name], name) for name in SCALE_REFERENCES}
+        shown = {name: average_silhouette([f.silhouette for f in held[name]]) for name in held}
+        scale = partial(measured_scale, other=recording.others[0], references=shown)
 
-
-def initialize_with_depth(
-    recording: Recording,
-    spans: Mapping[str, TimeSpan],
-    config: InitializationConfig,
-    progress: Callable[[float], None] | None = None,
-) -> InitializationResult:
-    """Measure the person with the first camera, and the distance with its depth images.
-
-    The search for the distance begins at that of ``config``. Raises as
-    :func:`initialize_from_recording`, also if there are no depth images or they do not fit.
-    """
-    references = {name: _depth_reference(recording, spans[name], name) for name in SCALE_REFERENCES}
-    scale = partial(depth_scale, references=references)
-    return _measured_at_scale(recording.first, spans, config, progress, scale)
-
-
-def _measured_at_scale(
-    first: SilhouetteSource,
-    spans: Mapping[str, TimeSpan],
-    config: InitializationConfig,
-    progress: Callable[[float], None] | None,
-    scale: Callable[[BodyModel, Camera], float],
-) -> InitializationResult:
     def measure(at: InitializationConfig, is_last: bool) -> InitializationResult:
-        return initialize_from_recording(first, spans, at, progress if is_last else None)
+        return initialize_from_recording(recording.first, spans, at, progress if is_last else None)
 
-    return measured_at_scale(measure, config, first.camera, scale)
+    return measured_at_scale(measure, config, recording.first.camera, scale)
 
 
 def _depth_reference(recording: Recording, span: TimeSpan, name: str) -> DepthReference:

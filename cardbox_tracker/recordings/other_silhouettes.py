@@ -13,7 +13,6 @@ from numpy.typing import NDArray
 
 from cardbox_tracker.camera.camera import Camera
 from cardbox_tracker.camera.depth_image import DepthImage, at_size, depth_from_image
-from cardbox_tracker.camera.encodings import brightness_of
 from cardbox_tracker.camera.pairing import TOLERANCE_NS, side_by_side
 from cardbox_tracker.common.errors import BagError, CardboxError
 from cardbox_tracker.detectors.detector import Detector
@@ -85,10 +84,9 @@ class DepthSilhouetteSource(SilhouetteSource):
         for seen, measured in side_by_side(streams, lambda item: int(item[0]), TOLERANCE_NS):
             if seen is None:
                 continue
-            stamp_ns, time_s, image, recorded, *_ = seen
-            if time_s > end_s:
+            if seen.time_s > end_s:
                 break
-            if time_s < start_s:
+            if seen.time_s < start_s:
                 continue
             if measured is None:
                 self._without += 1
@@ -97,10 +95,7 @@ class DepthSilhouetteSource(SilhouetteSource):
             self._is_near = self._is_near or bool(silhouette.any())
             if not self._is_near:
                 self._nearest_m = min(self._nearest_m, nearest_m(measured[1]))
-            found = self._points(self._looked_at(seen), silhouette)
-            pictures = brightness_of(image), silhouette, image
-            shown = recorded if self.has_pictures else None
-            yield RecordedFrame(stamp_ns, time_s, *pictures, measured[1], found, shown)
+            yield self._frame(self._looked_at(seen), silhouette, measured[1])
         self._end_points()
 
     @property

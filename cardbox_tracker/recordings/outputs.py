@@ -1,15 +1,13 @@
-"""The tracker's outputs for an image: topics, joints and figures.
+"""The tracker's outputs for an image: topics and joints.
 
-:mod:`.ros.messages.results` encodes them as messages of the nodes, :mod:`.recordings.result_bag`
-as messages of a bag, and :mod:`.recordings.result_table` as rows of a table. Add a joint to
-:mod:`.person.skeleton`, ``joint_values`` and ``joint_deviations``, a topic to ``outputs``, and a
-number to ``METRICS``.
+:mod:`.recordings.messages` encodes them as messages of nodes and bags, and
+:mod:`.recordings.result_table` as rows of a table. Add a joint to :mod:`.person.skeleton`,
+``joint_values`` and ``joint_deviations``, and a topic to ``TOPICS`` and ``OutputStream``.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Any, NamedTuple
 
@@ -90,60 +88,9 @@ class JointValues(NamedTuple):
     velocities: FloatArray | None = None
 
 
-class Points(NamedTuple):
-    """Points (n, 3), metres in the optical frame."""
-
-    points_m: FloatArray
-
-
-class Markers(NamedTuple):
-    """Shapes to show; without shapes, all earlier ones are removed."""
-
-    shapes: tuple[MarkerShape, ...]
-
-
-class Text(NamedTuple):
-    """A text."""
-
-    text: str
-
-
-Value = JointValues | Points | Markers | Text | KeypointStates
-
-
-@dataclass(frozen=True)
-class Output:
-    """One topic."""
-
-    topic: str  #: relative name
-    kind: type[Value]  #: class of the values, which determines the message type
-    #: value for an estimate with a posture; None if the estimate has no such value.
-    of: Callable[[Estimate, Tracker], Value | None]
-    #: value that is sent once when the posture is lost; None if nothing is sent.
-    absent: Value | None = None
-    needs_posture: bool = True  #: False if ``of`` has a value for every estimate
-    moves: bool = False  #: whether the values are joints with velocities
-
-
-@dataclass(frozen=True)
-class Metric:
-    """One number of an estimate."""
-
-    name: str  #: name of the column
-    unit: str  #: empty for a plain number
-    format: str  #: format specification of the number
-    #: the number of an estimate; None if it has no such number.
-    of: Callable[[Estimate], float | None]
-
-    @property
-    def label(self) -> str:
-        """Name with its unit for the diagnostics."""
-        return f"{self.name} ({self.unit})" if self.unit else self.name
-
-    def text(self, estimate: Estimate) -> str:
-        """Return the number as text; empty if there is no number."""
-        value = self.of(estimate)
-        return "" if value is None else format(value, self.format)
+Value = JointValues | KeypointStates | FloatArray | tuple[MarkerShape, ...] | str
+"""Joints, states, points (n, 3), metres in the optical frame, shapes to show instead of all earlier
+ones, or a text."""
 
 
 _NECK = [JOINT_STATE_NAMES.index(name) for name in NECK_NAMES]
@@ -279,100 +226,74 @@ def positions_of(joints: JointValues) -> dict[str, float]:
     return dict(zip(joints.names, np.asarray(joints.values).tolist(), strict=True))
 
 
-def _markers(estimate: Estimate, tracker: Tracker) -> Markers | None:
-    if estimate.posture is None:
-        return None
-    body = estimate.placed(tracker.body)
-    return Markers(marker_shapes(body, estimate.posture, estimate.neck))
-
-
-def outputs(torso_place: bool = True, hands: bool = True) -> tuple[Output, ...]:
-    """Return the topics of the tracker in the order of publication.
-
-    With ``torso_place``, the joints include place, neck, clavicles and what else is measured; with
-    ``hands``, there is the topic of hands, which has no message without any.
-    """
-    opened = Output("hands", JointValues, lambda found, _: open_hands(found))
-    return (
-        # The states come first, so that subscribers have them when the posture arrives.
-        Output(
-            "tracking_state", Text, lambda estimate, _: Text(estimate.state), needs_posture=False
-        ),
-        Output("keypoint_states", KeypointStates, lambda found, _: keypoint_states(found)),
-        Output("place_state", KeypointStates, lambda found, _: place_state(found)),
-        Output(
-            "joint_states",
-            JointValues,
-            lambda found, _: joint_values(found, torso_place),
-            moves=True,
-        ),
-        # Who waits for the deviations has the hands by then.
-        *([opened] if hands else ()),
-        Output(
-            "joint_states_stddev",
-            JointValues,
-            lambda found, _: joint_deviations(found, torso_place),
-        ),
-        Output(
-            "keypoints",
-            Points,
-            lambda found, _: None if found.keypoints_m is None else Points(found.keypoints_m),
-        ),
-        # Markers stay visible until they are removed.
-        Output("markers", Markers, _markers, absent=Markers(())),
-    )
-
-
-OUTPUTS: tuple[Output, ...] = outputs()
-"""All topics, with all joints."""
-
-METRICS: tuple[Metric, ...] = (
-    Metric("cost", "px", "d", lambda estimate: estimate.cost_px),
-    Metric("iou", "", ".4f", lambda estimate: estimate.iou),
-)
-"""Numbers that describe the fit of the model."""
+TOPICS = {
+    # The states come first, so that subscribers have them when the posture arrives.
+    "tracking_state": "std_msgs/msg/String",
+    "keypoint_states": "diagnostic_msgs/msg/DiagnosticArray",
+    "place_state": "diagnostic_msgs/msg/DiagnosticArray",
+    "joint_states": "sensor_msgs/msg/JointState",
+    # Who waits for the deviations has the hands by then.
+    "hands": "sensor_msgs/msg/JointState",
+    "joint_states_stddev": "sensor_msgs/msg/JointState",
+    "keypoints": "geometry_msgs/msg/PoseArray",
+    "markers": "visualization_msgs/msg/MarkerArray",
+}
+"""Topics of the tracker in the order of publication, and the types of their messages."""
 
 
 class OutputStream:
-    """The output values of a sequence of images; ``absent`` values are sent once."""
+    """The output values of a sequence of images, also velocities of the joints."""
 
-    def __init__(self, topics: tuple[Output, ...] = OUTPUTS) -> None:
-        """Begin before the first image with the ``topics`` of :func:`outputs`."""
-        self._topics = topics
-        self._state = ""
-        self._motion = _Motion()
+    def __init__(self, torso_place: bool = True) -> None:
+        """Begin before the first image; see :func:`joint_values` for ``torso_place``."""
+        self._torso_place, self._state = torso_place, ""
+        self._last: tuple[int, FloatArray, tuple[bool, bool], Tracker, BodyModel] | None = None
 
     def values(
         self,
         stamp_ns: int,
         estimate: Estimate,
         tracker: Tracker,
-        wanted: Callable[[Output], bool] = lambda _: True,
-    ) -> Iterator[tuple[Output, Value]]:
-        """Yield the values to send for the image of a stamp; only ``wanted`` ones are computed."""
+        wanted: Callable[[str], bool] = lambda _: True,
+    ) -> Iterator[tuple[str, Value]]:
+        """Yield topics and values for the image of a stamp; only ``wanted`` ones are computed."""
         is_new, self._state = estimate.state != self._state, estimate.state
         estimate = estimate.as_camera_stands(tracker.body.camera_pose.roll_rad)
-        velocities = self._motion.velocities(stamp_ns, estimate, tracker)
-        for output in self._topics:
-            has_value = estimate.posture is not None or not output.needs_posture
-            if not has_value and not (is_new and output.absent):
-                continue
-            if not wanted(output):
-                continue
-            value = output.of(estimate, tracker) if has_value else output.absent
-            if output.moves and isinstance(value, JointValues) and velocities is not None:
-                value = value._replace(velocities=velocities[: len(value.names)])
+        velocities = self._velocities(stamp_ns, estimate, tracker)
+        for topic in filter(wanted, TOPICS):
+            value = self._value(topic, estimate, tracker, is_new)
+            if topic == "joint_states" and isinstance(value, JointValues):
+                some = None if velocities is None else velocities[: len(value.names)]
+                value = value._replace(velocities=some)
             if value is not None:
-                yield output, value
+                yield topic, value
 
+    def _value(
+        self, topic: str, estimate: Estimate, tracker: Tracker, is_new: bool
+    ) -> Value | None:
+        """Return the value of a topic; None if the estimate has none."""
+        if topic == "tracking_state":
+            return estimate.state
+        if estimate.posture is None:
+            # Markers stay visible until they are removed.
+            return () if topic == "markers" and is_new else None
+        match topic:
+            case "keypoint_states":
+                return keypoint_states(estimate)
+            case "place_state":
+                return place_state(estimate)
+            case "joint_states":
+                return joint_values(estimate, self._torso_place)
+            case "hands":
+                return open_hands(estimate)
+            case "joint_states_stddev":
+                return joint_deviations(estimate, self._torso_place)
+            case "keypoints":
+                return estimate.keypoints_m
+        body = estimate.placed(tracker.body)
+        return marker_shapes(body, estimate.posture, estimate.neck)
 
-class _Motion:
-    """Velocities of the joints, from the results of two images that follow each other."""
-
-    def __init__(self) -> None:
-        self._last: tuple[int, FloatArray, tuple[bool, bool], Tracker, BodyModel] | None = None
-
-    def velocities(self, stamp_ns: int, estimate: Estimate, tracker: Tracker) -> FloatArray | None:
+    def _velocities(self, stamp_ns: int, estimate: Estimate, tracker: Tracker) -> FloatArray | None:
         """Return those of :func:`joint_values`, rad/s and m/s; None without an image before.
 
         It has a posture of the same version of the same body and is at most ``_LONGEST_NS`` old.

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import math
-import os
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from typing import NamedTuple
@@ -100,7 +100,7 @@ class Recording:
         extrinsics: Sequence[Extrinsics] = (),
         depth: str | None = None,
     ) -> None:
-        """Combine the cameras that :func:`open_recording` opens, the first one first.
+        """Combine the cameras of a :class:`RecordingRequest`, the first one first.
 
         ``extrinsics`` are of the further cameras. ``depth`` is a topic of depth images with the
         optical frame and aspect ratio of the first camera, or ``stereo`` for depth from the first
@@ -159,7 +159,7 @@ class Recording:
             elif depth is not None and depth[0] <= lead.stamp_ns + self._tolerance_ns:
                 there = depth[1]
             elif self._stereo is not None and None not in frames[:2]:
-                there = self._stereo(*(f.image for f in frames[:2] if f and f.image is not None))
+                there = self._stereo(*(frame.image for frame in frames[:2] if frame))
             stamp_ns, time_s, *_ = lead
             first = frames[0] or RecordedFrame(stamp_ns, time_s, black, black)
             picture = partial(self.first.full_picture, first)
@@ -172,68 +172,71 @@ class Recording:
         return depth_images(self.first.path, self._depth, self.first.camera)
 
 
-@contextmanager
-def open_recording(
-    path: str | os.PathLike[str],
-    background: Segmentation,
-    cameras: Sequence[str] = (),
-    extrinsics: Path | None = None,
-    depth: str | None = None,
-    points: Detector | PointTable | None = None,
-    camera: GivenCamera | None = None,
-) -> Iterator[Recording]:
-    """Open a recording, find the extrinsics of its cameras and learn their backgrounds.
+@dataclass(frozen=True)
+class RecordingRequest:
+    """A recording to read."""
 
-    ``path`` is one that :func:`open_images` takes, and ``camera`` has what that does not tell.
-    ``cameras`` are namespaces, the first one first, or none if there is one camera, and
-    ``extrinsics`` is a file of :func:`load_extrinsics`. ``points`` are the source of the person's
-    points.
+    path: Path  #: bag, video, or folder of images
+    silhouettes: Segmentation  #: what tells the person from the scene
+    #: namespaces, the first camera's first; empty if the recording has one camera
+    cameras: Sequence[str] = ()
+    extrinsics: Path | None = None  #: file of :func:`.load_extrinsics`, of further cameras
+    depth: str | None = None  #: topic of depth images, or ``stereo``; None without depth
+    points: Detector | PointTable | None = None  #: source of the person's 2D points, if any
+    camera: GivenCamera = GivenCamera()  #: what the recording itself does not say about its camera
 
-    Raises BagError if the recording cannot be read or lacks a camera; CameraError if extrinsics are
-    missing or disagree, or a camera is not calibrated; CardboxError for what does not go together.
-    """
-    names = camera_names(cameras)
-    for fault in input_faults(path, background, names, depth, camera):
-        raise CardboxError(fault)
-    with ExitStack() as stack:
-        # A reader has one position, and the cameras are read in parallel.
-        bags = [open_images(path, camera) for _ in names or ("",)]
-        for bag in bags:
-            stack.enter_context(bag)
-        found = _extrinsics_of(bags[0], names, extrinsics)
-        sources = [
-            _source(bag, background, name, points)
-            for bag, name in zip(bags, names or (None,), strict=True)
-        ]
-        yield Recording(names or ("",), sources, found, depth)
+    @property
+    def detector(self) -> Detector | None:
+        """The detector among the sources of silhouettes and points; None without one."""
+        sources = self.silhouettes, self.points
+        return next((source for source in sources if isinstance(source, Detector)), None)
 
+    @contextmanager
+    def open(self) -> Iterator[Recording]:
+        """Open it, find the extrinsics of its cameras and learn their backgrounds.
 
-def input_faults(
-    path: str | os.PathLike[str],
-    background: Segmentation,
-    cameras: Sequence[str],
-    depth: str | None,
-    camera: GivenCamera | None,
-) -> Iterator[str]:
-    """Yield what does not go together in arguments of :func:`open_recording`."""
-    if depth is not None and not cameras:
-        yield "--depth needs --cameras: the camera whose depth it is, first"
-    if isinstance(background, Within) and len(cameras) > 1:
-        yield (
-            "depth images can cut out the person for one camera only; several cameras need "
-            "--background"
-        )
-    is_turned = camera is not None and (camera.roll_rad or camera.is_mirrored)
-    is_given = camera is not None and (camera.is_calibrated or is_turned or camera.fps)
-    if is_turned and (depth is not None or isinstance(background, Within)):
-        yield "depth images are not turned: leave --camera-roll-deg and --mirrored out, or --depth"
-    if len(cameras) > 1 and is_given:
-        yield (
-            "--fov, --calibration, --camera-roll-deg, --mirrored and --fps describe one camera; "
-            "the recording of several cameras needs a CameraInfo of each"
-        )
-    if (depth is not None or isinstance(background, Within)) and not is_bag(Path(path)):
-        yield f"depth images are read from a rosbag2, which {os.fspath(path)} is not"
+        Raises BagError if it cannot be read or lacks a camera; CameraError if extrinsics are
+        missing or disagree, or a camera is not calibrated; CardboxError for what does not go
+        together.
+        """
+        names = camera_names(self.cameras)
+        for fault in self.faults():
+            raise CardboxError(fault)
+        with ExitStack() as stack:
+            # A reader has one position, and the cameras are read in parallel.
+            bags = [open_images(self.path, self.camera) for _ in names or ("",)]
+            for bag in bags:
+                stack.enter_context(bag)
+            found = _extrinsics_of(bags[0], names, self.extrinsics)
+            sources = [
+                _source(bag, self.silhouettes, name, self.points)
+                for bag, name in zip(bags, names or (None,), strict=True)
+            ]
+            yield Recording(names or ("",), sources, found, self.depth)
+
+    def faults(self) -> Iterator[str]:
+        """Yield what does not go together."""
+        camera, is_cut = self.camera, isinstance(self.silhouettes, Within)
+        if self.depth is not None and not self.cameras:
+            yield "--depth needs --cameras: the camera whose depth it is, first"
+        if is_cut and len(self.cameras) > 1:
+            yield (
+                "depth images can cut out the person for one camera only; several cameras need "
+                "--background"
+            )
+        is_turned = camera.roll_rad or camera.is_mirrored
+        if is_turned and (self.depth is not None or is_cut):
+            yield (
+                "depth images are not turned: leave --camera-roll-deg and --mirrored out, or "
+                "--depth"
+            )
+        if len(self.cameras) > 1 and (camera.is_calibrated or is_turned or camera.fps):
+            yield (
+                "--fov, --calibration, --camera-roll-deg, --mirrored and --fps describe one "
+                "camera; the recording of several cameras needs a CameraInfo of each"
+            )
+        if (self.depth is not None or is_cut) and not is_bag(Path(self.path)):
+            yield f"depth images are read from a rosbag2, which {self.path} is not"
 
 
 def _source(

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,16 +13,9 @@ from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.model_file import dumps_body_model
 from cardbox_tracker.person.urdf import LinkTransforms, urdf_from_body
 from cardbox_tracker.recordings.bag_writer import BagWriter
-from cardbox_tracker.recordings.markers import MarkerShape, Rgba
+from cardbox_tracker.recordings.messages import message_of
 from cardbox_tracker.recordings.outputs import (
-    LEVELS,
-    JointValues,
-    KeypointStates,
-    Markers,
     OutputStream,
-    Points,
-    Text,
-    Value,
     joint_values,
     person_space,
     positions_of,
@@ -69,40 +61,6 @@ class BagTransforms:
             )
         message = new("tf2_msgs/msg/TFMessage", transforms=transforms)
         self._writer.write("/tf", message, stamp_ns)
-
-
-# Constant of visualization_msgs/Marker; ADD is 0.
-_DELETE_ALL = 3
-
-
-def _write_markers(
-    bag: BagWriter, topic: str, stamp_ns: int, frame_id: str, markers: Markers
-) -> None:
-    """Write markers; without shapes, a message that removes all earlier ones."""
-    header = bag.header(stamp_ns, frame_id)
-    messages = [_marker(bag, header, shape) for shape in markers.shapes] or [
-        bag.new("visualization_msgs/msg/Marker", header=header, action=_DELETE_ALL, pose=bag.pose())
-    ]
-    array = bag.new("visualization_msgs/msg/MarkerArray", markers=messages)
-    bag.write(topic, array, stamp_ns)
-
-
-def _marker(bag: BagWriter, header: Any, shape: MarkerShape) -> Any:
-    return bag.new(
-        "visualization_msgs/msg/Marker",
-        header=header,
-        ns=shape.namespace,
-        type=shape.kind,
-        pose=bag.pose(),
-        scale=bag.new("geometry_msgs/msg/Vector3", **dict.fromkeys("xyz", shape.scale)),
-        color=_color(bag, shape.rgba),
-        points=bag.points(shape.points_m),
-        colors=[_color(bag, rgba) for rgba in shape.colors],
-    )
-
-
-def _color(bag: BagWriter, rgba: Rgba) -> Any:
-    return bag.new("std_msgs/msg/ColorRGBA", **dict(zip("rgba", rgba, strict=True)))
 
 
 Draw = Callable[[NDArray[np.uint8], Estimate, Tracker], NDArray[np.uint8]]
@@ -166,44 +124,11 @@ class _ResultBag:
             bag.write_image("/silhouette", stamp, optical, frame.silhouette, "mono8")
             bag.write_camera_info("/silhouette/camera_info", stamp, optical, camera)
         if self._draw is not None:
-            overlay = self._draw(frame.picture, estimate, tracker)
+            overlay = self._draw(frame.image, estimate, tracker)
             bag.write_image(f"{self._space}/overlay", stamp, optical, overlay, "bgr8")
-        for output, value in self._outputs.values(stamp, estimate, tracker):
-            _write_value(bag, f"{self._space}/{output.topic}", stamp, optical, value)
+        for topic, value in self._outputs.values(stamp, estimate, tracker):
+            message = message_of(bag.new, bag.header(stamp, optical), value)
+            bag.write(f"{self._space}/{topic}", message, stamp)
         joints = joint_values(estimate)
         if joints is not None:
             transforms.write(stamp, positions_of(joints))
-
-
-def _write_value(bag: BagWriter, topic: str, stamp_ns: int, frame_id: str, value: Value) -> None:
-    """Write an output with the header of its image, like the node."""
-    match value:
-        case JointValues():
-            bag.write_joint_state(topic, stamp_ns, frame_id, *value)
-        case Points(points_m):
-            bag.write_pose_array(topic, stamp_ns, frame_id, points_m)
-        case Markers():
-            _write_markers(bag, topic, stamp_ns, frame_id, value)
-        case KeypointStates():
-            _write_keypoint_states(bag, topic, stamp_ns, frame_id, value)
-        case Text(text):
-            bag.write_string(topic, stamp_ns, text)
-
-
-def _write_keypoint_states(
-    bag: BagWriter, topic: str, stamp_ns: int, frame_id: str, found: KeypointStates
-) -> None:
-    each = [
-        bag.new(
-            "diagnostic_msgs/msg/DiagnosticStatus",
-            level=LEVELS[state],
-            name=name,
-            message=str(state),
-            values=[
-                bag.new("diagnostic_msgs/msg/KeyValue", key=key, value=text)
-                for key, text in texts.items()
-            ],
-        )
-        for name, state, texts in found.rows()
-    ]
-    bag.write_stamped(topic, "diagnostic_msgs/msg/DiagnosticArray", stamp_ns, frame_id, status=each)

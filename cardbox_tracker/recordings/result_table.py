@@ -28,7 +28,6 @@ from cardbox_tracker.person.skeleton import (
     KeypointState,
 )
 from cardbox_tracker.recordings.outputs import (
-    METRICS,
     joint_deviations,
     joint_values,
     keypoint_states,
@@ -90,7 +89,8 @@ def units(
         "state": "",
         **_units(JOINT_NAMES),
         **dict.fromkeys(POINT_COLUMNS, "m"),
-        **{metric.name: metric.unit for metric in METRICS},
+        "cost": "px",
+        "iou": "",
         **_units(PLACE_NAMES),
         "stamp_ns": "ns",
         "time_s": "s",
@@ -170,7 +170,7 @@ def row_of(
     known |= {name: x for name, x in zip(ANATOMICAL_NAMES, angles, strict=True) if x == x}
     points_m = np.asarray(estimate.keypoints_m, float).ravel()
     known |= zip(POINT_COLUMNS, points_m.tolist(), strict=True)
-    known |= {metric.name: metric.of(estimate) for metric in METRICS}
+    known |= {"cost": estimate.cost_px, "iou": estimate.iou}
     stddevs = {} if deviations is None else positions_of(deviations)
     stddevs = {name: value for name, value in stddevs.items() if name in UNITS}
     known |= zip(_deviation_units(stddevs), stddevs.values(), strict=True)

@@ -17,7 +17,6 @@ from numpy.typing import NDArray
 
 from cardbox_tracker.camera.camera import OPTICAL_FRAME, Rectifier
 from cardbox_tracker.camera.depth_image import DepthImage
-from cardbox_tracker.camera.encodings import brightness_of
 from cardbox_tracker.common.beside import results_ahead
 from cardbox_tracker.common.errors import BagError, CameraError, CardboxError, EncodingError
 from cardbox_tracker.detectors.detector import Detector, KeptDetections
@@ -90,11 +89,9 @@ class RecordedFrame(NamedTuple):
 
     stamp_ns: int  #: stamp of the image
     time_s: float  #: seconds from the recording's start
-    brightness: NDArray[np.uint8]  #: (H, W) uint8, undistorted, at the working resolution
+    #: (H, W, 3) bgr, or (H, W) grey, undistorted, at the working resolution
+    image: NDArray[np.uint8]
     silhouette: NDArray[np.uint8]  #: (H, W) uint8, 0 or 255
-    #: (H, W, 3) bgr, or (H, W) grey, undistorted, at the working resolution; None if it was not
-    #: requested.
-    image: NDArray[np.uint8] | None = None
     #: (H, W), metres, from which the silhouette was cut out; None without depth.
     depth_m: DepthImage | None = None
     #: joints of the person in the image, from a detector; None without one.
@@ -102,11 +99,6 @@ class RecordedFrame(NamedTuple):
     recorded: RecordedImage | None = None  #: the image as it was recorded; None if it was not kept
     #: joints of each person, from a detector of several; None without one.
     people: tuple[ImagePoints, ...] | None = None
-
-    @property
-    def picture(self) -> NDArray[np.uint8]:
-        """Picture to display: the image, or its brightness without one."""
-        return self.brightness if self.image is None else self.image
 
 
 def _not_kept() -> NDArray[np.uint8]:
@@ -254,17 +246,23 @@ class SilhouetteSource:
         self._pipeline.restart()
         self._start_points(start_s, end_s)
         for prepared in self._images_until(end_s, start_s):
-            stamp_ns, time_s, image, recorded, *_ = prepared
             silhouette = self._silhouette(prepared)
-            if time_s >= start_s:
-                seen = brightness_of(image), silhouette, image
-                shown = recorded if self.has_pictures else None
-                frame = RecordedFrame(stamp_ns, time_s, *seen, recorded=shown)
-                if self._finds_people:
-                    yield frame._replace(people=self._people(prepared))
-                else:
-                    yield frame._replace(points=self._points(prepared, silhouette))
+            if prepared.time_s >= start_s:
+                yield self._frame(prepared, silhouette)
         self._end_points()
+
+    def _frame(
+        self,
+        prepared: PreparedImage,
+        silhouette: NDArray[np.uint8],
+        depth_m: DepthImage | None = None,
+    ) -> RecordedFrame:
+        stamp_ns, time_s, image, recorded, *_ = prepared
+        shown = recorded if self.has_pictures else None
+        frame = RecordedFrame(stamp_ns, time_s, image, silhouette, depth_m, recorded=shown)
+        if self._finds_people:
+            return frame._replace(people=self._people(prepared))
+        return frame._replace(points=self._points(prepared, silhouette))
 
     def _silhouette(self, prepared: PreparedImage) -> NDArray[np.uint8]:
         return self._pipeline.silhouette(prepared.image, prepared.stamp_ns)
@@ -352,7 +350,7 @@ class SilhouetteSource:
 
     def full_picture(self, frame: RecordedFrame) -> NDArray[np.uint8]:
         """Return the picture of a frame, undistorted, at the resolution of the recording."""
-        return frame.picture if frame.recorded is None else self.undistorted(frame.recorded)
+        return frame.image if frame.recorded is None else self.undistorted(frame.recorded)
 
     def undistorted(self, recorded: RecordedImage) -> NDArray[np.uint8]:
         """Return an image, undistorted, at the resolution of the recording."""

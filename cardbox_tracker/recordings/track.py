@@ -46,6 +46,7 @@ class TrackSummary:
     scene: Mapping[str, Mapping[str, float | str]] = field(default_factory=dict)
     #: in how many images each optional input was used, by its name.
     used: Mapping[str, int] = field(default_factory=dict)
+    quality: tuple[str, ...] = ()  #: see :meth:`Quality.lines`; empty for several people
     #: the same for each of several people by number; the numbers above are of all of them.
     people: Mapping[int, TrackSummary] = field(default_factory=dict)
 
@@ -57,26 +58,16 @@ class TrackSummary:
         return f"used {text} of {self.frames} images" if text else ""
 
 
-class _Tally:
-    """Counts the results of one person."""
-
-    def __init__(self) -> None:
-        self.frames = self.uncertain = 0
-        self.costs: list[int] = []
-        self.ious: list[float] = []
-
-    def add(self, estimate: Estimate) -> None:
-        self.frames += 1
-        self.uncertain += estimate.state == UNCERTAIN
-        if estimate.cost_px is not None and estimate.iou is not None:
-            self.costs.append(estimate.cost_px)
-            self.ious.append(estimate.iou)
-
-    def summary(self, body: BodyModel | None, remarks: Sequence[str] = ()) -> TrackSummary:
-        found = self.costs, self.ious
-        cost_px, iou = (float(np.mean(one)) if one else float("nan") for one in found)
-        counts = self.frames, len(self.costs)
-        return TrackSummary(*counts, cost_px, iou, self.uncertain, tuple(remarks), body)
+def _summary(
+    found: Sequence[Quality], body: BodyModel | None, remarks: Sequence[str] = ()
+) -> TrackSummary:
+    """Return the summary of one person, or of all of them together."""
+    fits = [fit for one in found for fit in one.fits]
+    cost_px, iou = (float(np.mean(x)) for x in zip(*fits, strict=True)) if fits else [math.nan] * 2
+    images, uncertain = sum(one.images for one in found), sum(one.uncertain for one in found)
+    lines = tuple(found[0].lines()) if len(found) == 1 else ()
+    given = uncertain, tuple(remarks), body
+    return TrackSummary(images, len(fits), cost_px, iou, *given, quality=lines)
 
 
 def track_recording(
@@ -102,16 +93,16 @@ def track_recording(
     """
     first, rng = recording.first, np.random.default_rng(seed)
     given = recording.others, people, look
-    session, tallies = Session(bodies, first.camera, config, rng, *given), list[_Tally]()
+    session, found = Session(bodies, first.camera, config, rng, *given), list[Quality]()
     has = first.has_points, people is not None, look is not None
     with nullcontext() if table is None else result_table(table, *has) as add_row:
         frames = 0
         for taken in recording.frames(start_s, end_s):
             frames += 1
             estimates = session.track(taken.observations)
-            tallies += [_Tally() for _ in estimates[len(tallies) :]]
-            for estimate, tracker, tally in zip(estimates, session.trackers, tallies, strict=True):
-                tally.add(estimate)
+            found += [Quality() for _ in estimates[len(found) :]]
+            for estimate, tracker, quality in zip(estimates, session.trackers, found, strict=True):
+                quality(taken.first, estimate, tracker)
                 if add_row is not None:
                     roll_rad = tracker.body.camera_pose.roll_rad
                     add_row(taken.first, estimate.as_camera_stands(roll_rad))
@@ -124,12 +115,6 @@ def track_recording(
             )
         recording.check_points()
     session.check_cameras(is_last=True)
-    whole = _Tally()
-    for tally in tallies:
-        whole.uncertain += tally.uncertain
-        whole.costs += tally.costs
-        whole.ious += tally.ious
-        whole.frames += tally.frames
     bodies = [tracker.body for tracker in session.trackers]
     optional = ("points", first.has_points), ("depth", recording.measures_depth)
     names = {f"camera {number}": name for number, name in enumerate(recording.names, 1)}
@@ -139,11 +124,11 @@ def track_recording(
             names.get(name, name): count for name, count in session.trackers[0].used.items()
         }
     else:
-        each = {n: tally.summary(bodies[n - 1]) for n, tally in enumerate(tallies, 1)}
+        pairs = zip(found, bodies, strict=True)
+        each = {n: _summary([quality], body) for n, (quality, body) in enumerate(pairs, 1)}
     # Of several people, there may be nobody.
-    summary = whole.summary(
-        bodies[0] if bodies else None, session.remarks(recording.names, is_all=True)
-    )
+    body = bodies[0] if bodies else None
+    summary = _summary(found, body, session.remarks(recording.names, is_all=True))
     return replace(summary, used=used, people=each)
 
 
@@ -164,10 +149,17 @@ class _Moment(NamedTuple):
 
 
 class Quality:
-    """Observer of :func:`~cardbox_tracker.recordings.track.track_recording`; see :meth:`lines`."""
+    """Observer that counts the results of one person; see :meth:`lines`.
+
+    Attributes:
+        images: number of images.
+        uncertain: number of images whose posture may be wrong.
+        fits: cost, px, and overlap (IoU) of each image with a posture.
+    """
 
     def __init__(self) -> None:
-        self._images = self._sure = self._sure_hands = self._sure_places = 0
+        self.images = self.uncertain = self._sure = self._sure_hands = self._sure_places = 0
+        self.fits: list[tuple[int, float]] = []
         self._moments: list[_Moment] = []
         self._angles_rad: list[float] = []
         self._hands_m: list[float] = []
@@ -175,7 +167,10 @@ class Quality:
 
     def __call__(self, frame: RecordedFrame, estimate: Estimate, tracker: Tracker) -> None:
         """Count one image."""
-        self._images += 1
+        self.images += 1
+        self.uncertain += estimate.state == UNCERTAIN
+        if estimate.cost_px is not None and estimate.iou is not None:
+            self.fits.append((estimate.cost_px, estimate.iou))
         self._sure += estimate.state == TRACKING
         states = estimate.keypoint_states or ()
         sure = [states[hand] == KeypointState.TRACKED for hand in _HANDS] if states else []
@@ -200,12 +195,12 @@ class Quality:
         Hands and distances are sure in the state ``tracked``. Typical is the median over images
         with a posture; a hand moves beside the shoulders with the deviations of all joints.
         """
-        if not self._images:
+        if not self.images:
             return
         yield (
-            f"sure: {self._sure / self._images:.0%} of {self._images} images, "
-            f"{self._sure_hands / (2 * self._images):.0%} of the hands in them, "
-            f"{self._sure_places / self._images:.0%} of the distances (to 0.3 m)"
+            f"sure: {self._sure / self.images:.0%} of {self.images} images, "
+            f"{self._sure_hands / (2 * self.images):.0%} of the hands in them, "
+            f"{self._sure_places / self.images:.0%} of the distances (to 0.3 m)"
         )
         if self._angles_rad:
             typical = [

@@ -140,21 +140,12 @@ def _is_in_sight(entry: Mapping[str, Any], camera: Mapping[str, Any]) -> bool:
     return bool(0 <= u < camera["width"] and 0 <= v < camera["height"])
 
 
-@dataclass(frozen=True)
-class TrackingError:
-    """Distances between estimated and true keypoints."""
+def tracking_error(estimates: Mapping[int, FloatArray], truth: GroundTruth) -> dict[str, Any]:
+    """Return the mean distances of keypoints (6, 3), metres, optical frame, from the truth.
 
-    mean_m: float  #: mean 3D error over shoulders, elbows and hands (MPJPE)
-    by_keypoint_m: dict[str, float]  #: mean 3D error of each keypoint
-    by_segment_m: dict[str, float]  #: mean 3D error in each segment of the session
-    lateral_m: float  #: mean error along x of the optical frame
-    vertical_m: float  #: mean error along y
-    depth_m: float  #: mean error along z
-    frames: int  #: number of compared images
-
-
-def tracking_error(estimates: Mapping[int, FloatArray], truth: GroundTruth) -> TrackingError:
-    """Compare keypoints (6, 3), m, optical frame, with the truth; CardboxError if no stamp fits."""
+    They are those of all, of each keypoint, in each segment of the session, and along x, y and z.
+    Raises CardboxError if no stamp fits.
+    """
     stamps = [stamp for stamp in estimates if stamp in truth.frames]
     if not stamps:
         raise CardboxError(
@@ -165,16 +156,14 @@ def tracking_error(estimates: Mapping[int, FloatArray], truth: GroundTruth) -> T
     segments: dict[str, list[float]] = defaultdict(list)
     for stamp, row in zip(stamps, distances, strict=True):
         segments[truth.frames[stamp].segment].append(float(row.mean()))
-    along = np.abs(differences).mean(axis=(0, 1))
-    return TrackingError(
-        float(distances.mean()),
-        dict(zip(KEYPOINT_NAMES, distances.mean(axis=0).tolist(), strict=True)),
-        {name: float(np.mean(values)) for name, values in segments.items()},
-        float(along[0]),
-        float(along[1]),
-        float(along[2]),
-        len(stamps),
-    )
+    by_keypoint = zip(KEYPOINT_NAMES, distances.mean(axis=0).tolist(), strict=True)
+    names = "lateral_error_m", "vertical_error_m", "depth_error_m"
+    return {
+        "mean_3d_error_m": float(distances.mean()),
+        "error_by_keypoint_m": dict(by_keypoint),
+        "error_by_segment_m": {name: float(np.mean(one)) for name, one in segments.items()},
+        **dict(zip(names, np.abs(differences).mean(axis=(0, 1)).tolist(), strict=True)),
+    }
 
 
 def beside_shoulders(difference: FloatArray) -> FloatArray:

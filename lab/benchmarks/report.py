@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from cardbox_tracker.common.files import atomic_path
+from cardbox_tracker.common.files import write_file
 from lab.benchmarks.nodes import PERCENTILES
 
 COMMAND = "make benchmark"
@@ -23,8 +23,7 @@ _FRAMES = {
 
 def write_report(results: Mapping[str, Any], path: Path) -> None:
     """Write the report of ``results``, as ``benchmark.json`` holds them, to ``path``."""
-    with atomic_path(path) as temporary:
-        temporary.write_text(report(results), encoding="utf-8")
+    write_file(path, report(results))
 
 
 def report(results: Mapping[str, Any]) -> str:

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from cardbox_tracker.common.errors import CardboxError
-from cardbox_tracker.common.files import atomic_path
+from cardbox_tracker.common.files import make_folder, write_file
 from cardbox_tracker.search.config import PRESETS
 from cardbox_tracker.tracking.precompile import compile_all
 from lab.evaluation.figures import figures
@@ -70,10 +70,7 @@ def evaluate_sessions(
     # Errors are reported before the work begins.
     ways = {folder: ways_of(folder, plan) for folder in folders}
     kinds = {folder: result_name(folder) for folder in folders}
-    try:
-        output.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise CardboxError(f"cannot make the folder {output}: {error.strerror}") from None
+    make_folder(output)
     compile_all()
     sessions: dict[str, list[dict[str, Any]]] = {kind: [] for kind in kinds.values()}
     with ProcessPoolExecutor(jobs, mp_context=get_context("spawn")) as pool:
@@ -106,8 +103,7 @@ def _write(results: Mapping[str, Any], path: Path) -> None:
         text = sessions_report(results)
     else:
         text = people_report(results, path.read_text("utf-8") if path.is_file() else "")
-    with atomic_path(path) as temporary:
-        temporary.write_text(text, encoding="utf-8")
+    write_file(path, text)
 
 
 def evaluate_session(way: Way, plan: Plan) -> dict[str, Any]:

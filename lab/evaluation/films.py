@@ -25,7 +25,7 @@ from cardbox_tracker.applications.drawing.video import video_file
 from cardbox_tracker.commands.request import add_tracking, tracking_request
 from cardbox_tracker.commands.tracking import track
 from cardbox_tracker.common.errors import CardboxError
-from cardbox_tracker.common.files import atomic_path
+from cardbox_tracker.common.files import write_file
 from cardbox_tracker.common.progress import progress_bar
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.skeleton import KeypointState
@@ -263,8 +263,7 @@ def evaluate_films(
         "provenance": provenance(),
     }
     write_json(results, report.with_suffix(".json"))
-    with atomic_path(report) as temporary:
-        temporary.write_text(films_report(results), encoding="utf-8")
+    write_file(report, films_report(results))
 
 
 def _film(folder: Path, shape: str, words: list[str], seeds: range) -> list[dict[str, Any]]:

@@ -15,7 +15,7 @@ import numpy as np
 
 import cardbox_tracker
 from cardbox_tracker.common.errors import CardboxError
-from cardbox_tracker.common.files import UnreadableFileError, atomic_path, read_regular
+from cardbox_tracker.common.files import UnreadableFileError, read_regular, write_file
 
 _DIGITS = 6
 _MOST_BYTES = 256 * 1024 * 1024
@@ -68,8 +68,7 @@ def processor() -> str:
 
 def write_json(data: Mapping[str, Any], path: Path) -> None:
     """Write ``data`` with floats rounded to ``_DIGITS`` places."""
-    with atomic_path(path) as temporary:
-        temporary.write_text(json.dumps(_rounded(data), indent=1) + "\n", encoding="utf-8")
+    write_file(path, json.dumps(_rounded(data), indent=1) + "\n")
 
 
 def read_json(path: Path) -> dict[str, Any]:

@@ -17,7 +17,7 @@ from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.posture import N_JOINTS, POSTURE
 from cardbox_tracker.person.proportions import STATURE_LIMITS_M, body_from_proportions
 from cardbox_tracker.recordings.initialize import initialize_from_recording
-from cardbox_tracker.recordings.recording import STEREO, FrameSet, open_recording
+from cardbox_tracker.recordings.recording import STEREO, FrameSet, RecordingRequest
 from cardbox_tracker.recordings.silhouettes import SilhouetteSource, TimeSpan
 from cardbox_tracker.recordings.truth import GroundTruth
 from cardbox_tracker.search.config import TrackerConfig
@@ -156,9 +156,9 @@ def track_session(
         raise CardboxError(
             f"{session.name} has no camera {only}; expected one of {', '.join(cameras)}"
         )
-    with open_recording(
+    with RecordingRequest(
         session.bag, scene, cameras, session.extrinsics, depth, inputs.points
-    ) as source:
+    ).open() as source:
         camera = source.first.camera
         offset_s = (session.truth.start_ns - source.first.start_ns) / 1e9
         if body is None and not session.has_references:
@@ -236,7 +236,7 @@ def recovery_of(
         CardboxError: the recording cannot be read.
     """
     first = session.truth.cameras[:1]
-    with open_recording(session.bag, session.spans["empty"], first) as opened:
+    with RecordingRequest(session.bag, session.spans["empty"], first).open() as opened:
         source = opened.first
         offset_s = (session.truth.start_ns - source.start_ns) / 1e9
         frames = list(source.frames(session.start_s + offset_s))

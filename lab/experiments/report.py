@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from cardbox_tracker.common.files import atomic_path
+from cardbox_tracker.common.files import write_file
 from cardbox_tracker.person.skeleton import JOINT_NAMES, KEYPOINT_NAMES
 from cardbox_tracker.search.config import paper_preset
 from lab.experiments.results import motions_in, recorded_results
@@ -34,8 +34,7 @@ def write_report(results: Results, timing: Results, folder: Path) -> None:
     if sides is not None:
         lines += _recorded(recorded_results(folder))
     lines += _origin(results, timing)
-    with atomic_path(folder / "report.md") as temporary:
-        temporary.write_text("\n".join(lines) + "\n", encoding="utf-8")
+    write_file(folder / "report.md", "\n".join(lines) + "\n")
 
 
 def _head(results: Results) -> Iterator[str]:

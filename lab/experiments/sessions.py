@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from cardbox_tracker.applications.simulation.session import SessionFormat, synthesize_session
 from cardbox_tracker.camera.camera import Camera
+from cardbox_tracker.camera.encodings import brightness_of
 from cardbox_tracker.common.errors import CardboxError
 from cardbox_tracker.measuring.config import InitializationConfig
 from cardbox_tracker.person.model import BodyModel
@@ -186,7 +187,7 @@ def _session(
         postures,
         torso_rad,
         shown,
-        np.array([frames[i].brightness for i in shown]),
+        np.array([brightness_of(frames[i].image) for i in shown]),
         iou,
     )
 

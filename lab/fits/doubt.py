@@ -26,7 +26,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cardbox_tracker.common.errors import CardboxError
-from cardbox_tracker.common.files import atomic_path
+from cardbox_tracker.common.files import write_file
 from cardbox_tracker.detectors.detector import Detector
 from cardbox_tracker.recordings.truth import beside_shoulders
 from cardbox_tracker.search.config import PRESETS
@@ -289,8 +289,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
             print(f"tracked {folder}", flush=True)
     stored = fit_all(by_source)
     if given.output is not None:
-        with atomic_path(given.output) as path:
-            path.write_text(json.dumps(stored, indent=1) + "\n", encoding="utf-8")
+        write_file(given.output, json.dumps(stored, indent=1) + "\n")
 
 
 def fit_all(

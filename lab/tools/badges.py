@@ -10,7 +10,7 @@ import sys
 import xml.etree.ElementTree as ElementTree
 from pathlib import Path
 
-from cardbox_tracker.common.files import atomic_path
+from cardbox_tracker.common.files import write_file
 
 ROOT = Path(__file__).resolve().parents[2]
 FOLDER = ROOT / "docs" / "images" / "badges"
@@ -60,8 +60,7 @@ def main() -> int:
     """Write the files."""
     FOLDER.mkdir(parents=True, exist_ok=True)
     for name, text in badges().items():
-        with atomic_path(FOLDER / name) as path:
-            path.write_text(text, encoding="utf-8")
+        write_file(FOLDER / name, text)
         print(f"wrote {FOLDER / name}")
     return 0
 

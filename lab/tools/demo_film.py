@@ -22,7 +22,7 @@ from cardbox_tracker.common.files import atomic_path
 from cardbox_tracker.detectors.detector import Detector
 from cardbox_tracker.detectors.pose_network import LANDMARKS, Detection
 from cardbox_tracker.recordings.given_camera import GivenCamera
-from cardbox_tracker.recordings.recording import open_recording
+from cardbox_tracker.recordings.recording import RecordingRequest
 from lab.evaluation.films import make_film
 
 FloatArray = NDArray[np.float64]
@@ -60,7 +60,9 @@ def main(arguments: list[str] | None = None) -> int:
     with TemporaryDirectory() as folder:
         film = make_film(options.session, "across", Path(folder) / "film.mp4")
         camera = GivenCamera(film.fov_deg)
-        with open_recording(film.path, detector, points=detector, camera=camera) as recording:
+        with RecordingRequest(
+            film.path, detector, points=detector, camera=camera
+        ).open() as recording:
             find = detector.start()
             images = [*recording.first.images()]
             found = [one for image in images if (one := find(image.image, image.stamp_ns))]

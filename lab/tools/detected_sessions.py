@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cardbox_tracker.detectors.detector import Detector
-from cardbox_tracker.recordings.recording import FrameSet, Recording, open_recording
+from cardbox_tracker.recordings.recording import FrameSet, Recording, RecordingRequest
 from lab.evaluation.session import RecordedSession, load_session
 from lab.evaluation.tracking import silhouettes_of
 
@@ -45,7 +45,9 @@ def opened(session: RecordedSession) -> Iterator[Recording]:
         CardboxError: the session cannot be read, or the detector is not installed.
     """
     silhouettes, cameras = silhouettes_of(session), session.truth.cameras
-    with open_recording(session.bag, silhouettes, cameras, points=Detector.installed()) as found:
+    with RecordingRequest(
+        session.bag, silhouettes, cameras, points=Detector.installed()
+    ).open() as found:
         yield found
 
 

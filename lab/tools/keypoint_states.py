@@ -16,7 +16,7 @@ import matplotlib
 import numpy as np
 
 from cardbox_tracker.common.errors import CardboxError
-from cardbox_tracker.common.files import atomic_path
+from cardbox_tracker.common.files import atomic_path, write_file
 from lab.evaluation.figures import KINDS, added
 from lab.evaluation.results import read_json
 
@@ -152,8 +152,7 @@ def main(args: list[str] | None = None) -> int:
     text = _TEXT + "\n".join(lines) + "\n" + _STATES_HEAD
     text += "\n".join(row for name, table in tables.items() for row in rows(name, table)) + "\n"
     path = given.folder / "keypoint-states.md"
-    with atomic_path(path) as temporary:
-        temporary.write_text(text, encoding="utf-8")
+    write_file(path, text)
     print(f"written: {path} and {given.image}")
     return 0
 

@@ -33,7 +33,7 @@ from cardbox_tracker.person.posture import PITCH
 from cardbox_tracker.person.proportions import body_from_proportions
 from cardbox_tracker.person.sizes import FloatArray
 from cardbox_tracker.person.skeleton import KEYPOINT_NAMES, rotation_z
-from cardbox_tracker.recordings.recording import Segmentation, open_recording
+from cardbox_tracker.recordings.recording import RecordingRequest, Segmentation
 from cardbox_tracker.recordings.silhouettes import TimeSpan
 from cardbox_tracker.search.config import default_preset
 from cardbox_tracker.tracking.estimate import Estimate
@@ -74,7 +74,7 @@ def _lines(folder: Path, truth: Any, camera: Any, given: list[float] | None) -> 
     scene: Segmentation = finder if empty is None else TimeSpan(empty["start_s"], empty["end_s"])
     names = [name] if len(truth.get("cameras", ())) > 1 else []
     found: dict[int, list[tuple[Estimate, ImagePoints | None]]] = {}
-    with open_recording(folder / "bag", scene, names, points=finder) as recording:
+    with RecordingRequest(folder / "bag", scene, names, points=finder).open() as recording:
         tracked = Session(bodies, recording.first.camera, default_preset(), people=len(people))
         for taken in recording.frames():
             there = found.setdefault(taken.stamp_ns, [])

@@ -28,7 +28,7 @@ from cardbox_tracker.detectors.detector import Detector
 from cardbox_tracker.person.proportions import body_from_proportions
 from cardbox_tracker.person.sizes import FloatArray
 from cardbox_tracker.person.skeleton import KEYPOINT_NAMES
-from cardbox_tracker.recordings.recording import Segmentation, open_recording
+from cardbox_tracker.recordings.recording import RecordingRequest, Segmentation
 from cardbox_tracker.recordings.silhouettes import TimeSpan
 from cardbox_tracker.recordings.truth import SHOULDERS
 from cardbox_tracker.search.config import default_preset
@@ -84,7 +84,9 @@ def _lines(
             finder if empty is None else TimeSpan(empty["start_s"], empty["end_s"])
         )
         spent_s, found = time.process_time(), {}
-        with open_recording(folder / "bag", scene, names, poses, points=finder) as recording:
+        with RecordingRequest(
+            folder / "bag", scene, names, poses, points=finder
+        ).open() as recording:
             others = recording.others
             session = Session(
                 bodies, recording.first.camera, default_preset(), others=others, people=count

@@ -20,11 +20,11 @@ from numpy.typing import NDArray
 from cardbox_tracker.applications.drawing.overlay import draw_overlay
 from cardbox_tracker.camera.camera import Camera
 from cardbox_tracker.common.errors import CardboxError
-from cardbox_tracker.common.files import atomic_path
+from cardbox_tracker.common.files import write_file
 from cardbox_tracker.detectors.detector import Detector
 from cardbox_tracker.detectors.image_points import POINT_NAMES
 from cardbox_tracker.person.model import BodyModel
-from cardbox_tracker.recordings.recording import open_recording
+from cardbox_tracker.recordings.recording import RecordingRequest
 from cardbox_tracker.recordings.silhouettes import RecordedFrame
 from cardbox_tracker.search.config import default_preset
 from cardbox_tracker.tracking.estimate import Estimate
@@ -150,7 +150,7 @@ class TrackedFilm:
         stamp_ns = int(self.session.stamps_ns[number])
         frame, (body, estimate) = self._frames[stamp_ns], self._found[stamp_ns]
         heads = heads_in(frame, self._entries[stamp_ns], self._camera, self._width)
-        seen = hidden(frame.picture, frame.silhouette, heads)
+        seen = hidden(frame.image, frame.silhouette, heads)
         view = self._camera.with_pitch(body.camera_pose.pitch_rad)
         tile = draw_overlay(seen, body, view, estimate)
         for u, v in self._camera.project(self.session.keypoints_m[number]):
@@ -174,7 +174,7 @@ def _frames(
 ) -> tuple[dict[int, RecordedFrame], Camera]:
     """Return the first camera's frames by stamp, with the detector's masks and points."""
     names = session.truth.cameras[:1]
-    with open_recording(session.bag, detector, names, points=detector) as source:
+    with RecordingRequest(session.bag, detector, names, points=detector).open() as source:
         return {f.stamp_ns: f for f in source.first.frames()}, source.first.camera
 
 
@@ -192,8 +192,7 @@ def main(arguments: list[str] | None = None) -> int:
     tiles = [tile for folder, count in shown for tile in tiles_of(folder, count)]
     picture = side_by_side(tiles, ATTRIBUTION)
     encoded = cv2.imencode(".jpg", picture, (cv2.IMWRITE_JPEG_QUALITY, _QUALITY))[1]
-    with atomic_path(options.output) as temporary:
-        temporary.write_bytes(encoded.tobytes())
+    write_file(options.output, encoded.tobytes())
     return 0
 
 

@@ -15,7 +15,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from cardbox_tracker.common.files import atomic_path
+from cardbox_tracker.common.files import write_file
 from lab.evaluation.people_report import replaced
 from lab.evaluation.report import mean_of
 from lab.evaluation.results import read_json
@@ -154,8 +154,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return 0
     print(f"{'differs' if given.check else 'written'}: {path}")
     if not given.check:
-        with atomic_path(path) as temporary:
-            temporary.write_text(text, encoding="utf-8")
+        write_file(path, text)
     return 1 if given.check else 0
 
 

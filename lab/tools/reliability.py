@@ -18,7 +18,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from cardbox_tracker.common.files import atomic_path
+from cardbox_tracker.common.files import write_file
 from lab.evaluation.people_report import replaced
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -87,8 +87,7 @@ def main(arguments: list[str] | None = None) -> int:
         return code
     path = ROOT / PAGE
     page = replaced(path.read_text(encoding="utf-8"), f"\n{table_of(rows)}\n", BEGIN, END)
-    with atomic_path(path) as temporary:
-        temporary.write_text(page, encoding="utf-8")
+    write_file(path, page)
     print(f"{tried}; written: {PAGE}")
     return code
 

@@ -18,7 +18,7 @@ from cardbox_tracker.common.errors import CardboxError
 from cardbox_tracker.detectors.detector import Detector
 from cardbox_tracker.measuring.scene_camera import scene_camera
 from cardbox_tracker.recordings.measured_scene import watch
-from cardbox_tracker.recordings.recording import open_recording
+from cardbox_tracker.recordings.recording import RecordingRequest
 
 
 class Row(NamedTuple):
@@ -62,7 +62,7 @@ def rows(folder: Path, detector: Detector) -> Iterator[Row]:
         stature_m = people[0].get("height") if len(people) == 1 else None
         finder = detector._replace(people=len(people) if len(people) > 1 else 0)
         names = () if name is None else (name,)
-        with open_recording(folder / "bag", finder, names, points=finder) as recording:
+        with RecordingRequest(folder / "bag", finder, names, points=finder).open() as recording:
             watched = watch(recording)
             statures_m = [stature_m] * len(watched.people)
             seen = watched.people, watched.pictures, recording.first.camera, statures_m

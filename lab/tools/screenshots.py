@@ -20,8 +20,9 @@ from cardbox_tracker.applications.drawing.guidance import Guide
 from cardbox_tracker.applications.drawing.overlay import ImageArray, draw_overlay
 from cardbox_tracker.applications.simulation.motions import Segment, timeline
 from cardbox_tracker.applications.simulation.session import synthesize_session
+from cardbox_tracker.camera.encodings import brightness_of
 from cardbox_tracker.common.errors import CardboxError
-from cardbox_tracker.common.files import atomic_path
+from cardbox_tracker.common.files import make_folder, write_file
 from cardbox_tracker.common.progress import progress_bar
 from cardbox_tracker.measuring.config import InitializationConfig
 from cardbox_tracker.measuring.guidance import Prompt, short_words
@@ -51,10 +52,7 @@ def write_screenshots(
     Raises:
         CardboxError: the folder cannot be written.
     """
-    try:
-        output.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise CardboxError(f"cannot make the folder {output}: {error.strerror}") from None
+    make_folder(output)
     segments = {segment.name: segment for segment in reversed(timeline("all"))}
     with tempfile.TemporaryDirectory() as folder:
         session = Path(folder) / "session"
@@ -81,8 +79,8 @@ def _shots(
         estimate = tracker.track(frame.silhouette, frame.image, frame.stamp_ns)
         if frame.time_s >= shown_s - 1e-6:
             break
-    overlay = draw_overlay(frame.picture, result.body, tracker.camera, estimate, _SCALE)
-    steps = _row([_large(frame.brightness), _large(frame.silhouette), overlay])
+    overlay = draw_overlay(frame.image, result.body, tracker.camera, estimate, _SCALE)
+    steps = _row([_large(brightness_of(frame.image)), _large(frame.silhouette), overlay])
     return {"steps": steps, "guidance": _guidance(source, segments)}
 
 
@@ -93,7 +91,7 @@ def _guidance(source: SilhouetteSource, segments: Mapping[str, Segment]) -> Imag
     for name, before_s, left_s in _GUIDED:
         frame = next(source.frames(segments[name].start_s - before_s))
         step = Prompt(name, short_words(name, guide.config.side_turn), left_s)
-        shown.append(guide.draw(step, frame.silhouette, frame.picture, mirror=True))
+        shown.append(guide.draw(step, frame.silhouette, frame.image, mirror=True))
     return _row(shown)
 
 
@@ -118,8 +116,7 @@ def _row(images: list[ImageArray]) -> ImageArray:
 
 def _write(path: Path, image: ImageArray) -> Path:
     data = cv2.imencode(".jpg", image, [cv2.IMWRITE_JPEG_QUALITY, _QUALITY])[1]
-    with atomic_path(path) as temporary:
-        temporary.write_bytes(data.tobytes())
+    write_file(path, data.tobytes())
     return path
 
 

@@ -15,7 +15,7 @@ from pathlib import Path
 
 import numpy as np
 
-from cardbox_tracker.common.files import atomic_path
+from cardbox_tracker.common.files import write_file
 from cardbox_tracker.detectors.detector import Detector
 from cardbox_tracker.person.skeleton import KeypointState
 from cardbox_tracker.recordings.truth import SHOULDERS, beside_shoulders
@@ -115,8 +115,7 @@ def main() -> None:
         print(row, flush=True)
         lines.append(row)
     if given.output is not None:
-        with atomic_path(given.output) as path:
-            path.write_text("\n".join(lines) + "\n", encoding="utf-8")
+        write_file(given.output, "\n".join(lines) + "\n")
 
 
 if __name__ == "__main__":

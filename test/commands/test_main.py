@@ -20,7 +20,7 @@ from cardbox_tracker.commands.main import COMMANDS, build_parser
 from cardbox_tracker.common.errors import CardboxError
 
 ROOT = Path(__file__).resolve().parents[2]
-NAMES = [command.NAME for command in COMMANDS]
+NAMES = [*COMMANDS]
 # Modules beside the subcommands.
 SHARED = {
     "__init__",

@@ -11,6 +11,7 @@ import cv2
 import numpy as np
 import pytest
 
+from cardbox_tracker.commands import request
 from cardbox_tracker.commands.main import build_parser
 from cardbox_tracker.commands.request import (
     TrackingRequest,
@@ -19,7 +20,6 @@ from cardbox_tracker.commands.request import (
 )
 from cardbox_tracker.common.errors import CardboxError
 from cardbox_tracker.detectors import detector as detector_module
-from cardbox_tracker.detectors import model_files
 from cardbox_tracker.detectors.model_files import ModelFiles
 from cardbox_tracker.detectors.person_choice import PersonChoice
 from cardbox_tracker.detectors.point_table import PointTable
@@ -158,7 +158,7 @@ def test_mistakes_with_several_people(words: tuple[str, ...], fault: str, film: 
 
 def test_hands_need_the_detector_and_its_file(film: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(detector_module, "installed_models", lambda: ModelFiles(film, film))
-    monkeypatch.setattr(model_files, "installed_hands", lambda: film)
+    monkeypatch.setattr(request, "installed_hands", lambda: film)
     given = ("--fov", 60, "--stature", 1.7)
     assert asked(film, *given, "--detector", "mediapipe", "--hands").hands == film
     assert asked(film, *given, "--detector", "mediapipe").hands is None

@@ -21,7 +21,7 @@ from cardbox_tracker.recordings.image_folder import _numbered
 from cardbox_tracker.recordings.image_recording import working_size
 from cardbox_tracker.recordings.open_images import open_images
 from cardbox_tracker.recordings.other_silhouettes import PersonInView
-from cardbox_tracker.recordings.recording import open_recording
+from cardbox_tracker.recordings.recording import RecordingRequest
 from cardbox_tracker.recordings.silhouettes import TimeSpan
 
 FOV = GivenCamera(fov_deg=60.0)
@@ -109,7 +109,7 @@ def test_a_phones_rotation_flag_turns_the_images(
     """The block in the upper left quarter is in the upper right one after 90 degrees."""
     path = film(tmp_path / "phone.mp4", pictures(20, 192, 108), 30.0)
     turned_by_flag(path, clockwise_deg)
-    with open_recording(path, EMPTY, camera=FOV) as recording:
+    with RecordingRequest(path, EMPTY, camera=FOV).open() as recording:
         upright = clockwise_deg != 180
         camera = recording.first.camera
         assert (camera.width, camera.height) == ((208, 368) if upright else (368, 208))
@@ -128,7 +128,7 @@ def test_silhouettes_of_a_video_are_those_of_its_images(tmp_path: Path) -> None:
         cv2.imwrite(str(folder / f"image{number}.png"), image)
     found = []
     for path in (video, folder):
-        with open_recording(path, EMPTY, camera=FOV) as recording:
+        with RecordingRequest(path, EMPTY, camera=FOV).open() as recording:
             found.append([frame.silhouette for frame in recording.first.frames(0.34)])
     assert len(found[0]) == len(found[1]) == 9
     for one, other in zip(*found, strict=True):
@@ -205,7 +205,7 @@ def test_images_that_do_not_belong_are_skipped_and_counted(tmp_path: Path) -> No
         cv2.imwrite(str(tmp_path / f"{number:03}.png"), image)
     (tmp_path / "012.png").write_bytes(b"\x89PNG nothing")
     cv2.imwrite(str(tmp_path / "014.png"), np.zeros((50, 50, 3), np.uint8))
-    with open_recording(tmp_path, EMPTY, camera=FOV) as recording:
+    with RecordingRequest(tmp_path, EMPTY, camera=FOV).open() as recording:
         assert len(list(recording.first.frames())) == 18
         (remark,) = recording.first.remarks
         assert "2 images cannot be decoded" in remark
@@ -215,7 +215,7 @@ def test_images_that_do_not_belong_are_skipped_and_counted(tmp_path: Path) -> No
 def test_a_video_that_was_cut_off_is_read_to_its_end_with_a_remark(tmp_path: Path) -> None:
     path = film(tmp_path / "film.avi", pictures(30, 320, 240), 30.0)
     path.write_bytes(path.read_bytes()[: path.stat().st_size * 2 // 3])
-    with open_recording(path, EMPTY, camera=FOV) as recording:
+    with RecordingRequest(path, EMPTY, camera=FOV).open() as recording:
         count = len(list(recording.first.frames()))
         assert 10 <= count < 28
         (remark,) = recording.first.remarks
@@ -267,14 +267,17 @@ def test_one_camera_needs_a_possible_field_of_view(tmp_path: Path) -> None:
     for fov_deg in (0.0, 180.0, float("nan")):
         with (
             pytest.raises(CameraError, match="field of view is"),
-            open_recording(path, EMPTY, camera=GivenCamera(fov_deg)),
+            RecordingRequest(path, EMPTY, camera=GivenCamera(fov_deg)).open(),
         ):
             pass
-    with pytest.raises(BagError, match="omit --cameras"), open_recording(path, EMPTY, ["left"]):
+    with (
+        pytest.raises(BagError, match="omit --cameras"),
+        RecordingRequest(path, EMPTY, ["left"]).open(),
+    ):
         pass
     with (
         pytest.raises(CardboxError, match="0 images lie in the background span"),
-        open_recording(path, TimeSpan(50, 60), camera=FOV),
+        RecordingRequest(path, TimeSpan(50, 60), camera=FOV).open(),
     ):
         pass
 
@@ -297,13 +300,13 @@ def test_a_calibration_file_replaces_the_field_of_view(tmp_path: Path) -> None:
     }
     file = tmp_path / "camera.yaml"
     file.write_text(yaml.safe_dump(data))
-    with open_recording(path, EMPTY, camera=GivenCamera(calibration=file)) as recording:
+    with RecordingRequest(path, EMPTY, camera=GivenCamera(calibration=file)).open() as recording:
         assert recording.first.camera.fx == pytest.approx(1500 * 368 / 1920)
         assert len(list(recording.first.frames())) == 20
     upright = film(tmp_path / "upright.mp4", pictures(2, 108, 192), 30.0)
     with (
         pytest.raises(CameraError, match=r"1920x1080, but .* 108x192"),
-        open_recording(upright, EMPTY, camera=GivenCamera(calibration=file)),
+        RecordingRequest(upright, EMPTY, camera=GivenCamera(calibration=file)).open(),
     ):
         pass
 
@@ -313,9 +316,12 @@ def test_a_bag_without_camera_info_takes_the_field_of_view(tmp_path: Path) -> No
         for number, image in enumerate(pictures(20, 320, 240)):
             stamp_ns = 10**18 + number * 33_333_333
             bag.write_image("/cam/image_raw", stamp_ns, "lens", image[..., 0].copy(), "mono8")
-    with pytest.raises(BagError, match="give --fov"), open_recording(tmp_path / "bag", EMPTY):
+    with (
+        pytest.raises(BagError, match="give --fov"),
+        RecordingRequest(tmp_path / "bag", EMPTY).open(),
+    ):
         pass
-    with open_recording(tmp_path / "bag", EMPTY, camera=FOV) as recording:
+    with RecordingRequest(tmp_path / "bag", EMPTY, camera=FOV).open() as recording:
         assert recording.first.camera.fx == pytest.approx(160 / np.tan(np.radians(30)))
         assert recording.first.frame_id == "lens"
         assert len(list(recording.first.frames())) == 20
@@ -347,7 +353,7 @@ def test_a_rolled_cameras_images_are_turned_back(tmp_path: Path) -> None:
     cv2.imwrite(str(tmp_path / "a.png"), image)
     cv2.imwrite(str(tmp_path / "b.png"), image)
     camera = GivenCamera(60.0, roll_rad=np.radians(10.0))
-    with open_recording(tmp_path, TimeSpan(0, 1), camera=camera) as recording:
+    with RecordingRequest(tmp_path, TimeSpan(0, 1), camera=camera).open() as recording:
         (_, _, level, *_), _ = recording.first.images()
         columns = [np.average(np.arange(320), weights=level[v, :, 0] > 128) for v in (60, 180)]
         assert columns[0] == pytest.approx(columns[1], abs=1.5)
@@ -376,7 +382,7 @@ def test_the_scene_is_learned_while_the_person_is_in_view(tmp_path: Path, fps: f
     count = round(5 * fps)
     images = [*swaying(60, count, rng), *swaying(200, count, rng)]
     path = film(tmp_path / "film.avi", images, fps)
-    with open_recording(path, PersonInView(), camera=FOV) as recording:
+    with RecordingRequest(path, PersonInView(), camera=FOV).open() as recording:
         frames = list(recording.first.frames())
         assert len(frames) == 2 * count
         for frame, left in ((frames[5], 60), (frames[-1], 200)):
@@ -391,12 +397,12 @@ def test_a_person_who_never_steps_aside_is_reported(tmp_path: Path) -> None:
     path = film(tmp_path / "film.avi", swaying(60, 75, np.random.default_rng(1)), 15.0)
     with (
         pytest.raises(CardboxError, match=r"hides .* all the time.*--detector mediapipe"),
-        open_recording(path, PersonInView(), camera=FOV),
+        RecordingRequest(path, PersonInView(), camera=FOV).open(),
     ):
         pass
     short = film(tmp_path / "short.avi", pictures(12, 320, 240), 15.0)
     with (
         pytest.raises(CardboxError, match=r"less than 2 s.*--detector mediapipe"),
-        open_recording(short, PersonInView(), camera=FOV),
+        RecordingRequest(short, PersonInView(), camera=FOV).open(),
     ):
         pass

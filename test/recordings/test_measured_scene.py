@@ -34,7 +34,7 @@ def frame(*people: tuple[float, tuple[int, int, int]], found: int) -> RecordedFr
         cv2.rectangle(image, (round(column) - 20, 60), (round(column) + 20, 120), colour, -1)
     points = tuple(standing(column) for column, _ in people[:found])
     silhouette = np.full(SHAPE, 255, np.uint8)
-    return RecordedFrame(0, 0.0, image[..., 0], silhouette, image, people=points)
+    return RecordedFrame(0, 0.0, image, silhouette, people=points)
 
 
 @pytest.mark.parametrize("step", [6.0, -6.0])

@@ -19,7 +19,7 @@ from cardbox_tracker.recordings.bag_reader import BagReader
 from cardbox_tracker.recordings.bag_writer import BagWriter
 from cardbox_tracker.recordings.given_camera import GivenCamera
 from cardbox_tracker.recordings.open_images import is_one_recording, open_images, recordings_in
-from cardbox_tracker.recordings.recording import open_recording
+from cardbox_tracker.recordings.recording import RecordingRequest
 from cardbox_tracker.recordings.silhouettes import SilhouetteSource, TimeSpan
 
 S, MS = 1_000_000_000, 1_000_000
@@ -193,7 +193,7 @@ def test_a_camera_info_of_another_shape_is_refused(tmp_path: Path, size: tuple[i
     store = get_typestore(Stores.ROS2_JAZZY)
     path = recorded(tmp_path / "wide", infos=[info(store, *size)])
     with pytest.raises(CameraError, match=f"/camera_info is for images of {size[0]}x.*160x120"):
-        open_recording(path, EMPTY).__enter__()
+        RecordingRequest(path, EMPTY).open().__enter__()
 
 
 @pytest.mark.parametrize("size", [(160, 120), (640, 480), (1296, 972)])
@@ -317,7 +317,7 @@ def test_transports_of_one_camera_are_one_camera(
 
 def test_the_root_namespace_is_a_camera_beside_others(tmp_path: Path) -> None:
     path = recorded(tmp_path / "bag", ("/image_raw", "/depth/image_raw"))
-    with open_recording(path, EMPTY, ["/"]) as recording:
+    with RecordingRequest(path, EMPTY, ["/"]).open() as recording:
         assert recording.first.account.startswith("used")
 
 

@@ -23,18 +23,15 @@ from cardbox_tracker.person.skeleton import (
     PLACE_NAMES,
     KeypointState,
 )
+from cardbox_tracker.recordings import outputs
+from cardbox_tracker.recordings.messages import message_of
 from cardbox_tracker.recordings.outputs import (
-    METRICS,
-    OUTPUTS,
     JointValues,
-    Markers,
     OutputStream,
-    Text,
     joint_deviations,
     joint_values,
     open_hands,
     open_hands_from,
-    outputs,
     posture_from,
     values_from,
 )
@@ -87,18 +84,16 @@ TOPICS = [
 
 
 def topics(stream: OutputStream, estimate: Estimate, **options: Any) -> list[str]:
-    return [output.topic for output, _ in stream.values(STAMP_NS, estimate, TRACKER, **options)]
+    return [topic for topic, _ in stream.values(STAMP_NS, estimate, TRACKER, **options)]
 
 
 def test_a_posture_is_all_topics_in_their_order() -> None:
-    found = {
-        output.topic: value for output, value in OutputStream().values(STAMP_NS, FOUND, TRACKER)
-    }
+    found = dict(OutputStream().values(STAMP_NS, FOUND, TRACKER))
     assert list(found) == TOPICS
-    kinds = {output.topic: output.kind for output in OUTPUTS if output.topic != "hands"}
-    assert kinds == {topic: type(value) for topic, value in found.items()}
+    kinds = {topic: message_of(lambda kind, **_: kind, None, found[topic]) for topic in found}
+    assert kinds == {topic: outputs.TOPICS[topic] for topic in outputs.TOPICS if topic != "hands"}
     state, keypoints, place, joints, deviations, points, markers = cast(Any, list(found.values()))
-    assert state == Text(TRACKING)
+    assert state == TRACKING
     assert keypoints.names[:4] == ("left_shoulder", "left_elbow", "left_hand", "right_shoulder")
     assert (keypoints.states, keypoints.chances.tolist()) == (STATES, CHANCES.tolist())
     (row,) = place.rows()
@@ -115,8 +110,8 @@ def test_a_posture_is_all_topics_in_their_order() -> None:
     assert (joints.names, deviations.names) == (ALL_NAMES, (*BODY_NAMES, *CLAVICLES, *LEG_NAMES))
     np.testing.assert_array_equal(joints.values, [*POSTURE, *[0.0] * 14])
     np.testing.assert_array_equal(deviations.values[:16], [0.1] * 12 + [0.0] * 4)
-    assert points.points_m.shape == (6, 3)
-    patches, skeleton = markers.shapes
+    assert points.shape == (6, 3)
+    patches, skeleton = markers
     assert (patches.namespace, patches.kind, patches.points_m.shape) == ("patches", 11, (90, 3))
     assert len(patches.colors) == 90
     assert (skeleton.namespace, skeleton.kind, skeleton.points_m.shape) == ("skeleton", 5, (16, 3))
@@ -151,10 +146,8 @@ def test_the_neck_follows_and_has_deviations_if_it_was_seen() -> None:
 
 
 def test_without_the_place_there_are_the_twelve_joints() -> None:
-    stream = OutputStream(outputs(torso_place=False))
-    found = {
-        output.topic: cast(Any, value) for output, value in stream.values(STAMP_NS, SEEN, TRACKER)
-    }
+    stream = OutputStream(torso_place=False)
+    found: dict[str, Any] = dict(stream.values(STAMP_NS, SEEN, TRACKER))
     assert list(found) == TOPICS
     for topic, expected in (("joint_states", POSTURE), ("joint_states_stddev", 0.1)):
         assert found[topic].names == JOINT_NAMES
@@ -164,22 +157,18 @@ def test_without_the_place_there_are_the_twelve_joints() -> None:
 def test_markers_are_where_the_estimate_is() -> None:
     """0.25 m nearer is less z of a level camera, 0.05 m lower is more y."""
     at_rest, moved = (
-        cast(Any, {o.topic: v for o, v in OutputStream().values(STAMP_NS, e, TRACKER)}["markers"])
+        cast(Any, dict(OutputStream().values(STAMP_NS, e, TRACKER))["markers"])
         for e in (FOUND, PLACED)
     )
-    for before, after in zip(at_rest.shapes, moved.shapes, strict=True):
+    for before, after in zip(at_rest, moved, strict=True):
         shift = np.broadcast_to((0.0, 0.05, -0.25), after.points_m.shape)
         np.testing.assert_allclose(after.points_m - before.points_m, shift, atol=1e-12)
 
 
 def test_an_uncertain_posture_is_sent_with_its_state() -> None:
-    found = [
-        (output.topic, value)
-        for output, value in OutputStream().values(
-            STAMP_NS, replace(FOUND, state=UNCERTAIN), TRACKER
-        )
-    ]
-    assert found[0] == ("tracking_state", Text("uncertain"))
+    unsure = replace(FOUND, state=UNCERTAIN)
+    found = list(OutputStream().values(STAMP_NS, unsure, TRACKER))
+    assert found[0] == ("tracking_state", "uncertain")
     assert [topic for topic, _ in found] == TOPICS
 
 
@@ -188,9 +177,9 @@ def test_markers_go_once_when_the_posture_does(state: str) -> None:
     stream = OutputStream()
     topics(stream, FOUND)
     gone = list(stream.values(STAMP_NS, Estimate(state), TRACKER))
-    assert [(output.topic, value) for output, value in gone] == [
-        ("tracking_state", Text(state)),
-        ("markers", Markers(())),
+    assert gone == [
+        ("tracking_state", state),
+        ("markers", ()),
     ]
     assert topics(stream, Estimate(state)) == ["tracking_state"]
     assert topics(stream, FOUND) == TOPICS
@@ -201,14 +190,14 @@ def test_what_nobody_wants_is_not_computed(monkeypatch: pytest.MonkeyPatch) -> N
         "cardbox_tracker.recordings.outputs.marker_shapes", lambda *_: pytest.fail("computed")
     )
     stream = OutputStream()
-    wanted = topics(stream, FOUND, wanted=lambda output: output.topic == "keypoints")
+    wanted = topics(stream, FOUND, wanted=lambda topic: topic == "keypoints")
     assert wanted == ["keypoints"]
     assert topics(stream, Estimate(LOST), wanted=lambda _: False) == []
 
 
 def velocities_of(stream: OutputStream, at_s: float, *seen: Any) -> Any:
     """Velocities of the joint states that a stream gives for an estimate and a tracker."""
-    found = {output.topic: value for output, value in stream.values(round(at_s * 1e9), *seen)}
+    found = dict(stream.values(round(at_s * 1e9), *seen))
     assert getattr(found.get("joint_states_stddev"), "velocities", None) is None
     return cast(JointValues, found["joint_states"]).velocities
 
@@ -242,17 +231,9 @@ def test_velocities_begin_anew_after_a_gap_another_tracker_or_a_jump_of_the_stam
 
 
 def test_without_the_place_velocities_are_those_of_the_twelve_joints() -> None:
-    stream = OutputStream(outputs(torso_place=False))
+    stream = OutputStream(torso_place=False)
     velocities_of(stream, 1.0, FOUND, TRACKER)
     assert velocities_of(stream, 1.1, PLACED, TRACKER).tolist() == [0.0] * 12
-
-
-def test_figures_as_text() -> None:
-    assert {metric.label: metric.text(FOUND) for metric in METRICS} == {
-        "cost (px)": "812",
-        "iou": "0.8765",
-    }
-    assert [metric.text(Estimate(LOST)) for metric in METRICS] == ["", ""]
 
 
 @given(st.permutations(range(12)))

@@ -21,7 +21,7 @@ from cardbox_tracker.detectors.pose_network import Detection
 from cardbox_tracker.recordings.bag_reader import BagReader
 from cardbox_tracker.recordings.bag_writer import BagWriter
 from cardbox_tracker.recordings.other_silhouettes import Within
-from cardbox_tracker.recordings.recording import Recording, open_recording
+from cardbox_tracker.recordings.recording import Recording, RecordingRequest
 from cardbox_tracker.recordings.silhouettes import SilhouetteSource, TimeSpan
 
 PERIOD_NS = 100_000_000
@@ -61,7 +61,7 @@ def chain(tmp_path: Path) -> Path:
 
 @pytest.fixture
 def sources(two: Path, chain: Path) -> Iterator[Recording]:
-    with open_recording(two, EMPTY, ["one", "/two/"], chain) as opened:
+    with RecordingRequest(two, EMPTY, ["one", "/two/"], chain).open() as opened:
         yield opened
 
 
@@ -94,7 +94,7 @@ def test_a_camera_whose_stamps_stand_still_is_not_used(
             stamp = 10**18 + 9 * PERIOD_NS + LATER_NS
             image = np.zeros((48, 64), np.uint8)
             new.write_image("/two/image_raw", stamp, "two_frame", image, "mono8")
-    with open_recording(folder, EMPTY, ["one", "two"], chain) as opened:
+    with RecordingRequest(folder, EMPTY, ["one", "two"], chain).open() as opened:
         sets = list(opened.frames(0.55))
         account = opened.sources[1].account
     # Neither a time of its own, nor a further image of the first camera's time.
@@ -105,21 +105,21 @@ def test_a_camera_whose_stamps_stand_still_is_not_used(
 def test_what_is_missing_is_said(two: Path, chain: Path) -> None:
     with (
         pytest.raises(CameraError, match="camera two"),
-        open_recording(two, EMPTY, ["one", "two"]),
+        RecordingRequest(two, EMPTY, ["one", "two"]).open(),
     ):
         pass
     with pytest.raises(BagError, match=r"0 image topics .*/three/"), BagReader(two) as bag:
         bag.image_topic("three")
-    with pytest.raises(BagError, match="--cameras NAMESPACE"), open_recording(two, EMPTY):
+    with pytest.raises(BagError, match="--cameras NAMESPACE"), RecordingRequest(two, EMPTY).open():
         pass
     with (
         pytest.raises(CardboxError, match="different namespaces"),
-        open_recording(two, EMPTY, ["one", "one"]),
+        RecordingRequest(two, EMPTY, ["one", "one"]).open(),
     ):
         pass
     with (
         pytest.raises(CameraError, match="left camera"),
-        open_recording(two, EMPTY, ["two", "one"], chain, depth="stereo"),
+        RecordingRequest(two, EMPTY, ["two", "one"], chain, depth="stereo").open(),
     ):
         pass
 
@@ -133,20 +133,19 @@ def test_depth_images_cut_out_the_person_without_a_background(two: Path, tmp_pat
             new.write_raw(message.topic, message.msgtype, message.raw, message.time_ns)
         for i in range(9):
             new.write_image("/one/depth", 10**18 + i * PERIOD_NS, "one_frame", depth, "16UC1")
-    with open_recording(folder, Within("/one/depth", 2.0), ["one"]) as source:
+    with RecordingRequest(folder, Within("/one/depth", 2.0), ["one"]).open() as source:
         frames = list(source.first.frames(0.25))
         # Of ten images the last one has no depth image, and two are before that time.
         assert len(frames) == 9 - 3
         assert "/one/depth" in source.first.remarks[0]
         for frame in frames:
             assert frame.silhouette.shape == (source.first.camera.height, source.first.camera.width)
-            assert frame.image is not None
         # A quarter of the image's height times a third of its width is near.
         near = np.mean([np.count_nonzero(frame.silhouette) for frame in frames])
         assert near / frames[0].silhouette.size == pytest.approx(60 / 96 * 40 / 128, rel=0.05)
         assert np.array_equal(frames[0].depth_m > 2.0, frames[0].silhouette == 0)
     within = Within("/one/depth", 2.0)
-    with open_recording(folder, within, ["one"], depth="/one/depth") as sources:
+    with RecordingRequest(folder, within, ["one"], depth="/one/depth").open() as sources:
         # Read once, for the silhouette and for whoever asks for the depth.
         taken = list(sources.frames(0.25))
         assert len(taken) == len(frames)
@@ -155,30 +154,30 @@ def test_depth_images_cut_out_the_person_without_a_background(two: Path, tmp_pat
             "/one/depth" not in sources.first.account and "/two/image_raw" in sources.first.account
         )
         assert not any("is nearer than" in remark for remark in sources.first.remarks)
-    with open_recording(folder, Within("/one/depth", 1.2), ["one"]) as source:
+    with RecordingRequest(folder, Within("/one/depth", 1.2), ["one"]).open() as source:
         list(source.first.frames())
         (_, remark) = source.first.remarks
         assert "--within 1.2 m: the nearest depths are 1.5 m" in remark
     with (
         pytest.raises(CardboxError, match="one camera"),
-        open_recording(folder, within, ["one", "two"]),
+        RecordingRequest(folder, within, ["one", "two"]).open(),
     ):
         pass
     with (
         pytest.raises(CardboxError, match=r"0\.1 m; .*0\.3 to 20 m"),
-        open_recording(folder, Within("/one/depth", 0.1), ["one"]),
+        RecordingRequest(folder, Within("/one/depth", 0.1), ["one"]).open(),
     ):
         pass
 
 
 def test_a_topic_without_depth_is_refused(two: Path) -> None:
     with (
-        open_recording(two, EMPTY, ["one"], depth="/one/camera_info") as opened,
+        RecordingRequest(two, EMPTY, ["one"], depth="/one/camera_info").open() as opened,
         pytest.raises(BagError, match=r"/one/camera_info .*sensor_msgs/msg/Camera"),
     ):
         next(opened.frames())
     with (
-        open_recording(two, EMPTY, ["one"], depth="/one/image_raw") as opened,
+        RecordingRequest(two, EMPTY, ["one"], depth="/one/image_raw").open() as opened,
         pytest.raises(CardboxError, match=r"'mono8'.*16UC1"),
     ):
         next(opened.frames())
@@ -193,7 +192,7 @@ def test_depth_comes_with_the_images_of_its_time(two: Path, tmp_path: Path) -> N
             depth = np.full((48, 64), 1000 + i, np.uint16)
             stamp = 10**18 + i * PERIOD_NS + LATER_NS
             new.write_image("/one/depth", stamp, "one_frame", depth, "16UC1")
-    with open_recording(folder, EMPTY, ["one"], depth="/one/depth") as opened:
+    with RecordingRequest(folder, EMPTY, ["one"], depth="/one/depth").open() as opened:
         depths = [s.depth_m for s in opened.frames(0.55)]
         assert [d is not None for d in depths] == [True, False, True, False]
         assert depths[2] is not None
@@ -202,7 +201,7 @@ def test_depth_comes_with_the_images_of_its_time(two: Path, tmp_path: Path) -> N
 
 
 def test_one_camera_is_a_list_of_one(two: Path) -> None:
-    with open_recording(two, EMPTY, ["one"]) as opened:
+    with RecordingRequest(two, EMPTY, ["one"]).open() as opened:
         sets = list(opened.frames(0.55))
         alone = list(opened.first.frames(0.55))
     assert (opened.names, opened.others) == (("one",), [])
@@ -246,7 +245,7 @@ def test_the_masks_of_a_detector_are_the_silhouettes(
 
     monkeypatch.setattr(detector_module, "PoseNetwork", Network)
     detector = detector_module.Detector(ModelFiles(tmp_path / "a", tmp_path / "b"))
-    with open_recording(two, detector, ["one"]) as source:
+    with RecordingRequest(two, detector, ["one"]).open() as source:
         frames = list(source.first.frames())
         # Of ten images the first six show the empty scene.
         assert [bool(frame.silhouette.any()) for frame in frames] == [False] * 6 + [True] * 4
@@ -270,7 +269,7 @@ def test_given_points_of_several_people_precede_those_of_the_masks(
     table.write_text("\n".join(["stamp_ns,camera,person,joint,u,v,score", *rows]) + "\n")
     models = ModelFiles(tmp_path / "a", tmp_path / "b")
     detector, given = Detector(models)._replace(people=2), PointTable(table, people=2)
-    with open_recording(two, detector, ["one"], points=given) as source:
+    with RecordingRequest(two, detector, ["one"], points=given).open() as source:
         frame, scale = next(iter(source.first.frames())), source.first.camera.width / CAMERA.width
     assert frame.people is not None
     columns = [one.px[POINT_INDEX["left_wrist"], 0] for one in frame.people]

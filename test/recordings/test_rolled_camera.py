@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -15,7 +16,7 @@ from cardbox_tracker.person.posture import reference_posture
 from cardbox_tracker.person.skeleton import KeypointState
 from cardbox_tracker.person.urdf import LinkTransforms, urdf_from_body
 from cardbox_tracker.recordings.given_camera import GivenCamera
-from cardbox_tracker.recordings.outputs import OutputStream, Points
+from cardbox_tracker.recordings.outputs import OutputStream
 from cardbox_tracker.tracking.estimate import Estimate, Hand, Legs
 from cardbox_tracker.tracking.tracker import Tracker
 
@@ -67,13 +68,12 @@ def test_keypoints_markers_and_links_are_in_one_frame(roll_deg: float) -> None:
         tracker.camera.reference_to_optical(level_m),
         clavicles_m=np.zeros(2),
     )
-    sent = {o.topic: value for o, value in OutputStream().values(0, estimate, tracker)}
-    keypoints = sent["keypoints"]
-    assert isinstance(keypoints, Points)
+    sent: dict[str, Any] = dict(OutputStream().values(0, estimate, tracker))
+    keypoints_m = sent["keypoints"]
     expected_m = level_m @ level_to_optical(0.2, np.radians(roll_deg)).T
-    assert keypoints.points_m == pytest.approx(expected_m)
-    skeleton_m = sent["markers"].shapes[1].points_m  # type: ignore[union-attr]
-    hand_m = keypoints.points_m[2]
+    assert keypoints_m == pytest.approx(expected_m)
+    skeleton_m = sent["markers"][1].points_m
+    hand_m = keypoints_m[2]
     assert np.linalg.norm(skeleton_m - hand_m, axis=1).min() < 0.03
     links = LinkTransforms(urdf_from_body(body, "camera")).at(
         dict.fromkeys(LinkTransforms(urdf_from_body(body)).joint_names, 0.0)
@@ -82,4 +82,4 @@ def test_keypoints_markers_and_links_are_in_one_frame(roll_deg: float) -> None:
     x, y, z, w = there.rotation
     cross = np.array([(0, -z, y), (z, 0, -x), (-y, x, 0)])
     to_root = np.eye(3) + 2 * w * cross + 2 * cross @ cross
-    assert keypoints.points_m @ to_root.T == pytest.approx(level_m * (-1.0, -1.0, 1.0))
+    assert keypoints_m @ to_root.T == pytest.approx(level_m * (-1.0, -1.0, 1.0))

@@ -111,11 +111,11 @@ def test_error_by_hand(tmp_path: Path) -> None:
         9999: np.zeros((6, 3)),
     }
     error = tracking_error(estimates, truth)
-    assert error.frames == 2
-    assert error.mean_m == pytest.approx(0.1)
-    assert error.by_segment_m == pytest.approx({"wave": 0.05, "neutral": 0.15})
-    assert error.by_keypoint_m == pytest.approx(dict.fromkeys(KEYPOINT_NAMES, 0.1))
-    assert (error.lateral_m, error.vertical_m, error.depth_m) == pytest.approx((0.015, 0.075, 0.02))
+    assert error["mean_3d_error_m"] == pytest.approx(0.1)
+    assert error["error_by_segment_m"] == pytest.approx({"wave": 0.05, "neutral": 0.15})
+    assert error["error_by_keypoint_m"] == pytest.approx(dict.fromkeys(KEYPOINT_NAMES, 0.1))
+    along = [error[f"{name}_error_m"] for name in ("lateral", "vertical", "depth")]
+    assert along == pytest.approx([0.015, 0.075, 0.02])
 
 
 def test_estimates_of_another_session_are_refused(tmp_path: Path) -> None:

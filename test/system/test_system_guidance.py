@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from copy import copy
 from typing import Any
 
 import numpy as np
@@ -26,10 +27,10 @@ class Person:
         self.obeys = True
         self.mistakes: dict[str, str] = {}
         # The queue holds every line even if this process reads slowly.
-        lines = qos.copy_of(qos.LATCHED)
+        lines = copy(qos.LATCHED)
         lines.depth = 1000
         self.statuses = graph.collect(String, "initializer/status", lines)
-        sentences = qos.copy_of(qos.RESULT)
+        sentences = copy(qos.RESULT)
         sentences.depth = 1000
         self.said = graph.collect(String, "initializer/say", sentences)
         self.guiding = graph.collect(Bool, "initializer/guiding", lines)

@@ -93,7 +93,7 @@ class MomentImages:
         rank = row.worst, -row.stamp_ns
         if not row.worst or (len(self._kept) == self._most and rank < self._kept[0][:2]):
             return
-        picture, camera, body = frame.picture, tracker.camera, tracker.body
+        picture, camera, body = frame.image, tracker.camera, tracker.body
         if self.is_head_hidden:
             picture = with_hidden_head(picture, body, camera, estimate, frame.points)
         scale = max(1, round(_WIDTH_PX / picture.shape[1]))

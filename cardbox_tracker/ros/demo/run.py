@@ -24,18 +24,19 @@ from cardbox_tracker.applications.reporting.page import angles_plot
 from cardbox_tracker.applications.simulation.session import SessionFormat, synthesize_session
 from cardbox_tracker.camera.encodings import SentImage, decode_bgr
 from cardbox_tracker.common.errors import CardboxError
-from cardbox_tracker.common.files import atomic_path
+from cardbox_tracker.common.files import make_folder, write_file
 from cardbox_tracker.common.progress import progress_bar
 from cardbox_tracker.person.posture import REFERENCE_NAMES
 from cardbox_tracker.recordings.bag_reader import BagReader, stamp_ns_of
 from cardbox_tracker.recordings.bag_writer import BagWriter
-from cardbox_tracker.recordings.outputs import OUTPUTS, positions_of
+from cardbox_tracker.recordings.outputs import TOPICS, positions_of
 from cardbox_tracker.recordings.result_bag import BagTransforms, result_writer
 from cardbox_tracker.recordings.result_reader import Results, read_results
 from cardbox_tracker.recordings.result_table import POINT_COLUMNS
 from cardbox_tracker.recordings.truth import GroundTruth, load_ground_truth, tracking_error
 from cardbox_tracker.ros.messages import results
 from cardbox_tracker.ros.messages.results import mean_iou_of
+from cardbox_tracker.ros.messages.types import class_of
 from cardbox_tracker.ros.nodes.camera_poses import silhouettes_of
 from cardbox_tracker.ros.runtime import qos
 from cardbox_tracker.ros.runtime.processes import Nodes, compile_kernels, isolate, running_nodes
@@ -50,7 +51,7 @@ _UNRELIABLE = QoSProfile(depth=100, reliability=ReliabilityPolicy.BEST_EFFORT)
 _OF_PERSON = {
     "body_model": (String, qos.LATCHED),
     "robot_description": (String, qos.LATCHED),
-    **{output.topic: (results.message_type(output.kind), qos.REPLAY) for output in OUTPUTS},
+    **{topic: (class_of(kind), qos.REPLAY) for topic, kind in TOPICS.items()},
 }
 _OF_CAMERA = {
     "silhouette": (Image, qos.REPLAY),
@@ -206,10 +207,7 @@ def run_demo(output: Path, preset: str, seed: int, cameras: int = 1) -> None:
     isolate()
     if cameras > 1 and not PRESETS[preset]().has_several_views:
         raise CardboxError(f"--preset {preset} is for one camera; leave it out with --cameras")
-    try:
-        output.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise CardboxError(f"cannot make the folder {output}: {error.strerror}") from None
+    make_folder(output)
     session = output / "session"
     with progress_bar("synthesize") as show:
         form = SessionFormat(cameras=cameras)
@@ -328,24 +326,18 @@ def _start_nodes(
 _VIDEO_HZ = 15.0
 
 
-def figures(results: Results, truth: GroundTruth, start_ns: int) -> dict[str, object]:
+def figures(results: Results, truth: GroundTruth, start_ns: int) -> dict[str, Any]:
     """Return the errors of the images from a stamp on, metres, and how many have a posture."""
     expected = {stamp for stamp in truth.frames if stamp >= start_ns}
     points_m = results.of(POINT_COLUMNS).reshape(-1, len(POINT_COLUMNS) // 3, 3)
     images = zip(results.stamp_ns.tolist(), results.state, points_m, strict=True)
     found = {s: (state, m) for s, state, m in images if s in expected and np.isfinite(m).all()}
-    error = tracking_error({stamp: m for stamp, (_, m) in found.items()}, truth)
     return {
         "cameras": max(1, len(truth.cameras)),
         "frames": len(expected),
         "frames_tracked": len(found),
         "frames_uncertain": sum(state == UNCERTAIN for state, _ in found.values()),
-        "mean_3d_error_m": error.mean_m,
-        "error_by_keypoint_m": error.by_keypoint_m,
-        "error_by_segment_m": error.by_segment_m,
-        "lateral_error_m": error.lateral_m,
-        "vertical_error_m": error.vertical_m,
-        "depth_error_m": error.depth_m,
+        **tracking_error({stamp: m for stamp, (_, m) in found.items()}, truth),
     }
 
 
@@ -353,10 +345,8 @@ def write_report(output: Path, truth: GroundTruth, start_ns: int, run: dict[str,
     """Write all files about the bag in ``output`` and the values ``run``; print the table."""
     results = read_results(output / "bag")
     report = run | figures(results, truth, start_ns)
-    with atomic_path(output / "report.json") as path:
-        path.write_text(json.dumps(report, indent=2) + "\n", encoding="utf-8")
-    with atomic_path(output / "angles.png") as path:
-        path.write_bytes(angles_plot(results))
+    write_file(output / "report.json", json.dumps(report, indent=2) + "\n")
+    write_file(output / "angles.png", angles_plot(results))
     topic = "".join(f"/{name}" for name in [*truth.cameras][:1]) + "/overlay"
     with BagReader(output / "bag") as bag, video_file(output / "overlay.mp4", _VIDEO_HZ) as add:
         for image in map(bag.deserialize, bag.messages([topic])):

@@ -7,7 +7,6 @@ packages are read by the names of their fields, so that no package has to be ins
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from itertools import chain
 from typing import Any
 
 from geometry_msgs.msg import Point32, Polygon, PolygonStamped
@@ -42,19 +41,16 @@ Convert = Callable[[Any, Size], list[ImagePoints]]
 """Takes a message; returns the points of each person. Raises CardboxError if it is malformed."""
 
 
-def keypoints_message(header: Header, px: FloatArray, scores: FloatArray) -> PolygonStamped:
-    """Return the message of one person's ``LANDMARKS``, (33, 2), px, and scores, (33,)."""
+def people_message(
+    header: Header, people: Sequence[tuple[FloatArray, FloatArray]]
+) -> PolygonStamped:
+    """Return the message of ``LANDMARKS``, (33, 2), px, and scores, (33,), of each person."""
     points = [
         Point32(x=float(px[i, 0]), y=float(px[i, 1]), z=float(scores[i]))
+        for px, scores in people
         for i in map(LANDMARKS.index, MESSAGE_NAMES)
     ]
     return PolygonStamped(header=header, polygon=Polygon(points=points))
-
-
-def people_message(header: Header, people: Sequence[tuple[FloatArray, FloatArray]]) -> Any:
-    """Return the message of the landmarks of several people, one after the other."""
-    one = [keypoints_message(header, *person).polygon.points for person in people]
-    return PolygonStamped(header=header, polygon=Polygon(points=list(chain(*one))))
 
 
 def skeleton_class() -> Any:

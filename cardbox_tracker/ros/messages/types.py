@@ -4,8 +4,12 @@ from __future__ import annotations
 
 import importlib
 import re
+from array import array
 from collections.abc import Callable, Iterable, Mapping
+from functools import cache
 from typing import Any
+
+import numpy as np
 
 from cardbox_tracker.common.errors import BagError, cut, quoted
 
@@ -37,6 +41,23 @@ def optional_class(package: str, name: str) -> Any:
         return getattr(importlib.import_module(f"{package}.msg"), name)
     except (ImportError, AttributeError):
         return None
+
+
+@cache
+def class_of(kind: str) -> Any:
+    """Return the class of a type such as ``std_msgs/msg/String`` that is installed."""
+    return optional_class(*kind.split("/msg/"))
+
+
+def new_message(kind: str, **fields: Any) -> Any:
+    """Return a message of a type with these fields; arrays of numbers are of doubles."""
+    for name, value in fields.items():
+        if isinstance(value, np.ndarray):
+            # rclpy checks each number of any other type.
+            fields[name] = array("d", value.tolist())
+    if kind == "diagnostic_msgs/msg/DiagnosticStatus":
+        fields["level"] = bytes([fields["level"]])
+    return class_of(kind)(**fields)
 
 
 def message_classes(

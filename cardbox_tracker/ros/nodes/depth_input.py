@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from sensor_msgs.msg import CameraInfo, CompressedImage, Image
@@ -52,15 +52,6 @@ class DepthInput:
         return as_seen_by(depth_m, self.camera, camera)
 
 
-class Taken(NamedTuple):
-    """An image or a depth image that waits for its counterpart."""
-
-    message: Any  #: header of the image, or the depth image
-    camera: Camera | None  #: camera of the image; None for a depth image
-    within_m: float  #: depth limit at the time of the image, metres
-    sent_ns: int  #: send time, ns since the epoch
-
-
 Send = Callable[[Header, ImageArray, Camera, int], None]
 """Callback that receives header, silhouette, camera and the later of both send times, ns."""
 
@@ -72,17 +63,17 @@ class DepthCut:
         self._node, self._topic = node, node.resolve(topic)
         self._send = send
         self.depth_m: DepthImage = np.empty((0, 0), np.float32)
-        self._arrivals: Arrivals[Taken] = Arrivals(2, TOLERANCE_NS)
+        self._arrivals: Arrivals[tuple[Any, ...]] = Arrivals(2, TOLERANCE_NS)
         self._input = DepthInput(node, topic, self._on_depth)
 
     def add(self, header: Header, camera: Camera, within_m: float, sent_ns: int) -> None:
         """Add an image of ``camera``, in which pixels nearer than ``within_m`` are the person."""
-        self._add(0, header, Taken(header, camera, within_m, sent_ns))
+        self._add(0, header, (header, camera, within_m, sent_ns))
 
     def _on_depth(self, message: Any, sent_ns: int) -> None:
-        self._add(1, message.header, Taken(message, None, 0.0, sent_ns))
+        self._add(1, message.header, (message, sent_ns))
 
-    def _add(self, number: int, header: Header, taken: Taken) -> None:
+    def _add(self, number: int, header: Header, taken: tuple[Any, ...]) -> None:
         self._arrivals.add(number, conversions.stamp_ns(header.stamp), taken)
         for seen, measured in self._arrivals.sets():
             if seen is None:
@@ -90,12 +81,11 @@ class DepthCut:
             if measured is None:
                 self._node.diagnostics.wait_for(f"depth images on {self._topic}")
                 continue
-            assert seen.camera is not None
+            (header, camera, within_m, seen_ns), (message, measured_ns) = seen, measured
             try:
-                self.depth_m = self._input.seen_by(seen.camera, measured.message)
+                self.depth_m = self._input.seen_by(camera, message)
             except EncodingError as error:
                 # The node would otherwise name the topic of the message that completed the set.
                 raise EncodingError(f"{self._topic}: {error}") from None
-            silhouette = silhouette_within(self.depth_m, seen.within_m)
-            sent_ns = max(seen.sent_ns, measured.sent_ns)
-            self._send(seen.message, silhouette, seen.camera, sent_ns)
+            silhouette = silhouette_within(self.depth_m, within_m)
+            self._send(header, silhouette, camera, max(seen_ns, measured_ns))

@@ -8,8 +8,6 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from geometry_msgs.msg import PolygonStamped
-from rclpy.clock import Clock
-from rclpy.clock_type import ClockType
 from rclpy.subscription import Subscription
 from sensor_msgs.msg import CameraInfo
 from std_msgs.msg import Header
@@ -30,6 +28,7 @@ from cardbox_tracker.ros.messages.types import optional_class
 from cardbox_tracker.ros.nodes.input_stream import InputStream
 from cardbox_tracker.ros.nodes.tracker_parameters import TrackerParameters
 from cardbox_tracker.ros.runtime import qos
+from cardbox_tracker.ros.runtime.diagnostics import every_second
 from cardbox_tracker.ros.runtime.node import CardboxNode
 
 MOST_AGE_NS = 300_000_000
@@ -38,7 +37,6 @@ SAME_TIME_NS = 50_000_000
 """Points that are newer than the silhouette by at most this are of the same time."""
 
 _KEPT = 8
-_LOOK_S = 1.0
 _SILENT_S = 3.0
 # After so many consecutive messages of another time the clocks are in doubt.
 _IN_DOUBT = 5
@@ -73,8 +71,7 @@ class KeypointTopic:
         self._use(POLYGON_STAMPED, PolygonStamped)
         self._look()
         # The publisher may start later, or be replaced by one of another type.
-        steady = Clock(clock_type=ClockType.STEADY_TIME)
-        self._timer = node.create_timer(_LOOK_S, self._look, clock=steady)
+        self._timer = every_second(node, self._look)
 
     def take(self, at_ns: int, frame_id: str) -> Taken | None:
         """Return the newest points for a silhouette of this stamp and frame, once, or None."""
@@ -274,13 +271,8 @@ class CameraKeypoints:
         Of several people it chooses the one in the silhouette; points of a table join within
         ``tolerance_ns``.
         """
-        calibration, at_ns = self._watch.current, stamp_ns(header.stamp)
-        taken = self._taken(at_ns, header.frame_id, tolerance_ns)
-        self._images += 1
-        if taken is None or calibration is None:
-            return None
-        size = camera.width, camera.height
-        person = person_in(silhouette, [placed(one, calibration, size) for one in taken.persons])
+        found = self._placed(header, camera, tolerance_ns)
+        person = None if found is None else person_in(silhouette, found)
         if person is None:
             return None
         self._reason = why_not(silhouette, person)
@@ -288,20 +280,29 @@ class CameraKeypoints:
             self._beside += 1
             return None
         self._used, self._beside = self._used + 1, 0
-        return ImagePoints(person.px, person.scores, min(taken.stamp_ns, at_ns))
+        return person
 
     def people(self, header: Header, camera: Camera) -> list[ImagePoints] | None:
         """Return the points of all people in the image; None before a detector has found any."""
-        calibration, at_ns = self._watch.current, stamp_ns(header.stamp)
-        taken = self._taken(at_ns, header.frame_id, TOLERANCE_NS)
-        self._images += 1
-        if taken is None or calibration is None:
+        found = self._placed(header, camera, TOLERANCE_NS)
+        if found is None:
             # Once a detector has found people, regions of the silhouette are none.
             return [] if self._used else None
         self._used += 1
-        size, age_ns = (camera.width, camera.height), min(taken.stamp_ns, at_ns)
+        return [one for one in found if not one.is_empty]
+
+    def _placed(
+        self, header: Header, camera: Camera, tolerance_ns: int
+    ) -> list[ImagePoints] | None:
+        """Return the points of all persons in px of the silhouette; None if there are none yet."""
+        calibration, at_ns = self._watch.current, stamp_ns(header.stamp)
+        taken = self._taken(at_ns, header.frame_id, tolerance_ns)
+        self._images += 1
+        if taken is None or calibration is None:
+            return None
+        size, of_ns = (camera.width, camera.height), min(taken.stamp_ns, at_ns)
         found = (placed(one, calibration, size) for one in taken.persons)
-        return [ImagePoints(one.px, one.scores, age_ns) for one in found if not one.is_empty]
+        return [ImagePoints(one.px, one.scores, of_ns) for one in found]
 
     def _taken(self, at_ns: int, frame_id: str, tolerance_ns: int) -> Taken | None:
         if self.topic is not None:

@@ -25,7 +25,7 @@ from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.model_file import dumps_body_model, load_body_model, loads_body_model
 from cardbox_tracker.person.skeleton import PLACE_NAMES
 from cardbox_tracker.person.urdf import urdf_from_body
-from cardbox_tracker.recordings.outputs import METRICS, place_of
+from cardbox_tracker.recordings.outputs import place_of
 from cardbox_tracker.ros.messages import conversions
 from cardbox_tracker.ros.nodes.camera_inputs import CameraInputs, Received
 from cardbox_tracker.ros.nodes.tracker_outputs import TrackedBodies, TrackerOutputs
@@ -111,7 +111,8 @@ class TrackingReport:
         estimate = self._estimate
         if estimate is None or estimate.posture is None:
             return values
-        values |= {metric.label: metric.text(estimate) for metric in METRICS}
+        if estimate.cost_px is not None and estimate.iou is not None:
+            values |= {"cost (px)": str(estimate.cost_px), "iou": f"{estimate.iou:.4f}"}
         if estimate.posture_stddev is not None:
             angles = estimate.posture_stddev[1:]
             values["largest deviation (deg)"] = f"{math.degrees(float(angles.max())):.1f}"

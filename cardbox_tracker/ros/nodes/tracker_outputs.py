@@ -15,17 +15,16 @@ from cardbox_tracker.person.model_file import dumps_body_model
 from cardbox_tracker.person.rep155 import Rep155Joints, head_joints, joint_names
 from cardbox_tracker.person.urdf import rep155_urdf
 from cardbox_tracker.recordings.outputs import (
+    TOPICS,
     JointValues,
-    Output,
     OutputStream,
     clavicles_of,
     neck_of,
-    outputs,
     person_space,
     place_of,
 )
 from cardbox_tracker.ros.messages import conversions, results
-from cardbox_tracker.ros.messages.types import optional_class
+from cardbox_tracker.ros.messages.types import class_of, optional_class
 from cardbox_tracker.ros.nodes.camera_inputs import ObservationSet
 from cardbox_tracker.ros.nodes.tracker_parameters import TrackerParameters
 from cardbox_tracker.ros.runtime import qos
@@ -93,7 +92,7 @@ class Rep155Outputs:
             others = place_of(estimate), head_joints(neck_of(estimate)), clavicles_of(estimate)
             values = np.concatenate([values, *others])
         joints = JointValues(self._names, values)
-        self._joints.publish(results.joint_state_message(header, joints))
+        self._joints.publish(results.message_of(header, joints))
 
 
 class TrackerOutputs:
@@ -106,18 +105,16 @@ class TrackerOutputs:
         person: int | None = None,
         bodies: TrackedBodies | None = None,
     ) -> None:
-        topics = outputs(settings.torso_place, settings.hands)
         space = "" if person is None else f"{person_space(person)[1:]}/"
         self._publishers = {
-            output.topic: node.advertise(
-                results.message_type(output.kind), space + output.topic, qos.RESULT
-            )
-            for output in topics
+            topic: node.advertise(class_of(kind), space + topic, qos.RESULT)
+            for topic, kind in TOPICS.items()
+            if settings.hands or topic != "hands"
         }
         # With people, body_model is that of the first one, or the given one of all.
         self._model = space and node.advertise(String, f"{space}body_model", qos.LATCHED)
         self._body: BodyModel | None = None
-        self._stream = OutputStream(topics)
+        self._stream = OutputStream(settings.torso_place)
         self._overlay = node.advertise(Image, f"{space}overlay", qos.SENSOR_DATA)
         self._camera_overlays = [
             node.advertise(Image, f"{camera.rstrip('/')}/overlay", qos.SENSOR_DATA)
@@ -142,8 +139,8 @@ class TrackerOutputs:
             # Joint states of a version of the body follow it.
             self._body = tracker.body
             self._model.publish(String(data=dumps_body_model(self._body)))
-        for output, value in self._stream.values(stamp_ns, estimate, tracker, self._is_wanted):
-            self._publishers[output.topic].publish(results.message_of(header, value))
+        for topic, value in self._stream.values(stamp_ns, estimate, tracker, self._is_wanted):
+            self._publishers[topic].publish(results.message_of(header, value))
         if self._human is not None:
             self._human.publish(header, estimate, tracker)
         if _wanted(self._overlay) and not self._guided:
@@ -155,8 +152,8 @@ class TrackerOutputs:
                 image = draw_camera_overlay(seen.picture(number), number, estimate, tracker)
                 publisher.publish(conversions.image_message(own, image, "bgr8"))
 
-    def _is_wanted(self, output: Output) -> bool:
-        return _wanted(self._publishers[output.topic])
+    def _is_wanted(self, topic: str) -> bool:
+        return topic in self._publishers and _wanted(self._publishers[topic])
 
     def waiting(self, message: Image, seen: Image | None, text: str) -> None:
         """Publish on ``overlay`` the image, or the silhouette, with a text about missing inputs."""

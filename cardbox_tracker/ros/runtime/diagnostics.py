@@ -16,6 +16,7 @@ from rclpy.clock import Clock
 from rclpy.clock_type import ClockType
 from rclpy.node import Node
 from rclpy.qos import QoSProfile
+from rclpy.timer import Timer
 
 from cardbox_tracker.camera.stamps import WINDOW, StreamStatistics
 from cardbox_tracker.common.errors import plain
@@ -65,7 +66,11 @@ class LogLimit:
         return True
 
 
-PERIOD_S = 1.0
+def every_second(node: Node, call: Callable[[], None]) -> Timer:
+    """Call a function once a second, also while the time of a simulation stands still."""
+    return node.create_timer(1.0, call, clock=Clock(clock_type=ClockType.STEADY_TIME))
+
+
 # The input has ceased after this time and this number of periods without a message.
 _SILENT_S = 3.0
 _SILENT_PERIODS = 5.0
@@ -129,8 +134,7 @@ class NodeDiagnostics:
             QoSProfile(depth=10),
             event_callbacks=qos.publisher_events("/diagnostics", self.warn),
         )
-        steady = Clock(clock_type=ClockType.STEADY_TIME)
-        self._timer = node.create_timer(PERIOD_S, self.publish, clock=steady)
+        self._timer = every_second(node, self.publish)
 
     def wait_for(self, text: str) -> None:
         """Report that the node publishes nothing until ``text`` arrives."""

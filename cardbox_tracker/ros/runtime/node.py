@@ -6,11 +6,10 @@ import sys
 import time
 import traceback
 from collections.abc import Callable
+from copy import copy
 from typing import Any, Protocol, TypeVar
 
 import rclpy
-from rclpy.clock import Clock
-from rclpy.clock_type import ClockType
 from rclpy.exceptions import ROSInterruptException
 from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 from rclpy.logging import get_logger
@@ -25,7 +24,7 @@ from std_srvs.srv import Trigger
 from cardbox_tracker.common import garbage, interrupts
 from cardbox_tracker.common.errors import CardboxError, cut, quoted
 from cardbox_tracker.ros.runtime import qos
-from cardbox_tracker.ros.runtime.diagnostics import PERIOD_S, NodeDiagnostics
+from cardbox_tracker.ros.runtime.diagnostics import NodeDiagnostics, every_second
 from cardbox_tracker.ros.runtime.publishers import TopicTypes
 
 Subscriber = Callable[[Any, dict[str, Any]], None]
@@ -116,7 +115,7 @@ class CardboxNode(Node):
         return self.create_publisher(
             kind,
             topic,
-            qos.copy_of(profile),
+            copy(profile),  # which an override changes
             event_callbacks=qos.publisher_events(self.resolve(topic), self.diagnostics.warn),
             qos_overriding_options=qos.overridable(profile),
         )
@@ -155,7 +154,7 @@ class CardboxNode(Node):
             kind,
             topic,
             guarded,  # type: ignore[arg-type]  # rclpy leaves out its own second argument
-            qos.copy_of(profile),
+            copy(profile),
             event_callbacks=qos.subscription_events(self.resolve(topic), self.diagnostics.warn),
             qos_overriding_options=qos.overridable(profile),
         )
@@ -173,8 +172,7 @@ class CardboxNode(Node):
                 timer.cancel()
                 self.create_subscription(CameraInfo, topic, heard, qos.LATCHED)  # type: ignore[arg-type]
 
-        steady = Clock(clock_type=ClockType.STEADY_TIME)
-        timer = self.create_timer(PERIOD_S, look, clock=steady)
+        timer = every_second(self, look)
 
     def _guarded(self, topic: str, callback: Callback) -> Callable[[Any, dict[str, Any]], None]:
         def guarded(message: Any, info: dict[str, Any]) -> None:

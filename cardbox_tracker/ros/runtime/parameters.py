@@ -24,7 +24,6 @@ T = TypeVar("T", bound=NodeParameters)
 _OF_QOS = "qos_overrides."
 _LIST_TYPES = {
     list[float]: Parameter.Type.DOUBLE_ARRAY,
-    list[int]: Parameter.Type.INTEGER_ARRAY,
     list[str]: Parameter.Type.STRING_ARRAY,
 }
 _TYPE_TEXTS = {
@@ -33,7 +32,6 @@ _TYPE_TEXTS = {
     float: "a number",
     str: "a text",
     list[float]: "a list of numbers",
-    list[int]: "a list of whole numbers",
     list[str]: "a list of texts",
 }
 

@@ -61,16 +61,6 @@ def overridable(profile: QoSProfile) -> QoSOverridingOptions:
     return QoSOverridingOptions(kinds)
 
 
-def copy_of(profile: QoSProfile) -> QoSProfile:
-    """Return a profile with the same policies, because an override changes the given object."""
-    return QoSProfile(
-        history=profile.history,
-        depth=profile.depth,
-        reliability=profile.reliability,
-        durability=profile.durability,
-    )
-
-
 def mismatch_text(topic: str, kind: QoSPolicyKind, subscribing: bool) -> str:
     """Return an explanation of a QoS mismatch; ``subscribing`` is False if this node publishes."""
     name = qos_policy_name_from_kind(kind)

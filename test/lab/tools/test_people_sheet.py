@@ -45,7 +45,7 @@ def test_heads_are_those_of_the_reference_and_of_the_detector(image: np.ndarray)
         "joints_px": {"head": [300.0, 100.0]},
     }
     points = ImagePoints.of({"nose": (140.0, 44.0, 0.9), "left_wrist": (10.0, 10.0, 0.9)})
-    frame = RecordedFrame(0, 0.0, image[..., 0], MASK, image, points=points)
+    frame = RecordedFrame(0, 0.0, image, MASK, points=points)
     radius = pytest.approx(150.0 * HEAD_RADIUS_M)
     found = heads_in(frame, entry, CAMERA, 640)
     assert found == [(150.0, 50.0, radius), (140.0, 44.0, radius)]

@@ -77,4 +77,4 @@ def test_errors_and_lost_images_are_counted(truth: GroundTruth) -> None:
     assert report["lateral_error_m"] == pytest.approx(0.03)
     assert report["vertical_error_m"] == pytest.approx(0.0, abs=1e-9)
     assert report["depth_error_m"] == pytest.approx(0.04)
-    assert set(report["error_by_segment_m"]) <= {"neutral", "bow"}  # type: ignore[call-overload]
+    assert set(report["error_by_segment_m"]) <= {"neutral", "bow"}

@@ -22,14 +22,12 @@ from cardbox_tracker.person.posture import reference_posture
 from cardbox_tracker.person.skeleton import JOINT_NAMES, KeypointState
 from cardbox_tracker.recordings.markers import MarkerShape, marker_shapes
 from cardbox_tracker.recordings.outputs import (
-    OUTPUTS,
+    TOPICS,
     JointValues,
     KeypointStates,
-    Markers,
-    Points,
-    Text,
 )
 from cardbox_tracker.ros.messages import conversions, results
+from cardbox_tracker.ros.messages.types import class_of
 
 HEADER = Header(frame_id="optical")
 CAMERA = Camera(320, 240, 300.0, 310.0, 159.5, 119.5)
@@ -202,10 +200,8 @@ def test_what_is_not_used_of_a_camera_info_may_be_anything() -> None:
     "make",
     [
         lambda values: JointValues(JOINT_NAMES, values[:12]),
-        lambda values: Points(values.reshape(6, 3)),
-        lambda values: Markers(
-            (MarkerShape("patches", 5, 1.0, values.reshape(6, 3), (0, 0, 0, 1)),)
-        ),
+        lambda values: values.reshape(6, 3),
+        lambda values: (MarkerShape("patches", 5, 1.0, values.reshape(6, 3), (0, 0, 0, 1)),),
     ],
 )
 def test_what_is_not_finite_becomes_no_message(make: Any, value: float) -> None:
@@ -218,7 +214,7 @@ def test_what_is_not_finite_becomes_no_message(make: Any, value: float) -> None:
 
 def test_joint_state_has_names_positions_and_header() -> None:
     posture = reference_posture("arms")
-    message = results.joint_state_message(HEADER, JointValues(JOINT_NAMES, posture))
+    message = results.message_of(HEADER, JointValues(JOINT_NAMES, posture))
     assert tuple(message.name) == JOINT_NAMES
     np.testing.assert_array_equal(message.position, posture)
     assert message.header.frame_id == "optical"
@@ -230,16 +226,14 @@ def test_joint_state_has_names_positions_and_header() -> None:
 
 def test_joint_state_has_velocities_where_they_are_known() -> None:
     moving = JointValues(("a", "b"), np.zeros(2), np.array([0.5, -2.0]))
-    assert list(results.joint_state_message(HEADER, moving).velocity) == [0.5, -2.0]
+    assert list(results.message_of(HEADER, moving).velocity) == [0.5, -2.0]
     with pytest.raises(NotFiniteError, match="velocities"):
-        results.joint_state_message(HEADER, moving._replace(velocities=np.array([0.0, np.inf])))
+        results.message_of(HEADER, moving._replace(velocities=np.array([0.0, np.inf])))
 
 
 def test_markers_are_the_patches_and_the_skeleton_in_the_optical_frame() -> None:
     body, posture = BodyModel(), reference_posture("front")
-    patches, skeleton = results.markers_message(
-        HEADER, Markers(marker_shapes(body, posture))
-    ).markers
+    patches, skeleton = results.message_of(HEADER, marker_shapes(body, posture)).markers
     corners = CAMERA.reference_to_optical(cardbox_patches(body, posture))
     assert (patches.type, len(patches.points), len(patches.colors)) == (
         Marker.TRIANGLE_LIST,
@@ -254,31 +248,26 @@ def test_markers_are_the_patches_and_the_skeleton_in_the_optical_frame() -> None
 
 def test_keypoints_are_poses_of_the_optical_frame() -> None:
     points = np.arange(18.0).reshape(6, 3)
-    message = results.points_message(HEADER, Points(points))
+    message = results.message_of(HEADER, points)
     got = [(p.position.x, p.position.y, p.position.z) for p in message.poses]
     np.testing.assert_array_equal(got, points)
     assert all(pose.orientation.w == 1.0 for pose in message.poses)
 
 
 def test_no_markers_remove_those_before() -> None:
-    (marker,) = results.markers_message(HEADER, Markers(())).markers
+    (marker,) = results.message_of(HEADER, ()).markers
     assert marker.action == Marker.DELETEALL
 
 
 def test_a_state_is_a_word() -> None:
-    assert results.message_of(HEADER, Text("uncertain")).data == "uncertain"
+    assert results.message_of(HEADER, "uncertain").data == "uncertain"
 
 
 def test_every_output_has_its_message() -> None:
     states = KeypointStates(("a",), (KeypointState.LOST,), np.array([0.75]))
-    values = (
-        *(JointValues(("a",), np.zeros(1)), Points(np.zeros((1, 3))), Markers(()), Text("a")),
-        states,
-    )
-    for value in values:
-        message = results.message_of(HEADER, value)
-        assert isinstance(message, results.message_type(type(value)))
-    assert {output.kind for output in OUTPUTS} <= {type(value) for value in values}
+    values = (JointValues(("a",), np.zeros(1)), np.zeros((1, 3)), (), "a", states)
+    found = {type(results.message_of(HEADER, value)) for value in values}
+    assert found == set(map(class_of, TOPICS.values()))
     (status,) = results.message_of(HEADER, states).status
     assert (status.name, status.message, status.level) == ("a", "lost", DiagnosticStatus.ERROR)
     assert status.values[0].value == "0.750"

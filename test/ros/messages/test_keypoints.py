@@ -18,7 +18,7 @@ from cardbox_tracker.ros.messages.keypoints import (
     COCO_NAMES,
     MESSAGE_NAMES,
     SKELETON_NAMES,
-    keypoints_message,
+    people_message,
     persons_of_detections,
     persons_of_polygon,
     persons_of_skeleton,
@@ -66,7 +66,7 @@ def test_the_order_is_that_of_coco() -> None:
 def test_points_of_the_detector_come_back() -> None:
     rng = np.random.default_rng(0)
     px, scores = rng.uniform(0, 400, (33, 2)), rng.uniform(0.1, 1.0, 33)
-    message = keypoints_message(Header(frame_id="eye"), px, scores)
+    message = people_message(Header(frame_id="eye"), [(px, scores)])
     assert message.header.frame_id == "eye"
     assert len(message.polygon.points) == len(MESSAGE_NAMES) == 21
     (person,) = persons_of_polygon(message, SIZE)
@@ -77,7 +77,7 @@ def test_points_of_the_detector_come_back() -> None:
 
 def test_an_image_without_a_person_gives_an_empty_person_or_none() -> None:
     (person,) = persons_of_polygon(
-        keypoints_message(Header(), np.zeros((33, 2)), np.zeros(33)), SIZE
+        people_message(Header(), [(np.zeros((33, 2)), np.zeros(33))]), SIZE
     )
     assert person.is_empty
     assert persons_of_polygon(polygon(), SIZE) == []

@@ -38,6 +38,10 @@ def test_each_change_of_state_is_told_once() -> None:
     assert "tracker/reset" in report.warnings()[""]
     report.add(found(TRACKING), BODY)
     assert report.warnings() == {}
+    values = report.values({})
+    assert (values["cost (px)"], values["iou"]) == ("812", "0.7500")
+    report.add(Estimate(TRACKING, np.zeros(12)), BODY)
+    assert not {"cost (px)", "iou"} & report.values({}).keys()
 
 
 @pytest.mark.parametrize("preset", PRESETS)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from copy import copy
+
 import pytest
 from rclpy.qos import DurabilityPolicy, QoSPolicyKind
 
@@ -38,6 +40,6 @@ def test_durability_of_latched_topics_stays_latched() -> None:
 
 
 def test_a_copy_can_be_overridden_without_changing_the_profile() -> None:
-    copy = qos.copy_of(qos.LATCHED)
-    copy.durability = DurabilityPolicy.VOLATILE
+    changed = copy(qos.LATCHED)
+    changed.durability = DurabilityPolicy.VOLATILE
     assert qos.LATCHED.durability == DurabilityPolicy.TRANSIENT_LOCAL
