@@ -25,6 +25,7 @@ import pytest
 from hypothesis import HealthCheck, settings
 
 from cardbox_tracker.camera.camera import Camera
+from cardbox_tracker.common import garbage
 from cardbox_tracker.detectors.image_points import ImagePoints
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.posture import N_STATE
@@ -38,6 +39,9 @@ with contextlib.suppress(ImportError), warnings.catch_warnings():
     # What rclpy imports with the first message uses modules that Python has deprecated.
     warnings.simplefilter("ignore", DeprecationWarning)
     importlib.import_module("lark")
+
+# Collecting makes half a million objects that stay; searching them took seconds of each process.
+garbage.search_seldom()
 
 # Otherwise each process of a run would compile 800 files of the tests and the package anew.
 os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
@@ -111,6 +115,11 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     places = {path: float(BETWEEN * place) for place, path in enumerate(waiting)}
     places |= {path: place + 0.5 for place, path in enumerate(computing)}
     items.sort(key=lambda item: places[item.path])
+
+
+def pytest_collection_finish() -> None:
+    """Search for garbage among what the tests make."""
+    garbage.keep_all()
 
 
 @pytest.hookimpl(wrapper=True)

@@ -12,6 +12,7 @@ import pytest
 
 from cardbox_tracker.applications.simulation.session import SessionFormat, synthesize_session
 from cardbox_tracker.commands.main import main
+from cardbox_tracker.measuring import first_sight
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.model_file import save_body_model
 from cardbox_tracker.person.skeleton import KEYPOINT_NAMES
@@ -52,6 +53,13 @@ def cardbox(capsys: pytest.CaptureFixture[str]) -> Callable[..., Done]:
         return Done(code, *capsys.readouterr())
 
     return run
+
+
+@pytest.fixture
+def quick_sight(monkeypatch: pytest.MonkeyPatch) -> None:
+    """For tests of what does not depend on how well a person is fitted whom nobody measured."""
+    monkeypatch.setattr(first_sight, "_ROUNDS", 1)
+    monkeypatch.setattr(first_sight, "_DISTANCES_M", np.array([1.5]))
 
 
 @pytest.fixture(scope="session")

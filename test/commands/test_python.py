@@ -73,7 +73,7 @@ def film(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture
-def network(film: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+def network(film: Path, quick_sight: None, monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
     """Be in the folder of the film, with the package that the example needs."""
     monkeypatch.setitem(sys.modules, "ultralytics", SimpleNamespace(YOLO=FakeYolo))
     monkeypatch.chdir(film.parent)

@@ -295,6 +295,7 @@ def test_the_cameras_pitch_is_found_from_the_recording(
     expected: tuple[str, ...],
     film: Path,
     fov: str,
+    quick_sight: None,
     monkeypatch: pytest.MonkeyPatch,
     cardbox: Callable[..., Any],
 ) -> None:

@@ -89,12 +89,21 @@ class Scene:
 # A process that has imported the nodes and loaded their code, of which each node is a copy: a node
 # then starts at once. The parent of a copy ends, so that the tests' process inherits the copy.
 SERVER = """
-import json, os, sys
+import inspect, json, os, sys
+from rclpy.type_support import check_for_type_support
+from rosbags.typesys import Stores, get_typestore
 from cardbox_tracker.start import main
-from cardbox_tracker.ros.nodes import single_process
+from cardbox_tracker.ros.nodes import play_bag_node, single_process
 from cardbox_tracker.tracking import precompile
 for part in json.loads(precompile.FILM_KERNELS.read_text()).items():
     precompile.compile_each(part)
+# What every node would do on its own: track once, find its messages' code, and log from a module.
+precompile._call_all(tuple(precompile.PRESETS), True, True)
+for kind in [kind for module in list(sys.modules.values()) if hasattr(module, "__path__")
+    for kind in vars(module).values() if hasattr(kind, "__import_type_support__")]:
+    check_for_type_support(kind)
+get_typestore(Stores.ROS2_JAZZY)
+inspect.getmodule(inspect.currentframe())
 for line in sys.stdin:
     words, log, environment = json.loads(line)
     if parent_of_copy := os.fork():

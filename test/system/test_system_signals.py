@@ -51,6 +51,7 @@ def end_early(name: str, arguments: list[str], number: int, stage: str) -> tuple
         assert time.monotonic() < end
         if process.poll() is not None:
             break
+        time.sleep(0.002)
     process.send_signal(number)
     said, _ = process.communicate(timeout=_LIMIT_S)
     return process.returncode, said

@@ -13,7 +13,7 @@ from lab.experiments.parallel import Progress
 from lab.experiments.plan import Plan
 from lab.experiments.sessions import Session, synthetic_session
 
-FPS, SIZE = 2.0, (160, 120)
+FPS, SIZE = 1.0, (160, 120)
 
 TINY = Plan(
     runs=3,
@@ -23,7 +23,7 @@ TINY = Plan(
     peer_runs=2,
     bodies=2,
     seeds=2,
-    model_every=8,
+    model_every=4,
     survival_rates=(0.005, 0.4, 1.0),
     particles=(25, 50),
     tempers=(0.015, 1.0),
@@ -62,4 +62,4 @@ def recording(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.fixture(scope="package")
 def session() -> Session:
     """A synthetic session, ready to be tracked."""
-    return synthetic_session("bow", 0, FPS, SIZE)
+    return synthetic_session("bow", 0, 2.0, SIZE)
