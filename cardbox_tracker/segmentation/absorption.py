@@ -9,14 +9,12 @@ region that a person touches in the image stays foreground.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import Any
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from cardbox_tracker.common.array_checks import ANY, check_array
-from cardbox_tracker.common.compiling import kernel
 from cardbox_tracker.segmentation.empty_scene import BackgroundLearner, BackgroundModel
 from cardbox_tracker.segmentation.scene_motion import changed_pixels
 
@@ -71,13 +69,10 @@ class StillRegions:
             self._sum = np.zeros(size[::-1], np.uint16)
             self._seen = np.zeros(size[::-1], np.uint8)
         check_array("sum of the images before it", self._sum, size[::-1], np.uint16)
-        if (height, width) != (_SCALE * size[1], _SCALE * size[0]):
-            seen = cv2.resize(silhouette, size, interpolation=cv2.INTER_AREA)
-            small = cv2.resize(brightness, size, interpolation=cv2.INTER_AREA)
-            self._sum += np.asarray(small, np.uint8).reshape(self._sum.shape)
-            self._seen |= np.asarray(seen, np.uint8).reshape(self._seen.shape)
-        else:
-            _add_halved(brightness, silhouette, self._sum, self._seen)
+        seen = cv2.resize(silhouette, size, interpolation=cv2.INTER_AREA)
+        small = cv2.resize(brightness, size, interpolation=cv2.INTER_AREA)
+        self._sum += np.asarray(small, np.uint8).reshape(self._sum.shape)
+        self._seen |= np.asarray(seen, np.uint8).reshape(self._seen.shape)
         self._count += 1
         if self._count < _BLOCK:
             return None
@@ -184,22 +179,3 @@ class Absorber:
 def _disk(radius_px: int) -> ImageArray:
     size = 2 * radius_px + 1
     return np.asarray(cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (size, size)), np.uint8)
-
-
-@kernel
-def _add_halved(brightness: Any, silhouette: Any, total: Any, seen: Any) -> None:
-    """Add the rounded means of squares of 2x2 px, and mark the squares with a person.
-
-    Brightness and silhouette are (2 h, 2 w), ``total`` (h, w) uint16 and ``seen`` (h, w).
-    """
-    height, width = total.shape
-    for v in range(height):
-        above, below, out = brightness[2 * v], brightness[2 * v + 1], total[v]
-        for u in range(width):
-            one, other = np.int32(above[2 * u]), np.int32(above[2 * u + 1])
-            square = np.int32(one + other + np.int32(below[2 * u]) + np.int32(below[2 * u + 1]))
-            out[u] += np.uint16(np.int32(square + 2) >> np.int32(2))
-        above, below, marks = silhouette[2 * v], silhouette[2 * v + 1], seen[v]
-        for u in range(width):
-            one, other = above[2 * u] | above[2 * u + 1], below[2 * u] | below[2 * u + 1]
-            marks[u] |= one | other

@@ -15,7 +15,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
-from typing import Any
 
 import cv2
 import numpy as np
@@ -24,17 +23,15 @@ from numpy.typing import NDArray
 from cardbox_tracker.camera.encodings import brightness_of
 from cardbox_tracker.camera.given_arrays import image_from
 from cardbox_tracker.common.array_checks import ANY, check_array
-from cardbox_tracker.common.compiling import kernel
 from cardbox_tracker.segmentation.absorption import Absorber
 from cardbox_tracker.segmentation.background_config import BackgroundConfig
-from cardbox_tracker.segmentation.chroma import ChromaScore
-from cardbox_tracker.segmentation.color_reader import ColorReader
+from cardbox_tracker.segmentation.chroma import ChromaScore, colors_of
 from cardbox_tracker.segmentation.empty_scene import BackgroundLearner, BackgroundModel
 from cardbox_tracker.segmentation.light import LightFollower
 from cardbox_tracker.segmentation.partial_scene import merged
 from cardbox_tracker.segmentation.regions import LEAST_AREA, MOST_HOLE, clean_in_window
 from cardbox_tracker.segmentation.shadows import decide_shadows
-from cardbox_tracker.segmentation.window import Window, find_edges, window_of
+from cardbox_tracker.segmentation.window import Window, window_of
 
 FloatImage = NDArray[np.float32]
 ImageArray = NDArray[np.uint8]
@@ -45,51 +42,28 @@ def segment_foreground(
     brighter: FloatImage,
     darker: FloatImage,
     edge: float,
-    score: FloatImage,
 ) -> tuple[ImageArray, Window]:
     """Mark the pixels whose score is at least 1 and at least ``edge`` times their neighbours'.
 
     The score of a difference, (H, W), grey levels, is the larger of its products with ``brighter``
     and ``darker``: scores of one grey level more than the background, and negative ones of one
-    less, (H, W). ``edge`` is a fraction of the highest score among a pixel and its 8 neighbours;
-    ``score`` (H, W) is scratch.
+    less, (H, W). ``edge`` is a fraction of the highest score among a pixel and its 8 neighbours.
 
     Returns (H, W), 0 or 255, and its window as :func:`~.window.window_of` has it. Raises ValueError
-    if the arrays differ in shape, or one is read-only.
+    if the arrays differ in shape or type.
     """
-    check_array("difference", difference, (ANY, ANY), np.float32, is_written=True)
+    check_array("difference", difference, (ANY, ANY), np.float32)
     shape = difference.shape
-    check_array("brighter", brighter, shape, np.float32, is_written=True)
-    check_array("darker", darker, shape, np.float32, is_written=True)
-    check_array("score", score, shape, np.float32, is_written=True)
-    foreground = np.empty(shape, np.uint8)
-    edges = _foreground(difference, brighter, darker, np.float32(edge), score, foreground)
-    return foreground, Window(*edges)
+    check_array("brighter", brighter, shape, np.float32)
+    check_array("darker", darker, shape, np.float32)
+    score = np.maximum(difference * brighter, difference * darker)
+    highest = np.asarray(cv2.dilate(score, _NEIGHBOURS), np.float32).reshape(shape)
+    is_seen = (score >= np.float32(edge) * highest) & (score >= np.float32(1))
+    foreground: ImageArray = np.uint8(255) * is_seen
+    return foreground, window_of(foreground)
 
 
-@kernel
-def _foreground(
-    difference: Any, brighter: Any, darker: Any, edge: Any, score: Any, foreground: Any
-) -> Any:
-    """Write the foreground (H, W), and return the edges of its window."""
-    height, width = difference.shape
-    one = np.float32(1)
-    for v in range(height):
-        for u in range(width):
-            value = difference[v, u]
-            score[v, u] = max(value * brighter[v, u], value * darker[v, u])
-    # Maximum over three rows, with a margin that is never the maximum.
-    columns = np.full(width + 2, np.float32(-np.inf))
-    for v in range(height):
-        above, here, below = score[max(v - 1, 0)], score[v], score[min(v + 1, height - 1)]
-        for u in range(width):
-            columns[u + 1] = max(max(above[u], here[u]), below[u])
-        for u in range(width):
-            limit = edge * max(max(columns[u], columns[u + 1]), columns[u + 2])
-            foreground[v, u] = 255 * ((here[u] >= limit) & (here[u] >= one))
-    return find_edges(foreground)
-
-
+_NEIGHBOURS = np.ones((3, 3), np.uint8)
 # Least standard deviation of a pixel, grey levels.
 _LEAST_STDDEV = 1.5
 # Standard deviation of the Gaussian that smooths differences against noise, px. The kernel covers
@@ -135,10 +109,8 @@ class SilhouetteExtractor:
         self._absorber = Absorber(config.absorb_after) if config.absorb_after else None
         # Window of the last silhouette, and number of images compared by colour.
         self._last, self._images = Window(0, 0, 0, 0), 0
-        self._colors = ColorReader(model.mean.shape)
         self._is_even = not any(length % 2 for length in model.mean.shape)
-        # Scratch memory is allocated once, since allocation takes longer than the arithmetic.
-        self._scratch = tuple(np.empty_like(model.mean) for _ in range(2))
+        self._signed = np.empty_like(model.mean)
 
     def _use(self, model: BackgroundModel) -> None:
         """Compare the next images with ``model``."""
@@ -195,14 +167,12 @@ class SilhouetteExtractor:
                 f"image has shape {image.shape[:2]}, the background {self.model.mean.shape}"
             )
         has_color = self._chroma is not None and image.ndim == 3
-        if has_color:
-            self._colors.read(image)
-        brightness = self._colors.brightness if has_color else brightness_of(image)
+        brightness = brightness_of(image)
         config = self.config
         if not config.clean_up:
             difference = np.abs(brightness - self.model.mean)
             return np.asarray(np.uint8(255) * ~(difference < self._limit))
-        signed, score = self._scratch
+        signed = self._signed
         if self._light is None:
             self.gain = self._scene_gain(brightness)
             expected, shares = self.model.mean, (1.0, -self.gain)
@@ -215,11 +185,11 @@ class SilhouetteExtractor:
             brightness, shares[0], expected, shares[1], 0.0, dst=signed, dtype=cv2.CV_32F
         )
         cv2.GaussianBlur(signed, _KERNEL_SIZE, _SMOOTHING_PX, dst=signed)
-        foreground, window = segment_foreground(signed, self._brighter, self._darker, _EDGE, score)
+        foreground, window = segment_foreground(signed, self._brighter, self._darker, _EDGE)
         near: Window | None = window.grown(_MARGIN_PX, foreground.shape)
         if has_color:
             near = self._near(window, foreground.shape)
-        self._decide(foreground, near, has_color)
+        self._decide(foreground, near, colors_of(image) if has_color else None)
         window = near or window_of(foreground).grown(_MARGIN_PX, foreground.shape)
         silhouette, self._last = clean_in_window(foreground, LEAST_AREA, MOST_HOLE, window)
         if self._light is not None:
@@ -236,18 +206,16 @@ class SilhouetteExtractor:
         near = window.joined(self._last).grown(_COLOR_MARGIN_PX, shape)
         return None if near.is_empty else near
 
-    def _decide(self, foreground: ImageArray, window: Window | None, has_color: bool) -> None:
+    def _decide(
+        self, foreground: ImageArray, window: Window | None, colors: ImageArray | None
+    ) -> None:
         """Add coloured pixels in a window (None: everywhere), and remove soft shadows."""
-        signed, config, colored = self._scratch[0], self.config, None
-        shadow = _DARKEST_SHADOW, config.soft_shadow
-        if has_color and self._chroma is not None:
-            colors = self._colors.colors
-            if self._is_even and config.soft_shadow > 0:
-                self._chroma.decide(colors, foreground, signed, self._per_level, shadow, window)
-                return
+        colored, softest = None, self.config.soft_shadow
+        if colors is not None and self._chroma is not None:
             colored = self._chroma(colors, foreground.shape, window)
-        if config.soft_shadow > 0:
-            decide_shadows(foreground, signed, self._per_level, colored, *shadow, window)
+        if softest > 0:
+            parts = foreground, self._signed, self._per_level, colored
+            decide_shadows(*parts, _DARKEST_SHADOW, softest, window)
         elif colored is not None:
             part = ... if window is None else window.slices
             foreground[part] |= colored

@@ -16,21 +16,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cardbox_tracker.common.array_checks import ANY, check_array
-from cardbox_tracker.common.compiling import kernel
-from cardbox_tracker.segmentation.chroma_kernels import (
-    DARKEST,
-    NEUTRAL,
-    collect_shares,
-    find_colors,
-    rate_colors,
-)
-from cardbox_tracker.segmentation.color_reader import halved
-from cardbox_tracker.segmentation.shadows import decide_pixels
 from cardbox_tracker.segmentation.window import Window
 
 FloatImage = NDArray[np.float32]
 ImageArray = NDArray[np.uint8]
 
+# Cr and Cb of grey.
+_NEUTRAL = 128.0
+# Dark pixels have hardly any colour, so ratios of the brightness are limited below this.
+_DARKEST = 8.0
+_RATIOS = (0.2, 1.6)
+# A channel above this may be saturated, which changes the colour.
+_CUT_OFF = 245.0
+# The highest difference is searched within half of a JPEG chroma block.
+_NEAR = np.ones((7, 7), np.uint8)
 # Kernel of the mean filter, px at half the resolution.
 _SMOOTHING = (3, 3)
 # Number of pixels whose medians estimate the white balance, and its largest change.
@@ -48,15 +47,31 @@ class ChromaModel(NamedTuple):
     stddev: FloatImage
 
 
-def chroma_planes(image: ImageArray) -> ImageArray:
+def half_size(image: NDArray[Any]) -> tuple[int, int]:
+    """Return the rows and columns of an image (H, W, ...) at half its resolution."""
+    height, width = image.shape[:2]
+    return max(height // 2, 1), max(width // 2, 1)
+
+
+def colors_of(image: ImageArray) -> ImageArray:
     """Return brightness, Cr and Cb (3, h, w) of a bgr image (H, W, 3), at half its resolution."""
-    smooth = np.asarray(cv2.blur(halved(image), _SMOOTHING), np.uint8)
-    return np.ascontiguousarray(smooth.transpose(2, 0, 1))
+    small = cv2.resize(image, half_size(image)[::-1], interpolation=cv2.INTER_AREA)
+    return np.ascontiguousarray(cv2.cvtColor(small, cv2.COLOR_BGR2YCrCb).transpose(2, 0, 1))
+
+
+def chroma_planes(image: ImageArray) -> ImageArray:
+    """Return :func:`colors_of` an image, smoothed."""
+    return _smooth(colors_of(image))
+
+
+def _smooth(planes: ImageArray) -> ImageArray:
+    smooth = [np.asarray(cv2.blur(one, _SMOOTHING), np.uint8) for one in planes]
+    return np.stack(smooth).reshape(planes.shape)
 
 
 def bgr_of(planes: FloatImage) -> FloatImage:
     """Convert brightness, Cr and Cb (3, h, w) to blue, green and red (3, h, w), not clipped."""
-    brightness, red_part, blue_part = planes[0], planes[1] - NEUTRAL, planes[2] - NEUTRAL
+    brightness, red_part, blue_part = planes[0], planes[1] - _NEUTRAL, planes[2] - _NEUTRAL
     red = brightness + 1.403 * red_part
     blue = brightness + 1.773 * blue_part
     green = brightness - 0.714 * red_part - 0.344 * blue_part
@@ -92,23 +107,20 @@ class ChromaScore:
         # Averaging mixes a bright place into its neighbours.
         highest = cv2.dilate(bgr_of(mean).max(axis=0), np.ones(_SMOOTHING, np.uint8))
         planes = (
-            1.0 / np.maximum(mean[:1], DARKEST),
-            mean[1:] - NEUTRAL,
+            1.0 / np.maximum(mean[:1], _DARKEST),
+            mean[1:] - _NEUTRAL,
             1.0 / limits,
             np.reshape(highest, (1, *mean.shape[1:])),
         )
         self._background = np.concatenate(planes).astype(np.float32)
         self._edge = edge
         size = mean[0].size
-        self._step = step = max(1, round((size / _SAMPLES) ** 0.5))
-        samples = mean[0, step // 2 :: step, step // 2 :: step].size
-        self._shares = np.empty((2, samples if follow else 0), np.float32)
+        step = max(1, round((size / _SAMPLES) ** 0.5))
+        self._grid = np.s_[:, step // 2 :: step, step // 2 :: step]
+        self._follow = follow
         self._cast = 0.0, 0.0
         if before is not None:
             self._cast = before._cast
-        # Allocation takes longer than the arithmetic.
-        self._score, self._margin = np.empty(size, np.float32), np.empty(size, np.float32)
-        self._mask = np.empty(4 * size, np.uint8)
 
     def __call__(
         self, colors: ImageArray, size: tuple[int, ...], window: Window | None = None
@@ -116,9 +128,8 @@ class ChromaScore:
         """Return a mask of the pixels of an image of this size whose colour differs, 255, else 0.
 
         ``colors``, (3, h, w), are brightness, Cr and Cb at half its resolution, as
-        :class:`~cardbox_tracker.segmentation.color_reader.ColorReader` has them. The part in
-        ``window``, with even edges, is compared; without it the whole image is, and its white
-        balance is estimated. The mask has the size of that, and the next call may change it.
+        :func:`colors_of` has them. The part in ``window``, with even edges, is compared; without it
+        the whole image is, and its white balance is estimated. The mask has the size of that.
 
         Raises ValueError if colours or size are not those of the learned images, or the window is
         empty, not in the image, or has odd edges.
@@ -127,61 +138,41 @@ class ChromaScore:
         check_array("colors", colors, (3, *half))
         if min(size) < 1 or half != (max(size[0] // 2, 1), max(size[1] // 2, 1)):
             raise ValueError(f"an image of {size} px does not have colours of {half} px")
+        if window is None and self._follow:
+            self._see_cast(colors)
         if window is None:
-            if self._shares.size:
-                self._see_cast(colors)
-            return self._compared(colors, (0, 0), size)
-        _check(window, size, 2)
-        sides = window.bottom - window.top, window.right - window.left
-        return self._compared(colors, (window.top // 2, window.left // 2), sides)
-
-    def decide(
-        self,
-        colors: ImageArray,
-        foreground: ImageArray,
-        difference: FloatImage,
-        per_level: FloatImage,
-        shadow: tuple[float, float],
-        window: Window | None = None,
-    ) -> None:
-        """Add coloured pixels to ``foreground`` and remove soft shadows from it, in place.
-
-        This does in one call what :meth:`__call__` and
-        :func:`~cardbox_tracker.segmentation.shadows.decide_shadows` do, and takes and refuses what
-        they do; H and W are even.
-        """
-        _, rows, columns = self._background.shape
-        shape = 2 * rows, 2 * columns
-        check_array("colors", colors, (3, rows, columns))
-        check_array("foreground", foreground, shape, is_written=True)
-        check_array("difference", difference, shape, np.float32, is_written=True)
-        check_array("per_level", per_level, shape, np.float32, is_written=True)
-        if window is None:
-            window = Window(0, shape[0], 0, shape[1])
-            if self._shares.size:
-                self._see_cast(colors)
+            part, sides = (slice(None), slice(None)), size
         else:
-            _check(window, shape, 2 if shape[1] % 8 else 8)
-        _decide_with_colors(
-            *(colors, self._background, *self._cast, self._edge),
-            *(self._score, self._margin, self._mask, foreground, difference, per_level),
-            *(*shadow, *window),
-        )
+            _check(window, size, 2)
+            part = (
+                slice(window.top // 2, window.bottom // 2),
+                slice(window.left // 2, window.right // 2),
+            )
+            sides = window.bottom - window.top, window.right - window.left
+        margin = self._margin(colors[:, *part], self._background[:, *part])
+        height, width = margin.shape
+        if sides == (2 * height, 2 * width):
+            return np.uint8(255) * (_doubled(margin) >= 0.0)
+        whole = cv2.resize(margin, (sides[1], sides[0]))
+        return np.asarray(cv2.inRange(whole, 0.0, np.inf), np.uint8)
 
-    def _compared(
-        self, colors: ImageArray, place: tuple[int, int], sides: tuple[int, ...]
-    ) -> ImageArray:
-        """Return the mask of a part of the height and width ``sides`` whose colours begin there."""
-        height, width = half = max(sides[0] // 2, 1), max(sides[1] // 2, 1)
-        count = height * width
-        rated = (*place, *half, self._background, *self._cast, self._edge)
-        if sides != (2 * height, 2 * width):
-            rate_colors(colors, *rated, self._score, self._margin)
-            margin = self._margin[:count].reshape(half)
-            whole = cv2.resize(margin, (sides[1], sides[0]))
-            return np.asarray(cv2.inRange(whole, 0.0, np.inf), np.uint8)
-        find_colors(colors, *rated, self._score, self._margin, self._mask)
-        return self._mask[: 4 * count].reshape(sides)
+    def _margin(self, colors: ImageArray, background: FloatImage) -> FloatImage:
+        """Return the margin (h, w) of a part, which is at least 0 in the foreground.
+
+        It is the distance of the chroma from the background's, in units of its limit, less 1 or
+        less a fraction of the highest one nearby.
+        """
+        level, red, blue = _smooth(colors).astype(np.float32)
+        inverse, mean_red, mean_blue, weight_red, weight_blue, brightest = background
+        cast_red, cast_blue = map(np.float32, self._cast)
+        ratio = np.clip(level * inverse, np.float32(_RATIOS[0]), np.float32(_RATIOS[1]))
+        red = (red - np.float32(_NEUTRAL) - ratio * mean_red - cast_red * level) * weight_red
+        blue = (blue - np.float32(_NEUTRAL) - ratio * mean_blue - cast_blue * level) * weight_blue
+        distance = np.sqrt(red * red + blue * blue)
+        score = np.where(ratio * brightest < np.float32(_CUT_OFF), distance, np.float32(0))
+        highest = np.asarray(cv2.dilate(score, _NEAR), np.float32).reshape(score.shape)
+        margin: FloatImage = np.minimum(score - 1, score - np.float32(self._edge) * highest)
+        return margin
 
     def without_cast(self, model: ChromaModel) -> ChromaModel:
         """Convert colours of the present white balance to that of the learned scene."""
@@ -193,9 +184,13 @@ class ChromaScore:
 
         Medians over the image are used, since the person covers less than half of it.
         """
-        collect_shares(colors, self._background, self._step, self._shares)
-        middle = self._shares.shape[1] // 2
-        medians = np.partition(self._shares, middle, axis=1)[:, middle]
+        level, red, blue = _smooth(colors)[self._grid].astype(np.float32)
+        background = self._background[self._grid]
+        ratio, least = level * background[0], np.maximum(level, np.float32(_DARKEST))
+        parts = (red, background[1]), (blue, background[2])
+        shares = [(one - np.float32(_NEUTRAL) - ratio * mean) / least for one, mean in parts]
+        middle = shares[0].size // 2
+        medians = [np.partition(one, middle, axis=None)[middle] for one in shares]
         red, blue = np.clip(medians, -_STRONGEST_CAST, _STRONGEST_CAST)
         self._cast = float(red), float(blue)
 
@@ -207,33 +202,11 @@ def _check(window: Window, shape: tuple[int, ...], unit: int) -> None:
         raise ValueError(f"{window} is empty or has odd edges; expected neither")
 
 
-@kernel
-def _decide_with_colors(
-    colors: Any,
-    background: Any,
-    red_cast: Any,
-    blue_cast: Any,
-    edge: Any,
-    score: Any,
-    margin: Any,
-    mask: Any,
-    foreground: Any,
-    difference: Any,
-    per_level: Any,
-    darkest: Any,
-    softest: Any,
-    top: Any,
-    bottom: Any,
-    left: Any,
-    right: Any,
-) -> None:
-    """Compare a window by colour, and decide about shadows in it."""
-    height, width = bottom - top, right - left
-    find_colors(
-        *(colors, top // 2, left // 2, height // 2, width // 2),
-        *(background, red_cast, blue_cast, edge, score, margin, mask),
-    )
-    colored = mask[: height * width].reshape((height, width))
-    decide_pixels(
-        foreground, colored, difference, per_level, -darkest, softest, top, bottom, left, right
-    )
+def _doubled(margin: FloatImage) -> FloatImage:
+    """Return an image (h, w) at twice the resolution, (2 h, 2 w), interpolated linearly."""
+    near, far = np.float32(0.75), np.float32(0.25)
+    for _ in range(2):
+        padded = np.pad(margin, ((1, 1), (0, 0)), "edge")
+        pairs = [near * margin + far * beside for beside in (padded[:-2], padded[2:])]
+        margin = np.stack(pairs, axis=1).reshape(-1, margin.shape[1]).T
+    return margin

@@ -10,8 +10,7 @@ from numpy.typing import NDArray
 from cardbox_tracker.camera.encodings import brightness_of
 from cardbox_tracker.camera.given_arrays import image_from
 from cardbox_tracker.common.array_checks import ANY, check_array
-from cardbox_tracker.segmentation.chroma import ChromaModel, chroma_planes
-from cardbox_tracker.segmentation.color_reader import half_size
+from cardbox_tracker.segmentation.chroma import ChromaModel, chroma_planes, half_size
 
 FloatImage = NDArray[np.float32]
 ImageArray = NDArray[np.uint8]

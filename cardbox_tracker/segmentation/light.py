@@ -16,77 +16,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cardbox_tracker.common.array_checks import ANY, check_array
-from cardbox_tracker.common.compiling import inlined_kernel, kernel
+from cardbox_tracker.common.compiling import kernel
 from cardbox_tracker.segmentation.chroma import bgr_of
-from cardbox_tracker.segmentation.light_outlines import average_blocks, find_smooth, grow_person
-from cardbox_tracker.segmentation.light_samples import (
-    BLOCK,
-    CUT_OFF,
-    STEP_PX,
-    limit_channels,
-    measure_level,
-    sum_cells,
-    take_samples,
-)
 from cardbox_tracker.segmentation.window import Window
-
-# Weight of the assumption of no change, as a share of a cell's pixels.
-_DOUBT = 0.02
-_f32 = np.float32
-
-
-@kernel
-def update_field(cells: Any, base: Any, rate: Any, field: Any) -> Any:
-    """Move the field towards the base times the change, and return the field's extremes.
-
-    ``cells`` (h, w, 2) are the smoothed change of each cell times its share of known pixels, and
-    that share. The change is relative to ``base`` (h, w); ``rate`` is its share in the ``field``
-    (h, w), factors of the level.
-    """
-    height, width = field.shape
-    least, most = _f32(np.inf), _f32(-np.inf)
-    for v in range(height):
-        for u in range(width):
-            # Cells without known pixels do not change.
-            change = cells[v, u, 0] / (cells[v, u, 1] + _f32(_DOUBT))
-            goal = base[v, u] * (_f32(1) + change)
-            value = field[v, u] + rate * (goal - field[v, u])
-            field[v, u] = value
-            least, most = min(least, value), max(most, value)
-    return least, most
-
-
-@kernel
-def multiply_field(mean: Any, field: Any, result: Any) -> None:
-    """Write the product of an image (H, W) and the field (h, w), interpolated between cells."""
-    height, width = mean.shape
-    rows, columns = field.shape
-    # The field's rows at the image's width.
-    wide = np.empty((rows, width), np.float32)
-    for u in range(width):
-        near, far, share = _neighbours(u, width, columns)
-        for v in range(rows):
-            wide[v, u] = field[v, near] + share * (field[v, far] - field[v, near])
-    for v in range(height):
-        near, far, share = _neighbours(v, height, rows)
-        upper, lower, row, out = wide[near], wide[far], mean[v], result[v]
-        for u in range(width):
-            out[u] = row[u] * (upper[u] + share * (lower[u] - upper[u]))
-
-
-@inlined_kernel
-def _neighbours(index: Any, length: Any, cells: Any) -> Any:
-    """Return the two cells around a pixel, and the share of the second one."""
-    place = (index + 0.5) * cells / length - 0.5
-    place = min(max(place, 0.0), cells - 1.0)
-    near = int(place)
-    return near, min(near + 1, cells - 1), _f32(place - near)
-
 
 FloatImage = NDArray[np.float32]
 ImageArray = NDArray[np.uint8]
 
-_GRID = (slice(1, None, STEP_PX), slice(1, None, STEP_PX))
+# Weight of the assumption of no change, as a share of a cell's pixels.
+_DOUBT = 0.02
+# A channel above this may be saturated, so the pixel may be brighter than it seems.
+_CUT_OFF = 250.0
+# The light is estimated from every fourth pixel of every fourth row.
+_STEP_PX = 4
+_GRID = (slice(1, None, _STEP_PX), slice(1, None, _STEP_PX))
 # Columns and rows of the cells of the coarse field, and the Gaussian that smooths them, with a
 # standard deviation of two cells.
 _CELLS = (20, 15)
@@ -112,6 +55,8 @@ _SETTLING = 8
 _ENOUGH = 0.15
 _LEAST = 1e-3
 _KERNEL = np.ones((5, 5), np.uint8)
+# Light varies by less than this fraction within the square of 12 px; an outline does not.
+_SOFT, _SQUARE = 0.06, np.ones((3, 3), np.uint8)
 # More foreground than a person covers: the light has changed, not the scene.
 _COVERAGE = 0.5
 # With more foreground than this caused by light, the field is estimated as after a step.
@@ -140,12 +85,7 @@ class LightFollower:
                 "from larger images"
             )
         self._prepare(mean, chroma)
-        count = self._size[0] * self._size[1]
-        self._ratios = np.empty(count + 2, np.float32)
-        self._ratio_bits = self._ratios.view(np.int32)
-        self._samples = np.empty(self._size[::-1], np.uint8)
-        self._means = np.empty(self._size[::-1], np.float32)
-        self._smooth = np.zeros(self._size[::-1], np.bool_)
+        self._samples = np.empty(self._small.shape, np.uint8)
         self._cells = np.zeros((*_CELLS[::-1], 2), np.float32)
         self.restart()
 
@@ -178,8 +118,6 @@ class LightFollower:
             np.float32
         )
         self._highest = float(self._brightest.max())
-        starts = np.arange(0, mean.size, BLOCK)
-        self._highest_of_blocks = np.maximum.reduceat(self._brightest, starts)
 
     def restart(self) -> None:
         """Forget the light and the person, since the next image may be from any other time."""
@@ -210,7 +148,7 @@ class LightFollower:
         """
         check_array("brightness", brightness, self._mean.shape)
         self._estimate(brightness)
-        if self.level * self._highest_field * self._highest < CUT_OFF:
+        if self.level * self._highest_field * self._highest < _CUT_OFF:
             return self._relative, self.level
         self._cut_off()
         return self._now, 1.0
@@ -222,23 +160,22 @@ class LightFollower:
 
     def _cut_off(self) -> None:
         """Compute the expected brightness, limited to the range of the camera's channels."""
-        limit = np.float32(CUT_OFF / (self.level * self._highest_field))
+        limit = np.float32(_CUT_OFF / (self.level * self._highest_field))
         weights = _WEIGHTS if len(self._channels) == 3 else _GREY
-        limit_channels(
-            *(self._relative.ravel(), np.float32(self.level), limit, self._mean.ravel()),
-            *(self._channels, self._brightest, self._highest_of_blocks, weights),
-            self._now.ravel(),
-        )
+        np.multiply(self._relative, np.float32(self.level), out=self._now)
+        now, mean = self._now.reshape(-1), self._mean.reshape(-1)
+        bright = np.flatnonzero(self._brightest > limit)
+        factors = now[bright] / np.maximum(mean[bright], 1.0)
+        limited = zip(weights, self._channels, strict=True)
+        now[bright] = sum(w * np.minimum(one[bright] * factors, 255.0) for w, one in limited)
 
     def _estimate(self, brightness: ImageArray) -> None:
         self._brightness = brightness
-        measured = measure_level(
-            *(brightness, self._samples, self._small, self._small_brightest, self._fine),
-            *(self._person, self._ratios, self._ratio_bits, self.level, _ENOUGH),
-        )
+        self._samples = brightness[_GRID]
+        measured = self._measured_level()
         if not measured >= 0.0:
             return
-        level = max(float(measured), _LEAST)
+        level = max(measured, _LEAST)
         if self._started and abs(level / self.level - 1.0) > _STEP:
             if self._settling == 0:
                 self._base = np.ones_like(self._field)
@@ -256,12 +193,12 @@ class LightFollower:
             person = cv2.dilate(known, _KERNEL).reshape(person.shape)
         if self._settling > 0 or self._is_lit:
             rate, tolerance = 1.0, _TOLERANCE_AFTER_STEP
-        sum_cells(
-            *(self._samples, self._small, self._small_brightest, around, self._base_fine),
-            *(person, level, tolerance, self._cells),
-        )
-        cells = cv2.sepFilter2D(self._cells, -1, _GAUSSIAN, _GAUSSIAN)
-        self._extremes = update_field(cells, self._base, np.float32(rate), self._field)
+        self._sum_cells(around, person, tolerance)
+        cells = np.asarray(cv2.sepFilter2D(self._cells, -1, _GAUSSIAN, _GAUSSIAN), np.float32)
+        # Cells without known pixels do not change.
+        goal = self._base * (1.0 + cells[..., 0] / (cells[..., 1] + np.float32(_DOUBT)))
+        self._field += np.float32(rate) * (goal - self._field)
+        self._extremes = float(self._field.min()), float(self._field.max())
         if self._is_lit:
             # The next estimate is relative to this one and adds the remainder of the smoothing.
             self._base = self._field.copy()
@@ -269,19 +206,57 @@ class LightFollower:
         self._fine = self._fine_of(self._field)
         self._spread()
 
+    def _measured_level(self) -> float:
+        """Return the median relative brightness outside the person; -1 without usable pixels.
+
+        With too few usable pixels outside the person, those of the person are used, too.
+        """
+        ratios = self._samples / np.maximum(self._small, np.float32(1))
+        with np.errstate(invalid="ignore"):
+            known = ratios * self._small_brightest < _CUT_OFF
+        outside = known & (self._person == 0)
+        used = outside if np.count_nonzero(outside) >= _ENOUGH * known.size else known
+        found = (ratios / self._fine)[used]
+        middle = len(found) // 2
+        return float(np.partition(found, middle)[middle]) if len(found) else -1.0
+
+    def _sum_cells(self, around: FloatImage, person: ImageArray, tolerance: float) -> None:
+        """Write each cell's mean change times its share of usable pixels, and that share.
+
+        Pixels that differ from the expected factors ``around`` (h, w) by more than the fraction
+        ``tolerance``, and those of the ``person`` (h, w), are not used.
+        """
+        ratios = self._samples / np.maximum(self._small, np.float32(1))
+        relative = ratios / np.float32(self.level)
+        change = relative / around - np.float32(1)
+        with np.errstate(invalid="ignore"):
+            is_cut_off = ratios * self._small_brightest >= _CUT_OFF
+        # A saturated pixel gives only a lower bound.
+        is_known = ~is_cut_off | ((change > 0) & (self._small_brightest < np.inf))
+        v, u = np.nonzero((person == 0) & is_known & (np.abs(change) < np.float32(tolerance)))
+        rows, columns = self._cells.shape[:2]
+        height, width = self._small.shape
+        share = np.float32(rows * columns / (height * width))
+        changes = share * ((relative / self._base_fine)[v, u].astype(np.float64) - 1.0)
+        self._cells[:] = 0
+        _add(v * rows // height, u * columns // width, changes, share, self._cells)
+
     def _fine_of(self, field: FloatImage) -> FloatImage:
         """Return a field at the resolution of the samples, (h, w)."""
-        shape = self._size[1], self._size[0]
-        return np.asarray(cv2.resize(field, self._size), np.float32).reshape(shape)
+        return np.asarray(cv2.resize(field, self._size), np.float32).reshape(self._small.shape)
 
     def _spread(self) -> None:
-        """Multiply the background by the field."""
-        lowest, self._highest_field = (float(extreme) for extreme in self._extremes)
+        """Multiply the background by the field, interpolated between cells."""
+        lowest, self._highest_field = self._extremes
         if self._highest_field < 1.0 + _SAME and lowest > 1.0 - _SAME:
             self._relative = self._mean
-        else:
-            multiply_field(self._mean, self._field, self._scaled)
-            self._relative = self._scaled
+            return
+        near, far, share = _neighbours(self._mean.shape[1], self._field.shape[1])
+        wide = self._field[:, near] + share * (self._field[:, far] - self._field[:, near])
+        near, far, share = _neighbours(self._mean.shape[0], self._field.shape[0])
+        upper, lower = wide[near], wide[far]
+        np.multiply(self._mean, upper + share[:, None] * (lower - upper), out=self._scaled)
+        self._relative = self._scaled
 
     def exclude(self, silhouette: ImageArray, window: Window | None = None) -> None:
         """Exclude the person: the silhouette (H, W) of the last image, all of it in ``window``."""
@@ -292,26 +267,48 @@ class LightFollower:
             return
         if self._settling > 0 or self._is_lit or self._images % _EVERY == 0:
             # Darker pixels may be the person's shadow, which moves with the person.
-            count = self._find_smooth(silhouette)
-            self._is_lit = count > _LIT * self._lit.size
+            smooth = self._find_smooth(silhouette)
+            self._is_lit = bool(np.count_nonzero(self._lit) > _LIT * self._lit.size)
         if self._settling > 0:
             self._settling -= 1
-            self._passing = np.empty(self._size[::-1], np.uint8)
-            take_samples(silhouette, self._passing)
-            self._passing[self._smooth] = 0
+            self._passing = np.where(smooth, np.uint8(0), silhouette[_GRID])
             return
-        grow_person(silhouette, self._lit, self._person)
+        person = np.where(self._lit, np.uint8(0), silhouette[_GRID])
+        self._person = np.asarray(cv2.dilate(person, _KERNEL), np.uint8).reshape(person.shape)
         self._passing = None
 
-    def _find_smooth(self, silhouette: ImageArray) -> int:
-        """Find parts of a silhouette (H, W) without an outline; return the brighter ones' size."""
-        height, width = self._mean.shape
-        quads = None if height % STEP_PX or width % STEP_PX else self._brightness.view(np.uint32)
-        if quads is None or not quads.flags.aligned:
-            self._means[:] = cv2.resize(
-                self._brightness, self._size, interpolation=cv2.INTER_AREA
-            ).reshape(self._means.shape)
-        else:
-            average_blocks(quads, self._means)
-        parts = self._means, self._blocks, self._fine, self.level
-        return int(find_smooth(*parts, silhouette, self._smooth, self._lit))
+    def _find_smooth(self, silhouette: ImageArray) -> NDArray[np.bool_]:
+        """Return the samples (h, w) of a silhouette (H, W) into which the background passes.
+
+        Those that are brighter than the background are lit.
+        """
+        shape = self._small.shape
+        means = cv2.resize(self._brightness, self._size, interpolation=cv2.INTER_AREA)
+        now = np.asarray(means, np.float32).reshape(shape)
+        relative = now / (self._blocks * self._fine * np.float32(self.level))
+        varies = cv2.dilate(relative, _SQUARE) - cv2.erode(relative, _SQUARE)
+        is_even = varies.reshape(shape) < np.float32(_SOFT)
+        is_hidden = silhouette[_GRID] > 0
+        count, found = cv2.connectedComponents(is_even.astype(np.uint8), connectivity=4)
+        labels = found.reshape(shape)
+        is_open = np.zeros(count, np.bool_)
+        is_open[labels[is_even & ~is_hidden]] = True
+        smooth: NDArray[np.bool_] = is_even & is_hidden & is_open[labels]
+        self._lit = smooth & (relative > 1.0)
+        return smooth
+
+
+@kernel
+def _add(rows: Any, columns: Any, changes: Any, share: Any, cells: Any) -> None:
+    """Add changes (n,) and shares of pixels to their cells, one after another."""
+    for i in range(len(changes)):
+        cell = cells[rows[i], columns[i]]
+        cell[0] += changes[i]
+        cell[1] += share
+
+
+def _neighbours(length: int, cells: int) -> tuple[NDArray[np.intp], NDArray[np.intp], FloatImage]:
+    """Return the two cells around each of ``length`` pixels, and the share of the second one."""
+    place = np.clip((np.arange(length) + 0.5) * cells / length - 0.5, 0.0, cells - 1.0)
+    near = place.astype(np.intp)
+    return near, np.minimum(near + 1, cells - 1), (place - near).astype(np.float32)

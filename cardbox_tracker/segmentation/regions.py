@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from cardbox_tracker.common.array_checks import ANY, check_array
 from cardbox_tracker.common.compiling import copied_kernel, kernel
-from cardbox_tracker.segmentation.window import Window, find_edges
+from cardbox_tracker.segmentation.window import Window, window_of
 
 ImageArray = NDArray[np.uint8]
 
@@ -72,13 +72,21 @@ def clean_in_window(
     part = foreground[window.slices]
     closed = np.asarray(cv2.morphologyEx(part, cv2.MORPH_CLOSE, _CLOSING_KERNEL), np.uint8)
     check_array("part of the foreground", closed, part.shape, is_written=True)
-    height, width = part.shape
-    words = closed.view(np.uint64) if width % 8 == 0 else _NO_WORDS
-    runs = np.empty((4, height * (width // 2 + 1)), np.int32)
-    specks, holes = float(min_area * foreground.size), float(max_hole * foreground.size)
-    top, left = window.top, window.left
-    edges = _clean(closed, words, specks, holes, runs, silhouette, top, left)
+    _recolour(closed, 255, min_area * foreground.size)
+    _recolour(closed, 0, max_hole * foreground.size)
+    silhouette[window.slices] = closed
+    inside = window_of(closed)
+    if inside.is_empty:
+        return silhouette, Window(0, 0, 0, 0)
+    offsets = window.top, window.top, window.left, window.left
+    edges = (edge + offset for edge, offset in zip(inside, offsets, strict=True))
     return silhouette, Window(*edges)
+
+
+def _recolour(image: ImageArray, colour: int, area_px: float) -> None:
+    """Invert regions of ``colour``, 0 or 255, with fewer than ``area_px`` pixels, in place."""
+    regions = find_regions(image if colour else ~image)
+    paint(*regions[:4], regions.areas_px < area_px, np.uint8(255 - colour), image)
 
 
 def find_regions(image: ImageArray) -> Regions:
@@ -181,40 +189,10 @@ def _number_regions(firsts: Any, runs: Any, rows: Any) -> Any:
 
 
 @kernel
-def _clean(
-    part: Any,
-    words: Any,
-    specks_px: float,
-    holes_px: float,
-    runs: Any,
-    silhouette: Any,
-    top: Any,
-    left: Any,
-) -> Any:
-    """Recolour small regions of a part, copy it to the silhouette and return its window there."""
-    _recolour(part, words, np.uint8(255), specks_px, runs)
-    _recolour(part, words, np.uint8(0), holes_px, runs)
-    height, width = part.shape
-    for v in range(height):
-        row, out = part[v], silhouette[top + v, left : left + width]
-        for u in range(width):
-            out[u] = row[u]
-    first, end, begin, last = find_edges(part)
-    if end == 0:
-        return 0, 0, 0, 0
-    return top + first, top + end, left + begin, left + last
-
-
-@kernel
-def _recolour(image: Any, words: Any, colour: Any, area_px: float, runs: Any) -> None:
-    """Invert regions of ``colour``, 0 or 255, with fewer than ``area_px`` pixels, in place."""
-    starts, ends, parents, areas = runs[0], runs[1], runs[2], runs[3]
-    height = image.shape[0]
-    other = np.uint8(255) - colour
-    firsts = np.empty(height + 1, np.int32)
-    _list_runs(image, words, colour, runs, firsts)
-    for v in range(height):
-        for run in range(firsts[v], firsts[v + 1]):
-            if areas[_root(parents, run)] < area_px:
-                for u in range(starts[run], ends[run]):
-                    image[v, u] = other
+def paint(
+    rows: Any, starts: Any, ends: Any, labels: Any, chosen: Any, colour: Any, image: Any
+) -> None:
+    """Set the pixels of the chosen regions, whose runs are given, to a colour."""
+    for run in range(len(rows)):
+        if chosen[labels[run]]:
+            image[rows[run], starts[run] : ends[run]] = colour

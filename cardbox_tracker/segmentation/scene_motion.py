@@ -13,8 +13,6 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from cardbox_tracker.segmentation.medians import median
-
 FloatImage = NDArray[np.float32]
 ImageArray = NDArray[np.uint8]
 Mask = NDArray[np.bool_]
@@ -82,8 +80,8 @@ def changed_pixels(
     The level of the light and the noise are medians, since moving pixels are less than half.
     """
     ratios = np.asarray(after / np.maximum(before, _DARKEST), np.float32)
-    level = max(median(ratios), 1e-3)
+    level = max(float(np.median(ratios)), 1e-3)
     # Differences grow with the light.
     difference = np.asarray(np.abs(after - level * before) / max(level, 1.0), np.float32)
-    noise = _FROM_MEDIAN * median(difference)
+    noise = _FROM_MEDIAN * float(np.median(difference))
     return np.asarray(difference > min(max(_LEAST, times_noise * noise), _MOST), np.bool_)

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from cardbox_tracker.common.array_checks import ANY, check_array
-from cardbox_tracker.common.compiling import kernel
 
 ImageArray = NDArray[np.uint8]
 
@@ -75,42 +75,8 @@ def window_of(image: ImageArray) -> Window:
 
     It may be up to eight columns wider at either side than necessary; it is empty if all are 0.
     """
-    # A read-only array would make numba compile another version.
-    flags = getattr(image, "flags", None)
-    if flags is None or not (flags.c_contiguous and flags.writeable and flags.aligned):
-        image = np.require(image, requirements=("C", "W", "A"))
     check_array("image", image, (ANY, ANY))
-    return Window(*find_edges(image))
-
-
-@kernel
-def find_edges(image: Any) -> Any:
-    """Return first and end row, first and end column (by 8) of the window of (H, W) uint8."""
-    if image.shape[1] % 8:
-        return _edges(image, 1)
-    return _edges(image.view(np.uint64), 8)
-
-
-@kernel
-def _edges(words: Any, pixels: Any) -> Any:
-    """Return the edges of a window, given so many pixels of a row in each number."""
-    height, width = words.shape
-    if width == 0:
-        return 0, 0, 0, 0
-    top, bottom = height, 0
-    columns = np.zeros(width, words.dtype)
-    for v in range(height):
-        row = words[v, 0] & np.uint8(0)
-        for u in range(width):
-            row |= words[v, u]
-            columns[u] |= words[v, u]
-        if row != 0:
-            top, bottom = min(top, v), v + 1
-    if bottom == 0:
-        return 0, 0, 0, 0
-    left, right = 0, width
-    while columns[left] == 0:
-        left += 1
-    while columns[right - 1] == 0:
-        right -= 1
-    return top, bottom, left * pixels, right * pixels
+    left, top, width, height = cv2.boundingRect(image) if image.size else (0, 0, 0, 0)
+    unit = 1 if image.shape[1] % 8 else 8
+    right = -(-(left + width) // unit) * unit
+    return Window(top, top + height, left // unit * unit, right)

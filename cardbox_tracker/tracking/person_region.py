@@ -24,7 +24,7 @@ from cardbox_tracker.common.array_checks import check_array
 from cardbox_tracker.common.compiling import copied_kernel, kernel
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.sizes import FloatArray
-from cardbox_tracker.segmentation.regions import Regions, find_regions
+from cardbox_tracker.segmentation.regions import Regions, find_regions, paint
 from cardbox_tracker.tracking.person_masks import Mask, PersonDrawer, PersonMasks, grown
 
 ImageArray = NDArray[np.uint8]
@@ -199,7 +199,7 @@ class PersonRegion:
             self._person = seen
             return silhouette
         selected = np.zeros_like(silhouette)
-        _paint(*regions[:4], kept, selected)
+        paint(*regions[:4], kept, np.uint8(255), selected)
         self._part(selected, seen, masks, image)
         if self._other is None:
             self._things.forget()
@@ -303,7 +303,7 @@ def warm_up() -> None:
     regions = find_regions(silhouette)
     cells = np.zeros((2, 8), np.uint8)
     _overlaps(*regions[:4], cells, cells, cells, cells, cells, 1, np.zeros((5, 1)))
-    _paint(*regions[:4], np.ones(1, np.bool_), silhouette)
+    paint(*regions[:4], np.ones(1, np.bool_), np.uint8(255), silhouette)
     things = StillThings()
     things.learn(silhouette, silhouette)
     things.compare(silhouette)
@@ -351,11 +351,3 @@ def _overlaps(
             in_still += count_px * still[v, u]
         for kind, count_px in enumerate((in_core, in_near, in_before, in_other, in_still)):
             areas_px[kind, label] += count_px
-
-
-@kernel
-def _paint(rows: Any, starts: Any, ends: Any, labels: Any, kept: Any, image: Any) -> None:
-    """Set the pixels of the kept regions to 255."""
-    for run in range(len(rows)):
-        if kept[labels[run]]:
-            image[rows[run], starts[run] : ends[run]] = 255

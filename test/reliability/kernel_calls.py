@@ -31,10 +31,8 @@ from cardbox_tracker.search.config import PRESETS
 from cardbox_tracker.segmentation.absorption import StillRegions
 from cardbox_tracker.segmentation.background import SilhouetteExtractor, segment_foreground
 from cardbox_tracker.segmentation.chroma import ChromaModel, ChromaScore
-from cardbox_tracker.segmentation.color_reader import ColorReader
 from cardbox_tracker.segmentation.empty_scene import BackgroundLearner, BackgroundModel
 from cardbox_tracker.segmentation.light import LightFollower
-from cardbox_tracker.segmentation.medians import median
 from cardbox_tracker.segmentation.regions import (
     clean_silhouette,
     find_regions,
@@ -144,17 +142,6 @@ def score_chroma(take: Take, numbers: Iterator[int]) -> None:
     small = (3, *(max(length // 2, 1) for length in take.size))  # type: ignore[attr-defined]
     score = ChromaScore(ChromaModel(take("f4", small), take("f4", small)), 3.0, 2.0, 0.5, True)
     score(take("u1", small), take.size, window(numbers))  # type: ignore[attr-defined]
-
-
-def decide_colors(take: Take, numbers: Iterator[int]) -> None:
-    small = (3, *(max(length // 2, 1) for length in take.size))  # type: ignore[attr-defined]
-    score = ChromaScore(ChromaModel(take("f4", small), take("f4", small)), 3.0, 2.0, 0.5, True)
-    score.decide(take("u1", small), take(), take("f4"), take("f4"), (0.6, 0.1), window(numbers))
-
-
-def read_colors(take: Take, _: Iterator[int]) -> None:
-    reader = ColorReader(take.size)  # type: ignore[attr-defined]
-    reader.read(take(more=(3,)))
 
 
 def find_still(take: Take, _: Iterator[int]) -> None:
@@ -280,14 +267,11 @@ CALLS: dict[str, Callable[[Take, Iterator[int]], Any]] = {
     ),
     "window_of": lambda take, _: window_of(take()),
     "segment_foreground": lambda take, _: segment_foreground(
-        take("f4"), take("f4"), take("f4"), 0.5, take("f4")
+        take("f4"), take("f4"), take("f4"), 0.5
     ),
     "decide_shadows": decide,
     "ChromaScore": score_chroma,
-    "ChromaScore.decide": decide_colors,
-    "ColorReader": read_colors,
     "StillRegions": find_still,
-    "median": lambda take, _: median(take("f4")),
     "LightFollower": follow_light,
     "SilhouetteExtractor": extract,
     "BackgroundLearner": learn_background,

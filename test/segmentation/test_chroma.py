@@ -10,11 +10,14 @@ from hypothesis import strategies as st
 
 from cardbox_tracker.segmentation.background import SilhouetteExtractor
 from cardbox_tracker.segmentation.background_config import BackgroundConfig
-from cardbox_tracker.segmentation.chroma import ChromaModel, ChromaScore, bgr_of, chroma_planes
-from cardbox_tracker.segmentation.chroma_kernels import collect_shares
-from cardbox_tracker.segmentation.color_reader import ColorReader, halved
+from cardbox_tracker.segmentation.chroma import (
+    ChromaModel,
+    ChromaScore,
+    bgr_of,
+    chroma_planes,
+    colors_of,
+)
 from cardbox_tracker.segmentation.empty_scene import BackgroundLearner
-from cardbox_tracker.segmentation.shadows import decide_shadows
 from cardbox_tracker.segmentation.window import Window
 
 H, W = 120, 160
@@ -39,10 +42,6 @@ def extractor(config: BackgroundConfig | None = None, sigma: float = 0.0) -> Sil
 
 def noisy(image: np.ndarray, sigma: float, rng: np.random.Generator) -> np.ndarray:
     return np.clip(image + rng.normal(0, sigma, image.shape) + 0.5, 0, 255).astype(np.uint8)
-
-
-def colors_of(image: np.ndarray) -> np.ndarray:
-    return np.ascontiguousarray(halved(image).transpose(2, 0, 1))
 
 
 def wrong(silhouette: np.ndarray) -> int:
@@ -138,17 +137,6 @@ def test_equal_to_numpy(seed: int, shape: tuple[int, int], edge: float) -> None:
     np.testing.assert_array_equal(made[is_clear], np.where(expected >= 0, 255, 0)[is_clear])
 
 
-@settings(max_examples=40, deadline=None)
-@given(st.integers(0, 2**32 - 1), st.tuples(st.integers(1, 20), st.integers(1, 40)))
-def test_an_image_is_read_as_opencv_reads_it(seed: int, shape: tuple[int, int]) -> None:
-    image = np.random.default_rng(seed).integers(0, 256, (*shape, 3), np.uint8)
-    reader = ColorReader(shape)
-    reader.read(image)
-    brightness = cv2.cvtColor(image, cv2.COLOR_BGR2GRAY).reshape(shape)
-    np.testing.assert_array_equal(reader.brightness, brightness)
-    np.testing.assert_array_equal(reader.colors, colors_of(image))
-
-
 @pytest.mark.parametrize("follow", [True, False])
 def test_the_white_balance_of_the_whole_image_is_followed(follow: bool) -> None:
     planes = chroma_planes(scene()).astype(np.float32)
@@ -169,29 +157,6 @@ def test_a_window_gives_the_same_inside() -> None:
     np.testing.assert_array_equal(part[8:-8, 8:-8], whole[window.slices][8:-8, 8:-8])
 
 
-@settings(max_examples=40, deadline=None)
-@given(st.integers(0, 2**32 - 1), st.sampled_from([(40, 64), (30, 44)]), st.booleans())
-def test_colours_and_shadows_in_one_call_are_those_of_two(
-    seed: int, shape: tuple[int, int], has_window: bool
-) -> None:
-    rng = np.random.default_rng(seed)
-    mean = rng.uniform(80, 160, (3, shape[0] // 2, shape[1] // 2)).astype(np.float32)
-    score = ChromaScore(ChromaModel(mean, np.full_like(mean, 9)), 2.0, 7.0, 0.5)
-    colors = np.clip(mean + rng.normal(0, 7, mean.shape), 0, 255).astype(np.uint8)
-    window = Window(8, 24, 16, 40) if has_window else None
-    inside = np.zeros(shape, bool)
-    inside[window.slices if window else ...] = True
-    noise = cv2.GaussianBlur(rng.normal(0, 1, shape), (0, 0), 2.0)
-    difference = (80 * noise / noise.std() - 40).astype(np.float32)
-    expected = np.where((np.abs(difference) > 20) & inside, 255, 0).astype(np.uint8)
-    made, per_level = expected.copy(), np.full(shape, 0.005, np.float32)
-    score.decide(colors, made, difference, per_level, (0.4, 0.25), window)
-    colored = score(colors, shape, window)
-    assert 0 < np.count_nonzero(colored) < colored.size
-    decide_shadows(expected, difference, per_level, colored, 0.4, 0.25, window)
-    np.testing.assert_array_equal(made, expected)
-
-
 def test_what_only_its_colour_shows_is_followed_from_image_to_image() -> None:
     made, whole = extractor(), np.zeros(8)
     for number in range(1, 20):
@@ -203,10 +168,12 @@ def test_what_only_its_colour_shows_is_followed_from_image_to_image() -> None:
 def test_the_white_balance_of_an_image_of_one_square_is_that_of_its_colour() -> None:
     """An image of 2x2 px has one pixel at half the resolution, which is its own neighbour."""
     colors = np.array([100, 148, 118], np.uint8).reshape(3, 1, 1)
-    background = np.array([1 / 100, 0, 0, 1, 1, 200], np.float32).reshape(6, 1, 1)
-    shares = np.zeros((2, 1), np.float32)
-    collect_shares(colors, background, 1, shares)
-    np.testing.assert_allclose(shares[:, 0], [0.2, -0.1], rtol=1e-5)
+    model = ChromaModel(
+        np.array([100, 128, 128], np.float32).reshape(3, 1, 1), np.ones((3, 1, 1), np.float32)
+    )
+    score = ChromaScore(model, 2.0, 7.0, 0.5, follow=True)
+    assert not score(colors, (2, 2)).any()
+    np.testing.assert_allclose(score.without_cast(model).mean.ravel(), [100, 108, 138], rtol=1e-5)
 
 
 @pytest.mark.parametrize("shape", [(3, 0), (3, 1), (2, 4, 4), (3, 0, 4), (3, 4, 0)])

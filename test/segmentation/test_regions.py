@@ -22,10 +22,7 @@ def image(*rows: str) -> np.ndarray:
 
 def recoloured(before: np.ndarray, colour: int, area_px: float) -> np.ndarray:
     after = before.copy()
-    height, width = before.shape
-    words = after.view(np.uint64) if width % 8 == 0 else np.zeros((1, 0), np.uint64)
-    runs = np.empty((4, height * (width // 2 + 1)), np.int32)
-    _recolour(after, words, np.uint8(colour), float(area_px), runs)
+    _recolour(after, colour, area_px)
     return after
 
 
