@@ -50,9 +50,11 @@ def segment_foreground(
     less, (H, W). ``edge`` is a fraction of the highest score among a pixel and its 8 neighbours.
 
     Returns (H, W), 0 or 255, and its window as :func:`~.window.window_of` has it. Raises ValueError
-    if the arrays differ in shape or type.
+    if the arrays differ in shape or type, or have no pixels.
     """
     check_array("difference", difference, (ANY, ANY), np.float32)
+    if not difference.size:
+        raise ValueError(f"difference has the shape {difference.shape}; expected pixels")
     shape = difference.shape
     check_array("brighter", brighter, shape, np.float32)
     check_array("darker", darker, shape, np.float32)
