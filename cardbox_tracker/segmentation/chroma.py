@@ -206,7 +206,7 @@ def _doubled(margin: FloatImage) -> FloatImage:
     """Return an image (h, w) at twice the resolution, (2 h, 2 w), interpolated linearly."""
     near, far = np.float32(0.75), np.float32(0.25)
     for _ in range(2):
-        rows = np.concatenate([margin[:1], margin, margin[-1:]])
-        pairs = [near * margin + far * beside for beside in (rows[:-2], rows[2:])]
+        padded = np.pad(margin, ((1, 1), (0, 0)), "edge")
+        pairs = [near * margin + far * beside for beside in (padded[:-2], padded[2:])]
         margin = np.stack(pairs, axis=1).reshape(-1, margin.shape[1]).T
     return margin
