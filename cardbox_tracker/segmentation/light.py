@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from cardbox_tracker.common.array_checks import ANY, check_array
 from cardbox_tracker.common.compiling import kernel
 from cardbox_tracker.segmentation.chroma import bgr_of
+from cardbox_tracker.segmentation.regions import flooded
 from cardbox_tracker.segmentation.window import Window
 
 FloatImage = NDArray[np.float32]
@@ -289,11 +290,7 @@ class LightFollower:
         varies = cv2.dilate(relative, _SQUARE) - cv2.erode(relative, _SQUARE)
         is_even = varies.reshape(shape) < np.float32(_SOFT)
         is_hidden = silhouette[_GRID] > 0
-        count, found = cv2.connectedComponents(is_even.astype(np.uint8), connectivity=4)
-        labels = found.reshape(shape)
-        is_open = np.zeros(count, np.bool_)
-        is_open[labels[is_even & ~is_hidden]] = True
-        smooth: NDArray[np.bool_] = is_even & is_hidden & is_open[labels]
+        smooth = is_hidden & flooded(~is_hidden, is_even)
         self._lit = smooth & (relative > 1.0)
         return smooth
 

@@ -89,6 +89,16 @@ def _recolour(image: ImageArray, colour: int, area_px: float) -> None:
     paint(*regions[:4], regions.areas_px < area_px, np.uint8(255 - colour), image)
 
 
+def flooded(start: NDArray[np.bool_], passable: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Return the ``passable`` pixels (H, W) that ``start`` (H, W) reaches over sides of pixels."""
+    count, found = cv2.connectedComponents(passable.astype(np.uint8), connectivity=4)
+    labels = found.reshape(passable.shape)
+    is_reached = np.zeros(count, np.bool_)
+    is_reached[labels[start & passable]] = True
+    reached: NDArray[np.bool_] = is_reached[labels]
+    return reached
+
+
 def find_regions(image: ImageArray) -> Regions:
     """Return the connected regions of the pixels of ``image`` (H, W), uint8, that are 255."""
     # A read-only array would make numba compile another version.

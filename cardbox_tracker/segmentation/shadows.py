@@ -1,8 +1,8 @@
 """Distinguishes shadows from dark clothes by their soft edge.
 
 Both darken the wall without changing its colour. But cloth ends within a pixel or two, and a shadow
-fades over many. The background is therefore flooded into dark pixels where the
-relative brightness changes slowly. The flood covers a shadow and stops at the outline of cloth.
+fades over many. The background is therefore flooded into dark pixels where the relative brightness
+changes slowly. The flood covers a shadow and stops at the outline of cloth.
 """
 
 from __future__ import annotations
@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cardbox_tracker.common.array_checks import ANY, check_array
+from cardbox_tracker.segmentation.regions import flooded
 from cardbox_tracker.segmentation.window import Window
 
 FloatImage = NDArray[np.float32]
@@ -68,12 +69,7 @@ def decide_shadows(
     varies = cv2.dilate(darkness, _SQUARE) - cv2.erode(darkness, _SQUARE)
     is_soft = is_dark & (varies.reshape(seen.shape) < np.float32(softest))
     is_background = seen == 0
-    flooded = (is_soft | is_background).astype(np.uint8)
-    count, found = cv2.connectedComponents(flooded, connectivity=4)
-    labels = found.reshape(seen.shape)
-    is_open = np.zeros(count, np.bool_)
-    is_open[labels[is_background]] = True
-    shadow = is_soft & is_open[labels]
+    shadow = is_soft & flooded(is_background, is_soft | is_background)
     # Near the outline the square reaches into the person, so the last pixels skip this test.
     for _ in range(_REACH_PX):
         near = cv2.dilate(shadow.astype(np.uint8), _CROSS).reshape(seen.shape)

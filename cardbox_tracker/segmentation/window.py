@@ -71,12 +71,7 @@ class Window(NamedTuple):
 
 
 def window_of(image: ImageArray) -> Window:
-    """Return a window that contains all pixels of an image (H, W), uint8, that are not 0.
-
-    It may be up to eight columns wider at either side than necessary; it is empty if all are 0.
-    """
+    """Return the window of the pixels of an image (H, W), uint8, that are not 0; it may be empty."""
     check_array("image", image, (ANY, ANY))
     left, top, width, height = cv2.boundingRect(image) if image.size else (0, 0, 0, 0)
-    unit = 1 if image.shape[1] % 8 else 8
-    right = -(-(left + width) // unit) * unit
-    return Window(top, top + height, left // unit * unit, right)
+    return Window(top, top + height, left, left + width)

@@ -58,7 +58,7 @@ STEPS: Mapping[str, Sequence[tuple[Any, str]]] = {
     "networks of people": [(Network, "__call__")],
     "identity of the person": [(PoseNetwork, "__call__")],
     "detections kept and read": [(KeptDetections, "__call__")],
-    "silhouette and brightness": [(DetectorSilhouetteSource, "frames")],
+    "silhouette": [(DetectorSilhouetteSource, "frames")],
     "what is kept of the images": [(scene, "watch")],
     "camera of the scene": [(scene, "found_camera")],
     "bodies of the scene": [(scene, "seen_person"), (scene, "seen_people")],
