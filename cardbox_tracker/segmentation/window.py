@@ -71,7 +71,7 @@ class Window(NamedTuple):
 
 
 def window_of(image: ImageArray) -> Window:
-    """Return the window of the pixels of an image (H, W), uint8, that are not 0; it may be empty."""
+    """Return the window of the pixels of an image (H, W), uint8, that are not 0, if any."""
     check_array("image", image, (ANY, ANY))
     left, top, width, height = cv2.boundingRect(image) if image.size else (0, 0, 0, 0)
     return Window(top, top + height, left, left + width)
