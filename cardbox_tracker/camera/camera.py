@@ -25,6 +25,10 @@ FloatArray = NDArray[np.float64]
 
 # Largest difference of the aspect ratios of a calibration and of the images.
 _ASPECT = 0.02
+WORKING_SIZE = (320, 240)
+"""Working size (width, height), px, of images of 4:3; others have as many pixels."""
+# The kernels draw rows of pixels fastest if their number is a multiple of this.
+_MULTIPLE_PX = 8
 OPTICAL_FRAME = "camera_optical_frame"
 """Name of the optical frame of a camera that has none."""
 CALIBRATED, GIVEN_FIELD_OF_VIEW = 0.005, 0.03
@@ -215,6 +219,18 @@ class Calibration:
         k = np.array([(full.fx, 0.0, full.cx), (0.0, full.fy, full.cy), (0.0, 0.0, 1.0)])
         return replace(self, width=full.width, height=full.height, k=k)
 
+    def working_size(self, most: tuple[int, int] = WORKING_SIZE) -> tuple[int, int]:
+        """Return the size (width, height), px, at which images as they are sent are used.
+
+        It has their aspect ratio, and about as many pixels as ``most``. Raises CameraError as
+        :meth:`camera` does.
+        """
+        self._check()
+        aspect = self.width / self.height
+        width = _multiple(_MULTIPLE_PX, math.sqrt(most[0] * most[1] * aspect))
+        # Colours are kept for two pixels across and down.
+        return width, _multiple(2, width / aspect)
+
     def level_size(self, width: int, height: int) -> tuple[int, int]:
         """Return the size of images of ``width`` x ``height`` px after they are turned level."""
         return (height, width) if self._quarters % 2 else (width, height)
@@ -329,6 +345,10 @@ class Calibration:
         problem = lens_problem(self.distortion_model, self.distortion)
         if self.is_distorted and problem:
             raise CameraError(problem)
+
+
+def _multiple(step: int, side: float) -> int:
+    return max(1, round(side / step)) * step
 
 
 class Rectifier:

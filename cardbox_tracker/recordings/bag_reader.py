@@ -36,7 +36,7 @@ from cardbox_tracker.recordings.bag_files import (
     read_other_channels,
 )
 from cardbox_tracker.recordings.given_camera import GivenCamera
-from cardbox_tracker.recordings.image_recording import WORKING_SIZE, RecordedImage
+from cardbox_tracker.recordings.image_recording import RecordedImage
 
 IMAGE_TYPES = ("sensor_msgs/msg/Image", "sensor_msgs/msg/CompressedImage")
 CAMERA_INFO_TYPE = "sensor_msgs/msg/CameraInfo"
@@ -76,7 +76,7 @@ class BagReader:
 
         The properties of ``camera`` replace those of the recording's only camera.
         """
-        self.path, self.working_size = Path(path), WORKING_SIZE
+        self.path = Path(path)
         self._given = camera or GivenCamera()
         self._reader: AnyReader | None = None
         self._stamps: dict[str, RecordedStamps] = {}

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from math import sqrt
 from pathlib import Path
 
 import numpy as np
@@ -13,23 +12,6 @@ from numpy.typing import NDArray
 from cardbox_tracker.camera.camera import Calibration
 from cardbox_tracker.common.errors import BagError
 from cardbox_tracker.recordings.given_camera import GivenCamera
-
-WORKING_SIZE = (320, 240)
-"""Working size (width, height), px, of bags, whatever the aspect ratio of their images."""
-# The kernels draw rows of pixels fastest if their number is a multiple of this.
-_MULTIPLE_PX = 8
-
-
-def working_size(width: int, height: int) -> tuple[int, int]:
-    """Return the working size for images of ``width`` x ``height`` px.
-
-    It has their aspect ratio, as nearly as multiples of 8 px allow, and about as many pixels as
-    ``WORKING_SIZE``, which it is for 4:3.
-    """
-    pixels, aspect = WORKING_SIZE[0] * WORKING_SIZE[1], width / height
-    sides = sqrt(pixels * aspect), sqrt(pixels / aspect)
-    across, down = (max(1, round(side / _MULTIPLE_PX)) * _MULTIPLE_PX for side in sides)
-    return across, down
 
 
 @dataclass(frozen=True)
@@ -55,7 +37,6 @@ class Film:
 
     Attributes:
         path: the file or folder.
-        working_size: size (width, height), px, at which the images are used.
         duration_s: seconds from the first to the last image.
     """
 
@@ -65,13 +46,13 @@ class Film:
         self.path, self._given = path, camera
         # The one that may tell the field of view.
         self._file = path
-        self.working_size, self.duration_s = (0, 0), 0.0
+        self.duration_s = 0.0
         self._size = self._stored = (0, 0)
 
     def _set_size(self, width: int, height: int) -> None:
-        """Store the size of the images, px, and the working size that follows from it."""
+        """Store the size of the images, px."""
         self._stored = self._stored if any(self._stored) else (width, height)
-        self._size, self.working_size = (width, height), working_size(width, height)
+        self._size = width, height
 
     def __exit__(self, *_: object) -> None:
         """Do nothing: files are only open while they are read."""

@@ -70,7 +70,7 @@ class DepthSilhouetteSource(SilhouetteSource):
                 f"the limit of the depth is {within.metres:g} m; expected {least_m:g} to "
                 f"{most_m:g} m, between the person and the wall"
             )
-        self._open(bag, bag.working_size, camera)
+        self._open(bag, camera)
         self._find_points(points, camera)
         self._within, self.depth_topic = within, within.topic
         self._without, self._nearest_m, self._is_near = 0, math.inf, False
@@ -135,7 +135,7 @@ class DetectorSilhouetteSource(SilhouetteSource):
         A detector as ``points`` finds points and mask at once. Raises CardboxError if the networks
         cannot be loaded.
         """
-        self._open(bag, bag.working_size, camera)
+        self._open(bag, camera)
         self._find_points(detector if isinstance(points, Detector) else points, camera)
         self._detector = self._detector or self._started(detector)
         self._finds_people = detector.people > 0
@@ -171,7 +171,7 @@ class PersonInViewSource(SilhouetteSource):
         See :class:`SilhouetteSource`. Raises CardboxError if the person hides a part of the scene
         in all images.
         """
-        self._open(bag, bag.working_size, camera, learning=PersonInViewLearning)
+        self._open(bag, camera, learning=PersonInViewLearning)
         self._find_points(points, camera)
         learning = self._pipeline.learning
         every = max(1, round(1e9 / (_LEARNING_HZ * self.period_ns())))

@@ -28,7 +28,6 @@ from cardbox_tracker.detectors.detector import Detector
 from cardbox_tracker.detectors.point_table import PointTable
 from cardbox_tracker.recordings.bag_reader import BagReader
 from cardbox_tracker.recordings.given_camera import GivenCamera
-from cardbox_tracker.recordings.image_recording import working_size
 from cardbox_tracker.recordings.open_images import ImageRecording, is_bag, open_images
 from cardbox_tracker.recordings.other_silhouettes import (
     DepthSilhouetteSource,
@@ -245,11 +244,6 @@ def _source(
     camera: str | None,
     points: Detector | PointTable | None,
 ) -> SilhouetteSource:
-    finds_people = any(isinstance(one, Detector) and one.people for one in (background, points))
-    if finds_people and isinstance(bag, BagReader):
-        # The networks expect square pixels.
-        calibration = bag.calibration(camera)
-        bag.working_size = working_size(calibration.width, calibration.height)
     if isinstance(background, Within):
         return DepthSilhouetteSource(bag, background, camera, points)
     if isinstance(background, Detector):

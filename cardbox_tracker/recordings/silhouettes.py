@@ -15,7 +15,7 @@ from typing import BinaryIO, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from cardbox_tracker.camera.camera import OPTICAL_FRAME, Rectifier
+from cardbox_tracker.camera.camera import OPTICAL_FRAME, WORKING_SIZE, Rectifier
 from cardbox_tracker.camera.depth_image import DepthImage
 from cardbox_tracker.common.beside import results_ahead
 from cardbox_tracker.common.errors import BagError, CameraError, CardboxError, EncodingError
@@ -135,19 +135,19 @@ class SilhouetteSource:
         bag: ImageRecording,
         background: TimeSpan,
         config: BackgroundConfig | None = None,
-        size: tuple[int, int] | None = None,
+        size: tuple[int, int] = WORKING_SIZE,
         camera: str | None = None,
         points: Detector | PointTable | None = None,
     ) -> None:
         """Learn the empty scene from the first images of the span ``background``.
 
-        It learns from at most ``config.learn_images`` images, like the background node. ``size``
-        is the working resolution (width, height), px, None for that of the recording; without
+        It learns from at most ``config.learn_images`` images, like the background node. Images
+        have about as many pixels as ``size`` (width, height) and keep their aspect; without
         ``camera``, its namespace, the recording has only one; ``points`` is the source of the
         person's points. Raises BagError if the span has too few images, CameraError if the camera
         is not calibrated, and CardboxError if ``points`` cannot be read.
         """
-        self._open(bag, size or bag.working_size, camera, config)
+        self._open(bag, camera, config, size=size)
         self._find_points(points, camera)
         self._background_s = background.end_s
         is_readable = False
@@ -171,10 +171,10 @@ class SilhouetteSource:
     def _open(
         self,
         bag: ImageRecording,
-        size: tuple[int, int],
         camera: str | None,
         config: BackgroundConfig | None = None,
         learning: type[Learning] = Learning,
+        size: tuple[int, int] = WORKING_SIZE,
     ) -> None:
         self._bag, self.path, self.start_ns = bag, bag.path, bag.start_ns
         self._broken: dict[int, str] = {}

@@ -100,20 +100,19 @@ def save_background(stored: StoredBackground, path: str | os.PathLike[str]) -> N
         np.savez(file, allow_pickle=False, **arrays)
 
 
-def load_background(path: str | os.PathLike[str], size: tuple[int, int]) -> StoredBackground:
-    """Read a background of size (width, height), px; BackgroundFileError if it is none."""
+def load_background(path: str | os.PathLike[str], most: tuple[int, int]) -> StoredBackground:
+    """Read a background of a pipeline with ``most`` pixels; BackgroundFileError if it is none."""
     expected = (
         "a background that can be used: the file that the background node wrote. Delete it, or "
         "give another name, and let the node learn with nobody in view"
     )
     with foreign(path, BackgroundFileError, expected):
         with regular_file(path, _MOST_BYTES) as file:
-            arrays = _read(file, size)
-        return _checked(arrays, size)
+            arrays = _read(file, 2 * most[0] * most[1])
+        return _checked(arrays, most)
 
 
-def _read(file: BinaryIO, size: tuple[int, int]) -> dict[str, NDArray[Any]]:
-    pixels = size[0] * size[1]
+def _read(file: BinaryIO, pixels: int) -> dict[str, NDArray[Any]]:
     most = {_MEAN: pixels, _STDDEV: pixels, _CHROMA_MEAN: 3 * pixels, _CHROMA_STDDEV: 3 * pixels}
     arrays: dict[str, NDArray[Any]] = {}
     with zipfile.ZipFile(file) as archive:
@@ -151,20 +150,9 @@ def _array(entry: IO[bytes], key: str, most: int) -> NDArray[Any]:
     return np.frombuffer(data, kind, count).reshape(shape, order=order)
 
 
-def _checked(arrays: dict[str, NDArray[Any]], size: tuple[int, int]) -> StoredBackground:
+def _checked(arrays: dict[str, NDArray[Any]], most: tuple[int, int]) -> StoredBackground:
     if str(arrays[_FORMAT]) != FORMAT:
         raise ValueError(f"its format is '{arrays[_FORMAT]}'; this version reads '{FORMAT}'")
-    mean = arrays[_MEAN]
-    if mean.shape != size[::-1]:
-        found = "x".join(map(str, mean.shape[::-1]))
-        raise ValueError(f"it is of {found} px, but width and height of the node are {size}")
-    chroma = None
-    if all(key in arrays for key in _COLOR):
-        shape = 3, max(size[1] // 2, 1), max(size[0] // 2, 1)
-        chroma = ChromaModel(*(_plane(arrays, key, shape) for key in _COLOR))
-    model = BackgroundModel(
-        _plane(arrays, _MEAN, mean.shape), _plane(arrays, _STDDEV, mean.shape), chroma
-    )
     if arrays[_SIZE].dtype.kind != "i" or arrays[_SIZE].shape != (2,):
         raise ValueError("its size is not two whole numbers")
     width, height = arrays[_SIZE].tolist()
@@ -175,7 +163,19 @@ def _checked(arrays: dict[str, NDArray[Any]], size: tuple[int, int]) -> StoredBa
         np.asarray(arrays[_DISTORTION], np.float64).ravel(),
         str(arrays[_DISTORTION_MODEL]),
     )
-    calibration.camera(width, height)
+    size, mean = calibration.working_size(most), arrays[_MEAN]
+    if mean.shape not in (size, size[::-1]):  # a camera that lies on its side
+        found = "x".join(map(str, mean.shape[::-1]))
+        raise ValueError(
+            f"it is of {found} px, but width and height of the node ask for {size[0]}x{size[1]}"
+        )
+    chroma = None
+    if all(key in arrays for key in _COLOR):
+        shape = 3, max(mean.shape[0] // 2, 1), max(mean.shape[1] // 2, 1)
+        chroma = ChromaModel(*(_plane(arrays, key, shape) for key in _COLOR))
+    model = BackgroundModel(
+        _plane(arrays, _MEAN, mean.shape), _plane(arrays, _STDDEV, mean.shape), chroma
+    )
     return StoredBackground(model, calibration)
 
 

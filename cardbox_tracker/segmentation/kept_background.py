@@ -128,14 +128,14 @@ class KeptBackground:
         use: what was done with the file, in words.
     """
 
-    def __init__(self, path: Path | None, size: tuple[int, int]) -> None:
-        """Read the file ``path`` if there is one; ``size`` is the working size, px."""
+    def __init__(self, path: Path | None, most: tuple[int, int]) -> None:
+        """Read the file ``path`` if there is one; ``most`` is that of the pipeline, px."""
         self.path = path
         self._stored: StoredBackground | None = None
         self._before: BackgroundModel | None = None
         self.use = "not there yet"
         if path is not None and path.exists():
-            self._stored = load_background(path, size)
+            self._stored = load_background(path, most)
             self.use = "not used yet"
 
     def carry_over(self, model: BackgroundModel | None) -> None:

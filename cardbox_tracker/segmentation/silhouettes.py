@@ -10,7 +10,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from cardbox_tracker.camera.camera import Calibration
+from cardbox_tracker.camera.camera import WORKING_SIZE, Calibration
 from cardbox_tracker.camera.depth_image import DepthImage
 from cardbox_tracker.camera.encodings import brightness_of, to_working_size
 from cardbox_tracker.segmentation.background import SilhouetteExtractor
@@ -37,18 +37,20 @@ class SilhouettePipeline:
     def __init__(
         self,
         calibration: Calibration,
-        size: tuple[int, int],
+        most: tuple[int, int] = WORKING_SIZE,
         config: BackgroundConfig | None = None,
         learning: type[Learning] = Learning,
     ) -> None:
-        """Start without a background; ``size`` (width, height), px, is that of working images.
+        """Start without a background.
 
-        ``calibration`` is that of the images, which may have any size of its aspect ratio;
-        ``learning`` learns the empty scene. Raises CameraError if the camera is uncalibrated or its
+        ``calibration`` is that of the images, which may have any size of its aspect ratio; working
+        images keep it, with about as many pixels as ``most`` (width, height). ``learning`` learns
+        the empty scene. Raises CameraError if the camera is uncalibrated or its
         distortion model is unknown.
         """
         self.calibration = calibration
-        self._size, level = size, calibration.level_size(*size)
+        self._size = calibration.working_size(most)
+        level = calibration.level_size(*self._size)
         self.camera = calibration.camera(*level)
         self._rectifier = calibration.rectifier(*level)
         self._config = config or BackgroundConfig()

@@ -2,19 +2,17 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from cardbox_tracker.camera.camera import Camera
+from cardbox_tracker.camera.camera import WORKING_SIZE, Camera
 from cardbox_tracker.person.posture import ARM_ANGLES
 from cardbox_tracker.person.sizes import FloatArray
 from cardbox_tracker.terms.term import Silhouette
-
-WIDTH = 320
-"""Width of the image for the comparison, px."""
 
 HALF_PX, FAR_PX = 5.0, 10.0
 """Distance with a quarter of the weight, and limit of the distances."""
@@ -29,13 +27,18 @@ ABOVE_HIPS_PX = 4
 STATE_STEP = np.array([0.02, 0.03, 0.03, 0.08, *[0.055] * (2 * ARM_ANGLES), 0.04, 0.02])
 """Steps (14,) of central differences, about 2 px; smaller steps would suffer from whole pixels."""
 
+# Images whose sides differ by a smaller share are compared as they are.
+_SAME_SIZE = 0.05
 # Margin around the person for the moved model.
 _MARGIN_PX = 24
 
 
 def comparing(camera: Camera) -> Camera:
     """Return the camera at the size at which outlines are compared."""
-    return camera.scaled(WIDTH, round(WIDTH * camera.height / camera.width))
+    scale = math.sqrt(math.prod(WORKING_SIZE) / (camera.width * camera.height))
+    if abs(scale - 1.0) < _SAME_SIZE:
+        return camera
+    return camera.scaled(round(scale * camera.width), round(scale * camera.height))
 
 
 class SeenOutline:

@@ -19,8 +19,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from cardbox_tracker.camera.camera import WORKING_SIZE
 from cardbox_tracker.recordings.bag_reader import BagReader
-from cardbox_tracker.recordings.image_recording import WORKING_SIZE
 from cardbox_tracker.segmentation.background_config import BackgroundConfig
 from cardbox_tracker.segmentation.silhouettes import SilhouettePipeline
 

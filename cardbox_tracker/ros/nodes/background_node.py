@@ -19,7 +19,9 @@ from cardbox_tracker.ros.nodes.depth_input import DepthCut
 from cardbox_tracker.ros.nodes.shared_parameters import (
     camera_roll_parameter,
     depth_parameter,
+    height_parameter,
     image_transport_parameter,
+    width_parameter,
 )
 from cardbox_tracker.ros.runtime import qos
 from cardbox_tracker.ros.runtime.command_line import node_main
@@ -51,8 +53,8 @@ class BackgroundParameters(NodeParameters, BackgroundConfig):
 
     effects = MappingProxyType({"learn_images": _NEXT_LEARNING})
     image_transport: str = image_transport_parameter()
-    width: int = at_start(320, "working resolution, width", unit="px", limits=(32, 4096))
-    height: int = at_start(240, "working resolution, height", unit="px", limits=(32, 4096))
+    width: int = width_parameter()
+    height: int = height_parameter()
     background_file: str = at_start(
         "",
         "file of the learned background; if it exists at the start and fits the camera and the "

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from functools import partial
 
+from cardbox_tracker.camera.camera import WORKING_SIZE
 from cardbox_tracker.ros.runtime.parameter_fields import at_start
 
 cameras_parameter = partial(
@@ -37,6 +38,22 @@ camera_roll_parameter = partial(
     "same value",
     unit="degrees",
     limits=(-180.0, 180.0),
+)
+
+width_parameter = partial(
+    at_start,
+    WORKING_SIZE[0],
+    "images are used with about width times height pixels, in their own aspect ratio",
+    unit="px",
+    limits=(32, 4096),
+)
+
+height_parameter = partial(
+    at_start,
+    WORKING_SIZE[1],
+    "see width",
+    unit="px",
+    limits=(32, 4096),
 )
 
 image_transport_parameter = partial(
