@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from operator import index
 from typing import NamedTuple
@@ -59,7 +59,7 @@ _OTHER_SIDE = [
 class LegPoints(NamedTuple):
     """The points ``LEG_POINT_NAMES`` of one person in one image."""
 
-    px: FloatArray  #: column and row, (8, 2), as in :class:`ImagePoints`
+    px: FloatArray  #: column and row, (8, 2), as in :class:`ImagePoints`; nan if it is not known
     scores: FloatArray  #: chance that the point is in the image and visible, 0 to 1, (8,)
     #: the points in space, (8, 3), with the axes, origin and scale of ``ImagePoints.spatial_m``;
     #: None without it.
@@ -94,10 +94,10 @@ class ImagePoints:
     #: are of the same image.
     stamp_ns: int | None = None
     #: the points in space as the detector estimates them, (17, 3), up to a common scale: x right, y
-    #: down, z away from the camera, in a level frame; None without it. Only directions between the
-    #: points are used.
+    #: down, z away from the camera, in a level frame; None without it, nan where one is missing.
+    #: Only directions between the points are used.
     spatial_m: FloatArray | None = None
-    #: the points of the legs, which the tracker of the upper body does not use; None without them
+    #: the points of the legs; None without them
     legs: LegPoints | None = None
 
     def __post_init__(self) -> None:
@@ -122,20 +122,27 @@ class ImagePoints:
                 ) from None
 
     @classmethod
-    def of(
-        cls, found: Mapping[str, tuple[float, float, float]], stamp_ns: int | None = None
-    ) -> ImagePoints:
-        """Return the points with column, row and score by name; other names are not used."""
-        px, scores = np.full((len(POINT_NAMES), 2), np.nan), np.zeros(len(POINT_NAMES))
-        for name, (column, row, score) in found.items():
-            if name in POINT_INDEX:
-                place = POINT_INDEX[name]
-                px[place], scores[place] = (column, row), score
-        return cls(px, scores, stamp_ns)
+    def of(cls, found: Mapping[str, Sequence[float]], stamp_ns: int | None = None) -> ImagePoints:
+        """Return the points of some names; others are not used.
+
+        Each has column, row and score, and may have x, y and z as in ``spatial_m``.
+        """
+
+        def known(names: Sequence[str]) -> tuple[FloatArray, FloatArray, FloatArray | None]:
+            values = np.full((len(names), 6), np.nan)
+            values[:, 2] = 0.0
+            for number, name in enumerate(names):
+                given = found.get(name, ())
+                values[number, : len(given)] = given
+            space = values[:, 3:]
+            return values[:, :2], values[:, 2], space if np.isfinite(space).any() else None
+
+        (px, scores, spatial_m), legs = known(POINT_NAMES), LegPoints(*known(LEG_POINT_NAMES))
+        return cls(px, scores, stamp_ns, spatial_m, legs if legs.scores.any() else None)
 
     @classmethod
     def from_coco17(cls, points: FloatArray, stamp_ns: int | None = None) -> ImagePoints:
-        """Return the points of COCO, which most detectors have; knees and ankles are not used.
+        """Return the points of COCO, which most detectors have.
 
         ``points``, (17, 3), are column, row (px) and score, 0 to 1, of each of ``COCO_NAMES``; nan
         or the score 0 where one is missing. Raises ValueError for another shape or type.

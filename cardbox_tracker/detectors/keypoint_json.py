@@ -43,14 +43,17 @@ _UPPER = (
     *("left_shoulder", "left_elbow", "left_wrist"),
 )
 _LEGS = tuple(f"{side}_{name}" for side in ("right", "left") for name in ("hip", "knee", "ankle"))
-_BODY_25B = (*COCO_NAMES, *_others(8))
+_SIDES = "left", "right"
+# Big toe, small toe and heel of each foot.
+_FEET = [name for side in _SIDES for name in (f"{side}_foot", f"{side} small toe", f"{side}_heel")]
+_BODY_25B = (*COCO_NAMES, *_others(2), *_FEET)
 _FACE = ("right_eye", "left_eye", "right_ear", "left_ear")
 LAYOUTS: dict[int, tuple[str, ...]] = {
     17: COCO_NAMES,
     18: (*_UPPER, *_LEGS, *_FACE),
-    25: (*_UPPER, "hips", *_LEGS, *_FACE, *_others(6)),
-    26: (*COCO_NAMES, *_others(9)),
-    133: (*COCO_NAMES, *_others(74), *_hand("left"), *_hand("right")),
+    25: (*_UPPER, "hips", *_LEGS, *_FACE, *_FEET),
+    26: (*COCO_NAMES, *_others(3), *_FEET[::3], *_FEET[1::3], *_FEET[2::3]),
+    133: (*COCO_NAMES, *_FEET, *_others(68), *_hand("left"), *_hand("right")),
 }
 """Names of a person's points by their number: COCO, OpenPose's COCO and BODY_25, Halpe, and
 COCO-WholeBody."""
@@ -121,7 +124,9 @@ def coco_people(file: Path) -> Iterator[FoundPerson]:
     for person in people:
         if seen <= flags and (is_annotated or _VISIBLE in seen):
             # Of annotations, the third number says whether the point was seen.
-            scored = [(*point[:3], point[3] / _VISIBLE) for point in person.points]
+            scored: list[NamedPoint] = [
+                (*point[:3], point[3] / _VISIBLE) for point in person.points
+            ]
             yield person._replace(points=scored)
         else:
             yield person

@@ -33,8 +33,9 @@ class FindsPeople(Protocol):
     def detect(self, image: ColorImage) -> Iterable[Mapping[str, Any]]:
         """Return the people in an undistorted image (H, W, 3), bgr, the most certain one first.
 
-        Each has column, row (px) and score (0 to 1) by names of ``LANDMARKS``; points with score 0
-        are missing. ``mask``, (H, W), may be the pixels of the person.
+        Each has column, row (px) and score (0 to 1) by names of ``LANDMARKS``, and may have x, y
+        and z as in ``ImagePoints.spatial_m``; points with score 0 are missing. ``mask``, (H, W),
+        may be the pixels of the person.
         """
 
 
@@ -80,8 +81,8 @@ class OwnNetwork(PoseNetwork):
                 found.append(_detection(person, image.shape[:2]))
             except (CardboxError, ValueError, TypeError, AttributeError) as error:
                 raise CardboxError(
-                    f"{name}, person {number}: {error}; expected column, row and score by names of "
-                    "points"
+                    f"{name}, person {number}: {error}; expected column, row and score, or these "
+                    "and x, y and z, by names of points"
                 ) from None
         return [one for one in found if one.scores.any()]
 
@@ -102,18 +103,25 @@ class OwnNetwork(PoseNetwork):
 
 def _detection(person: Mapping[str, Any], shape: tuple[int, int]) -> Detection:
     points_px, scores, known = np.full((POINTS, 2), np.nan), np.zeros(POINTS), {}
+    spatial_m = np.full((POINTS, 3), np.nan)
     for name, values in person.items():
         if name == _MASK:
             continue
         if name not in LANDMARKS:
             raise ValueError(f"{quoted(name)} is no point; those are {', '.join(LANDMARKS)}")
-        column, row, score = map(float, values)
+        column, row, score, *space = map(float, values)
+        if len(space) not in (0, 3):
+            raise ValueError(f"{name} has {len(values)} numbers, not 3 or 6")
         check_point((name, column, row, score), shape[::-1])
         if score > 0.0:
+            number = LANDMARKS.index(name)
             known[name] = column, row, score
-            points_px[LANDMARKS.index(name)], scores[LANDMARKS.index(name)] = (column, row), score
+            points_px[number], scores[number] = (column, row), score
+            spatial_m[number, : len(space)] = space
     check_person(known)
     found = Detection(points_px, scores, np.zeros(shape, np.uint8))
+    if np.isfinite(spatial_m).any():
+        found = found._replace(spatial_m=spatial_m)
     mask = person.get(_MASK)
     if mask is None:
         mask = figure_of(found).drawn(shape)

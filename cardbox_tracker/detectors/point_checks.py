@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping, Sequence
 from math import isfinite
 
 import numpy as np
@@ -12,8 +12,8 @@ from cardbox_tracker.detectors.image_points import POINT_NAMES, ImagePoints
 
 Size = tuple[int, int]
 """Width and height of the camera's image, px."""
-NamedPoint = tuple[str, float, float, float]
-"""Name, column and row (px), and score of a point."""
+NamedPoint = tuple[str, float, float, float, *tuple[float, ...]]
+"""Name, column and row (px), and score of a point, and its x, y and z in space if it has them."""
 
 # float32 rounds a score of 1 by less.
 _MOST_SCORE = 1.001
@@ -25,7 +25,7 @@ _SHARES, _LEAST_POINTS = 1.5, 3
 
 def check_point(point: NamedPoint, size: Size | None) -> None:
     """Raise CardboxError if a score is no chance, or, above 0, its place far off the image."""
-    name, column, row, score = point
+    name, column, row, score, *_ = point
     if not 0.0 <= score <= _MOST_SCORE:
         raise CardboxError(f"{name} has the score {score:g}; expected a chance from 0 to 1")
     if score == 0.0:
@@ -51,7 +51,7 @@ def person_of(points: Iterable[NamedPoint], size: Size | None) -> ImagePoints:
     return ImagePoints.of(found)
 
 
-def check_person(found: dict[str, tuple[float, float, float]]) -> None:
+def check_person(found: Mapping[str, Sequence[float]]) -> None:
     """Raise CardboxError if the points of one person, by name, are shares of the image."""
     places = np.array([point[:2] for point in found.values()])
     if len(places) >= _LEAST_POINTS and np.abs(places).max() <= _SHARES:

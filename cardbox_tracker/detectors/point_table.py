@@ -8,6 +8,7 @@ import re
 from bisect import bisect_left
 from collections import Counter
 from collections.abc import Sequence
+from dataclasses import replace
 from decimal import Decimal
 from pathlib import Path
 from typing import NamedTuple
@@ -18,14 +19,23 @@ from numpy.typing import NDArray
 from cardbox_tracker.camera.camera import Calibration
 from cardbox_tracker.common.errors import CardboxError, quoted
 from cardbox_tracker.common.files import UnreadableFileError, foreign, regular_file
-from cardbox_tracker.detectors.image_points import POINT_INDEX, ImagePoints
+from cardbox_tracker.detectors.image_points import (
+    LEG_POINT_NAMES,
+    POINT_INDEX,
+    ImagePoints,
+    LegPoints,
+)
 from cardbox_tracker.detectors.keypoint_json import coco_people, openpose_people
 from cardbox_tracker.detectors.person_choice import LEAST_INSIDE, inside, near_person, person_in
 from cardbox_tracker.detectors.point_checks import Size, check_person, check_point, person_of
+from cardbox_tracker.person.sizes import FloatArray
 
 COLUMNS = ("stamp_ns", "joint", "u", "v", "score")
 """Columns that a table needs; ``frame`` may take the place of the first."""
+SPACE = ("x", "y", "z")
+"""Columns of points in space, as in ``ImagePoints.spatial_m``, which a table may have."""
 FRAME, _PERSON = "frame", "person"
+_USED = frozenset((*POINT_INDEX, *LEG_POINT_NAMES))
 # Columns of the image's stamp with their units, ns.
 _STAMPS = {"stamp_ns": 1, "stamp_us": 10**3, "stamp_ms": 10**6, "stamp_s": 10**9, "stamp": 10**9}
 _MOST_NS = 2**63
@@ -90,7 +100,7 @@ class PointTable(NamedTuple):
         return GivenPoints(path, "name" if is_named else FRAME, persons)
 
     def _read_table(self, camera: str | None, size: Size | None) -> tuple[str, Persons]:
-        found: dict[tuple[Key, str], dict[str, tuple[float, float, float]]] = {}
+        found: dict[tuple[Key, str], dict[str, list[float]]] = {}
         first_lines: dict[tuple[Key, str], int] = {}
         try:
             # Spreadsheets begin a file with a byte order mark.
@@ -101,6 +111,7 @@ class PointTable(NamedTuple):
                 rows = csv.DictReader(file)
                 column = self._check(rows.fieldnames or (), camera)
                 kind = FRAME if column == FRAME else COLUMNS[0]
+                space = SPACE if set(SPACE) <= set(rows.fieldnames or ()) else ()
                 for row in rows:
                     if camera is not None and row["camera"] != camera:
                         continue
@@ -120,8 +131,8 @@ class PointTable(NamedTuple):
                             f"{kind} {image} has {joint} again; with several people, give a column "
                             f"{_PERSON}"
                         )
-                    if score > 0.0 and joint in POINT_INDEX:
-                        joints[joint] = u, v, score
+                    if score > 0.0 and joint in _USED:
+                        joints[joint] = [u, v, score, *(float(row[x] or "nan") for x in space)]
         except (UnreadableFileError, UnicodeDecodeError, _TableError):
             raise
         except (ValueError, TypeError, ArithmeticError) as error:
@@ -360,9 +371,19 @@ def _lies(person: ImagePoints) -> bool:
 
 def placed(person: ImagePoints, calibration: Calibration, size: Size) -> ImagePoints:
     """Return points of a camera's own image undistorted and at the working ``size``."""
-    px = calibration.rectified(person.px, *size)
-    # Beyond its image, a lens with distortion is not calibrated.
-    is_near = ((px > -np.array(size)) & (px < 2 * np.array(size))).all(axis=1)
-    found = ImagePoints(px, np.where(is_near, person.scores, 0.0))
+
+    def moved(
+        px: FloatArray, scores: FloatArray, spatial_m: FloatArray | None
+    ) -> tuple[FloatArray, FloatArray, FloatArray | None]:
+        px = calibration.rectified(px, *size)
+        if calibration.is_distorted:
+            # Beyond its image, a lens is not calibrated.
+            is_near = ((px > -np.array(size)) & (px < 2 * np.array(size))).all(axis=1)
+            scores = np.where(is_near, scores, 0.0)
+        return px, scores, None if spatial_m is None else spatial_m @ calibration.turn().T
+
+    px, scores, spatial_m = moved(person.px, person.scores, person.spatial_m)
+    legs = None if person.legs is None else LegPoints(*moved(*person.legs))
+    found = replace(person, px=px, scores=scores, spatial_m=spatial_m, legs=legs)
     # In a mirrored image, a detector takes the left side for the right one.
     return found.exchanged() if calibration.is_mirrored else found

@@ -109,6 +109,10 @@ class Detection(NamedTuple):
         return np.asarray(np.uint8(255) * (self.mask >= _LEAST_MASK))
 
 
+NOBODY = Detection(np.zeros((POINTS, 2)), np.zeros(POINTS), np.zeros((0, 0), np.uint8))
+"""All points are missing."""
+
+
 def figure_of(found: Detection) -> Figure:
     """Return the figure of a detection."""
     return Figure(dict(zip(LANDMARKS, found.points_px, strict=True)))

@@ -44,6 +44,9 @@ FORWARD = np.array([0.09, 0.045, 0.0, 0.0, 0.01, 0.0])
 _HEIGHT_STDDEVS = np.array([0.025, 0.016, 0.013, 0.016, 0.014, 0.010])
 _FORWARD_STDDEVS = np.array([0.03, 0.02, 0.015, 0.015, 0.015, 0.01])
 _SHOULDER, _HIP, _KNEE, _ANKLE = range(2, 6)
+_TRUNK = [
+    POINT_INDEX[f"{side}_{name}"] for name in ("shoulder", "hip") for side in ("left", "right")
+]
 # How much higher MediaPipe marks the hips where no feet are in the image.
 _HIP_ALONE = 0.022
 # Leans of legs, trunk and aside of a person, rad: means, and deviations among people and images.
@@ -306,7 +309,8 @@ def _upright(sights: Sightings, number: int, camera: Camera) -> _Seen | None:
         known &= is_inside(px, camera)
         if points.legs is not None:
             # Ankles are doubtful where heels or toes are cut off.
-            known[_ANKLE] &= bool(is_inside(points.legs.px[4:], camera).all())
+            feet = is_inside(points.legs.px[4:], camera) | (points.legs.scores[4:] <= 0.0)
+            known[_ANKLE] &= bool(feet.all())
         facing, is_bowed, bend, is_straight, sits = _posture(points)
         # The network guesses legs that are not in the image.
         is_straight, sits = is_straight and bool(known[_KNEE]), sits and bool(known[_KNEE])
@@ -376,13 +380,10 @@ def _posture(points: ImagePoints) -> tuple[tuple[float, float], bool, float, boo
 
     The bend is that of the hips plus the mean one of the knees, rad; nan if legs are unknown.
     """
-    if points.spatial_m is None:
-        return (0.0, 1.0), False, math.nan, True, False
     there = points.spatial_m
-    shoulders, hips = (
-        np.array([there[POINT_INDEX[f"{side}_{name}"]] for side in ("left", "right")])
-        for name in ("shoulder", "hip")
-    )
+    if there is None or not np.isfinite(there[_TRUNK]).all():
+        return (0.0, 1.0), False, math.nan, True, False
+    shoulders, hips = there[_TRUNK].reshape(2, 2, 3)
     across = shoulders[0] - shoulders[1]
     length = max(float(np.hypot(across[0], across[2])), 1e-6)
     facing = float(across[2] / length), float(across[0] / length)

@@ -128,9 +128,8 @@ class CameraAndListener:
         """Create the ROS node; ``nodes`` will start the executables ``processes``."""
         import rclpy
         from diagnostic_msgs.msg import DiagnosticArray
-        from geometry_msgs.msg import PolygonStamped
         from rclpy.executors import SingleThreadedExecutor
-        from sensor_msgs.msg import CameraInfo, Image, JointState
+        from sensor_msgs.msg import CameraInfo, Image, JointState, PointCloud2
         from std_msgs.msg import Bool
 
         from cardbox_tracker.ros.runtime import qos
@@ -157,7 +156,7 @@ class CameraAndListener:
             qos.RESULT,
         )
         self._node.create_subscription(
-            PolygonStamped,
+            PointCloud2,
             "detector/keypoints",
             self._saw,  # type: ignore[arg-type]  # as above
             qos.RESULT,
@@ -178,7 +177,7 @@ class CameraAndListener:
     def _saw(self, message: Any, _: dict[str, Any]) -> None:
         from cardbox_tracker.ros.messages.conversions import stamp_ns
 
-        if any(point.z > 0.0 for point in message.polygon.points):
+        if message.height:
             self.points_ns[stamp_ns(message.header.stamp)] = time.time_ns()
 
     def _note_nodes(self, message: Any, _: dict[str, Any]) -> None:

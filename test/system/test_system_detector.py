@@ -9,12 +9,11 @@ import numpy as np
 import pytest
 import rclpy
 from diagnostic_msgs.msg import DiagnosticArray
-from geometry_msgs.msg import Point32, Polygon, PolygonStamped
-from sensor_msgs.msg import CameraInfo, Image, JointState
+from sensor_msgs.msg import CameraInfo, Image, JointState, PointCloud2
 from std_msgs.msg import Header
 
 from cardbox_tracker.detectors.detector import PersonDetector
-from cardbox_tracker.detectors.pose_network import LANDMARKS, Detection
+from cardbox_tracker.detectors.pose_network import LANDMARKS, NOBODY, Detection
 from cardbox_tracker.person.kinematics import pose
 from cardbox_tracker.person.model_file import save_body_model
 from cardbox_tracker.person.posture import reference_posture
@@ -22,6 +21,7 @@ from cardbox_tracker.ros.messages.conversions import (
     camera_info_message,
     image_message,
 )
+from cardbox_tracker.ros.messages.keypoints import people_message
 from cardbox_tracker.ros.nodes.detector_node import DetectorNode
 from cardbox_tracker.ros.runtime import qos
 
@@ -102,15 +102,17 @@ class Room:
         self.graph.wait(holds, what)
 
 
-def bad_messages(header: Header) -> list[PolygonStamped]:
+def bad_messages(header: Header) -> list[PointCloud2]:
     """Return messages that nobody can use: their points are too many, nowhere, or elsewhere."""
-    nan, far = Point32(x=float("nan"), z=0.5), Point32(x=1e30, z=0.5)
     elsewhere = Header(frame_id="elsewhere", stamp=header.stamp)
+    there = NOBODY._replace(scores=np.full(len(LANDMARKS), 0.5))
+    nowhere = there._replace(points_px=np.full((len(LANDMARKS), 2), np.nan))
+    endless = there._replace(points_px=np.full((len(LANDMARKS), 2), np.inf))
     return [
-        PolygonStamped(header=header, polygon=Polygon(points=[Point32()] * 10_000)),
-        PolygonStamped(header=header, polygon=Polygon(points=[nan] * 17)),
-        PolygonStamped(header=header, polygon=Polygon(points=[far] * 17)),
-        PolygonStamped(header=elsewhere, polygon=Polygon(points=[Point32(z=0.5)] * 17)),
+        people_message(header, [NOBODY] * 1000),
+        people_message(header, [nowhere]),
+        people_message(header, [endless]),
+        people_message(elsewhere, [there]),
     ]
 
 
@@ -126,7 +128,7 @@ def test_the_detector_alone_leads_to_joint_states(
         room.until(lambda: int(room.values().get("keypoints used", "0")) >= 10, "points")
         assert float(room.values()["keypoints behind the image (ms)"]) <= 300.0
 
-        publisher = own_graph.node.create_publisher(PolygonStamped, "detector/keypoints", 10)
+        publisher = own_graph.node.create_publisher(PointCloud2, "detector/keypoints", 10)
         own_graph.wait(lambda: publisher.get_subscription_count() == 1, "the tracker")
         for number in range(40):
             header = Header(frame_id="eye", stamp=own_graph.next_stamp())
@@ -137,7 +139,7 @@ def test_the_detector_alone_leads_to_joint_states(
         room.until(lambda: int(room.values()["keypoints used"]) >= used + 5, "good points")
         said = room.tracker.text()
         assert "Traceback" not in said
-        assert "10000 points" in said and "expected a place" in said
+        assert "33000 points" in said and "expected a place" in said
         assert said.count("detector/keypoints:") <= 6, "a sender of nonsense fills the log"
     finally:
         room.close()

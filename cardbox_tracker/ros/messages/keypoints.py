@@ -6,19 +6,33 @@ packages are read by the names of their fields, so that no package has to be ins
 
 from __future__ import annotations
 
+from array import array
 from collections.abc import Callable, Sequence
 from typing import Any
 
-from geometry_msgs.msg import Point32, Polygon, PolygonStamped
+import numpy as np
+from sensor_msgs.msg import PointCloud2, PointField
 from std_msgs.msg import Header
 
-from cardbox_tracker.common.errors import CardboxError
+from cardbox_tracker.common.errors import CardboxError, cut
 from cardbox_tracker.detectors.image_points import COCO_NAMES, POINT_NAMES, ImagePoints
-from cardbox_tracker.detectors.point_checks import Size, person_of
-from cardbox_tracker.detectors.pose_network import LANDMARKS
+from cardbox_tracker.detectors.point_checks import NamedPoint, Size, person_of
+from cardbox_tracker.detectors.pose_network import LANDMARKS, Detection
 from cardbox_tracker.person.sizes import FloatArray
 from cardbox_tracker.ros.messages.types import optional_class
 
+_FIELDS = dict.fromkeys(("u", "v", "score", "x", "y", "z"), PointField.FLOAT32)
+_FIELDS |= dict.fromkeys(("landmark", "person"), PointField.UINT32)
+_KINDS = {
+    PointField.INT8: "i1",
+    PointField.UINT8: "u1",
+    PointField.INT16: "i2",
+    PointField.UINT16: "u2",
+    PointField.INT32: "i4",
+    PointField.UINT32: "u4",
+    PointField.FLOAT32: "f4",
+    PointField.FLOAT64: "f8",
+}
 MESSAGE_NAMES = (*COCO_NAMES, *POINT_NAMES[13:])
 """The points of a PolygonStamped: those of COCO, then the knuckles, which may be left out."""
 SKELETON_NAMES = (
@@ -32,8 +46,8 @@ SKELETON_NAMES = (
 )
 """The points of hri_msgs/Skeleton2D in its order."""
 
-POLYGON_STAMPED = "geometry_msgs/msg/PolygonStamped"
-"""Type of the messages that need no further package."""
+POINT_CLOUD = "sensor_msgs/msg/PointCloud2"
+"""Type of the detector's messages."""
 
 _MOST_PERSONS = 100
 
@@ -41,16 +55,75 @@ Convert = Callable[[Any, Size], list[ImagePoints]]
 """Takes a message; returns the points of each person. Raises CardboxError if it is malformed."""
 
 
-def people_message(
-    header: Header, people: Sequence[tuple[FloatArray, FloatArray]]
-) -> PolygonStamped:
-    """Return the message of ``LANDMARKS``, (33, 2), px, and scores, (33,), of each person."""
-    points = [
-        Point32(x=float(px[i, 0]), y=float(px[i, 1]), z=float(scores[i]))
-        for px, scores in people
-        for i in map(LANDMARKS.index, MESSAGE_NAMES)
-    ]
-    return PolygonStamped(header=header, polygon=Polygon(points=points))
+def people_message(header: Header, people: Sequence[Detection]) -> PointCloud2:
+    """Return the message of all points of some people, a row a person; their masks are not sent."""
+    kind = np.dtype([(name, "<" + _KINDS[field]) for name, field in _FIELDS.items()])
+    points = np.zeros((len(people), len(LANDMARKS)), kind)
+    for number, (row, one) in enumerate(zip(points, people, strict=True)):
+        row["u"], row["v"], row["score"] = *one.points_px.T, one.scores
+        row["landmark"], row["person"] = range(len(LANDMARKS)), number
+        unknown = np.full(3, np.nan)
+        row["x"], row["y"], row["z"] = unknown if one.spatial_m is None else one.spatial_m.T
+    return PointCloud2(
+        header=header,
+        height=len(people),
+        width=len(LANDMARKS),
+        fields=[
+            PointField(name=name, offset=4 * number, datatype=field, count=1)
+            for number, (name, field) in enumerate(_FIELDS.items())
+        ],
+        point_step=kind.itemsize,
+        row_step=kind.itemsize * len(LANDMARKS),
+        data=array("B", points.tobytes()),
+    )
+
+
+def persons_of_cloud(message: Any, size: Size) -> list[ImagePoints]:
+    """Return the people of a PointCloud2.
+
+    Its fields are those of :func:`people_message`, of any type and order; without ``x``, ``y`` and
+    ``z`` the points are in the image only, and without ``person`` they are of one. Points that a
+    detector guesses far outside of the image are missing. Raises CardboxError for other fields.
+    """
+    count = message.width * message.height
+    if not count:
+        return []
+    given = {field.name: field for field in message.fields if field.name in _FIELDS}
+    space = [name for name in ("x", "y", "z") if name in given]
+    names = ["u", "v", "score", *(space if len(space) == 3 else ())]
+    lacking = [name for name in (*names, "landmark") if name not in given]
+    if lacking or count > len(LANDMARKS) * _MOST_PERSONS:
+        raise CardboxError(
+            f"{count} points with the fields {', '.join(given) or 'of another kind'}; expected u, "
+            f"v, score and landmark, a number from 0 to {len(LANDMARKS) - 1}, of at most "
+            f"{_MOST_PERSONS} persons (docs/detectors.md)"
+        )
+    order = ">" if message.is_bigendian else "<"
+    try:
+        kind = np.dtype(
+            {
+                "names": list(given),
+                "formats": [order + _KINDS[field.datatype] for field in given.values()],
+                "offsets": [field.offset for field in given.values()],
+                "itemsize": message.point_step,
+            }
+        )
+        rows = np.frombuffer(message.data, np.uint8).reshape(message.height, message.row_step)
+        rows = np.ascontiguousarray(rows[:, : message.width * message.point_step])
+        points = rows.view(kind).ravel()
+    except (KeyError, ValueError, TypeError) as error:
+        raise CardboxError(f"the points cannot be read: {cut(str(error))}") from None
+    if not 0 <= points["landmark"].min() <= points["landmark"].max() < len(LANDMARKS):
+        raise CardboxError(f"a landmark is not a number from 0 to {len(LANDMARKS) - 1}")
+    away_px = np.hypot(points["u"], points["v"])
+    far = np.isfinite(away_px) & (away_px > 2 * max(size))
+    people: dict[int, list[NamedPoint]] = {}
+    for point in points[~far]:
+        u, v, score, *space_m = (float(point[name]) for name in names)
+        person = int(point["person"]) if "person" in given else 0
+        named: NamedPoint = LANDMARKS[int(point["landmark"])], u, v, score, *space_m
+        people.setdefault(person, []).append(named)
+    return [person_of(of, size) for of in people.values()]
 
 
 def skeleton_class() -> Any:
@@ -136,7 +209,8 @@ def persons_of_detections(message: Any, size: Size) -> list[ImagePoints]:
 
 
 CONVERSIONS: dict[str, Convert] = {
-    POLYGON_STAMPED: persons_of_polygon,
+    POINT_CLOUD: persons_of_cloud,
+    "geometry_msgs/msg/PolygonStamped": persons_of_polygon,
     "hri_msgs/msg/Skeleton2D": persons_of_skeleton,
     "yolo_msgs/msg/DetectionArray": persons_of_detections,
 }

@@ -12,14 +12,14 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from geometry_msgs.msg import PolygonStamped
+from sensor_msgs.msg import PointCloud2
 from std_msgs.msg import Float64, Header
 
 from cardbox_tracker.camera.camera import Calibration, Camera, unrectified
 from cardbox_tracker.camera.stamps import WINDOW, StampOrder
 from cardbox_tracker.detectors.detector import Detector, PersonDetector
 from cardbox_tracker.detectors.image_points import ImagePoints
-from cardbox_tracker.detectors.pose_network import LANDMARKS, Detection, image_points
+from cardbox_tracker.detectors.pose_network import NOBODY, Detection, image_points
 from cardbox_tracker.measuring.people_camera import FOUND_STDDEV, PeopleCamera, people_camera
 from cardbox_tracker.ros.messages.conversions import ImageArray, stamp_ns
 from cardbox_tracker.ros.messages.keypoints import (
@@ -30,7 +30,9 @@ from cardbox_tracker.ros.messages.keypoints import (
 from cardbox_tracker.ros.nodes.camera_images import CameraImages, SilhouetteOutputs
 from cardbox_tracker.ros.nodes.shared_parameters import (
     camera_roll_parameter,
+    height_parameter,
     image_transport_parameter,
+    width_parameter,
 )
 from cardbox_tracker.ros.runtime import qos
 from cardbox_tracker.ros.runtime.command_line import node_main
@@ -104,8 +106,8 @@ class DetectorParameters(NodeParameters):
     """Find a person with a neural network: images in, 2D points and silhouettes out."""
 
     image_transport: str = image_transport_parameter()
-    width: int = at_start(320, "working resolution, width", unit="px", limits=(32, 4096))
-    height: int = at_start(240, "working resolution, height", unit="px", limits=(32, 4096))
+    width: int = width_parameter()
+    height: int = height_parameter()
     publish_silhouette: bool = at_start(
         False,
         "also publish the person's mask on silhouette, instead of the node background, which must "
@@ -142,7 +144,7 @@ class DetectorNode(CardboxNode):
         self._pipeline: SilhouettePipeline | None = None
         self._looked_ns = 0
         self._took_ms: deque[float] = deque(maxlen=WINDOW)
-        self._keypoints = self.advertise(PolygonStamped, "~/keypoints", qos.RESULT)
+        self._keypoints = self.advertise(PointCloud2, "~/keypoints", qos.RESULT)
         self._skeleton_kind = skeleton_class()
         self._skeletons = (
             None
@@ -205,18 +207,24 @@ class DetectorNode(CardboxNode):
     def _send_points(
         self, header: Header, found: Sequence[Detection], pipeline: SilhouettePipeline
     ) -> None:
-        """Publish all points, with the score 0 if nobody is there, and the first skeleton."""
+        """Publish all points in the camera's own image, and the first skeleton."""
         calibration, camera = pipeline.calibration, pipeline.camera
         size = camera.width, camera.height
         people = [
-            (unrectified(calibration, one.points_px, *size), one.scores) for one in found
-        ] or [(np.zeros((len(LANDMARKS), 2)), np.zeros(len(LANDMARKS)))]
-        px, scores = people[0]
+            one._replace(
+                points_px=unrectified(calibration, one.points_px, *size),
+                spatial_m=None if one.spatial_m is None else one.spatial_m @ calibration.turn(),
+            )
+            for one in found
+        ]
         self._keypoints.publish(people_message(header, people))
         if self._skeletons is not None:
+            one = people[0] if people else NOBODY
             size = calibration.width, calibration.height
-            kind = self._skeleton_kind
-            self._skeletons.publish(skeleton_message(kind, header, px, scores, size))
+            skeleton = skeleton_message(
+                self._skeleton_kind, header, one.points_px, one.scores, size
+            )
+            self._skeletons.publish(skeleton)
 
     def _values(self) -> dict[str, str]:
         values = {

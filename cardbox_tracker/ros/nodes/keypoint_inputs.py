@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import time
 from collections import deque
+from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
-from geometry_msgs.msg import PolygonStamped
 from rclpy.subscription import Subscription
-from sensor_msgs.msg import CameraInfo
+from sensor_msgs.msg import CameraInfo, PointCloud2
 from std_msgs.msg import Header
 
 from cardbox_tracker.camera.calibration_watch import CalibrationWatch
@@ -23,7 +23,7 @@ from cardbox_tracker.detectors.person_choice import person_in
 from cardbox_tracker.detectors.point_checks import check_places
 from cardbox_tracker.detectors.point_table import COLUMNS, Image, PointTable, placed, why_not
 from cardbox_tracker.ros.messages.conversions import ImageArray, stamp_ns
-from cardbox_tracker.ros.messages.keypoints import CONVERSIONS, POLYGON_STAMPED, Size
+from cardbox_tracker.ros.messages.keypoints import CONVERSIONS, POINT_CLOUD, Size
 from cardbox_tracker.ros.messages.types import optional_class
 from cardbox_tracker.ros.nodes.input_stream import InputStream
 from cardbox_tracker.ros.nodes.tracker_parameters import TrackerParameters
@@ -68,7 +68,7 @@ class KeypointTopic:
         self._wrong_type = ""
         self._type = ""
         self._subscription: Subscription | None = None
-        self._use(POLYGON_STAMPED, PolygonStamped)
+        self._use(POINT_CLOUD, PointCloud2)
         self._look()
         # The publisher may start later, or be replaced by one of another type.
         self._timer = every_second(node, self._look)
@@ -302,7 +302,7 @@ class CameraKeypoints:
             return None
         size, of_ns = (camera.width, camera.height), min(taken.stamp_ns, at_ns)
         found = (placed(one, calibration, size) for one in taken.persons)
-        return [ImagePoints(one.px, one.scores, of_ns) for one in found]
+        return [replace(one, stamp_ns=of_ns) for one in found]
 
     def _taken(self, at_ns: int, frame_id: str, tolerance_ns: int) -> Taken | None:
         if self.topic is not None:

@@ -9,16 +9,17 @@ from typing import Any
 import numpy as np
 import pytest
 from geometry_msgs.msg import Point32, Polygon, PolygonStamped
+from sensor_msgs.msg import PointCloud2, PointField
 from std_msgs.msg import Header
 
 from cardbox_tracker.common.errors import CardboxError
-from cardbox_tracker.detectors.image_points import POINT_INDEX, POINT_NAMES
-from cardbox_tracker.detectors.pose_network import LANDMARKS
+from cardbox_tracker.detectors.image_points import POINT_INDEX
+from cardbox_tracker.detectors.pose_network import LANDMARKS, NOBODY, image_points
 from cardbox_tracker.ros.messages.keypoints import (
     COCO_NAMES,
-    MESSAGE_NAMES,
     SKELETON_NAMES,
     people_message,
+    persons_of_cloud,
     persons_of_detections,
     persons_of_polygon,
     persons_of_skeleton,
@@ -66,20 +67,60 @@ def test_the_order_is_that_of_coco() -> None:
 def test_points_of_the_detector_come_back() -> None:
     rng = np.random.default_rng(0)
     px, scores = rng.uniform(0, 400, (33, 2)), rng.uniform(0.1, 1.0, 33)
-    message = people_message(Header(frame_id="eye"), [(px, scores)])
+    one = NOBODY._replace(points_px=px, scores=scores, spatial_m=rng.normal(size=(33, 3)))
+    message = people_message(Header(frame_id="eye"), [one, one._replace(spatial_m=None)])
     assert message.header.frame_id == "eye"
-    assert len(message.polygon.points) == len(MESSAGE_NAMES) == 21
-    (person,) = persons_of_polygon(message, SIZE)
-    of = [LANDMARKS.index(name) for name in POINT_NAMES]
-    np.testing.assert_allclose(person.px, px[of], atol=1e-3)
-    np.testing.assert_allclose(person.scores, scores[of], atol=1e-6)
+    assert (message.height, message.width) == (2, len(LANDMARKS))
+    found, expected = persons_of_cloud(message, SIZE), image_points(one)
+    for person, spatial_m in zip(found, (expected.spatial_m, None), strict=True):
+        np.testing.assert_allclose(person.px, expected.px, atol=1e-3)
+        np.testing.assert_allclose(person.scores, expected.scores, atol=1e-6)
+        assert person.legs is not None and expected.legs is not None
+        np.testing.assert_allclose(person.legs.px, expected.legs.px, atol=1e-3)
+        assert (person.spatial_m is None) == (spatial_m is None)
+        if person.spatial_m is not None:
+            np.testing.assert_allclose(person.spatial_m, spatial_m, atol=1e-6)
+
+
+def cloud(kinds: dict[str, str], rows: list[tuple[float, ...]], order: str = "<") -> PointCloud2:
+    """Return a cloud of another program, with a gap after each point."""
+    numbers = {"u1": PointField.UINT8, "i2": PointField.INT16, "f8": PointField.FLOAT64}
+    kind = np.dtype([(name, order + of) for name, of in kinds.items()] + [("", "u1", 3)])
+    fields = [
+        PointField(name=name, offset=kind.fields[name][1], datatype=numbers[of], count=1)  # type: ignore[index]
+        for name, of in kinds.items()
+    ]
+    data = np.zeros(len(rows), kind)
+    for name, column in zip(kinds, zip(*rows, strict=True), strict=True):
+        data[name] = column
+    return PointCloud2(
+        height=1,
+        width=len(rows),
+        fields=fields,
+        is_bigendian=order == ">",
+        point_step=kind.itemsize,
+        row_step=kind.itemsize * len(rows),
+        data=data.tobytes(),
+    )
+
+
+@pytest.mark.parametrize("order", ["<", ">"])
+def test_a_cloud_of_another_program_is_read_by_its_fields(order: str) -> None:
+    kinds = {"landmark": "u1", "score": "f8", "v": "i2", "u": "f8", "person": "i2"}
+    rows = [(11.0, 0.9, 60.0, 50.5, 3.0), (16.0, 0.8, 80.0, 70.0, 3.0), (25.0, 0.7, 9.0, 8.0, 5.0)]
+    first, second = persons_of_cloud(cloud(kinds, rows, order), SIZE)
+    assert first.px[POINT_INDEX["left_shoulder"]].tolist() == [50.5, 60.0]
+    assert first.px[POINT_INDEX["right_wrist"]].tolist() == [70.0, 80.0]
+    assert first.spatial_m is None and first.legs is None
+    assert second.legs is not None and second.legs.px[0].tolist() == [8.0, 9.0]
+    with pytest.raises(CardboxError, match="a landmark is not a number from 0 to 32"):
+        persons_of_cloud(cloud(kinds, [(33.0, *rows[0][1:])], order), SIZE)
 
 
 def test_an_image_without_a_person_gives_an_empty_person_or_none() -> None:
-    (person,) = persons_of_polygon(
-        people_message(Header(), [(np.zeros((33, 2)), np.zeros(33))]), SIZE
-    )
+    (person,) = persons_of_cloud(people_message(Header(), [NOBODY]), SIZE)
     assert person.is_empty
+    assert persons_of_cloud(people_message(Header(), []), SIZE) == []
     assert persons_of_polygon(polygon(), SIZE) == []
     assert persons_of_detections(SimpleNamespace(detections=[]), SIZE) == []
 

@@ -16,16 +16,16 @@ from cardbox_tracker.camera.camera import Calibration
 from cardbox_tracker.common.errors import CardboxError
 from cardbox_tracker.detectors.detector import PersonDetector
 from cardbox_tracker.detectors.image_points import POINT_INDEX
-from cardbox_tracker.detectors.pose_network import LANDMARKS, Detection
+from cardbox_tracker.detectors.pose_network import Detection
 from cardbox_tracker.ros.messages.conversions import calibration_message, image_message
-from cardbox_tracker.ros.messages.keypoints import MESSAGE_NAMES, persons_of_polygon
+from cardbox_tracker.ros.messages.keypoints import persons_of_cloud
 from cardbox_tracker.ros.nodes.detector_node import DetectorNode
 
 WIDTH, HEIGHT = 640, 480
 K = np.array([(500.0, 0.0, 319.5), (0.0, 500.0, 239.5), (0.0, 0.0, 1.0)])
 STRAIGHT = Calibration(WIDTH, HEIGHT, K, np.zeros(5))
 CURVED = Calibration(WIDTH, HEIGHT, K, np.array([-0.2, 0.05, 0.0, 0.0, 0.0]))
-ELBOW = MESSAGE_NAMES.index("left_elbow")
+ELBOW = POINT_INDEX["left_elbow"]
 
 
 class Network:
@@ -81,17 +81,18 @@ def test_points_are_pixels_of_the_cameras_image(bus: Any, calibration: Calibrati
     assert driver.network.shapes == [(240, 320, 3)]
     (message,) = bus.sent["/detector/keypoints"]
     assert (message.header.frame_id, message.header.stamp.sec) == ("eye", 1)
-    point = message.polygon.points[ELBOW]
-    assert (point.x, point.y) == pytest.approx((100.0, 120.0), abs=1.0)
-    assert point.z == pytest.approx(0.75)
+    (person,) = persons_of_cloud(message, (WIDTH, HEIGHT))
+    assert person.px[ELBOW].tolist() == pytest.approx([100.0, 120.0], abs=1.0)
+    assert person.scores[ELBOW] == pytest.approx(0.75)
+    assert person.legs is not None and person.legs.scores.min() == 0.75
     assert "/silhouette" not in bus.sent
 
 
-def test_without_a_person_every_score_is_zero(bus: Any) -> None:
+def test_without_a_person_the_message_has_no_points(bus: Any) -> None:
     driver = Driver(bus, publish_silhouette=True)
     driver.show(None)
     (message,) = bus.sent["/detector/keypoints"]
-    assert {point.z for point in message.polygon.points} == {0.0}
+    assert (message.height, len(message.data)) == (0, 0)
     assert not np.any(np.frombuffer(bus.sent["/silhouette"][0].data, np.uint8))
     values = {value.key: value.value for value in bus.tick().values}
     assert values["images without a person"] == "1"
@@ -197,10 +198,6 @@ def test_without_the_network_files_it_is_said_what_to_do(
         bus.start(DetectorNode)
 
 
-def test_every_point_of_the_message_is_a_landmark() -> None:
-    assert set(MESSAGE_NAMES) <= set(LANDMARKS)
-
-
 def test_several_people_are_in_one_message(bus: Any) -> None:
     driver = Driver(bus, people=2, publish_silhouette=True)
     places = (np.full((33, 2), column / 2 - 0.25) for column in (60.0, 200.0))
@@ -208,7 +205,7 @@ def test_several_people_are_in_one_message(bus: Any) -> None:
     driver.node._person.all_in = lambda at_ns, image: pair  # type: ignore[method-assign]
     driver.show(100.0)
     (message,) = bus.sent["/detector/keypoints"]
-    people = persons_of_polygon(message, (640, 480))
-    assert len(message.polygon.points) == 42 and len(people) == 2
-    columns = [person.px[POINT_INDEX["left_elbow"], 0] for person in people]
+    people = persons_of_cloud(message, (640, 480))
+    assert (message.height, message.width, len(people)) == (2, 33, 2)
+    columns = [person.px[ELBOW, 0] for person in people]
     assert columns == pytest.approx([60.0, 200.0], abs=1.0)

@@ -11,16 +11,18 @@ import numpy as np
 import pytest
 import rclpy
 from builtin_interfaces.msg import Time
-from geometry_msgs.msg import Point32, Polygon, PolygonStamped, PoseArray
+from geometry_msgs.msg import PolygonStamped, PoseArray
 from rclpy.context import Context
 from rclpy.qos import QoSProfile
-from sensor_msgs.msg import Image
+from sensor_msgs.msg import Image, PointCloud2
 from std_msgs.msg import Header
 
 from cardbox_tracker.camera.camera import Camera
 from cardbox_tracker.common.errors import CardboxError
-from cardbox_tracker.detectors.image_points import POINT_INDEX, ImagePoints
+from cardbox_tracker.detectors.image_points import LEG_POINT_NAMES, POINT_INDEX, ImagePoints
+from cardbox_tracker.detectors.pose_network import LANDMARKS, NOBODY
 from cardbox_tracker.ros.messages.conversions import camera_info_message, image_message
+from cardbox_tracker.ros.messages.keypoints import people_message
 from cardbox_tracker.ros.nodes import input_stream, keypoint_inputs
 from cardbox_tracker.ros.nodes.camera_inputs import CameraInputs, ObservationSet
 from cardbox_tracker.ros.nodes.keypoint_inputs import KeypointInputs
@@ -40,20 +42,35 @@ def header(at_ns: int, frame: str = "eye") -> Header:
     return Header(frame_id=frame, stamp=Time(sec=at_ns // 10**9, nanosec=at_ns % 10**9))
 
 
-def keypoints(at_ns: int, column: float = 100.0, frame: str = "eye") -> PolygonStamped:
-    """Return a person whose points are all in one place of the camera's image of 640x480."""
-    point = Point32(x=column, y=100.0, z=0.5)
-    return PolygonStamped(header=header(at_ns, frame), polygon=Polygon(points=[point] * 17))
+def keypoints(at_ns: int, column: float = 100.0, frame: str = "eye", people: int = 1) -> Any:
+    """Return people whose points are all in one place of the camera's image of 640x480."""
+    count = len(LANDMARKS)
+    points_px = np.tile([column, 100.0], (count, 1))
+    spatial_m = np.arange(3.0 * count).reshape(count, 3)
+    one = NOBODY._replace(points_px=points_px, scores=np.full(count, 0.5), spatial_m=spatial_m)
+    return people_message(header(at_ns, frame), [one] * people)
+
+
+def without(name: str) -> Any:
+    message = keypoints(T)
+    message.fields = [field for field in message.fields if field.name != name]
+    return message
 
 
 class Tracker:
     """A node that only asks for points."""
 
-    def __init__(self, bus: Any, source: str = "points", cameras: tuple[str, ...] = ("",)) -> None:
+    def __init__(
+        self,
+        bus: Any,
+        source: str = "points",
+        cameras: tuple[str, ...] = ("",),
+        roll_deg: float = 0.0,
+    ) -> None:
         self.bus = bus
         self.node = bus.start(lambda **options: CardboxNode("tracker", **options))
         names = [name for name in cameras if name]
-        settings = TrackerParameters(keypoints=source, cameras=names)
+        settings = TrackerParameters(keypoints=source, cameras=names, camera_roll_deg=roll_deg)
         self.inputs = KeypointInputs(self.node, settings)
         self.node.diagnostics.advice = self.inputs.warnings
         self.cameras = cameras
@@ -88,6 +105,22 @@ def test_points_are_placed_in_the_silhouette(tracker: Tracker) -> None:
     assert nose_of(points) == pytest.approx((100.5 / 10 - 0.5, 100.5 / 10 - 0.5))
     assert points is not None and points.stamp_ns == T
     assert points.scores[NOSE] == 0.5
+    # Nothing that the detector found is lost on the way.
+    assert points.spatial_m is not None and points.spatial_m[NOSE].tolist() == [0.0, 1.0, 2.0]
+    assert points.legs is not None and points.legs.spatial_m is not None
+    assert points.legs.px[-1].tolist() == pytest.approx([9.55, 9.55])
+    at = 3.0 * LANDMARKS.index(LEG_POINT_NAMES[-1])
+    assert points.legs.spatial_m[-1].tolist() == [at, at + 1, at + 2]
+
+
+def test_points_in_space_are_turned_as_the_image_is(bus: Any) -> None:
+    """Down in the image of a camera that lies on its right side is to the right in the room."""
+    tracker = Tracker(bus, roll_deg=90.0).calibrate()
+    bus.send("/points", keypoints(T))
+    camera = Camera(48, 64, 60.0, 60.0, 23.5, 31.5)
+    points = tracker.inputs.cameras[0].points(header(T), camera, np.zeros((64, 48), np.uint8))
+    assert points is not None and points.spatial_m is not None
+    assert points.spatial_m[NOSE].tolist() == pytest.approx([-1.0, 0.0, 2.0])
 
 
 @pytest.mark.parametrize(
@@ -142,7 +175,7 @@ def test_points_of_a_newer_image_wait_for_their_silhouette(tracker: Tracker) -> 
 
 
 def test_nobody_gives_no_points(tracker: Tracker) -> None:
-    tracker.bus.send("/points", PolygonStamped(header=header(T)))
+    tracker.bus.send("/points", people_message(header(T), []))
     assert tracker.ask(T) is None
     assert tracker.warning() == ""
 
@@ -150,8 +183,9 @@ def test_nobody_gives_no_points(tracker: Tracker) -> None:
 @pytest.mark.parametrize(
     ("message", "expected"),
     [
-        (PolygonStamped(header=header(T), polygon=Polygon(points=[Point32()] * 9)), "9 points"),
-        (PolygonStamped(header=header(T), polygon=Polygon(points=[Point32()] * 10_000)), "10000"),
+        (without("landmark"), "33 points with the fields u, v, score"),
+        (without("score"), "expected u, v, score and landmark"),
+        (keypoints(T, people=101), "3333 points"),
         (keypoints(T, float("nan")), "expected a place"),
         (keypoints(T, float("inf")), "expected a place"),
         (keypoints(0), "no stamp"),
@@ -173,7 +207,7 @@ def test_bad_messages_are_reported_and_not_used(
 def test_another_release_of_a_foreign_message_is_reported(tracker: Tracker) -> None:
     tracker.bus.send("/points", SimpleNamespace(header=header(T), people=[]))
     assert tracker.ask(T) is None
-    assert "fields of geometry_msgs/msg/PolygonStamped" in tracker.warning()
+    assert "fields of sensor_msgs/msg/PointCloud2" in tracker.warning()
 
 
 def test_points_of_another_camera_are_not_used(tracker: Tracker) -> None:
@@ -397,7 +431,7 @@ def test_the_type_of_the_publisher_is_used_when_it_comes(
     until(tracker_node, lambda: said("sensor_msgs/msg/Image"))
     assert said("expected one of") and said("hri_msgs/msg/Skeleton2D")
     wrong.close()
-    for kind, count in ((PoseArray, 1), (PolygonStamped, 0)):
+    for kind, count in ((PoseArray, 1), (PolygonStamped, 0), (PointCloud2, 0)):
         foreign = Foreign(kind)
 
         def arrived(foreign: Foreign = foreign, count: int = count) -> bool:

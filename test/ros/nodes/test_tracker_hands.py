@@ -18,7 +18,7 @@ from cardbox_tracker.camera.rasterisation import render
 from cardbox_tracker.common.errors import CardboxError
 from cardbox_tracker.detectors.hand_network import HandPoints
 from cardbox_tracker.detectors.image_points import POINT_INDEX
-from cardbox_tracker.detectors.pose_network import LANDMARKS, Square
+from cardbox_tracker.detectors.pose_network import LANDMARKS, NOBODY, Square
 from cardbox_tracker.person.cardbox import cardbox_patches
 from cardbox_tracker.person.hands import HAND_NAMES
 from cardbox_tracker.person.legs import LEG_NAMES
@@ -74,7 +74,8 @@ def test_hands_are_published_with_their_joints(
         header = Header(frame_id="eye", stamp=Time(sec=1, nanosec=tenth * 10**8))
         bus.send("/silhouette/camera_info", camera_info_message(header, CAMERA))
         bus.send("/camera_info", camera_info_message(header, CAMERA))
-        bus.send(POINTS, people_message(header, [(px, scores)]))
+        person = NOBODY._replace(points_px=px, scores=scores)
+        bus.send(POINTS, people_message(header, [person]))
         image = np.zeros((CAMERA.height, CAMERA.width, 3), np.uint8)
         bus.send("/silhouette/image", image_message(header, image, "bgr8"))
         bus.send("/silhouette", image_message(header, OUTLINE, "mono8"))
