@@ -67,21 +67,27 @@ def figures(results: Results, joints_m: Mapping[int, FloatArray]) -> dict[str, f
     rows = {stamp: row for row, stamp in enumerate(results.stamp_ns.tolist())}
     seen = [(rows[stamp], true_m) for stamp, true_m in joints_m.items() if stamp in rows]
     points_m = results.of(POINT_COLUMNS).reshape(-1, 6, 3)
-    has_legs: list[bool] = np.isfinite(results.of(LEG_NAMES)).all(axis=1).tolist()
+    has_legs = np.isfinite(results.of(LEG_NAMES).sum(axis=1))
     off_m = np.array([points_m[row] - true_m for row, true_m in seen]).reshape(-1, 6, 3)
-    shape, place = (np.linalg.norm(one, axis=2) for one in (beside_shoulders(off_m), off_m))
+    shape_cm, place_cm = shape_and_place_cm(off_m)
     return {
-        "shape_cm": 100.0 * _mean(shape),
-        "place_cm": 100.0 * _mean(place),
+        "shape_cm": shape_cm,
+        "place_cm": place_cm,
         "tracking": sum(results.state[row] == TRACKING for row, _ in seen) / len(joints_m),
-        "legs": sum(has_legs[row] for row, _ in seen) / len(joints_m),
-        "images": int(np.isfinite(shape).any(axis=1).sum()),
+        "legs": sum(bool(has_legs[row]) for row, _ in seen) / len(joints_m),
+        "images": int(np.isfinite(off_m).any(axis=(1, 2)).sum()),
     }
 
 
-def _mean(values: FloatArray) -> float:
-    known = values[np.isfinite(values)]
-    return float(known.mean()) if known.size else np.nan
+def shape_and_place_cm(off_m: FloatArray) -> tuple[float, float]:
+    """Return the mean lengths of errors (n, 6, 3), m, beside the shoulders' middle and not shifted.
+
+    Errors that are nan do not count; without any others the result is nan.
+    """
+    lengths = (np.linalg.norm(one, axis=2) for one in (beside_shoulders(off_m), off_m))
+    known = [one[np.isfinite(one)] for one in lengths]
+    shape_cm, place_cm = (100.0 * float(one.mean()) if one.size else np.nan for one in known)
+    return shape_cm, place_cm
 
 
 def of_film(case: Case, folder: Path) -> Iterator[Results]:
@@ -188,13 +194,13 @@ def main() -> None:
             by_way[way] = measured(case, way, options.rate)
             print(case.name, way, by_way[way], flush=True)
             write_file(kept, json.dumps(found, indent=1) + "\n")
-            write_file(options.output, page(found, further_part(options.output)))
+            write_file(options.output, page(found, parts_of(options.output)[1]))
 
 
-def further_part(path: Path) -> str:
-    """Return the part of a page that begins with ``FURTHER``; "" without one."""
-    text = path.read_text() if path.is_file() else ""
-    return text[text.index(FURTHER) :] if FURTHER in text else ""
+def parts_of(path: Path) -> tuple[str, str]:
+    """Return what precedes ``FURTHER`` in a page, and the rest; "" for what there is not."""
+    before, begin, rest = (path.read_text() if path.is_file() else "").partition(FURTHER)
+    return before, begin + rest
 
 
 if __name__ == "__main__":
