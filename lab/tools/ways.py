@@ -18,6 +18,7 @@ import sys
 import tempfile
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
+from itertools import permutations
 from pathlib import Path
 from typing import Any
 
@@ -34,7 +35,7 @@ from cardbox_tracker.recordings.result_table import POINT_COLUMNS
 from cardbox_tracker.recordings.truth import beside_shoulders
 from cardbox_tracker.ros.runtime.processes import compile_kernels, isolate
 from cardbox_tracker.tracking.estimate import TRACKING
-from lab.tools.way_cases import Case, cases_of
+from lab.tools.way_cases import Case, Person, cases_of
 from lab.tools.way_nodes import live
 
 WAYS = {"film": "film", "bag": "bag", "slow": "live, slowly", "live": "live"}
@@ -52,8 +53,9 @@ detector's. A film has one camera.
 
 Each cell has the error of the shape and of the place, cm, then the share of the images with a 3D
 reference that are `tracking`, and of those that have legs. *Shape*: mean error of shoulders, elbows
-and hands, both skeletons shifted to the middle of their shoulders; *place*: not shifted. The last
-row is the mean of the rows above in which all ways have figures."""
+and hands, both skeletons shifted to the middle of their shoulders; *place*: not shifted.
+*Exchanged*: the people have other numbers than their statures were given by. The last row is the
+mean of the rows above in which all ways have figures."""
 _SHOWN = "shape_cm", "place_cm", "tracking", "legs"
 _LONGEST_S = 1800.0
 
@@ -126,6 +128,21 @@ def _tracked(case: Case, path: Path, words: Sequence[str], table: Path) -> Itera
         yield read_results(table, number)
 
 
+def of_people(people: Sequence[Person], found: Sequence[Results]) -> list[dict[str, Any]]:
+    """Return the figures of each person, with the numbers that give the least errors of the place.
+
+    ``exchanged`` says whether these are not the numbers by which the statures were given.
+    """
+    ways = [
+        [
+            {"person": person.name, "exchanged": run is not own} | figures(run, person.joints_m)
+            for person, own, run in zip(people, found, order, strict=True)
+        ]
+        for order in permutations(found)
+    ]
+    return min(ways, key=lambda one: sum(np.nan_to_num(row["place_cm"], nan=1e3) for row in one))
+
+
 def measured(case: Case, way: str, rate: float) -> Any:
     """Return the figures of each person by one way, or the text of the error."""
     with tempfile.TemporaryDirectory() as name:
@@ -134,8 +151,7 @@ def measured(case: Case, way: str, rate: float) -> Any:
         try:
             runs = {"film": of_film, "bag": of_bag}
             found = runs[way](case, folder) if way in runs else live(case, folder, speed)
-            pairs = zip(case.people, found, strict=True)
-            return [{"person": one.name} | figures(run, one.joints_m) for one, run in pairs]
+            return of_people(case.people, list(found))
         except (CardboxError, subprocess.TimeoutExpired) as error:
             return " ".join(str(error).split())
 
@@ -158,7 +174,11 @@ def page(found: Mapping[str, Mapping[str, Any]], further: str = "") -> str:
             if len(row) == len(ways) and all(one["images"] for one in row.values()):
                 complete.append(row)
     if complete:
-        means = [{k: np.mean([r[w][k] for r in complete]) for k in _SHOWN} for w in ways]
+        means = [
+            {name: np.mean([row[way][name] for row in complete]) for name in _SHOWN}
+            | {"exchanged": False}
+            for way in ways
+        ]
         lines.append(f"| mean of {len(complete)} |{''.join(f' {_cell(one)} |' for one in means)}")
     lines += ["", "Failed:", "", *failed] if failed else []
     return "\n".join([*lines, *(["", further.rstrip()] if further else [])]) + "\n"
@@ -168,7 +188,8 @@ def _cell(one: Mapping[str, Any] | None) -> str:
     if one is None:
         return "failed"
     shape, place, tracking, legs = (float(one[name]) for name in _SHOWN)
-    return f"{shape:.1f} / {place:.1f}, {tracking:.0%}, {legs:.0%}"
+    told = ", exchanged" if one["exchanged"] else ""
+    return f"{shape:.1f} / {place:.1f}, {tracking:.0%}, {legs:.0%}{told}"
 
 
 def main() -> None:
