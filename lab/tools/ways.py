@@ -13,6 +13,7 @@ from __future__ import annotations
 import argparse
 import json
 import os
+import signal
 import subprocess
 import sys
 import tempfile
@@ -200,6 +201,8 @@ def main() -> None:
     parser.add_argument("--rate", type=float, default=0.3, help="speed of slow replay")
     parser.add_argument("--full-speed", action="store_true", help="also live at full speed")
     options = parser.parse_args()
+    # Nodes are stopped on the way out.
+    signal.signal(signal.SIGTERM, lambda *_: sys.exit(128 + signal.SIGTERM))
     os.environ.setdefault("PYTHONPATH", str(Path(__file__).parents[2]))
     isolate()
     compile_kernels()
