@@ -3,10 +3,10 @@
     python -m lab.tools.triangulated SESSION... [--output docs/evaluation/ways.md]
 
 The first two cameras of each session are tracked as :mod:`.ways` tracks their bag. The points are
-those of the same detector at the same working resolution; of several people, those nearest to the
-true person count in each image, so that the triangulation confuses nobody. Its hand is 5.55 % of
-the stature beyond the wrist towards the middle of the knuckles of index and little finger, as in
-the references. The table becomes the last part of the page.
+those of the same detector at the same working resolution; of several people, who is found counts
+for the nearest true person in each image, so that the triangulation confuses nobody. Its hand is
+5.55 % of the stature beyond the wrist towards the middle of the knuckles of index and little
+finger, as in the references. The table becomes the last part of the page.
 """
 
 from __future__ import annotations
@@ -43,7 +43,8 @@ _HEADER = f"""{FURTHER}
 `python -m lab.tools.triangulated SESSION... --output docs/evaluation/ways.md` makes this table:
 shape and place as above, cm, of this package and of `cv2.triangulatePoints` with the same
 detector's points and the same poses of the cameras, in the images in which both have all joints.
-Of several people, the points nearest to the reference are triangulated, so nobody is confused.
+Of several people, who is found counts for the nearest one of the reference, so OpenCV confuses
+nobody.
 OpenCV's hand is {100 * HAND:.2f} % of the stature beyond the wrist towards the knuckles, as in the
 references.
 
@@ -87,20 +88,26 @@ def keypoints_of(points_m: FloatArray, stature_m: float) -> FloatArray:
 
 
 def nearest(
-    people: Sequence[ImagePoints], joints_m: FloatArray, camera: Camera, pose: FloatArray
-) -> FloatArray:
-    """Return the pixels (17, 2) of who is nearest to a true person (6, 3); nan if nobody is seen.
+    people: Sequence[ImagePoints], joints_m: Sequence[FloatArray], camera: Camera, pose: FloatArray
+) -> list[FloatArray]:
+    """Return the pixels (17, 2) of each true person (6, 3) in an image; nan for who is not found.
 
-    ``pose`` (3, 4) is from the frame of ``joints_m`` into that of ``camera``.
+    Who is found counts for the true person who is nearest. ``pose`` (3, 4) is from the frame of
+    ``joints_m`` into that of ``camera``.
     """
-    there_m = joints_m[_ARM_KEYPOINTS] @ pose[:, :3].T + pose[:, 3]
-    true_px = there_m[:, :2] / there_m[:, 2:] * [camera.fx, camera.fy] + [camera.cx, camera.cy]
-
-    def away_px(found: ImagePoints) -> float:
-        away = np.linalg.norm(found.px[_ARM] - true_px, axis=1)
-        return float(away[np.isfinite(away)].mean()) if np.isfinite(away).any() else np.inf
-
-    return min(people, key=away_px).px if people else np.full((len(POINT_INDEX), 2), np.nan)
+    found = [np.full((len(POINT_INDEX), 2), np.nan)] * len(joints_m)
+    least_px = np.full(len(joints_m), np.inf)
+    there_m = np.array(joints_m)[:, _ARM_KEYPOINTS] @ pose[:, :3].T + pose[:, 3]
+    true_px = there_m[..., :2] / there_m[..., 2:] * [camera.fx, camera.fy] + [camera.cx, camera.cy]
+    for one in people:
+        away = np.linalg.norm(one.px[_ARM] - true_px, axis=2)
+        known = np.isfinite(away)
+        away_px = np.where(known, away, 0.0).sum(axis=1) / np.maximum(known.sum(axis=1), 1)
+        away_px[~known.any(axis=1)] = np.inf
+        k = int(away_px.argmin())
+        if away_px[k] < least_px[k]:
+            found[k], least_px[k] = one.px, away_px[k]
+    return found
 
 
 def of_opencv(case: Case) -> list[dict[int, FloatArray]]:
@@ -115,15 +122,18 @@ def of_opencv(case: Case) -> list[dict[int, FloatArray]]:
         there = np.column_stack([other.extrinsics.rotation, other.extrinsics.translation_m])
         cameras, poses = [recording.first.camera, other.camera], [np.eye(3, 4), there]
         for taken in recording.frames(case.start_s):
-            for person, own in zip(case.people, found, strict=True):
-                if (true_m := person.joints_m.get(taken.stamp_ns)) is None:
-                    continue
-                pixels = [
-                    nearest(_people_in(frame), true_m, camera, pose)
-                    for frame, camera, pose in zip(taken.frames, cameras, poses, strict=True)
-                ]
+            stamp = taken.stamp_ns
+            there_are = [k for k, one in enumerate(case.people) if stamp in one.joints_m]
+            if not there_are:
+                continue
+            true_m = [case.people[k].joints_m[stamp] for k in there_are]
+            views = [
+                nearest(_people_in(frame), true_m, camera, pose)
+                for frame, camera, pose in zip(taken.frames, cameras, poses, strict=True)
+            ]
+            for k, *pixels in zip(there_are, *views, strict=True):
                 points_m = triangulated(pixels, cameras, there)
-                own[taken.stamp_ns] = keypoints_of(points_m, person.stature_m)
+                found[k][stamp] = keypoints_of(points_m, case.people[k].stature_m)
     return found
 
 

@@ -50,14 +50,20 @@ def test_a_hand_is_beyond_the_wrist_towards_the_knuckles() -> None:
     assert found[4].tolist() == points_m[POINT_INDEX["right_elbow"]].tolist()
 
 
-def test_who_is_nearest_to_the_true_person_counts() -> None:
+def test_who_is_found_counts_for_the_nearest_true_person() -> None:
     joints_m = keypoints_of(POINTS_M, 1.7)
-    him = ImagePoints(pixels(moved(POINTS_M), CAMERAS[1]), np.ones(len(POINT_NAMES)))
-    her = ImagePoints(him.px + 30.0, him.scores)
+    beside_m = joints_m + np.array([1.0, 0.0, 0.0])
+    scores = np.ones(len(POINT_NAMES))
+    him = ImagePoints(pixels(moved(POINTS_M), CAMERAS[1]), scores)
+    like_him = ImagePoints(him.px + 3.0, scores)
+    her = ImagePoints(pixels(moved(POINTS_M + np.array([1.1, 0.0, 0.0])), CAMERAS[1]), scores)
     nobody = ImagePoints(np.full_like(him.px, np.nan), np.zeros(len(POINT_NAMES)))
-    for people in ([him, her, nobody], [nobody, her, him]):
-        assert nearest(people, joints_m, CAMERAS[1], POSE).tolist() == him.px.tolist()
-    assert np.isnan(nearest([], joints_m, CAMERAS[1], POSE)).all()
+    for people in ([him, like_him, her, nobody], [nobody, her, like_him, him]):
+        found = nearest(people, [joints_m, beside_m], CAMERAS[1], POSE)
+        assert [one.tolist() for one in found] == [him.px.tolist(), her.px.tolist()]
+    found = nearest([like_him], [beside_m, joints_m], CAMERAS[1], POSE)
+    assert np.isnan(found[0]).all()
+    assert found[1].tolist() == like_him.px.tolist()
 
 
 def test_the_row_has_images_with_all_joints_of_both() -> None:
