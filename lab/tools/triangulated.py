@@ -44,9 +44,8 @@ _HEADER = f"""{FURTHER}
 shape and place as above, cm, of this package and of `cv2.triangulatePoints` with the same
 detector's points and the same poses of the cameras, in the images in which both have all joints.
 Of several people, who is found counts for the nearest one of the reference, so OpenCV confuses
-nobody.
-OpenCV's hand is {100 * HAND:.2f} % of the stature beyond the wrist towards the knuckles, as in the
-references.
+nobody. Its hand is {100 * HAND:.2f} % of the stature beyond the wrist towards the knuckles, as in
+the references.
 
 | recording | images | shape | OpenCV's | place | OpenCV's |
 |---|---|---|---|---|---|"""

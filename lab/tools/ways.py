@@ -55,8 +55,9 @@ detector's. A film has one camera.
 Each cell has the error of the shape and of the place, cm, then the share of the images with a 3D
 reference that are `tracking`, and of those that have legs. *Shape*: mean error of shoulders, elbows
 and hands, both skeletons shifted to the middle of their shoulders; *place*: not shifted.
-*Exchanged*: the people have other numbers than their statures were given by. The last row is the
-mean of the rows above in which all ways have figures."""
+Both are of the images that have an estimate, whose number is in `ways.json`. Live figures change
+from run to run. *Exchanged*: the people have other numbers than their statures were given by. The last
+row is the mean of the rows above in which all ways have figures."""
 _SHOWN = "shape_cm", "place_cm", "tracking", "legs"
 _LONGEST_S = 1800.0
 
