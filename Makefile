@@ -1,5 +1,5 @@
 # make setup   everything in .venv: the cardbox command, the nodes, the tools of the tests
-# make demo    the whole chain on a synthetic recording, through the nodes; results in demo_output/
+# make demo    a film of a real person, then the live chain, nodes on a synthetic recording; results in demo_output/
 # make dist    wheel and sdist in dist/
 # make example   a small recording, its measured person and their posture, in example/
 # make test    set-up, lint, types, all tests
@@ -115,7 +115,10 @@ links: $(VENV)/extras
 
 .PHONY: demo
 demo: setup
-	$(BIN)/cardbox demo --live --output demo_output
+	$(BIN)/cardbox demo --output demo_output/film
+	$(BIN)/cardbox demo --live --output demo_output/live
+	@echo "look at demo_output/film/overlay.mp4, space.png and error.png: a woman in a film"
+	@echo "look at demo_output/live/overlay.mp4 and angles.png: the nodes, live"
 
 .PHONY: dist
 dist: $(VENV)/dependencies

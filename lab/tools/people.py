@@ -70,7 +70,7 @@ def _lines(
     name = camera.get("name", "camera")
     pitch_rad = float(np.radians(camera["pitch_down_deg"]))
     # The tracker numbers people as they come, and from left to right if they come together.
-    as_numbered = sorted(people, key=lambda person: _comes(person, name))
+    as_numbered = sorted(people, key=lambda person: comes(person, name))
     statures = given or [person["height"] for person in as_numbered]
     bodies = [body_from_proportions(one, None, camera_pitch_rad=pitch_rad) for one in statures]
     empty = next((one for one in truth["segments"] if one["name"] == "empty"), None)
@@ -149,7 +149,7 @@ def _mean(errors_m: FloatArray) -> float:
     return float(known.mean()) if len(known) else np.nan
 
 
-def _comes(person: Any, camera: str) -> tuple[int, float]:
+def comes(person: Any, camera: str) -> tuple[int, float]:
     """Return the image in which a person first is in sight, and where; last if in none."""
     for number, frame in enumerate(person["frames"]):
         seen = joints_of(frame, camera)
