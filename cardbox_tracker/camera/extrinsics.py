@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import cv2
@@ -19,6 +20,8 @@ FARTHEST_M = 30.0
 _ROTATION_TOLERANCE = 1e-2
 # Largest plausible length, even in millimetres; sums of such numbers stay finite.
 _LARGEST = 1e6
+# Cosine of the angle between optical axes that hardly meet.
+_PARALLEL = 0.99
 
 
 def _is_possible(values: FloatArray) -> bool:
@@ -104,3 +107,20 @@ class Extrinsics:
         angle = np.degrees(np.linalg.norm(cv2.Rodrigues(self.rotation)[0]))
         text = f"{np.linalg.norm(self.translation_m):.3f} m and {angle:.1f} degrees apart"
         return f"{text} ({self.source})" if self.source else text
+
+
+def meeting_m(others: Sequence[Extrinsics]) -> float | None:
+    """Return how far from the first camera the optical axes come nearest to each other, metres.
+
+    People stand where the cameras look. None if no axis comes near within 0.5 to 10 m, as of
+    parallel cameras.
+    """
+    found = []
+    for one in others:
+        axis = one.rotation[2]
+        # The point of the first axis, and that of the other one, with the least distance.
+        sides = np.column_stack([(0.0, 0.0, 1.0), -axis])
+        (ahead_m, _), *_ = np.linalg.lstsq(sides, one.centre_m, rcond=None)
+        if abs(axis[2]) < _PARALLEL and 0.5 <= ahead_m <= 10.0:
+            found.append(float(ahead_m))
+    return float(np.mean(found)) if found else None

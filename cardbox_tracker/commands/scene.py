@@ -12,8 +12,14 @@ from cardbox_tracker.commands.arguments import print_remarks
 from cardbox_tracker.commands.request import PersonRequest
 from cardbox_tracker.measuring.people_camera import PITCH_PRIOR, USUAL_PITCH
 from cardbox_tracker.measuring.scene import FOUND, GIVEN, USUAL, Scene, SceneCamera, Value
-from cardbox_tracker.measuring.scene_camera import FoundCamera, lens_of, scene_camera
-from cardbox_tracker.person.model import PLACEMENT, BodyModel
+from cardbox_tracker.measuring.scene_camera import (
+    FoundCamera,
+    degrees_of,
+    in_scene,
+    lens_of,
+    scene_camera,
+)
+from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.proportions import USUAL_STATURE_M, USUAL_STDDEV_M
 from cardbox_tracker.recordings.measured_scene import Watched, seen_people, seen_person, watch
 from cardbox_tracker.recordings.recording import Recording, RecordingRequest
@@ -70,17 +76,9 @@ def _bodies(
     bodies: Sequence[BodyModel], person: PersonRequest, found: FoundCamera
 ) -> Iterator[BodyModel]:
     """Yield the bodies with what was found of the camera and of the first person's distance."""
-    pitch = found.camera.pitch_rad
+    far = found.distances[0] if found.distances and person.people is None else None
     for body in bodies:
-        body = body.with_values(camera_pitch_rad=pitch.mean, pitch_stddev_rad=pitch.stddev)
-        if (height := found.camera.height_m) is not None:
-            above = {"camera_height_m": height.mean, "height_stddev_m": height.stddev}
-            body = body.with_values(**above)
-        far = found.distances[0] if found.distances else None
-        if person.people is None and far is not None and "distance_m" in body.unknown:
-            lowest_m, highest_m, *_ = PLACEMENT["distance_m"]
-            distance_m = float(far.distances[0]) * (person.stature_m or USUAL_STATURE_M)
-            body = body.with_values(distance_m=min(max(distance_m, lowest_m), highest_m))
+        body = in_scene(body, found.camera, far, person.stature_m or USUAL_STATURE_M)
         if person.stature_m is None and person.model is None:
             body = body.with_values(stature_stddev=USUAL_STDDEV_M / USUAL_STATURE_M)
         yield body
@@ -124,10 +122,7 @@ def found_camera(
     # Images are turned back by a roll that is given.
     roll_rad = None if recording.camera.roll_rad is None else 0.0
     found = scene_camera(people, watched.pictures, camera, statures_m, given, roll_rad)
-    pitch, shown_by = found.camera.pitch_rad, " and ".join(found.sources)
-    degrees, deviation = math.degrees(pitch.mean), math.degrees(pitch.stddev)
-    number = f"{abs(degrees):.0f} degrees {'down' if degrees >= 0 else 'up'}"
-    number += f" (standard deviation {deviation:.0f})"
+    number, shown_by = degrees_of(found.camera.pitch_rad), " and ".join(found.sources)
     remarks = list(found.remarks)
     if given is None and found.sources:
         remarks.append(

@@ -30,6 +30,8 @@ from cardbox_tracker.measuring.people_camera import (
 )
 from cardbox_tracker.measuring.room_edges import PITCHES_RAD, ROLLS_RAD, edge_likelihoods
 from cardbox_tracker.measuring.scene import FOUND, GIVEN, USUAL, SceneCamera, Value
+from cardbox_tracker.person.model import PLACEMENT, BodyModel
+from cardbox_tracker.person.proportions import USUAL_STATURE_M
 from cardbox_tracker.person.sizes import FloatArray
 
 GIVEN_STDDEV = float(np.radians(0.5))
@@ -150,8 +152,8 @@ def scene_camera(
     is_asked = given is None and has_edges and shown is not None
     if is_asked and apart > max(_TOLD, _SURE * by_people[1]):
         remarks.append(
-            f"the upright edges of the room show a camera pitch of {_degrees(by_edges)}, and "
-            f"people show {_degrees(by_people)}; {_degrees((pitch, pitch_stddev))} is used, so "
+            f"the upright edges of the room show a camera pitch of {degrees_of(by_edges)}, and "
+            f"people show {degrees_of(by_people)}; {degrees_of((pitch, pitch_stddev))} is used, so "
             "give --camera-pitch-deg if it is known"
         )
     if moves:
@@ -164,8 +166,8 @@ def scene_camera(
     if given is not None:
         if sources and abs(given[0] - pitch) > max(_TOLD, _SURE * np.hypot(pitch_stddev, given[1])):
             remarks.append(
-                f"a camera pitch of {_degrees(given)} is given and used, but "
-                f"{' and '.join(sources)} show {_degrees(found[:2])}; leave it out to use that"
+                f"a camera pitch of {degrees_of(given)} is given and used, but "
+                f"{' and '.join(sources)} show {degrees_of(found[:2])}; leave it out to use that"
             )
         found = Value(*given, GIVEN)
     turned = Value(roll, roll_stddev, FOUND if roll else USUAL)
@@ -189,6 +191,27 @@ def scene_camera(
         distances = known.distances
     camera_found = SceneCamera(lens, found, turned, height)
     return FoundCamera(camera_found, tuple(sources), tuple(remarks), distances)
+
+
+def in_scene(
+    body: BodyModel,
+    camera: SceneCamera,
+    far: Distances | None = None,
+    stature_m: float = USUAL_STATURE_M,
+) -> BodyModel:
+    """Return a body before the camera that was found.
+
+    If its own distance is not known, it is the first one of ``far``.
+    """
+    pitch, height = camera.pitch_rad, camera.height_m
+    body = body.with_values(camera_pitch_rad=pitch.mean, pitch_stddev_rad=pitch.stddev)
+    if height is not None:
+        body = body.with_values(camera_height_m=height.mean, height_stddev_m=height.stddev)
+    if far is not None and "distance_m" in body.unknown:
+        lowest_m, highest_m, *_ = PLACEMENT["distance_m"]
+        distance_m = min(max(float(far.distances[0]) * stature_m, lowest_m), highest_m)
+        body = body.with_values(distance_m=distance_m)
+    return body
 
 
 def camera_moves(people: Sequence[Sightings], pictures: Sequence[Picture], camera: Camera) -> bool:
@@ -268,7 +291,8 @@ def lens_of(camera: Camera, factor: Value | None = None) -> Value:
     return Value(2 * float(np.arctan(tangent)), slope * factor.stddev, factor.origin)
 
 
-def _degrees(value: tuple[float, ...]) -> str:
+def degrees_of(value: tuple[Any, ...]) -> str:
+    """Return mean and standard deviation of a pitch, rad, in words."""
     pitch, stddev = np.degrees(value[0]), np.degrees(value[1])
     word = "down" if pitch >= 0 else "up"
     return f"{abs(pitch):.0f} degrees {word} (standard deviation {stddev:.0f})"

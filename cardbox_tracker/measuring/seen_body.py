@@ -68,6 +68,7 @@ class SeenBody:
         self._begun: tuple[Future[FirstSight], float] | None = None
         self._fits: list[FirstSight] = []
         self._times_s: list[float] = []
+        self._far: Distances | None = None
 
     def tilt(self, guess: BodyModel) -> None:
         """Go on with all fits before the camera of another ``guess``, with another pitch."""
@@ -115,7 +116,7 @@ class SeenBody:
             self._times_s.append(time_s)
             self._next_s = time_s + self._wait_s
             self._wait_s *= 2.0
-            self.body = self._median()
+            self.body = self._scaled(self._median())
         elif not self._fits and fit.iou > self._poor_iou:
             # A body that fits poorly serves until one fits well.
             self.body, self._poor_iou = fit.body, fit.iou
@@ -126,10 +127,24 @@ class SeenBody:
     def in_film(self, far: Distances | None) -> BodyModel:
         """Return the body at the place of the first fit, where the film begins.
 
-        Its scale is the mean of the fits' and that by ``far``, distances in m, weighted by their
-        variances. A distance that is given stays.
+        Distances ``far``, m, correct its scale.
         """
-        body = self._median(self._fits[0].body) if self._fits else self.body
+        self._far = far
+        return self._scaled(self._median(self._fits[0].body) if self._fits else self.body)
+
+    def correct(self, far: Distances | None) -> bool:
+        """Correct the scale by distances, m, of images so far; return if ``body`` changed."""
+        self._far, before = far, self.body
+        if self._fits:
+            self.body = self._scaled(self._median())
+        return self.body != before
+
+    def _scaled(self, body: BodyModel) -> BodyModel:
+        """Return a body with the mean scale of fits and distances, weighted by their variances.
+
+        A distance that is given stays.
+        """
+        far = self._far
         if far is None:
             return body
         away = np.abs(np.subtract.outer(self._times_s, far.times_s))

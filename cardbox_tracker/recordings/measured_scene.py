@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
-from typing import Generic, NamedTuple, TypeVar
+from typing import NamedTuple
 
 import numpy as np
 
@@ -23,6 +23,7 @@ from cardbox_tracker.detectors.image_points import ImagePoints
 from cardbox_tracker.measuring.first_sight import upper_body
 from cardbox_tracker.measuring.people_camera import Distances
 from cardbox_tracker.measuring.scene_camera import Picture
+from cardbox_tracker.measuring.scene_watch import MOST_PICTURES, Spread
 from cardbox_tracker.measuring.seen_body import MOST_SIGHTS, SeenBody
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.sizes import FloatArray
@@ -30,36 +31,6 @@ from cardbox_tracker.recordings.recording import FrameSet, Recording
 from cardbox_tracker.recordings.silhouettes import RecordedFrame
 from cardbox_tracker.search.config import TrackerConfig
 from cardbox_tracker.tracking.session import Session
-
-T = TypeVar("T")
-
-
-# Images in which edges of the room are sought.
-_MOST_PICTURES = 12
-
-
-class Spread(Generic[T]):
-    """A few items spread evenly over however many there are.
-
-    Attributes:
-        items: at least half of the number asked for, if there were so many.
-    """
-
-    def __init__(self, most: int) -> None:
-        self._most, self._every, self._seen = most, 1, 0
-        self.items: list[T] = []
-
-    def add(self, make: Callable[[], T | None]) -> None:
-        """Take the next item, which is made only if it is due; None lets the one after it be."""
-        if self._seen % self._every == 0:
-            item = make()
-            if item is None:
-                return
-            self.items.append(item)
-        self._seen += 1
-        if len(self.items) > self._most:
-            del self.items[1::2]
-            self._every *= 2
 
 
 class Watched(NamedTuple):
@@ -78,7 +49,7 @@ def watch(recording: Recording, start_s: float = 0.0, end_s: float = math.inf) -
     """
     for source in recording.sources:
         source.keep_images()
-    frames, pictures = Spread[RecordedFrame](MOST_SIGHTS), Spread[Picture](_MOST_PICTURES)
+    frames, pictures = Spread[RecordedFrame](MOST_SIGHTS), Spread[Picture](MOST_PICTURES)
     people: list[_Person] = []
     for taken in recording.frames(start_s, end_s):
         frame = taken.first

@@ -137,6 +137,7 @@ class Doubt:
         """Forget the previous results."""
         self._whole: float | None = None
         self._hands = np.zeros(len(HANDS))
+        self._source: Source | None = None
 
     def judge(
         self, evidence: Values, source: Source, hidden: BoolArray, vetoes: Sequence[bool] = ()
@@ -146,6 +147,10 @@ class Doubt:
         ``hidden`` (6,) says whether no camera sees a keypoint; each of ``vetoes``, such as a
         person's back, makes the whole result uncertain.
         """
+        if source is not self._source:
+            # What an outline left open, points show.
+            self.forget()
+            self._source = source
         uncertain_from, doubtful_from, of = self._models[source]
         values = {name: each.tolist() for name, each in evidence.items()}
         chances = np.array([_chance(of[kind], values, i) for i, kind in enumerate(KINDS)])

@@ -23,6 +23,7 @@ import cv2
 import numpy as np
 
 from cardbox_tracker.camera.camera import Camera
+from cardbox_tracker.camera.extrinsics import meeting_m
 from cardbox_tracker.camera.tilt import tilted_body, tilted_states
 from cardbox_tracker.camera.view import OtherCamera
 from cardbox_tracker.detectors.figure import Figure, figure_of_points
@@ -39,6 +40,9 @@ from cardbox_tracker.detectors.identity import (
     unlike,
 )
 from cardbox_tracker.detectors.image_points import ImagePoints
+from cardbox_tracker.measuring.people_camera import Distances
+from cardbox_tracker.measuring.scene_camera import in_scene
+from cardbox_tracker.measuring.scene_watch import SceneWatch
 from cardbox_tracker.measuring.seen_body import SeenBody
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.posture import PLACE, POSTURE
@@ -119,9 +123,10 @@ class _Person:
         self.sights = [_Sight() for _ in tracker.cameras]
         self.fitted_ns = self.others_images = 0
         self.chance = 1.0
-        self._time_s = 0.0
 
-    def track(self, observations: Observations, only_measures: bool = False) -> Estimate:
+    def track(
+        self, observations: Observations, time_s: float, only_measures: bool = False
+    ) -> Estimate:
         """Return the estimate by the newest version of the body, which these images may show."""
         tracker, measuring = self.tracker, self._measuring
         if measuring is None:
@@ -129,9 +134,8 @@ class _Person:
         frames = tracker.frames(observations)
         first = frames[0]
         is_new_start = bool(measuring.body.unknown) or self.estimate.posture is None
-        self._time_s += first.interval_s
         is_detected = first.points is not None and first.points.are_certain
-        if measuring.see(first.silhouette, first.image, self._time_s, is_detected):
+        if measuring.see(first.silhouette, first.image, time_s, is_detected):
             tracker.use(measuring.body, first.stamp_ns, is_new_start)
             frames = tracker.again(frames)
         if only_measures:
@@ -154,6 +158,11 @@ class _Person:
             (state,) = tilted_states(state[None], before, self.tracker.body)
             offset_m = None if last.offset_m is None else state[PLACE]
             self.estimate = replace(last, posture=state[POSTURE], offset_m=offset_m)
+
+    def correct(self, far: Distances | None, stamp_ns: int) -> None:
+        """Go on with the scale by the distances, m, of somebody who is measured."""
+        if self._measuring is not None and self._measuring.correct(far):
+            self.tracker.use(self._measuring.body, stamp_ns)
 
     @property
     def seen_ns(self) -> int | None:
@@ -192,6 +201,7 @@ class Session:
         look: Look | None = None,
         beside: Executor | None = None,
         only_measures: bool = False,
+        scene: SceneWatch | None = None,
     ) -> None:
         """Set up for people who may come, with the body of each in the order of their numbers.
 
@@ -199,14 +209,17 @@ class Session:
         to right if they come together. ``people`` is their number, 0 for up to ``MOST_PEOPLE``;
         None for one without a number, to whom everything belongs that the cameras show. Unknown
         values of a body are measured, see :class:`~cardbox_tracker.measuring.seen_body.SeenBody`;
-        ``beside`` does so while tracking goes on, and with ``only_measures`` nobody is tracked. The
-        other arguments are those of :class:`~.tracker.Tracker`.
+        ``beside`` does so while tracking goes on, and with ``only_measures`` nobody is tracked.
+        ``scene`` finds the camera and people's distances meanwhile, and bodies follow it. The other
+        arguments are those of :class:`~.tracker.Tracker`.
         """
-        self._bodies, self._camera = tuple(bodies), camera
+        self._bodies = tuple(_before_all(body, others) for body in bodies)
+        self._camera = camera
         self.config = config or TrackerConfig()
         self._rng, self._others = rng or np.random.default_rng(0), tuple(others)
         self._look, self._is_alone, self._beside = look, people is None, beside
         self._only_measures, self._most = only_measures, people or MOST_PEOPLE
+        self._scene = scene
         self._people: list[_Person] = []
         # Images in a row with somebody new, by camera.
         self._new = [0] * (1 + len(self._others))
@@ -248,6 +261,7 @@ class Session:
     def remarks(self, names: Sequence[str], is_all: bool = False) -> list[str]:
         """Return warnings about images that contradict each other; ``is_all`` adds past ones."""
         told = [text for one in self.trackers for text in one.remarks(names, is_all)]
+        told += () if self._scene is None else self._scene.remarks
         if self.agreement is not None:
             told += self.agreement.remarks(names[1:])
         return list(dict.fromkeys(told))
@@ -286,18 +300,35 @@ class Session:
         :meth:`.Tracker.track` does.
         """
         observations = listed(observations, 1 + len(self._others))
-        if self._is_alone:
-            (person,) = self._people
-            person.estimate = person.track(observations, self._only_measures)
-            return [person.estimate]
         stamp_ns = stamp_of(observations)
         if stamp_ns is None:
             stamp_ns = 0 if self._last_ns is None else self._last_ns + _USUAL_NS
         self._last_ns = stamp_ns
+        first = observations[0]
+        if self._is_alone:
+            (person,) = self._people
+            self._look_around(first, [None if first is None else first.points])
+            person.estimate = person.track(observations, stamp_ns / 1e9, self._only_measures)
+            return [person.estimate]
         seen = [self._shared(*one) for one in enumerate(observations)]
+        self._look_around(first, [person.sights[0].points for person in self._people])
         for person in self._people:
             person.estimate = self._tracked(person, [one.get(person.number) for one in seen])
         return [person.estimate for person in self._people]
+
+    def _look_around(self, seen: Observation | None, points: Sequence[ImagePoints | None]) -> None:
+        """Use what the first camera shows of the scene, with the points of each person."""
+        if self._scene is None or seen is None:
+            return
+        assert self._last_ns is not None
+        found = self._scene.see(self._last_ns / 1e9, points, seen.image)
+        if found is None:
+            return
+        self.tilt([in_scene(body, found.camera) for body in self._bodies], self._last_ns)
+        for person, far in zip(self._people, found.distances, strict=False):
+            stature_m = self._scene.stature_m(person.number)
+            there = far and far._replace(distances=far.distances * stature_m)
+            person.correct(there, self._last_ns)
 
     def _shared(self, camera: int, seen: Observation | None) -> dict[int, _Share]:
         """Return what a camera shows of each person, by number."""
@@ -554,7 +585,7 @@ class Session:
             one.seen if one is not None and is_used else Observation(stamp_ns=now_ns)
             for one, is_used in zip(shares, used, strict=True)
         ]
-        found = person.track(given, self._only_measures)
+        found = person.track(given, now_ns / 1e9, self._only_measures)
         found = replace(found, person=person.number, person_chance=person.chance)
         if found.posture is not None:
             person.fitted_ns = now_ns
@@ -567,6 +598,14 @@ class Session:
         elif any(one.is_found for one in there) and now_ns - person.fitted_ns <= DROPPED_NS:
             return _held(last)
         return found
+
+
+def _before_all(body: BodyModel, others: Sequence[OtherCamera]) -> BodyModel:
+    """Return a body at an unknown distance where all cameras, which look at it, may see it."""
+    distance_m = meeting_m([other.extrinsics for other in others])
+    if distance_m is None or "distance_m" not in body.unknown:
+        return body
+    return body.with_values(distance_m=distance_m)
 
 
 def _held(last: Estimate, hidden: bool = False) -> Estimate:

@@ -8,7 +8,8 @@ import pytest
 
 from cardbox_tracker.detectors.figure import figure_of_points
 from cardbox_tracker.detectors.image_points import POINT_NAMES, ImagePoints
-from cardbox_tracker.recordings.measured_scene import Spread, _assign, _Person
+from cardbox_tracker.measuring.scene_watch import Spread
+from cardbox_tracker.recordings.measured_scene import _assign, _Person
 from cardbox_tracker.recordings.silhouettes import RecordedFrame
 
 RED, BLUE = (40, 40, 220), (220, 60, 40)

@@ -120,7 +120,8 @@ class CameraInputs:
 
     :class:`ImagePairing` pairs each silhouette with its image. With several cameras or depth
     images, :class:`~cardbox_tracker.camera.pairing.Arrivals` then synchronizes the streams by their
-    stamps.
+    stamps. While the detector keeps up, silhouettes wait for their points, but not longer than
+    until the next silhouette.
     """
 
     def __init__(
@@ -164,7 +165,8 @@ class CameraInputs:
         self._poses = CameraPoses(node, cameras, settings.extrinsics_file, self._on_poses)
         if settings.depth:
             self._depth_input = DepthInput(node, settings.depth, self._on_depth)
-        self._keypoints = KeypointInputs(node, settings)
+        self._keypoints = KeypointInputs(node, settings, self._release)
+        self._held: Sequence[Received | None] | None = None
         self._tracks_people = settings.people > 0
 
     @property
@@ -199,7 +201,7 @@ class CameraInputs:
             self._clocks[number - 1].see()
         if len(self._streams) == 1:
             # The node itself drops and counts repeated and late messages.
-            self._deliver(received, [received])
+            self._hold([received])
             return
         self._stuck[number] = 0 if is_usable else self._stuck[number] + 1
         if not is_usable:
@@ -209,7 +211,22 @@ class CameraInputs:
         for one_time in self._arrivals.sets():
             # A set with only a depth image cannot be tracked.
             if any(one is not None for one in one_time[: self._count]):
-                self._deliver(self._lead_of(one_time), one_time)
+                self._hold(one_time)
+
+    def _hold(self, received: Sequence[Received | None]) -> None:
+        """Deliver messages of one time, with their points if these come before the next ones."""
+        try:
+            self._release(is_last=True)
+        finally:
+            self._held = received
+            self._keypoints.expect(_stamp_ns(self._lead_of(received).message))
+            self._release()
+
+    def _release(self, is_last: bool = False) -> None:
+        received = self._held
+        if received is not None and (is_last or not self._keypoints.are_due):
+            self._held = None
+            self._deliver(self._lead_of(received), received)
 
     def _lead_of(self, received: Sequence[Received | None]) -> Received:
         """Return the silhouette whose stamp represents the set: the first camera's or earliest."""

@@ -2,25 +2,21 @@
 
 from __future__ import annotations
 
-import math
 import os
 import time
 from collections import deque
 from collections.abc import Sequence
-from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from sensor_msgs.msg import PointCloud2
-from std_msgs.msg import Float64, Header
+from std_msgs.msg import Header
 
-from cardbox_tracker.camera.camera import Calibration, Camera, unrectified
+from cardbox_tracker.camera.camera import Calibration, unrectified
 from cardbox_tracker.camera.stamps import WINDOW, StampOrder
 from cardbox_tracker.detectors.detector import Detector, PersonDetector
-from cardbox_tracker.detectors.image_points import ImagePoints
-from cardbox_tracker.detectors.pose_network import NOBODY, Detection, image_points
-from cardbox_tracker.measuring.people_camera import FOUND_STDDEV, PeopleCamera, people_camera
+from cardbox_tracker.detectors.pose_network import NOBODY, Detection
 from cardbox_tracker.ros.messages.conversions import ImageArray, stamp_ns
 from cardbox_tracker.ros.messages.keypoints import (
     people_message,
@@ -42,61 +38,6 @@ from cardbox_tracker.ros.runtime.parameters import LiveParameters
 from cardbox_tracker.ros.runtime.publishers import SinglePublisher
 from cardbox_tracker.segmentation.silhouettes import SilhouettePipeline
 from cardbox_tracker.tracking.session import MOST_PEOPLE
-
-# People stand still for some time, and move about between.
-_IMAGES = 10
-
-
-class CameraPitch:
-    """Looks for the pitch until a standing person shows it, and latches it."""
-
-    def __init__(self, node: CardboxNode) -> None:
-        self._node = node
-        self._publisher = node.advertise(Float64, "~/camera_pitch", qos.LATCHED)
-        # A try takes as long as several images.
-        self._beside = ThreadPoolExecutor(1)
-        self.restart()
-
-    def restart(self) -> None:
-        """Look again, because the camera is another one."""
-        self._seen: list[ImagePoints] = []
-        self._is_found = False
-        self._tried: Future[PeopleCamera | None] | None = None
-        self._images, self._every = 0, 1
-
-    def see(self, found: Detection, camera: Camera) -> None:
-        """Add a person in the image of ``camera``."""
-        self._images += 1
-        if self._tried is not None and self._tried.done():
-            shown, self._tried = self._tried.result(), None
-            self._use(shown)
-        if self._is_found or self._tried is not None or self._images % self._every:
-            return
-        self._seen.append(image_points(found))
-        if len(self._seen) < _IMAGES:
-            return
-        # Images of one posture count as one.
-        given = [[(0.0, points) for points in self._seen]], [None], camera
-        self._tried = self._beside.submit(people_camera, *given)
-        self._seen.clear()
-        # Further tries come more and more seldom.
-        self._every *= 2
-
-    def _use(self, shown: PeopleCamera | None) -> None:
-        if shown is None:
-            return
-        pitch_rad, stddev_rad = float(shown.values[0]), math.sqrt(shown.covariance[0, 0])
-        if stddev_rad > FOUND_STDDEV:
-            return
-        self._is_found = True
-        self._publisher.publish(Float64(data=pitch_rad))
-        degrees = math.degrees(pitch_rad)
-        self._node.get_logger().info(
-            f"camera pitch {abs(degrees):.0f} degrees {'down' if degrees >= 0 else 'up'} (standard "
-            f"deviation {math.degrees(stddev_rad):.0f}), found from the person "
-            "standing upright"
-        )
-
 
 _NICE = 5
 
@@ -151,7 +92,6 @@ class DetectorNode(CardboxNode):
             if self._skeleton_kind is None
             else self.advertise(self._skeleton_kind, "~/skeleton2d", qos.RESULT)
         )
-        self._pitch = CameraPitch(self)
         self._silhouettes = SilhouetteOutputs(self) if settings.publish_silhouette else None
         self.diagnostics.extra = self._values
         self._images = CameraImages(
@@ -168,7 +108,6 @@ class DetectorNode(CardboxNode):
     def _on_calibration(self, calibration: Calibration) -> None:
         settings = self.parameters.value
         self._pipeline = SilhouettePipeline(calibration, (settings.width, settings.height))
-        self._pitch.restart()
         self._person.restart()
 
     def _on_image(self, header: Header, full: ImageArray, sent_ns: int) -> None:
@@ -184,8 +123,6 @@ class DetectorNode(CardboxNode):
         found = self._person.all_in(stamp_ns(header.stamp), image)
         self._took_ms.append(1e3 * (time.perf_counter() - began_s))
         self._send_points(header, found, pipeline)
-        if len(found) == 1:
-            self._pitch.see(found[0], pipeline.camera)
         if self._silhouettes is not None:
             self._silhouettes.send_image(header, image)
             silhouette = np.zeros(image.shape[:2], np.uint8)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections import deque
+from collections.abc import Callable
 from dataclasses import replace
 from typing import Any, NamedTuple
 
@@ -40,6 +41,9 @@ _KEPT = 8
 _SILENT_S = 3.0
 # After so many consecutive messages of another time the clocks are in doubt.
 _IN_DOUBT = 5
+# Weight of an image in the share of images whose points come before the next image, and the share
+# from which on images wait for theirs.
+_LEARN_RATE, _KEEPS_UP = 0.1, 0.8
 
 
 class Taken(NamedTuple):
@@ -58,8 +62,13 @@ class KeypointTopic:
         size: width and height of the camera's image, px; None until they are known.
     """
 
-    def __init__(self, node: CardboxNode, name: str, topic: str) -> None:
+    def __init__(
+        self, node: CardboxNode, name: str, topic: str, arrived: Callable[[], None]
+    ) -> None:
         self.stream = InputStream(name, node.resolve(topic))
+        self._arrived = arrived
+        self._newest_ns = self._expected_ns = 0
+        self._in_time = 0.0
         self.size: Size | None = None
         self._node, self._topic = node, topic
         self._kept: deque[Taken] = deque()
@@ -72,6 +81,17 @@ class KeypointTopic:
         self._look()
         # The publisher may start later, or be replaced by one of another type.
         self._timer = every_second(node, self._look)
+
+    def expect(self, at_ns: int) -> None:
+        """Take notice of the next silhouette; the points of the one before came until now."""
+        came = self._newest_ns >= self._expected_ns
+        self._in_time += _LEARN_RATE * (came - self._in_time)
+        self._expected_ns = at_ns
+
+    @property
+    def is_due(self) -> bool:
+        """Whether the points of the newest silhouette will come before the next one."""
+        return self._in_time > _KEEPS_UP and self._newest_ns < self._expected_ns
 
     def take(self, at_ns: int, frame_id: str) -> Taken | None:
         """Return the newest points for a silhouette of this stamp and frame, once, or None."""
@@ -176,11 +196,13 @@ class KeypointTopic:
             self._report(f"the fields of {self._type} are not the expected ones: {cut(str(error))}")
             return
         self.stream.problem = ""
+        self._newest_ns = at_ns
         self._kept.append(Taken(at_ns, message.header.frame_id.lstrip("/"), persons))
         if len(self._kept) > _KEPT:
             oldest = self._kept.popleft()
             if self._asked_ns:
                 self._leave_out(oldest)
+        self._arrived()
 
     def _leave_out(self, taken: Taken) -> None:
         self._unused += 1
@@ -200,13 +222,31 @@ _BESIDE = 10
 
 
 class KeypointInputs:
-    """The points of all ``cameras``, none without a source; the tracker never waits for them."""
+    """The points of all ``cameras``; none without a source."""
 
-    def __init__(self, node: CardboxNode, settings: TrackerParameters) -> None:
-        """Subscribe with ``node`` if ``keypoints`` is given; raise CardboxError if it is wrong."""
+    def __init__(
+        self,
+        node: CardboxNode,
+        settings: TrackerParameters,
+        arrived: Callable[[], None] = lambda: None,
+    ) -> None:
+        """Subscribe with ``node`` if ``keypoints`` is given; raise CardboxError if it is wrong.
+
+        ``arrived`` is called after each message with points.
+        """
         cameras = (settings.cameras or [""]) if settings.keypoints else []
-        self.cameras = [CameraKeypoints(node, settings, name) for name in cameras]
+        self.cameras = [CameraKeypoints(node, settings, name, arrived) for name in cameras]
         self._topics = [one.topic for one in self.cameras if one.topic is not None]
+
+    def expect(self, at_ns: int) -> None:
+        """Take notice of the next silhouettes, of a time."""
+        for one in self._topics:
+            one.expect(at_ns)
+
+    @property
+    def are_due(self) -> bool:
+        """Whether points of the newest silhouettes will come before the next ones."""
+        return any(one.is_due for one in self._topics)
 
     def values(self) -> dict[str, str]:
         """Return rate, age and use of each camera's points for the diagnostics."""
@@ -230,7 +270,13 @@ class KeypointInputs:
 class CameraKeypoints:
     """The points of one camera, and the calibration that leads from its image to silhouettes."""
 
-    def __init__(self, node: CardboxNode, settings: TrackerParameters, camera: str) -> None:
+    def __init__(
+        self,
+        node: CardboxNode,
+        settings: TrackerParameters,
+        camera: str,
+        arrived: Callable[[], None],
+    ) -> None:
         source, below = settings.keypoints, f"{camera.rstrip('/')}/" if camera else ""
         self.topic: KeypointTopic | None = None
         self._name = f"{camera.strip('/')} keypoints".lstrip()
@@ -245,7 +291,7 @@ class CameraKeypoints:
                 )
         else:
             topic = source if source.startswith("/") else f"{below}{source}"
-            self.topic = KeypointTopic(node, self._name, topic)
+            self.topic = KeypointTopic(node, self._name, topic, arrived)
         self._info_topic = node.resolve(f"{below}camera_info")
         self._watch = CalibrationWatch(
             self._info_topic,

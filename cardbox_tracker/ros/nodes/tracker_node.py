@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from functools import partial
 from typing import Any
 
 import numpy as np
-from std_msgs.msg import Float64, String
+from std_msgs.msg import String
 
 from cardbox_tracker.camera.camera import Camera
 from cardbox_tracker.camera.stamps import StampOrder
@@ -20,7 +20,7 @@ from cardbox_tracker.common.progress import told
 from cardbox_tracker.common.settings import restarts
 from cardbox_tracker.detectors.hand_network import HandNetwork
 from cardbox_tracker.detectors.model_files import installed_hands
-from cardbox_tracker.measuring.people_camera import FOUND_STDDEV
+from cardbox_tracker.measuring.scene_watch import SceneWatch
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.model_file import dumps_body_model, load_body_model, loads_body_model
 from cardbox_tracker.person.skeleton import PLACE_NAMES
@@ -29,7 +29,7 @@ from cardbox_tracker.recordings.outputs import place_of
 from cardbox_tracker.ros.messages import conversions
 from cardbox_tracker.ros.nodes.camera_inputs import CameraInputs, Received
 from cardbox_tracker.ros.nodes.tracker_outputs import TrackedBodies, TrackerOutputs
-from cardbox_tracker.ros.nodes.tracker_parameters import NOT_GIVEN_DEG, TrackerParameters
+from cardbox_tracker.ros.nodes.tracker_parameters import TrackerParameters
 from cardbox_tracker.ros.runtime import qos
 from cardbox_tracker.ros.runtime.command_line import node_main
 from cardbox_tracker.ros.runtime.node import CardboxNode
@@ -127,22 +127,15 @@ class OwnBody:
         text: the body model that was published last; empty before.
     """
 
-    def __init__(
-        self,
-        node: CardboxNode,
-        settings: TrackerParameters,
-        tilt: Callable[[Sequence[BodyModel]], None],
-    ) -> None:
+    def __init__(self, node: CardboxNode, settings: TrackerParameters) -> None:
         self.text = ""
-        self._node, self._settings, self._tilt = node, settings, tilt
+        self._settings = settings
         self._is_measured = False
         self._body: BodyModel | None = None
         self._model = node.advertise(String, "body_model", qos.LATCHED)
         self._description = node.advertise(String, "robot_description", qos.LATCHED)
         if settings.model_file:
             return
-        if settings.camera_pitch_deg == NOT_GIVEN_DEG:
-            node.subscribe(Float64, "detector/camera_pitch", self._on_pitch, qos.LATCHED)
         given = settings.statures or [settings.stature]
         stature = (
             f"a stature of {' and '.join(f'{one:g}' for one in given)} m"
@@ -152,15 +145,6 @@ class OwnBody:
         node.get_logger().info(
             f"nobody is measured: the person in the image is tracked with {stature}"
         )
-
-    def _on_pitch(self, message: Float64, _: int) -> None:
-        if not self._is_measured:
-            # The message has no deviation; this is the largest one of a pitch that is found.
-            tilt = {"camera_pitch_rad": message.data, "pitch_stddev_rad": FOUND_STDDEV}
-            bodies = [body.with_values(**tilt) for body in self._settings.guesses]
-            degrees = math.degrees(message.data)
-            self._node.diagnostics.say("pitch", f"the detector found a pitch of {degrees:.0f} deg")
-            self._tilt(bodies)
 
     def replace(self, text: str) -> None:
         """Latch the text of a measured body, too, so that late subscribers get one body."""
@@ -203,7 +187,7 @@ class TrackerNode(CardboxNode):
         self._camera: Camera | None = None
         self._others: Sequence[OtherCamera] = ()
         self._session: Session | None = None
-        self._is_tilted = False
+        self._scene: SceneWatch | None = None
         numbers = [None, *range(1, settings.people + 1)][settings.people > 0 :]
         self._reports = [TrackingReport() for _ in numbers]
         bodies = TrackedBodies(self, len(numbers)) if settings.rep155_id else None
@@ -224,7 +208,7 @@ class TrackerNode(CardboxNode):
         file = settings.model_file
         known = [load_body_model(user_path(file))] if file else settings.guesses
         if known:
-            self._own = OwnBody(self, settings, self._tilt)
+            self._own = OwnBody(self, settings)
             self._use(known)
         self._wait()
 
@@ -270,14 +254,6 @@ class TrackerNode(CardboxNode):
         self._build("new body model")
         self._wait()
 
-    def _tilt(self, bodies: Sequence[BodyModel]) -> None:
-        """Use the other pitch of ``bodies``, from the next image on and without a new start."""
-        if self._session is None:
-            self._use(bodies)
-            return
-        self._bodies = [self._rolled(body) for body in bodies]
-        self._is_tilted = True
-
     def _on_cameras(self, first: Camera | None, others: Sequence[OtherCamera]) -> None:
         """Use the cameras when all are known or one has changed."""
         if not (others or self._others) and first == self._camera:
@@ -303,13 +279,17 @@ class TrackerNode(CardboxNode):
         """
         if not self._bodies or self._camera is None:
             return
-        self._is_tilted = False
         settings = self.parameters.value
         rng = np.random.default_rng(settings.seed)
         people = settings.people or None
         # A fit takes as long as several images.
+        self._scene = None
+        if settings.keypoints and any(body.unknown for body in self._bodies):
+            is_level = settings.camera_roll_deg != 0.0
+            scene = self._camera, *settings.given_of_scene, self._beside, is_level
+            self._scene = SceneWatch(*scene)
         given = settings.config(), rng, self._others, people, self._look, self._beside
-        self._session = Session(self._bodies, self._camera, *given)
+        self._session = Session(self._bodies, self._camera, *given, scene=self._scene)
         for report, tracker in zip(self._reports, self._session.trackers, strict=True):
             report.start(tracker.body)
         self.diagnostics.say(reason, f"{reason}: tracking starts from the front reference posture")
@@ -355,9 +335,6 @@ class TrackerNode(CardboxNode):
             self._outputs[0].waiting(lead.message, lead.image, text)
             return
         seen = self._inputs.observed(received)
-        if self._is_tilted:
-            self._is_tilted = False
-            self._session.tilt(self._bodies, conversions.stamp_ns(seen.header.stamp))
         estimates, trackers = self._session.track(seen.observations), self._session.trackers
         for outputs, report, estimate, tracker in zip(
             self._outputs, self._reports, estimates, trackers, strict=True
@@ -369,6 +346,8 @@ class TrackerNode(CardboxNode):
             if self._own is not None and tracker is trackers[0]:
                 self._own.publish(tracker.body, seen.header.frame_id)
             outputs.publish(seen, estimate, tracker)
+        if self._scene is not None and self._scene.news:
+            self.diagnostics.say("scene", self._scene.news)
         self._agreement.see(self._session.agreement)
         self.diagnostics.advice = self._warnings
         self.diagnostics.working(seen.sent_ns)

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 from cardbox_tracker.camera.pairing import camera_names
 from cardbox_tracker.common.settings import NoEffectError, nested
+from cardbox_tracker.measuring.people_camera import PITCH_PRIOR, USUAL_PITCH
 from cardbox_tracker.measuring.scene_camera import GIVEN_STDDEV
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.proportions import (
@@ -88,8 +89,9 @@ class TrackerParameters(NodeParameters):
     )
     camera_pitch_deg: float = at_start(
         NOT_GIVEN_DEG,
-        "with people who are not measured: pitch of the camera, positive downwards; 90: the "
-        "detector finds it, or the camera is taken as level",
+        "with people who are not measured: pitch of the (first) camera, positive downwards; 90: "
+        "with keypoints it is found, without them the camera is taken as level, and every posture "
+        "is at best uncertain",
         unit="deg",
         limits=(-80.0, NOT_GIVEN_DEG),
     )
@@ -145,15 +147,29 @@ class TrackerParameters(NodeParameters):
     def guesses(self) -> tuple[BodyModel, ...]:
         """Bodies of people who are not measured; empty if a measured one is waited for."""
         given = self.statures or [self.stature] * (self.stature > 0.0)
-        if not (given or self.keypoints) or self.model_file or len(self.cameras) > 1:
+        if not (given or self.keypoints) or self.model_file:
             return ()
-        place, pitch_deg = self.person_distance_m or None, self.camera_pitch_deg
+        place, pitch = self.person_distance_m or None, self._pitch
         bodies = [body_from_proportions(one, place) for one in given or [USUAL_STATURE_M]]
         changes = {} if given else {"stature_stddev": USUAL_STDDEV_M / USUAL_STATURE_M}
-        if pitch_deg != NOT_GIVEN_DEG:
-            changes["camera_pitch_rad"] = math.radians(pitch_deg)
-            changes["pitch_stddev_rad"] = GIVEN_STDDEV
+        if pitch is None:
+            # Only points show the pitch; without them, a level camera is assumed.
+            usual = USUAL_PITCH, PITCH_PRIOR
+            pitch = usual if self.keypoints else (0.0, math.hypot(*usual))
+        changes["camera_pitch_rad"], changes["pitch_stddev_rad"] = pitch
         return tuple(body.with_values(**changes) for body in bodies)
+
+    @property
+    def _pitch(self) -> tuple[float, float] | None:
+        """Mean and standard deviation of the pitch that is given, rad; None for none."""
+        if self.camera_pitch_deg == NOT_GIVEN_DEG:
+            return None
+        return math.radians(self.camera_pitch_deg), GIVEN_STDDEV
+
+    @property
+    def given_of_scene(self) -> tuple[list[float | None], tuple[float, float] | None]:
+        """The statures, None for one that is not given, and the pitch, of a ``SceneWatch``."""
+        return [one or None for one in self.statures or [self.stature]], self._pitch
 
     def config(self) -> TrackerConfig:
         """Return the settings of the core."""
@@ -205,11 +221,6 @@ class TrackerParameters(NodeParameters):
                 "person_distance_m and camera_pitch_deg are of people who are not measured: give "
                 "stature, statures or keypoints, too, or leave them out, because a body model has "
                 "its own"
-            )
-        if (self.stature or self.statures) and len(self.cameras) > 1:
-            raise ValueError(
-                "stature is for one camera; with several, have the person measured instead: "
-                "call initializer/initialize, or give model_file"
             )
         lowest_m, highest_m = STATURE_LIMITS_M
         given = self.stature or lowest_m, *self.statures

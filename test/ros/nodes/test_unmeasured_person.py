@@ -8,27 +8,21 @@ from typing import Any
 import numpy as np
 import pytest
 from builtin_interfaces.msg import Time
-from std_msgs.msg import Float64, Header, String
+from std_msgs.msg import Header, String
 
 from cardbox_tracker.camera.camera import Camera
+from cardbox_tracker.camera.extrinsics import Extrinsics, meeting_m
 from cardbox_tracker.camera.rasterisation import render
-from cardbox_tracker.detectors.pose_network import LANDMARKS, Detection
-from cardbox_tracker.measuring.people_camera import (
-    FORWARD,
-    FOUND_STDDEV,
-    HEIGHTS,
-    LEVELS,
-    people_camera,
-)
+from cardbox_tracker.camera.view import OtherCamera
+from cardbox_tracker.measuring.people_camera import FOUND_STDDEV, PITCH_PRIOR, USUAL_PITCH
 from cardbox_tracker.person.cardbox import cardbox_patches
 from cardbox_tracker.person.model_file import dumps_body_model, loads_body_model
 from cardbox_tracker.person.posture import reference_posture
 from cardbox_tracker.person.proportions import USUAL_STATURE_M, body_from_proportions
 from cardbox_tracker.ros.messages.conversions import camera_info_message, image_message
-from cardbox_tracker.ros.nodes.detector_node import CameraPitch
 from cardbox_tracker.ros.nodes.tracker_node import TrackerNode
 from cardbox_tracker.ros.nodes.tracker_parameters import TrackerParameters
-from cardbox_tracker.ros.runtime.node import CardboxNode
+from cardbox_tracker.tracking.session import Session
 
 CAMERA = Camera(160, 120, 150.0, 150.0, 79.5, 59.5)
 PERSON = body_from_proportions(1.8, 2.3, hip_height_m=-0.4).with_values(unknown=())
@@ -84,30 +78,41 @@ def test_a_measured_body_replaces_it(bus: Any, start: Any) -> None:
     show(bus, 1)
     measured = dumps_body_model(PERSON)
     bus.send("/body_model", String(data=measured))
-    bus.send("/detector/camera_pitch", Float64(data=0.2))
     show(bus, 2)
     assert node._bodies == [loads_body_model(measured)]
     assert bus.texts("/body_model")[-1] == measured
 
 
-def test_the_detectors_pitch_is_used(bus: Any, start: Any) -> None:
+def test_a_camera_of_unknown_pitch_is_sure_of_nothing(bus: Any, start: Any) -> None:
+    """As in films: points will show the pitch, silhouettes alone never do."""
     node = start(keypoints="detector/keypoints")
     [body] = node._bodies
     assert body.sizes.tolist() == body_from_proportions(USUAL_STATURE_M).sizes.tolist()
     assert body.stature_stddev == pytest.approx(0.09 / 1.69)
-    bus.send("/detector/camera_pitch", Float64(data=0.2))
-    assert node._bodies[0].camera_pose.pitch_rad == 0.2
-    # What a standing person shows is not as sure as a measured pitch.
-    assert node._bodies[0].camera_pose.pitch_stddev_rad == FOUND_STDDEV
-    bus.send("/detector/camera_pitch", Float64(data=float("nan")))
-    assert node._bodies[0].camera_pose.pitch_rad == 0.2
+    assert body.camera_pose.pitch_rad == USUAL_PITCH
+    assert body.camera_pose.pitch_stddev_rad == PITCH_PRIOR > FOUND_STDDEV
+    assert node._scene is not None
+    [alone] = TrackerParameters(stature=1.8).guesses
+    assert alone.camera_pose.pitch_rad == 0.0
+    assert alone.camera_pose.pitch_stddev_rad > FOUND_STDDEV
+
+
+def test_people_who_are_not_measured_stand_where_the_cameras_look() -> None:
+    """The axes of the cameras, 90 degrees apart, meet 3 m before the first one."""
+    turn = np.array([(0.0, 0.0, 1.0), (0.0, 1.0, 0.0), (-1.0, 0.0, 0.0)])
+    aside = Extrinsics(turn, turn @ (-2.0, 0.0, -3.0))
+    assert meeting_m([aside]) == pytest.approx(3.0)
+    assert meeting_m([Extrinsics(np.eye(3), np.array([-0.1, 0.0, 0.0]))]) is None
+    settings = TrackerParameters(cameras=["a", "b"], statures=[1.75, 1.6], people=2)
+    settings.check()
+    others = [OtherCamera(CAMERA, aside)]
+    session = Session(settings.guesses, CAMERA, settings.config(), others=others, people=2)
+    assert [one.body.placement.distance_m for one in session.trackers] == [3.0, 3.0]
 
 
 def test_what_is_given_of_people_and_camera_is_used(bus: Any, start: Any) -> None:
     given = {"statures": [1.75, 1.62], "people": 2}
     node = start(**given, person_distance_m=2.5, camera_pitch_deg=10.0)
-    with pytest.raises(KeyError):
-        bus.send("/detector/camera_pitch", Float64(data=0.2))
     lengths_m = [body.size("upper_arm_length") for body in node._bodies]
     assert lengths_m == [
         body_from_proportions(stature_m).size("upper_arm_length") for stature_m in (1.75, 1.62)
@@ -132,12 +137,9 @@ def test_what_would_have_no_effect_is_refused(given: dict[str, Any], expected: s
         TrackerParameters(**given).check()
 
 
-@pytest.mark.parametrize(
-    ("more", "expected"), [({"cameras": ["a", "b"]}, "for one camera"), ({}, "expected 1.1 to 2.2")]
-)
-def test_an_impossible_stature_is_refused(more: dict[str, Any], expected: str) -> None:
-    with pytest.raises(ValueError, match=expected):
-        TrackerParameters(stature=1.8 if more else 0.5, **more).check()
+def test_an_impossible_stature_is_refused() -> None:
+    with pytest.raises(ValueError, match=r"expected 1\.1 to 2\.2"):
+        TrackerParameters(stature=0.5).check()
 
 
 def test_without_either_a_measured_body_is_waited_for(bus: Any, start: Any) -> None:
@@ -145,38 +147,6 @@ def test_without_either_a_measured_body_is_waited_for(bus: Any, start: Any) -> N
     show(bus, 1)
     assert "body model" in bus.tick().message
     assert not bus.sent["/joint_states"] and "/body_model" not in bus.sent
-
-
-@pytest.mark.parametrize("shown", [True, False])
-def test_a_standing_person_shows_the_detector_the_pitch(
-    bus: Any, shown: bool, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    pitch = CameraPitch(bus.start(lambda **options: CardboxNode("detector", **options)))
-    camera, px = CAMERA.with_pitch(0.2), np.zeros((33, 2))
-    for number, name in enumerate(LANDMARKS):
-        level = name.removeprefix("left_").removeprefix("right_")
-        level = "ankle" if level in ("heel", "foot") else level
-        if level in LEVELS:
-            at = LEVELS.index(level)
-            there = np.array((-2.5 + 1.8 * FORWARD[at], 0.0, 1.8 * HEIGHTS[at] - 1.6))
-            px[number] = camera.project(camera.reference_to_optical(there))
-    scores = np.full(33, 0.9 if shown else 0.1)
-    tries: list[int] = []
-    images: list[Detection] = []
-
-    def seen_in(*given: Any) -> Any:
-        tries.append(len(images))
-        return people_camera(*given)
-
-    monkeypatch.setattr("cardbox_tracker.ros.nodes.detector_node.people_camera", seen_in)
-    for _ in range(100):
-        images.append(Detection(px, scores, np.zeros((120, 160), np.uint8)))
-        pitch.see(images[-1], CAMERA)
-        pitch._beside.submit(int).result()
-    # A live node has little time for it.
-    assert tries == ([10] if shown else [10, 30, 68])
-    found = bus.texts("/detector/camera_pitch")
-    assert found == ([pytest.approx(0.2, abs=0.06)] if shown else [])
 
 
 def test_a_pitch_that_is_found_late_changes_nothing_of_who_is_tracked(bus: Any, start: Any) -> None:
@@ -201,7 +171,8 @@ def test_a_pitch_that_is_found_late_changes_nothing_of_who_is_tracked(bus: Any, 
     ages = [(one.filter, one.filter._age + 1) for one in trackers]
     bodies = [loads_body_model(bus.texts(f"/person_{n}/body_model")[-1]) for n in (1, 2)]
     counts = [len(bus.texts(f"/person_{n}/body_model")) for n in (1, 2)]
-    bus.send("/detector/camera_pitch", Float64(data=0.15))
+    tilted = [body.with_values(camera_pitch_rad=0.15) for body in node._bodies]
+    node._session.tilt(tilted, 1_500_000_000)
     after = shown(5)
     assert node._session.trackers == trackers
     assert [(one.filter, one.filter._age) for one in trackers] == ages
