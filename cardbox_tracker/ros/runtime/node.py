@@ -7,6 +7,8 @@ import time
 import traceback
 from collections.abc import Callable
 from copy import copy
+from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any, Protocol, TypeVar
 
 import rclpy
@@ -25,6 +27,7 @@ from cardbox_tracker.common import garbage, interrupts
 from cardbox_tracker.common.errors import CardboxError, cut, quoted
 from cardbox_tracker.ros.runtime import qos
 from cardbox_tracker.ros.runtime.diagnostics import NodeDiagnostics, every_second
+from cardbox_tracker.ros.runtime.named_parameters import in_every_namespace
 from cardbox_tracker.ros.runtime.publishers import TopicTypes
 
 Subscriber = Callable[[Any, dict[str, Any]], None]
@@ -243,7 +246,8 @@ def run_node(create: Callable[[], CardboxNode], args: list[str] | None = None) -
 def run(create: Callable[[], N], args: list[str] | None, work: Callable[[N], None]) -> int:
     """Create nodes with ``create`` and run ``work`` until ROS ends; return the exit code."""
     try:
-        rclpy.init(args=args)
+        with TemporaryDirectory() as folder:
+            rclpy.init(args=in_every_namespace(sys.argv if args is None else args, Path(folder)))
     except Exception as error:
         print(f"cannot start: {error}", file=sys.stderr)
         return 2
