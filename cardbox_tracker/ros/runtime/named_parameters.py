@@ -11,7 +11,9 @@ from collections.abc import Sequence
 from pathlib import Path
 
 _RULE = re.compile(r"(\w+):([^:=]+):=(.*)", re.DOTALL)
-_SECTION = re.compile(r"^(\w+)(?=:[ \t]*(?:#.*)?\n(?:[ \t]*(?:#.*)?\n)*[ \t]+ros__parameters:)", re.M)
+_SECTION = re.compile(
+    r"^(\w+)(?=:[ \t]*(?:#.*)?\n(?:[ \t]*(?:#.*)?\n)*[ \t]+ros__parameters:)", re.M
+)
 
 
 def in_every_namespace(command_line: Sequence[str], folder: Path) -> list[str]:

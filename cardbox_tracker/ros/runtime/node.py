@@ -12,6 +12,7 @@ from tempfile import TemporaryDirectory
 from typing import Any, Protocol, TypeVar
 
 import rclpy
+from rclpy.event_handler import SubscriptionEventCallbacks
 from rclpy.exceptions import ROSInterruptException
 from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 from rclpy.logging import get_logger
@@ -169,11 +170,19 @@ class CardboxNode(Node):
             return
 
         def look() -> None:
-            # A publisher that latches nothing would warn of a subscriber that asks for it.
+            # A publisher that latches nothing would warn of a subscriber that asks for it, and only
+            # a reliable one sends what it has latched.
             ends = self.get_publishers_info_by_topic(name)
-            if any(end.qos_profile.durability == qos.LATCHED.durability for end in ends):
+            if any(qos.is_latched(end.qos_profile) for end in ends):
                 timer.cancel()
-                self.create_subscription(CameraInfo, topic, heard, qos.LATCHED)  # type: ignore[arg-type]
+                quiet = SubscriptionEventCallbacks(use_default_callbacks=False)
+                self.create_subscription(
+                    CameraInfo,
+                    topic,
+                    heard,  # type: ignore[arg-type]
+                    qos.LATCHED,
+                    event_callbacks=quiet,
+                )
 
         timer = every_second(self, look)
 
