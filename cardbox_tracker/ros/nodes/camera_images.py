@@ -80,8 +80,8 @@ class CameraImages:
         """Use a CameraInfo if it is the first valid one, or lasts."""
         before = self.watch.remark
         changed = self.watch.see(message)
-        if self.watch.remark and not before:
-            self._node.get_logger().warning(self.watch.remark)
+        if self.watch.remark not in ("", before):
+            self._node.diagnostics.say("CameraInfo", self.watch.remark, warning=True)
         calibration = self.watch.current
         if not changed or calibration is None:
             return
@@ -128,6 +128,7 @@ class CameraImages:
                 self._changed(calibration)
         height, width = image.shape[:2]
         calibration.check_shape(width, height, self.topic, self.info_topic)
+        self.watch.images.look(image)
         # TF knows neither an empty name nor one with a slash before it.
         frame_id = message.header.frame_id.lstrip("/")
         message.header.frame_id = frame_id or calibration.frame_id

@@ -15,8 +15,10 @@ STARTING = 150
 
 _MOST_NAMED = 5
 # Images that are made of a camera's.
-_MADE = ("/overlay", "/silhouette", "/silhouette/image", "/silhouette/camera_info")
-_MADE += ("/background/mean", "/background/stddev")
+_MADE = (
+    *("/overlay", "/silhouette", "/silhouette/image", "/silhouette/camera_info"),
+    *("/background/mean", "/background/stddev"),
+)
 
 
 class SinglePublisher:

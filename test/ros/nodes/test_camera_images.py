@@ -14,6 +14,7 @@ from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from sensor_msgs.msg import CameraInfo
 from std_msgs.msg import Header
 
+from cardbox_tracker.camera.calibration_watch import LASTING
 from cardbox_tracker.camera.camera import Camera
 from cardbox_tracker.ros.messages.conversions import (
     camera_info_message,
@@ -163,3 +164,29 @@ def test_camera_info_of_any_quality_of_service_is_used_without_a_warning(
     assert received == {"eye 0", "eye 1"}
     told = [line for line in capfd.readouterr().err.splitlines() if "[tested]" in line]
     assert not warnings and not told
+
+
+@pytest.mark.parametrize("is_zoom", [True, False])
+def test_a_calibration_that_the_images_contradict_is_told_and_not_used(
+    is_zoom: bool, make_node: Callable[..., Any], hands: Any
+) -> None:
+    """Background and detector get images and calibration by this way."""
+    node = CardboxNode("tested", hands, context=make_node().context, enable_rosout=False)
+    focal_px: list[float] = []
+    images = CameraImages(node, "raw", lambda c: focal_px.append(c.k[0, 0]), lambda *_: None)
+    wall = np.random.default_rng(1).uniform(50, 200, (12, 16))
+    near = np.kron(wall[2:-2, 3:-3], np.ones((15, 16)))[:120, :160]
+    far = np.kron(wall, np.ones((10, 10)))
+    for number in range(3 * LASTING):
+        header, is_new = Header(stamp=Time(sec=1 + number)), number > LASTING
+        seen = near if is_new and is_zoom else far
+        hands.give("/image_raw", image_message(header, seen.astype(np.uint8), "mono8"))
+        focal = 240.0 if is_new else 150.0
+        info = camera_info_message(header, Camera(160, 120, focal, focal, 79.5, 59.5))
+        hands.give("/camera_info", info)
+    told = " ".join(images.remarks().values())
+    node.destroy_node()
+    assert focal_px == ([150.0, 240.0] if is_zoom else [150.0])
+    assert is_zoom or (
+        "but the images on /image_raw have not" in told and "start this node" in told
+    )
