@@ -100,7 +100,7 @@ class CameraImages:
 
     def on_image(self, message: Image | CompressedImage, sent_ns: int) -> None:
         """Deliver an image if its stamp can be used and the calibration is known."""
-        order = self._node.diagnostics.input.add(conversions.stamp_ns(message.header.stamp))
+        order = self._node.diagnostics.arrived(conversions.stamp_ns(message.header.stamp))
         if not order.is_usable:
             return
         self.order, self.image_bytes = order, len(message.data)

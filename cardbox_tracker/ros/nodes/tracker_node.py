@@ -343,7 +343,7 @@ class TrackerNode(CardboxNode):
 
     def _on_input(self, lead: Received, received: Sequence[Received | None]) -> None:
         """Track the messages of one time; ``lead`` has the stamp that represents them."""
-        step = self.diagnostics.input.add(conversions.stamp_ns(lead.message.header.stamp))
+        step = self.diagnostics.arrived(conversions.stamp_ns(lead.message.header.stamp))
         if step is StampOrder.RESTART:
             self._build("an image is older than the one before (a bag that loops?)")
         if not step.is_usable:
