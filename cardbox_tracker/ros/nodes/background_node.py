@@ -239,7 +239,11 @@ class BackgroundNode(CardboxNode):
                 f"most of the image is nearer than within_m, {settings.within_m:g} m: choose it "
                 "between the person and the wall, and let nothing else stand before it"
             )
-        elif settings.within_m == 0.0 and (drifted or covered > _COVERAGE_TO_WARN):
+        elif (
+            settings.within_m == 0.0
+            and "exposure" not in texts
+            and (drifted or covered > _COVERAGE_TO_WARN)
+        ):
             texts["brightness"] = (
                 "the whole scene changed its brightness: switch the camera's automatic exposure "
                 "and white balance off (v4l2-ctl -c auto_exposure=1,white_balance_automatic=0), "
