@@ -21,12 +21,12 @@ def exposure_problem(image: NDArray[Any]) -> str:
     low, high = np.quantile(pixels, (1.0 - _SHARE, _SHARE)).tolist()
     if high < _DARK:
         return (
-            f"the image is dark: {100 * _SHARE:.0f} % of it are below {_DARK} of 255 grey levels. "
+            f"the image is dark: {100 * _SHARE:.0f} % of its pixels are below {_DARK} of 255. "
             "Switch a light on, take the cover off the lens, or set a longer exposure or more gain"
         )
     if low >= _WHITE:
         return (
-            f"the image is overexposed: {100 * _SHARE:.0f} % of it are white. Set a shorter "
-            "exposure or less gain"
+            f"the image is overexposed: {100 * _SHARE:.0f} % of its pixels are white. Set a "
+            "shorter exposure or less gain"
         )
     return ""

@@ -245,8 +245,16 @@ EVEN_S = np.arange(150) / 15
 def test_bursts_are_told_also_where_most_of_their_images_are_left_out(seen: Sequence[int]) -> None:
     kept = np.isin(np.arange(150) % 15, seen)
     arrive_s = np.floor(EVEN_S) + 1 + np.arange(150) % 15 * 1e-3
-    told = arrivals(EVEN_S[kept], arrive_s[kept])
-    assert list(told) == ["bursts"] and "one every 1.0 s" in told["bursts"]
+    # The driver stamps an image when it is taken, or when it is sent.
+    for stamps_s in (EVEN_S, arrive_s):
+        told = arrivals(stamps_s[kept], arrive_s[kept])
+        assert list(told) == ["bursts"] and "one every 1.0 s" in told["bursts"]
+
+
+def test_lost_images_are_no_burst() -> None:
+    rng = np.random.default_rng(2)
+    for kept in (rng.random((20, 150)) < 0.25, rng.random((20, 150)) < 0.7):
+        assert not any(arrivals(EVEN_S[one], EVEN_S[one]) for one in kept)
 
 
 @pytest.mark.parametrize(

@@ -222,7 +222,7 @@ class BackgroundNode(CardboxNode):
         """Return what a user should do about the images, a text for each kind of trouble."""
         settings, texts = self.parameters.value, self.camera_images.remarks()
         # A slow node leaves images out, and of a burst most, which are not lost on the way.
-        is_left_out = self.diagnostics.is_slow or self.diagnostics.arrivals.is_in_bursts
+        is_left_out = self.diagnostics.is_slow or self.diagnostics.arrivals.has_burst
         loss = 0.0 if is_left_out else self.diagnostics.input.loss
         image_bytes, covered = self.camera_images.image_bytes, self._outputs.covered
         if loss > _LOSS_TO_WARN and image_bytes > _LARGE_IMAGE_BYTES:

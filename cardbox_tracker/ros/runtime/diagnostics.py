@@ -227,7 +227,7 @@ class NodeDiagnostics:
     @property
     def is_slow(self) -> bool:
         """Whether results take longer than the period of images that come evenly."""
-        if len(self._latencies_ms) < _ENOUGH or self.arrivals.is_in_bursts:
+        if len(self._latencies_ms) < _ENOUGH or self.arrivals.has_burst:
             return False
         return 0 < self.input.period_ns / 1e6 < float(np.median(self._latencies_ms))
 

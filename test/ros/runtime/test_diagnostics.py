@@ -291,6 +291,7 @@ def test_images_that_come_in_bursts_are_neither_lost_nor_slow(
         now[0] += 1.0 if frame % 15 == 0 else 0.001
         diagnostics.arrived(1_000_000_000 + frame * PERIOD_NS)
         diagnostics.working(sent_ns=time.time_ns() - 5 * PERIOD_NS)
+        diagnostics.status()
     assert "arrive in bursts" in diagnostics.status().message
     assert [line[:27] for line in logged.lines] == ["the images arrive in bursts"]
 
