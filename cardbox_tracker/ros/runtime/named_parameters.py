@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
+from itertools import pairwise
 from pathlib import Path
 
 _RULE = re.compile(r"(\w+):([^:=]+):=(.*)", re.DOTALL)
@@ -22,7 +23,7 @@ def in_every_namespace(command_line: Sequence[str], folder: Path) -> list[str]:
     What cannot be read stays as it is, since rcl says what is wrong with it.
     """
     done, is_of_ros = list(command_line), False
-    for place, (word, value) in enumerate(zip(done, [*done[1:], ""], strict=True)):
+    for place, (word, value) in enumerate(pairwise([*command_line, ""])):
         if word in ("--ros-args", "--"):
             is_of_ros = word == "--ros-args"
         elif is_of_ros and word in ("-p", "--param", "--params-file"):
