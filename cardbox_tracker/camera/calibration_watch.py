@@ -1,7 +1,7 @@
 """Follows lasting changes of a camera's calibration and ignores brief or invalid ones.
 
 A single wrong CameraInfo, or a second camera on the same topic, must not discard the background
-that was learned with the right one.
+that was learned with the right one. Images that stay the same prove a lasting change wrong.
 """
 
 from __future__ import annotations
@@ -11,6 +11,7 @@ from typing import Any
 
 from cardbox_tracker.camera.camera import Calibration
 from cardbox_tracker.camera.camera_info import calibration_from_info, info_array, info_remark
+from cardbox_tracker.camera.zoom import ZoomWitness
 from cardbox_tracker.common.errors import CameraError
 
 LASTING = 30
@@ -24,6 +25,7 @@ class CalibrationWatch:
     """Selects the calibration of the camera from the CameraInfo messages that arrive.
 
     Attributes:
+        images: takes the camera's images, if there are any, which may contradict a change.
         current: calibration in use; None before the first valid one.
         seen: True once any CameraInfo arrived, valid or not.
         ignored: number of messages that were ignored.
@@ -34,6 +36,7 @@ class CalibrationWatch:
     def __init__(self, topic: str, image_topic: str, roll_rad: float = 0.0) -> None:
         """Watch the calibrations on ``topic``, which belong to the images on ``image_topic``."""
         self._roll_rad = roll_rad
+        self.images = ZoomWitness()
         self.current: Calibration | None = None
         self.seen = False
         self.ignored = 0
@@ -44,6 +47,7 @@ class CalibrationWatch:
         # A driver sends the same with each image, so it is checked once.
         self._content: tuple[Any, ...] = ()
         self._count = 0
+        self._is_contradicted = False
         self._good = 0
 
     def see(self, message: Any) -> bool:
@@ -74,7 +78,12 @@ class CalibrationWatch:
             return False
         if self.current is not None and not self._lasts(calibration):
             self._ignore(
-                f"a CameraInfo on {self._topic} that differs from those before ({calibration} "
+                f"the CameraInfo on {self._topic} has changed ({calibration} instead of "
+                f"{self.current}), but the images on {self._image_topic} have not, so it is wrong "
+                "and the one before is used: see who publishes it with 'ros2 topic info --verbose "
+                f"{self._topic}'; if the one before was wrong, start this node again"
+                if self._is_contradicted
+                else f"a CameraInfo on {self._topic} that differs from those before ({calibration} "
                 f"instead of {self.current}) is ignored; the background is kept. If the camera "
                 f"was really changed, it is followed after {LASTING} of them in a row; if not, "
                 f"see who publishes it: ros2 topic info --verbose {self._topic}"
@@ -95,9 +104,14 @@ class CalibrationWatch:
 
     def _lasts(self, calibration: Calibration) -> bool:
         if self._other is None or not self._other.is_same(calibration):
-            self._other, self._count = calibration, 0
+            self._other, self._count, self._is_contradicted = calibration, 0, False
+            self.images.mark()
         self._count += 1
-        return self._count >= LASTING
+        if self._count % LASTING:
+            return False
+        assert self.current is not None
+        self._is_contradicted = self.images.contradicts(self.current, calibration)
+        return not self._is_contradicted
 
     def _ignore(self, remark: str) -> None:
         self.ignored += 1
@@ -106,6 +120,8 @@ class CalibrationWatch:
     def _back_to_good(self) -> None:
         self._other, self._count = None, 0
         self._good += 1
+        if self._good % LASTING == 1:
+            self.images.remember()
         if self._good >= _REMEMBERED:
             self.remark = ""
 

@@ -224,6 +224,82 @@ class StreamStatistics:
         return texts
 
 
+# A burst begins with an image that is so much later, after its stamp, than those before it.
+_HELD_BACK_S = 0.3
+# Stamps of one burst lie within this share of the time to the next, if they are of the arrival.
+_MOMENT = 0.05
+# So many bursts within this time are told.
+_BURSTS, _BURSTS_WITHIN_S = 3, 10.0
+# Stamps that are farther ahead of this computer's clock are of another one.
+_AHEAD_S = 1.0
+
+
+class ArrivalWatch:
+    """Tells images that arrive in bursts, and stamps in the future, of a live stream."""
+
+    def __init__(self) -> None:
+        self._bursts_s: deque[float] = deque(maxlen=_BURSTS)
+        # Least and largest delay since the last burst has begun.
+        self._delays_s = float("inf"), -float("inf")
+        # Stamps since the last gap: the first one, the last one.
+        self._group_ns = 0, 0
+        self._ahead_s = self._now_s = 0.0
+
+    def add(self, stamp_ns: int, order: StampOrder, arrived_s: float, clock_ns: int) -> None:
+        """Take a message that arrives at a steady time, s, and at one of the clock, ns or 0."""
+        if not order.is_usable:
+            return
+        is_stamped = order is not StampOrder.UNSTAMPED
+        self._now_s = arrived_s
+        self._ahead_s = (stamp_ns - clock_ns) / 1e9 if clock_ns and is_stamped else 0.0
+        delay_s = arrived_s - stamp_ns / 1e9
+        least_s, most_s = self._delays_s
+        if order is StampOrder.RESTART or not is_stamped:
+            least_s = most_s = delay_s
+        elif delay_s - least_s > _HELD_BACK_S:
+            # A recording that is played slowly is ever later, and never catches up.
+            if most_s - least_s > _HELD_BACK_S:
+                self._bursts_s.append(arrived_s)
+            least_s = most_s = delay_s
+        self._delays_s = min(least_s, delay_s), max(most_s, delay_s)
+        first_ns, last_ns = self._group_ns
+        gap_ns = stamp_ns - last_ns
+        if 0 <= gap_ns < _HELD_BACK_S * 1e9:
+            self._group_ns = first_ns, stamp_ns
+            return
+        if 0 < last_ns - first_ns < _MOMENT * gap_ns:
+            self._bursts_s.append(arrived_s)
+        self._group_ns = stamp_ns, stamp_ns
+
+    @property
+    def has_burst(self) -> bool:
+        """Whether some of the latest messages were held back, so that no other fault is sure."""
+        return bool(self._recent_s)
+
+    @property
+    def _recent_s(self) -> list[float]:
+        return [at_s for at_s in self._bursts_s if at_s > self._now_s - _BURSTS_WITHIN_S]
+
+    def remarks(self) -> dict[str, str]:
+        """Return texts on the latest messages by kind."""
+        texts, recent_s = {}, self._recent_s
+        if len(recent_s) == _BURSTS:
+            period_s = (recent_s[-1] - recent_s[0]) / (_BURSTS - 1)
+            texts["bursts"] = (
+                f"the images arrive in bursts, one every {period_s:.1f} s, so results come "
+                "late and most images are left out: the driver or the network holds them back; "
+                "connect the camera by cable, switch the power saving of Wi-Fi off, or let the "
+                "driver send each image at once"
+            )
+        if self._ahead_s > _AHEAD_S:
+            texts["stamps ahead"] = (
+                f"the stamps are {self._ahead_s:.1f} s ahead of this computer's clock, so whoever "
+                "looks up TF at them waits: synchronize the clocks of the camera's computer and of "
+                "this one, for example with chrony"
+            )
+        return texts
+
+
 class RecordedStamps:
     """Times of a recorded stream, which always increase.
 

@@ -19,7 +19,7 @@ from rosbags.typesys import Stores, get_typestore
 
 from cardbox_tracker.camera.calibration_watch import CalibrationWatch
 from cardbox_tracker.camera.camera import Calibration
-from cardbox_tracker.camera.camera_info import is_other_lens
+from cardbox_tracker.camera.camera_info import calibration_from_info, is_other_lens
 from cardbox_tracker.camera.encodings import (
     Levels,
     SentImage,
@@ -27,6 +27,7 @@ from cardbox_tracker.camera.encodings import (
     decode_compressed,
 )
 from cardbox_tracker.camera.stamps import RecordedStamps, StampOrder
+from cardbox_tracker.camera.zoom import ZoomWitness
 from cardbox_tracker.common.errors import BagError, CameraError, EncodingError, cut
 from cardbox_tracker.recordings.bag_files import (
     check_parts,
@@ -52,6 +53,8 @@ _LEFT_OUT = MappingProxyType(
     }
 )
 _MOST_PERIOD_NS = 2_000_000_000
+# Images before and after a change of the calibration are compared over this time.
+_AROUND_NS = 2_000_000_000
 _REPAIR = "'ros2 bag reindex' remakes lost metadata, 'mcap recover' a file that was cut off"
 
 
@@ -313,17 +316,45 @@ class BagReader:
             if watch.doubt:
                 self._skipped[f"{topic} doubt"] = watch.doubt
             if other is not None:
+                is_wrong = self._is_contradicted(camera, other, watch.current)
                 self._skipped[f"{topic} changes"] = (
                     f"the calibration on {topic} changes at "
-                    f"{(other.time_ns - self.start_ns) / 1e9:.1f} s, as by a zoom. The first one "
-                    "is used for all images, so results from there on are wrong: track what comes "
-                    "before with --end, and record the rest apart"
+                    f"{(other.time_ns - self.start_ns) / 1e9:.1f} s, "
+                ) + (
+                    "but the images do not, so it is wrong from there on and the first one is used "
+                    "for all images: if that one is wrong, give --calibration FILE or --fov DEG"
+                    if is_wrong
+                    else "as by a zoom. The first one is used for all images, so results from "
+                    "there on are wrong: track what comes before with --end, and record the rest "
+                    "apart"
                 )
             self._infos[camera] = info, watch.current
             return self._infos[camera]
         if fault is not None:
             raise fault
         raise BagError(f"{self.path} has no message on {topic}; record it with the images")
+
+    def _is_contradicted(self, camera: str | None, other: BagMessage, old: Calibration) -> bool:
+        """Return whether the images do not change as the calibration does with ``other``."""
+        witness, looked, is_marked = ZoomWitness(), 0, False
+        topic, info_topic = self.image_topic(camera), other.topic
+        with suppress(CameraError, EncodingError):
+            new = calibration_from_info(self.deserialize(other), topic, info_topic)
+            for image in self.images(topic):
+                since_ns = image.time_ns - other.time_ns
+                if since_ns > _AROUND_NS:
+                    break
+                if since_ns < -_AROUND_NS:
+                    continue
+                if since_ns >= 0 and not is_marked:
+                    is_marked = True
+                    witness.mark()
+                witness.look(image.as_sent)
+                looked += 1
+                if looked == 1:
+                    witness.remember()
+            return witness.contradicts(old, new)
+        return False
 
     def calibration(self, camera: str | None = None) -> Calibration:
         """Return the given calibration, or that in the first CameraInfo that has one.

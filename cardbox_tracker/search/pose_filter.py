@@ -90,6 +90,8 @@ and the views of the further cameras; returns a new filter."""
 
 # Frames with too much foreground after which it is assumed to be a near person.
 _TOO_MUCH_FRAMES = 15
+# Share of the image above the hips that no person fills, however near.
+_FULL = 0.8
 # Factor on the foreground by which it decreases only if the person is elsewhere.
 _SUDDEN = 4
 
@@ -136,7 +138,10 @@ class PersonPresence:
             found.append(Presence.PERSON if is_hidden else one)
         self._too_much = self._too_much + 1 if Presence.TOO_MUCH in found else 0
         if self._is_too_long_too_much:
-            found = [Presence.PERSON if one is Presence.TOO_MUCH else one for one in found]
+            found = [
+                Presence.PERSON if one is Presence.TOO_MUCH and not _is_full(frame) else one
+                for one, frame in zip(found, frames, strict=True)
+            ]
         seeing = [number for number, one in enumerate(found) if one is Presence.PERSON]
         if seeing:
             now_px, before_px = sum(f.foreground_px for f in frames), self._foreground_px
@@ -145,6 +150,10 @@ class PersonPresence:
             self._foreground_px = now_px
             return Presence.PERSON, seeing
         return (Presence.TOO_MUCH if Presence.TOO_MUCH in found else Presence.NOBODY), seeing
+
+
+def _is_full(frame: Frame) -> bool:
+    return frame.foreground_px > _FULL * frame.rows * frame.camera.width
 
 
 def presence_of(

@@ -210,14 +210,22 @@ class LightFollower:
     def _measured_level(self) -> float:
         """Return the median relative brightness outside the person; -1 without usable pixels.
 
-        With too few usable pixels outside the person, those of the person are used, too.
+        Where too few pixels outside the person are within the camera's range, the saturated ones
+        count too, with their least brightness; where there are too few of these, the person's.
         """
         ratios = self._samples / np.maximum(self._small, np.float32(1))
         with np.errstate(invalid="ignore"):
-            known = ratios * self._small_brightest < _CUT_OFF
-        outside = known & (self._person == 0)
-        used = outside if np.count_nonzero(outside) >= _ENOUGH * known.size else known
-        found = (ratios / self._fine)[used]
+            highest = ratios * self._small_brightest
+        known, outside = highest < _CUT_OFF, self._person == 0
+        bright = outside & (highest < np.inf)
+        enough = _ENOUGH * known.size
+        if np.count_nonzero(known & outside) >= enough:
+            found = (ratios / self._fine)[known & outside]
+        elif np.count_nonzero(bright) >= enough:
+            # The field is no share of a lower bound.
+            found = ratios[bright]
+        else:
+            found = (ratios / self._fine)[known]
         middle = len(found) // 2
         return float(np.partition(found, middle)[middle]) if len(found) else -1.0
 

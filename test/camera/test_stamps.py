@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 
+import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from cardbox_tracker.camera.stamps import (
+    ArrivalWatch,
     RecordedStamps,
     StampOrder,
     StampSequence,
@@ -223,3 +225,57 @@ def test_two_passes_of_a_short_loop_are_apart_but_for_the_image_that_shows_it() 
     times, remarks = times_of([*once, *once])
     assert times == [*once, None, *even(24)[13:]]
     assert any("go back" in remark for remark in remarks)
+
+
+def arrivals(
+    stamps_s: Iterable[float], arrive_s: Iterable[float], ahead_s: float = 0.0
+) -> dict[str, str]:
+    """Return the remarks after images that arrive at these times, of a clock that is ahead."""
+    watch, sequence = ArrivalWatch(), StampSequence()
+    for stamp_s, arrived_s in zip(stamps_s, arrive_s, strict=True):
+        stamp_ns = round((1000 + stamp_s + ahead_s) * 1e9)
+        watch.add(stamp_ns, sequence.add(stamp_ns), arrived_s, round((1000 + arrived_s) * 1e9))
+    return watch.remarks()
+
+
+EVEN_S = np.arange(150) / 15
+
+
+@pytest.mark.parametrize("seen", [range(15), (0, 14), (1, 13, 14)])
+def test_bursts_are_told_also_where_most_of_their_images_are_left_out(seen: Sequence[int]) -> None:
+    kept = np.isin(np.arange(150) % 15, seen)
+    arrive_s = np.floor(EVEN_S) + 1 + np.arange(150) % 15 * 1e-3
+    # The driver stamps an image when it is taken, or when it is sent.
+    for stamps_s in (EVEN_S, arrive_s):
+        told = arrivals(stamps_s[kept], arrive_s[kept])
+        assert list(told) == ["bursts"] and "one every 1.0 s" in told["bursts"]
+
+
+def test_lost_images_are_no_burst() -> None:
+    rng = np.random.default_rng(2)
+    for kept in (rng.random((20, 150)) < 0.25, rng.random((20, 150)) < 0.7):
+        assert not any(arrivals(EVEN_S[one], EVEN_S[one]) for one in kept)
+
+
+@pytest.mark.parametrize(
+    ("stamps_s", "arrive_s"),
+    [
+        (EVEN_S, EVEN_S + 0.05 * np.sin(np.arange(150))),
+        (EVEN_S, 0.5 * EVEN_S),
+        (EVEN_S, 10 * EVEN_S),
+        (EVEN_S % 1.5, EVEN_S),
+        (EVEN_S, EVEN_S + 0.5 * (EVEN_S > 4)),
+        (EVEN_S, EVEN_S + 0.5 * ((EVEN_S > 4) & (EVEN_S < 5))),
+        (np.full(150, -1000.0), EVEN_S),
+    ],
+    ids=["jitter", "twice as fast", "slow motion", "a loop", "a pause", "a delay", "no stamps"],
+)
+def test_other_streams_are_no_bursts(stamps_s: np.ndarray, arrive_s: np.ndarray) -> None:
+    assert "bursts" not in arrivals(stamps_s, arrive_s)
+
+
+@pytest.mark.parametrize(("ahead_s", "is_told"), [(10.0, True), (0.1, False), (-3600.0, False)])
+def test_stamps_in_the_future_are_told(ahead_s: float, is_told: bool) -> None:
+    told = arrivals(EVEN_S, EVEN_S, ahead_s)
+    assert list(told) == ["stamps ahead"] * is_told
+    assert not is_told or "10.0 s ahead" in told["stamps ahead"]

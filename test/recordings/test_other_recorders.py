@@ -148,6 +148,28 @@ def test_a_zoom_within_the_recording_is_told(tmp_path: Path) -> None:
             assert any("changes at 0.4 s" in text for text in bag.remarks) == is_told
 
 
+@pytest.mark.parametrize("is_zoom", [True, False])
+def test_a_calibration_that_the_images_contradict_is_told(tmp_path: Path, is_zoom: bool) -> None:
+    wall = np.random.default_rng(1).uniform(50, 200, (12, 16))
+    far = np.kron(wall, np.ones((10, 10))).astype(np.uint8)
+    near = cv2.resize(far[12:-12, 16:-16], (160, 120))
+    with BagWriter(tmp_path / "bag") as bag:
+        for number in range(12):
+            focal_px, seen = (206.25, near if is_zoom else far) if number > 5 else (165.0, far)
+            k = (focal_px, 0.0, 79.5, 0.0, focal_px, 59.5, 0.0, 0.0, 1.0)
+            now = START + number * S // 15
+            bag.write("/camera_info", info(bag._store, k=k), now)
+            kind, values = "sensor_msgs/msg/Image", {"height": 120, "width": 160, "step": 160}
+            header = bag.header(now, "/left")
+            image = bag.new(kind, header=header, data=seen.ravel(), encoding="mono8", **values)
+            bag.write("/image_raw", image, now)
+    with open_images(tmp_path / "bag") as bag:
+        assert bag.calibration().k[0, 0] == 165.0
+        (told,) = (text for text in bag.remarks if "changes at 0.4 s" in text)
+    assert ("as by a zoom" in told) is is_zoom
+    assert ("the images do not" in told and "--calibration" in told) is not is_zoom
+
+
 @pytest.mark.parametrize(
     ("name", "advice"),
     [

@@ -194,3 +194,13 @@ def test_people_count_for_the_level_only_if_little_else_is_seen() -> None:
     covered._person[:] = 255
     covered.follow(image)
     assert covered.level == pytest.approx(1.2)
+
+
+@pytest.mark.parametrize("grey", [True, False])
+@pytest.mark.parametrize("light", [1.5, 2.2])
+def test_a_wall_that_becomes_white_is_no_person(grey: bool, light: float) -> None:
+    """Only the person is within the camera's range, and is not taken for the light."""
+    room = Room(grey, brightness=1.5)
+    assert room.iou(1.0) > 0.9
+    assert min(room.iou(light) for _ in range(20)) > 0.9
+    assert min(room.iou(1.0) for _ in range(5)) > 0.9

@@ -221,8 +221,9 @@ class BackgroundNode(CardboxNode):
     def _advice(self) -> dict[str, str]:
         """Return what a user should do about the images, a text for each kind of trouble."""
         settings, texts = self.parameters.value, self.camera_images.remarks()
-        # A slow node leaves images out, which are not lost on the way.
-        loss = 0.0 if self.diagnostics.is_slow else self.diagnostics.input.loss
+        # A slow node leaves images out, and of a burst most, which are not lost on the way.
+        is_left_out = self.diagnostics.is_slow or self.diagnostics.arrivals.has_burst
+        loss = 0.0 if is_left_out else self.diagnostics.input.loss
         image_bytes, covered = self.camera_images.image_bytes, self._outputs.covered
         if loss > _LOSS_TO_WARN and image_bytes > _LARGE_IMAGE_BYTES:
             texts["loss"] = (
@@ -238,7 +239,11 @@ class BackgroundNode(CardboxNode):
                 f"most of the image is nearer than within_m, {settings.within_m:g} m: choose it "
                 "between the person and the wall, and let nothing else stand before it"
             )
-        elif settings.within_m == 0.0 and (drifted or covered > _COVERAGE_TO_WARN):
+        elif (
+            settings.within_m == 0.0
+            and "exposure" not in texts
+            and (drifted or covered > _COVERAGE_TO_WARN)
+        ):
             texts["brightness"] = (
                 "the whole scene changed its brightness: switch the camera's automatic exposure "
                 "and white balance off (v4l2-ctl -c auto_exposure=1,white_balance_automatic=0), "

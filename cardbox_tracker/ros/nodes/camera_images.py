@@ -13,6 +13,7 @@ from std_msgs.msg import Header
 from cardbox_tracker.camera.calibration_watch import CalibrationWatch
 from cardbox_tracker.camera.camera import Calibration, Camera
 from cardbox_tracker.camera.encodings import Levels
+from cardbox_tracker.camera.exposure import exposure_problem
 from cardbox_tracker.camera.stamps import StampOrder
 from cardbox_tracker.ros.messages import conversions
 from cardbox_tracker.ros.messages.conversions import ImageArray
@@ -65,6 +66,7 @@ class CameraImages:
         self.order = StampOrder.NEXT
         self.image_bytes = 0
         self._levels = Levels()
+        self._image: ImageArray | None = None
         self._early: tuple[Image | CompressedImage, int] | None = None
         self._single = SinglePublisher(node, (self.topic, self.info_topic))
         # Of messages that arrive together, those of the first subscription are taken first.
@@ -80,8 +82,8 @@ class CameraImages:
         """Use a CameraInfo if it is the first valid one, or lasts."""
         before = self.watch.remark
         changed = self.watch.see(message)
-        if self.watch.remark and not before:
-            self._node.get_logger().warning(self.watch.remark)
+        if self.watch.remark not in ("", before):
+            self._node.diagnostics.say("CameraInfo", self.watch.remark, warning=True)
         calibration = self.watch.current
         if not changed or calibration is None:
             return
@@ -100,7 +102,7 @@ class CameraImages:
 
     def on_image(self, message: Image | CompressedImage, sent_ns: int) -> None:
         """Deliver an image if its stamp can be used and the calibration is known."""
-        order = self._node.diagnostics.input.add(conversions.stamp_ns(message.header.stamp))
+        order = self._node.diagnostics.arrived(conversions.stamp_ns(message.header.stamp))
         if not order.is_usable:
             return
         self.order, self.image_bytes = order, len(message.data)
@@ -128,14 +130,18 @@ class CameraImages:
                 self._changed(calibration)
         height, width = image.shape[:2]
         calibration.check_shape(width, height, self.topic, self.info_topic)
+        self.watch.images.look(image)
+        self._image = image
         # TF knows neither an empty name nor one with a slash before it.
         frame_id = message.header.frame_id.lstrip("/")
         message.header.frame_id = frame_id or calibration.frame_id
         self._deliver(message.header, image, sent_ns)
 
     def remarks(self) -> dict[str, str]:
-        """Return warnings about the publishers and the calibration, by kind."""
+        """Return warnings about publishers, calibration and exposure, by kind."""
         found = {"": self.watch.remark, "calibration": self.watch.doubt}
+        problem = "" if self._image is None else exposure_problem(self._image)
+        found["exposure"] = problem and f"{self.topic}: {problem}"
         return self._single.remarks() | {kind: text for kind, text in found.items() if text}
 
 

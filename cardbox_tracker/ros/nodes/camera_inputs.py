@@ -82,7 +82,7 @@ class ImagePairing:
             self._deliver(silhouette, image, sent_ns)
 
 
-_SILENT_S = 3.0
+_SILENT_S = 2.0
 _STUCK = 10
 # Of one clock, images from different computers or of depth may arrive this much later.
 _OTHER_CLOCK_S = 0.1

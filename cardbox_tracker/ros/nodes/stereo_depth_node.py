@@ -103,7 +103,7 @@ class StereoDepthNode(CardboxNode):
     def _on_image(self, side: str, message: Image | CompressedImage, sent_ns: int) -> None:
         """Measure the latest pair of matching stamps, and drop older images."""
         stamp_ns = conversions.stamp_ns(message.header.stamp)
-        if side == "left" and not self.diagnostics.input.add(stamp_ns).is_usable:
+        if side == "left" and not self.diagnostics.arrived(stamp_ns).is_usable:
             return
         self._kept[side].append(message)
         tolerance_ns = 1e9 * self.parameters.value.tolerance_s

@@ -12,6 +12,7 @@ import numpy as np
 from std_msgs.msg import String
 
 from cardbox_tracker.camera.camera import Camera
+from cardbox_tracker.camera.exposure import exposure_problem
 from cardbox_tracker.camera.stamps import StampOrder
 from cardbox_tracker.camera.view import OtherCamera
 from cardbox_tracker.common.errors import CameraError
@@ -57,16 +58,17 @@ class TrackingReport:
 
     def __init__(self) -> None:
         self._body: BodyModel | None = None
-        self._state = ""
+        self._state = self._reason = ""
         self._counts: dict[str, int] = {}
         self._estimate: Estimate | None = None
 
     def start(self, body: BodyModel) -> None:
         """Begin again with ``body``."""
-        self._state, self._body = "", body
+        self._state = self._reason = ""
+        self._body = body
 
-    def add(self, estimate: Estimate, body: BodyModel) -> dict[str, str]:
-        """Add the estimate of an image and the ``body`` to which it belongs.
+    def add(self, estimate: Estimate, body: BodyModel, exposure: str = "") -> dict[str, str]:
+        """Add the estimate of an image, the ``body`` to which it belongs, and a fault of the light.
 
         Returns:
             Texts about changes, by kind.
@@ -78,7 +80,7 @@ class TrackingReport:
         self._estimate = estimate
         self._counts[estimate.state] = self._counts.get(estimate.state, 0) + 1
         before, self._state = self._state, estimate.state
-        reason = _REASONS.get(estimate.state)
+        reason = self._reason = exposure or _REASONS.get(estimate.state, "")
         if estimate.state == before:
             return news
         if estimate.state == UNCERTAIN:
@@ -95,8 +97,8 @@ class TrackingReport:
 
     def warnings(self) -> dict[str, str]:
         """Return texts about present problems, by kind."""
-        reason = _REASONS.get(self._state)
-        if reason is None:
+        reason = self._reason
+        if not reason:
             return {}
         return {"": reason if self._state == UNCERTAIN else f"no joint states: {reason}"}
 
@@ -323,7 +325,7 @@ class TrackerNode(CardboxNode):
 
     def _on_input(self, lead: Received, received: Sequence[Received | None]) -> None:
         """Track the messages of one time; ``lead`` has the stamp that represents them."""
-        step = self.diagnostics.input.add(conversions.stamp_ns(lead.message.header.stamp))
+        step = self.diagnostics.arrived(conversions.stamp_ns(lead.message.header.stamp))
         if step is StampOrder.RESTART:
             self._build("an image is older than the one before (a bag that loops?)")
         if not step.is_usable:
@@ -339,7 +341,10 @@ class TrackerNode(CardboxNode):
         for outputs, report, estimate, tracker in zip(
             self._outputs, self._reports, estimates, trackers, strict=True
         ):
-            news, named = report.add(estimate, tracker.body), _named(estimate.person)
+            image, exposure = seen.observations[0].image, ""
+            if image is not None and estimate.posture is None:
+                exposure = exposure_problem(image)
+            news, named = report.add(estimate, tracker.body, exposure), _named(estimate.person)
             for kind, text in news.items():
                 self.diagnostics.say(named + kind, named + text)
             # Joint states of a new version of the body follow the version.

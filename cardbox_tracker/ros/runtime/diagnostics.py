@@ -18,7 +18,7 @@ from rclpy.node import Node
 from rclpy.qos import QoSProfile
 from rclpy.timer import Timer
 
-from cardbox_tracker.camera.stamps import WINDOW, StreamStatistics
+from cardbox_tracker.camera.stamps import WINDOW, ArrivalWatch, StampOrder, StreamStatistics
 from cardbox_tracker.common.errors import plain
 from cardbox_tracker.ros.runtime import qos
 
@@ -72,7 +72,7 @@ def every_second(node: Node, call: Callable[[], None]) -> Timer:
 
 
 # The input has ceased after this time and this number of periods without a message.
-_SILENT_S = 3.0
+_SILENT_S = 2.0
 _SILENT_PERIODS = 5.0
 # The median latency needs at least this many results.
 _ENOUGH = 30
@@ -97,6 +97,7 @@ class NodeDiagnostics:
 
     Attributes:
         input: the images or silhouettes that drive the node.
+        arrivals: when they arrive, as far as :meth:`arrived` was called.
         extra: called once a second; returns further values, text by name.
         source: name of the input, such as "images on /image_raw", for the report that it has
             ceased.
@@ -109,6 +110,7 @@ class NodeDiagnostics:
 
     def __init__(self, node: Node) -> None:
         self.input = StreamStatistics()
+        self.arrivals = ArrivalWatch()
         self.extra: Callable[[], dict[str, str]] = dict
         self.advice: Callable[[], dict[str, str]] = dict
         self.source = ""
@@ -135,6 +137,13 @@ class NodeDiagnostics:
             event_callbacks=qos.publisher_events("/diagnostics", self.warn),
         )
         self._timer = every_second(node, self.publish)
+
+    def arrived(self, stamp_ns: int) -> StampOrder:
+        """Count a live message of the input, and return its relation to the one before."""
+        order = self.input.add(stamp_ns)
+        clock_ns = self._node.get_clock().now().nanoseconds
+        self.arrivals.add(stamp_ns, order, time.monotonic(), clock_ns)
+        return order
 
     def wait_for(self, text: str) -> None:
         """Report that the node publishes nothing until ``text`` arrives."""
@@ -217,8 +226,8 @@ class NodeDiagnostics:
 
     @property
     def is_slow(self) -> bool:
-        """Whether results take longer than the period of the images."""
-        if len(self._latencies_ms) < _ENOUGH:
+        """Whether results take longer than the period of images that come evenly."""
+        if len(self._latencies_ms) < _ENOUGH or self.arrivals.has_burst:
             return False
         return 0 < self.input.period_ns / 1e6 < float(np.median(self._latencies_ms))
 
@@ -233,7 +242,8 @@ class NodeDiagnostics:
 
     def _remarks(self) -> list[str]:
         """Return all current warnings, and log each new kind."""
-        found = self.remarks() | self.input.remarks() | self._slowness() | self.advice()
+        found = self.remarks() | self.input.remarks() | self.arrivals.remarks()
+        found |= self._slowness() | self.advice()
         found = {kind: plain(text) for kind, text in found.items()}
         for kind, text in found.items():
             if kind and self._log.allows(kind, kind):

@@ -7,9 +7,12 @@ import time
 import traceback
 from collections.abc import Callable
 from copy import copy
+from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any, Protocol, TypeVar
 
 import rclpy
+from rclpy.event_handler import SubscriptionEventCallbacks
 from rclpy.exceptions import ROSInterruptException
 from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 from rclpy.logging import get_logger
@@ -25,6 +28,7 @@ from cardbox_tracker.common import garbage, interrupts
 from cardbox_tracker.common.errors import CardboxError, cut, quoted
 from cardbox_tracker.ros.runtime import qos
 from cardbox_tracker.ros.runtime.diagnostics import NodeDiagnostics, every_second
+from cardbox_tracker.ros.runtime.named_parameters import in_every_namespace
 from cardbox_tracker.ros.runtime.publishers import TopicTypes
 
 Subscriber = Callable[[Any, dict[str, Any]], None]
@@ -166,11 +170,19 @@ class CardboxNode(Node):
             return
 
         def look() -> None:
-            # A publisher that latches nothing would warn of a subscriber that asks for it.
+            # A publisher that latches nothing would warn of a subscriber that asks for it, and only
+            # a reliable one sends what it has latched.
             ends = self.get_publishers_info_by_topic(name)
-            if any(end.qos_profile.durability == qos.LATCHED.durability for end in ends):
+            if any(qos.is_latched(end.qos_profile) for end in ends):
                 timer.cancel()
-                self.create_subscription(CameraInfo, topic, heard, qos.LATCHED)  # type: ignore[arg-type]
+                quiet = SubscriptionEventCallbacks(use_default_callbacks=False)
+                self.create_subscription(
+                    CameraInfo,
+                    topic,
+                    heard,  # type: ignore[arg-type]
+                    qos.LATCHED,
+                    event_callbacks=quiet,
+                )
 
         timer = every_second(self, look)
 
@@ -243,7 +255,8 @@ def run_node(create: Callable[[], CardboxNode], args: list[str] | None = None) -
 def run(create: Callable[[], N], args: list[str] | None, work: Callable[[N], None]) -> int:
     """Create nodes with ``create`` and run ``work`` until ROS ends; return the exit code."""
     try:
-        rclpy.init(args=args)
+        with TemporaryDirectory() as folder:
+            rclpy.init(args=in_every_namespace(sys.argv if args is None else args, Path(folder)))
     except Exception as error:
         print(f"cannot start: {error}", file=sys.stderr)
         return 2

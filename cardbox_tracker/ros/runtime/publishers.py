@@ -10,9 +10,15 @@ from rclpy.node import Node
 PATIENCE = 5
 """Number of checks, one a second, after which a topic without a publisher is reported."""
 
+STARTING = 150
+"""The same where no other topic fits: the camera may be in a process that compiles first."""
+
 _MOST_NAMED = 5
-# Drawings are no camera's images.
-_DRAWN = "/overlay"
+# Images that are made of a camera's.
+_MADE = (
+    *("/overlay", "/silhouette", "/silhouette/image", "/silhouette/camera_info"),
+    *("/background/mean", "/background/stddev"),
+)
 
 
 class SinglePublisher:
@@ -39,25 +45,26 @@ class SinglePublisher:
                 )
             if topic in self._absent:
                 self._absent[topic] += 1
-                if self._absent[topic] > PATIENCE:
-                    found[f"no publisher of {topic}"] = self._missing(topic)
+                others = self._others(topic)
+                if self._absent[topic] > (PATIENCE if others else STARTING):
+                    there = ", ".join(others[:_MOST_NAMED]) or "none at all"
+                    found[f"no publisher of {topic}"] = (
+                        f"nobody publishes {topic}; topics of the same type are: {there}. Start "
+                        "the camera's driver with the same ROS_DOMAIN_ID, or remap the topic to "
+                        "one of these"
+                    )
         return found
 
-    def _missing(self, topic: str) -> str:
+    def _others(self, topic: str) -> list[str]:
         types = dict(self._node.get_topic_names_and_types())
         own = f"{self._node.get_namespace().rstrip('/')}/{self._node.get_name()}"
-        others = [
+        return [
             name
             for name, kinds in types.items()
-            if not name.endswith(_DRAWN)
+            if not name.endswith(_MADE)
             and set(kinds) & set(types.get(topic, ()))
             and {*self._publishers(name)} - {own}
         ]
-        there = ", ".join(others[:_MOST_NAMED]) or "none at all"
-        return (
-            f"nobody publishes {topic}; topics of the same type are: {there}. Start the camera's "
-            "driver with the same ROS_DOMAIN_ID, or remap the topic to one of these"
-        )
 
     def _publishers(self, topic: str) -> list[str]:
         ends = self._node.get_publishers_info_by_topic(topic)

@@ -61,6 +61,11 @@ def overridable(profile: QoSProfile) -> QoSOverridingOptions:
     return QoSOverridingOptions(kinds)
 
 
+def is_latched(profile: QoSProfile) -> bool:
+    """Return whether a publisher sends its last message to a subscriber that comes later."""
+    return (profile.durability, profile.reliability) == (LATCHED.durability, LATCHED.reliability)
+
+
 def mismatch_text(topic: str, kind: QoSPolicyKind, subscribing: bool) -> str:
     """Return an explanation of a QoS mismatch; ``subscribing`` is False if this node publishes."""
     name = qos_policy_name_from_kind(kind)

@@ -10,10 +10,11 @@ import numpy as np
 import pytest
 from builtin_interfaces.msg import Time
 from rclpy.executors import SingleThreadedExecutor
-from rclpy.qos import QoSProfile
+from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from sensor_msgs.msg import CameraInfo
 from std_msgs.msg import Header
 
+from cardbox_tracker.camera.calibration_watch import LASTING
 from cardbox_tracker.camera.camera import Camera
 from cardbox_tracker.ros.messages.conversions import (
     camera_info_message,
@@ -102,7 +103,17 @@ def test_only_the_image_of_the_first_camera_info_is_kept_for_it(
     assert delivered == ([2, 4] if info_stamp_s == 2 else [4])
 
 
-@pytest.mark.parametrize(("profile", "count"), [(qos.LATCHED, 1), (qos.CAMERA, 0)])
+# DDS latches nothing of a publisher of best effort.
+HALF_LATCHED = QoSProfile(
+    depth=1,
+    reliability=ReliabilityPolicy.BEST_EFFORT,
+    durability=DurabilityPolicy.TRANSIENT_LOCAL,
+)
+
+
+@pytest.mark.parametrize(
+    ("profile", "count"), [(qos.LATCHED, 1), (qos.CAMERA, 0), (HALF_LATCHED, 0)]
+)
 def test_a_camera_info_that_was_latched_before_the_node_is_used(
     profile: QoSProfile, count: int, make_node: Callable[..., Any]
 ) -> None:
@@ -124,3 +135,58 @@ def test_a_camera_info_that_was_latched_before_the_node_is_used(
     executor.shutdown()
     node.destroy_node()
     assert (len(found), mismatches) == (count, [])
+
+
+@pytest.mark.parametrize("first", [qos.LATCHED, HALF_LATCHED])
+def test_camera_info_of_any_quality_of_service_is_used_without_a_warning(
+    first: QoSProfile, make_node: Callable[..., Any], capfd: pytest.CaptureFixture[str]
+) -> None:
+    """One publisher latches, and a volatile one of best effort sends beside it."""
+    driver = make_node(name="driver")
+    profiles = first, qos.SENSOR_DATA
+    senders = [driver.create_publisher(CameraInfo, "/camera_info", one) for one in profiles]
+    received = set[str]()
+    node = CardboxNode("tested", context=driver.context, enable_rosout=False)
+    node.subscribe_info("camera_info", lambda message, _: received.add(message.header.frame_id))
+    executor = SingleThreadedExecutor(context=driver.context)
+    for one in (driver, node):
+        executor.add_node(one)
+    deadline_s, ticks = time.monotonic() + 20.0, 0
+    while (len(received) < 2 or ticks < 30) and time.monotonic() < deadline_s:
+        for number, sender in enumerate(senders):
+            sender.publish(camera_info_message(Header(frame_id=f"eye {number}"), CAMERA))
+        executor.spin_once(0.1)
+        ticks += 1
+        time.sleep(0.05)
+    executor.shutdown()
+    warnings = node.diagnostics._remarks()
+    node.destroy_node()
+    assert received == {"eye 0", "eye 1"}
+    told = [line for line in capfd.readouterr().err.splitlines() if "[tested]" in line]
+    assert not warnings and not told
+
+
+@pytest.mark.parametrize("is_zoom", [True, False])
+def test_a_calibration_that_the_images_contradict_is_told_and_not_used(
+    is_zoom: bool, make_node: Callable[..., Any], hands: Any
+) -> None:
+    """Background and detector get images and calibration by this way."""
+    node = CardboxNode("tested", hands, context=make_node().context, enable_rosout=False)
+    focal_px: list[float] = []
+    images = CameraImages(node, "raw", lambda c: focal_px.append(c.k[0, 0]), lambda *_: None)
+    wall = np.random.default_rng(1).uniform(50, 200, (12, 16))
+    near = np.kron(wall[2:-2, 3:-3], np.ones((15, 16)))[:120, :160]
+    far = np.kron(wall, np.ones((10, 10)))
+    for number in range(3 * LASTING):
+        header, is_new = Header(stamp=Time(sec=1 + number)), number > LASTING
+        seen = near if is_new and is_zoom else far
+        hands.give("/image_raw", image_message(header, seen.astype(np.uint8), "mono8"))
+        focal = 240.0 if is_new else 150.0
+        info = camera_info_message(header, Camera(160, 120, focal, focal, 79.5, 59.5))
+        hands.give("/camera_info", info)
+    told = " ".join(images.remarks().values())
+    node.destroy_node()
+    assert focal_px == ([150.0, 240.0] if is_zoom else [150.0])
+    assert is_zoom or (
+        "but the images on /image_raw have not" in told and "start this node" in told
+    )

@@ -52,7 +52,7 @@ class Network:
 
 def camera_image(column: float | None) -> np.ndarray:
     """Return an image (H, W) with a bright spot in a column, in the row 120."""
-    image = np.full((HEIGHT, WIDTH), 20, np.uint8)
+    image = np.full((HEIGHT, WIDTH), 60, np.uint8)
     if column is not None:
         image[112:129, int(column) - 8 : int(column) + 9] = 250
     return image

@@ -72,6 +72,34 @@ def test_who_was_measured_is_not_fitted_with_any_preset(
     assert not [text for text in said if "fitted to the person" in text]
 
 
+def test_a_dark_image_is_no_empty_one(bus: Any) -> None:
+    pytest.importorskip("rclpy", reason="rclpy is not installed")
+    from builtin_interfaces.msg import Time
+    from std_msgs.msg import Header
+
+    from cardbox_tracker.ros.messages.conversions import camera_info_message, image_message
+    from cardbox_tracker.ros.nodes.background_node import BackgroundNode
+    from cardbox_tracker.ros.nodes.tracker_node import TrackerNode
+
+    camera, rng = Camera(96, 72, 99.0, 99.0, 47.5, 35.5), np.random.default_rng(1)
+    bus.start(TrackerNode, stature=1.7)
+    bus.send("/silhouette/camera_info", camera_info_message(Header(frame_id="eye"), camera))
+    for grey, words in ((0.0, "dark"), (90.0, "nobody is in the image"), (400.0, "overexposed")):
+        for number in range(2):
+            header = Header(frame_id="eye", stamp=Time(sec=int(10 + grey + number)))
+            seen = np.clip(rng.normal(grey, 4, (72, 96)), 0, 255).astype(np.uint8)
+            bus.send("/silhouette/image", image_message(header, seen, "mono8"))
+            bus.send("/silhouette", image_message(header, np.zeros_like(seen), "mono8"))
+        assert words in bus.tick().message
+    bus.start(BackgroundNode)
+    bus.send("/camera_info", camera_info_message(Header(frame_id="eye"), camera))
+    header = Header(frame_id="eye", stamp=Time(sec=1000))
+    bus.send("/image_raw", image_message(header, np.zeros((72, 96), np.uint8), "mono8"))
+    bus.tick()
+    told = [value.value for value in bus.sent["/diagnostics"][-1].status[0].values]
+    assert any("/image_raw: the image is dark" in text and "lens" in text for text in told)
+
+
 def test_another_body_is_told_with_its_sizes() -> None:
     report = TrackingReport()
     report.start(BODY)

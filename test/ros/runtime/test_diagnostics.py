@@ -280,3 +280,31 @@ def test_a_node_that_needs_longer_than_a_period_says_what_to_do(
         diagnostics.working(sent_ns=time.time_ns() - int(periods * PERIOD_NS))
     assert diagnostics.status().message.endswith("left out; do X" if said else "working")
     assert diagnostics.is_slow is (periods > 1)
+
+
+def test_images_that_come_in_bursts_are_neither_lost_nor_slow(
+    make_node: Callable, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    diagnostics, logged, now = clocked(make_node(), monkeypatch)
+    diagnostics.remedy = "do X"
+    for frame in range(120):
+        now[0] += 1.0 if frame % 15 == 0 else 0.001
+        diagnostics.arrived(1_000_000_000 + frame * PERIOD_NS)
+        diagnostics.working(sent_ns=time.time_ns() - 5 * PERIOD_NS)
+        diagnostics.status()
+    assert "arrive in bursts" in diagnostics.status().message
+    assert [line[:27] for line in logged.lines] == ["the images arrive in bursts"]
+
+
+def test_three_seconds_without_an_image_are_told(
+    make_node: Callable, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Once a second, whenever that is, the node looks whether anything has come."""
+    diagnostics, logged, now = clocked(make_node(), monkeypatch)
+    diagnostics.input.add(1_000_000_000)
+    diagnostics.publish()
+    now[0] += 0.9
+    for _ in range(2):
+        now[0] += 1.0
+        diagnostics.publish()
+    assert "have ceased" in logged.lines[0]

@@ -8,7 +8,7 @@ from typing import Any
 
 from std_msgs.msg import String
 
-from cardbox_tracker.ros.runtime.publishers import PATIENCE, SinglePublisher
+from cardbox_tracker.ros.runtime.publishers import PATIENCE, STARTING, SinglePublisher
 
 WAIT_S = 30.0
 
@@ -57,3 +57,15 @@ def test_a_wrong_name_is_reported_with_the_topics_of_the_type(
     camera.destroy_publisher(late)
     wait_for(lambda: node.count_publishers("/kamera/image_raw") == 0)
     assert all(watch.remarks() == {} for _ in range(PATIENCE + 2))
+
+
+def test_a_camera_that_still_starts_is_not_missing(make_node: Callable[..., Any]) -> None:
+    """Other nodes of the launch already make images, none of which is the camera's."""
+    node, other = make_node(), make_node(name="background")
+    node.create_subscription(String, "/image_raw", print, 1)
+    for topic in ("silhouette", "silhouette/image", "overlay", "background/mean"):
+        other.create_publisher(String, topic, 1)
+    wait_for(lambda: node.count_publishers("/background/mean") == 1)
+    watch = SinglePublisher(node, ("/image_raw",))
+    assert [watch.remarks() for _ in range(STARTING)] == [{}] * STARTING
+    assert "of the same type are: none at all" in watch.remarks()["no publisher of /image_raw"]
