@@ -298,7 +298,7 @@ def _typed(given: dict[str, str], node: str, camera: str = "") -> dict[str, obje
         path = Path(kept)
         typed["background_file"] = str(path.with_name(f"{path.stem}_{camera}{path.suffix}"))
     is_guessed = typed["stature"] or typed["statures"] or typed["keypoints"]
-    if node == "tracker" and (not is_guessed or len(typed["cameras"]) > 1):
+    if node == "tracker" and not is_guessed:
         # The body that the initializer measures has them.
         typed["person_distance_m"] = typed["camera_pitch_deg"] = None
     # An empty list has no type in ROS, so it is left out.

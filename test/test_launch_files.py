@@ -403,7 +403,7 @@ def test_silhouettes_of_the_detector_take_the_place_of_the_background(
         ({"stature": "1.75"}, True),
         ({"statures": "[1.75, 1.62]", "people": "2"}, True),
         ({"silhouettes": "detector"}, True),
-        ({"silhouettes": "detector", "cameras": "[left, right]"}, False),
+        ({"silhouettes": "detector", "cameras": "[left, right]"}, True),
     ],
 )
 def test_the_tracker_is_told_of_distance_and_pitch_if_nobody_is_measured(

@@ -68,7 +68,7 @@ class KeypointTopic:
         self.stream = InputStream(name, node.resolve(topic))
         self._arrived = arrived
         self._newest_ns = self._expected_ns = 0
-        self._in_time = 0.0
+        self._in_time = 1.0
         self.size: Size | None = None
         self._node, self._topic = node, topic
         self._kept: deque[Taken] = deque()
@@ -217,6 +217,8 @@ class KeypointTopic:
 
 
 _PATIENCE_S = 3.0
+# Images at the start, in which a detector may not have looked at any yet.
+_STARTING = 30
 # Images in a row whose points lie beside the silhouette, after which a warning follows.
 _BESIDE = 10
 
@@ -332,8 +334,8 @@ class CameraKeypoints:
         """Return the points of all people in the image; None before a detector has found any."""
         found = self._placed(header, camera, TOLERANCE_NS)
         if found is None:
-            # Once a detector has found people, regions of the silhouette are none.
-            return [] if self._used else None
+            # Once a detector has found people, or may soon, regions of the silhouette are none.
+            return [] if self._used or self._images <= _STARTING else None
         self._used += 1
         return [one for one in found if not one.is_empty]
 

@@ -19,6 +19,7 @@ from cardbox_tracker.detectors.image_points import POINT_INDEX
 from cardbox_tracker.detectors.pose_network import Detection
 from cardbox_tracker.ros.messages.conversions import calibration_message, image_message
 from cardbox_tracker.ros.messages.keypoints import persons_of_cloud
+from cardbox_tracker.ros.nodes.background_node import BackgroundNode
 from cardbox_tracker.ros.nodes.detector_node import DetectorNode
 
 WIDTH, HEIGHT = 640, 480
@@ -209,3 +210,26 @@ def test_several_people_are_in_one_message(bus: Any) -> None:
     assert (message.height, message.width, len(people)) == (2, 33, 2)
     columns = [person.px[ELBOW, 0] for person in people]
     assert columns == pytest.approx([60.0, 200.0], abs=1.0)
+
+
+@pytest.mark.parametrize(
+    ("sent", "expected"),
+    [((640, 360), (368, 208)), ((480, 480), (280, 280)), ((360, 640), (208, 370))],
+)
+@pytest.mark.parametrize("most", [{}, {"width": 240, "height": 320}])
+def test_silhouettes_keep_the_aspect_of_the_images(
+    bus: Any, sent: tuple[int, int], expected: tuple[int, int], most: dict[str, int]
+) -> None:
+    """Width and height are a number of pixels, the nodes detector and background alike."""
+    k = np.array([(500.0, 0.0, sent[0] / 2), (0.0, 500.0, sent[1] / 2), (0.0, 0.0, 1.0)])
+    calibration = Calibration(*sent, k, np.zeros(5))
+    driver = Driver(bus, calibration, publish_silhouette=True, **most)
+    image = np.full(sent[::-1], 60, np.uint8)
+    bus.send("/image_raw", image_message(Header(stamp=Time(sec=1)), image, "mono8"))
+    (info,) = bus.sent["/silhouette/camera_info"]
+    assert (info.width, info.height) == expected
+    assert info.k[0] == pytest.approx(info.k[4], rel=0.005)
+    assert driver.network.shapes == [(*expected[::-1], 3)]
+    node = bus.start(BackgroundNode, within_m=0.0, **most)
+    node._on_calibration(calibration)
+    assert (node._pipeline.camera.width, node._pipeline.camera.height) == expected

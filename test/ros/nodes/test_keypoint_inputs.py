@@ -361,7 +361,9 @@ def test_an_impossible_topic_ends_the_start(bus: Any) -> None:
         Tracker(bus, "not a topic")
 
 
-def test_observations_have_the_points_of_their_camera(bus: Any) -> None:
+@pytest.mark.parametrize("late", [0, 1])
+def test_silhouettes_wait_for_the_points_of_a_detector_that_keeps_up(bus: Any, late: int) -> None:
+    """Points come after the silhouette of their image, or of the image after it."""
     found: list[ObservationSet] = []
     node = bus.start(lambda **options: CardboxNode("tracker", **options))
     settings = TrackerParameters(keypoints="points", use_image=False)
@@ -370,14 +372,22 @@ def test_observations_have_the_points_of_their_camera(bus: Any) -> None:
     )
     bus.send("/silhouette/camera_info", camera_info_message(header(T), CAMERA))
     bus.send("/camera_info", camera_info_message(header(T), FULL))
-    for image in range(2):
-        # The points come after the silhouette of their image.
+    delivered = []
+    for image in range(12):
         at_ns = T + image * 33 * MS
         bus.send("/silhouette", image_message(header(at_ns), SILHOUETTE, "mono8"))
-        bus.send("/points", keypoints(at_ns))
-    first, second = (one.observations[0].points for one in found)
-    assert first is None
-    assert second is not None and second.stamp_ns == T
+        delivered.append(len(found))
+        if image >= late:
+            bus.send("/points", keypoints(at_ns - late * 33 * MS))
+    points = [one.observations[0].points for one in found]
+    if late:
+        # The first images wait until the next one, in vain; later ones do not wait.
+        assert delivered == [0, 1, 2, *range(4, 13)]
+        assert all(one is not None for one in points[4:])
+    else:
+        assert delivered == [*range(12)] and len(found) == 12
+        stamps = [one.stamp_ns for one in points if one is not None]
+        assert stamps == [T + image * 33 * MS for image in range(12)]
     assert "keypoints rate (Hz)" in inputs.values([])
 
 
