@@ -104,6 +104,7 @@ class PlaceWatch:
         contradiction: what two sources of scale say, if they differ beyond their deviations.
         is_too_large: whether the body is too large for the second source, so that its bones turn
             along the line of sight to fit the image, and the shape is wrong, too.
+        scale: how much larger than the body the second source shows the person, if they differ.
     """
 
     def __init__(self, body: BodyModel, camera: Camera) -> None:
@@ -115,7 +116,7 @@ class PlaceWatch:
         self._compared: list[tuple[float, float]] = []
         self._first_ns: int | None = None
         self._apart_m = 0.0
-        self.contradiction, self.is_too_large = "", False
+        self.contradiction, self.is_too_large, self.scale = "", False, 1.0
 
     def placed(self, estimate: Estimate, body: BodyModel, frames: Sequence[Frame]) -> Estimate:
         """Return an estimate with its place, which no deviation of it is surer than."""
@@ -184,10 +185,10 @@ class PlaceWatch:
         stddev = hypot(_POINTS_STDDEV, DISTANCE_STDDEV, self._camera.focal_stddev)
         apart = abs(log(shown_m / other_m)) / stddev
         is_apart = apart > (_AGREEING if self.contradiction else _CONTRADICTING)
-        self._apart_m, self.contradiction = 0.0, ""
+        self._apart_m, self.contradiction, self.scale = 0.0, "", 1.0
         self.is_too_large = is_apart and shown_m > other_m
         if is_apart:
-            self._apart_m = abs(shown_m - other_m)
+            self._apart_m, self.scale = abs(shown_m - other_m), other_m / shown_m
             self.contradiction = (
                 f"by the {self._scale} the person is {shown_m:.1f} m away, by the "
                 f"{rests_on if is_second else 'given distance'} {other_m:.1f} m: one of them or "

@@ -17,6 +17,7 @@ from __future__ import annotations
 from collections.abc import Container, Iterator, Mapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import replace
+from itertools import combinations
 from typing import NamedTuple
 
 import cv2
@@ -74,6 +75,8 @@ _HIDDEN, _MIXED = 0.15, 0.5
 _SEEN = 0.4
 # Time for which a hidden person stays where they were, ns.
 _HELD_NS = 3_000_000_000
+# Relative difference of statures up to which they are the same.
+_SAME_STATURE = 0.08
 # Images in a row in which somebody new is seen before they are tracked, after the first images.
 _PROVED = 3
 # Least area and height of the region of a new person, as shares of the image.
@@ -261,10 +264,23 @@ class Session:
     def remarks(self, names: Sequence[str], is_all: bool = False) -> list[str]:
         """Return warnings about images that contradict each other; ``is_all`` adds past ones."""
         told = [text for one in self.trackers for text in one.remarks(names, is_all)]
+        told += self._exchanged_statures()
         told += () if self._scene is None else self._scene.remarks
         if self.agreement is not None:
             told += self.agreement.remarks(names[1:])
         return list(dict.fromkeys(told))
+
+    def _exchanged_statures(self) -> Iterator[str]:
+        """Yield which two people are as tall as each other's stature."""
+        shown = [(one.number, one.tracker.arm_m, one.tracker.place.scale) for one in self._people]
+        for (one, own_m, own), (two, other_m, other) in combinations(shown, 2):
+            is_own = abs(own * own_m / other_m - 1.0) < _SAME_STATURE < abs(own - 1.0)
+            if is_own and abs(other * other_m / own_m - 1.0) < _SAME_STATURE:
+                yield (
+                    f"person {one} is as tall as person {two} is given, and the other way round: "
+                    "exchange their statures, which count from left to right if people come "
+                    "together, else as they come"
+                )
 
     def points_of(self, number: int) -> ImagePoints | None:
         """Return the points of one of several people in the first camera's last image."""

@@ -62,6 +62,7 @@ class Tracker:
         images: number of times that were tracked.
         used: in how many of them each optional input told of the posture, by its name.
         empty: number of last images in a row in which nobody was.
+        place: how surely it is known where the person is.
     """
 
     def __init__(
@@ -96,7 +97,7 @@ class Tracker:
         self.cameras = [
             TrackedCamera(self.body, self.camera, self.config, other) for other in (None, *others)
         ]
-        self._place = PlaceWatch(body, self.camera)
+        self.place = PlaceWatch(body, self.camera)
         self.agreement: CameraAgreement | None = None
         self.faults = CameraFaults(len(self.cameras))
         self.images, self.used, self.empty = 0, dict[str, int](), 0
@@ -144,7 +145,7 @@ class Tracker:
         is_moved = (pose, body.placement) != (before.camera_pose, before.placement)
         if is_moved:
             self.camera = self.camera.with_pitch(pose.pitch_rad)
-            self._place = PlaceWatch(self.body, self.camera)
+            self.place = PlaceWatch(self.body, self.camera)
             if self._before is not None:
                 self._before = moved(self._before[None])[0]
         self._silhouette = CompiledSilhouette(self.body, self.camera)
@@ -173,6 +174,11 @@ class Tracker:
         return is_new_start
 
     @property
+    def arm_m(self) -> float:
+        """Length of an arm of the body, m, which is proportional to the stature."""
+        return self.body.size("upper_arm_length") + self.body.size("forearm_length")
+
+    @property
     def filter(self) -> PoseFilter:
         """The particle filter, for tools that need more than the estimate."""
         return self._filter
@@ -185,7 +191,7 @@ class Tracker:
     def remarks(self, names: Sequence[str] = (), is_all: bool = False) -> list[str]:
         """Return warnings about images that contradict each other, see :class:`.CameraFaults`."""
         depths = (camera.depth.remark for camera in self.cameras)
-        found = *self.faults.remarks(names, is_all), *depths, self._place.contradiction
+        found = *self.faults.remarks(names, is_all), *depths, self.place.contradiction
         return [text for text in found if text]
 
     def used_texts(self) -> dict[str, str]:
@@ -260,7 +266,7 @@ class Tracker:
             if is_found:
                 self._before = None
                 self._filter.forget()
-        estimate = self._place.placed(estimate, self.body, frames)
+        estimate = self.place.placed(estimate, self.body, frames)
         estimate = self._doubted(estimate, is_doubtful)
         self._count(frames, estimate)
         estimate = self._legs.see(frames[0], self._head.see(frames[0], estimate))
@@ -274,7 +280,7 @@ class Tracker:
     def _doubted(self, estimate: Estimate, is_doubtful: bool) -> Estimate:
         """Return an estimate that is no surer than body, pitch, distance, person and limits."""
         state, states, posture = estimate.state, estimate.keypoint_states, estimate.posture
-        is_doubtful = is_doubtful or self._place.is_too_large
+        is_doubtful = is_doubtful or self.place.is_too_large
         is_doubtful |= self._is_alone and self.cameras[0].identity.is_doubtful
         if self.config.has_several_views and posture is not None:
             is_doubtful |= is_at_two_limits(posture)

@@ -166,7 +166,7 @@ def test_a_body_that_is_too_large_makes_the_shape_uncertain() -> None:
     tracker = Tracker(TALL.with_values(unknown=()), CAMERA, default_preset())
     shown = render(cardbox_patches(TALL, reference_posture("front")), CAMERA)
     sure = tracker.track(shown)
-    tracker._place.is_too_large = True
+    tracker.place.is_too_large = True
     doubtful = tracker.track(shown)
     assert KeypointState.TRACKED in sure.keypoint_states
     assert doubtful.state == UNCERTAIN

@@ -19,6 +19,7 @@ from cardbox_tracker.detectors.image_points import ImagePoints
 from cardbox_tracker.person.cardbox import cardbox_patches
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.posture import N_STATE, TORSO_Y, reference_posture
+from cardbox_tracker.person.proportions import body_from_proportions
 from cardbox_tracker.person.skeleton import KeypointState
 from cardbox_tracker.search.config import default_preset
 from cardbox_tracker.terms.outline import Outline
@@ -194,6 +195,21 @@ def test_a_reset_forgets_one_person(detected: Detect) -> None:
     show.people.reset(1)
     assert places([person.estimate for person in show.people._people])[0] is None
     assert places(show((-0.6, RED), (0.6, BLUE))) == pytest.approx([-0.6, 0.6], abs=0.1)
+
+
+@pytest.mark.parametrize(
+    ("scales", "is_told"),
+    [((1.72 / 1.4, 1.4 / 1.72), True), ((1.72 / 1.4, 1.0), False), ((1.0, 1.0), False)],
+)
+def test_statures_in_the_wrong_order_are_told(scales: tuple[float, float], is_told: bool) -> None:
+    """Two people are as tall in a second camera as the other one is said to be."""
+    bodies = [body_from_proportions(stature_m, 2.5) for stature_m in (1.4, 1.72)]
+    watched = Session(bodies, CAMERA, default_preset(), people=2)
+    for tracker, scale in zip(watched.trackers, scales, strict=True):
+        tracker.place.scale = scale
+    told = [text for text in watched.remarks(["camera"]) if "exchange their statures" in text]
+    assert len(told) == is_told
+    assert not told or "person 1 is as tall as person 2 is given" in told[0]
 
 
 def test_a_camera_that_misses_a_person_takes_their_place_from_the_other(detected: Detect) -> None:
