@@ -64,6 +64,9 @@ _MEMORY = 0.5
 # What stays, from one image to the next, of the doubt about hands beyond the present one: an arm
 # that was wrongly chosen is often rated well in single images.
 _DOUBT_STAYS = 0.85
+# Shares of the limit of this doubt below which a posture becomes sure, and stays so: a robot that
+# follows would stop and go on where the doubt is about the limit.
+_BECOMES_SURE, _STAYS_SURE = 0.9, 1.25
 _FRESH_FRAMES = 15.0
 _AREAS, _PRIORS = (0.1, 3.0), (-0.2, 0.3)
 # Step of the numerical derivatives, rad and m.
@@ -138,6 +141,7 @@ class Doubt:
         self._whole: float | None = None
         self._hands = np.zeros(len(HANDS))
         self._source: Source | None = None
+        self._is_sure = False
 
     def judge(
         self, evidence: Values, source: Source, hidden: BoolArray, vetoes: Sequence[bool] = ()
@@ -162,10 +166,13 @@ class Doubt:
         is_uncertain = is_doubted
         # The paper's filter finds hands so badly that its state only says whether it is lost.
         if source is not Source.PAPER:
-            is_uncertain |= bool(self._hands.max() > doubtful_from)
+            share = _STAYS_SURE if self._is_sure else _BECOMES_SURE
+            limit = min(share * doubtful_from, uncertain_from)
+            is_uncertain |= bool(self._hands.max() > limit)
             # An outline shows hands so badly that they make the images uncertain.
             if source is not Source.POINTS:
-                is_unsure[HANDS] = self._hands > doubtful_from
+                is_unsure[HANDS] = self._hands > limit
+        self._is_sure = not is_uncertain
         given = zip(
             chances.tolist(), hidden.tolist(), (is_unsure | is_doubted).tolist(), strict=True
         )
