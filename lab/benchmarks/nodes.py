@@ -26,7 +26,7 @@ from cardbox_tracker.common.errors import CardboxError
 from cardbox_tracker.detectors.model_files import installed_models
 from cardbox_tracker.person.model_file import save_body_model
 from cardbox_tracker.ros.runtime.processes import Nodes, isolate, running_nodes
-from lab.benchmarks.scene import BenchmarkScene, make_scene, recorded_scene
+from lab.benchmarks.scene import BenchmarkScene, make_scene, recorded_scene, wide_scene
 
 RATES_HZ = (15, 30, 60)
 STREAMS = (("mono8", 320, 240), ("bgr8", 640, 480))
@@ -68,7 +68,8 @@ def measure_nodes(
         ways["with_detector"] = WITH_DETECTOR, drawn
         if session is not None:
             scene = recorded_scene(session, 60)
-            seen = {("bgr8", scene.camera.width, scene.camera.height): scene}
+            scenes = scene, wide_scene(scene)
+            seen = {("bgr8", one.camera.width, one.camera.height): one for one in scenes}
             ways |= {"with_detector": (WITH_DETECTOR, seen), "of_detector": (OF_DETECTOR, seen)}
             ways["detector_with_robot"] = (*OF_DETECTOR, "initializer", ROBOT), seen
     measured: dict[str, Any] = {"with_detector": None}

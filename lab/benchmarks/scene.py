@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -56,6 +56,20 @@ def make_scene(width: int, height: int, count: int, empty: int = 30) -> Benchmar
         np.array([image for image, _ in drawn]),
         np.array([silhouette for _, silhouette in drawn]),
     )
+
+
+def wide_scene(scene: BenchmarkScene, width: int = 1280, height: int = 720) -> BenchmarkScene:
+    """Return a scene as a camera of another aspect shows it, whose borders are repeated."""
+    large = scene.camera.scaled(round(scene.camera.width * height / scene.camera.height), height)
+    left = (width - large.width) // 2
+    border = 0, 0, left, width - large.width - left, cv2.BORDER_REPLICATE
+
+    def widened(images: Images) -> Images:
+        resized = (cv2.resize(image, (large.width, height)) for image in images)
+        return np.array([cv2.copyMakeBorder(image, *border) for image in resized], np.uint8)
+
+    camera = replace(large, width=width, cx=large.cx + left)
+    return replace(scene, camera=camera, empty=widened(scene.empty), images=widened(scene.images))
 
 
 def recorded_scene(folder: Path, count: int, empty: int = 30) -> BenchmarkScene:
