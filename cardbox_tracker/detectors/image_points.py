@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from operator import index
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -159,6 +159,28 @@ class ImagePoints:
             spatial_m=None if self.spatial_m is None else self.spatial_m[_OTHER_SIDE],
             legs=None if self.legs is None else self.legs.exchanged(),
         )
+
+    def apart_px(self, other: ImagePoints) -> float:
+        """Return the mean distance of points that are certain in both; infinite without any."""
+        is_certain = np.minimum(self.scores, other.scores) >= _CERTAIN
+        away_px = np.linalg.norm(self.px - other.px, axis=1)[is_certain]
+        return float(away_px.mean()) if len(away_px) else float("inf")
+
+    def moved_on(self, before: ImagePoints, share: float) -> ImagePoints:
+        """Return the points after ``share`` of the time since ``before``, in even motion.
+
+        Those that are not certain in both stay.
+        """
+
+        def moved(points: Any, others: Any) -> FloatArray:
+            is_certain = np.minimum(points.scores, others.scores) >= _CERTAIN
+            step = np.where(is_certain[:, None], points.px - others.px, 0.0)
+            return np.asarray(points.px + share * step)
+
+        legs = self.legs
+        if legs is not None and before.legs is not None:
+            legs = legs._replace(px=moved(legs, before.legs))
+        return replace(self, px=moved(self, before), legs=legs)
 
     @property
     def are_certain(self) -> bool:

@@ -19,6 +19,7 @@ from cardbox_tracker.camera.pairing import TOLERANCE_NS
 from cardbox_tracker.camera.stamps import StampOrder
 from cardbox_tracker.common.errors import CardboxError, cut, quoted
 from cardbox_tracker.common.files import user_path
+from cardbox_tracker.detectors.figure import figure_of_points
 from cardbox_tracker.detectors.image_points import ImagePoints
 from cardbox_tracker.detectors.person_choice import person_in
 from cardbox_tracker.detectors.point_checks import check_places
@@ -37,6 +38,9 @@ MOST_AGE_NS = 300_000_000
 SAME_TIME_NS = 50_000_000
 """Points that are newer than the silhouette by at most this are of the same time."""
 
+# Points are moved on by their motion for at most this time, if those before are at most so much
+# older, ns; points of one person are at most so far apart, lengths of the trunk.
+_MOVED_NS, _MOTION_NS, _SAME_PERSON = 150_000_000, 250_000_000, 0.5
 _KEPT = 8
 _SILENT_S = 3.0
 # After so many consecutive messages of another time the clocks are in doubt.
@@ -54,6 +58,39 @@ class Taken(NamedTuple):
     persons: list[ImagePoints]  #: points of each person
 
 
+class _Motion(NamedTuple):
+    """The same people at two times, who go on as they moved."""
+
+    newest: Taken
+    before: list[ImagePoints]  #: points of each person of ``newest`` in the image before
+    span_ns: int  #: time between both
+
+    @classmethod
+    def of(cls, before: Taken | None, newest: Taken) -> _Motion | None:
+        """Return the motion between two sets of points; None if one person has none."""
+        span_ns = 0 if before is None else newest.stamp_ns - before.stamp_ns
+        if before is None or not 0 < span_ns <= _MOTION_NS:
+            return None
+        same = []
+        for one in newest.persons:
+            apart = [one.apart_px(other) for other in before.persons]
+            most_px = _SAME_PERSON * figure_of_points(one).trunk_px
+            if not apart or not min(apart) <= most_px:
+                return None
+            same.append(before.persons[int(np.argmin(apart))])
+        return cls(newest, same, span_ns)
+
+    def at(self, at_ns: int) -> Taken | None:
+        """Return the points at a time, ns; None if they are too old for it."""
+        ahead_ns = at_ns - self.newest.stamp_ns
+        if ahead_ns > _MOVED_NS:
+            return None
+        share = max(ahead_ns, 0) / self.span_ns
+        pairs = zip(self.newest.persons, self.before, strict=True)
+        moved = [one.moved_on(before, share) for one, before in pairs]
+        return self.newest._replace(stamp_ns=at_ns, persons=moved)
+
+
 class KeypointTopic:
     """Keeps the points that arrive for one camera until a silhouette takes them.
 
@@ -69,6 +106,8 @@ class KeypointTopic:
         self._arrived = arrived
         self._newest_ns = self._expected_ns = 0
         self._in_time = 1.0
+        self._last: Taken | None = None
+        self._motion: _Motion | None = None
         self.size: Size | None = None
         self._node, self._topic = node, topic
         self._kept: deque[Taken] = deque()
@@ -94,12 +133,16 @@ class KeypointTopic:
         return self._in_time > _KEEPS_UP and self._newest_ns < self._expected_ns
 
     def take(self, at_ns: int, frame_id: str) -> Taken | None:
-        """Return the newest points for a silhouette of this stamp and frame, once, or None."""
-        self._asked_ns, newest = at_ns, None
+        """Return the newest points for a silhouette of this stamp and frame, or None.
+
+        Points of images before are moved on, or else returned once.
+        """
+        self._asked_ns, newest, before = at_ns, None, self._last
         while self._kept and self._kept[0].stamp_ns <= at_ns + SAME_TIME_NS:
-            newest = self._kept.popleft()
+            before, newest = newest or before, self._kept.popleft()
         if newest is None:
-            return None
+            return self._motion.at(at_ns) if self._motion is not None else None
+        self._last, self._motion = newest, None
         if at_ns - newest.stamp_ns > MOST_AGE_NS:
             self._leave_out(newest)
             return None
@@ -111,7 +154,9 @@ class KeypointTopic:
             return None
         self._used, self._in_doubt = self._used + 1, 0
         self._apart_ns = at_ns - newest.stamp_ns
-        return newest
+        self._motion = _Motion.of(before, newest)
+        moved = self._motion.at(at_ns) if self._motion is not None else None
+        return moved or newest
 
     def values(self) -> dict[str, str]:
         """Return rate, age and use of the points for the diagnostics."""
@@ -186,6 +231,7 @@ class KeypointTopic:
             return
         if order is StampOrder.RESTART:
             self._kept.clear()
+            self._last = self._motion = None
         try:
             persons = self._convert(message, self.size)
         except CardboxError as error:

@@ -163,9 +163,46 @@ def test_points_that_come_seldom_join_every_sixth_image(tracker: Tracker) -> Non
             # They were found in an image that is three images old.
             tracker.bus.send("/points", keypoints(T + (image - 3) * 33 * MS))
         joined.append(tracker.ask(T + image * 33 * MS) is not None)
-    assert [image for image, is_there in enumerate(joined) if is_there] == [9, 15, 21, 27]
+    # The second ones tell how the person moves, which holds for 0.15 s.
+    there = [image for image, is_there in enumerate(joined) if is_there]
+    assert there == [9, 15, 16, 21, 22, 27, 28]
     values = tracker.inputs.values()
     assert values["keypoints behind the image (ms)"] == "99"
+
+
+@pytest.mark.parametrize("people", [1, 2])
+def test_points_go_on_as_the_person_moves(tracker: Tracker, people: int) -> None:
+    """A person moves by 10 px between two images; another one, who stands, is named first."""
+    trunk = {"left_shoulder": (20, 0), "right_shoulder": (-20, 0), "left_hip": (10, 60)}
+    trunk |= {"right_hip": (-10, 60), "nose": (0, -20), "left_knee": (10, 90)}
+
+    def figure(column: float) -> Any:
+        px, scores = np.zeros((len(LANDMARKS), 2)), np.zeros(len(LANDMARKS))
+        for name, (across, down) in trunk.items():
+            px[LANDMARKS.index(name)] = column + across, 100 + down
+            scores[LANDMARKS.index(name)] = 0.9
+        return NOBODY._replace(points_px=px, scores=scores)
+
+    def seen(column: float) -> list[Any]:
+        return [figure(500.0), figure(column)][2 - people :]
+
+    def columns(at_ns: int) -> list[float] | None:
+        found = tracker.inputs.cameras[0].people(header(at_ns), CAMERA)
+        return None if not found else [round(10 * one.px[NOSE, 0] + 4.5, 3) for one in found]
+
+    still = [500.0][2 - people :]
+    for number, column in enumerate((100.0, 110.0)):
+        message = people_message(header(T + 33 * number * MS), seen(column)[:: (-1) ** number])
+        tracker.bus.send("/points", message)
+    order = (-1) ** (people - 1)
+    assert columns(T + 33 * MS) == [*still, 110.0][::order]
+    assert columns(T + 66 * MS) == [*still, 120.0][::order]
+    assert columns(T + 132 * MS) == [*still, 140.0][::order]
+    assert columns(T + 200 * MS) is None
+    # Somebody else is where nobody was: nothing tells how they move.
+    tracker.bus.send("/points", people_message(header(T + 233 * MS), seen(300.0)))
+    assert columns(T + 266 * MS) == [*still, 300.0]
+    assert columns(T + 300 * MS) is None
 
 
 def test_points_of_a_newer_image_wait_for_their_silhouette(tracker: Tracker) -> None:
