@@ -38,9 +38,10 @@ MOST_AGE_NS = 300_000_000
 SAME_TIME_NS = 50_000_000
 """Points that are newer than the silhouette by at most this are of the same time."""
 
-# Points are moved on by their motion for at most this time, if those before are at most so much
-# older, ns; points of one person are at most so far apart, lengths of the trunk.
-_MOVED_NS, _MOTION_NS, _SAME_PERSON = 150_000_000, 250_000_000, 0.5
+# Points are moved on by their motion for at most this time, ns, if those before are at most so much
+# older, and for at most so many times the time between both, since the motion is noisy. Points of
+# one person are at most so far apart, lengths of the trunk.
+_MOVED_NS, _MOTION_NS, _MOST_SPANS, _SAME_PERSON = 150_000_000, 250_000_000, 2, 0.5
 _KEPT = 8
 _SILENT_S = 3.0
 # After so many consecutive messages of another time the clocks are in doubt.
@@ -85,10 +86,10 @@ class _Motion(NamedTuple):
         ahead_ns = at_ns - self.newest.stamp_ns
         if ahead_ns > _MOVED_NS:
             return None
-        share = max(ahead_ns, 0) / self.span_ns
+        moved_ns = min(max(ahead_ns, 0), _MOST_SPANS * self.span_ns)
         pairs = zip(self.newest.persons, self.before, strict=True)
-        moved = [one.moved_on(before, share) for one, before in pairs]
-        return self.newest._replace(stamp_ns=at_ns, persons=moved)
+        moved = [one.moved_on(before, moved_ns / self.span_ns) for one, before in pairs]
+        return self.newest._replace(stamp_ns=self.newest.stamp_ns + moved_ns, persons=moved)
 
 
 class KeypointTopic:

@@ -197,7 +197,8 @@ def test_points_go_on_as_the_person_moves(tracker: Tracker, people: int) -> None
     order = (-1) ** (people - 1)
     assert columns(T + 33 * MS) == [*still, 110.0][::order]
     assert columns(T + 66 * MS) == [*still, 120.0][::order]
-    assert columns(T + 132 * MS) == [*still, 140.0][::order]
+    # A motion of 33 ms is too noisy for more than 66.
+    assert columns(T + 132 * MS) == [*still, 130.0][::order]
     assert columns(T + 200 * MS) is None
     # Somebody else is where nobody was: nothing tells how they move.
     tracker.bus.send("/points", people_message(header(T + 233 * MS), seen(300.0)))
