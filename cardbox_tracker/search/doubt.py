@@ -66,7 +66,7 @@ _MEMORY = 0.5
 _DOUBT_STAYS = 0.85
 # Shares of the limit of this doubt below which a posture becomes sure, and stays so: a robot that
 # follows would stop and go on where the doubt is about the limit.
-_BECOMES_SURE, _STAYS_SURE = 0.9, 1.25
+_BECOMES_SURE, _STAYS_SURE = 0.95, 1.25
 _FRESH_FRAMES = 15.0
 _AREAS, _PRIORS = (0.1, 3.0), (-0.2, 0.3)
 # Step of the numerical derivatives, rad and m.
