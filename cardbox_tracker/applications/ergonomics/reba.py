@@ -224,12 +224,12 @@ class Seen(NamedTuple):
 
 
 def images_of(results: Results) -> list[Seen]:
-    """Return the images of a table of ``cardbox track --legs``; CardboxError if it has no legs."""
+    """Return the images of a table of results; CardboxError if it has no legs."""
     missing = [name for name in LEG_NAMES if name not in results.numbers]
     if missing:
         raise CardboxError(
             f"{results.path} has no column {missing[0]}; make a table with 'cardbox track "
-            "RECORDING --detector mediapipe --legs --csv OUT.csv'"
+            "RECORDING --detector mediapipe --csv OUT.csv'"
         )
     shape = len(results.state), 2, 3, 3
     legs_m = results.of(LEG_POINT_COLUMNS).reshape(shape)

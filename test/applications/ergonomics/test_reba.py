@@ -240,7 +240,7 @@ def test_hidden_legs_count_as_declared(tmp_path: Path) -> None:
 def test_a_table_without_legs_is_refused(tmp_path: Path) -> None:
     path = table(tmp_path / "a.csv", SEATED)
     path.write_text(path.read_text().replace("left_hip_flexion", "other"))
-    with pytest.raises(CardboxError, match="--legs --csv"):
+    with pytest.raises(CardboxError, match="--detector mediapipe --csv"):
         images_of(read_results(path))
     with pytest.raises(CardboxError, match="there are no results"):
         images_of(read_results(tmp_path / "none.csv"))
