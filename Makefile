@@ -120,8 +120,10 @@ demo: setup
 	@echo "look at demo_output/film/overlay.mp4, space.png and error.png: a woman in a film"
 	@echo "look at demo_output/live/overlay.mp4 and angles.png: the nodes, live"
 
+# This needs nothing of what the package needs: no ROS, no tools of the tests.
 .PHONY: dist
-dist: $(VENV)/dependencies
+dist: | $(VENV)/bin/python
+	$(PIP) install --quiet 'setuptools>=70.1,<80'
 	rm -rf build/lib build/bdist.* *.egg-info
 	$(BIN)/python setup.py --quiet sdist bdist_wheel
 	rm -rf build/lib build/bdist.* *.egg-info

@@ -18,12 +18,7 @@ from ament_index_python.packages import (
     get_package_share_directory,
 )
 from launch import LaunchContext, LaunchDescription
-from launch.actions import (
-    DeclareLaunchArgument,
-    LogInfo,
-    OpaqueFunction,
-    SetEnvironmentVariable,
-)
+from launch.actions import LogInfo, OpaqueFunction, SetEnvironmentVariable
 from launch.substitutions import EnvironmentVariable, LaunchConfiguration
 from launch_ros.actions import Node
 from launch_ros.parameter_descriptions import ParameterValue
@@ -40,6 +35,7 @@ from cardbox_tracker.ros.runtime.launch_arguments import (
     shares_process,
     values,
 )
+from cardbox_tracker.ros.runtime.launching import declared, node
 
 SHARE = Path(get_package_share_directory("cardbox_tracker"))
 PROFILES = "FASTRTPS_DEFAULT_PROFILES_FILE"
@@ -151,16 +147,12 @@ NOBODY = '<robot name="cardbox_person"><link name="camera_level"/></robot>'
 
 
 def generate_launch_description() -> LaunchDescription:
-    declared = [
-        DeclareLaunchArgument(name, default_value=a.default, description=a.meaning)
-        for name, a in ARGUMENTS.items()
-    ]
     profiles = EnvironmentVariable(
         PROFILES, default_value=str(SHARE / "config" / "fastdds_large_images.xml")
     )
     return LaunchDescription(
         [
-            *declared,
+            *declared(ARGUMENTS),
             # Wrong arguments must be found before the first node starts.
             OpaqueFunction(function=_check),
             # Without this profile Fast DDS loses most large images; the user's profile is kept.
@@ -232,18 +224,7 @@ def _nodes(context: LaunchContext) -> list[object]:
     own = {"background": remappings, "detector": remappings, "tracker": infos}
     nodes = [_single_process(context, remappings)] if is_single else []
     return nodes + [
-        Node(
-            package="cardbox_tracker",
-            executable=name,
-            name=name,
-            namespace=[LaunchConfiguration("namespace"), *(["/", below] if below else [])],
-            parameters=[
-                [LaunchConfiguration("config_dir"), f"/{name}.yaml"],
-                _exact(_typed(given, name, below)),
-            ],
-            remappings=own.get(name, []),
-            output="screen",
-        )
+        node(name, _typed(given, name, below), below, remappings=own.get(name, []))
         for name in GIVEN
         if name not in left_out
         for below in (cameras if name in OF_A_CAMERA else [""])
@@ -258,32 +239,12 @@ def _below(camera: str, topic: str) -> str:
 def _users(context: LaunchContext) -> list[object]:
     """Return the requested nodes that use the posture."""
     typed = values(ARGUMENTS, context.launch_configurations)
-    wanted: dict[str, dict[str, object]] = {}
-    if typed["rula"]:
-        wanted["rula"] = {}
+    found = [node("rula", {})] if typed["rula"] else []
     if typed["robot_file"]:
         names = ("robot_file", "joint_map_file")
         # An empty argument leaves the value of retarget.yaml.
-        wanted["retarget"] = {name: typed[name] for name in names if typed[name]}
-    return [
-        Node(
-            package="cardbox_tracker",
-            executable=name,
-            name=name,
-            namespace=LaunchConfiguration("namespace"),
-            parameters=[[LaunchConfiguration("config_dir"), f"/{name}.yaml"], _exact(own)],
-            output="screen",
-        )
-        for name, own in wanted.items()
-    ]
-
-
-def _exact(parameters: dict[str, object]) -> dict[str, object]:
-    """Give texts a type, without which launch would read them as a number or as nothing."""
-    return {
-        name: ParameterValue(value, value_type=str) if isinstance(value, str) else value
-        for name, value in parameters.items()
-    }
+        found.append(node("retarget", {name: typed[name] for name in names if typed[name]}))
+    return found
 
 
 def _typed(given: dict[str, str], node: str, camera: str = "") -> dict[str, object]:

@@ -10,26 +10,14 @@ drivers, which publish cam0/image_raw, cam0/camera_info and the same topics for 
 recording of both with replay.launch.py and cameras:="[cam0, cam1]".
 """
 
-import runpy
-import sys
 from pathlib import Path
 
-from ament_index_python.packages import get_package_share_directory
-from launch import LaunchContext, LaunchDescription
-from launch.actions import (
-    DeclareLaunchArgument,
-    IncludeLaunchDescription,
-    OpaqueFunction,
-    SetLaunchConfiguration,
-)
-from launch.launch_description_sources import PythonLaunchDescriptionSource
-from launch.substitutions import LaunchConfiguration
-from launch_ros.actions import Node
-from launch_ros.parameter_descriptions import ParameterValue
+from launch import LaunchDescription
+from launch.actions import SetLaunchConfiguration
 
-from cardbox_tracker.ros.runtime.launch_arguments import Argument, check_names, values
+from cardbox_tracker.ros.runtime.launch_arguments import Argument
+from cardbox_tracker.ros.runtime.launching import Typed, node, with_nodes
 
-SHARE = Path(get_package_share_directory("cardbox_tracker"))
 ORDER = ("first", "second")
 ARGUMENTS = {
     "first": Argument("cam0", "namespace of the camera that the person faces", name=True),
@@ -44,32 +32,13 @@ ARGUMENTS = {
 }
 # Arguments that are parameters of the node camera.
 OF_BOTH = ("width", "height", "rate_hz")
-# Arguments of the included launch file are also arguments of this one.
-NODES = runpy.run_path(str(SHARE / "launch" / "nodes.launch.py"))["ARGUMENTS"]
 
 
 def generate_launch_description() -> LaunchDescription:
-    return LaunchDescription(
-        [
-            *(
-                DeclareLaunchArgument(name, default_value=a.default, description=a.meaning)
-                for name, a in ARGUMENTS.items()
-            ),
-            # Wrong arguments must be found before the first node starts.
-            OpaqueFunction(function=_check),
-            # It comes first, because it sets the environment and declares shared arguments.
-            IncludeLaunchDescription(
-                PythonLaunchDescriptionSource(str(SHARE / "launch" / "nodes.launch.py"))
-            ),
-            OpaqueFunction(function=_cameras),
-        ]
-    )
+    return LaunchDescription(with_nodes(__file__, ARGUMENTS, _check, _cameras))
 
 
-def _check(context: LaunchContext) -> list[object]:
-    check_names(__file__, {*ARGUMENTS, *NODES}, sys.argv)
-    given = context.launch_configurations
-    typed = values(ARGUMENTS, given)
+def _check(typed: Typed, given: dict[str, str]) -> list[object]:
     names = [str(typed[one]) for one in ORDER]
     if not all(names) or len(set(names)) < len(names):
         raise ValueError(
@@ -85,28 +54,17 @@ def _check(context: LaunchContext) -> list[object]:
     return [SetLaunchConfiguration("cameras", f"[{', '.join(names)}]")]
 
 
-def _cameras(context: LaunchContext) -> list[object]:
-    typed = values(ARGUMENTS, context.launch_configurations)
+def _cameras(typed: Typed, given: dict[str, str]) -> list[object]:
     return [
-        Node(
-            package="cardbox_tracker",
-            executable="camera",
-            name="camera",
-            namespace=[LaunchConfiguration("namespace"), "/", str(typed[one])],
-            parameters=[
-                [LaunchConfiguration("config_dir"), "/camera.yaml"],
-                {name: typed[name] for name in OF_BOTH}
-                | {
-                    # Without a type, launch would read a text as a number or as nothing.
-                    name: ParameterValue(text, value_type=str)
-                    for name, text in (
-                        ("device", typed[f"{one}_device"]),
-                        ("calibration_file", typed[f"{one}_calibration_file"]),
-                        ("frame_id", f"{typed[one]}_optical_frame"),
-                    )
-                },
-            ],
-            output="screen",
+        node(
+            "camera",
+            {name: typed[name] for name in OF_BOTH}
+            | {
+                "device": typed[f"{one}_device"],
+                "calibration_file": typed[f"{one}_calibration_file"],
+                "frame_id": f"{typed[one]}_optical_frame",
+            },
+            below=str(typed[one]),
         )
         for one in ORDER
         if typed[f"{one}_device"]

@@ -171,10 +171,8 @@ def launch_arguments(name: str) -> set[str]:
             names = [target.id for target in node.targets if isinstance(target, ast.Name)]
             if "ARGUMENTS" in names:
                 found |= {k.value for k in node.value.keys if isinstance(k, ast.Constant)}
-        if isinstance(node, ast.Call) and getattr(node.func, "id", "") == "DeclareLaunchArgument":
-            found |= {a.value for a in node.args[:1] if isinstance(a, ast.Constant)}
-        if isinstance(node, ast.Constant) and str(node.value).endswith(".launch.py"):
-            found |= launch_arguments(str(node.value))
+        if isinstance(node, ast.Call) and getattr(node.func, "id", "").startswith("with_"):
+            found |= launch_arguments("nodes.launch.py")
     return {str(argument) for argument in found}
 
 

@@ -29,7 +29,7 @@ COMMANDS = {
     "view": "show results in a viewer: image, body in 3D, plots, error, a slider for the time",
     "export": "write results as TRC, MOT, BVH or C3D, or as joint angles of the ISB",
     "rula": "score the strain on arms, neck and trunk in a recording (RULA)",
-    "reba": "score the strain on the whole body in a table of 'cardbox track --legs' (REBA)",
+    "reba": "score the strain on the whole body in a table of 'cardbox track --detector' (REBA)",
     "retarget": "move a robot arm, given by its URDF, as the measured person moves theirs",
     "stream": "stream results as 24 joints in real time, to programs that teleoperate robots",
     "benchmark": "measure how fast the tracker is on this machine (in a checkout)",

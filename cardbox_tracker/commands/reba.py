@@ -23,7 +23,7 @@ from cardbox_tracker.commands.rula import add_score_outputs, outputs_of, write_s
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of ``cardbox reba``."""
     add = parser.add_argument
-    add("table", type=Path, metavar="TABLE.csv", help="table of 'cardbox track --legs --csv'")
+    add("table", type=Path, metavar="TABLE.csv", help="table of 'cardbox track --detector'")
     add_score_outputs(parser)
     add("--person", type=at_least(1), metavar="K", help="whom of several people (default: 1)")
     add_seed(parser, "the samples of the postures")

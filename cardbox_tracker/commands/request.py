@@ -457,9 +457,6 @@ def tracking_request(options: argparse.Namespace, faults: Iterable[str] = ()) ->
                 "--hands needs the detector's wrists and knuckles: give --detector mediapipe"
             )
         hands = problems.caught(installed_hands, None)
-    # The option of this name of "cardbox rula" is a score.
-    if getattr(options, "legs", False) is True and not has_detector:
-        problems.add("--legs needs the detector's knees and ankles: give --detector mediapipe")
     problems.check()
     return TrackingRequest(
         recording, person, options.preset, config, options.seed, inputs_of(options), hands

@@ -53,12 +53,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="with --detector mediapipe: also tell open from closed hands, and measure palms and "
         "wrists, in further columns and in the video (docs/results.md)",
     )
-    parser.add_argument(
-        "--legs",
-        action="store_true",
-        help="has no effect: with --detector, hips, knees and ankles are always measured "
-        "(docs/results.md)",
-    )
     parser.add_argument("--video", type=Path, metavar="OUT.mp4", help="also write an overlay video")
     parser.add_argument(
         "--json",

@@ -159,7 +159,7 @@ def score_errors(
 def true_scores(session: RecordedSession, body: BodyModel, rula: RulaConfig) -> ScoreArray:
     """Return the grand scores (n,) of the true joints with the lengths of ``body``."""
     postures = true_postures(session)
-    return rula_scores(body, postures, rula).grand
+    return rula_scores(body, postures, rula)["grand"]
 
 
 def score_error(scores: list[ScoreDistribution], truth: ScoreArray) -> ScoreError:

@@ -167,16 +167,6 @@ def test_hands_need_the_detector_and_its_file(film: Path, monkeypatch: pytest.Mo
         assert "--hands needs the detector" in refused(film, *given, *words, "--hands")
 
 
-def test_legs_need_the_detector(film: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(detector_module, "installed_models", lambda: ModelFiles(film, film))
-    given = ("--fov", 60, "--stature", 1.7)
-    with_legs = asked(film, *given, "--detector", "mediapipe", "--legs")
-    assert with_legs == asked(film, *given, "--detector", "mediapipe")
-    points = "--detector", film.parent / "points.csv"
-    for words in ((), points, ("--silhouettes", "detector")):
-        assert "--legs needs the detector" in refused(film, *given, *words, "--legs")
-
-
 NEEDED = {
     "--fov DEG or --calibration FILE": ("--fov", "60"),
     "--background T0:T1 or --within M": ("--background", "0:1"),

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from cardbox_tracker.camera.camera import Camera
 from cardbox_tracker.camera.rasterisation import render
 from cardbox_tracker.detectors.figure import Figure
-from cardbox_tracker.detectors.identity import Identity
+from cardbox_tracker.detectors.identity import OTHER, Identity, apart, unlike
 from cardbox_tracker.detectors.image_points import ImagePoints
 from cardbox_tracker.person.cardbox import cardbox_patches
 from cardbox_tracker.person.model import BodyModel
@@ -59,6 +59,19 @@ def test_who_was_away_is_known_by_the_clothes_until_the_scene_was_empty() -> Non
     assert identity.is_same(figure(900.0), CLOTHES, 5_100_000_000)
     identity.nobody(65_200_000_000)
     assert identity.is_same(figure(0.0), OTHERS, 65_300_000_000)
+
+
+@pytest.mark.parametrize(("distance", "is_alike"), [(0.5, True), (0.7, False)])
+def test_colours_as_far_apart_as_0_6_tell_the_same_person(distance: float, is_alike: bool) -> None:
+    """One person's are 0.1 to 0.4 apart, those of different clothes 0.8 to 1."""
+    share = (1.0 - distance**2) ** 2
+    colours = np.array([share, 1.0 - share])
+    assert apart(CLOTHES, colours) == pytest.approx(distance)
+    identity = Identity()
+    for number in range(6):
+        identity.is_same(figure(0.0), CLOTHES, number * STEP_NS)
+    assert identity.is_same(figure(0.0), colours, 5_000_000_000) == is_alike
+    assert (unlike(None, CLOTHES, None, colours, 0) < OTHER) == is_alike
 
 
 def test_two_joints_of_one_part_at_their_limits() -> None:

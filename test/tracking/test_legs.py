@@ -46,6 +46,7 @@ SITTING = np.radians([85.0, 10.0, 0.0, 88.0, 85.0, 8.0, 0.0, 88.0])
 THIGH_SHARE, SHANK_SHARE = 0.236, 0.228
 # The detector's slope of a bone whose true slope is known, see the fit.
 FACTORS, OFFSETS = np.array([0.93, 0.68]), np.array([-0.04, -0.08])
+NO_ERROR = np.zeros(2)
 
 
 def estimate(
@@ -73,8 +74,13 @@ def joints_m(
     return CAMERA.reference_to_optical(np.array(legs))
 
 
-def seen(joints: FloatArray, found: Estimate, score: float = 1.0) -> ImagePoints:
-    """What a detector without noise finds of these joints, with its usual slopes."""
+def seen(
+    joints: FloatArray, found: Estimate, score: float = 1.0, off: FloatArray = NO_ERROR
+) -> ImagePoints:
+    """What a detector without noise finds of these joints, with its usual slopes.
+
+    The slopes of thigh and shank are ``off`` by two numbers.
+    """
     px, scores = np.full((len(POINT_NAMES), 2), np.nan), np.zeros(len(POINT_NAMES))
     spatial, legs_m = np.zeros((len(POINT_NAMES), 3)), np.zeros((len(LEG_POINT_NAMES), 3))
     legs_px = np.full((len(LEG_POINT_NAMES), 2), np.nan)
@@ -90,7 +96,8 @@ def seen(joints: FloatArray, found: Estimate, score: float = 1.0) -> ImagePoints
             at = LEG_POINT_NAMES.index(f"{side}_{name}")
             legs_px[at], legs_scores[at] = CAMERA.project(joints[number, part + 1]), score
             bone = joints[number, part + 1] - joints[number, part]
-            slope = (bone[2] / np.linalg.norm(bone) - OFFSETS[part]) / FACTORS[part]
+            slope = bone[2] / np.linalg.norm(bone) + off[part]
+            slope = (slope - OFFSETS[part]) / FACTORS[part]
             slope = float(np.clip(slope, -1.0, 1.0))
             end = end + np.array([0.0, np.sqrt(1.0 - slope**2), slope])
             legs_m[at] = end
@@ -138,6 +145,29 @@ def test_legs_are_found_where_they_are(angles: FloatArray, lower_m: float) -> No
     bends = np.degrees(legs.angles - angles)[[0, 3, 4, 7]]
     assert np.abs(bends).max() < 12.0
     assert set(legs.states) == {KeypointState.TRACKED}
+
+
+def test_straight_legs_are_straight_by_the_detectors_usual_slopes() -> None:
+    straight = np.zeros(8)
+    legs = read(straight, estimate(), images=1).legs
+    assert legs is not None
+    assert np.degrees(legs.angles) == pytest.approx(straight, abs=1.0)
+
+
+def test_a_wrong_slope_is_believed_by_its_deviation() -> None:
+    """That of the shank has a deviation of 0.12, that of the thigh 0.22; angles have 1 rad."""
+    found = estimate()
+    joints = joints_m(np.zeros(8), found)
+    believed = []
+    for part, off in enumerate((-0.3, 0.3)):
+        points = seen(joints, found, off=off * np.eye(2)[part])
+        legs = LegReader(BODY, CAMERA).see(frame(points), found).legs
+        assert legs is not None
+        bones = np.diff([legs.points_m[:3], joints[0]], axis=1)[:, part]
+        slopes = bones[:, 2] / np.linalg.norm(bones, axis=1)
+        believed.append((slopes[0] - slopes[1]) / off)
+    # With the deviations exchanged, these are 0.95 and 0.51.
+    assert believed == pytest.approx([0.83, 0.72], abs=0.06)
 
 
 def test_a_lifted_leg_is_not_pulled_to_the_floor() -> None:

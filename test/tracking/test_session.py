@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from itertools import permutations
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -238,6 +240,31 @@ def test_a_camera_that_misses_a_person_takes_their_place_from_the_other(detected
         found = people.track(seen)
         assert [one.person for one in found] == [1, 2]
         assert places(found) == pytest.approx([-0.6, 0.6], abs=0.15)
+
+
+def test_the_gap_between_two_lines_of_sight_by_hand() -> None:
+    """Both cameras look at the point 2.6 m before them, where a trunk of 0.5 m has 50 px."""
+    turn = np.array([(0.5, 0.0, 0.75**0.5), (0.0, 1.0, 0.0), (-(0.75**0.5), 0.0, 0.5)])
+    middle_m = np.array([0.0, 0.0, 2.6])
+    other = OtherCamera(CAMERA, Extrinsics(turn, middle_m - turn @ middle_m))
+    people = Session([BODY], CAMERA, default_preset(), others=[other], people=2)
+    people._last_ns = 1
+
+    def gap(trunk_px: float, other_px: float, lower_px: float = 0.0) -> float:
+        here, there = (
+            SimpleNamespace(middle_px=(159.5, row), trunk_px=px)
+            for row, px in ((119.5, trunk_px), (119.5 + lower_px, other_px))
+        )
+        seen: Any = SimpleNamespace(sights=[SimpleNamespace(seen_ns=1, figure=here)])
+        shown: Any = SimpleNamespace(figure=there)
+        return people._gap(seen, 1, shown)
+
+    assert gap(50.0, 50.0) == pytest.approx(0.0, abs=1e-9)
+    # A trunk that looks twice as long has (ln 2 / 0.4)^2, as one that looks half as long.
+    assert gap(50.0, 100.0) == pytest.approx(3.003, abs=1e-3)
+    assert gap(25.0, 100.0) == pytest.approx(6.006, abs=1e-3)
+    # 15 px lower are 0.15 m at 2.6 m.
+    assert gap(50.0, 50.0, 15.0) == pytest.approx(1.0, abs=0.02)
 
 
 def test_pixels_of_others_do_not_count() -> None:

@@ -29,8 +29,6 @@ import numpy as np
 from cardbox_tracker.applications.ergonomics.recording import RulaRow
 from cardbox_tracker.applications.ergonomics.rula import (
     INDEPENDENT,
-    NECK_EXTENDED_DEG,
-    NECK_TWISTED_DEG,
     NOT_MEASURED,
     SAMPLES,
     WRISTS,
@@ -38,15 +36,18 @@ from cardbox_tracker.applications.ergonomics.rula import (
     Method,
     ScoreArray,
     ScoreDistribution,
+    Scores,
     distribution_of,
     elbow_scores,
     measured_wrists,
     neck_samples,
+    neck_scores,
     of_both_arms,
     part,
     table_of,
     trunk_scores,
     upper_arm_scores,
+    with_arms,
     wrist_samples,
     wrist_scores,
 )
@@ -54,9 +55,9 @@ from cardbox_tracker.common.errors import CardboxError
 from cardbox_tracker.common.settings import setting
 from cardbox_tracker.person.hands import WRIST_NAMES
 from cardbox_tracker.person.legs import LEG_KEYPOINT_NAMES, LEG_NAMES, leg_directions
-from cardbox_tracker.person.posture import LEFT_ARM, PITCH, RIGHT_ARM
+from cardbox_tracker.person.posture import PITCH
 from cardbox_tracker.person.sizes import FloatArray
-from cardbox_tracker.person.skeleton import JOINT_NAMES, NECK_NAMES, KeypointState, arm_directions
+from cardbox_tracker.person.skeleton import JOINT_NAMES, NECK_NAMES, KeypointState
 from cardbox_tracker.recordings.result_reader import Results
 from cardbox_tracker.recordings.result_table import LEG_POINT_COLUMNS, POINT_COLUMNS
 from cardbox_tracker.search.particles import normal_postures
@@ -149,28 +150,6 @@ TABLE_C: ScoreArray = table_of(
 """Score of body and load (12), and of arm and coupling (12)."""
 
 
-class ArmScores(NamedTuple):
-    """Scores (...) of one arm: its parts, ``TABLE_B``, and the grand score with this arm."""
-
-    upper_arm: ScoreArray
-    lower_arm: ScoreArray
-    wrist: ScoreArray
-    table_b: ScoreArray
-    grand: ScoreArray
-
-
-class RebaScores(NamedTuple):
-    """Scores (...) of arms and body; ``grand`` is that of the worse arm, 1 to 15."""
-
-    left: ArmScores
-    right: ArmScores
-    trunk: ScoreArray
-    neck: ScoreArray
-    legs: ScoreArray
-    table_a: ScoreArray
-    grand: ScoreArray
-
-
 REBA = Method(
     "REBA",
     15,
@@ -224,12 +203,12 @@ class Seen(NamedTuple):
 
 
 def images_of(results: Results) -> list[Seen]:
-    """Return the images of a table of ``cardbox track --legs``; CardboxError if it has no legs."""
+    """Return the images of a table of results; CardboxError if it has no legs."""
     missing = [name for name in LEG_NAMES if name not in results.numbers]
     if missing:
         raise CardboxError(
             f"{results.path} has no column {missing[0]}; make a table with 'cardbox track "
-            "RECORDING --detector mediapipe --legs --csv OUT.csv'"
+            "RECORDING --detector mediapipe --csv OUT.csv'"
         )
     shape = len(results.state), 2, 3, 3
     legs_m = results.of(LEG_POINT_COLUMNS).reshape(shape)
@@ -311,17 +290,11 @@ def _distribution(
         angles, deviations = seen.legs
         legs = angles + INDEPENDENT * deviations * rng.standard_normal((SAMPLES, len(angles)))
     wrists = wrist_samples(seen.wrists, SAMPLES, rng)
-    scores = reba_scores(postures, config, necks, legs, seen.lengths_m, wrists, is_seated)
-    of_mean = reba_scores(
-        mean,
-        config,
-        None if seen.neck is None else seen.neck[0],
-        None if seen.legs is None else seen.legs[0],
-        seen.lengths_m,
-        seen.wrists[0],
-        is_seated,
-    )
-    return distribution_of(scores, REBA, int(of_mean.grand))
+    rest = seen.lengths_m, is_seated
+    scores = reba_scores(postures, config, necks, legs, wrists, *rest)
+    neck, leg = (None if one is None else one[0] for one in (seen.neck, seen.legs))
+    of_mean = reba_scores(mean, config, neck, leg, seen.wrists[0], *rest)
+    return distribution_of(scores, REBA, int(of_mean["grand"]))
 
 
 def reba_scores(
@@ -329,10 +302,10 @@ def reba_scores(
     config: RebaConfig,
     necks: FloatArray | None = None,
     legs: FloatArray | None = None,
-    lengths_m: FloatArray | None = None,
     wrists: FloatArray | None = None,
+    lengths_m: FloatArray | None = None,
     is_seated: bool = False,
-) -> RebaScores:
+) -> Scores:
     """Return the scores of postures.
 
     Args:
@@ -340,31 +313,35 @@ def reba_scores(
         config: settings.
         necks: ``neck_yaw`` and ``neck_pitch`` of each posture, (..., 2), rad; None if unknown.
         legs: ``LEG_NAMES`` of each posture, (..., 8), rad; None if unknown.
-        lengths_m: see :class:`Seen`; needed with legs.
         wrists: flexion and deviation of the left and the right wrist in each posture,
             (..., 2, 2), rad; nan or None if unknown.
+        lengths_m: see :class:`Seen`; needed with legs.
         is_seated: whether the person sits, so that bent knees do not count.
     """
-    d = np.asarray(postures, np.float64)
-    if wrists is None:
-        wrists = np.full((*d.shape[:-1], 2, 2), np.nan)
-    is_far_back = np.degrees(d[..., PITCH]) < -60.0
-    trunk = trunk_scores(d, config) - is_far_back
-    neck = np.full(trunk.shape, config.neck) if necks is None else _neck(necks)
+    is_far_back = np.degrees(postures[..., PITCH]) < -60.0
+    trunk = trunk_scores(postures, config) - is_far_back
+    neck = np.full(trunk.shape, config.neck) if necks is None else neck_scores(necks, 2, 20.0)
     leg = np.full(trunk.shape, config.legs)
     if legs is not None and lengths_m is not None:
         leg = _legs(legs, lengths_m, is_seated)
     table_a = TABLE_A[trunk - 1, neck - 1, leg - 1]
     body = np.minimum(table_a + config.load, 12)
-    left = _arm(d[..., LEFT_ARM], 1.0, wrists[..., 0, :], body, config)
-    right = _arm(d[..., RIGHT_ARM], -1.0, wrists[..., 1, :], body, config)
-    return RebaScores(left, right, trunk, neck, leg, table_a, np.maximum(left.grand, right.grand))
 
+    def arm(upper: FloatArray, fore: FloatArray, side: float, angles: FloatArray) -> Scores:
+        upper_arm, lower_arm = upper_arm_scores(upper, side, config), elbow_scores(upper, fore)
+        wrist = wrist_scores(angles, (15.0,), config.wrist)
+        table_b = TABLE_B[upper_arm - 1, lower_arm - 1, wrist - 1]
+        grand = TABLE_C[body - 1, np.minimum(table_b + config.coupling, 12) - 1] + config.activity
+        return {
+            "upper_arm": upper_arm,
+            "lower_arm": lower_arm,
+            "wrist": wrist,
+            "table_b": table_b,
+            "grand": grand,
+        }
 
-def _neck(necks: FloatArray) -> ScoreArray:
-    yaw_deg, pitch_deg = (np.degrees(necks[..., joint]) for joint in (0, 1))
-    score = np.where((pitch_deg > 20.0) | (pitch_deg < -NECK_EXTENDED_DEG), 2, 1)
-    return np.asarray(score + (np.abs(yaw_deg) > NECK_TWISTED_DEG))
+    of_body = {"trunk": trunk, "neck": neck, "legs": leg, "table_a": table_a}
+    return with_arms(of_body, postures, wrists, arm)
 
 
 def _legs(angles: FloatArray, lengths_m: FloatArray, is_seated: bool) -> ScoreArray:
@@ -410,16 +387,3 @@ def sits(angles: FloatArray, pitch: FloatArray, lengths_m: FloatArray) -> ScoreA
     slopes_rad = np.abs(np.arcsin(knee_m[..., 2] / np.linalg.norm(knee_m, axis=-1)))
     is_level = (slopes_rad < _LEVEL_RAD).all(axis=0)
     return np.asarray(is_level & (centre_m < heels_m - _MARGIN_M))
-
-
-def _arm(
-    angles: FloatArray, side: float, wrists: FloatArray, body: ScoreArray, config: RebaConfig
-) -> ArmScores:
-    """Return the scores of arms (..., 4) with wrists (..., 2); ``side`` is +1 for left ones."""
-    upper, fore = arm_directions(angles, side)
-    upper_arm, lower_arm = upper_arm_scores(upper, side, config), elbow_scores(upper, fore)
-    wrist = wrist_scores(wrists, (15.0,), config.wrist)
-    table_b = TABLE_B[upper_arm - 1, lower_arm - 1, wrist - 1]
-    arm = np.minimum(table_b + config.coupling, 12)
-    grand = TABLE_C[body - 1, arm - 1] + config.activity
-    return ArmScores(upper_arm, lower_arm, wrist, table_b, np.asarray(grand))

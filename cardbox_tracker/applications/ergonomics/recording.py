@@ -226,7 +226,7 @@ def score_shares(
     for name in method.measurable:
         known = {name in row.measured for row in scored}
         sources[name] = MIXED if len(known) > 1 else (DECLARED, MEASURED)[known == {True}]
-    for name, words, highest, _ in method.parts:
+    for name, words, highest in method.parts:
         source = sources.get(name, MIXED if "table" in name else MEASURED)
         time_s = _time_at(rows, name, highest)
         shares.append(ScoreShares(name, words, source, time_s))

@@ -20,11 +20,10 @@ count from 1, so an index into a table or into chances is the score less one.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, fields
-from operator import attrgetter
 from types import MappingProxyType
-from typing import Any, ClassVar, NamedTuple
+from typing import ClassVar, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -138,6 +137,9 @@ def declared(
 
 
 ScoreArray = NDArray[np.int64]
+Scores = Mapping[str, ScoreArray]
+"""Scores (...) by the names of the parts. ``left_grand`` and ``right_grand`` are the grand scores
+with one arm, and ``grand`` is that of the worse one; tables are without load and muscle use."""
 
 # The papers name no angle for these words.
 ABDUCTED_DEG, OUTWARDS_DEG, NECK_TWISTED_DEG, WRIST_ASIDE_DEG, SIDE_BENT_DEG = 30, 30, 20, 15, 10
@@ -207,50 +209,20 @@ TABLE_C: ScoreArray = table_of(
 """Grand score: wrist and arm (8 or more), neck, trunk and legs (7 or more)."""
 
 
-class ArmScores(NamedTuple):
-    """Scores (...) of one arm: its parts, ``TABLE_A``, and the grand score with this arm."""
-
-    upper_arm: ScoreArray
-    lower_arm: ScoreArray
-    wrist: ScoreArray
-    table_a: ScoreArray
-    grand: ScoreArray
-
-
-class RulaScores(NamedTuple):
-    """Scores (...) of both arms and the trunk; ``grand`` is that of the worse arm, 1 to 7.
-
-    ``neck`` is that of the settings if the angles of the neck are not known. ``table_b`` is the
-    score of neck, trunk and legs without load and muscle use.
-    """
-
-    left: ArmScores
-    right: ArmScores
-    trunk: ScoreArray
-    grand: ScoreArray
-    neck: ScoreArray
-    table_b: ScoreArray
-
-
 class Part(NamedTuple):
-    """A part score: column of the tables and place among all scores, words, highest score."""
+    """A part score: column of the tables, words, highest score."""
 
     name: str
     words: str
     highest: int
-    place: str
-
-    def of(self, scores: Any) -> ScoreArray:
-        """Return the part's scores among all."""
-        return np.asarray(attrgetter(self.place)(scores))
 
 
 def part(words: str, highest: int, side: str = "") -> Part:
     """Return a part of the body, or of the arm of a ``side``, by its words."""
     name = words.lower().replace(" ", "_")
-    if not side:
-        return Part(name, words, highest, name)
-    return Part(f"{side}_{name}", f"{words}, {side}", highest, f"{side}.{name}")
+    return (
+        Part(f"{side}_{name}", f"{words}, {side}", highest) if side else Part(name, words, highest)
+    )
 
 
 def of_both_arms(words: str, highest: int) -> tuple[Part, Part]:
@@ -380,7 +352,7 @@ def sampled_scores(
     bent = wrist_samples(wrists, len(drawn), rng)
     found = score_distribution(body, posture + INDEPENDENT * (drawn - posture), config, necks, bent)
     known = np.where(np.isfinite(wrists[1]), wrists[0], np.nan)
-    of_mean = rula_scores(body, posture, config, angles, known).grand
+    of_mean = rula_scores(body, posture, config, angles, known)["grand"]
     return found._replace(of_mean=int(of_mean)), measured
 
 
@@ -395,14 +367,15 @@ def score_distribution(
     return distribution_of(rula_scores(body, postures, config, necks, wrists), RULA)
 
 
-def distribution_of(scores: Any, method: Method, of_mean: int = 0) -> ScoreDistribution:
+def distribution_of(scores: Scores, method: Method, of_mean: int = 0) -> ScoreDistribution:
     """Return the distribution of the scores (n,) of equally likely postures."""
 
-    def chances(found: ScoreArray, highest: int = method.highest) -> FloatArray:
+    def chances(name: str, highest: int = method.highest) -> FloatArray:
+        found = scores[name]
         return np.asarray(np.bincount(found, minlength=highest + 1)[1:] / len(found))
 
-    parts = {part.name: chances(part.of(scores), part.highest) for part in method.parts}
-    grand, left, right = (chances(one.grand) for one in (scores, scores.left, scores.right))
+    parts = {part.name: chances(part.name, part.highest) for part in method.parts}
+    grand, left, right = map(chances, ("grand", "left_grand", "right_grand"))
     return ScoreDistribution(grand, left, right, parts, of_mean)
 
 
@@ -412,22 +385,60 @@ def rula_scores(
     config: RulaConfig,
     necks: FloatArray | None = None,
     wrists: FloatArray | None = None,
-) -> RulaScores:
+) -> Scores:
     """Return the scores of postures (..., 12), rad and metres, of ``body``.
 
     ``necks`` (..., 2) are ``neck_yaw`` and ``neck_pitch``, rad, or None; ``wrists`` (..., 2, 2)
     flexion and deviation of the left and the right wrist, rad, nan or None if unknown.
     """
-    d = np.asarray(postures, dtype=np.float64)
-    if wrists is None:
-        wrists = np.full((*d.shape[:-1], 2, 2), np.nan)
-    trunk = trunk_scores(d, config)
-    neck = np.full(trunk.shape, config.neck) if necks is None else _neck(necks)
+    trunk = trunk_scores(postures, config)
+    neck = np.full(trunk.shape, config.neck) if necks is None else neck_scores(necks, 4, 10.0, 20.0)
     table_b = TABLE_B[neck - 1, trunk - 1, config.legs - 1]
     rest = table_b + config.body_muscle_use + config.body_load
-    left = _arm(body, d[..., LEFT_ARM], 1.0, wrists[..., 0, :], rest, config)
-    right = _arm(body, d[..., RIGHT_ARM], -1.0, wrists[..., 1, :], rest, config)
-    return RulaScores(left, right, trunk, np.maximum(left.grand, right.grand), neck, table_b)
+    parts = body_parts(body.sizes)
+
+    def arm(upper: FloatArray, fore: FloatArray, side: float, angles: FloatArray) -> Scores:
+        hand_m = parts.shoulder_aside_m + side * (
+            parts.upper_arm.height_m * upper[..., 1] + parts.forearm.height_m * fore[..., 1]
+        )
+        is_away = (hand_m < 0.0) | (_aside_deg(fore, side) > OUTWARDS_DEG)
+        upper_arm = upper_arm_scores(upper, side, config)
+        lower_arm = elbow_scores(upper, fore) + is_away
+        wrist = wrist_scores(angles, (WRIST_NEUTRAL_DEG, 15.0), config.wrist)
+        table_a = TABLE_A[upper_arm - 1, lower_arm - 1, wrist - 1, config.wrist_twist - 1]
+        grand = grand_score(table_a + config.arm_muscle_use + config.arm_load, rest)
+        return {
+            "upper_arm": upper_arm,
+            "lower_arm": lower_arm,
+            "wrist": wrist,
+            "table_a": table_a,
+            "grand": grand,
+        }
+
+    return with_arms({"trunk": trunk, "neck": neck, "table_b": table_b}, postures, wrists, arm)
+
+
+def with_arms(
+    body: Scores,
+    postures: FloatArray,
+    wrists: FloatArray | None,
+    arm: Callable[[FloatArray, FloatArray, float, FloatArray], Scores],
+) -> Scores:
+    """Return the scores of the ``body`` with those of both arms in postures (..., 12).
+
+    ``arm`` returns the scores of an arm for the directions (..., 3) of upper arm and forearm in the
+    trunk's frame, +1 for left or -1, and the angles (..., 2) of the wrist, rad, nan if unknown.
+    """
+    if wrists is None:
+        wrists = np.full((*postures.shape[:-1], 2, 2), np.nan)
+    found = dict(body)
+    for number, (name, joints, side) in enumerate(
+        (("left", LEFT_ARM, 1.0), ("right", RIGHT_ARM, -1.0))
+    ):
+        directions = arm_directions(postures[..., joints], side)
+        scores = arm(*directions, side, wrists[..., number, :])
+        found |= {f"{name}_{part}": of_part for part, of_part in scores.items()}
+    return found | {"grand": np.maximum(found["left_grand"], found["right_grand"])}
 
 
 def trunk_scores(postures: FloatArray, config: ErgonomicConfig) -> ScoreArray:
@@ -437,36 +448,15 @@ def trunk_scores(postures: FloatArray, config: ErgonomicConfig) -> ScoreArray:
     return np.asarray(trunk + config.trunk_twisted)
 
 
-def _neck(necks: FloatArray) -> ScoreArray:
+def neck_scores(necks: FloatArray, extended: int, *limits_deg: float) -> ScoreArray:
+    """Return the scores of necks (..., 2), rad; a neck in extension has the score ``extended``.
+
+    The score is 1 up to the first of the limits of the flexion, and 1 more beyond each of them; a
+    twisted neck adds 1.
+    """
     yaw_deg, pitch_deg = (np.degrees(necks[..., joint]) for joint in (0, 1))
-    flexed = _steps(pitch_deg, 10.0, 20.0)
-    score = np.where(pitch_deg < -NECK_EXTENDED_DEG, 4, flexed)
+    score = np.where(pitch_deg < -NECK_EXTENDED_DEG, extended, _steps(pitch_deg, *limits_deg))
     return np.asarray(score + (np.abs(yaw_deg) > NECK_TWISTED_DEG))
-
-
-def _arm(
-    body: BodyModel,
-    angles: FloatArray,
-    side: float,
-    wrists: FloatArray,
-    rest: ScoreArray,
-    config: RulaConfig,
-) -> ArmScores:
-    """Return the scores of arms (..., 4) with wrists (..., 2); ``side`` is +1 for left ones."""
-    upper, fore = arm_directions(angles, side)
-    upper_arm = upper_arm_scores(upper, side, config)
-    fore_aside_deg = _aside_deg(fore, side)
-    parts = body_parts(body.sizes)
-    hand_m = parts.shoulder_aside_m + side * (
-        parts.upper_arm.height_m * upper[..., 1] + parts.forearm.height_m * fore[..., 1]
-    )
-    is_away = (hand_m < 0.0) | (fore_aside_deg > OUTWARDS_DEG)
-    lower_arm = elbow_scores(upper, fore) + is_away
-
-    wrist = wrist_scores(wrists, (WRIST_NEUTRAL_DEG, 15.0), config.wrist)
-    table_a = TABLE_A[upper_arm - 1, lower_arm - 1, wrist - 1, config.wrist_twist - 1]
-    arm = table_a + config.arm_muscle_use + config.arm_load
-    return ArmScores(upper_arm, lower_arm, wrist, table_a, grand_score(arm, rest))
 
 
 def wrist_scores(wrists: FloatArray, limits_deg: Sequence[float], declared: int) -> ScoreArray:

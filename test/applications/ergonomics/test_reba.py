@@ -49,15 +49,15 @@ def legs_of(degrees: dict[int, float], pitch: float = 0.0) -> int:
     for at, angle in degrees.items():
         angles[at] = np.radians(angle)
     body = posture(torso_pitch=pitch)
-    return int(reba_scores(body, CONFIG, legs=angles, lengths_m=LENGTHS_M).legs)
+    return int(reba_scores(body, CONFIG, legs=angles, lengths_m=LENGTHS_M)["legs"])
 
 
 def test_a_person_who_stands_upright_has_the_least_scores() -> None:
     """Trunk, neck and legs 1: A = 1. Upper arm 1, straight elbow 2, wrist 1: B = 1. C = 1."""
-    found = reba_scores(np.zeros(12), CONFIG, np.zeros(2), STANDING, LENGTHS_M)
-    assert (found.trunk, found.neck, found.legs, found.table_a) == (1, 1, 1, 1)
-    assert (found.left.upper_arm, found.left.lower_arm, found.left.table_b) == (1, 2, 1)
-    assert found.grand == 1
+    found = reba_scores(np.zeros(12), CONFIG, np.zeros(2), STANDING, lengths_m=LENGTHS_M)
+    assert (found["trunk"], found["neck"], found["legs"], found["table_a"]) == (1, 1, 1, 1)
+    assert (found["left_upper_arm"], found["left_lower_arm"], found["left_table_b"]) == (1, 2, 1)
+    assert found["grand"] == 1
 
 
 def test_a_bowed_person_who_lifts_by_hand() -> None:
@@ -69,13 +69,13 @@ def test_a_bowed_person_who_lifts_by_hand() -> None:
     bowed = posture(torso_pitch=65.0, right_shoulder_flexion=50.0)
     legs = np.radians([20.0, 0.0, 0.0, 40.0] * 2)
     config = replace(CONFIG, load=2, coupling=2)
-    found = reba_scores(bowed, config, np.radians([0.0, 25.0]), legs, LENGTHS_M)
-    assert (found.trunk, found.neck, found.legs, found.table_a) == (4, 2, 2, 6)
-    assert (found.right.upper_arm, found.right.lower_arm, found.right.table_b) == (3, 2, 4)
-    assert found.right.grand == 10
-    assert found.grand == 10
+    found = reba_scores(bowed, config, np.radians([0.0, 25.0]), legs, lengths_m=LENGTHS_M)
+    assert (found["trunk"], found["neck"], found["legs"], found["table_a"]) == (4, 2, 2, 6)
+    assert (found["right_upper_arm"], found["right_lower_arm"], found["right_table_b"]) == (3, 2, 4)
+    assert found["right_grand"] == 10
+    assert found["grand"] == 10
     # Neck and legs as declared: table A has 3, and 5 with the load; table C has 7 for (5, 6).
-    assert reba_scores(bowed, replace(config, activity=2)).grand == 7 + 2
+    assert reba_scores(bowed, replace(config, activity=2))["grand"] == 7 + 2
 
 
 @pytest.mark.parametrize(
@@ -85,14 +85,14 @@ def test_a_bowed_person_who_lifts_by_hand() -> None:
 def test_scores_of_the_trunk(pitch: float, roll: float, expected: int) -> None:
     body = np.zeros(12)
     body[[PITCH, ROLL]] = np.radians([pitch, roll])
-    assert reba_scores(body, CONFIG).trunk == expected
+    assert reba_scores(body, CONFIG)["trunk"] == expected
 
 
 @pytest.mark.parametrize(
     ("yaw", "pitch", "expected"), [(0, 15, 1), (0, 25, 2), (0, -15, 2), (30, 0, 2), (30, 25, 3)]
 )
 def test_scores_of_the_neck(yaw: float, pitch: float, expected: int) -> None:
-    assert reba_scores(np.zeros(12), CONFIG, np.radians([yaw, pitch])).neck == expected
+    assert reba_scores(np.zeros(12), CONFIG, np.radians([yaw, pitch]))["neck"] == expected
 
 
 def test_scores_of_the_legs() -> None:
@@ -138,7 +138,7 @@ def test_who_sits_is_found(hip: float, knee: float, lean: float) -> None:
 def test_what_is_not_measured_counts_as_declared() -> None:
     config = replace(CONFIG, neck=3, legs=4)
     found = reba_scores(np.zeros(12), config)
-    assert (found.neck, found.legs, found.table_a) == (3, 4, 6)
+    assert (found["neck"], found["legs"], found["table_a"]) == (3, 4, 6)
     names = [one.name for one in declared(config, ("neck", "legs"))]
     assert "neck" not in names and "legs" not in names
     assert {"load", "coupling", "activity", "wrist"} <= set(names)
@@ -150,9 +150,9 @@ def test_what_is_not_measured_counts_as_declared() -> None:
 def test_wrists_by_hand(flexion_deg: float, deviation_deg: float, score: int) -> None:
     wrists = np.radians([(np.nan, np.nan), (flexion_deg, deviation_deg)])
     found = reba_scores(np.zeros(12), replace(CONFIG, wrist=3), wrists=wrists)
-    assert (found.left.wrist, found.right.wrist) == (3, score)
+    assert (found["left_wrist"], found["right_wrist"]) == (3, score)
     # Upper arm 1, straight elbow 2.
-    assert found.right.table_b == (1, 2, 3)[score - 1]
+    assert found["right_table_b"] == (1, 2, 3)[score - 1]
 
 
 def test_wrists_of_a_table_are_read(tmp_path: Path) -> None:
@@ -240,7 +240,7 @@ def test_hidden_legs_count_as_declared(tmp_path: Path) -> None:
 def test_a_table_without_legs_is_refused(tmp_path: Path) -> None:
     path = table(tmp_path / "a.csv", SEATED)
     path.write_text(path.read_text().replace("left_hip_flexion", "other"))
-    with pytest.raises(CardboxError, match="--legs --csv"):
+    with pytest.raises(CardboxError, match="--detector mediapipe --csv"):
         images_of(read_results(path))
     with pytest.raises(CardboxError, match="there are no results"):
         images_of(read_results(tmp_path / "none.csv"))

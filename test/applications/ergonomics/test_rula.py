@@ -41,8 +41,8 @@ def posture(**angles_deg: float) -> np.ndarray:
 def scores(config: RulaConfig | None = None, **angles_deg: float) -> tuple[int, ...]:
     """Upper arm, lower arm, trunk, grand score, of the left arm; the right one hangs."""
     found = rula_scores(BODY, posture(**angles_deg), config or RulaConfig())
-    left = found.left
-    return tuple(map(int, (left.upper_arm, left.lower_arm, found.trunk, left.grand)))
+    names = "left_upper_arm", "left_lower_arm", "trunk", "left_grand"
+    return tuple(int(found[name]) for name in names)
 
 
 @pytest.mark.parametrize(
@@ -114,8 +114,8 @@ def test_wrists_by_hand(flexion_deg: float, deviation_deg: float, score: int) ->
     wrists = np.radians([(flexion_deg, deviation_deg), (np.nan, np.nan)])
     bent = posture(left_elbow_flexion=80, right_elbow_flexion=80)
     found = rula_scores(BODY, bent, RulaConfig(wrist=2), wrists=wrists)
-    assert (found.left.wrist, found.right.wrist) == (score, 2)
-    assert found.left.table_a == (1, 2, 2, 3)[score - 1]
+    assert (found["left_wrist"], found["right_wrist"]) == (score, 2)
+    assert found["left_table_a"] == (1, 2, 2, 3)[score - 1]
 
 
 def test_a_wrist_counts_with_all_of_its_deviation() -> None:
@@ -137,7 +137,7 @@ def test_tables_count_without_load_and_muscle_use() -> None:
     config = RulaConfig(wrist=3, wrist_twist=2, arm_load=2, legs=2, body_muscle_use=1)
     found = rula_scores(BODY, posture(left_shoulder_abduction=100, torso_pitch=30), config)
     # Upper arm 5, lower arm 3, wrist 3, twist 2; upper arm 1, lower arm 2; neck 1, trunk 3, legs 2.
-    assert (found.left.table_a, found.right.table_a, found.table_b) == (7, 3, 4)
+    assert (found["left_table_a"], found["right_table_a"], found["table_b"]) == (7, 3, 4)
     spread = score_distribution(BODY, posture(torso_pitch=30)[None], config)
     assert {name: len(chances) for name, chances in spread.parts.items()} == {
         part.name: part.highest for part in RULA.parts
@@ -183,8 +183,8 @@ def test_a_known_neck_replaces_the_declared_one(
 ) -> None:
     angles = np.radians([yaw_deg, pitch_deg])
     found = rula_scores(BODY, posture(), RulaConfig(neck=6), angles)
-    assert (int(found.neck), int(found.grand)) == (neck, grand)
-    assert int(rula_scores(BODY, posture(), RulaConfig(neck=6)).neck) == 6
+    assert (int(found["neck"]), int(found["grand"])) == (neck, grand)
+    assert int(rula_scores(BODY, posture(), RulaConfig(neck=6))["neck"]) == 6
 
 
 def test_an_uncertain_neck_spreads_the_score() -> None:
@@ -206,8 +206,11 @@ def test_an_uncertain_neck_spreads_the_score() -> None:
 def test_the_worse_arm_decides_and_sides_are_alike() -> None:
     left = rula_scores(BODY, posture(left_shoulder_abduction=100), RulaConfig())
     right = rula_scores(BODY, posture(right_shoulder_abduction=100), RulaConfig())
-    assert left.grand == left.left.grand > left.right.grand
-    assert (left.left, left.right) == (right.right, right.left)
+    assert left["grand"] == left["left_grand"] > left["right_grand"]
+    mirrored = {"left": "right", "right": "left"}
+    for name, score in left.items():
+        side, _, rest = name.partition("_")
+        assert right[f"{mirrored[side]}_{rest}" if side in mirrored else name] == score
 
 
 @given(
@@ -217,8 +220,8 @@ def test_the_worse_arm_decides_and_sides_are_alike() -> None:
 def test_every_posture_has_a_score(share: np.ndarray, config: RulaConfig) -> None:
     low, high = TURNING_LIMITS.T
     found = rula_scores(BODY, (low + share * (high - low))[None], config)
-    assert 1 <= found.grand[0] <= 7
-    assert found.grand[0] == max(found.left.grand[0], found.right.grand[0])
+    assert 1 <= found["grand"][0] <= 7
+    assert found["grand"][0] == max(found["left_grand"][0], found["right_grand"][0])
 
 
 def test_a_posture_on_a_line_is_as_likely_on_either_side() -> None:

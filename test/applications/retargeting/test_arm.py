@@ -65,6 +65,20 @@ def test_the_robots_segments_point_as_the_persons(turn_deg: float) -> None:
     assert cosines[2] > np.cos(np.radians(6.0))
 
 
+@pytest.mark.parametrize(
+    ("error", "other", "swings"),
+    [(0.2, 0.11, False), (0.2, 0.09, True), (0.08, 0.03, True), (0.06, 0.0, False)],
+)
+def test_an_arm_swings_only_from_a_bad_solution_to_a_much_better_one(
+    error: float, other: float, swings: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Bad is 0.07, about 15 degrees; much better is half of the squared error."""
+    follower, errors = ArmFollower(ROBOT, RetargetConfig()), iter([error, other])
+    monkeypatch.setattr(follower, "_solved", lambda start, wanted: (start, next(errors)))
+    now = np.full(7, 0.1)
+    assert (follower.target(BODY, posture(), now) != now).any() == swings
+
+
 @hypothesis_settings(max_examples=15, deadline=None)
 @given(st.lists(st.floats(-1, 1), min_size=7, max_size=7))
 def test_the_derivatives_are_those_of_the_directions(positions: list[float]) -> None:
