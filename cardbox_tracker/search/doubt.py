@@ -64,9 +64,9 @@ _MEMORY = 0.5
 # What stays, from one image to the next, of the doubt about hands beyond the present one: an arm
 # that was wrongly chosen is often rated well in single images.
 _DOUBT_STAYS = 0.85
-# Shares of the limit of this doubt below which a posture becomes sure, and stays so: a robot that
-# follows would stop and go on where the doubt is about the limit.
-_BECOMES_SURE, _STAYS_SURE = 0.95, 1.25
+# Share of the limit of this doubt below which a sure posture stays so: a robot that follows would
+# stop and go on where the doubt is about the limit.
+_STAYS_SURE = 1.25
 _FRESH_FRAMES = 15.0
 _AREAS, _PRIORS = (0.1, 3.0), (-0.2, 0.3)
 # Step of the numerical derivatives, rad and m.
@@ -166,8 +166,9 @@ class Doubt:
         is_uncertain = is_doubted
         # The paper's filter finds hands so badly that its state only says whether it is lost.
         if source is not Source.PAPER:
-            share = _STAYS_SURE if self._is_sure else _BECOMES_SURE
-            limit = min(share * doubtful_from, uncertain_from)
+            limit = doubtful_from
+            if self._is_sure:
+                limit = min(_STAYS_SURE * doubtful_from, uncertain_from)
             is_uncertain |= bool(self._hands.max() > limit)
             # An outline shows hands so badly that they make the images uncertain.
             if source is not Source.POINTS:
