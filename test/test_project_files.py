@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 import shlex
+import subprocess
 import xml.etree.ElementTree as ElementTree
 from pathlib import Path
 from typing import Any
@@ -127,3 +128,11 @@ def test_make_docs_builds_with_the_extra() -> None:
     setup = (ROOT / "setup.py").read_text(encoding="utf-8")
     for name in names.split("|"):
         assert f'"{name}": ' in setup
+
+
+def test_make_dist_installs_neither_ros_nor_the_tools_of_the_tests() -> None:
+    words = ["make", "--dry-run", "dist", "VENV=build/no_venv"]
+    done = subprocess.run(words, cwd=ROOT, capture_output=True, text=True, check=True)
+    (installed,) = re.findall(r"pip .*install (.*)", done.stdout)
+    assert re.fullmatch(r"--quiet 'setuptools[^ ]*'", installed)
+    assert "bdist_wheel" in done.stdout

@@ -45,6 +45,8 @@ FILTERS: MappingProxyType[str, MakeFilter] = MappingProxyType(
 )
 """Filter classes by the values of ``TrackerConfig.filter``."""
 
+# A model that overlaps the silhouette less than this is somewhere else.
+_TOUCHING_IOU = 0.05
 # A joint is at its limit within this angle, rad.
 _AT_LIMIT_RAD = np.radians(0.5)
 
@@ -335,6 +337,13 @@ class Tracker:
         if not fit.is_finite:
             # Without a reset, values that are not finite would stay in the particles.
             self.reset()
+            return Estimate(LOST)
+        is_detected = any(frame.points is not None for frame in frames)
+        if self.config.has_several_views and is_detected and fit.iou < _TOUCHING_IOU:
+            # The person is there, but not where the model is.
+            if self.config.relocalize:
+                self._before = None
+                self._filter.forget()
             return Estimate(LOST)
         self._before = np.append(fit.posture, np.zeros(2) if fit.offset_m is None else fit.offset_m)
         self._poor_frames = self._poor_frames + 1 if fit.is_poor else 0

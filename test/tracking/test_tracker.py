@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
 from typing import Any
@@ -568,6 +569,37 @@ def test_numbers_that_are_not_finite_never_leave_and_do_not_stay(part: str) -> N
         assert_sees_all_but_the_depth_of_hands(states[number])
     assert states[1].posture is None and states[1].keypoints_m is None
     assert _Infected.made == 3  # a new one after each ruin
+
+
+class _Elsewhere(_Infected):
+    """A filter whose model overlaps the silhouette by a share from its second frame on."""
+
+    def __init__(self, *given: Any, iou: float) -> None:
+        super().__init__(*given)
+        self._iou, self.forgot = iou, 0
+
+    def follow(self, frames: Any, terms: Any) -> Any:
+        fit = self._inner.follow(frames, terms)
+        self._frames += 1
+        return replace(fit, iou=self._iou, is_poor=False) if self._frames > 1 else fit
+
+    def forget(self) -> None:
+        self.forgot += 1
+        self._inner.forget()
+
+
+@pytest.mark.parametrize(
+    ("iou", "has_points", "is_lost"), [(0.04, True, True), (0.07, True, False), (0.0, False, False)]
+)
+def test_a_model_that_does_not_touch_whom_a_detector_sees_is_lost_at_once(
+    iou: float, has_points: bool, is_lost: bool, detected: Callable[..., ImagePoints]
+) -> None:
+    tracker = make(default_preset(), make_filter=partial(_Elsewhere, iou=iou))
+    points = detected(BODY, CAMERA, front()) if has_points else None
+    states = [tracker.track(Observation(seen(front()), points=points)).state for _ in range(2)]
+    assert [state == LOST for state in states] == [False, is_lost]
+    forgot: Any = tracker.filter
+    assert forgot.forgot == is_lost
 
 
 def test_an_image_of_another_size_is_refused() -> None:
