@@ -23,6 +23,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cardbox_tracker.camera.camera import Camera
+from cardbox_tracker.common.least_squares import (
+    Prior,
+    Residuals,
+    Solution,
+    differences,
+    minimize,
+    pseudo_huber,
+    weighted,
+)
 from cardbox_tracker.detectors.image_points import LEG_POINT_NAMES, POINT_INDEX, ImagePoints
 from cardbox_tracker.person.proportions import USUAL_STATURE_M, USUAL_STDDEV_M
 from cardbox_tracker.person.sizes import FloatArray
@@ -69,8 +78,9 @@ _BOWED, _BENT, _SITS = np.radians((50.0, 35.0, 35.0))
 _LEAST_SCORE, _LEAST_LEVELS, _BORDER = 0.5, 3, 0.02
 # Images of one person that count, and the time in which people keep posture and errors, s.
 _MOST_IMAGES, _SAME_S, _SITTING_IMAGES = 24, 4.0, 3.0
-# Residual from which on it counts less, deviations; rounds of the fit, and the last step.
-_ROBUST, _ROUNDS, _STEP, _LAST_STEP = 2.0, 60, 1e-5, 1e-6
+# Residual from which on it counts less, deviations; steps of the fit, the step of the differences,
+# and the share of the cost that the last step gains.
+_ROBUST, _ROUNDS, _STEP, _LEAST_GAIN = 2.0, 60, 1e-5, 1e-9
 # Nearest and farthest logarithm of a distance, statures.
 _NEAREST, _FARTHEST = np.log((0.3, 30.0))
 _SHARED, _OF_PERSON, _OF_IMAGE = 4, 2 * len(LEVELS) + 4, 7
@@ -193,15 +203,16 @@ def people_camera(
             last[:, None] + np.arange(_OF_IMAGE),
         ]
     )
-    found, _ = _fitted(seen, distance, own, mean, precision, mean)
+    found = _fitted(seen, distance, own, Prior(mean, precision), mean).values[0]
     # Most images show the floor, so in the second fit only the others may show something higher.
     high = found[last + _OF_IMAGE - 1]
     on_floor = np.abs(high - np.median(high)) < _ON_FLOOR
     precision[last[on_floor] + _OF_IMAGE - 1] *= (_STEP_UP / _FLOOR) ** 2
-    found, information = _fitted(seen, distance, own, mean, precision, found)
+    fit = _fitted(seen, distance, own, Prior(mean, precision), found)
+    found = fit.values[0]
     if not np.isfinite(found).all():
         return None
-    covariance: FloatArray = np.linalg.inv(information).astype(np.float64)
+    covariance: FloatArray = np.linalg.inv(fit.information[0]).astype(np.float64)
     variances = np.diag(covariance)[last + 1]
     distances = [
         Distances(seen.times_s[its], np.exp(found[last + 1])[its], math.sqrt(variances[its].mean()))
@@ -218,79 +229,51 @@ def _ends(values: FloatArray) -> FloatArray:
 
 
 def _fitted(
-    seen: _Seen,
-    distance: FloatArray,
-    own: NDArray[np.int64],
-    mean: FloatArray,
-    precision: FloatArray,
-    start: FloatArray,
-) -> tuple[FloatArray, FloatArray]:
-    """Return the unknowns and their information matrix by damped Gauss-Newton steps.
+    seen: _Seen, distance: FloatArray, own: NDArray[np.int64], prior: Prior, start: FloatArray
+) -> Solution:
+    """Return the unknowns that fit best.
 
     Args:
         seen: the images.
         distance: of each image to begin with, statures, (n,).
         own: numbers of the unknowns that each image depends on, (n, k).
-        mean: of the unknowns before anything is seen.
-        precision: inverse of their variances.
+        prior: what is known of the unknowns before anything is seen.
         start: values to begin with.
     """
     scale = distance[:, None, None] / seen.stddevs
+    images, weight = np.arange(len(own))[:, None, None], np.repeat(seen.weight, 2 * len(LEVELS))
 
-    def residuals(values: FloatArray) -> FloatArray:
-        return ((_rays(seen, values) - seen.rays) * scale).reshape(len(own), -1)
-
-    def cost(values: FloatArray) -> float:
-        robust = _ROBUST**2 * (np.sqrt(1.0 + (residuals(values[own]) / _ROBUST) ** 2) - 1.0)
-        prior = precision @ (values - mean) ** 2 / 2
-        return float((robust.sum(axis=1) * seen.weight).sum() + prior)
-
-    values, damping, information = start, 1e-3, np.diag(precision)
-    before = cost(values)
-    eye = np.eye(own.shape[1])
-    for _ in range(_ROUNDS):
-        away = residuals(values[own])
-        slopes = np.stack([residuals(values[own] + _STEP * one) - away for one in eye], 2) / _STEP
-        weights = seen.weight[:, None] / np.sqrt(1.0 + (away / _ROBUST) ** 2)
-        weighted = slopes * weights[..., None]
-        information, gradient = np.diag(precision), precision * (mean - values)
-        np.add.at(
-            information,
-            (own[:, :, None], own[:, None, :]),
-            slopes.transpose(0, 2, 1) @ weighted,
+    def levels(unknowns: FloatArray) -> Residuals:
+        (values,) = unknowns
+        away, slopes = differences(
+            lambda each: ((_rays(seen, each) - seen.rays) * scale).reshape(*each.shape[:-1], -1),
+            values[own],
+            _STEP,
         )
-        np.subtract.at(gradient, own, (weighted * away[..., None]).sum(axis=1))
-        diagonal = np.diag(information.diagonal())
-        while damping < 1e6:
-            step = np.linalg.solve(information + damping * diagonal, gradient)
-            after = cost(values + step)
-            if after <= before:
-                break
-            damping *= 4.0
-        else:
-            break
-        values, before, damping = values + step, after, damping / 4.0
-        if np.abs(step).max() < _LAST_STEP:
-            break
-    return values, information
+        jacobian = np.zeros((*away.shape, len(values)))
+        jacobian[images, np.arange(away.shape[1])[:, None], own[:, None]] = slopes
+        jacobian = jacobian.reshape(1, -1, len(values))
+        return weighted(away.reshape(1, -1), jacobian, pseudo_huber, _ROBUST, weight)
+
+    return minimize({"levels": levels}, start[None], prior, steps=_ROUNDS, least_gain=_LEAST_GAIN)
 
 
 def _rays(seen: _Seen, unknowns: FloatArray) -> FloatArray:
-    """Return the rays (n, 6, 2) on which the levels are for the unknowns (n, k) of each image."""
+    """Return the rays (..., n, 6, 2) of the levels for the unknowns (..., n, k) of each image."""
     count = len(LEVELS)
-    pitch, roll, height_m, log_focal, log_stature = unknowns[:, :5, None].transpose(1, 0, 2)
-    heights = HEIGHTS + unknowns[:, 5 : 5 + count]
-    forward = FORWARD + unknowns[:, 5 + count : 5 + 2 * count]
-    leans, changes = unknowns[:, 5 + 2 * count : 8 + 2 * count], unknowns[:, -5:-2]
-    aside, far = unknowns[:, -7:-6], np.exp(np.clip(unknowns[:, -6:-5], _NEAREST, _FARTHEST))
-    legs = np.minimum(heights, heights[:, _HIP : _HIP + 1]) - heights[:, _ANKLE:]
-    trunk = np.maximum(heights - heights[:, _HIP : _HIP + 1], 0.0)
-    forward = forward + leans[:, :1] * legs + leans[:, 1:2] * trunk
-    lowered = unknowns[:, -2:-1] * (np.arange(count) <= _HIP) - unknowns[:, -1:]
+    pitch, roll, height_m, log_focal, log_stature = np.moveaxis(unknowns[..., :5, None], -2, 0)
+    heights = HEIGHTS + unknowns[..., 5 : 5 + count]
+    forward = FORWARD + unknowns[..., 5 + count : 5 + 2 * count]
+    leans, changes = unknowns[..., 5 + 2 * count : 8 + 2 * count], unknowns[..., -5:-2]
+    aside, far = unknowns[..., -7:-6], np.exp(np.clip(unknowns[..., -6:-5], _NEAREST, _FARTHEST))
+    legs = np.minimum(heights, heights[..., _HIP : _HIP + 1]) - heights[..., _ANKLE:]
+    trunk = np.maximum(heights - heights[..., _HIP : _HIP + 1], 0.0)
+    forward = forward + leans[..., :1] * legs + leans[..., 1:2] * trunk
+    lowered = unknowns[..., -2:-1] * (np.arange(count) <= _HIP) - unknowns[..., -1:]
     # Optical axes of a level camera: right, down, forward.
-    x = aside + seen.facing[:, :1] * forward + (leans[:, 2:] + changes[:, 2:]) * heights
+    x = aside + seen.facing[:, :1] * forward + (leans[..., 2:] + changes[..., 2:]) * heights
     y = height_m / np.exp(log_stature) - heights + lowered
-    z = far - seen.facing[:, 1:] * forward - changes[:, :1] * legs - changes[:, 1:2] * trunk
+    z = far - seen.facing[:, 1:] * forward - changes[..., :1] * legs - changes[..., 1:2] * trunk
     c, s = np.cos(pitch), np.sin(pitch)
     down, ahead = c * y - s * z, np.maximum(s * y + c * z, 0.05)
     # A camera that is turned clockwise sees the world turned the other way.

@@ -23,6 +23,7 @@ from math import hypot
 import numpy as np
 
 from cardbox_tracker.camera.camera import Camera
+from cardbox_tracker.common.least_squares import Residuals
 from cardbox_tracker.common.settings import Settings, setting
 from cardbox_tracker.detectors.image_points import POINT_INDEX, ImagePoints
 from cardbox_tracker.person.model import MEASURED, BodyModel
@@ -47,7 +48,6 @@ from cardbox_tracker.terms.term import (
     ARMS,
     Frame,
     Posed,
-    Residuals,
     Term,
     TermObservation,
 )
@@ -217,15 +217,10 @@ class JointPointsObservation(TermObservation):
     def residuals(self, posed: Posed) -> Residuals:
         """Return the residuals of points and bones in units of their deviations."""
         count = len(posed)
-        found = Residuals(
-            np.empty((count, kernels.N_RESIDUALS)),
-            np.empty((count, kernels.N_RESIDUALS, N_STATE)),
-            np.empty(count),
-        )
-        kernels.residuals(
-            posed.states, posed.body, self.seen, (found.values, found.jacobian, found.costs)
-        )
-        return found
+        shape = count, kernels.N_RESIDUALS
+        found = np.empty(shape), np.empty((*shape, N_STATE)), np.empty(count)
+        kernels.residuals(posed.states, posed.body, self.seen, found)
+        return Residuals(*found)
 
     def evidence(self, posed: Posed) -> dict[str, FloatArray]:
         """Return how the joints of one state differ from the points, see :data:`EVIDENCE`."""

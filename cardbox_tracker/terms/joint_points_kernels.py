@@ -76,7 +76,7 @@ class Evidence(NamedTuple):
 
 EvidenceTuple = tuple[Floats, Floats, Floats, Floats]
 Found = tuple[Floats, Floats, Floats]
-"""Values, Jacobian and costs of :class:`~.term.Residuals`."""
+"""Values, Jacobian and costs of :class:`~cardbox_tracker.common.least_squares.Residuals`."""
 
 
 @inlined_kernel

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from cardbox_tracker.camera.camera import Camera
 from cardbox_tracker.common.compiling import inlined_kernel, kernel
+from cardbox_tracker.common.least_squares import Residuals
 from cardbox_tracker.person.kinematics import TWIST, moves, state_twists
 from cardbox_tracker.person.posture import N_STATE
 from cardbox_tracker.person.sizes import FloatArray
@@ -42,7 +43,7 @@ from cardbox_tracker.terms.outline_points import (
     point_on_edge,
     project_corners,
 )
-from cardbox_tracker.terms.term import Posed, Residuals, Silhouette, TermObservation
+from cardbox_tracker.terms.term import Posed, Silhouette, TermObservation
 
 INFORMATION = 0.01
 """Weight of a pixel of outline, 1 / px^2; it is low because errors of neighbours are correlated."""
@@ -60,7 +61,7 @@ SeenTuple = tuple[Floats, NDArray[np.float32], Floats]
 """fx, fy, cx, cy of the image of the distances, (4,); signed distances, (H, W), px, negative
 inside; first and last column, first and end row of the part that counts, (4,), px."""
 Found = tuple[Floats, Floats, Floats]
-"""Values, Jacobian and costs of :class:`~.term.Residuals`."""
+"""Values, Jacobian and costs of :class:`~cardbox_tracker.common.least_squares.Residuals`."""
 
 
 class Outline(TermObservation):
@@ -104,13 +105,9 @@ class Outline(TermObservation):
         if self.is_empty:
             return None
         count = len(posed)
-        found = Residuals(
-            np.zeros((count, POINTS)), np.zeros((count, POINTS, N_STATE)), np.zeros(count)
-        )
-        _residuals(
-            posed.states, posed.body, self._seen, (found.values, found.jacobian, found.costs)
-        )
-        return found
+        found = np.zeros((count, POINTS)), np.zeros((count, POINTS, N_STATE)), np.zeros(count)
+        _residuals(posed.states, posed.body, self._seen, found)
+        return Residuals(*found)
 
 
 def _forget(

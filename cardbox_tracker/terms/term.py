@@ -19,12 +19,13 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 from types import MappingProxyType
-from typing import Any, NamedTuple, Protocol
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from cardbox_tracker.camera.camera import Camera
+from cardbox_tracker.common.least_squares import Residuals
 from cardbox_tracker.detectors.image_points import ImagePoints
 from cardbox_tracker.person.kinematics import keypoints_of_states
 from cardbox_tracker.person.model import BodyModel
@@ -153,16 +154,6 @@ class Frame:
     def changed(self, **values: Any) -> Frame:
         """Return the frame with other attributes."""
         return replace(self, **values)
-
-
-class Residuals(NamedTuple):
-    """Robust residuals of N states, for a Gauss-Newton step."""
-
-    #: residuals in units of their deviations, times the root of their robust weight, (N, R)
-    values: FloatArray
-    #: derivatives of ``values`` by the values of the states, (N, R, 14), with constant weights
-    jacobian: FloatArray
-    costs: FloatArray  #: robust costs, (N,), which a step should reduce
 
 
 class TermObservation:

@@ -1,10 +1,10 @@
 """Finds how the head turns and nods on the torso from the points of a face in an image.
 
 A silhouette shows the head's place but hardly its direction. A rigid model of the face (nose, eyes
-and ears) is fitted to the points of a detector by maximum a posteriori estimation: Gauss-Newton
-from several starts over yaw, pitch and roll of the neck, the place of the head in the image and its
-size, with normal priors. The torso is that of the tracked state, so the angles are those between
-torso and head:
+and ears) is fitted to the points of a detector by maximum a posteriori estimation, from several
+starts: over yaw, pitch and roll of the neck, the place of the head in the image and its size, with
+normal priors. The torso is that of the tracked state, so the angles are those between torso and
+head:
 
     R_head = R_torso Rz(yaw) Ry(pitch) Rx(roll)
 
@@ -16,13 +16,19 @@ estimated and not returned.
 from __future__ import annotations
 
 from dataclasses import replace
-from math import cos, exp, sin, sqrt
+from math import cos, exp, sin
 from typing import NamedTuple
 
 import numpy as np
 
 from cardbox_tracker.camera.camera import Camera
-from cardbox_tracker.common.compiling import borrowing_kernel, kernel
+from cardbox_tracker.common.compiling import borrowing_kernel, inlined_kernel, kernel
+from cardbox_tracker.common.least_squares import (
+    Prior,
+    Residuals,
+    minimize,
+    write_differences,
+)
 from cardbox_tracker.detectors.image_points import POINT_INDEX, ImagePoints
 from cardbox_tracker.person.kinematics import pose
 from cardbox_tracker.person.model import BodyModel
@@ -31,7 +37,6 @@ from cardbox_tracker.person.posture import PITCH, YAW
 from cardbox_tracker.person.sizes import FloatArray
 from cardbox_tracker.person.skeleton import NECK_LIMITS
 from cardbox_tracker.terms.kernel_arguments import Floats
-from cardbox_tracker.terms.linear_kernels import solve, write_normal
 from cardbox_tracker.terms.term import Frame
 from cardbox_tracker.tracking.estimate import Estimate
 
@@ -102,15 +107,22 @@ _FARTHEST_M = 0.3
 # Standard deviations: face model and detector in metres at the face, detector in pixels.
 _POINT_M, _POINT_PX = 0.010, 1.0
 # Of the priors of yaw, pitch, roll, rad; place across and up, m; logarithm of the size.
-_PRIOR = np.array([*np.radians([60.0, 40.0, 15.0]), 0.15, 0.15, 0.10])
-_STARTS_RAD = np.radians([(0.0, 0.0), (45.0, 0.0), (-45.0, 0.0), (0.0, 35.0), (0.0, -35.0)])
-_STEPS = 8
+_PRIOR = Prior(np.zeros(6), np.array([*np.radians([60.0, 40.0, 15.0]), 0.15, 0.15, 0.10]) ** -2.0)
+_STARTS = np.zeros((5, 6))
+_STARTS[1:, :2] = np.radians([(45.0, 0.0), (-45.0, 0.0), (0.0, 35.0), (0.0, -35.0)])
+_STEPS, _LEAST_GAIN = 8, 1e-3
 _LARGEST_STEP = np.array([0.5, 0.5, 0.5, 0.2, 0.2, 0.2])
 _DIFFERENCE = 1e-6
 
 _SMOOTHING_S = 0.15
 _KEPT_S = 0.5
 _DRIFT_RAD_S = 1.0
+
+
+_Given = tuple[Floats, Floats, Floats, Floats, Floats, tuple[float, float, float, float], float]
+"""Rotation (3, 3) from the torso's to the optical frame; axes of the reference frame (3, 3) and the
+middle of the head (3,) there; a face of this size, (n, 3); the points in the image, (n, 2); focal
+lengths and principal point, px; the points' deviation, px."""
 
 
 class Neck(NamedTuple):
@@ -137,15 +149,30 @@ def fit_neck(
     if depth_m <= _FARTHEST_M:
         return None
     size = body_parts(body.sizes).head.height_m / HEAD_HEIGHT_M
-    values, rms, information = _solve(
-        np.ascontiguousarray(axes @ frames.torso_rotation),
-        np.ascontiguousarray(axes.T),
-        head_m,
-        size * FACE_M[known],
-        points.px[_CHOSEN[known]],
+    given = (
+        *(np.ascontiguousarray(axes @ frames.torso_rotation), np.ascontiguousarray(axes.T), head_m),
+        *(size * FACE_M[known], points.px[_CHOSEN[known]]),
         (camera.fx, camera.fy, camera.cx, camera.cy),
         float(np.hypot(_POINT_PX, camera.fx * _POINT_M / depth_m)),
     )
+
+    def face(values: FloatArray) -> Residuals:
+        found = np.empty((5, 2 * len(given[3]))), np.empty((5, 2 * len(given[3]), 6))
+        _linearized(values, given, found)
+        return Residuals(*found)
+
+    found = minimize(
+        {"face": face},
+        _STARTS,
+        _PRIOR,
+        steps=_STEPS,
+        largest=_LARGEST_STEP,
+        least_gain=_LEAST_GAIN,
+    )
+    best = int(np.argmin(found.total))
+    values, information = found.values[best], found.information[best]
+    # Priors add as many residuals as there are unknowns, so the points are the degrees of freedom.
+    rms = float(np.sqrt(found.total[best] / (2 * np.count_nonzero(known))))
     angles = values[:2]
     beyond = np.maximum(NECK_LIMITS[:, 0] - angles, angles - NECK_LIMITS[:, 1])
     stddev = np.sqrt(np.diag(np.linalg.inv(information))[:2]) * max(1.0, rms)
@@ -155,92 +182,43 @@ def fit_neck(
     return Neck(np.clip(angles, NECK_LIMITS[:, 0], NECK_LIMITS[:, 1]), stddev)
 
 
+@inlined_kernel
+def _component(c: int, x: float, y: float, z: float, values: Floats, given: _Given) -> float:
+    """Return a component, in the optical frame, of a point of the turned face, m."""
+    torso, axes, centre_m, _, _, _, _ = given
+    at: float = centre_m[c] + values[3] * axes[1, c] + values[4] * axes[2, c]
+    at += torso[c, 0] * x + torso[c, 1] * y + torso[c, 2] * z
+    return at
+
+
 @borrowing_kernel
-def _residuals(
-    values: Floats,
-    torso: Floats,
-    axes: Floats,
-    centre_m: Floats,
-    face_m: Floats,
-    px: Floats,
-    lens: tuple[float, float, float, float],
-    sigma_px: float,
-    at: Floats,
-    residuals: Floats,
-) -> None:
-    """Write the residuals (2n + 6,) of values (6,), in standard deviations.
+def _write_residuals(values: Floats, given: _Given, residuals: Floats) -> None:
+    """Write the residuals (2n,) of values (6,), in standard deviations.
 
     The values are yaw, pitch and roll of the neck, rad; place across and up, m; logarithm of the
-    size. ``torso`` (3, 3) turns the torso's to the optical frame; rows of ``axes`` (3, 3) are the
-    reference frame's axes and ``centre_m`` (3,) is the middle of the head there. A face of this
-    size has the points ``face_m`` (n, 3), which are at ``px`` (n, 2) in the image, with the
-    deviation ``sigma_px``; ``at`` (3,) is scratch.
+    size.
     """
+    _, _, _, face_m, px, (fx, fy, cx, cy_px), sigma_px = given
     cy, sy = cos(values[0]), sin(values[0])
     cp, sp = cos(values[1]), sin(values[1])
     cr, sr = cos(values[2]), sin(values[2])
     size = exp(values[5])
-    fx, fy, cx, cy_px = lens
     for i in range(face_m.shape[0]):
         x, y, z = size * face_m[i, 0], size * face_m[i, 1], size * face_m[i, 2]
         # Rx(roll), then Ry(pitch), then Rz(yaw).
         y, z = cr * y - sr * z, sr * y + cr * z
         x, z = cp * x + sp * z, cp * z - sp * x
         x, y = cy * x - sy * y, sy * x + cy * y
-        for c in range(3):
-            at[c] = centre_m[c] + values[3] * axes[1, c] + values[4] * axes[2, c]
-            at[c] += torso[c, 0] * x + torso[c, 1] * y + torso[c, 2] * z
-        depth = max(at[2], 0.05)
-        residuals[2 * i] = (fx * at[0] / depth + cx - px[i, 0]) / sigma_px
-        residuals[2 * i + 1] = (fy * at[1] / depth + cy_px - px[i, 1]) / sigma_px
-    for j in range(6):
-        residuals[2 * face_m.shape[0] + j] = values[j] / _PRIOR[j]
+        depth = max(_component(2, x, y, z, values, given), 0.05)
+        across = fx * _component(0, x, y, z, values, given) / depth + cx
+        down = fy * _component(1, x, y, z, values, given) / depth + cy_px
+        residuals[2 * i] = (across - px[i, 0]) / sigma_px
+        residuals[2 * i + 1] = (down - px[i, 1]) / sigma_px
 
 
 @kernel
-def _solve(
-    torso: Floats,
-    axes: Floats,
-    centre_m: Floats,
-    face_m: Floats,
-    px: Floats,
-    lens: tuple[float, float, float, float],
-    sigma_px: float,
-) -> tuple[Floats, float, Floats]:
-    """Return the best values (6,), the residuals' RMS and the information (6, 6); see above."""
-    count = 2 * face_m.shape[0] + 6
-    here, above, jacobian = np.empty(count), np.empty(count), np.empty((count, 6))
-    normal, step, best = np.empty((6, 6)), np.empty(6), np.empty(6)
-    least, kept, at = np.inf, np.empty((6, 6)), np.empty(3)
-    for start in range(_STARTS_RAD.shape[0]):
-        values = np.zeros(6)
-        values[0], values[1] = _STARTS_RAD[start, 0], _STARTS_RAD[start, 1]
-        for number in range(_STEPS + 1):
-            _residuals(values, torso, axes, centre_m, face_m, px, lens, sigma_px, at, here)
-            for j in range(6):
-                before = values[j]
-                values[j] = before + _DIFFERENCE
-                _residuals(values, torso, axes, centre_m, face_m, px, lens, sigma_px, at, above)
-                values[j] = before
-                for i in range(count):
-                    jacobian[i, j] = (above[i] - here[i]) / _DIFFERENCE
-            write_normal(jacobian, here, normal, step)
-            if number == _STEPS:
-                break
-            solve(normal, step)
-            for j in range(6):
-                values[j] -= min(max(step[j], -_LARGEST_STEP[j]), _LARGEST_STEP[j])
-        cost = 0.0
-        for i in range(count):
-            cost += here[i] ** 2
-        if cost < least:
-            least = cost
-            for j in range(6):
-                best[j] = values[j]
-                for i in range(6):
-                    kept[i, j] = normal[i, j]
-    # Priors add as many residuals as there are unknowns, so the points are the degrees of freedom.
-    return best, sqrt(least / (2 * face_m.shape[0])), kept
+def _linearized(values: Floats, given: _Given, found: tuple[Floats, Floats]) -> None:
+    write_differences(_write_residuals, values, given, _DIFFERENCE, found)
 
 
 class HeadTracker:

@@ -102,7 +102,7 @@ def test_nor_does_one_of_several_cameras() -> None:
 def test_nor_do_the_first_points_of_a_detector() -> None:
     compile_all()
     before = compiled()
-    assert before["cardbox_tracker.search.refiner._add"] > 0
+    assert before["cardbox_tracker.common.least_squares._add"] > 0
     body = BodyModel()
     person = render(cardbox_patches(body, FRONT), CAMERA)
     count = len(POINT_NAMES)
@@ -149,7 +149,10 @@ precompile.compile_for_films()
 
 def test_two_processes_keep_each_kernel_of_the_list(tmp_path: Path) -> None:
     every = json.loads(FILM_KERNELS.read_text())
-    few = {name: every[name] for name in ("search.approach", "terms.arm_points", "search.refiner")}
+    few = {
+        name: every[name]
+        for name in ("search.approach", "terms.arm_points", "common.least_squares")
+    }
     (tmp_path / "few.json").write_text(json.dumps(few))
     values = os.environ | {"NUMBA_CACHE_DIR": str(tmp_path), "PYTHONPATH": str(ROOT)}
     command = [sys.executable, "-c", IN_COPIES, str(tmp_path / "few.json")]

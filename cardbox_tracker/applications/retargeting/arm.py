@@ -17,6 +17,7 @@ from cardbox_tracker.applications.retargeting.config import RetargetConfig
 from cardbox_tracker.applications.retargeting.joint_map import WITH_HEAD_AND_HANDS
 from cardbox_tracker.applications.retargeting.robot import Robot
 from cardbox_tracker.common.errors import CardboxError
+from cardbox_tracker.common.least_squares import Prior, Residuals, minimize
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.parts import body_parts
 from cardbox_tracker.person.posture import LEFT_ARM, RIGHT_ARM
@@ -24,7 +25,7 @@ from cardbox_tracker.person.sizes import FloatArray
 from cardbox_tracker.person.skeleton import arm_directions, rotation_x, rotation_y, rotation_z
 
 ARM_JOINTS = ("shoulder_abduction", "shoulder_flexion", "elbow_abduction", "elbow_flexion")
-_STEPS, _CLOSE = 12, 1e-2
+_STEPS, _LARGEST_STEP, _CLOSE = 12, 0.8, 3e-2
 # The joints are pulled to the middle of their range, so that redundant ones do not drift.
 _REST = 0.03
 _DAMPING = 1e-3
@@ -295,45 +296,31 @@ class ArmFollower:
     def clear(self, positions: FloatArray) -> FloatArray:
         """See :class:`~.retargeter.Method`."""
         found = positions.copy()
-        arm = found[: len(self.arm.joints)]
-        for _ in range(3):
-            gaps, slopes = self.kinematics.too_near(arm)
-            if len(gaps) == 0:
-                break
-            normal = slopes @ slopes.T + 1e-4 * np.eye(len(gaps))
-            arm[:] = np.clip(arm - slopes.T @ np.linalg.solve(normal, gaps), self._low, self._high)
+        arm = found[None, : len(self.arm.joints)]
+
+        def gaps(arm: FloatArray) -> Residuals:
+            gaps, slopes = self.kinematics.too_near(arm[0])
+            return Residuals(gaps[None], slopes[None])
+
+        limits = self._low, self._high
+        arm[:] = minimize({"gaps": gaps}, arm, limits=limits, steps=3, damping=1e-4).values
         return found
 
     def _solved(self, start: FloatArray, wanted: FloatArray) -> tuple[FloatArray, float]:
         """Return joint positions (n,) within the limits and the squared error of directions."""
-        positions = np.clip(start, self._low, self._high)
-        pull = _REST * np.eye(len(positions))
-        off, slope = self.kinematics.residual(positions, wanted)
-        cost = float(off @ off + np.sum((_REST * (positions - self._rest)) ** 2))
-        damping = _DAMPING
-        for _ in range(_STEPS):
-            slopes = np.vstack([slope, pull])
-            errors = np.concatenate([off, _REST * (positions - self._rest)])
-            gradient = slopes.T @ errors
-            # A joint at its limit that would go on beyond it stays there.
-            free = ~(
-                ((positions <= self._low) & (gradient > 0))
-                | ((positions >= self._high) & (gradient < 0))
-            )
-            normal = slopes[:, free].T @ slopes[:, free] + damping * np.eye(int(free.sum()))
-            step = np.zeros(len(positions))
-            step[free] = -np.linalg.solve(normal, gradient[free])
-            tried = np.clip(positions + np.clip(step, -0.8, 0.8), self._low, self._high)
-            new_off, new_slope = self.kinematics.residual(tried, wanted)
-            new_cost = float(new_off @ new_off + np.sum((_REST * (tried - self._rest)) ** 2))
-            if new_cost >= cost:
-                damping *= 10.0
-                if damping > 1e3:
-                    break
-                continue
-            is_close = cost - new_cost < _CLOSE * (cost + _CLOSE)
-            positions, off, slope, cost = tried, new_off, new_slope, new_cost
-            damping = max(0.2 * damping, 1e-6)
-            if is_close:
-                break
-        return positions, float(off @ off)
+
+        def directions(positions: FloatArray) -> Residuals:
+            off, slopes = self.kinematics.residual(positions[0], wanted)
+            return Residuals(off[None], slopes[None])
+
+        found = minimize(
+            {"directions": directions},
+            np.clip(start, self._low, self._high)[None],
+            Prior(self._rest, np.full(len(start), _REST**2)),
+            (self._low, self._high),
+            steps=_STEPS,
+            largest=_LARGEST_STEP,
+            damping=_DAMPING,
+            least_gain=_CLOSE,
+        )
+        return found.values[0], float(found.costs["directions"][0])
