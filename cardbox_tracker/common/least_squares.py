@@ -25,7 +25,9 @@ from cardbox_tracker.common.compiling import inlined_allocation, inlined_kernel,
 Floats = NDArray[np.float64]
 Equations = tuple[Floats, Floats, Floats, Floats]
 """Values (N, n), upper triangles of the matrices (N, n, n) and right sides (N, n) of the normal
-equations there, and costs (N, K)."""
+equations there, and costs (N, K), of which the last one is that of the prior."""
+Rules = tuple[Floats, Floats, Floats, Floats]
+"""Damping, lowest and highest values, and largest change of a step, each (n,)."""
 Loss = Callable[[Floats], tuple[Floats, Floats]]
 """Takes squares of residuals in units of a scale; returns robust squares, and their derivatives."""
 
@@ -66,8 +68,7 @@ class Solution(NamedTuple):
     @property
     def total(self) -> Floats:
         """Sums of all costs, (N,)."""
-        total: Floats = np.sum(list(self.costs.values()), axis=0)
-        return total
+        return np.asarray(sum(self.costs.values()))
 
 
 def minimize(
@@ -91,7 +92,7 @@ def minimize(
         steps: most steps; each computes the residuals once.
         largest: largest change of an unknown in a step, (n,) or one for all.
         damping: inverse variance of a step, (n,) or one for all.
-        least_gain: share of its cost that the last step of a fit gains; fits end together.
+        least_gain: share of its cost from which on a step that gains less is a fit's last one.
 
     Raises:
         ValueError: residuals or their Jacobian have another shape or type.
@@ -113,10 +114,15 @@ def minimize(
         _propose(now, factors, (by_step, low, high, most), moved)
         after = _equations(residuals, given, moved)
         are_done = _accept(now, after, factors, least_gain, is_done)
-    _, information, _, costs = now
-    lower = np.tri(size, dtype=np.bool_)
-    information = np.where(lower, information.swapaxes(1, 2), information)
-    return Solution(values, information, dict(zip((*residuals, PRIOR), costs.T, strict=True)))
+    return solution_of(now, tuple(residuals))
+
+
+def solution_of(found: Equations, names: tuple[str, ...]) -> Solution:
+    """Return the solution of ``found`` equations with residuals of these names."""
+    values, upper, _, costs = found
+    lower = np.tri(values.shape[1], dtype=np.bool_)
+    information = np.where(lower, upper.swapaxes(1, 2), upper)
+    return Solution(values, information, dict(zip((*names, PRIOR), costs.T, strict=True)))
 
 
 def _equations(
@@ -170,10 +176,8 @@ def _add(values: Floats, jacobian: Floats, number: int, found: Equations) -> Non
 
 
 @kernel
-def _propose(
-    now: Equations, factors: Floats, rules: tuple[Floats, Floats, Floats, Floats], moved: Floats
-) -> None:
-    """Write the values after a step, (N, n); the rules are those of a step and the limits."""
+def _propose(now: Equations, factors: Floats, rules: Rules, moved: Floats) -> None:
+    """Write the values after a step, (N, n); damped by ``factors`` (N,)."""
     values, information, right, _ = now
     damping, low, high, largest = rules
     size = values.shape[1]
@@ -226,6 +230,8 @@ def _accept(
     values, information, right, costs = now
     are_done = True
     for n in range(values.shape[0]):
+        if is_done[n]:
+            continue
         before, gain = 0.0, 0.0
         for k in range(costs.shape[1]):
             before += costs[n, k]
@@ -259,29 +265,58 @@ def differences(
 
 
 @inlined_allocation
-def write_differences(
+def minimize_compiled(
     write: Callable[[Floats, Any, Floats], Any],
-    values: Floats,
     given: Any,
-    step: float,
-    found: tuple[Floats, Floats],
-) -> None:
-    """Write residuals (N, R) at N x n values and their derivatives (N, R, n), in compiled code.
+    start: Floats,
+    prior: tuple[Floats, Floats],
+    rules: Rules,
+    ends: tuple[int, float],
+    differences: tuple[int, float],
+) -> Equations:
+    """Do as :func:`minimize` in compiled code, with residuals that a kernel writes.
 
-    The kernel ``write`` takes values (n,) and ``given``, and writes residuals (R,).
+    Args:
+        write: takes values (n,) and ``given``, and writes R residuals, (R,).
+        given: other arguments of ``write``.
+        start: values to begin with, (N, n).
+        prior: means (1, n) or (N, n), and inverse variances (n,).
+        rules: damping, limits and largest change of a step, each (n,).
+        ends: most steps, and least gain.
+        differences: R, and the change of a value for its derivatives.
     """
-    errors, jacobian = found
-    above, moved = np.empty(errors.shape[1]), np.empty(values.shape[1])
-    for n in range(values.shape[0]):
-        write(values[n], given, errors[n])
-        for j in range(moved.shape[0]):
-            moved[j] = values[n, j]
-        for j in range(moved.shape[0]):
-            moved[j] += step
-            write(moved, given, above)
-            moved[j] = values[n, j]
-            for i in range(above.shape[0]):
-                jacobian[n, i, j] = (above[i] - errors[n, i]) / step
+    (count, size), rows = start.shape, differences[0]
+    errors, jacobian, above = np.empty((count, rows)), np.empty((count, rows, size)), np.empty(rows)
+    now = _zeros(count, size)
+    now[0][:] = start
+    factors, is_done = np.ones(count), np.zeros(count, np.bool_)
+    for step in range(ends[0] + 1):
+        after = now if step == 0 else _zeros(count, size)
+        if step > 0:
+            _propose(now, factors, rules, after[0])
+        values = after[0]
+        for n in range(count):
+            if is_done[n]:
+                continue
+            write(values[n], given, errors[n])
+            for j in range(size):
+                value = values[n, j]
+                values[n, j] = value + differences[1]
+                write(values[n], given, above)
+                values[n, j] = value
+                for i in range(rows):
+                    jacobian[n, i, j] = (above[i] - errors[n, i]) / differences[1]
+        _begin(after, prior[0], prior[1])
+        _add(errors, jacobian, 0, after)
+        if step > 0 and _accept(now, after, factors, ends[1], is_done):
+            break
+    return now
+
+
+@inlined_allocation
+def _zeros(count: int, size: int) -> Equations:
+    matrices = np.zeros((count, size, size))
+    return np.zeros((count, size)), matrices, np.zeros((count, size)), np.zeros((count, 2))
 
 
 def pseudo_huber(squares: Floats) -> tuple[Floats, Floats]:

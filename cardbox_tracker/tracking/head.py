@@ -23,12 +23,7 @@ import numpy as np
 
 from cardbox_tracker.camera.camera import Camera
 from cardbox_tracker.common.compiling import borrowing_kernel, inlined_kernel, kernel
-from cardbox_tracker.common.least_squares import (
-    Prior,
-    Residuals,
-    minimize,
-    write_differences,
-)
+from cardbox_tracker.common.least_squares import Equations, minimize_compiled, solution_of
 from cardbox_tracker.detectors.image_points import POINT_INDEX, ImagePoints
 from cardbox_tracker.person.kinematics import pose
 from cardbox_tracker.person.model import BodyModel
@@ -107,11 +102,14 @@ _FARTHEST_M = 0.3
 # Standard deviations: face model and detector in metres at the face, detector in pixels.
 _POINT_M, _POINT_PX = 0.010, 1.0
 # Of the priors of yaw, pitch, roll, rad; place across and up, m; logarithm of the size.
-_PRIOR = Prior(np.zeros(6), np.array([*np.radians([60.0, 40.0, 15.0]), 0.15, 0.15, 0.10]) ** -2.0)
+_STDDEVS = np.array([*np.radians([60.0, 40.0, 15.0]), 0.15, 0.15, 0.10])
+_PRIOR = np.zeros((1, 6)), _STDDEVS**-2.0
 _STARTS = np.zeros((5, 6))
 _STARTS[1:, :2] = np.radians([(45.0, 0.0), (-45.0, 0.0), (0.0, 35.0), (0.0, -35.0)])
-_STEPS, _LEAST_GAIN = 8, 1e-3
 _LARGEST_STEP = np.array([0.5, 0.5, 0.5, 0.2, 0.2, 0.2])
+_RULES = np.zeros(6), np.full(6, -np.inf), np.full(6, np.inf), _LARGEST_STEP
+# Steps, and the share of its cost that the last one gains.
+_ENDS = 8, 1e-3
 _DIFFERENCE = 1e-6
 
 _SMOOTHING_S = 0.15
@@ -156,19 +154,7 @@ def fit_neck(
         float(np.hypot(_POINT_PX, camera.fx * _POINT_M / depth_m)),
     )
 
-    def face(values: FloatArray) -> Residuals:
-        found = np.empty((5, 2 * len(given[3]))), np.empty((5, 2 * len(given[3]), 6))
-        _linearized(values, given, found)
-        return Residuals(*found)
-
-    found = minimize(
-        {"face": face},
-        _STARTS,
-        _PRIOR,
-        steps=_STEPS,
-        largest=_LARGEST_STEP,
-        least_gain=_LEAST_GAIN,
-    )
+    found = solution_of(_solve(given), ("face",))
     best = int(np.argmin(found.total))
     values, information = found.values[best], found.information[best]
     # Priors add as many residuals as there are unknowns, so the points are the degrees of freedom.
@@ -217,8 +203,12 @@ def _write_residuals(values: Floats, given: _Given, residuals: Floats) -> None:
 
 
 @kernel
-def _linearized(values: Floats, given: _Given, found: tuple[Floats, Floats]) -> None:
-    write_differences(_write_residuals, values, given, _DIFFERENCE, found)
+def _solve(given: _Given) -> Equations:
+    """Return the equations of the best values from each start."""
+    rows = 2 * given[3].shape[0]
+    return minimize_compiled(
+        _write_residuals, given, _STARTS, _PRIOR, _RULES, _ENDS, (rows, _DIFFERENCE)
+    )
 
 
 class HeadTracker:

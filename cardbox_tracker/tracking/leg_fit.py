@@ -1,4 +1,4 @@
-"""Compiled Gauss-Newton fit of both legs to what one image shows; :mod:`.legs` has the cost.
+"""Compiled residuals, and the fit, of both legs to what one image shows; :mod:`.legs` has the cost.
 
 Values (12,) are the angles of the left and of the right leg, the logarithms of the factors of
 thigh and shank, the height of the floor, and the logarithm of the factor of the distance.
@@ -11,9 +11,9 @@ from math import cos, exp, inf, isnan, sin, sqrt
 import numpy as np
 
 from cardbox_tracker.common.compiling import borrowing_kernel, inlined_kernel, kernel
+from cardbox_tracker.common.least_squares import Equations, minimize_compiled, solution_of
 from cardbox_tracker.person.legs import LEG_LIMITS
 from cardbox_tracker.terms.kernel_arguments import Floats
-from cardbox_tracker.terms.linear_kernels import solve, write_normal
 
 N_ANGLES, N_VALUES = 8, 12
 LENGTHS, FLOOR, DISTANCE = 8, 10, 11
@@ -23,12 +23,15 @@ REST = np.tile(np.radians([60.0, 15.0, 15.0, 60.0]), 2)
 """Deviations of the angles from those of hanging legs, (8,), rad."""
 # Of each leg: two points in the image, two slopes, and the foot; then the priors.
 _OF_LEG, _N_RESIDUALS = 7, 2 * 7 + 2 * N_ANGLES + 4
-_STEPS, _LARGEST_STEP, _NEAREST_M = 8, 0.6, 0.1
+_NEAREST_M = 0.1
 # Deviation of a foot on the floor, m, and height above it from which a foot is lifted rather.
 _CONTACT_M, _LIFTED_M = 0.02, 0.06
 # Lowest and highest values; the lengths of people are within 12 %, floor and distance are free.
 _LOWEST = np.array([*LEG_LIMITS[:, 0], -0.12, -0.12, -inf, -inf])
 _HIGHEST = np.array([*LEG_LIMITS[:, 1], 0.12, 0.12, inf, inf])
+_RULES = np.zeros(N_VALUES), _LOWEST, _HIGHEST, np.full(N_VALUES, 0.6)
+# The residuals have the priors. Steps, and the share of its cost that the last one gains.
+_PRIOR, _ENDS = (np.zeros((1, N_VALUES)), np.zeros(N_VALUES)), (8, 1e-3)
 
 Person = tuple[Floats, Floats, Floats, Floats, float]
 """The hips (3,) and the left one from their middle (3,), metres in the reference frame; the
@@ -118,44 +121,31 @@ def _write_residuals(values: Floats, given: Given, points_m: Floats, residuals: 
     return total
 
 
+@borrowing_kernel
+def _write(values: Floats, given: tuple[Given, Floats], residuals: Floats) -> None:
+    _write_residuals(values, given[0], given[1], residuals)
+
+
 @kernel
+def _solve(first: Floats, others: Floats, given: Given) -> Equations:
+    """Return the equations of the best values from the first and from the best other start."""
+    points_m, residuals, least = np.empty((6, 3)), np.empty(_N_RESIDUALS), inf
+    start = np.empty((2 if others.shape[0] else 1, N_VALUES))
+    start[0] = first
+    for row in range(others.shape[0]):
+        cost = _write_residuals(others[row], given, points_m, residuals)
+        if cost < least:
+            least = cost
+            start[1] = others[row]
+    arguments, differences = (given, points_m), (_N_RESIDUALS, DIFFERENCE)
+    return minimize_compiled(_write, arguments, start, _PRIOR, _RULES, _ENDS, differences)
+
+
 def fit(first: Floats, others: Floats, given: Given) -> tuple[Floats, Floats, float]:
     """Return the best values (12,), their information (12, 12), and the residuals' sum of squares.
 
     The fit begins at ``first`` (12,) and at the best of the ``others`` (n, 12).
     """
-    points_m, jacobian = np.empty((6, 3)), np.empty((_N_RESIDUALS, N_VALUES))
-    here, above, step = np.empty(_N_RESIDUALS), np.empty(_N_RESIDUALS), np.empty(N_VALUES)
-    normal, information = np.empty((N_VALUES, N_VALUES)), np.empty((N_VALUES, N_VALUES))
-    values, best, start, least = np.empty(N_VALUES), np.empty(N_VALUES), first, inf
-    for row in range(others.shape[0]):
-        cost = _write_residuals(others[row], given, points_m, here)
-        if cost < least:
-            least, start = cost, others[row]
-    least = inf
-    for begun in range(2 if others.shape[0] else 1):
-        for j in range(N_VALUES):
-            values[j] = start[j] if begun else first[j]
-        for number in range(_STEPS + 1):
-            cost = _write_residuals(values, given, points_m, here)
-            for j in range(N_VALUES):
-                before = values[j]
-                values[j] = before + DIFFERENCE
-                _write_residuals(values, given, points_m, above)
-                values[j] = before
-                for i in range(_N_RESIDUALS):
-                    jacobian[i, j] = (above[i] - here[i]) / DIFFERENCE
-            write_normal(jacobian, here, normal, step)
-            if cost < least:
-                least = cost
-                for j in range(N_VALUES):
-                    best[j] = values[j]
-                    for i in range(N_VALUES):
-                        information[i, j] = normal[i, j]
-            if number == _STEPS:
-                break
-            solve(normal, step)
-            for j in range(N_VALUES):
-                value = values[j] - min(max(step[j], -_LARGEST_STEP), _LARGEST_STEP)
-                values[j] = min(max(value, _LOWEST[j]), _HIGHEST[j])
-    return best, information, least
+    found = solution_of(_solve(first, others, given), ("legs",))
+    best = int(np.argmin(found.total))
+    return found.values[best], found.information[best], float(found.total[best])
