@@ -12,7 +12,7 @@ first, four times as large after a step that makes the cost larger, and a quarte
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from math import sqrt
 from typing import Any, NamedTuple
 
@@ -23,13 +23,12 @@ from cardbox_tracker.common.array_checks import check_array
 from cardbox_tracker.common.compiling import inlined_allocation, inlined_kernel, kernel
 
 Floats = NDArray[np.float64]
+Bools = NDArray[np.bool_]
 Equations = tuple[Floats, Floats, Floats, Floats]
 """Values (N, n), upper triangles of the matrices (N, n, n) and right sides (N, n) of the normal
 equations there, and costs (N, K), of which the last one is that of the prior."""
-Rules = tuple[Floats, Floats, Floats, Floats]
-"""Damping, lowest and highest values, and largest change of a step, each (n,)."""
-Loss = Callable[[Floats], tuple[Floats, Floats]]
-"""Takes squares of residuals in units of a scale; returns robust squares, and their derivatives."""
+Rules = tuple[Floats, Floats, Floats, Floats, Floats, Floats]
+"""What :func:`rules_of` returns."""
 
 PRIOR = "prior"
 """Name of the prior among the costs."""
@@ -50,36 +49,58 @@ class Residuals(NamedTuple):
     costs: Floats | None = None
 
 
-class Prior(NamedTuple):
-    """A normal prior of the unknowns."""
+class Solution:
+    """The result of N fits.
 
-    mean: Floats  #: (n,), or (N, n) for each fit
-    inverse: Floats  #: inverse variances, (n,)
+    Attributes:
+        values: unknowns, (N, n).
+        information: matrix of the normal equations there, (N, n, n): the inverse of the posterior's
+            covariance.
+        costs: robust costs (N,) by the name of the residuals, and that of the prior.
+        total: sums of all costs, (N,).
+    """
+
+    def __init__(self, found: Equations, names: Iterable[str]) -> None:
+        """Take the equations of residuals with these names."""
+        self.values, upper, _, costs = found
+        lower = np.tri(upper.shape[1], dtype=np.bool_)
+        self.information: Floats = np.where(lower, upper.swapaxes(1, 2), upper)
+        self.costs = dict(zip((*names, PRIOR), costs.T, strict=True))
+        self.total: Floats = costs.sum(axis=1)
 
 
-class Solution(NamedTuple):
-    """The result of N fits."""
+def rules_of(
+    size: int,
+    *,
+    mean: Floats | float = 0.0,
+    inverse: Floats | float = 0.0,
+    damping: Floats | float = 0.0,
+    low: Floats | float = -np.inf,
+    high: Floats | float = np.inf,
+    largest: Floats | float = np.inf,
+) -> Rules:
+    """Return the rules of fits of n = ``size`` unknowns; each is (n,) or a number for all.
 
-    values: Floats  #: unknowns, (N, n)
-    #: matrix of the normal equations there, (N, n, n): the inverse of the posterior's covariance
-    information: Floats
-    costs: Mapping[str, Floats]  #: robust cost by the name of the residuals, (N,); and the prior's
-
-    @property
-    def total(self) -> Floats:
-        """Sums of all costs, (N,)."""
-        return np.asarray(sum(self.costs.values()))
+    Args:
+        size: number of unknowns.
+        mean: mean of the prior; (N, n) if each fit has its own.
+        inverse: inverse variance of the prior.
+        damping: inverse variance of a step.
+        low: lowest values; a value that would go on beyond its limit is left out of the step.
+        high: highest values.
+        largest: largest change in a step.
+    """
+    one, two, three, four, five = (
+        np.zeros(size) + rule for rule in (inverse, damping, low, high, largest)
+    )
+    return np.array(mean + np.zeros(size), order="C", ndmin=2), one, two, three, four, five
 
 
 def minimize(
     residuals: Mapping[str, Callable[[Floats], Residuals | None]],
     start: Floats,
-    prior: Prior | None = None,
-    limits: tuple[Floats | float, Floats | float] = (-np.inf, np.inf),
-    *,
+    rules: Rules,
     steps: int,
-    largest: Floats | float = np.inf,
-    damping: Floats | float = 0.0,
     least_gain: float = 0.0,
 ) -> Solution:
     """Return unknowns (N, n) with a smaller cost near ``start`` (N, n), with their information.
@@ -87,54 +108,28 @@ def minimize(
     Args:
         residuals: what gives the residuals of unknowns (N, n), by name; None if there are none.
         start: values to begin with; they may be beyond the limits.
-        prior: prior of the unknowns.
-        limits: lowest and highest values. One that would go on beyond its limit is left out.
+        rules: prior, limits and damping.
         steps: most steps; each computes the residuals once.
-        largest: largest change of an unknown in a step, (n,) or one for all.
-        damping: inverse variance of a step, (n,) or one for all.
         least_gain: share of its cost from which on a step that gains less is a fit's last one.
 
     Raises:
-        ValueError: residuals or their Jacobian have another shape or type.
+        ValueError: the rules, residuals or their Jacobian have another shape or type.
     """
-    size = start.shape[1]
-    low, high = (np.zeros(size) + one for one in limits)
-    by_step, most = np.zeros(size) + damping, np.zeros(size) + largest
-    values, factors = np.array(start, np.float64), np.ones(len(start))
-    if prior is None:
-        prior = Prior(np.zeros(size), np.zeros(size))
-    given = np.atleast_2d(prior.mean), prior.inverse
-    now = _equations(residuals, given, values)
-    is_done = now[-1].sum(axis=1) <= 0.0
-    are_done = bool(is_done.all())
+    factors, is_done = np.ones(len(start)), np.zeros(len(start), np.bool_)
+    np.broadcast_to(rules[0], start.shape)  # raises for other shapes
+    now = _equations(residuals, np.array(start, np.float64, order="C"), rules)
     for _ in range(steps):
-        if are_done:
+        after = _equations(residuals, _proposed(now, factors, rules), rules)
+        if _accept(now, after, factors, least_gain, is_done):
             break
-        moved = np.empty_like(values)
-        _propose(now, factors, (by_step, low, high, most), moved)
-        after = _equations(residuals, given, moved)
-        are_done = _accept(now, after, factors, least_gain, is_done)
-    return solution_of(now, tuple(residuals))
-
-
-def solution_of(found: Equations, names: tuple[str, ...]) -> Solution:
-    """Return the solution of ``found`` equations with residuals of these names."""
-    values, upper, _, costs = found
-    lower = np.tri(values.shape[1], dtype=np.bool_)
-    information = np.where(lower, upper.swapaxes(1, 2), upper)
-    return Solution(values, information, dict(zip((*names, PRIOR), costs.T, strict=True)))
+    return Solution(now, residuals)
 
 
 def _equations(
-    residuals: Mapping[str, Callable[[Floats], Residuals | None]],
-    prior: tuple[Floats, Floats],
-    values: Floats,
+    residuals: Mapping[str, Callable[[Floats], Residuals | None]], values: Floats, rules: Rules
 ) -> Equations:
-    """Return the normal equations of the residuals, and of the prior with mean (N, n)."""
     count, size = values.shape
-    information, right = np.zeros((count, size, size)), np.empty((count, size))
-    found = values, information, right, np.zeros((count, len(residuals) + 1))
-    _begin(found, *prior)
+    found = _begun(values, rules, len(residuals) + 1)
     for number, (name, residuals_of) in enumerate(residuals.items()):
         rows = residuals_of(values)
         if rows is not None:
@@ -147,16 +142,69 @@ def _equations(
     return found
 
 
+@inlined_allocation
+def minimize_compiled(
+    write: Callable[[Floats, Any, Floats], Any],
+    given: tuple[Any, int, float],
+    start: Floats,
+    rules: Rules,
+    ends: tuple[int, float],
+) -> Equations:
+    """Do as :func:`minimize` in compiled code, for the equations of a :class:`Solution`.
+
+    The kernel ``write`` takes values (n,) and the first of what is ``given``, and writes residuals
+    (R,). Then come R and the change of a value for its derivatives. ``ends`` are most steps, and
+    least gain.
+    """
+    factors, is_done = np.ones(start.shape[0]), np.zeros(start.shape[0], np.bool_)
+    now = _linearized(write, given, start.copy(), rules, is_done)
+    for _ in range(ends[0]):
+        after = _linearized(write, given, _proposed(now, factors, rules), rules, is_done)
+        if _accept(now, after, factors, ends[1], is_done):
+            break
+    return now
+
+
+@inlined_allocation
+def _linearized(
+    write: Callable[[Floats, Any, Floats], Any],
+    given: tuple[Any, int, float],
+    values: Floats,
+    rules: Rules,
+    is_done: Bools,
+) -> Equations:
+    arguments, rows, step = given
+    (count, size), above = values.shape, np.empty(rows)
+    errors, jacobian = np.zeros((count, rows)), np.zeros((count, rows, size))
+    for n in range(count):
+        if is_done[n]:
+            continue
+        write(values[n], arguments, errors[n])
+        for j in range(size):
+            value = values[n, j]
+            values[n, j] = value + step
+            write(values[n], arguments, above)
+            values[n, j] = value
+            for i in range(rows):
+                jacobian[n, i, j] = (above[i] - errors[n, i]) / step
+    found = _begun(values, rules, 2)
+    _add(errors, jacobian, 0, found)
+    return found
+
+
 @kernel
-def _begin(found: Equations, means: Floats, inverse: Floats) -> None:
-    """Add the prior to equations that are 0; ``means`` are (1, n) or (N, n)."""
-    values, information, right, costs = found
-    for n in range(values.shape[0]):
-        for i in range(values.shape[1]):
+def _begun(values: Floats, rules: Rules, columns: int) -> Equations:
+    """Return the equations of the prior, with so many columns of costs."""
+    (count, size), (means, inverse, _, _, _, _) = values.shape, rules
+    information, right = np.zeros((count, size, size)), np.empty((count, size))
+    costs = np.zeros((count, columns))
+    for n in range(count):
+        for i in range(size):
             away = values[n, i] - means[n if means.shape[0] > 1 else 0, i]
             information[n, i, i] = inverse[i]
             right[n, i] = -inverse[i] * away
             costs[n, -1] += inverse[i] * away**2
+    return values, information, right, costs
 
 
 @kernel
@@ -176,11 +224,11 @@ def _add(values: Floats, jacobian: Floats, number: int, found: Equations) -> Non
 
 
 @kernel
-def _propose(now: Equations, factors: Floats, rules: Rules, moved: Floats) -> None:
-    """Write the values after a step, (N, n); damped by ``factors`` (N,)."""
+def _proposed(now: Equations, factors: Floats, rules: Rules) -> Floats:
+    """Return the values after a step, (N, n), damped by ``factors`` (N,)."""
     values, information, right, _ = now
-    damping, low, high, largest = rules
-    size = values.shape[1]
+    _, _, damping, low, high, largest = rules
+    size, moved = values.shape[1], np.empty(values.shape)
     matrix, change, is_held = np.empty((size, size)), np.empty(size), np.empty(size, np.bool_)
     for n in range(values.shape[0]):
         for i in range(size):
@@ -196,6 +244,7 @@ def _propose(now: Equations, factors: Floats, rules: Rules, moved: Floats) -> No
         for i in range(size):
             value = values[n, i] + min(max(change[i], -largest[i]), largest[i])
             moved[n, i] = min(max(value, low[i]), high[i])
+    return moved
 
 
 @inlined_kernel
@@ -207,7 +256,8 @@ def _solve(matrix: Floats, right: Floats) -> None:
     size = right.shape[0]
     for i in range(size):
         root = sqrt(max(matrix[i, i], _LEAST))
-        for j in range(i, size):
+        matrix[i, i] = root
+        for j in range(i + 1, size):
             matrix[i, j] /= root
         right[i] /= root
         for k in range(i + 1, size):
@@ -224,7 +274,7 @@ def _solve(matrix: Floats, right: Floats) -> None:
 
 @kernel
 def _accept(
-    now: Equations, after: Equations, factors: Floats, least_gain: float, is_done: NDArray[np.bool_]
+    now: Equations, after: Equations, factors: Floats, least_gain: float, is_done: Bools
 ) -> bool:
     """Take over the fits whose costs are not larger than before; return whether all are done."""
     values, information, right, costs = now
@@ -252,92 +302,15 @@ def _accept(
     return are_done
 
 
-def differences(
-    function: Callable[[Floats], Floats], values: Floats, step: float
-) -> tuple[Floats, Floats]:
-    """Return a function's results (N, R) at N x n values, and their derivatives (N, R, n).
-
-    The ``function`` gives (..., R) for (..., n) values; it is called once, with (n + 1, N, n).
-    """
-    size = values.shape[1]
-    here, *moved = function(values + step * np.eye(size + 1, size, -1)[:, None])
-    return here, (np.stack(moved, axis=2) - here[..., None]) / step
-
-
-@inlined_allocation
-def minimize_compiled(
-    write: Callable[[Floats, Any, Floats], Any],
-    given: Any,
-    start: Floats,
-    prior: tuple[Floats, Floats],
-    rules: Rules,
-    ends: tuple[int, float],
-    differences: tuple[int, float],
-) -> Equations:
-    """Do as :func:`minimize` in compiled code, with residuals that a kernel writes.
-
-    Args:
-        write: takes values (n,) and ``given``, and writes R residuals, (R,).
-        given: other arguments of ``write``.
-        start: values to begin with, (N, n).
-        prior: means (1, n) or (N, n), and inverse variances (n,).
-        rules: damping, limits and largest change of a step, each (n,).
-        ends: most steps, and least gain.
-        differences: R, and the change of a value for its derivatives.
-    """
-    (count, size), rows = start.shape, differences[0]
-    errors, jacobian, above = np.empty((count, rows)), np.empty((count, rows, size)), np.empty(rows)
-    now = _zeros(count, size)
-    now[0][:] = start
-    factors, is_done = np.ones(count), np.zeros(count, np.bool_)
-    for step in range(ends[0] + 1):
-        after = now if step == 0 else _zeros(count, size)
-        if step > 0:
-            _propose(now, factors, rules, after[0])
-        values = after[0]
-        for n in range(count):
-            if is_done[n]:
-                continue
-            write(values[n], given, errors[n])
-            for j in range(size):
-                value = values[n, j]
-                values[n, j] = value + differences[1]
-                write(values[n], given, above)
-                values[n, j] = value
-                for i in range(rows):
-                    jacobian[n, i, j] = (above[i] - errors[n, i]) / differences[1]
-        _begin(after, prior[0], prior[1])
-        _add(errors, jacobian, 0, after)
-        if step > 0 and _accept(now, after, factors, ends[1], is_done):
-            break
-    return now
-
-
-@inlined_allocation
-def _zeros(count: int, size: int) -> Equations:
-    matrices = np.zeros((count, size, size))
-    return np.zeros((count, size)), matrices, np.zeros((count, size)), np.zeros((count, 2))
-
-
-def pseudo_huber(squares: Floats) -> tuple[Floats, Floats]:
-    """Return the loss that is linear in residuals far above the scale."""
-    root = np.sqrt(1.0 + squares)
-    return 2.0 * (root - 1.0), 1.0 / root
-
-
-def geman_mcclure(squares: Floats) -> tuple[Floats, Floats]:
-    """Return the loss below 1, by which residuals of the scale have a quarter of the weight."""
-    return squares / (1.0 + squares), (1.0 + squares) ** -2.0
-
-
-def weighted(
-    errors: Floats, jacobian: Floats, loss: Loss, scale: float, weight: Floats | float = 1.0
+def pseudo_huber(
+    errors: Floats, jacobian: Floats, scale: float, weight: Floats | float = 1.0
 ) -> Residuals:
-    """Return robust residuals of errors (N, R) with a Jacobian (N, R, n), both in deviations.
+    """Return residuals whose loss is linear far above the ``scale``.
 
-    The ``scale`` is that of the loss, deviations; ``weight``, (N, R) or one for all, multiplies it.
+    Errors (N, R), their Jacobian (N, R, n) and the scale are in deviations; ``weight``, (N, R) or
+    one for all, multiplies the loss.
     """
-    robust, weights = loss((errors / scale) ** 2)
-    roots = np.sqrt(weight * weights)
-    costs = scale**2 * (weight * robust).sum(axis=1)
+    root = np.sqrt(1.0 + (errors / scale) ** 2)
+    costs = 2.0 * scale**2 * (weight * (root - 1.0)).sum(axis=1)
+    roots = np.sqrt(weight / root)
     return Residuals(roots * errors, roots[..., None] * jacobian, costs)

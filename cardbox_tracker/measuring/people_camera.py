@@ -24,13 +24,12 @@ from numpy.typing import NDArray
 
 from cardbox_tracker.camera.camera import Camera
 from cardbox_tracker.common.least_squares import (
-    Prior,
     Residuals,
+    Rules,
     Solution,
-    differences,
     minimize,
     pseudo_huber,
-    weighted,
+    rules_of,
 )
 from cardbox_tracker.detectors.image_points import LEG_POINT_NAMES, POINT_INDEX, ImagePoints
 from cardbox_tracker.person.proportions import USUAL_STATURE_M, USUAL_STDDEV_M
@@ -203,12 +202,14 @@ def people_camera(
             last[:, None] + np.arange(_OF_IMAGE),
         ]
     )
-    found = _fitted(seen, distance, own, Prior(mean, precision), mean).values[0]
+    rules = rules_of(len(mean), mean=mean, inverse=precision)
+    found = _fitted(seen, distance, own, rules, mean).values[0]
     # Most images show the floor, so in the second fit only the others may show something higher.
     high = found[last + _OF_IMAGE - 1]
     on_floor = np.abs(high - np.median(high)) < _ON_FLOOR
     precision[last[on_floor] + _OF_IMAGE - 1] *= (_STEP_UP / _FLOOR) ** 2
-    fit = _fitted(seen, distance, own, Prior(mean, precision), found)
+    rules = rules_of(len(mean), mean=mean, inverse=precision)
+    fit = _fitted(seen, distance, own, rules, found)
     found = fit.values[0]
     if not np.isfinite(found).all():
         return None
@@ -229,7 +230,7 @@ def _ends(values: FloatArray) -> FloatArray:
 
 
 def _fitted(
-    seen: _Seen, distance: FloatArray, own: NDArray[np.int64], prior: Prior, start: FloatArray
+    seen: _Seen, distance: FloatArray, own: NDArray[np.int64], rules: Rules, start: FloatArray
 ) -> Solution:
     """Return the unknowns that fit best.
 
@@ -237,25 +238,23 @@ def _fitted(
         seen: the images.
         distance: of each image to begin with, statures, (n,).
         own: numbers of the unknowns that each image depends on, (n, k).
-        prior: what is known of the unknowns before anything is seen.
+        rules: what is known of the unknowns before anything is seen.
         start: values to begin with.
     """
     scale = distance[:, None, None] / seen.stddevs
     images, weight = np.arange(len(own))[:, None, None], np.repeat(seen.weight, 2 * len(LEVELS))
+    steps = _STEP * np.eye(own.shape[1] + 1, own.shape[1], -1)[:, None]
 
     def levels(unknowns: FloatArray) -> Residuals:
-        (values,) = unknowns
-        away, slopes = differences(
-            lambda each: ((_rays(seen, each) - seen.rays) * scale).reshape(*each.shape[:-1], -1),
-            values[own],
-            _STEP,
-        )
-        jacobian = np.zeros((*away.shape, len(values)))
-        jacobian[images, np.arange(away.shape[1])[:, None], own[:, None]] = slopes
-        jacobian = jacobian.reshape(1, -1, len(values))
-        return weighted(away.reshape(1, -1), jacobian, pseudo_huber, _ROBUST, weight)
+        moved = (_rays(seen, unknowns[0, own] + steps) - seen.rays) * scale
+        away = moved.reshape(*moved.shape[:2], -1)
+        jacobian = np.zeros((*away.shape[1:], unknowns.size))
+        rows = np.arange(away.shape[2])[:, None]
+        jacobian[images, rows, own[:, None]] = np.moveaxis(away[1:] - away[0], 0, 2) / _STEP
+        jacobian = jacobian.reshape(1, -1, unknowns.size)
+        return pseudo_huber(away[0].reshape(1, -1), jacobian, _ROBUST, weight)
 
-    return minimize({"levels": levels}, start[None], prior, steps=_ROUNDS, least_gain=_LEAST_GAIN)
+    return minimize({"levels": levels}, start[None], rules, _ROUNDS, _LEAST_GAIN)
 
 
 def _rays(seen: _Seen, unknowns: FloatArray) -> FloatArray:

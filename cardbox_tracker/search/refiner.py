@@ -8,11 +8,11 @@ of the first camera by its matrix.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-
-import numpy as np
+from typing import NamedTuple
 
 from cardbox_tracker.camera.view import View
-from cardbox_tracker.common.least_squares import Prior, Residuals, minimize
+from cardbox_tracker.common.least_squares import Residuals, minimize, rules_of
+from cardbox_tracker.person.posture import N_STATE
 from cardbox_tracker.person.sizes import FloatArray
 from cardbox_tracker.terms.multi_view import MultiViewCost
 from cardbox_tracker.terms.term import Posed, TermObservation
@@ -22,6 +22,13 @@ Cue = tuple[int, TermObservation]
 
 # Largest change of a value in a step, rad and m.
 _MOST_CHANGE = 0.5
+
+
+class Prior(NamedTuple):
+    """A normal prior of a state."""
+
+    mean: FloatArray  #: (14,), or (N, 14) for each state
+    inverse: FloatArray  #: inverse variances, (14,)
 
 
 class Refiner:
@@ -46,15 +53,10 @@ class Refiner:
         states are within their limits. The information is (N, 14, 14).
         """
         low, high = self._cost.limits.T
-        found = minimize(
-            {f"cue {i}": self._of(*cue) for i, cue in enumerate(cues)},
-            np.ascontiguousarray(states, np.float64),
-            prior,
-            (low, high),
-            steps=steps,
-            largest=_MOST_CHANGE,
-            damping=damping,
-        )
+        given = prior._asdict() | {"low": low, "high": high}
+        rules = rules_of(N_STATE, damping=damping, largest=_MOST_CHANGE, **given)
+        terms = {f"cue {i}": self._of(*cue) for i, cue in enumerate(cues)}
+        found = minimize(terms, states, rules, steps)
         return found.values, found.information
 
     def _of(self, number: int, cue: TermObservation) -> Callable[[FloatArray], Residuals | None]:

@@ -15,7 +15,6 @@ from typing import NamedTuple
 import numpy as np
 
 from cardbox_tracker.camera.view import View
-from cardbox_tracker.common.least_squares import Prior
 from cardbox_tracker.person.model import MEASURED
 from cardbox_tracker.person.parts import BOTTOM, HEIGHT, TORSO
 from cardbox_tracker.person.posture import (
@@ -39,7 +38,7 @@ from cardbox_tracker.search.mirroring import mirrored_states, turned_states
 from cardbox_tracker.search.particles import Particles
 from cardbox_tracker.search.pose_filter import Fit, PersonPresence, Presence
 from cardbox_tracker.search.rated_states import Draws, RatedStates
-from cardbox_tracker.search.refiner import Refiner
+from cardbox_tracker.search.refiner import Prior, Refiner
 from cardbox_tracker.search.visibility import are_hidden, is_trackable
 from cardbox_tracker.search.whole_body_config import SearchProfile
 from cardbox_tracker.terms.multi_view import MultiViewCost

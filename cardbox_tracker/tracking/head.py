@@ -23,7 +23,7 @@ import numpy as np
 
 from cardbox_tracker.camera.camera import Camera
 from cardbox_tracker.common.compiling import borrowing_kernel, inlined_kernel, kernel
-from cardbox_tracker.common.least_squares import Equations, minimize_compiled, solution_of
+from cardbox_tracker.common.least_squares import Equations, Solution, minimize_compiled, rules_of
 from cardbox_tracker.detectors.image_points import POINT_INDEX, ImagePoints
 from cardbox_tracker.person.kinematics import pose
 from cardbox_tracker.person.model import BodyModel
@@ -103,12 +103,11 @@ _FARTHEST_M = 0.3
 _POINT_M, _POINT_PX = 0.010, 1.0
 # Of the priors of yaw, pitch, roll, rad; place across and up, m; logarithm of the size.
 _STDDEVS = np.array([*np.radians([60.0, 40.0, 15.0]), 0.15, 0.15, 0.10])
-_PRIOR = np.zeros((1, 6)), _STDDEVS**-2.0
 _STARTS = np.zeros((5, 6))
 _STARTS[1:, :2] = np.radians([(45.0, 0.0), (-45.0, 0.0), (0.0, 35.0), (0.0, -35.0)])
 _LARGEST_STEP = np.array([0.5, 0.5, 0.5, 0.2, 0.2, 0.2])
-_RULES = np.zeros(6), np.full(6, -np.inf), np.full(6, np.inf), _LARGEST_STEP
-# Steps, and the share of its cost that the last one gains.
+_RULES = rules_of(6, inverse=_STDDEVS**-2.0, largest=_LARGEST_STEP)
+# Steps, and the share of its cost from which on a step that gains less is the last one.
 _ENDS = 8, 1e-3
 _DIFFERENCE = 1e-6
 
@@ -154,7 +153,7 @@ def fit_neck(
         float(np.hypot(_POINT_PX, camera.fx * _POINT_M / depth_m)),
     )
 
-    found = solution_of(_solve(given), ("face",))
+    found = Solution(_solve(given), ["face"])
     best = int(np.argmin(found.total))
     values, information = found.values[best], found.information[best]
     # Priors add as many residuals as there are unknowns, so the points are the degrees of freedom.
@@ -205,10 +204,8 @@ def _write_residuals(values: Floats, given: _Given, residuals: Floats) -> None:
 @kernel
 def _solve(given: _Given) -> Equations:
     """Return the equations of the best values from each start."""
-    rows = 2 * given[3].shape[0]
-    return minimize_compiled(
-        _write_residuals, given, _STARTS, _PRIOR, _RULES, _ENDS, (rows, _DIFFERENCE)
-    )
+    rows = given, 2 * given[3].shape[0], _DIFFERENCE
+    return minimize_compiled(_write_residuals, rows, _STARTS, _RULES, _ENDS)
 
 
 class HeadTracker:

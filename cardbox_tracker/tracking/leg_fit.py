@@ -11,7 +11,7 @@ from math import cos, exp, inf, isnan, sin, sqrt
 import numpy as np
 
 from cardbox_tracker.common.compiling import borrowing_kernel, inlined_kernel, kernel
-from cardbox_tracker.common.least_squares import Equations, minimize_compiled, solution_of
+from cardbox_tracker.common.least_squares import Equations, Solution, minimize_compiled, rules_of
 from cardbox_tracker.person.legs import LEG_LIMITS
 from cardbox_tracker.terms.kernel_arguments import Floats
 
@@ -29,9 +29,9 @@ _CONTACT_M, _LIFTED_M = 0.02, 0.06
 # Lowest and highest values; the lengths of people are within 12 %, floor and distance are free.
 _LOWEST = np.array([*LEG_LIMITS[:, 0], -0.12, -0.12, -inf, -inf])
 _HIGHEST = np.array([*LEG_LIMITS[:, 1], 0.12, 0.12, inf, inf])
-_RULES = np.zeros(N_VALUES), _LOWEST, _HIGHEST, np.full(N_VALUES, 0.6)
-# The residuals have the priors. Steps, and the share of its cost that the last one gains.
-_PRIOR, _ENDS = (np.zeros((1, N_VALUES)), np.zeros(N_VALUES)), (8, 1e-3)
+_RULES = rules_of(N_VALUES, low=_LOWEST, high=_HIGHEST, largest=0.6)
+# Steps, and the share of its cost from which on a step that gains less is the last one.
+_ENDS = 8, 1e-3
 
 Person = tuple[Floats, Floats, Floats, Floats, float]
 """The hips (3,) and the left one from their middle (3,), metres in the reference frame; the
@@ -137,8 +137,8 @@ def _solve(first: Floats, others: Floats, given: Given) -> Equations:
         if cost < least:
             least = cost
             start[1] = others[row]
-    arguments, differences = (given, points_m), (_N_RESIDUALS, DIFFERENCE)
-    return minimize_compiled(_write, arguments, start, _PRIOR, _RULES, _ENDS, differences)
+    rows = (given, points_m), _N_RESIDUALS, DIFFERENCE
+    return minimize_compiled(_write, rows, start, _RULES, _ENDS)
 
 
 def fit(first: Floats, others: Floats, given: Given) -> tuple[Floats, Floats, float]:
@@ -146,6 +146,6 @@ def fit(first: Floats, others: Floats, given: Given) -> tuple[Floats, Floats, fl
 
     The fit begins at ``first`` (12,) and at the best of the ``others`` (n, 12).
     """
-    found = solution_of(_solve(first, others, given), ("legs",))
+    found = Solution(_solve(first, others, given), ["legs"])
     best = int(np.argmin(found.total))
     return found.values[best], found.information[best], float(found.total[best])

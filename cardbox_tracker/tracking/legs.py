@@ -1,7 +1,7 @@
 """Fits the legs of a tracked person to the points of a detector.
 
 The upper body comes first: it places the hips and turns them. For each image, the angles of both
-legs then are a maximum a posteriori estimate by Gauss-Newton steps. These residuals count, each in
+legs then are a maximum a posteriori estimate by least squares. These residuals count, each in
 units of its deviation:
 
 - knees and ankles in the image;

@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from cardbox_tracker.camera.camera import Camera
 from cardbox_tracker.camera.extrinsics import Extrinsics
 from cardbox_tracker.camera.view import OtherCamera, View
-from cardbox_tracker.common.least_squares import Prior, Residuals
+from cardbox_tracker.common.least_squares import Residuals
 from cardbox_tracker.detectors.image_points import (
     POINT_INDEX,
     POINT_NAMES,
@@ -31,7 +31,7 @@ from cardbox_tracker.person.posture import (
 )
 from cardbox_tracker.search.arm_search import ARM_LIMITS
 from cardbox_tracker.search.mirroring import mirrored_states
-from cardbox_tracker.search.refiner import Cue, Refiner
+from cardbox_tracker.search.refiner import Cue, Prior, Refiner
 from cardbox_tracker.terms import joint_points_kernels as kernels
 from cardbox_tracker.terms.joint_points import JointPoints
 from cardbox_tracker.terms.multi_view import MultiViewCost

@@ -17,7 +17,7 @@ from cardbox_tracker.applications.retargeting.config import RetargetConfig
 from cardbox_tracker.applications.retargeting.joint_map import WITH_HEAD_AND_HANDS
 from cardbox_tracker.applications.retargeting.robot import Robot
 from cardbox_tracker.common.errors import CardboxError
-from cardbox_tracker.common.least_squares import Prior, Residuals, minimize
+from cardbox_tracker.common.least_squares import Residuals, minimize, rules_of
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.parts import body_parts
 from cardbox_tracker.person.posture import LEFT_ARM, RIGHT_ARM
@@ -271,11 +271,13 @@ class ArmFollower:
         count = len(self.arm.joints)
         self._low, self._high = self._lower[:count], self._upper[:count]
         # A slide or an arm of several turns has a wide range, of which a turn suffices.
-        self._rest = np.clip(0.5 * (self._low + self._high), -np.pi, np.pi)
-        width = np.minimum(self._high - self._low, 2 * np.pi)
-        self._starts = np.vstack(
-            [self._rest, self._rest + width * (random.random((_STARTS, count)) - 0.5)]
+        rest = np.clip(0.5 * (self._low + self._high), -np.pi, np.pi)
+        limits = {"low": self._low, "high": self._high}
+        self._rules = rules_of(
+            count, mean=rest, inverse=_REST**2, damping=_DAMPING, largest=_LARGEST_STEP, **limits
         )
+        width = np.minimum(self._high - self._low, 2 * np.pi)
+        self._starts = np.vstack([rest, rest + width * (random.random((_STARTS, count)) - 0.5)])
 
     def target(self, body: BodyModel, posture: FloatArray, now: FloatArray) -> FloatArray:
         """See :class:`~.retargeter.Method`."""
@@ -302,8 +304,8 @@ class ArmFollower:
             gaps, slopes = self.kinematics.too_near(arm[0])
             return Residuals(gaps[None], slopes[None])
 
-        limits = self._low, self._high
-        arm[:] = minimize({"gaps": gaps}, arm, limits=limits, steps=3, damping=1e-4).values
+        rules = rules_of(arm.size, damping=1e-4, low=self._low, high=self._high)
+        arm[:] = minimize({"gaps": gaps}, arm, rules, steps=3).values
         return found
 
     def _solved(self, start: FloatArray, wanted: FloatArray) -> tuple[FloatArray, float]:
@@ -313,14 +315,6 @@ class ArmFollower:
             off, slopes = self.kinematics.residual(positions[0], wanted)
             return Residuals(off[None], slopes[None])
 
-        found = minimize(
-            {"directions": directions},
-            np.clip(start, self._low, self._high)[None],
-            Prior(self._rest, np.full(len(start), _REST**2)),
-            (self._low, self._high),
-            steps=_STEPS,
-            largest=_LARGEST_STEP,
-            damping=_DAMPING,
-            least_gain=_CLOSE,
-        )
+        start = np.clip(start, self._low, self._high)[None]
+        found = minimize({"directions": directions}, start, self._rules, _STEPS, _CLOSE)
         return found.values[0], float(found.costs["directions"][0])
