@@ -190,7 +190,7 @@ class Tracker:
 
     def remarks(self, names: Sequence[str] = (), is_all: bool = False) -> list[str]:
         """Return warnings about images that contradict each other, see :class:`.CameraFaults`."""
-        depths = (camera.depth.remark for camera in self.cameras)
+        depths = (camera.depth.remark() for camera in self.cameras)
         found = *self.faults.remarks(names, is_all), *depths, self.place.contradiction
         return [text for text in found if text]
 

@@ -11,6 +11,7 @@ from cardbox_tracker.camera.camera import Camera
 from cardbox_tracker.camera.extrinsics import Extrinsics
 from cardbox_tracker.camera.view import OtherCamera, View
 from cardbox_tracker.common.errors import InitializationError
+from cardbox_tracker.common.health import CONTRADICTED, INVERTED, Watch
 from cardbox_tracker.measuring import camera_guess
 from cardbox_tracker.measuring.camera_guess import guessed_extrinsics, reference_states
 from cardbox_tracker.measuring.camera_pose import (
@@ -20,12 +21,7 @@ from cardbox_tracker.measuring.camera_pose import (
     moved_by,
     turned_by,
 )
-from cardbox_tracker.measuring.silhouette_tangents import (
-    PoseDirection,
-    PoseFault,
-    TopTangents,
-    roll_of,
-)
+from cardbox_tracker.measuring.silhouette_tangents import PoseDirection, TopTangents, roll_of
 from cardbox_tracker.person.model import PROPORTIONS, BodyModel
 from cardbox_tracker.person.posture import reference_posture
 from cardbox_tracker.person.skeleton import KeypointState
@@ -316,19 +312,19 @@ def turned_up(pose: Extrinsics) -> Extrinsics:
     ("extrinsics", "is_exchanged", "fault"),
     [
         (TRUE, False, None),
-        (TRUE.inverse(), False, PoseFault.INVERTED),
-        (TRUE, True, PoseFault.INVERTED),
+        (TRUE.inverse(), False, INVERTED),
+        (TRUE, True, INVERTED),
         (TRUE.inverse(), True, None),
-        (turned_up(TRUE), False, PoseFault.CONTRADICTED),
+        (turned_up(TRUE), False, CONTRADICTED),
     ],
 )
 def test_the_direction_of_a_pose_is_judged(
-    extrinsics: Extrinsics, is_exchanged: bool, fault: PoseFault | None
+    extrinsics: Extrinsics, is_exchanged: bool, fault: Watch | None
 ) -> None:
     found = judged(extrinsics, is_exchanged)
-    assert found.fault is fault
-    if fault is PoseFault.CONTRADICTED:
-        assert np.degrees(found.height_rad) == pytest.approx(5.0, abs=0.7)
+    assert (found.fault and found.fault.watch) is fault
+    if fault is CONTRADICTED:
+        assert found.height_deg == pytest.approx(5.0, abs=0.7)
 
 
 def test_a_few_frames_and_empty_images_say_nothing() -> None:
@@ -343,7 +339,7 @@ def test_a_few_frames_and_empty_images_say_nothing() -> None:
     assert found.fault is None
     found.see(frame.first, frame.other)
     found.see(frame.first, frame.other)
-    assert found.fault is PoseFault.INVERTED
+    assert found.fault is not None and found.fault.watch is INVERTED
 
 
 def test_a_pose_that_was_put_right_is_trusted_again() -> None:
@@ -354,7 +350,7 @@ def test_a_pose_that_was_put_right_is_trusted_again() -> None:
             lower = np.zeros_like(frame.other)
             lower[40:] = frame.other[:-40]
             found.see(frame.first, lower)
-    assert found.fault is PoseFault.CONTRADICTED
+    assert found.fault is not None and found.fault.watch is CONTRADICTED
     for _ in range(30):
         for frame in frames:
             found.see(frame.first, frame.other)

@@ -35,7 +35,6 @@ from cardbox_tracker.ros.runtime import qos
 from cardbox_tracker.ros.runtime.command_line import node_main
 from cardbox_tracker.ros.runtime.node import CardboxNode
 from cardbox_tracker.ros.runtime.parameters import LiveParameters
-from cardbox_tracker.tracking.camera_agreement import AgreementWatch
 from cardbox_tracker.tracking.estimate import LOST, NO_PERSON, UNCERTAIN, Estimate
 from cardbox_tracker.tracking.precompile import compile_all
 from cardbox_tracker.tracking.session import Session
@@ -200,7 +199,6 @@ class TrackerNode(CardboxNode):
         self.subscribe(String, "body_model", self._on_model, qos.LATCHED)
         self._inputs = CameraInputs(self, settings, self._on_cameras, self._on_input)
         self._names = [name.strip("/") for name in settings.cameras or [""]]
-        self._agreement = AgreementWatch(self._names)
         self.diagnostics.source = f"silhouettes on {self._inputs.source}"
         self.diagnostics.extra = self._values
         self.diagnostics.remedy = (
@@ -353,7 +351,7 @@ class TrackerNode(CardboxNode):
             outputs.publish(seen, estimate, tracker)
         if self._scene is not None and self._scene.news:
             self.diagnostics.say("scene", self._scene.news)
-        self._agreement.see(self._session.agreement)
+        self._session.check_cameras()
         self.diagnostics.advice = self._warnings
         self.diagnostics.working(seen.sent_ns)
         self.diagnostics.made("joint states", conversions.stamp_ns(seen.header.stamp))
@@ -372,7 +370,9 @@ class TrackerNode(CardboxNode):
         first = None if self._session is None else self._session.trackers[0]
         ious = [] if first is None else first.camera_ious()
         used = {} if first is None else first.used_texts()
-        common = self._inputs.values(ious) | self._agreement.values() | used
+        agreement = None if self._session is None else self._session.agreement
+        turned = {} if agreement is None else agreement.values(self._names[1:])
+        common = self._inputs.values(ious) | turned | used
         values: dict[str, str] = {}
         if self.parameters.value.people:
             absent = [str(k) for k, report in enumerate(self._reports, 1) if report.is_absent]
