@@ -117,6 +117,7 @@ setup(
         f"{NAME}.applications.ergonomics": ["*.html"],
         f"{NAME}.applications.reporting": ["*.html"],
         NAME: ["py.typed"],
+        f"{NAME}.common": ["*.csv"],
         f"{NAME}.ros": ["*.csv"],
         f"{NAME}.search": ["*.json"],
         f"{NAME}.terms": ["*.json"],

@@ -13,6 +13,7 @@ from pathlib import Path
 import pytest
 
 from cardbox_tracker.commands.main import build_parser
+from cardbox_tracker.common.health import WATCHES
 
 ROOT = Path(__file__).parents[1]
 DOCUMENTS = sorted(
@@ -206,7 +207,7 @@ def key_words(text: str) -> set[str]:
 @cache
 def spoken() -> list[set[str]]:
     """Return the key words of each text in the code but docstrings."""
-    texts = []
+    texts = [watch.words for watch in WATCHES.values()]
     for path in sorted((ROOT / "cardbox_tracker").rglob("*.py")):
         tree = ast.parse(path.read_text(encoding="utf-8"))
         silent = {id(n.value) for n in ast.walk(tree) if isinstance(n, ast.Expr)}

@@ -11,6 +11,8 @@ from collections import Counter, deque
 from collections.abc import Iterable
 from enum import Enum
 
+from cardbox_tracker.common.health import WATCHES
+
 WINDOW = 120
 _PAUSE_NS = 2_000_000_000
 # The network does not reorder messages over this time, so the source was restarted.
@@ -42,6 +44,15 @@ class StampOrder(Enum):
     def is_usable(self) -> bool:
         """Whether the image can be processed as the next one."""
         return self not in (StampOrder.LATE, StampOrder.REPEATED, StampOrder.FOREIGN)
+
+
+_FAULTS = {
+    StampOrder.UNSTAMPED: WATCHES["stamps that are zero"],
+    StampOrder.REPEATED: WATCHES["stamps that repeat"],
+    StampOrder.FOREIGN: WATCHES["stamps of two clocks"],
+    StampOrder.LATE: WATCHES["stamps that are late"],
+    StampOrder.RESTART: WATCHES["stamps that go back"],
+}
 
 
 class StampSequence:
@@ -188,57 +199,29 @@ class StreamStatistics:
 
     def remarks(self) -> dict[str, str]:
         """Return texts on faults of the latest stamps by kind; a single late image is no fault."""
-        texts = {}
-        latest = Counter(self._latest)
-        count = len(self._latest)
+        latest, of = Counter(self._latest), len(self._latest)
         # All images of a recording count, and of a stream only what happens often.
-        most, most_restarts = (0, 0) if self._latest.maxlen is None else (count // 10 + 1, 2)
-        if latest[StampOrder.UNSTAMPED]:
-            texts["stamps that are zero"] = (
-                "the images have no stamp (it is zero), so they are used in the order of arrival "
-                "and losses are not seen; set header.stamp in the camera's driver"
-            )
-        if latest[StampOrder.REPEATED] > most:
-            texts["stamps that repeat"] = (
-                f"{latest[StampOrder.REPEATED]} of the latest {count} images repeat the stamp of "
-                "the one before and are left out; does the driver send them twice, or are there "
-                "two publishers?"
-            )
-        if latest[StampOrder.FOREIGN]:
-            texts["stamps of two clocks"] = (
-                "the stamps jump to and fro between two times, and images of one of them are left "
-                "out; expected one camera with one clock: see 'ros2 topic info --verbose'"
-            )
-        if latest[StampOrder.LATE] > most:
-            texts["stamps that are late"] = (
-                f"{latest[StampOrder.LATE]} of the latest {count} images have stamps that go back "
-                "by less than a second and are left out; are images sent twice, or is a recording "
-                "played in a loop?"
-            )
-        if latest[StampOrder.RESTART] > most_restarts:
-            texts["stamps that go back"] = (
-                f"the stamps of the latest {count} images went back {latest[StampOrder.RESTART]} "
-                "times by more than a second, and tracking started again each time; is "
-                "the clock of the camera's computer being set, or a recording played in a loop?"
-            )
-        return texts
+        is_recording = self._latest.maxlen is None
+        return {
+            watch.name: watch.words.format(value=latest[order], of=of)
+            for order, watch in _FAULTS.items()
+            if watch.is_beyond(latest[order]) or (is_recording and latest[order])
+        }
 
 
 # A burst begins with an image that is so much later, after its stamp, than those before it.
 _HELD_BACK_S = 0.3
 # Stamps of one burst lie within this share of the time to the next, if they are of the arrival.
 _MOMENT = 0.05
-# So many bursts within this time are told.
-_BURSTS, _BURSTS_WITHIN_S = 3, 10.0
-# Stamps that are farther ahead of this computer's clock are of another one.
-_AHEAD_S = 1.0
+# Time for which a burst counts.
+_BURSTS_WITHIN_S = 10.0
 
 
 class ArrivalWatch:
     """Tells images that arrive in bursts, and stamps in the future, of a live stream."""
 
     def __init__(self) -> None:
-        self._bursts_s: deque[float] = deque(maxlen=_BURSTS)
+        self._bursts_s: deque[float] = deque(maxlen=round(WATCHES["bursts"].limit) + 1)
         # Least and largest delay since the last burst has begun.
         self._delays_s = float("inf"), -float("inf")
         # Stamps since the last gap: the first one, the last one.
@@ -282,22 +265,13 @@ class ArrivalWatch:
 
     def remarks(self) -> dict[str, str]:
         """Return texts on the latest messages by kind."""
-        texts, recent_s = {}, self._recent_s
-        if len(recent_s) == _BURSTS:
-            period_s = (recent_s[-1] - recent_s[0]) / (_BURSTS - 1)
-            texts["bursts"] = (
-                f"the images arrive in bursts, one every {period_s:.1f} s, so results come "
-                "late and most images are left out: the driver or the network holds them back; "
-                "connect the camera by cable, switch the power saving of Wi-Fi off, or let the "
-                "driver send each image at once"
-            )
-        if self._ahead_s > _AHEAD_S:
-            texts["stamps ahead"] = (
-                f"the stamps are {self._ahead_s:.1f} s ahead of this computer's clock, so whoever "
-                "looks up TF at them waits: synchronize the clocks of the camera's computer and of "
-                "this one, for example with chrony"
-            )
-        return texts
+        recent_s = self._recent_s
+        period_s = (recent_s[-1] - recent_s[0]) / max(len(recent_s) - 1, 1) if recent_s else 0.0
+        found = {
+            "bursts": WATCHES["bursts"].remark(len(recent_s), period_s=period_s),
+            "stamps ahead": WATCHES["stamps ahead"].remark(self._ahead_s),
+        }
+        return {kind: text for kind, text in found.items() if text}
 
 
 class RecordedStamps:

@@ -12,7 +12,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from cardbox_tracker.common.health import OTHER_CLOTHES, Verdict
+from cardbox_tracker.common.health import Verdict
 from cardbox_tracker.detectors.figure import Figure
 from cardbox_tracker.person.sizes import FloatArray
 
@@ -130,7 +130,7 @@ class Identity:
         self._colours: FloatArray | None = None
         self._seen_ns = self._anybody_ns = 0
         self._images, self._is_away = 0, False
-        self._others = Verdict(OTHER_CLOTHES)
+        self._others = Verdict("other person")
 
     @property
     def is_doubtful(self) -> bool:

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from cardbox_tracker.camera.camera import Camera
 from cardbox_tracker.camera.extrinsics import Extrinsics
-from cardbox_tracker.common.health import CONTRADICTED, INVERTED, Verdict
+from cardbox_tracker.common.health import Verdict
 from cardbox_tracker.person.sizes import FloatArray
 from cardbox_tracker.terms.term import Silhouette
 
@@ -213,7 +213,7 @@ class PoseDirection:
         self._pencils = [self._tangents.pencil(pose) for pose in (given, inverse)]
         self._per_px = np.degrees(1.0 / other.fx)
         self._frames = 0
-        self._inverted, self._wrong = Verdict(INVERTED, _explained), Verdict(CONTRADICTED)
+        self._inverted, self._wrong = Verdict("inverted", _explained), Verdict("contradicted")
 
     @property
     def fault(self) -> Verdict | None:

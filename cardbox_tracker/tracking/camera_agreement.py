@@ -23,13 +23,7 @@ from cardbox_tracker.camera.camera import Camera
 from cardbox_tracker.camera.extrinsics import Extrinsics
 from cardbox_tracker.camera.view import View
 from cardbox_tracker.common.errors import CameraError
-from cardbox_tracker.common.health import (
-    EXTRINSICS,
-    EXTRINSICS_UNMEASURED,
-    HEIGHT,
-    ROLLED,
-    Verdict,
-)
+from cardbox_tracker.common.health import WATCHES, Verdict
 from cardbox_tracker.measuring.camera_pose import ROTATION, PoseProblem, Sighting, turned_by
 from cardbox_tracker.measuring.silhouette_tangents import PoseDirection, TopTangents, roll_of
 from cardbox_tracker.person.model import MEASURED, BodyModel
@@ -63,8 +57,8 @@ class _Compared:
             else earlier.direction
         )
         self.is_measured = body.source == MEASURED
-        self.turned = Verdict(EXTRINSICS if self.is_measured else EXTRINSICS_UNMEASURED)
-        self.rolled = Verdict(ROLLED, abs)
+        self.turned = Verdict("extrinsics" if self.is_measured else "extrinsics unmeasured")
+        self.rolled = Verdict("rolled", abs)
 
     def remarks(self, name: str) -> Iterator[str]:
         """Yield warnings about doubtful extrinsics; some are empty."""
@@ -72,9 +66,11 @@ class _Compared:
         if fault is not None:
             yield fault.remark(name=name)
             return
-        yield self.turned.remark(name=name, shown=_shown(self.turned.value))
-        if not (self.is_measured or self.turned.holds):
-            yield HEIGHT.remark(self.direction.height_deg, name=name)
+        if self.turned.holds:
+            shown = _shown(self.turned.value)
+            yield WATCHES["extrinsics"].words.format(name=name, shown=shown)
+        elif not self.is_measured:
+            yield WATCHES["height"].remark(self.direction.height_deg, name=name)
         yield self.rolled.remark(name=name, shown=_shown(self.rolled.value))
 
 

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cardbox_tracker.camera.camera import Camera
-from cardbox_tracker.common.health import FROZEN, FROZEN_FOR_LONG, FULL, TURNED, Verdict
+from cardbox_tracker.common.health import WATCHES, Verdict
 from cardbox_tracker.detectors.image_points import POINT_INDEX, ImagePoints
 from cardbox_tracker.terms.term import Frame
 from cardbox_tracker.tracking.camera_agreement import CameraAgreement
@@ -48,10 +48,10 @@ class CameraFaults:
         self._left_out: list[dict[str, tuple[int, int]]] = [{} for _ in range(count)]
         self._now_ns = 0
         self._last: list[NDArray[Any] | None] = [None] * count
-        self._repeated = [Verdict(FROZEN_FOR_LONG) for _ in range(count)]
+        self._repeated = [Verdict("frozen for long") for _ in range(count)]
         # The silhouettes of all cameras when each one's last image was new.
         self._then: list[list[NDArray[Any] | None]] = [[None] * count for _ in range(count)]
-        self._turned = [Verdict(TURNED) for _ in range(count)]
+        self._turned = [Verdict("turned") for _ in range(count)]
 
     def without(
         self, observations: Sequence[Observation | None], stamp_ns: int | None = None
@@ -64,8 +64,8 @@ class CameraFaults:
         kept = [None if mask is None else np.array(mask) for mask in now]
         for number, one in enumerate(seen):
             mask = kept[number]
-            if mask is not None and FULL.is_beyond(np.count_nonzero(mask) / mask.size):
-                self._leave_out(number, FULL.words)
+            if mask is not None and WATCHES["full"].is_beyond(np.count_nonzero(mask) / mask.size):
+                self._leave_out(number, WATCHES["full"].words)
                 seen[number] = None if one is None or one.points is None else one
             shown = None if one is None else one.image
             if shown is None and mask is not None and mask.any():
@@ -78,7 +78,7 @@ class CameraFaults:
                 self._last[number], self._then[number] = np.array(shown), kept
         frozen = [self._is_frozen(number, kept) for number in range(count)]
         for number in np.flatnonzero(frozen).tolist():
-            self._leave_out(number, FROZEN.words)
+            self._leave_out(number, WATCHES["frozen"].words)
             seen[number] = None
         return seen
 
@@ -93,7 +93,7 @@ class CameraFaults:
         for number, (frame, view) in enumerate(zip(frames[1:], agreement.views, strict=True)):
             turned_rad = facing_rad(frame.points, frame.camera) + view.yaw_rad - before_rad
             if self.is_turned(number + 1, turned_rad):
-                reasons[number] = reasons[number] or TURNED.words
+                reasons[number] = reasons[number] or WATCHES["turned"].words
         self.is_contradicted = len(reasons) == 1 and bool(reasons[0])
         wrong = ["", *reasons]
         if len(reasons) > 1 and all(reasons):
@@ -120,7 +120,7 @@ class CameraFaults:
             for other, (before, there) in enumerate(zip(self._then[number], now, strict=True))
             if other != number
         )
-        return moved > 0.0 if repeated.holds else FROZEN.is_beyond(moved)
+        return moved > 0.0 if repeated.holds else WATCHES["frozen"].is_beyond(moved)
 
     def is_turned(self, camera: int, turned_rad: float) -> bool:
         """Return whether somebody has faced another way than in the first camera for some images.

@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from cardbox_tracker.common.health import BACK
+from cardbox_tracker.common.health import WATCHES
 from cardbox_tracker.person.appearance import COLOR_STEPS, HAND, HEAD, steps_of_levels
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.posture import PITCH, YAW
@@ -94,7 +94,7 @@ class Facing:
         is_known = self._known_s >= _KNOWN_S
         if is_known:
             excess = now - max(self._usual, _LEAST_USUAL)
-            self.shows_back = BACK.is_beyond(excess, self.shows_back)
+            self.shows_back = WATCHES["back"].is_beyond(excess, self.shows_back)
         is_usual = not is_known or abs(now - self._usual) < _USUAL_CHANGE
         if is_frontal and is_usual and not self.shows_back:
             self._known_s += passed_s

@@ -24,7 +24,7 @@ from math import erfc, hypot, log, sqrt, tan
 import numpy as np
 
 from cardbox_tracker.camera.camera import Camera
-from cardbox_tracker.common.health import DISTANCE, Verdict
+from cardbox_tracker.common.health import Verdict
 from cardbox_tracker.detectors.image_points import POINT_INDEX, ImagePoints
 from cardbox_tracker.person.kinematics import pose
 from cardbox_tracker.person.model import MEASURED, BodyModel
@@ -113,7 +113,7 @@ class PlaceWatch:
         is_found = body.is_distance_found or "distance_m" in body.unknown
         self._is_given = body.source != MEASURED and not is_found
         stddev = hypot(_POINTS_STDDEV, DISTANCE_STDDEV, camera.focal_stddev)
-        self._compared = Verdict(DISTANCE, lambda one, other: abs(log(one / other)) / stddev)
+        self._compared = Verdict("distance", lambda one, other: abs(log(one / other)) / stddev)
         self._first_ns: int | None = None
         self._apart_m = 0.0
         self.contradiction, self.is_too_large, self.scale = "", False, 1.0

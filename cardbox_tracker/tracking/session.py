@@ -27,7 +27,7 @@ from cardbox_tracker.camera.camera import Camera
 from cardbox_tracker.camera.extrinsics import meeting_m
 from cardbox_tracker.camera.tilt import tilted_body, tilted_states
 from cardbox_tracker.camera.view import OtherCamera
-from cardbox_tracker.common.health import OTHER_CLOTHES, Verdict
+from cardbox_tracker.common.health import Verdict
 from cardbox_tracker.detectors.figure import Figure, figure_of_points
 from cardbox_tracker.detectors.identity import (
     ALIKE,
@@ -123,7 +123,7 @@ class _Person:
         self.number, self.tracker, self._measuring = number or 1, tracker, measuring
         self.estimate = Estimate(NO_PERSON, person=number)
         self.sights = [_Sight() for _ in tracker.cameras]
-        self.fitted_ns, self.others = 0, Verdict(OTHER_CLOTHES)
+        self.fitted_ns, self.others = 0, Verdict("other person")
         self.chance = 1.0
 
     def track(

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from cardbox_tracker.camera.camera import Camera
 from cardbox_tracker.camera.view import OtherCamera, View
-from cardbox_tracker.common.health import OTHER_VIEW, Verdict
+from cardbox_tracker.common.health import Verdict
 from cardbox_tracker.detectors.figure import Figure, figure_of_points
 from cardbox_tracker.detectors.identity import Identity, colours_in
 from cardbox_tracker.person.model import BodyModel
@@ -107,7 +107,7 @@ class DepthAgreement(Verdict):
 
     def __init__(self) -> None:
         """Trust the depth until images contradict it."""
-        super().__init__(OTHER_VIEW)
+        super().__init__("other view")
         self._frames = 0
 
     def accepted(self, silhouette: Silhouette, depth_m: DepthImage | None) -> DepthImage | None:
