@@ -13,9 +13,10 @@ from cardbox_tracker.camera.camera import Calibration
 from cardbox_tracker.camera.camera_info import calibration_from_info, info_array, info_remark
 from cardbox_tracker.camera.zoom import ZoomWitness
 from cardbox_tracker.common.errors import CameraError
+from cardbox_tracker.common.health import WATCHES
 
-LASTING = 30
-"""A change is accepted after this many equal calibrations in a row, one or two seconds."""
+LASTING = round(WATCHES["other calibration"].limit) + 1
+"""A change is accepted after this many equal calibrations in a row."""
 
 # A remark is removed after this many valid calibrations.
 _REMEMBERED = 150
@@ -77,17 +78,10 @@ class CalibrationWatch:
             self._back_to_good()
             return False
         if self.current is not None and not self._lasts(calibration):
-            self._ignore(
-                f"the CameraInfo on {self._topic} has changed ({calibration} instead of "
-                f"{self.current}), but the images on {self._image_topic} have not, so it is wrong "
-                "and the one before is used: see who publishes it with 'ros2 topic info --verbose "
-                f"{self._topic}'; if the one before was wrong, start this node again"
-                if self._is_contradicted
-                else f"a CameraInfo on {self._topic} that differs from those before ({calibration} "
-                f"instead of {self.current}) is ignored; the background is kept. If the camera "
-                f"was really changed, it is followed after {LASTING} of them in a row; if not, "
-                f"see who publishes it: ros2 topic info --verbose {self._topic}"
-            )
+            name = "wrong calibration" if self._is_contradicted else "other calibration"
+            given = {"topic": self._topic, "image_topic": self._image_topic, "lasting": LASTING}
+            given |= {"other": calibration, "current": self.current}
+            self._ignore(WATCHES[name].words.format(**given))
             return False
         self.current, self._other, self._count = calibration, None, 0
         self._content = content

@@ -14,9 +14,10 @@ from sensor_msgs.msg import CameraInfo, PointCloud2
 from std_msgs.msg import Header
 
 from cardbox_tracker.camera.calibration_watch import CalibrationWatch
-from cardbox_tracker.camera.camera import Camera
+from cardbox_tracker.camera.camera import Calibration, Camera
 from cardbox_tracker.camera.pairing import TOLERANCE_NS
 from cardbox_tracker.camera.stamps import StampOrder
+from cardbox_tracker.camera.zoom import ZoomWitness
 from cardbox_tracker.common.errors import CardboxError, cut, quoted
 from cardbox_tracker.common.files import user_path
 from cardbox_tracker.common.health import WATCHES, Verdict
@@ -259,6 +260,8 @@ class KeypointTopic:
         self._node.diagnostics.say(kind, self.stream.problem, warning=True)
 
 
+# Relative difference of focal length and principal point up to which cameras are the same.
+_SAME_CAMERA = 1e-3
 # Images at the start, in which a detector may not have looked at any yet.
 _STARTING = 30
 
@@ -309,6 +312,27 @@ class KeypointInputs:
         return texts
 
 
+class _SilhouetteWitness(ZoomWitness):
+    """Contradicts another calibration of a camera while its silhouettes are still of the old one.
+
+    Their node sees the images, and so it knows whether they have changed.
+    """
+
+    camera: Camera | None = None
+
+    def contradicts(self, old: Calibration, new: Calibration) -> bool:
+        """Return whether the last silhouette is of the ``old`` calibration and not of the other."""
+        return self._is_of(old) and not self._is_of(new)
+
+    def _is_of(self, calibration: Calibration) -> bool:
+        here = self.camera
+        if here is None:
+            return False
+        there = calibration.camera(here.width, here.height)
+        k, own = ((one.fx, one.fy, one.cx, one.cy) for one in (there, here))
+        return np.allclose(k, own, rtol=_SAME_CAMERA)
+
+
 class CameraKeypoints:
     """The points of one camera, and the calibration that leads from its image to silhouettes."""
 
@@ -341,6 +365,7 @@ class CameraKeypoints:
             node.resolve(f"{below}image_raw"),
             np.radians(settings.camera_roll_deg),
         )
+        self._watch.images = self._witness = _SilhouetteWitness()
         self._began_s = time.monotonic()
         node.subscribe_info(f"{below}camera_info", self._on_info)
 
@@ -385,6 +410,7 @@ class CameraKeypoints:
     ) -> list[ImagePoints] | None:
         """Return the points of all persons in px of the silhouette; None if there are none yet."""
         calibration, at_ns = self._watch.current, stamp_ns(header.stamp)
+        self._witness.camera = camera
         taken = self._taken(at_ns, header.frame_id, tolerance_ns)
         self._images += 1
         if taken is None or calibration is None:
