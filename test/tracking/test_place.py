@@ -151,17 +151,6 @@ def test_a_stature_that_contradicts_the_given_distance_is_told(
         assert place.stddev_m[0] >= abs(2.0 * stature_m / 1.80 - 2.0)
 
 
-@pytest.mark.parametrize(("first", "is_told"), [(1.10, False), (1.25, True)])
-def test_a_contradiction_lasts_until_the_sources_agree(first: float, is_told: bool) -> None:
-    """A tenth is too little to be told, and too much for an end."""
-    watch = PlaceWatch(TALL, CAMERA)
-    shown = [first] * 5 + [1.10] * 9
-    for number, factor in enumerate(shown):
-        frame = replace(frames(points_at(2.0 * factor))[0], stamp_ns=number * 10**8)
-        watch.see(estimate_at(2.0, TALL), TALL, frame)
-    assert bool(watch.contradiction) is is_told
-
-
 def test_a_body_that_is_too_large_makes_the_shape_uncertain() -> None:
     tracker = Tracker(TALL.with_values(unknown=()), CAMERA, default_preset())
     shown = render(cardbox_patches(TALL, reference_posture("front")), CAMERA)
