@@ -10,7 +10,7 @@ from dataclasses import replace
 from typing import Any
 
 from cardbox_tracker.camera.camera import Calibration
-from cardbox_tracker.camera.camera_info import calibration_from_info, info_array, info_remark
+from cardbox_tracker.camera.camera_info import calibration_from_info, info_remark
 from cardbox_tracker.camera.zoom import ZoomWitness
 from cardbox_tracker.common.errors import CameraError
 from cardbox_tracker.common.health import WATCHES
@@ -45,8 +45,6 @@ class CalibrationWatch:
         self._topic = topic
         self._image_topic = image_topic
         self._other: Calibration | None = None
-        # A driver sends the same with each image, so it is checked once.
-        self._content: tuple[Any, ...] = ()
         self._count = 0
         self._is_contradicted = False
         self._good = 0
@@ -56,10 +54,7 @@ class CalibrationWatch:
 
         Raises CameraError if the message is invalid and no valid one has arrived yet.
         """
-        self.seen, content = True, _content(message)
-        if self.current is not None and content == self._content:
-            self._back_to_good()
-            return False
+        self.seen = True
         try:
             calibration = calibration_from_info(message, self._image_topic, self._topic)
             calibration = replace(calibration, roll_rad=self._roll_rad)
@@ -74,7 +69,6 @@ class CalibrationWatch:
             )
             return False
         if self.current is not None and self.current.is_same(calibration):
-            self._content = content
             self._back_to_good()
             return False
         if self.current is not None and not self._lasts(calibration):
@@ -84,7 +78,6 @@ class CalibrationWatch:
             self._ignore(WATCHES[name].words.format(**given))
             return False
         self.current, self._other, self._count = calibration, None, 0
-        self._content = content
         self.remark, self.doubt = "", info_remark(message, self._topic)
         return True
 
@@ -118,14 +111,3 @@ class CalibrationWatch:
             self.images.remember()
         if self._good >= _REMEMBERED:
             self.remark = ""
-
-
-def _content(message: Any) -> tuple[Any, ...]:
-    """Return what the calibration of a CameraInfo follows from."""
-    roi = message.roi
-    return (
-        *(info_array(message, name).tobytes() for name in ("k", "d", "p")),
-        *(message.header.frame_id, message.distortion_model, message.width, message.height),
-        *(message.binning_x, message.binning_y),
-        *(roi.x_offset, roi.y_offset, roi.width, roi.height),
-    )

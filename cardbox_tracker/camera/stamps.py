@@ -6,10 +6,10 @@ tracking with every image.
 
 from __future__ import annotations
 
-from bisect import insort
 from collections import Counter, deque
 from collections.abc import Iterable
 from enum import Enum
+from statistics import median_low
 
 from cardbox_tracker.common.health import WATCHES
 
@@ -132,9 +132,6 @@ class StreamStatistics:
         self._sequence = StampSequence()
         self._last_ns: int | None = None
         self._spacings_ns: deque[int] = deque()
-        # A low spacing of each group, since the period is needed with every image.
-        self._group_ns: list[int] = []
-        self._low_ns: deque[int] = deque(maxlen=WINDOW // _GROUP)
         self._latest: deque[StampOrder] = deque(maxlen=remembered)
 
     def add(self, stamp_ns: int) -> StampOrder:
@@ -149,21 +146,11 @@ class StreamStatistics:
         if order is StampOrder.RESTART:
             self._dropped_before = self.dropped
             self._spacings_ns.clear()
-            self._low_ns.clear()
-            self._group_ns.clear()
         elif order is StampOrder.NEXT and last_ns is not None:
-            self._note(stamp_ns - last_ns)
+            if len(self._spacings_ns) == WINDOW:
+                self._dropped_before += self._lost_in([self._spacings_ns.popleft()])
+            self._spacings_ns.append(stamp_ns - last_ns)
         return order
-
-    def _note(self, spacing_ns: int) -> None:
-        if len(self._spacings_ns) == WINDOW:
-            self._dropped_before += self._lost_in([self._spacings_ns.popleft()])
-        self._spacings_ns.append(spacing_ns)
-        if len(self._group_ns) % _GROUP == 0:
-            self._group_ns.clear()
-            self._low_ns.append(spacing_ns)
-        insort(self._group_ns, spacing_ns)
-        self._low_ns[-1] = self._group_ns[min(1, len(self._group_ns) - 1)]
 
     @property
     def dropped(self) -> int:
@@ -187,7 +174,9 @@ class StreamStatistics:
     @property
     def period_ns(self) -> int:
         """Spacing of the stamps without losses, ns: a low one, as most images may be lost."""
-        return sorted(self._low_ns)[(len(self._low_ns) - 1) // 2] if self._low_ns else 0
+        known = [*self._spacings_ns]
+        groups = [sorted(known[at : at + _GROUP]) for at in range(0, len(known), _GROUP)]
+        return median_low(group[:2][-1] for group in groups) if groups else 0
 
     @property
     def loss(self) -> float:
