@@ -17,8 +17,6 @@ WINDOW = 120
 _PAUSE_NS = 2_000_000_000
 # The network does not reorder messages over this time, so the source was restarted.
 _RESTART_NS = 1_000_000_000
-# A clock that is set forward by more, while the recorder's goes on.
-_CLOCK_SET_NS = 10_000_000_000
 # After this many consecutive images of one clock the other clock is forgotten.
 _PATIENCE = 5
 # The period is known from this number of spacings on.
@@ -277,7 +275,7 @@ class RecordedStamps:
         self.statistics = StreamStatistics(remembered=None)
         self._last: tuple[int, int] | None = None
         self._ahead_ns = 0
-        self._jump_ns = 0
+        self._jump_s = 0.0
 
     def add(self, stamp_ns: int, recorded_ns: int) -> int | None:
         """Return the time of the next message, ns, by its stamp (0: none); None to leave it out."""
@@ -289,9 +287,10 @@ class RecordedStamps:
         is_back = is_unstamped or order is StampOrder.RESTART
         before_ns, recorded_before_ns = self._last or (time_ns, recorded_ns)
         ahead_ns, waited_ns = time_ns - before_ns, recorded_ns - recorded_before_ns
-        is_set = not is_unstamped and ahead_ns - waited_ns > _CLOCK_SET_NS and waited_ns < _PAUSE_NS
+        jump_s = 0.0 if is_unstamped or waited_ns >= _PAUSE_NS else (ahead_ns - waited_ns) / 1e9
+        is_set = WATCHES["clock set"].is_beyond(jump_s)
         if is_set:
-            self._jump_ns = self._jump_ns or ahead_ns - waited_ns
+            self._jump_s = self._jump_s or jump_s
         if self._last is not None and (is_back or is_set or time_ns <= before_ns):
             time_ns = before_ns + max(waited_ns, 1)
             if not is_unstamped:
@@ -301,11 +300,5 @@ class RecordedStamps:
 
     def remarks(self) -> list[str]:
         """Return texts on all faults, as :meth:`StreamStatistics.remarks`."""
-        found = [*self.statistics.remarks().values()]
-        if self._jump_ns:
-            found.append(
-                f"the stamps jump forward by {self._jump_ns / 1e9:.0f} s while the recorder's "
-                "clock goes on: the clock of the camera's computer was set. Times go on with the "
-                "recorder's clock"
-            )
-        return found
+        jump = WATCHES["clock set"].remark(self._jump_s)
+        return [*self.statistics.remarks().values(), *([jump] if jump else [])]

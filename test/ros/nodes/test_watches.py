@@ -20,7 +20,12 @@ from cardbox_tracker.camera.calibration_watch import CalibrationWatch
 from cardbox_tracker.camera.camera import Calibration, Camera
 from cardbox_tracker.camera.exposure import exposure_problem
 from cardbox_tracker.camera.extrinsics import Extrinsics
-from cardbox_tracker.camera.stamps import ArrivalWatch, StampOrder, StreamStatistics
+from cardbox_tracker.camera.stamps import (
+    ArrivalWatch,
+    RecordedStamps,
+    StampOrder,
+    StreamStatistics,
+)
 from cardbox_tracker.camera.view import OtherCamera, View
 from cardbox_tracker.common.health import WATCHES, Verdict
 from cardbox_tracker.detectors.figure import Figure
@@ -35,6 +40,9 @@ from cardbox_tracker.ros.nodes.camera_inputs import CameraInputs
 from cardbox_tracker.ros.nodes.keypoint_inputs import CameraKeypoints, KeypointTopic, Taken
 from cardbox_tracker.ros.nodes.tracker_parameters import TrackerParameters
 from cardbox_tracker.ros.runtime.diagnostics import NodeDiagnostics
+from cardbox_tracker.ros.runtime.publishers import SinglePublisher
+from cardbox_tracker.segmentation.learning import StillLearning
+from cardbox_tracker.segmentation.scene_motion import SceneMotion
 from cardbox_tracker.terms.term import Frame
 from cardbox_tracker.tracking.camera_agreement import CameraAgreement
 from cardbox_tracker.tracking.camera_faults import CameraFaults
@@ -410,6 +418,49 @@ def wrong_calibration(measures: Sequence[float], patch: pytest.MonkeyPatch) -> T
         yield witness.contradicts(calibration, calibration)
 
 
+def clock_set(measures: Sequence[float]) -> Told:
+    """Stamps of an image that the recorder took a tenth of a second after the one before."""
+    for jump_s in measures:
+        stamps = RecordedStamps()
+        for at_ns in (10 * S, 10 * S + PERIOD_NS):
+            stamps.add(at_ns, at_ns)
+        stamps.add(10 * S + 2 * PERIOD_NS + round(jump_s * S), 10 * S + 2 * PERIOD_NS)
+        yield bool(stamps.remarks())
+
+
+def single(publishers: dict[str, int]) -> SinglePublisher:
+    """Return the watch of a node beside so many publishers of images by topic."""
+    node: Any = SimpleNamespace(
+        get_publishers_info_by_topic=lambda topic: [
+            SimpleNamespace(node_namespace="/", node_name=f"driver_{n}")
+            for n in range(publishers.get(topic, 0))
+        ],
+        get_topic_names_and_types=lambda: [(topic, ["Image"]) for topic in publishers],
+        get_namespace=lambda: "/",
+        get_name=lambda: "tracker",
+    )
+    return SinglePublisher(node, ("/image_raw",))
+
+
+def publishers(measures: Sequence[float]) -> Told:
+    return (bool(single({"/image_raw": round(count)}).remarks()) for count in measures)
+
+
+def no_publisher(measures: Sequence[float], others: int = 1) -> Told:
+    """So many checks, while so many nodes publish images on another topic."""
+    for count in measures:
+        watch = single({"/image_raw": 0, "/image": others})
+        yield [bool(watch.remarks()) for _ in range(round(count))][-1]
+
+
+def motion(measures: Sequence[float], patch: pytest.MonkeyPatch) -> Told:
+    for share in measures:
+        patch.setattr(SceneMotion, "add", lambda *_, found=share: found)
+        learning = StillLearning(30)
+        learning.add(person())
+        yield learning.count == 0
+
+
 class Case(NamedTuple):
     """A row's name, values within and beyond its limit, and how it ends if the limits differ."""
 
@@ -462,6 +513,11 @@ CASES = [
     Case("near", 0.55, 0.65, near),
     Case("other calibration", 29, 30, other_calibration),
     Case("wrong calibration", 0.09, 0.11, wrong_calibration),
+    Case("clock set", 9.8, 10.2, clock_set),
+    Case("publishers", 1, 2, publishers),
+    Case("no publisher", 5, 6, no_publisher),
+    Case("no camera", 150, 151, lambda measures: no_publisher(measures, 0)),
+    Case("motion", 0.005, 0.007, motion),
 ]
 
 
@@ -469,9 +525,9 @@ CASES = [
 def test_a_watch_holds_beyond_its_limit_until_its_end(
     case: Case, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    more = [monkeypatch] if case.feed.__code__.co_argcount == 2 else []
+    more = [monkeypatch] if "patch" in case.feed.__code__.co_varnames[:2] else []
     limit = WATCHES[case.name].limit
-    assert limit == 0 or all(0.5 < one / limit < 2.0 for one in (case.within, case.beyond))
+    assert limit == 0 or all(0.5 < one / limit <= 2.0 for one in (case.within, case.beyond))
     lasting = case.beyond if case.lasting is None else case.lasting
     ending = case.within if case.ending is None else case.ending
     assert not list(case.feed([case.within], *more))[-1]
