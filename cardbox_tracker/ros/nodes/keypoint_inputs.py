@@ -13,12 +13,11 @@ from rclpy.subscription import Subscription
 from sensor_msgs.msg import CameraInfo, PointCloud2
 from std_msgs.msg import Header
 
-from cardbox_tracker.camera.calibration_watch import CalibrationWatch
 from cardbox_tracker.camera.camera import Calibration, Camera
+from cardbox_tracker.camera.camera_info import calibration_from_info
 from cardbox_tracker.camera.pairing import TOLERANCE_NS
 from cardbox_tracker.camera.stamps import StampOrder
-from cardbox_tracker.camera.zoom import ZoomWitness
-from cardbox_tracker.common.errors import CardboxError, cut, quoted
+from cardbox_tracker.common.errors import CameraError, CardboxError, cut, quoted
 from cardbox_tracker.common.files import user_path
 from cardbox_tracker.common.health import WATCHES, Verdict
 from cardbox_tracker.detectors.figure import figure_of_points
@@ -312,27 +311,6 @@ class KeypointInputs:
         return texts
 
 
-class _SilhouetteWitness(ZoomWitness):
-    """Contradicts another calibration of a camera while its silhouettes are still of the old one.
-
-    Their node sees the images, and so it knows whether they have changed.
-    """
-
-    camera: Camera | None = None
-
-    def contradicts(self, old: Calibration, new: Calibration) -> bool:
-        """Return whether the last silhouette is of the ``old`` calibration and not of the other."""
-        return self._is_of(old) and not self._is_of(new)
-
-    def _is_of(self, calibration: Calibration) -> bool:
-        here = self.camera
-        if here is None:
-            return False
-        there = calibration.camera(here.width, here.height)
-        k, own = ((one.fx, one.fy, one.cx, one.cy) for one in (there, here))
-        return np.allclose(k, own, rtol=_SAME_CAMERA)
-
-
 class CameraKeypoints:
     """The points of one camera, and the calibration that leads from its image to silhouettes."""
 
@@ -360,18 +338,37 @@ class CameraKeypoints:
             topic = source if source.startswith("/") else f"{below}{source}"
             self.topic = KeypointTopic(node, self._name, topic, arrived)
         self._info_topic = node.resolve(f"{below}camera_info")
-        self._watch = CalibrationWatch(
-            self._info_topic,
-            node.resolve(f"{below}image_raw"),
-            np.radians(settings.camera_roll_deg),
-        )
-        self._watch.images = self._witness = _SilhouetteWitness()
+        self._image_topic = node.resolve(f"{below}image_raw")
+        self._roll_rad = np.radians(settings.camera_roll_deg)
+        self._calibration: Calibration | None = None
+        self._camera: Camera | None = None
         self._began_s = time.monotonic()
         node.subscribe_info(f"{below}camera_info", self._on_info)
 
     def _on_info(self, message: CameraInfo, _: int) -> None:
-        if self._watch.see(message) and self.topic is not None and self._watch.current is not None:
-            self.topic.size = self._watch.current.width, self._watch.current.height
+        """Follow another calibration unless the silhouettes, whose node sees the images, do not."""
+        before = self._calibration
+        try:
+            found = calibration_from_info(message, self._image_topic, self._info_topic)
+            found = replace(found, roll_rad=self._roll_rad)
+            is_seen = self._is_seen(found)
+        except CameraError:
+            if before is None:
+                raise
+            return
+        if before is None or is_seen or not self._is_seen(before):
+            self._calibration = found
+            if self.topic is not None:
+                self.topic.size = found.width, found.height
+
+    def _is_seen(self, calibration: Calibration) -> bool:
+        """Return whether the last silhouette is of a calibration, or raise CameraError."""
+        size = self._camera or calibration
+        there, here = calibration.camera(size.width, size.height), self._camera
+        if here is None:
+            return False
+        k, own = ((one.fx, one.fy, one.cx, one.cy) for one in (there, here))
+        return np.allclose(k, own, rtol=_SAME_CAMERA)
 
     def points(
         self,
@@ -409,8 +406,8 @@ class CameraKeypoints:
         self, header: Header, camera: Camera, tolerance_ns: int
     ) -> list[ImagePoints] | None:
         """Return the points of all persons in px of the silhouette; None if there are none yet."""
-        calibration, at_ns = self._watch.current, stamp_ns(header.stamp)
-        self._witness.camera = camera
+        calibration, at_ns = self._calibration, stamp_ns(header.stamp)
+        self._camera = camera
         taken = self._taken(at_ns, header.frame_id, tolerance_ns)
         self._images += 1
         if taken is None or calibration is None:
@@ -422,12 +419,13 @@ class CameraKeypoints:
     def _taken(self, at_ns: int, frame_id: str, tolerance_ns: int) -> Taken | None:
         if self.topic is not None:
             return self.topic.take(at_ns, frame_id)
-        if self._watch.current is None:
+        calibration = self._calibration
+        if calibration is None:
             return None
         found = self._given.persons(Image(at_ns), tolerance_ns)
         try:
             for person in found:
-                check_places(person, (self._watch.current.width, self._watch.current.height))
+                check_places(person, (calibration.width, calibration.height))
         except CardboxError as error:
             self._fault = str(error)
             return None
@@ -447,7 +445,7 @@ class CameraKeypoints:
         if self._beside.holds:
             texts[f"place of {self._name}"] = self._beside.remark(reason=self._reason)
         is_late = WATCHES["no points"].is_beyond(time.monotonic() - self._began_s)
-        if self._watch.current is None and is_late:
+        if self._calibration is None and is_late:
             texts[f"calibration on {self._info_topic}"] = (
                 f"no CameraInfo has come on {self._info_topic}, so keypoints cannot be placed in "
                 "the silhouette; remap camera_info of the tracker to that of the camera"

@@ -329,8 +329,8 @@ def test_a_calibration_that_the_silhouettes_contradict_is_not_followed(
     for number in range(65):
         source.points(header(T + number * 33 * MS), silhouette, SILHOUETTE)
         tracker.bus.send("/camera_info", camera_info_message(header(T), other))
-    assert source._watch.current is not None
-    assert source._watch.current.k[0, 0] == (other if is_zoomed else FULL).fx
+    assert source._calibration is not None
+    assert source._calibration.k[0, 0] == (other if is_zoomed else FULL).fx
 
 
 def test_a_table_is_looked_up_by_the_stamp(bus: Any, tmp_path: Path) -> None:
