@@ -20,7 +20,8 @@ if TYPE_CHECKING:
     from cardbox_tracker.camera.extrinsics import Extrinsics
     from cardbox_tracker.camera.extrinsics_files import load_extrinsics
     from cardbox_tracker.camera.view import OtherCamera
-    from cardbox_tracker.commands.python import track
+    from cardbox_tracker.commands.request import Request
+    from cardbox_tracker.commands.track import track
     from cardbox_tracker.common.errors import (
         BackgroundFileError,
         BagError,
@@ -80,6 +81,7 @@ __all__ = [
     "NotFiniteError",
     "Observation",
     "OtherCamera",
+    "Request",
     "Result",
     "RosMissingError",
     "Session",
@@ -130,7 +132,8 @@ _MODULES = {
     "camera.extrinsics": ("Extrinsics",),
     "camera.extrinsics_files": ("load_extrinsics",),
     "applications.exporting.formats": ("Result", "read_result"),
-    "commands.python": ("track",),
+    "commands.request": ("Request",),
+    "commands.track": ("track",),
 }
 _MODULE_OF = {name: module for module, names in _MODULES.items() for name in names}
 

@@ -6,12 +6,14 @@ import argparse
 import math
 import os
 import sys
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import fields
+from dataclasses import MISSING, Field, dataclass, field, fields
 from itertools import chain
+from operator import index
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeVar
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Any, NamedTuple, Self, TypeVar
 
 from cardbox_tracker.common.errors import CardboxError, plain
 from cardbox_tracker.common.files import check_writable, is_written_in_place
@@ -32,45 +34,162 @@ REFERENCES = {
 
 
 def parsed(
-    kind: Callable[[str], T], expected: str, is_right: Callable[[T], bool] = lambda _: True
-) -> Callable[[str], T]:
-    """Return a parser of ``kind`` that raises ArgumentTypeError unless the value ``is_right``."""
+    kind: Callable[[Any], T], expected: str, is_right: Callable[[T], bool] = lambda _: True
+) -> Callable[[Any], T]:
+    """Return a reader of texts, and of values of Python, by ``kind``.
 
-    def parse(text: str) -> T:
-        with suppress(ValueError):
-            value = kind(text)
-            if is_right(value):
+    It raises ArgumentTypeError unless the value ``is_right``.
+    """
+
+    def read(given: Any) -> T:
+        with suppress(ValueError, TypeError, OverflowError):
+            value = kind(given)
+            if is_right(value) and not isinstance(given, bool):
                 return value
-        raise argparse.ArgumentTypeError(f"expected {expected}, got {text!r}")
+        raise argparse.ArgumentTypeError(f"expected {expected}, got {given!r}")
 
-    return parse
+    return read
 
 
-def _span(text: str) -> TimeSpan:
+def _span(given: str | Iterable[float]) -> TimeSpan:
     from cardbox_tracker.recordings.silhouettes import TimeSpan
 
-    return TimeSpan.parse(text)
+    return TimeSpan.parse(given if isinstance(given, str) else ":".join(map(str, given)))
 
 
 span = parsed(_span, "T0:T1, seconds from the start of the recording with T0 before T1")
-"""Parser of a span ``T0:T1``."""
+"""Reader of a span ``T0:T1``, or of its two times."""
 time = parsed(float, "seconds from the start of the recording", lambda one: 0.0 <= one < math.inf)
-"""Parser of a time."""
+"""Reader of a time."""
+number = parsed(float, "a number")
+"""Reader of a number."""
+path = parsed(Path, "a path")
+"""Reader of a path."""
 
 
-def at_least(lowest: int) -> Callable[[str], int]:
-    """Return a parser of whole numbers of ``lowest`` or more."""
-    return parsed(int, f"a whole number of {lowest} or more", lambda one: one >= lowest)
+def whole(given: Any) -> int:
+    """Return a whole number, or raise ValueError or TypeError."""
+    return int(given) if isinstance(given, str) else index(given)
 
 
-def between(lowest: float, highest: float) -> Callable[[str], float]:
-    """Return a parser of numbers in a range, 0 excluded if it is the lowest."""
+def at_least(lowest: int) -> Callable[[Any], int]:
+    """Return a reader of whole numbers of ``lowest`` or more."""
+    return parsed(whole, f"a whole number of {lowest} or more", lambda one: one >= lowest)
+
+
+def between(lowest: float, highest: float) -> Callable[[Any], float]:
+    """Return a reader of numbers in a range, 0 excluded if it is the lowest."""
     least = "above" if lowest == 0.0 else "from"
     return parsed(
         float,
         f"a number {least} {lowest:g} to {highest:g}",
         lambda one: lowest <= one <= highest and not lowest == 0.0 == one,
     )
+
+
+class Option(NamedTuple):
+    """How the value of a field is given on a command line, in a file of options, or from Python."""
+
+    help: str | Callable[[], str]  #: a function spares imports
+    read: Callable[[Any], Any]  #: returns the value of a text, or of what Python gives
+    metavar: str | None = None
+    flag: str = ""  #: the option if it has not the name of the field
+    choices: Callable[[], Collection[str]] | None = None
+    #: further arguments of ``add_argument``, such as the type of one of several words
+    words: Mapping[str, Any] = MappingProxyType({})
+
+    def value(self, given: Any) -> Any:
+        """Return the value, or raise ArgumentTypeError."""
+        choices = tuple(self.choices()) if self.choices else ()
+        if choices and given not in choices:
+            shown = ", ".join(map(repr, choices))
+            raise argparse.ArgumentTypeError(f"invalid choice: {given!r} (choose from {shown})")
+        return self.read(given)
+
+
+def option(
+    help: str | Callable[[], str],
+    read: Callable[[Any], Any] = str,
+    metavar: str | None = None,
+    default: Any = None,
+    flag: str = "",
+    choices: Callable[[], Collection[str]] | None = None,
+    **words: Any,
+) -> Any:
+    """Return a field of :class:`Options`, see :class:`Option`; MISSING is no default."""
+    made = Option(help, read, metavar, flag, choices, words)
+    return field(default=default, metadata={"option": made})
+
+
+def switch(help: str) -> Any:
+    """Return a field of :class:`Options` that is True if its option is given."""
+
+    def read(given: Any) -> bool:
+        if isinstance(given, bool):
+            return given
+        raise argparse.ArgumentTypeError(f"expected True or False, got {given!r}")
+
+    return option(help, read, default=False, action="store_true")
+
+
+@dataclass(frozen=True)
+class Options:
+    """Base of the dataclasses whose fields are options: each is made by :func:`option`.
+
+    Python may also give a value as it is typed. Raises CardboxError if one is wrong.
+    """
+
+    def __post_init__(self) -> None:
+        """Read the values; None stands for the default."""
+        for entry in fields(self):
+            given = getattr(self, entry.name)
+            if given is None:
+                object.__setattr__(self, entry.name, entry.default)
+            elif given is not entry.default:
+                try:
+                    value = entry.metadata["option"].value(given)
+                except argparse.ArgumentTypeError as error:
+                    raise CardboxError(f"argument {_flag(entry)}: {error}") from None
+                object.__setattr__(self, entry.name, value)
+
+    @classmethod
+    def of(cls, options: argparse.Namespace) -> Self:
+        """Return the values of :func:`add_options`."""
+        return cls(**{entry.name: getattr(options, entry.name) for entry in fields(cls)})
+
+    def given(self) -> dict[str, Any]:
+        """Return the values that are not the default, by their options."""
+        values = ((entry, getattr(self, entry.name)) for entry in fields(self))
+        return {_flag(entry): value for entry, value in values if value != entry.default}
+
+
+def _flag(entry: Field[Any]) -> str:
+    flag = entry.metadata["option"].flag or f"--{entry.name.replace('_', '-')}"
+    return entry.name if entry.default is MISSING else flag
+
+
+def add_options(
+    parser: argparse.ArgumentParser | argparse._ArgumentGroup,
+    kind: type[Options],
+    *names: str,
+    **changed: Mapping[str, Any],
+) -> None:
+    """Add an option for each field of ``kind``, or for those with these names.
+
+    ``changed`` are other arguments of ``add_argument`` by the names of fields.
+    """
+    for entry in fields(kind):
+        if names and entry.name not in names:
+            continue
+        one: Option = entry.metadata["option"]
+        words: dict[str, Any] = {"help": one.help() if callable(one.help) else one.help}
+        if entry.default is not MISSING:
+            default = None if entry.default == () else entry.default
+            words |= {"dest": entry.name, "default": default}
+        if one.words.get("action") != "store_true":
+            choices = one.choices() if one.choices else None
+            words |= {"type": one.read, "metavar": one.metavar, "choices": choices}
+        parser.add_argument(_flag(entry), **{**words, **one.words, **changed.get(entry.name, {})})
 
 
 def add_references(parser: argparse.ArgumentParser) -> None:
@@ -93,18 +212,6 @@ def add_references(parser: argparse.ArgumentParser) -> None:
     )
 
 
-def add_preset(parser: argparse.ArgumentParser) -> None:
-    """Add ``--preset``, a name of ``search.config.PRESETS``."""
-    from cardbox_tracker.search.config import PRESETS
-
-    parser.add_argument(
-        "--preset",
-        choices=PRESETS,
-        default="default",
-        help="tracker settings: paper is Table I of the paper, default tracks best",
-    )
-
-
 def add_seed(parser: argparse.ArgumentParser, what: str) -> None:
     """Add ``--seed``; ``what`` names the random numbers that it determines."""
     parser.add_argument("--seed", type=at_least(0), default=0, help=f"random seed of {what}")
@@ -119,18 +226,6 @@ def add_camera_count(parser: argparse.ArgumentParser, several: str) -> None:
         default=1,
         metavar="N",
         help=f"1 to 4; {several}",
-    )
-
-
-def add_camera_pitch(parser: argparse.ArgumentParser, found: str = "") -> None:
-    """Add ``--camera-pitch-deg``, None by default if ``found`` says how it is found, else 0."""
-    text = "positive when the camera looks down"
-    parser.add_argument(
-        "--camera-pitch-deg",
-        type=float,
-        default=None if found else 0.0,
-        metavar="P",
-        help=f"{text} (default: {found})" if found else text,
     )
 
 

@@ -6,24 +6,27 @@ import argparse
 import math
 from pathlib import Path
 
-from cardbox_tracker.commands.arguments import add_camera_pitch, add_force, check_outputs
+from cardbox_tracker.commands.arguments import add_force, add_options, check_outputs, number
+from cardbox_tracker.commands.request import CAMERA_PITCH, TrackingOptions
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of ``cardbox body``."""
-    parser.add_argument(
-        "--stature",
-        type=float,
-        required=True,
-        metavar="M",
-        help="height of the person, metres, crown to floor",
-    )
-    parser.add_argument(
-        "--distance",
-        type=float,
-        metavar="M",
-        help="from the camera to the person, metres along the floor; without it, it is found from "
-        "the first silhouette, to about a fifth",
+    add_options(
+        parser,
+        TrackingOptions,
+        *("stature_m", "distance_m", "camera_pitch_deg"),
+        stature_m={
+            "type": number,
+            "required": True,
+            "metavar": "M",
+            "help": "height of the person, metres, crown to floor",
+        },
+        distance_m={
+            "help": "from the camera to the person, metres along the floor; without it, it is "
+            "found from the first silhouette, to about a fifth"
+        },
+        camera_pitch_deg={"default": 0.0, "help": CAMERA_PITCH},
     )
     parser.add_argument(
         "--shoulder-breadth",
@@ -39,7 +42,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="of the middle of the hips above the camera's centre, metres, negative below it; "
         "by default it is fitted to the first silhouette",
     )
-    add_camera_pitch(parser)
     parser.add_argument(
         "--output", type=Path, required=True, metavar="MODEL.yaml", help="body model to write"
     )
@@ -53,8 +55,8 @@ def run(options: argparse.Namespace) -> None:
 
     check_outputs((options.output,), options.force)
     body = body_from_proportions(
-        options.stature,
-        options.distance,
+        options.stature_m,
+        options.distance_m,
         options.shoulder_breadth,
         options.hip_height,
         math.radians(options.camera_pitch_deg),

@@ -8,35 +8,30 @@ from pathlib import Path
 
 from cardbox_tracker.commands.arguments import (
     REFERENCES,
-    add_camera_pitch,
     add_force,
+    add_options,
     add_references,
     add_seed,
     check_outputs,
     span,
 )
 from cardbox_tracker.commands.initialize import measuring_config
+from cardbox_tracker.commands.request import CAMERA_PITCH, RecordingOptions, TrackingOptions
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of ``cardbox calibrate-extrinsics``."""
-    parser.add_argument(
-        "recording", type=Path, metavar="BAG", help="rosbag2 folder or file of all cameras"
-    )
-    parser.add_argument(
-        "--background",
-        type=span,
-        required=True,
-        metavar="T0:T1",
-        help="seconds during which nobody is in view",
-    )
-    parser.add_argument(
-        "--cameras",
-        nargs="+",
-        required=True,
-        metavar="NAMESPACE",
-        help="cameras of the recording that see the person, such as cam0 cam1, the one that the "
-        "person faced first",
+    add_options(
+        parser,
+        RecordingOptions,
+        *("recording", "background", "cameras"),
+        recording={"metavar": "BAG", "help": "rosbag2 folder or file of all cameras"},
+        background={"required": True},
+        cameras={
+            "required": True,
+            "help": "cameras of the recording that see the person, such as cam0 cam1, the one that "
+            "the person faced first",
+        },
     )
     add_references(parser)
     parser.add_argument(
@@ -47,15 +42,17 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="seconds in which the person moves, at first standing as for --front; 10 s or more "
         "in which the arms are raised and the person turns and steps about",
     )
-    parser.add_argument(
-        "--distance",
-        type=float,
-        required=True,
-        metavar="M",
-        help="from the first camera to the person, metres along the floor; distances between the "
-        "cameras are proportional to it",
+    add_options(
+        parser,
+        TrackingOptions,
+        *("distance_m", "camera_pitch_deg"),
+        distance_m={
+            "required": True,
+            "help": "from the first camera to the person, metres along the floor; distances "
+            "between the cameras are proportional to it",
+        },
+        camera_pitch_deg={"default": 0.0, "help": CAMERA_PITCH},
     )
-    add_camera_pitch(parser)
     add_seed(parser, "the hypotheses and the filter")
     parser.add_argument(
         "--output",
@@ -75,7 +72,7 @@ def run(options: argparse.Namespace) -> None:
 
     check_outputs((options.output,), options.force, inputs=(options.recording,))
     pitch_rad = math.radians(options.camera_pitch_deg)
-    config = measuring_config(options, options.distance, pitch_rad)
+    config = measuring_config(options, options.distance_m, pitch_rad)
     references = {name: getattr(options, name) for name in REFERENCES}
     with progress_bar("calibrate") as show:
         result = calibrate_recording(

@@ -6,7 +6,8 @@ import argparse
 import json
 from pathlib import Path
 
-from cardbox_tracker.commands.arguments import add_camera_count, add_preset, add_seed
+from cardbox_tracker.commands.arguments import add_camera_count, add_options, add_seed
+from cardbox_tracker.commands.request import TrackingOptions
 from cardbox_tracker.common.errors import CardboxError, RosMissingError
 from cardbox_tracker.common.files import make_folder, write_file
 
@@ -23,7 +24,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         action="store_true",
         help="with ROS 2: run the whole chain through the nodes, on a synthetic recording",
     )
-    add_preset(parser)
+    add_options(parser, TrackingOptions, "preset")
     add_camera_count(parser, "with --live; several see the person together, with default")
     add_seed(parser, "the recording and the filters")
 
@@ -49,12 +50,8 @@ def _track_film(output: Path, seed: int) -> None:
     from cardbox_tracker.applications.exporting.markers import write_trc
     from cardbox_tracker.applications.exporting.motion import Motion
     from cardbox_tracker.applications.reporting.page import space_view
-    from cardbox_tracker.commands.request import (
-        PersonRequest,
-        TrackFiles,
-        TrackingRequest,
-    )
     from cardbox_tracker.commands.tracking import track
+    from cardbox_tracker.commands.tracking_request import PersonRequest, TrackFiles, TrackingRequest
     from cardbox_tracker.person.proportions import body_from_proportions
     from cardbox_tracker.recordings.given_camera import GivenCamera
     from cardbox_tracker.recordings.recording import RecordingRequest

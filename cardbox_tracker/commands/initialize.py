@@ -9,15 +9,16 @@ from pathlib import Path
 
 from cardbox_tracker.commands.arguments import (
     REFERENCES,
-    add_camera_pitch,
     add_force,
+    add_options,
     add_references,
     add_seed,
     check_outputs,
     print_remarks,
 )
-from cardbox_tracker.commands.request import Problems, add_recording, inputs_of, recording_request
+from cardbox_tracker.commands.request import CAMERA_PITCH, RecordingOptions, TrackingOptions
 from cardbox_tracker.commands.scene import tilt_in
+from cardbox_tracker.commands.tracking_request import Problems, inputs_of, recording_request
 from cardbox_tracker.common.progress import progress_bar
 from cardbox_tracker.measuring.config import InitializationConfig
 from cardbox_tracker.person.model import BodyModel
@@ -34,16 +35,22 @@ _GUESSED_M = 2.0
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of ``cardbox initialize``."""
-    add_recording(parser)
+    add_options(parser, RecordingOptions)
     add_references(parser)
-    parser.add_argument(
-        "--distance",
-        type=float,
-        metavar="M",
-        help="from the camera to the person, metres along the floor; all sizes are proportional "
-        "to it; not needed with --depth, or with two or more --cameras, which measure it",
+    add_options(
+        parser,
+        TrackingOptions,
+        *("distance_m", "camera_pitch_deg"),
+        distance_m={
+            "help": "from the camera to the person, metres along the floor; all sizes are "
+            "proportional to it; not needed with --depth, or with two or more --cameras, which "
+            "measure it"
+        },
+        camera_pitch_deg={
+            "help": f"{CAMERA_PITCH} (default: 0; found in the --front images where a detector "
+            "finds silhouettes)"
+        },
     )
-    add_camera_pitch(parser, "0; found in the --front images where a detector finds silhouettes")
     add_seed(parser, "the hypotheses")
     parser.add_argument(
         "--output", type=Path, required=True, metavar="MODEL.yaml", help="body model to write"
@@ -62,24 +69,24 @@ def measuring_config(
 
 def run(options: argparse.Namespace) -> None:
     """Measure the person, write the body model and print its sizes."""
-    problems = Problems(options.recording)
+    asked, problems = RecordingOptions.of(options), Problems(options.recording)
     # The silhouettes alone are measured.
-    recording = replace(recording_request(options, problems), points=None)
-    is_given = options.distance is not None
-    if not is_given and options.depth is None and len(options.cameras) < 2:
+    recording = replace(recording_request(asked, problems), points=None)
+    is_given = options.distance_m is not None
+    if not is_given and asked.depth is None and len(asked.cameras) < 2:
         problems.miss("--distance M or --depth TOPIC or two --cameras", "one camera has no scale")
-    if is_given and options.depth is not None and options.within is None:
+    if is_given and asked.depth is not None and asked.within_m is None:
         problems.add(
             "--depth and --distance both give the distance of the person; leave one of them out, "
             "or give --within M in place of --background"
         )
-    distance_m = options.distance if is_given else _GUESSED_M
+    distance_m = options.distance_m if is_given else _GUESSED_M
     pitch_rad = math.radians(options.camera_pitch_deg or 0.0)
     config = problems.caught(
         lambda: measuring_config(options, distance_m, pitch_rad), InitializationConfig()
     )
     problems.check()
-    check_outputs((options.output,), options.force, inputs_of(options))
+    check_outputs((options.output,), options.force, inputs_of(asked))
     spans = {name: getattr(options, name) for name in REFERENCES}
     if options.camera_pitch_deg is None and recording.detector is not None:
         pitch_rad, recording = tilt_in(recording, spans["front"])

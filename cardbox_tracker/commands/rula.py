@@ -14,17 +14,22 @@ from cardbox_tracker.applications.ergonomics.report import PageContent
 from cardbox_tracker.applications.ergonomics.rula import RulaConfig
 from cardbox_tracker.commands.arguments import (
     add_force,
+    add_options,
     add_settings,
     check_outputs,
     print_remarks,
     settings_from,
 )
-from cardbox_tracker.commands.request import add_tracking, tracking_request
+from cardbox_tracker.commands.request import TrackingOptions
 from cardbox_tracker.commands.tracking import track
+from cardbox_tracker.commands.tracking_request import tracking_request
 from cardbox_tracker.common.errors import CardboxError
 from cardbox_tracker.common.files import write_file
 from cardbox_tracker.person.proportions import USUAL_STATURE_M
+from cardbox_tracker.recordings.silhouettes import RecordedFrame
 from cardbox_tracker.recordings.track import TrackSummary
+from cardbox_tracker.tracking.estimate import Estimate
+from cardbox_tracker.tracking.tracker import Tracker
 
 HIDDEN_HEAD, _, NO_IMAGES = IMAGES = ("hidden-head", "shown", "none")
 
@@ -35,7 +40,8 @@ _LEAST_CLOCK_S = 1e9
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of ``cardbox rula``."""
-    add_tracking(parser)
+    hands = "with --detector mediapipe: also measure the wrists, which are declared otherwise"
+    add_options(parser, TrackingOptions, hands={"help": hands})
     add_score_outputs(parser)
     parser.add_argument(
         "--images",
@@ -43,11 +49,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         default=IMAGES[0],
         help="images of the worst moments in --html: with the head of the tracked person made "
         "unrecognizable, as they are, or none",
-    )
-    parser.add_argument(
-        "--hands",
-        action="store_true",
-        help="with --detector mediapipe: also measure the wrists, which are declared otherwise",
     )
     add_force(parser)
     add_settings(parser, RulaConfig, "what no image shows")
@@ -57,17 +58,24 @@ def run(options: argparse.Namespace) -> None:
     """Track the person, score every image, and print times, part scores and declared inputs."""
     if options.html is None and (options.title is not None or options.images != IMAGES[0]):
         raise CardboxError("--images and --title change the page of --html; give --html OUT.html")
-    request = tracking_request(options)
+    asked = TrackingOptions.of(options)
+    request = tracking_request(asked)
     check_outputs(outputs_of(options), options.force, inputs=request.inputs)
     config = settings_from(options, RulaConfig)
     images = None
     if options.html is not None and options.images != NO_IMAGES:
         images = MomentImages(is_head_hidden=options.images == HIDDEN_HEAD)
-    observer = RulaObserver(config, options.seed, images)
-    if options.people is not None and options.person is None:
+    observer = RulaObserver(config, asked.seed, images)
+    if asked.people is not None and asked.person is None:
         print_remarks(["of several people, person 1 is scored; --person K gives another"])
-    summary = track(request, observers=(observer,))
-    write_scores(options, _content(options, config, observer.rows, summary, images))
+
+    def observe(frame: RecordedFrame, estimate: Estimate, tracker: Tracker) -> None:
+        if estimate.person in (None, asked.number):
+            observer(frame, estimate, tracker)
+
+    summary = track(request, observers=(observe,))
+    content = _content(asked, options.title, config, observer.rows, summary, images)
+    write_scores(options, content)
 
 
 def add_score_outputs(parser: argparse.ArgumentParser) -> None:
@@ -104,22 +112,19 @@ def write_scores(options: argparse.Namespace, content: PageContent) -> None:
 
 
 def _content(
-    options: argparse.Namespace,
+    asked: TrackingOptions,
+    title: str | None,
     config: RulaConfig,
     rows: Sequence[RulaRow],
     summary: TrackSummary,
     images: MomentImages | None,
 ) -> PageContent:
-    name = options.recording.resolve().name
-    number = options.person if options.people is not None and options.person else 1
-    statures = options.stature or (USUAL_STATURE_M,)
-    person = (
-        f"stature {statures[min(number, len(statures)) - 1]} m"
-        if options.model is None
-        else options.model.name
-    )
-    if options.people is not None:
-        person = f"person {number}, {person}"
+    name = asked.recording.resolve().name
+    statures_m = asked.statures_m or (USUAL_STATURE_M,)
+    stature_m = statures_m[min(asked.number, len(statures_m)) - 1]
+    person = f"stature {stature_m} m" if asked.model is None else asked.model.name
+    if asked.people is not None:
+        person = f"person {asked.number}, {person}"
     if summary.body is not None:
         person += f"; sizes from {_SIZES_FROM[summary.body.source]}"
     span = f"{rows[0].time_s:.1f} to {rows[-1].time_s:.1f} s, {len(rows)} images"
@@ -128,12 +133,12 @@ def _content(
     begin_s = rows[0].stamp_ns / 1e9
     if begin_s > _LEAST_CLOCK_S:
         facts["Begin"] = f"{datetime.fromtimestamp(begin_s, UTC):%Y-%m-%d %H:%M:%S} UTC"
-    points = options.detector or "none, so the neck is declared"
-    facts["Points of a detector"] = points
-    facts["Tracker"] = f"cardbox_tracker {__version__}, preset {options.preset}"
-    facts["Random seed"] = str(options.seed)
+    points = asked.detector or asked.detector_class or "none, so the neck is declared"
+    facts["Points of a detector"] = str(points)
+    facts["Tracker"] = f"cardbox_tracker {__version__}, preset {asked.preset}"
+    facts["Random seed"] = str(asked.seed)
     return PageContent(
-        options.title or f"RULA of {name}",
+        title or f"RULA of {name}",
         facts,
         config,
         rows,

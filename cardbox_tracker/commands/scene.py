@@ -9,7 +9,7 @@ from dataclasses import replace
 
 from cardbox_tracker.camera.camera import Camera
 from cardbox_tracker.commands.arguments import print_remarks
-from cardbox_tracker.commands.request import PersonRequest
+from cardbox_tracker.commands.tracking_request import PersonRequest
 from cardbox_tracker.measuring.people_camera import PITCH_PRIOR, USUAL_PITCH
 from cardbox_tracker.measuring.scene import FOUND, GIVEN, USUAL, Scene, SceneCamera, Value
 from cardbox_tracker.measuring.scene_camera import (

@@ -26,15 +26,15 @@ import numba
 import numpy as np
 
 import cardbox_tracker
-from cardbox_tracker.commands.request import (
+from cardbox_tracker.commands.request import Request, with_own_options
+from cardbox_tracker.commands.tracking import track
+from cardbox_tracker.commands.tracking_request import (
     FORMATS,
     TABLES,
     TrackFiles,
     TrackingRequest,
     tracking_request,
-    with_own_options,
 )
-from cardbox_tracker.commands.tracking import track
 from cardbox_tracker.common import interrupts
 from cardbox_tracker.common.errors import CardboxError, plain
 from cardbox_tracker.common.files import (
@@ -119,19 +119,19 @@ class Job(NamedTuple):
     program: str = ""  #: see :func:`digest_of_program`; empty if the process has this program
 
 
-def track_folder(options: argparse.Namespace) -> None:
+def track_folder(asked: Request, options: argparse.Namespace) -> None:
     """Track each recording of a folder that is not finished, and print a summary."""
-    folder = options.recording
+    folder = asked.recording
     output = options.output or Path(f"{folder.resolve().name}_tracked")
     recordings = recordings_in(folder, output)
     formats = _formats(options.formats or ())
-    _check_output(output, folder, recordings, options.force)
+    _check_output(output, folder, recordings, asked.force)
     before = _read_rows(output / SUMMARY)
-    jobs, rows = _jobs(options, recordings, formats)
+    jobs, rows = _jobs(asked, recordings, formats)
     reasons = list(_reasons(rows.values(), recordings))
     if len(rows) == len(recordings) > 1 and len(reasons) == 1:
         raise CardboxError(f"{reasons[0][1]} (the same for all {len(rows)} recordings)")
-    if not options.force:
+    if not asked.force:
         kept = {job.name for job in jobs if _is_finished(job, before, output, formats)}
         jobs = [job for job in jobs if job.name not in kept]
         rows |= {name: before[name] for name in kept}
@@ -188,16 +188,15 @@ def _check_output(output: Path, folder: Path, recordings: Mapping[str, Path], fo
 
 
 def _jobs(
-    options: argparse.Namespace, recordings: Mapping[str, Path], formats: Sequence[str]
+    asked: Request, recordings: Mapping[str, Path], formats: Sequence[str]
 ) -> tuple[list[Job], dict[str, Row]]:
     """Return a job for each recording, and the rows of those whose options are wrong."""
     program = digest_of_program()
     jobs, rows = [], {}
     for name, path in recordings.items():
         try:
-            own = with_own_options(options, options.recording, name)
-            own.recording = path
-            request = replace(tracking_request(own), force=True)
+            own = with_own_options(asked, asked.recording, name)
+            request = replace(tracking_request(replace(own, recording=path)), force=True)
             jobs.append(Job(name, request, digest_of_inputs(request, formats, program)))
         except (CardboxError, OSError) as error:
             rows[name] = Row.failed(name, error)

@@ -8,12 +8,13 @@ from pathlib import Path
 
 from cardbox_tracker.commands.arguments import (
     add_force,
-    add_preset,
+    add_options,
     add_seed,
     at_least,
     check_outputs,
 )
-from cardbox_tracker.commands.request import points_named
+from cardbox_tracker.commands.request import TrackingOptions
+from cardbox_tracker.commands.tracking_request import points_named
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -78,7 +79,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         action="store_true",
         help="with --sessions: also count the recoveries from disturbances",
     )
-    add_preset(parser)
+    add_options(parser, TrackingOptions, "preset")
     parser.add_argument(
         "--jobs", type=at_least(1), metavar="N", help="number of processes; one per core by default"
     )

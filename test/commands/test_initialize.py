@@ -29,7 +29,7 @@ SPANS = {
         *((("--" + name, "9:3"), f"--{name}: {SPAN}") for name in ("front", "side", "arms")),
         (("--background", "5"), f"--background: {SPAN}"),
         (("--depth", "/depth"), "--depth and --distance"),
-        (("--distance", "far"), "invalid float value: 'far'"),
+        (("--distance", "far"), "--distance: expected a number, got 'far'"),
         (("--distance", "-2"), "distance_m is -2 m; expected 0.3 to 20 m"),
         (("--distance", "0"), "distance_m is 0 m; expected 0.3 to 20 m"),
         (("--distance", "nan"), "distance_m is nan; expected a finite number of m"),

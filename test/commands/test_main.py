@@ -27,11 +27,11 @@ SHARED = {
     "main",
     "arguments",
     "request",
+    "tracking_request",
     "scene",
     "tracking",
     "track_folder",
     "checkout",
-    "python",
 }
 
 
