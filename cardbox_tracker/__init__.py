@@ -33,12 +33,14 @@ if TYPE_CHECKING:
         NotFiniteError,
         RosMissingError,
     )
+    from cardbox_tracker.detectors.detector import Detector
     from cardbox_tracker.detectors.image_points import ImagePoints
     from cardbox_tracker.measuring.config import (
         InitializationConfig,
         InitializationResult,
     )
     from cardbox_tracker.measuring.measure import initialize_body
+    from cardbox_tracker.measuring.scene_watch import SceneWatch
     from cardbox_tracker.person.model import BodyModel
     from cardbox_tracker.person.model_file import load_body_model, save_body_model
     from cardbox_tracker.person.proportions import body_from_proportions
@@ -71,6 +73,7 @@ __all__ = [
     "CameraError",
     "CardboxError",
     "Depth",
+    "Detector",
     "EncodingError",
     "Estimate",
     "Extrinsics",
@@ -84,6 +87,7 @@ __all__ = [
     "Request",
     "Result",
     "RosMissingError",
+    "SceneWatch",
     "Session",
     "SilhouetteExtractor",
     "Tracker",
@@ -115,11 +119,13 @@ _MODULES = {
         "RosMissingError",
     ),
     "search.config": ("PRESETS", "TrackerConfig"),
+    "detectors.detector": ("Detector",),
     "detectors.image_points": ("ImagePoints",),
     "terms.depth": ("Depth",),
     "camera.view": ("OtherCamera",),
     "measuring.config": ("InitializationConfig", "InitializationResult"),
     "measuring.measure": ("initialize_body",),
+    "measuring.scene_watch": ("SceneWatch",),
     "tracking.estimate": ("Estimate",),
     "tracking.observation": ("Observation",),
     "tracking.session": ("Session",),

@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 
 import cardbox_tracker
+from cardbox_tracker.applications.demo.film import DemoFilm
 from cardbox_tracker.applications.drawing.video import video_file
 from cardbox_tracker.applications.simulation.person import person_frames
 from cardbox_tracker.applications.simulation.renderer import Renderer
@@ -117,6 +118,22 @@ def assert_same(one: cardbox_tracker.Result, other: cardbox_tracker.Result) -> N
     np.testing.assert_array_equal(one.time_s, other.time_s)
     assert (one.state, one.bodies, one.scene) == (other.state, other.bodies, other.scene)
     assert one.has_others == other.has_others
+
+
+def test_the_loop_over_images_of_python_tracks_a_real_person(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    demo, found = DemoFilm.load(), list[Any]()
+    (tmp_path / "film.mp4").symlink_to(demo.path)
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(Detector, "installed", lambda: demo.detector)
+    code = code_in("python.md", 1)
+    for shown, given in (("1.75", demo.stature_m), ("60", demo.fov_deg)):
+        code = code.replace(shown, str(given))
+    exec(code, {"print": found.append})
+    keypoints_m = np.array(found, float)
+    assert keypoints_m.shape == demo.true_m.shape and np.isfinite(keypoints_m).all()
+    assert np.nanmean(demo.errors_m(keypoints_m)) < 0.08
 
 
 def test_the_examples_of_readme_and_python_run(
