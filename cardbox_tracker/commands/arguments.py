@@ -6,14 +6,13 @@ import argparse
 import math
 import os
 import sys
-from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import MISSING, Field, dataclass, field, fields
 from itertools import chain
 from operator import index
 from pathlib import Path
-from types import MappingProxyType
-from typing import TYPE_CHECKING, Any, NamedTuple, Self, TypeVar
+from typing import TYPE_CHECKING, Any, Self, TypeVar
 
 from cardbox_tracker.common.errors import CardboxError, plain
 from cardbox_tracker.common.files import check_writable, is_written_in_place
@@ -87,49 +86,32 @@ def between(lowest: float, highest: float) -> Callable[[Any], float]:
     )
 
 
-class Option(NamedTuple):
-    """How the value of a field is given on a command line, in a file of options, or from Python."""
+def _switch(given: Any) -> bool:
+    if isinstance(given, bool):
+        return given
+    raise argparse.ArgumentTypeError(f"expected True or False, got {given!r}")
 
-    help: str | Callable[[], str]  #: a function spares imports
-    read: Callable[[Any], Any]  #: returns the value of a text, or of what Python gives
-    metavar: str | None = None
-    flag: str = ""  #: the option if it has not the name of the field
-    choices: Callable[[], Collection[str]] | None = None
-    #: further arguments of ``add_argument``, such as the type of one of several words
-    words: Mapping[str, Any] = MappingProxyType({})
 
-    def value(self, given: Any) -> Any:
-        """Return the value, or raise ArgumentTypeError."""
-        choices = tuple(self.choices()) if self.choices else ()
-        if choices and given not in choices:
-            shown = ", ".join(map(repr, choices))
-            raise argparse.ArgumentTypeError(f"invalid choice: {given!r} (choose from {shown})")
-        return self.read(given)
+# Readers by the types of fields.
+_READERS = {"Path": path, "float": number, "str": str, "bool": _switch}
 
 
 def option(
-    help: str | Callable[[], str],
-    read: Callable[[Any], Any] = str,
+    help: str,
     metavar: str | None = None,
+    read: Callable[[Any], Any] | None = None,
     default: Any = None,
     flag: str = "",
-    choices: Callable[[], Collection[str]] | None = None,
     **words: Any,
 ) -> Any:
-    """Return a field of :class:`Options`, see :class:`Option`; MISSING is no default."""
-    made = Option(help, read, metavar, flag, choices, words)
-    return field(default=default, metadata={"option": made})
+    """Return a field of :class:`Options`.
 
-
-def switch(help: str) -> Any:
-    """Return a field of :class:`Options` that is True if its option is given."""
-
-    def read(given: Any) -> bool:
-        if isinstance(given, bool):
-            return given
-        raise argparse.ArgumentTypeError(f"expected True or False, got {given!r}")
-
-    return option(help, read, default=False, action="store_true")
+    ``read`` returns the value of a text, or of what Python gives; without it, the field's type
+    tells. MISSING is no default; ``flag`` is the option if it has not the name of the field. The
+    rest are arguments of ``add_argument``, such as the ``type`` of one of several words.
+    """
+    words = {"help": help, "metavar": metavar, **words}
+    return field(default=default, metadata={"words": words, "read": read, "flag": flag})
 
 
 @dataclass(frozen=True)
@@ -143,14 +125,9 @@ class Options:
         """Read the values; None stands for the default."""
         for entry in fields(self):
             given = getattr(self, entry.name)
-            if given is None:
-                object.__setattr__(self, entry.name, entry.default)
-            elif given is not entry.default:
-                try:
-                    value = entry.metadata["option"].value(given)
-                except argparse.ArgumentTypeError as error:
-                    raise CardboxError(f"argument {_flag(entry)}: {error}") from None
-                object.__setattr__(self, entry.name, value)
+            is_given = given is not None and given is not entry.default
+            value = _read(entry, given) if is_given else entry.default
+            object.__setattr__(self, entry.name, value)
 
     @classmethod
     def of(cls, options: argparse.Namespace) -> Self:
@@ -164,32 +141,42 @@ class Options:
 
 
 def _flag(entry: Field[Any]) -> str:
-    flag = entry.metadata["option"].flag or f"--{entry.name.replace('_', '-')}"
+    flag: str = entry.metadata["flag"] or f"--{entry.name.replace('_', '-')}"
     return entry.name if entry.default is MISSING else flag
 
 
-def add_options(
-    parser: argparse.ArgumentParser | argparse._ArgumentGroup,
-    kind: type[Options],
-    *names: str,
-    **changed: Mapping[str, Any],
-) -> None:
-    """Add an option for each field of ``kind``, or for those with these names.
+def _reader(entry: Field[Any]) -> Callable[[Any], Any]:
+    found: Callable[[Any], Any] | None = entry.metadata["read"]
+    return found or _READERS[str(entry.type).removesuffix(" | None")]
+
+
+def _read(entry: Field[Any], given: Any) -> Any:
+    choices = entry.metadata["words"].get("choices")
+    try:
+        if choices and given not in choices:
+            shown = ", ".join(map(repr, choices))
+            raise argparse.ArgumentTypeError(f"invalid choice: {given!r} (choose from {shown})")
+        return _reader(entry)(given)
+    except argparse.ArgumentTypeError as error:
+        raise CardboxError(f"argument {_flag(entry)}: {error}") from None
+
+
+def add_options(parser: Any, kind: type[Options], *names: str, **changed: dict[str, Any]) -> None:
+    """Add an option to a parser for each field of ``kind``, or for those with these names.
 
     ``changed`` are other arguments of ``add_argument`` by the names of fields.
     """
     for entry in fields(kind):
         if names and entry.name not in names:
             continue
-        one: Option = entry.metadata["option"]
-        words: dict[str, Any] = {"help": one.help() if callable(one.help) else one.help}
+        words: dict[str, Any] = {"type": _reader(entry)}
         if entry.default is not MISSING:
             default = None if entry.default == () else entry.default
             words |= {"dest": entry.name, "default": default}
-        if one.words.get("action") != "store_true":
-            choices = one.choices() if one.choices else None
-            words |= {"type": one.read, "metavar": one.metavar, "choices": choices}
-        parser.add_argument(_flag(entry), **{**words, **one.words, **changed.get(entry.name, {})})
+        words |= entry.metadata["words"] | changed.get(entry.name, {})
+        if entry.default is False:
+            words = {"dest": entry.name, "help": words["help"], "action": "store_true"}
+        parser.add_argument(_flag(entry), **words)
 
 
 def add_references(parser: argparse.ArgumentParser) -> None:

@@ -8,34 +8,32 @@ from __future__ import annotations
 import argparse
 import os
 import shlex
-from collections.abc import Collection, Iterable, Mapping
+from collections.abc import Iterable, Mapping
 from contextlib import suppress
 from dataclasses import MISSING, dataclass, fields, replace
 from pathlib import Path, PurePosixPath
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any, Literal, NoReturn
+from typing import Any, Literal, NoReturn
 
 from cardbox_tracker.commands.arguments import (
     Options,
     add_options,
     at_least,
     between,
-    number,
     option,
     parsed,
-    path,
     span,
-    switch,
     time,
     whole,
 )
 from cardbox_tracker.common.errors import CardboxError
 from cardbox_tracker.common.files import foreign, read_regular
 from cardbox_tracker.common.settings import settings_of
-
-if TYPE_CHECKING:
-    from cardbox_tracker.detectors.own_network import FindsPeople
-    from cardbox_tracker.detectors.person_choice import PersonChoice
+from cardbox_tracker.detectors.own_network import FindsPeople
+from cardbox_tracker.detectors.person_choice import PersonChoice
+from cardbox_tracker.search.config import PRESETS
+from cardbox_tracker.search.whole_body_config import WholeBodyConfig
+from cardbox_tracker.tracking.session import MOST_PEOPLE
 
 Setting = bool | int | float | str
 AUTO = "auto"
@@ -71,8 +69,6 @@ def _detector(given: Any) -> Any:
 
 
 def _person_choice(given: Any) -> PersonChoice | int:
-    from cardbox_tracker.detectors.person_choice import PersonChoice
-
     if isinstance(given, PersonChoice):
         return given
     text = ",".join(map(str, given)) if isinstance(given, tuple | list) else str(given)
@@ -90,8 +86,6 @@ def _statures(given: Any) -> tuple[float, ...]:
 
 
 def _people(given: Any) -> int | str:
-    from cardbox_tracker.tracking.session import MOST_PEOPLE
-
     if given == AUTO:
         return AUTO
     expected = f"{AUTO} or a number from 1 to {MOST_PEOPLE}"
@@ -111,19 +105,7 @@ def _setting(text: str) -> tuple[str, Setting]:
     return name, value
 
 
-def _presets() -> Collection[str]:
-    from cardbox_tracker.search.config import PRESETS
-
-    return PRESETS
-
-
-def _effort() -> str:
-    from cardbox_tracker.search.whole_body_config import WholeBodyConfig
-
-    effort = settings_of(WholeBodyConfig)["effort"]
-    return f"{effort.description}; {effort.range_text}; for the preset default"
-
-
+_EFFORT = settings_of(WholeBodyConfig)["effort"]
 _NAMED = "NAME=VALUE, such as lost_frames=10"
 
 
@@ -133,37 +115,34 @@ class RecordingOptions(Options):
 
     recording: Path = option(
         "rosbag2 folder or file, video, or folder of JPEG or PNG images",
-        path,
         "RECORDING",
-        MISSING,
+        default=MISSING,
     )
     background: tuple[float, float] | None = option(
-        "seconds during which nobody is in view", span, "T0:T1"
+        "seconds during which nobody is in view", "T0:T1", span
     )
     cameras: tuple[str, ...] = option(
-        "cameras of the recording that see the person, such as cam0 cam1, the one that the "
-        "person faced first; with one name, that camera alone",
-        parsed(_cameras, "names of cameras"),
+        "cameras of the recording that see the person, such as cam0 cam1, the one that the person "
+        "faced first; with one name, that camera alone",
         "NAMESPACE",
-        (),
+        parsed(_cameras, "names of cameras"),
+        default=(),
         type=str,
         nargs="+",
     )
     extrinsics: Path | None = option(
-        "where further cameras stand, from Kalibr (YAML) or aniposelib (TOML), if the "
-        "recording does not tell",
-        path,
+        "where further cameras stand, from Kalibr (YAML) or aniposelib (TOML), if the recording "
+        "does not tell",
         "FILE",
     )
     depth: str | None = option(
-        "depth images of the same view as the first of --cameras; 'stereo' measures depth in "
-        "the first two of them, a rectified pair, left first",
-        metavar="TOPIC",
+        "depth images of the same view as the first of --cameras; 'stereo' measures depth in the "
+        "first two of them, a rectified pair, left first",
+        "TOPIC",
     )
     within_m: float | None = option(
-        "in place of --background: all that is nearer in the images of --depth, metres, is "
-        "the person",
-        number,
+        "in place of --background: all that is nearer in the images of --depth, metres, is the "
+        "person",
         "M",
         flag="--within",
     )
@@ -171,54 +150,52 @@ class RecordingOptions(Options):
         "what tells the person from the scene: the empty scene of --background; the mask of a "
         "person detector, the default with --detector mediapipe; or a scene that is learned around "
         "the person, who must step aside at some time, the default for other films",
-        choices=lambda: ("background", "detector", "person_in_view"),
+        choices=("background", "detector", "person_in_view"),
     )
     #: also an object with ``detect(image)``, or its class
     detector: str | FindsPeople | type[FindsPeople] | None = option(
         "also use 2D points of the person's joints: those of MediaPipe's networks ('cardbox "
         "detector --install'), or those that any detector has written: a table FILE.csv, FILE.json "
         "of COCO, or a folder of OpenPose's files (docs/detectors.md)",
-        _detector,
         "mediapipe|FILE|FOLDER",
+        _detector,
     )
     detector_class: str | None = option(
         "the same of a class of your own with a function detect(image) (docs/extending.md)",
-        metavar="MODULE:CLASS",
+        "MODULE:CLASS",
     )
     person: str | tuple[float, float] | int | PersonChoice | None = option(
-        "with --detector mediapipe: whom of several people to follow: the left or right one "
-        "in the image, the largest, or the one at column X and row Y. With --people: the number of "
-        "the one whose results are used, if not all are",
-        _person_choice,
+        "with --detector mediapipe: whom of several people to follow: the left or right one in the "
+        "image, the largest, or the one at column X and row Y. With --people: the number of the "
+        "one whose results are used, if not all are",
         "left|right|largest|X,Y|K",
+        _person_choice,
     )
     fov_deg: float | None = option(
-        "field of view across the width of the image as it is shown: webcams 60 to 78, phones "
-        "60 to 75 held sideways and 36 to 46 upright. Without it, what a phone wrote into the "
-        "file, or else, with --detector, 65 degrees along the longer side",
-        number,
+        "field of view across the width of the image as it is shown: webcams 60 to 78, phones 60 "
+        "to 75 held sideways and 36 to 46 upright. Without it, what a phone wrote into the file, "
+        "or else, with --detector, 65 degrees along the longer side",
         "DEG",
         flag="--fov",
     )
     calibration: Path | None = option(
-        "in place of --fov: file of camera_calibration, OpenCV's FileStorage or Kalibr",
-        path,
-        "FILE",
+        "in place of --fov: file of camera_calibration, OpenCV's FileStorage or Kalibr", "FILE"
     )
     camera_roll_deg: float | None = option(
-        "how far the camera is turned clockwise, seen from behind it, 180 if its top is "
-        "below; images are turned back",
-        between(-_MOST_ROLL_DEG, _MOST_ROLL_DEG),
+        "how far the camera is turned clockwise, seen from behind it, 180 if its top is below; "
+        "images are turned back",
         "R",
+        between(-_MOST_ROLL_DEG, _MOST_ROLL_DEG),
     )
-    mirrored: bool = switch(
+    mirrored: bool = option(
         "the images are mirrored, as some programs do with those of a front camera; they are "
-        "turned back"
+        "turned back",
+        default=False,
     )
     fps: float | None = option(
         "images a second of a folder of images (default: 30), or of a video in slow motion",
-        between(0.0, _MOST_FPS),
         "HZ",
+        between(0.0, _MOST_FPS),
     )
 
 
@@ -228,73 +205,72 @@ class TrackingOptions(RecordingOptions):
 
     model: Path | None = option(
         "the person, from 'cardbox initialize', the node initializer, or 'cardbox body'",
-        path,
         "MODEL.yaml",
     )
     stature_m: float | tuple[float, ...] | None = option(
-        "in place of --model: height of the person, metres, crown to floor; sizes are the "
-        "mean ones of people of that stature. With --people, one for each of them in turn, or one "
-        "for all. Of films with --detector, the mean stature of adults is taken without both",
-        parsed(_statures, "metres, or those of each person as in 1.75,1.62"),
+        "in place of --model: height of the person, metres, crown to floor; sizes are the mean "
+        "ones of people of that stature. With --people, one for each of them in turn, or one for "
+        "all. Of films with --detector, the mean stature of adults is taken without both",
         "M[,M...]",
+        parsed(_statures, "metres, or those of each person as in 1.75,1.62"),
         flag="--stature",
     )
     scene: Path | None = option(
-        "camera, and without --stature and --model also people, of another recording of the "
-        "same camera, as 'cardbox track' wrote them beside its table",
-        path,
+        "camera, and without --stature and --model also people, of another recording of the same "
+        "camera, as 'cardbox track' wrote them beside its table",
         "OUT.scene.yaml",
     )
     people: int | Literal["auto"] | None = option(
-        "track N people, or all who come (up to 6); they are numbered as "
-        "they come, and from left to right if they come together",
-        _people,
+        "track N people, or all who come (up to 6); they are numbered as they come, and from left "
+        "to right if they come together",
         "N|auto",
+        _people,
     )
     distance_m: float | None = option(
-        "with --stature: from the camera to the person, metres along the floor; without it, "
-        "it is found from the first images",
-        number,
+        "with --stature: from the camera to the person, metres along the floor; without it, it is "
+        "found from the first images",
         "M",
         flag="--distance",
     )
     camera_pitch_deg: float | None = option(
         f"{CAMERA_PITCH} (default: with --stature, found from the person who stands upright at "
         "--start)",
-        number,
         "P",
     )
     start_s: float | None = option(
-        "second at which the person stands as for --front; tracking starts there. With "
-        "--stature, or a body that was not measured, any posture will do (default: 0)",
-        time,
+        "second at which the person stands as for --front; tracking starts there. With --stature, "
+        "or a body that was not measured, any posture will do (default: 0)",
         "T",
+        time,
         flag="--start",
     )
     end_s: float | None = option(
-        "second at which tracking ends (default: the last)", time, "T", flag="--end"
+        "second at which tracking ends (default: the last)", "T", time, flag="--end"
     )
     preset: str = option(
         "tracker settings: paper is Table I of the paper, default tracks best",
         default="default",
-        choices=_presets,
+        choices=PRESETS,
     )
-    effort: float | None = option(_effort, number, "X")
+    effort: float | None = option(
+        f"{_EFFORT.description}; {_EFFORT.range_text}; for the preset default", "X"
+    )
     set: Mapping[str, Setting] | None = option(
-        "another setting of the tracker by its name in docs/parameters.md, such as "
-        "lost_frames=10; may be given several times",
-        parsed(dict, _NAMED),
+        "another setting of the tracker by its name in docs/parameters.md, such as lost_frames=10; "
+        "may be given several times",
         "NAME=VALUE",
+        parsed(dict, _NAMED),
         type=parsed(_setting, _NAMED),
         action="append",
     )
     settings: Path | None = option(
-        "file of such settings; --set and --effort take precedence over it", path, "FILE.yaml"
+        "file of such settings; --set and --effort take precedence over it", "FILE.yaml"
     )
-    seed: int = option("random seed of the filters", at_least(0), default=0)
-    hands: bool = switch(
+    seed: int = option("random seed of the filters", read=at_least(0), default=0)
+    hands: bool = option(
         "with --detector mediapipe: also tell open from closed hands, and measure palms and "
-        "wrists, in further columns and in the video (docs/results.md)"
+        "wrists, in further columns and in the video (docs/results.md)",
+        default=False,
     )
 
     @property
@@ -329,34 +305,30 @@ class Request(TrackingOptions):
     """
 
     csv: Path | None = option(
-        "table to write, one row per image (docs/results.md); by default it has the name of "
-        "the recording and is in the current folder. OUT.body.yaml beside it is the body that "
-        "was used",
-        path,
+        "table to write, one row per image (docs/results.md); by default it has the name of the "
+        "recording and is in the current folder. OUT.body.yaml beside it is the body that was used",
         "OUT.csv|OUT.parquet",
     )
-    bag: Path | None = option("also write the topics of the tracker", path, "OUT")
-    video: Path | None = option("also write an overlay video", path, "OUT.mp4")
+    bag: Path | None = option("also write the topics of the tracker", "OUT")
+    video: Path | None = option("also write an overlay video", "OUT.mp4")
     json: Path | None = option(
         "also write what is printed at the end: what was tracked, used, left out and assumed",
-        path,
         "OUT.json",
     )
     export: str | tuple[str, ...] | None = option(
         "also write the table in formats of 'cardbox export' beside it, such as trc,bvh",
-        _formats,
         "FORMAT[,...]",
+        _formats,
     )
     plot: Path | None = option(
-        "also plot the angles, with bands of one standard deviation", path, "OUT.png"
+        "also plot the angles, with bands of one standard deviation", "OUT.png"
     )
     report: Path | None = option(
-        "also write a page with the overlay video (OUT.overlay.mp4 without --video), the "
-        "skeleton from aside, the angles and the times to look at",
-        path,
+        "also write a page with the overlay video (OUT.overlay.mp4 without --video), the skeleton "
+        "from aside, the angles and the times to look at",
         "OUT.html",
     )
-    force: bool = switch("replace results that exist; without it, refuse")
+    force: bool = option("replace results that exist; without it, refuse", default=False)
 
 
 def with_own_options(asked: Request, folder: Path, name: str) -> Request:
