@@ -14,93 +14,50 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from cardbox_tracker.applications.exporting.formats import Result, read_result
-    from cardbox_tracker.camera.calibration_file import load_calibration
-    from cardbox_tracker.camera.camera import Calibration, Camera
-    from cardbox_tracker.camera.extrinsics import Extrinsics
-    from cardbox_tracker.camera.extrinsics_files import load_extrinsics
-    from cardbox_tracker.camera.view import OtherCamera
-    from cardbox_tracker.commands.request import Request
-    from cardbox_tracker.commands.track import track
-    from cardbox_tracker.common.errors import (
-        BackgroundFileError,
-        BagError,
-        BodyModelError,
-        CameraError,
-        CardboxError,
-        EncodingError,
-        InitializationError,
-        NotFiniteError,
-        RosMissingError,
-    )
-    from cardbox_tracker.detectors.detector import Detector
-    from cardbox_tracker.detectors.image_points import ImagePoints
-    from cardbox_tracker.measuring.config import (
-        InitializationConfig,
-        InitializationResult,
-    )
-    from cardbox_tracker.measuring.measure import initialize_body
-    from cardbox_tracker.measuring.scene_watch import SceneWatch
-    from cardbox_tracker.person.model import BodyModel
-    from cardbox_tracker.person.model_file import load_body_model, save_body_model
-    from cardbox_tracker.person.proportions import body_from_proportions
-    from cardbox_tracker.person.skeleton import JOINT_NAMES, KEYPOINT_NAMES
-    from cardbox_tracker.search.config import PRESETS, TrackerConfig
-    from cardbox_tracker.segmentation.background import SilhouetteExtractor
-    from cardbox_tracker.segmentation.background_config import BackgroundConfig
-    from cardbox_tracker.segmentation.empty_scene import BackgroundLearner, BackgroundModel
-    from cardbox_tracker.terms.depth import Depth
-    from cardbox_tracker.tracking.estimate import Estimate
-    from cardbox_tracker.tracking.observation import Observation
-    from cardbox_tracker.tracking.session import Session
-    from cardbox_tracker.tracking.tracker import Tracker
+    from cardbox_tracker.applications.exporting.formats import Result as Result
+    from cardbox_tracker.applications.exporting.formats import read_result as read_result
+    from cardbox_tracker.camera.calibration_file import load_calibration as load_calibration
+    from cardbox_tracker.camera.camera import Calibration as Calibration
+    from cardbox_tracker.camera.camera import Camera as Camera
+    from cardbox_tracker.camera.extrinsics import Extrinsics as Extrinsics
+    from cardbox_tracker.camera.extrinsics_files import load_extrinsics as load_extrinsics
+    from cardbox_tracker.camera.view import OtherCamera as OtherCamera
+    from cardbox_tracker.commands.request import Request as Request
+    from cardbox_tracker.commands.track import track as track
+    from cardbox_tracker.common.errors import BackgroundFileError as BackgroundFileError
+    from cardbox_tracker.common.errors import BagError as BagError
+    from cardbox_tracker.common.errors import BodyModelError as BodyModelError
+    from cardbox_tracker.common.errors import CameraError as CameraError
+    from cardbox_tracker.common.errors import CardboxError as CardboxError
+    from cardbox_tracker.common.errors import EncodingError as EncodingError
+    from cardbox_tracker.common.errors import InitializationError as InitializationError
+    from cardbox_tracker.common.errors import NotFiniteError as NotFiniteError
+    from cardbox_tracker.common.errors import RosMissingError as RosMissingError
+    from cardbox_tracker.detectors.detector import Detector as Detector
+    from cardbox_tracker.detectors.image_points import ImagePoints as ImagePoints
+    from cardbox_tracker.measuring.config import InitializationConfig as InitializationConfig
+    from cardbox_tracker.measuring.config import InitializationResult as InitializationResult
+    from cardbox_tracker.measuring.measure import initialize_body as initialize_body
+    from cardbox_tracker.measuring.scene_watch import SceneWatch as SceneWatch
+    from cardbox_tracker.person.model import BodyModel as BodyModel
+    from cardbox_tracker.person.model_file import load_body_model as load_body_model
+    from cardbox_tracker.person.model_file import save_body_model as save_body_model
+    from cardbox_tracker.person.proportions import body_from_proportions as body_from_proportions
+    from cardbox_tracker.person.skeleton import JOINT_NAMES as JOINT_NAMES
+    from cardbox_tracker.person.skeleton import KEYPOINT_NAMES as KEYPOINT_NAMES
+    from cardbox_tracker.search.config import PRESETS as PRESETS
+    from cardbox_tracker.search.config import TrackerConfig as TrackerConfig
+    from cardbox_tracker.segmentation.background import SilhouetteExtractor as SilhouetteExtractor
+    from cardbox_tracker.segmentation.background_config import BackgroundConfig as BackgroundConfig
+    from cardbox_tracker.segmentation.empty_scene import BackgroundLearner as BackgroundLearner
+    from cardbox_tracker.segmentation.empty_scene import BackgroundModel as BackgroundModel
+    from cardbox_tracker.terms.depth import Depth as Depth
+    from cardbox_tracker.tracking.estimate import Estimate as Estimate
+    from cardbox_tracker.tracking.observation import Observation as Observation
+    from cardbox_tracker.tracking.session import Session as Session
+    from cardbox_tracker.tracking.tracker import Tracker as Tracker
 
 __version__ = "0.1.0"
-
-__all__ = [
-    "JOINT_NAMES",
-    "KEYPOINT_NAMES",
-    "PRESETS",
-    "BackgroundConfig",
-    "BackgroundFileError",
-    "BackgroundLearner",
-    "BackgroundModel",
-    "BagError",
-    "BodyModel",
-    "BodyModelError",
-    "Calibration",
-    "Camera",
-    "CameraError",
-    "CardboxError",
-    "Depth",
-    "Detector",
-    "EncodingError",
-    "Estimate",
-    "Extrinsics",
-    "ImagePoints",
-    "InitializationConfig",
-    "InitializationError",
-    "InitializationResult",
-    "NotFiniteError",
-    "Observation",
-    "OtherCamera",
-    "Request",
-    "Result",
-    "RosMissingError",
-    "SceneWatch",
-    "Session",
-    "SilhouetteExtractor",
-    "Tracker",
-    "TrackerConfig",
-    "body_from_proportions",
-    "initialize_body",
-    "load_body_model",
-    "load_calibration",
-    "load_extrinsics",
-    "read_result",
-    "save_body_model",
-    "track",
-]
 
 _MODULES = {
     "person.model": ("BodyModel",),
@@ -142,6 +99,7 @@ _MODULES = {
     "commands.track": ("track",),
 }
 _MODULE_OF = {name: module for module, names in _MODULES.items() for name in names}
+__all__ = sorted(_MODULE_OF)
 
 
 def __getattr__(name: str) -> Any:

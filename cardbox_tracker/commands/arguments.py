@@ -93,7 +93,12 @@ def _switch(given: Any) -> bool:
 
 
 # Readers by the types of fields.
-_READERS = {"Path": path, "float": number, "str": str, "bool": _switch}
+_READERS: dict[str, Callable[[Any], Any]] = {
+    "Path": path,
+    "float": number,
+    "str": str,
+    "bool": _switch,
+}
 
 
 def option(
@@ -147,7 +152,7 @@ def _flag(entry: Field[Any]) -> str:
 
 def _reader(entry: Field[Any]) -> Callable[[Any], Any]:
     found: Callable[[Any], Any] | None = entry.metadata["read"]
-    return found or _READERS[str(entry.type).removesuffix(" | None")]
+    return _READERS[str(entry.type).removesuffix(" | None")] if found is None else found
 
 
 def _read(entry: Field[Any], given: Any) -> Any:

@@ -28,23 +28,22 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         },
         camera_pitch_deg={"default": 0.0, "help": CAMERA_PITCH},
     )
-    parser.add_argument(
+    add = parser.add_argument
+    add(
         "--shoulder-breadth",
         type=float,
         metavar="M",
         help="between the shoulder joints, metres; by default it is fitted to the first "
         "silhouette, like all other breadths",
     )
-    parser.add_argument(
+    add(
         "--hip-height",
         type=float,
         metavar="M",
         help="of the middle of the hips above the camera's centre, metres, negative below it; "
         "by default it is fitted to the first silhouette",
     )
-    parser.add_argument(
-        "--output", type=Path, required=True, metavar="MODEL.yaml", help="body model to write"
-    )
+    add("--output", type=Path, required=True, metavar="MODEL.yaml", help="body model to write")
     add_force(parser)
 
 

@@ -14,7 +14,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     from cardbox_tracker.applications.exporting.formats import formats
 
     add_results(parser)
-    parser.add_argument(
+    add = parser.add_argument
+    add(
         "--to",
         choices=formats(),
         required=True,
@@ -22,14 +23,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "for Blender; c3d: markers, with ezc3d; isb: CSV with joint angles by the recommendations "
         "of the ISB (docs/export.md); or a format that another package adds",
     )
-    parser.add_argument(
+    add(
         "--output",
         type=Path,
         metavar="FILE",
         help="file to write; by default it has the name of the results and is in the current "
         "folder",
     )
-    parser.add_argument(
+    add(
         "--model",
         type=Path,
         metavar="MODEL.yaml",

@@ -29,6 +29,7 @@ from cardbox_tracker.commands.arguments import (
 from cardbox_tracker.common.errors import CardboxError
 from cardbox_tracker.common.files import foreign, read_regular
 from cardbox_tracker.common.settings import settings_of
+from cardbox_tracker.detectors.detector import Detector
 from cardbox_tracker.detectors.own_network import FindsPeople
 from cardbox_tracker.detectors.person_choice import PersonChoice
 from cardbox_tracker.search.config import PRESETS
@@ -152,8 +153,8 @@ class RecordingOptions(Options):
         "the person, who must step aside at some time, the default for other films",
         choices=("background", "detector", "person_in_view"),
     )
-    #: also an object with ``detect(image)``, or its class
-    detector: str | FindsPeople | type[FindsPeople] | None = option(
+    #: also a :class:`~cardbox_tracker.Detector`, or an object with ``detect(image)``, or its class
+    detector: str | Detector | FindsPeople | type[FindsPeople] | None = option(
         "also use 2D points of the person's joints: those of MediaPipe's networks ('cardbox "
         "detector --install'), or those that any detector has written: a table FILE.csv, FILE.json "
         "of COCO, or a folder of OpenPose's files (docs/detectors.md)",

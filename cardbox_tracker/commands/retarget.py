@@ -23,27 +23,28 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     from cardbox_tracker.applications.retargeting.config import RetargetConfig
 
     add_results(parser)
-    parser.add_argument("--robot", type=Path, required=True, metavar="ROBOT.urdf", help="the robot")
-    parser.add_argument(
+    add = parser.add_argument
+    add("--robot", type=Path, required=True, metavar="ROBOT.urdf", help="the robot")
+    add(
         "--map",
         type=Path,
         metavar="MAP.yaml",
         help="which joint moves which, as in config/example_joint_map.yaml; without it the robot's "
         "arm is found and points as the person's",
     )
-    parser.add_argument(
+    add(
         "--csv",
         type=Path,
         metavar="OUT.csv",
         help="table of the robot's joints and their velocities",
     )
-    parser.add_argument(
+    add(
         "--bag",
         type=Path,
         metavar="OUT",
         help="a bag of results with the robot beside the person, for 'cardbox view'",
     )
-    parser.add_argument(
+    add(
         "--stream",
         metavar="ADDRESS",
         help="send the robot's joints in real time by ZMQ, as tcp://127.0.0.1:5557, for LeRobot",

@@ -14,22 +14,21 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     from cardbox_tracker.applications.teleoperation.sending import PACKETS
 
     add_results(parser)
-    parser.add_argument(
+    add = parser.add_argument
+    add(
         "--to",
         choices=PACKETS,
         required=True,
         help="sonic: frames of its protocol v3; isaac: msgpack of Isaac Teleop's full body; json: "
         "a line for each time (docs/retargeting.md)",
     )
-    parser.add_argument(
-        "--rate", type=between(1, 1000), default=50.0, metavar="HZ", help="packets a second"
-    )
-    parser.add_argument(
+    add("--rate", type=between(1, 1000), default=50.0, metavar="HZ", help="packets a second")
+    add(
         "--address",
         metavar="ADDRESS",
         help="publish by ZMQ, as tcp://127.0.0.1:5556 (default: the standard output)",
     )
-    parser.add_argument("--fast", action="store_true", help="do not wait for the time of a packet")
+    add("--fast", action="store_true", help="do not wait for the time of a packet")
 
 
 def run(options: argparse.Namespace) -> None:

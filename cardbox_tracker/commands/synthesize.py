@@ -10,21 +10,16 @@ from cardbox_tracker.commands.arguments import add_camera_count, add_force, add_
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of ``cardbox synthesize``."""
-    parser.add_argument(
+    add = parser.add_argument
+    add(
         "--motion",
         default="all",
         help="motion after the reference postures: wave, bend, bow or all",
     )
-    parser.add_argument(
-        "--output", type=Path, required=True, metavar="BAG", help="recording to write"
-    )
+    add("--output", type=Path, required=True, metavar="BAG", help="recording to write")
     add_seed(parser, "noise and sway")
-    parser.add_argument(
-        "--storage", choices=("mcap", "sqlite3"), default="mcap", help="format of the recording"
-    )
-    parser.add_argument(
-        "--compressed", action="store_true", help="write JPEG images instead of raw ones"
-    )
+    add("--storage", choices=("mcap", "sqlite3"), default="mcap", help="format of the recording")
+    add("--compressed", action="store_true", help="write JPEG images instead of raw ones")
     add_camera_count(
         parser, "several are cam0, cam1, ..., and BAG/extrinsics.yaml says where they stand"
     )

@@ -43,24 +43,22 @@ _OF_MANY = ("output", "formats", "jobs", "scheduler")
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of ``cardbox track``."""
     add_options(parser, Request)
-    many = parser.add_argument_group("a folder of recordings (docs/many-recordings.md)")
-    many.add_argument(
+    add = parser.add_argument_group("a folder of recordings (docs/many-recordings.md)").add_argument
+    add(
         "--output",
         type=Path,
         metavar="DIR",
         help="folder of the results; by default FOLDER_tracked in the current folder. A recording "
         "that is finished there with the same inputs and settings is not tracked again",
     )
-    many.add_argument(
-        "--formats", nargs="+", choices=FORMATS, help="results of each recording; csv by default"
-    )
-    many.add_argument(
+    add("--formats", nargs="+", choices=FORMATS, help="results of each recording; csv by default")
+    add(
         "--jobs",
         type=at_least(1),
         metavar="N",
         help="recordings that are tracked at a time, each on one core; one per core by default",
     )
-    many.add_argument(
+    add(
         "--scheduler",
         metavar="ADDRESS",
         help="in place of --jobs: track on the workers of this Dask cluster, such as tcp://HOST:8786",
@@ -80,7 +78,7 @@ def run(options: argparse.Namespace) -> None:
         track_folder(asked, options)
         return
     faults = _without_effect(options, _OF_MANY, "which is one recording: give --csv")
-    _track_one(replace(asked, csv=asked.csv or Path(f"{_name(path)}.csv")), faults)
+    track_one(replace(asked, csv=asked.csv or Path(f"{_name(path)}.csv")), faults)
 
 
 def track(recording: Request | str | os.PathLike[str], **options: Any) -> Result:
@@ -101,7 +99,7 @@ def track(recording: Request | str | os.PathLike[str], **options: Any) -> Result
         raise CardboxError("export writes beside the table: give csv, or save the result")
     if path.is_dir() and not is_one_recording(path):
         raise CardboxError(f"{path} is no recording; track its recordings one by one")
-    summary, kept = _track_one(asked, show=lambda _: None)
+    summary, kept = track_one(asked, show=lambda _: None)
     scene = summary.scene and loads_scene(dumps_scene(summary.scene))
     people = {number: Result(**vars(one), scene=scene) for number, one in kept.items()}
     if asked.number not in people:
@@ -120,7 +118,7 @@ def _without_effect(options: argparse.Namespace, names: tuple[str, ...], what: s
     return [f"--{name} has no effect on {options.recording}, {what}" for name in given]
 
 
-def _track_one(
+def track_one(
     asked: Request, faults: Iterable[str] = (), show: Callable[[float], None] | None = None
 ) -> tuple[TrackSummary, dict[int, Results]]:
     """Track one recording and write the requested files; see :func:`.tracking.track`.

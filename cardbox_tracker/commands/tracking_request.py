@@ -338,6 +338,8 @@ def points_named(given: object, class_name: str | None = None) -> Detector | Poi
             sys.path.append(os.getcwd())
         own = loaded(EntryPoint("--detector-class", class_name, DETECTORS))
         return Detector(OwnModel.of(own, class_name))
+    if isinstance(given, Detector):
+        return given
     if not isinstance(given, str | Path):
         return Detector(OwnModel.of(given, f"the detector {type(given).__name__}"))
     if given == MEDIAPIPE:
