@@ -5,10 +5,12 @@ from __future__ import annotations
 import argparse
 import math
 import os
+import re
 import sys
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import MISSING, Field, dataclass, field, fields
+from inspect import cleandoc
 from itertools import chain
 from operator import index
 from pathlib import Path
@@ -102,7 +104,6 @@ _READERS: dict[str, Callable[[Any], Any]] = {
 
 
 def option(
-    help: str,
     metavar: str | None = None,
     read: Callable[[Any], Any] | None = None,
     default: Any = None,
@@ -115,7 +116,7 @@ def option(
     tells. MISSING is no default; ``flag`` is the option if it has not the name of the field. The
     rest are arguments of ``add_argument``, such as the ``type`` of one of several words.
     """
-    words = {"help": help, "metavar": metavar, **words}
+    words = {"metavar": metavar, **words}
     return field(default=default, metadata={"words": words, "read": read, "flag": flag})
 
 
@@ -123,7 +124,8 @@ def option(
 class Options:
     """Base of the dataclasses whose fields are options: each is made by :func:`option`.
 
-    Python may also give a value as it is typed. Raises CardboxError if one is wrong.
+    What the docstring says of an attribute is also the help of its option. Python may give a value
+    as it is typed, too. Raises CardboxError if one is wrong.
     """
 
     def __post_init__(self) -> None:
@@ -143,6 +145,13 @@ class Options:
         """Return the values that are not the default, by their options."""
         values = ((entry, getattr(self, entry.name)) for entry in fields(self))
         return {_flag(entry): value for entry, value in values if value != entry.default}
+
+
+def _helps(kind: type[Options]) -> dict[str, str]:
+    """Return what the docstrings of a class and of its bases say of each attribute."""
+    texts = "\n".join(cleandoc(each.__doc__ or "") for each in kind.__mro__)
+    found = re.findall(r"(?m)^    (\w+): (.*(?:\n {8}.*)*)", texts)
+    return {name: " ".join(text.split()) for name, text in found}
 
 
 def _flag(entry: Field[Any]) -> str:
@@ -171,10 +180,11 @@ def add_options(parser: Any, kind: type[Options], *names: str, **changed: dict[s
 
     ``changed`` are other arguments of ``add_argument`` by the names of fields.
     """
+    helps = _helps(kind)
     for entry in fields(kind):
         if names and entry.name not in names:
             continue
-        words: dict[str, Any] = {"type": _reader(entry)}
+        words: dict[str, Any] = {"type": _reader(entry), "help": helps.get(entry.name)}
         if entry.default is not MISSING:
             default = None if entry.default == () else entry.default
             words |= {"dest": entry.name, "default": default}

@@ -112,167 +112,116 @@ _NAMED = "NAME=VALUE, such as lost_frames=10"
 
 @dataclass(frozen=True)
 class RecordingOptions(Options):
-    """A recording of any kind, and how it is read."""
+    """A recording of any kind, and how it is read.
 
-    recording: Path = option(
-        "rosbag2 folder or file, video, or folder of JPEG or PNG images",
-        "RECORDING",
-        default=MISSING,
-    )
-    background: tuple[float, float] | None = option(
-        "seconds during which nobody is in view", "T0:T1", span
-    )
+    Attributes:
+        recording: rosbag2 folder or file, video, or folder of JPEG or PNG images
+        background: seconds during which nobody is in view
+        cameras: cameras of the recording that see the person, such as cam0 cam1, the one that the
+            person faced first; with one name, that camera alone
+        extrinsics: where further cameras stand, from Kalibr (YAML) or aniposelib (TOML), if the
+            recording does not tell
+        depth: depth images of the same view as the first of --cameras; 'stereo' measures depth in
+            the first two of them, a rectified pair, left first
+        within_m: in place of --background: all that is nearer in the images of --depth, metres, is
+            the person
+        silhouettes: what tells the person from the scene: the empty scene of --background; the mask
+            of a person detector, the default with --detector mediapipe; or a scene that is learned
+            around the person, who must step aside at some time, the default for other films
+        detector: also use 2D points of the person's joints: those of MediaPipe's networks ('cardbox
+            detector --install'), or those that any detector has written: a table FILE.csv,
+            FILE.json of COCO, or a folder of OpenPose's files (docs/detectors.md)
+        detector_class: the same of a class of your own with a function detect(image)
+            (docs/extending.md)
+        person: with --detector mediapipe: whom of several people to follow: the left or right one
+            in the image, the largest, or the one at column X and row Y. With --people: the number
+            of the one whose results are used, if not all are
+        fov_deg: field of view across the width of the image as it is shown: webcams 60 to 78,
+            phones 60 to 75 held sideways and 36 to 46 upright. Without it, what a phone wrote into
+            the file, or else, with --detector, 65 degrees along the longer side
+        calibration: in place of --fov: file of camera_calibration, OpenCV's FileStorage or Kalibr
+        camera_roll_deg: how far the camera is turned clockwise, seen from behind it, 180 if its top
+            is below; images are turned back
+        mirrored: the images are mirrored, as some programs do with those of a front camera; they
+            are turned back
+        fps: images a second of a folder of images (default: 30), or of a video in slow motion
+    """
+
+    recording: Path = option("RECORDING", default=MISSING)
+    background: tuple[float, float] | None = option("T0:T1", span)
     cameras: tuple[str, ...] = option(
-        "cameras of the recording that see the person, such as cam0 cam1, the one that the person "
-        "faced first; with one name, that camera alone",
-        "NAMESPACE",
-        parsed(_cameras, "names of cameras"),
-        default=(),
-        type=str,
-        nargs="+",
+        "NAMESPACE", parsed(_cameras, "names of cameras"), default=(), type=str, nargs="+"
     )
-    extrinsics: Path | None = option(
-        "where further cameras stand, from Kalibr (YAML) or aniposelib (TOML), if the recording "
-        "does not tell",
-        "FILE",
-    )
-    depth: str | None = option(
-        "depth images of the same view as the first of --cameras; 'stereo' measures depth in the "
-        "first two of them, a rectified pair, left first",
-        "TOPIC",
-    )
-    within_m: float | None = option(
-        "in place of --background: all that is nearer in the images of --depth, metres, is the "
-        "person",
-        "M",
-        flag="--within",
-    )
-    silhouettes: str | None = option(
-        "what tells the person from the scene: the empty scene of --background; the mask of a "
-        "person detector, the default with --detector mediapipe; or a scene that is learned around "
-        "the person, who must step aside at some time, the default for other films",
-        choices=("background", "detector", "person_in_view"),
-    )
+    extrinsics: Path | None = option("FILE")
+    depth: str | None = option("TOPIC")
+    within_m: float | None = option("M", flag="--within")
+    silhouettes: str | None = option(choices=("background", "detector", "person_in_view"))
     #: also a :class:`~cardbox_tracker.Detector`, or an object with ``detect(image)``, or its class
     detector: str | Detector | FindsPeople | type[FindsPeople] | None = option(
-        "also use 2D points of the person's joints: those of MediaPipe's networks ('cardbox "
-        "detector --install'), or those that any detector has written: a table FILE.csv, FILE.json "
-        "of COCO, or a folder of OpenPose's files (docs/detectors.md)",
-        "mediapipe|FILE|FOLDER",
-        _detector,
+        "mediapipe|FILE|FOLDER", _detector
     )
-    detector_class: str | None = option(
-        "the same of a class of your own with a function detect(image) (docs/extending.md)",
-        "MODULE:CLASS",
-    )
+    detector_class: str | None = option("MODULE:CLASS")
     person: str | tuple[float, float] | int | PersonChoice | None = option(
-        "with --detector mediapipe: whom of several people to follow: the left or right one in the "
-        "image, the largest, or the one at column X and row Y. With --people: the number of the "
-        "one whose results are used, if not all are",
-        "left|right|largest|X,Y|K",
-        _person_choice,
+        "left|right|largest|X,Y|K", _person_choice
     )
-    fov_deg: float | None = option(
-        "field of view across the width of the image as it is shown: webcams 60 to 78, phones 60 "
-        "to 75 held sideways and 36 to 46 upright. Without it, what a phone wrote into the file, "
-        "or else, with --detector, 65 degrees along the longer side",
-        "DEG",
-        flag="--fov",
-    )
-    calibration: Path | None = option(
-        "in place of --fov: file of camera_calibration, OpenCV's FileStorage or Kalibr", "FILE"
-    )
-    camera_roll_deg: float | None = option(
-        "how far the camera is turned clockwise, seen from behind it, 180 if its top is below; "
-        "images are turned back",
-        "R",
-        between(-_MOST_ROLL_DEG, _MOST_ROLL_DEG),
-    )
-    mirrored: bool = option(
-        "the images are mirrored, as some programs do with those of a front camera; they are "
-        "turned back",
-        default=False,
-    )
-    fps: float | None = option(
-        "images a second of a folder of images (default: 30), or of a video in slow motion",
-        "HZ",
-        between(0.0, _MOST_FPS),
-    )
+    fov_deg: float | None = option("DEG", flag="--fov")
+    calibration: Path | None = option("FILE")
+    camera_roll_deg: float | None = option("R", between(-_MOST_ROLL_DEG, _MOST_ROLL_DEG))
+    mirrored: bool = option(default=False)
+    fps: float | None = option("HZ", between(0.0, _MOST_FPS))
 
 
 @dataclass(frozen=True)
 class TrackingOptions(RecordingOptions):
-    """A recording, the person in it, and the settings of the tracker."""
+    """A recording, the person in it, and the settings of the tracker.
 
-    model: Path | None = option(
-        "the person, from 'cardbox initialize', the node initializer, or 'cardbox body'",
-        "MODEL.yaml",
-    )
+    Attributes:
+        model: the person, from 'cardbox initialize', the node initializer, or 'cardbox body'
+        stature_m: in place of --model: height of the person, metres, crown to floor; sizes are the
+            mean ones of people of that stature. With --people, one for each of them in turn, or one
+            for all. Of films with --detector, the mean stature of adults is taken without both
+        scene: camera, and without --stature and --model also people, of another recording of the
+            same camera, as 'cardbox track' wrote them beside its table
+        people: track N people, or all who come (up to 6); they are numbered as they come, and from
+            left to right if they come together
+        distance_m: with --stature: from the camera to the person, metres along the floor; without
+            it, it is found from the first images
+        camera_pitch_deg: positive when the camera looks down (default: with --stature, found from
+            the person who stands upright at --start)
+        start_s: second at which the person stands as for --front; tracking starts there. With
+            --stature, or a body that was not measured, any posture will do (default: 0)
+        end_s: second at which tracking ends (default: the last)
+        preset: tracker settings: paper is Table I of the paper, default tracks best
+        set: another setting of the tracker by its name in docs/parameters.md, such as
+            lost_frames=10; may be given several times
+        settings: file of such settings; --set and --effort take precedence over it
+        seed: random seed of the filters
+        hands: with --detector mediapipe: also tell open from closed hands, and measure palms and
+            wrists, in further columns and in the video (docs/results.md)
+    """
+
+    model: Path | None = option("MODEL.yaml")
     stature_m: float | tuple[float, ...] | None = option(
-        "in place of --model: height of the person, metres, crown to floor; sizes are the mean "
-        "ones of people of that stature. With --people, one for each of them in turn, or one for "
-        "all. Of films with --detector, the mean stature of adults is taken without both",
         "M[,M...]",
         parsed(_statures, "metres, or those of each person as in 1.75,1.62"),
         flag="--stature",
     )
-    scene: Path | None = option(
-        "camera, and without --stature and --model also people, of another recording of the same "
-        "camera, as 'cardbox track' wrote them beside its table",
-        "OUT.scene.yaml",
-    )
-    people: int | Literal["auto"] | None = option(
-        "track N people, or all who come (up to 6); they are numbered as they come, and from left "
-        "to right if they come together",
-        "N|auto",
-        _people,
-    )
-    distance_m: float | None = option(
-        "with --stature: from the camera to the person, metres along the floor; without it, it is "
-        "found from the first images",
-        "M",
-        flag="--distance",
-    )
-    camera_pitch_deg: float | None = option(
-        f"{CAMERA_PITCH} (default: with --stature, found from the person who stands upright at "
-        "--start)",
-        "P",
-    )
-    start_s: float | None = option(
-        "second at which the person stands as for --front; tracking starts there. With --stature, "
-        "or a body that was not measured, any posture will do (default: 0)",
-        "T",
-        time,
-        flag="--start",
-    )
-    end_s: float | None = option(
-        "second at which tracking ends (default: the last)", "T", time, flag="--end"
-    )
-    preset: str = option(
-        "tracker settings: paper is Table I of the paper, default tracks best",
-        default="default",
-        choices=PRESETS,
-    )
+    scene: Path | None = option("OUT.scene.yaml")
+    people: int | Literal["auto"] | None = option("N|auto", _people)
+    distance_m: float | None = option("M", flag="--distance")
+    camera_pitch_deg: float | None = option("P")
+    start_s: float | None = option("T", time, flag="--start")
+    end_s: float | None = option("T", time, flag="--end")
+    preset: str = option(default="default", choices=PRESETS)
     effort: float | None = option(
-        f"{_EFFORT.description}; {_EFFORT.range_text}; for the preset default", "X"
+        "X", help=f"{_EFFORT.description}; {_EFFORT.range_text}; for the preset default"
     )
     set: Mapping[str, Setting] | None = option(
-        "another setting of the tracker by its name in docs/parameters.md, such as lost_frames=10; "
-        "may be given several times",
-        "NAME=VALUE",
-        parsed(dict, _NAMED),
-        type=parsed(_setting, _NAMED),
-        action="append",
+        "NAME=VALUE", parsed(dict, _NAMED), type=parsed(_setting, _NAMED), action="append"
     )
-    settings: Path | None = option(
-        "file of such settings; --set and --effort take precedence over it", "FILE.yaml"
-    )
-    seed: int = option("random seed of the filters", read=at_least(0), default=0)
-    hands: bool = option(
-        "with --detector mediapipe: also tell open from closed hands, and measure palms and "
-        "wrists, in further columns and in the video (docs/results.md)",
-        default=False,
-    )
+    settings: Path | None = option("FILE.yaml")
+    seed: int = option(read=at_least(0), default=0)
+    hands: bool = option(default=False)
 
     @property
     def statures_m(self) -> tuple[float, ...]:
@@ -300,36 +249,30 @@ def _formats(given: str | Iterable[str]) -> tuple[str, ...]:
 class Request(TrackingOptions):
     """What :func:`cardbox_tracker.track` tracks, and the files that it writes.
 
-    The fields are the options of ``cardbox track``, whose help explains them. Lengths are in m,
-    times in s from the start of the recording, angles in degrees, as the names say. Raises
-    CardboxError if a value is wrong.
+    The fields are the options of ``cardbox track``. Raises CardboxError if a value is wrong.
+
+    Attributes:
+        csv: table to write, one row per image (docs/results.md); by default it has the name of the
+            recording and is in the current folder. OUT.body.yaml beside it is the body that was
+            used
+        bag: also write the topics of the tracker
+        video: also write an overlay video
+        json: also write what is printed at the end: what was tracked, used, left out and assumed
+        export: also write the table in formats of 'cardbox export' beside it, such as trc,bvh
+        plot: also plot the angles, with bands of one standard deviation
+        report: also write a page with the overlay video (OUT.overlay.mp4 without --video), the
+            skeleton from aside, the angles and the times to look at
+        force: replace results that exist; without it, refuse
     """
 
-    csv: Path | None = option(
-        "table to write, one row per image (docs/results.md); by default it has the name of the "
-        "recording and is in the current folder. OUT.body.yaml beside it is the body that was used",
-        "OUT.csv|OUT.parquet",
-    )
-    bag: Path | None = option("also write the topics of the tracker", "OUT")
-    video: Path | None = option("also write an overlay video", "OUT.mp4")
-    json: Path | None = option(
-        "also write what is printed at the end: what was tracked, used, left out and assumed",
-        "OUT.json",
-    )
-    export: str | tuple[str, ...] | None = option(
-        "also write the table in formats of 'cardbox export' beside it, such as trc,bvh",
-        "FORMAT[,...]",
-        _formats,
-    )
-    plot: Path | None = option(
-        "also plot the angles, with bands of one standard deviation", "OUT.png"
-    )
-    report: Path | None = option(
-        "also write a page with the overlay video (OUT.overlay.mp4 without --video), the skeleton "
-        "from aside, the angles and the times to look at",
-        "OUT.html",
-    )
-    force: bool = option("replace results that exist; without it, refuse", default=False)
+    csv: Path | None = option("OUT.csv|OUT.parquet")
+    bag: Path | None = option("OUT")
+    video: Path | None = option("OUT.mp4")
+    json: Path | None = option("OUT.json")
+    export: str | tuple[str, ...] | None = option("FORMAT[,...]", _formats)
+    plot: Path | None = option("OUT.png")
+    report: Path | None = option("OUT.html")
+    force: bool = option(default=False)
 
 
 def with_own_options(asked: Request, folder: Path, name: str) -> Request:
