@@ -14,24 +14,17 @@ from inspect import cleandoc
 from itertools import chain
 from operator import index
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Self, TypeVar
+from typing import TYPE_CHECKING, Any, ClassVar, Self, TypeVar
 
 from cardbox_tracker.common.errors import CardboxError, plain
 from cardbox_tracker.common.files import check_writable, is_written_in_place
-from cardbox_tracker.common.settings import settings_of
+from cardbox_tracker.common.settings import Setting, check
 
 if TYPE_CHECKING:
     from cardbox_tracker.recordings.result_reader import Results
     from cardbox_tracker.recordings.silhouettes import TimeSpan
 
 T = TypeVar("T")
-
-REFERENCES = {
-    "front": "faces the camera, arms hanging 20 degrees away from the body",
-    "side": "stands the same, turned by 90 degrees",
-    "arms": "faces the camera, both arms stretched sideways, hands open",
-}
-"""Reference postures by name, with the description for the person."""
 
 
 def parsed(
@@ -88,6 +81,15 @@ def between(lowest: float, highest: float) -> Callable[[Any], float]:
     )
 
 
+camera_count = parsed(whole, "a number from 1 to 4", lambda one: 1 <= one <= 4)
+"""Reader of a number of cameras."""
+
+
+def one_of(names: Iterable[str]) -> Callable[[Any], Any]:
+    """Return a reader of one of several texts."""
+    return parsed(str, f"one of {', '.join(names)}", lambda one: one in names)
+
+
 def _switch(given: Any) -> bool:
     if isinstance(given, bool):
         return given
@@ -113,28 +115,46 @@ def option(
     """Return a field of :class:`Options`.
 
     ``read`` returns the value of a text, or of what Python gives; without it, the field's type
-    tells. MISSING is no default; ``flag`` is the option if it has not the name of the field. The
-    rest are arguments of ``add_argument``, such as the ``type`` of one of several words.
+    tells. MISSING is no default; ``flag`` is the option if it has not the name of the field, and
+    without hyphens a place. The rest are arguments of ``add_argument``, such as the ``type`` of one
+    of several words.
     """
     words = {"metavar": metavar, **words}
     return field(default=default, metadata={"words": words, "read": read, "flag": flag})
 
 
+def choice(names: Iterable[str], **given: Any) -> Any:
+    """Return a field of :class:`Options` for one of several texts."""
+    return option(f"{{{','.join(names)}}}", one_of(names), **given)
+
+
 @dataclass(frozen=True)
 class Options:
-    """Base of the dataclasses whose fields are options: each is made by :func:`option`.
+    """Base of the dataclasses whose fields are options: made by :func:`option`, or settings.
 
     What the docstring says of an attribute is also the help of its option. Python may give a value
     as it is typed, too. Raises CardboxError if one is wrong.
     """
 
+    #: heading of the settings, or of the fields of the class itself
+    group: ClassVar[str] = ""
+
     def __post_init__(self) -> None:
         """Read the values; None stands for the default."""
         for entry in fields(self):
             given = getattr(self, entry.name)
-            is_given = given is not None and given is not entry.default
-            value = _read(entry, given) if is_given else entry.default
+            value = entry.default if given is None else given
+            if value is not entry.default and "read" in entry.metadata:
+                try:
+                    value = _reader(entry)(given)
+                except argparse.ArgumentTypeError as error:
+                    raise CardboxError(f"argument {_flag(entry)}: {error}") from None
             object.__setattr__(self, entry.name, value)
+        try:
+            check(self)
+        except ValueError as error:
+            name, _, rest = str(error).partition(" ")
+            raise CardboxError(f"--{name.replace('_', '-')} {rest}") from None
 
     @classmethod
     def of(cls, options: argparse.Namespace) -> Self:
@@ -149,13 +169,13 @@ class Options:
 
 def _helps(kind: type[Options]) -> dict[str, str]:
     """Return what the docstrings of a class and of its bases say of each attribute."""
-    texts = "\n".join(cleandoc(each.__doc__ or "") for each in kind.__mro__)
+    texts = "\n".join(cleandoc(each.__doc__ or "") for each in reversed(kind.__mro__))
     found = re.findall(r"(?m)^    (\w+): (.*(?:\n {8}.*)*)", texts)
     return {name: " ".join(text.split()) for name, text in found}
 
 
 def _flag(entry: Field[Any]) -> str:
-    flag: str = entry.metadata["flag"] or f"--{entry.name.replace('_', '-')}"
+    flag: str = entry.metadata.get("flag") or f"--{entry.name.replace('_', '-')}"
     return entry.name if entry.default is MISSING else flag
 
 
@@ -164,107 +184,74 @@ def _reader(entry: Field[Any]) -> Callable[[Any], Any]:
     return _READERS[str(entry.type).removesuffix(" | None")] if found is None else found
 
 
-def _read(entry: Field[Any], given: Any) -> Any:
-    choices = entry.metadata["words"].get("choices")
-    try:
-        if choices and given not in choices:
-            shown = ", ".join(map(repr, choices))
-            raise argparse.ArgumentTypeError(f"invalid choice: {given!r} (choose from {shown})")
-        return _reader(entry)(given)
-    except argparse.ArgumentTypeError as error:
-        raise CardboxError(f"argument {_flag(entry)}: {error}") from None
+def _words_of(one: Setting, default: Any) -> dict[str, Any]:
+    unit = f" [{one.unit}]" if one.unit else ""
+    text = one.description.replace("%", "%%") + unit
+    if one.choices:
+        return {"help": text, "choices": one.choices}
+    allowed = f"; {one.range_text}" if one.range_text else ""
+    return {"help": f"{text}{allowed}", "type": type(default), "metavar": "N"}
 
 
-def add_options(parser: Any, kind: type[Options], *names: str, **changed: dict[str, Any]) -> None:
+def add_options(
+    parser: argparse.ArgumentParser, kind: type[Options], *names: str, **changed: dict[str, Any]
+) -> None:
     """Add an option to a parser for each field of ``kind``, or for those with these names.
 
     ``changed`` are other arguments of ``add_argument`` by the names of fields.
     """
-    helps = _helps(kind)
+    helps, group = _helps(kind), parser.add_argument_group(kind.group) if kind.group else parser
     for entry in fields(kind):
         if names and entry.name not in names:
             continue
-        words: dict[str, Any] = {"type": _reader(entry), "help": helps.get(entry.name)}
-        if entry.default is not MISSING:
-            default = None if entry.default == () else entry.default
-            words |= {"dest": entry.name, "default": default}
-        words |= entry.metadata["words"] | changed.get(entry.name, {})
-        if entry.default is False:
-            words = {"dest": entry.name, "help": words["help"], "action": "store_true"}
-        parser.add_argument(_flag(entry), **words)
-
-
-def add_references(parser: argparse.ArgumentParser) -> None:
-    """Add the spans of the reference postures, and ``--side-turn``."""
-    from cardbox_tracker.person.posture import SIDE_TURNS
-
-    for name, posture in REFERENCES.items():
-        parser.add_argument(
-            f"--{name}",
-            type=span,
-            required=True,
-            metavar="T0:T1",
-            help=f"seconds during which the person {posture}",
-        )
-    parser.add_argument(
-        "--side-turn",
-        choices=SIDE_TURNS,
-        default="left",
-        help="which way the person turns for --side, as they see it",
-    )
-
-
-def add_seed(parser: argparse.ArgumentParser, what: str) -> None:
-    """Add ``--seed``; ``what`` names the random numbers that it determines."""
-    parser.add_argument("--seed", type=at_least(0), default=0, help=f"random seed of {what}")
-
-
-def add_camera_count(parser: argparse.ArgumentParser, several: str) -> None:
-    """Add ``--cameras``, a number; ``several`` describes the purpose of more than one."""
-    parser.add_argument(
-        "--cameras",
-        type=int,
-        choices=range(1, 5),
-        default=1,
-        metavar="N",
-        help=f"1 to 4; {several}",
-    )
-
-
-def add_settings(parser: argparse.ArgumentParser, kind: Any, title: str) -> None:
-    """Add an option, a switch for a bool, for each setting of ``kind``, below ``title``."""
-    group = parser.add_argument_group(title)
-    defaults = {entry.name: entry.default for entry in fields(kind)}
-    for name, setting in settings_of(kind).items():
-        flag, default = f"--{name.replace('_', '-')}", defaults[name]
-        text = setting.description.replace("%", "%%")
+        flag, default, words = _flag(entry), entry.default, dict[str, Any]()
+        if flag.startswith("-"):
+            words = {"dest": entry.name, "default": None if default == () else default}
+        if (one := entry.metadata.get("setting")) is not None:
+            words |= _words_of(one, default)
+        else:
+            words |= {"type": _reader(entry), "help": helps.get(entry.name)}
+            words |= entry.metadata["words"] | changed.get(entry.name, {})
         if isinstance(default, bool):
-            group.add_argument(flag, action="store_true", help=text)
-            continue
-        unit = f" [{setting.unit}]" if setting.unit else ""
-        if setting.choices:
-            group.add_argument(flag, choices=setting.choices, default=default, help=text)
-            continue
-        allowed = f"; {setting.range_text}" if setting.range_text else ""
-        group.add_argument(
-            flag, type=type(default), default=default, metavar="N", help=f"{text}{unit}{allowed}"
-        )
+            action = "store_false" if default else "store_true"
+            words = {"dest": entry.name, "help": words["help"], "action": action}
+        is_own = one is not None or entry.name in vars(kind)
+        (group if is_own else parser).add_argument(flag, **words)
 
 
-def settings_from(options: argparse.Namespace, kind: type[T]) -> T:
-    """Return the settings of the dataclass ``kind`` from the options of :func:`add_settings`."""
-    try:
-        return kind(**{name: getattr(options, name) for name in settings_of(kind)})
-    except ValueError as error:
-        name, _, rest = str(error).partition(" ")
-        raise CardboxError(f"--{name.replace('_', '-')} {rest}") from None
+@dataclass(frozen=True, kw_only=True)
+class Written(Options):
+    """A command that writes results.
+
+    Attributes:
+        force: replace results that exist; without it, refuse
+    """
+
+    force: bool = option(default=False)
 
 
-def add_force(parser: argparse.ArgumentParser) -> None:
-    """Add ``--force``."""
-    parser.add_argument(
-        "--force", action="store_true", help="replace results that exist; without it, refuse"
-    )
+@dataclass(frozen=True, kw_only=True)
+class TrackedResults(Options):
+    """Results of tracking.
+
+    Attributes:
+        results: table of 'cardbox track' (CSV or Parquet), or its bag
+        person: results of several people: the number of the person (default: 1)
+    """
+
+    results: Path = option("RESULTS", default=MISSING)
+    person: int | None = option("K", at_least(1))
+
+    def read(self) -> Results:
+        """Return the results of the person, or of the first one of several, which is said."""
+        from cardbox_tracker.recordings.result_reader import read_results
+
+        path = self.results
+        results = read_results(path, self.person)
+        if results.has_others and self.person is None:
+            told = f"{path} has several people: person 1 is used; --person K gives another"
+            print_remarks([told])
+        return results
 
 
 def check_outputs(
@@ -318,32 +305,6 @@ def _is_same(path: Path, other: Path) -> bool:
         return os.path.samefile(path, other)
     except OSError:
         return False
-
-
-def add_results(parser: argparse.ArgumentParser) -> None:
-    """Add ``RESULTS``, and ``--person``, the number of one of several people in them."""
-    parser.add_argument(
-        "results",
-        type=Path,
-        metavar="RESULTS",
-        help="table of 'cardbox track' (CSV or Parquet), or its bag",
-    )
-    parser.add_argument(
-        "--person",
-        type=at_least(1),
-        metavar="K",
-        help="results of several people: the number of the person (default: 1)",
-    )
-
-
-def results_of(path: Path, person: int | None) -> Results:
-    """Return the results of a person, or of the first one of several, which is said."""
-    from cardbox_tracker.recordings.result_reader import read_results
-
-    results = read_results(path, person)
-    if results.has_others and person is None:
-        print_remarks([f"{path} has several people: person 1 is used; --person K gives another"])
-    return results
 
 
 def print_remarks(*remarks: Iterable[str]) -> None:

@@ -2,45 +2,50 @@
 
 from __future__ import annotations
 
-import argparse
 import json
+from dataclasses import dataclass
 from pathlib import Path
 
-from cardbox_tracker.commands.arguments import add_camera_count, add_options, add_seed
+from cardbox_tracker.commands.arguments import Options, at_least, camera_count, choice, option
 from cardbox_tracker.commands.request import Request
 from cardbox_tracker.common.errors import CardboxError, RosMissingError
 from cardbox_tracker.common.files import make_folder, write_file
+from cardbox_tracker.search.config import PRESETS
 
 _PRESET = "default"
 
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the arguments of ``cardbox demo``."""
-    parser.add_argument(
-        "--output", type=Path, default=Path("demo_output"), metavar="DIR", help="folder of results"
-    )
-    parser.add_argument(
-        "--live",
-        action="store_true",
-        help="with ROS 2: run the whole chain through the nodes, on a synthetic recording",
-    )
-    add_options(parser, Request, "preset")
-    add_camera_count(parser, "with --live; several see the person together, with default")
-    add_seed(parser, "the recording and the filters")
+@dataclass(frozen=True)
+class Arguments(Options):
+    """The film, or the nodes.
+
+    Attributes:
+        output: folder of results
+        live: with ROS 2: run the whole chain through the nodes, on a synthetic recording
+        preset: tracker settings: paper is Table I of the paper, default tracks best
+        cameras: 1 to 4; with --live; several see the person together, with default
+        seed: random seed of the recording and the filters
+    """
+
+    output: Path = option("DIR", default=Path("demo_output"))
+    live: bool = option(default=False)
+    preset: str = choice(PRESETS, default=_PRESET)
+    cameras: int = option("N", camera_count, default=1)
+    seed: int = option(read=at_least(0), default=0)
 
 
-def run(options: argparse.Namespace) -> None:
+def run(given: Arguments) -> None:
     """Track the film, or run the nodes; write the results."""
-    if options.live:
+    if given.live:
         try:
             from cardbox_tracker.ros.demo.run import run_demo
         except ImportError as error:
             raise RosMissingError(error) from None
-        run_demo(options.output, options.preset, options.seed, options.cameras)
-    elif options.cameras > 1 or options.preset != _PRESET:
+        run_demo(given.output, given.preset, given.seed, given.cameras)
+    elif given.cameras > 1 or given.preset != _PRESET:
         raise CardboxError("--cameras and --preset are for the nodes: give --live, too")
     else:
-        _track_film(options.output, options.seed)
+        _track_film(given.output, given.seed)
 
 
 def _track_film(output: Path, seed: int) -> None:

@@ -7,11 +7,12 @@ import io
 import os
 import signal
 import sys
-from collections.abc import Container, Sequence
+from collections.abc import Callable, Container, Sequence
 from importlib import import_module
 from typing import Any
 
 from cardbox_tracker import __version__
+from cardbox_tracker.commands.arguments import add_options
 from cardbox_tracker.commands.checkout import LAB, from_checkout
 from cardbox_tracker.common import interrupts
 from cardbox_tracker.common.errors import CardboxError, plain
@@ -40,8 +41,9 @@ COMMANDS = {
 }
 """Each subcommand with one line for ``cardbox --help``, without a capital letter or a full stop.
 
-Its module, of this folder or of ``lab/``, has ``add_arguments(parser)`` and ``run(options)``, which
-does the work and prints the result, and raises CardboxError if the user can correct the cause.
+Its module has ``Arguments``, whose fields are its options, and ``run(arguments)``, which does the
+work and prints the result, and raises CardboxError if the user can correct the cause. That of
+``lab/`` has ``add_arguments(parser)`` in place of ``Arguments``.
 """
 
 # A folder of recordings has many reasons.
@@ -129,16 +131,20 @@ def build_parser(words: Container[str] = COMMANDS) -> argparse.ArgumentParser:
         )
         added.register("action", None, _Once)
         if name in words:
-            module = _module(name)
-            module.add_arguments(added)
-            added.set_defaults(run=module.run)
+            added.set_defaults(run=_add(added, name))
     return parser
 
 
-def _module(name: str) -> Any:
+def _add(parser: argparse.ArgumentParser, name: str) -> Callable[[argparse.Namespace], None]:
+    """Add the arguments of a subcommand; return the function that runs it."""
     if name in LAB:
-        return from_checkout(*LAB[name])
-    return import_module(f"cardbox_tracker.commands.{name.replace('-', '_')}")
+        module = from_checkout(*LAB[name])
+        module.add_arguments(parser)
+        run: Callable[[argparse.Namespace], None] = module.run
+        return run
+    module = import_module(f"cardbox_tracker.commands.{name.replace('-', '_')}")
+    add_options(parser, module.Arguments)
+    return lambda options: module.run(module.Arguments.of(options))
 
 
 class _Once(argparse._StoreAction):

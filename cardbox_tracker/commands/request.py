@@ -13,13 +13,15 @@ from contextlib import suppress
 from dataclasses import MISSING, dataclass, fields, replace
 from pathlib import Path, PurePosixPath
 from types import MappingProxyType
-from typing import Any, Literal, NoReturn
+from typing import Any, Literal, NoReturn, TypeVar
 
 from cardbox_tracker.commands.arguments import (
     Options,
     add_options,
     at_least,
     between,
+    choice,
+    one_of,
     option,
     parsed,
     span,
@@ -36,11 +38,13 @@ from cardbox_tracker.search.config import PRESETS
 from cardbox_tracker.search.whole_body_config import WholeBodyConfig
 from cardbox_tracker.tracking.session import MOST_PEOPLE
 
+R = TypeVar("R", bound="Request")
 Setting = bool | int | float | str
+TABLES = ("csv", "parquet")
+FORMATS = (*TABLES, "mp4", "bag")
+"""Results of a recording: a table in one of two formats, a video, a bag."""
 AUTO = "auto"
 """Given in place of a number of people: all who come."""
-CAMERA_PITCH = "positive when the camera looks down"
-"""Help of a pitch, degrees."""
 OPTIONS_ENDING = ".options"
 """Ending of the files beside the recordings of a folder that have options for them."""
 
@@ -155,7 +159,7 @@ class RecordingOptions(Options):
     extrinsics: Path | None = option("FILE")
     depth: str | None = option("TOPIC")
     within_m: float | None = option("M", flag="--within")
-    silhouettes: str | None = option(choices=("background", "detector", "person_in_view"))
+    silhouettes: str | None = choice(("background", "detector", "person_in_view"))
     #: also a :class:`~cardbox_tracker.Detector`, or an object with ``detect(image)``, or its class
     detector: str | Detector | FindsPeople | type[FindsPeople] | None = option(
         "mediapipe|FILE|FOLDER", _detector
@@ -212,7 +216,7 @@ class TrackingOptions(RecordingOptions):
     camera_pitch_deg: float | None = option("P")
     start_s: float | None = option("T", time, flag="--start")
     end_s: float | None = option("T", time, flag="--end")
-    preset: str = option(default="default", choices=PRESETS)
+    preset: str = choice(PRESETS, default="default")
     effort: float | None = option(
         "X", help=f"{_EFFORT.description}; {_EFFORT.range_text}; for the preset default"
     )
@@ -275,7 +279,29 @@ class Request(TrackingOptions):
     force: bool = option(default=False)
 
 
-def with_own_options(asked: Request, folder: Path, name: str) -> Request:
+@dataclass(frozen=True)
+class TrackArguments(Request):
+    """The arguments of ``cardbox track``: a recording, or a folder of them.
+
+    Attributes:
+        output: folder of the results; by default FOLDER_tracked in the current folder. A recording
+            that is finished there with the same inputs and settings is not tracked again
+        formats: results of each recording; csv by default
+        jobs: recordings that are tracked at a time, each on one core; one per core by default
+        scheduler: in place of --jobs: track on the workers of this Dask cluster, such as
+            tcp://HOST:8786
+    """
+
+    group = "a folder of recordings (docs/many-recordings.md)"
+    output: Path | None = option("DIR")
+    formats: tuple[str, ...] | None = option(
+        f"{{{','.join(FORMATS)}}}", tuple, type=one_of(FORMATS), nargs="+"
+    )
+    jobs: int | None = option("N", at_least(1))
+    scheduler: str | None = option("ADDRESS")
+
+
+def with_own_options(asked: R, folder: Path, name: str) -> R:
     """Return the request for one recording of ``folder``.
 
     The file ``NAME.options`` beside a recording, or beside a folder of recordings, has options as

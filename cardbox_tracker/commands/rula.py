@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-import argparse
 from collections.abc import Sequence
+from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
 
@@ -13,12 +13,11 @@ from cardbox_tracker.applications.ergonomics.recording import MomentImages, Rula
 from cardbox_tracker.applications.ergonomics.report import PageContent
 from cardbox_tracker.applications.ergonomics.rula import RulaConfig
 from cardbox_tracker.commands.arguments import (
-    add_force,
-    add_options,
-    add_settings,
+    Written,
     check_outputs,
+    choice,
+    option,
     print_remarks,
-    settings_from,
 )
 from cardbox_tracker.commands.request import TrackingOptions
 from cardbox_tracker.commands.tracking import track
@@ -38,34 +37,56 @@ _SIZES_FROM = {"measured": "reference postures", "proportions": "proportions of 
 _LEAST_CLOCK_S = 1e9
 
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the arguments of ``cardbox rula``."""
-    hands = "with --detector mediapipe: also measure the wrists, which are declared otherwise"
-    add_options(parser, TrackingOptions, hands={"help": hands})
-    add_score_outputs(parser)
-    parser.add_argument(
-        "--images",
-        choices=IMAGES,
-        default=IMAGES[0],
-        help="images of the worst moments in --html: with the head of the tracked person made "
-        "unrecognizable, as they are, or none",
-    )
-    add_force(parser)
-    add_settings(parser, RulaConfig, "what no image shows")
+@dataclass(frozen=True, kw_only=True)
+class ScoreFiles(Written):
+    """The files that both methods write.
+
+    Attributes:
+        csv: table to write, one row per image: its score, the chance of each
+        plot: draw the scores over time
+        html: write a page that prints: scores, shares of time, worst moments
+        title: heading of --html, such as the task
+    """
+
+    csv: Path | None = option("OUT.csv")
+    plot: Path | None = option("OUT.png")
+    html: Path | None = option("OUT.html")
+    title: str | None = option("TEXT")
+
+    @property
+    def outputs(self) -> tuple[Path | None, ...]:
+        """The files; None for each that is not wanted."""
+        return self.csv, self.plot, self.html
 
 
-def run(options: argparse.Namespace) -> None:
+@dataclass(frozen=True)
+class Arguments(RulaConfig, ScoreFiles, TrackingOptions):
+    """A recording, and what no image shows.
+
+    Attributes:
+        hands: with --detector mediapipe: also measure the wrists, which are declared otherwise
+        images: images of the worst moments in --html: with the head of the tracked person made
+            unrecognizable, as they are, or none
+    """
+
+    group = "what no image shows"
+    images: str = choice(IMAGES, default=HIDDEN_HEAD)
+
+    def __post_init__(self) -> None:
+        """Read the values; the settings are checked in the same way."""
+        TrackingOptions.__post_init__(self)
+
+
+def run(asked: Arguments) -> None:
     """Track the person, score every image, and print times, part scores and declared inputs."""
-    if options.html is None and (options.title is not None or options.images != IMAGES[0]):
+    if asked.html is None and (asked.title is not None or asked.images != IMAGES[0]):
         raise CardboxError("--images and --title change the page of --html; give --html OUT.html")
-    asked = TrackingOptions.of(options)
     request = tracking_request(asked)
-    check_outputs(outputs_of(options), options.force, inputs=request.inputs)
-    config = settings_from(options, RulaConfig)
+    check_outputs(asked.outputs, asked.force, inputs=request.inputs)
     images = None
-    if options.html is not None and options.images != NO_IMAGES:
-        images = MomentImages(is_head_hidden=options.images == HIDDEN_HEAD)
-    observer = RulaObserver(config, asked.seed, images)
+    if asked.html is not None and asked.images != NO_IMAGES:
+        images = MomentImages(is_head_hidden=asked.images == HIDDEN_HEAD)
+    observer = RulaObserver(asked, asked.seed, images)
     if asked.people is not None and asked.person is None:
         print_remarks(["of several people, person 1 is scored; --person K gives another"])
 
@@ -74,47 +95,28 @@ def run(options: argparse.Namespace) -> None:
             observer(frame, estimate, tracker)
 
     summary = track(request, observers=(observe,))
-    content = _content(asked, options.title, config, observer.rows, summary, images)
-    write_scores(options, content)
+    write_scores(asked, _content(asked, observer.rows, summary, images))
 
 
-def add_score_outputs(parser: argparse.ArgumentParser) -> None:
-    """Add the options of the files that both methods write."""
-    for flag, name, text in (
-        ("--csv", "OUT.csv", "table to write, one row per image: its score, the chance of each"),
-        ("--plot", "OUT.png", "draw the scores over time"),
-        ("--html", "OUT.html", "write a page that prints: scores, shares of time, worst moments"),
-    ):
-        parser.add_argument(flag, type=Path, metavar=name, help=text)
-    parser.add_argument("--title", metavar="TEXT", help="heading of --html, such as the task")
-
-
-def outputs_of(options: argparse.Namespace) -> tuple[Path | None, ...]:
-    """Return the files of :func:`add_score_outputs`; None for each that is not wanted."""
-    return options.csv, options.plot, options.html
-
-
-def write_scores(options: argparse.Namespace, content: PageContent) -> None:
+def write_scores(files: ScoreFiles, content: PageContent) -> None:
     """Print times, part scores and declared inputs, and write the files."""
     rows, config, method = content.rows, content.config, content.method
     shares = recording.score_shares(rows, config, method)
     for line in report.report_lines(recording.summarize(rows, method), shares, config, method):
         print(line)
-    if options.csv is not None:
-        recording.write_csv(rows, options.csv, method)
-    if options.plot is not None:
-        write_file(options.plot, report.score_plot(rows, (), method))
-    if options.html is not None:
-        report.write_page(content, options.html)
-    for path in outputs_of(options):
+    if files.csv is not None:
+        recording.write_csv(rows, files.csv, method)
+    if files.plot is not None:
+        write_file(files.plot, report.score_plot(rows, (), method))
+    if files.html is not None:
+        report.write_page(content, files.html)
+    for path in files.outputs:
         if path is not None:
             print(f"wrote {path}")
 
 
 def _content(
-    asked: TrackingOptions,
-    title: str | None,
-    config: RulaConfig,
+    asked: Arguments,
     rows: Sequence[RulaRow],
     summary: TrackSummary,
     images: MomentImages | None,
@@ -138,9 +140,9 @@ def _content(
     facts["Tracker"] = f"cardbox_tracker {__version__}, preset {asked.preset}"
     facts["Random seed"] = str(asked.seed)
     return PageContent(
-        title or f"RULA of {name}",
+        asked.title or f"RULA of {name}",
         facts,
-        config,
+        asked,
         rows,
         None if images is None else images.by_stamp(),
         images is None or images.is_head_hidden,

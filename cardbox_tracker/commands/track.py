@@ -5,7 +5,6 @@
 
 from __future__ import annotations
 
-import argparse
 import json
 import os
 from collections.abc import Callable, Iterable, Iterator, Mapping
@@ -16,10 +15,10 @@ from typing import Any
 
 from cardbox_tracker.applications.exporting.formats import Format, Result, export, formats
 from cardbox_tracker.applications.reporting.page import angles_plot, write_page
-from cardbox_tracker.commands.arguments import add_options, at_least, check_outputs
-from cardbox_tracker.commands.request import Request
+from cardbox_tracker.commands.arguments import check_outputs
+from cardbox_tracker.commands.request import Request, TrackArguments
 from cardbox_tracker.commands.tracking import track as track_request
-from cardbox_tracker.commands.tracking_request import FORMATS, TrackFiles, tracking_request
+from cardbox_tracker.commands.tracking_request import TrackFiles, tracking_request
 from cardbox_tracker.common.errors import CardboxError
 from cardbox_tracker.common.files import (
     body_beside,
@@ -40,44 +39,22 @@ _OF_ONE = ("csv", "bag", "video", "json", "export", "plot", "report")
 _OF_MANY = ("output", "formats", "jobs", "scheduler")
 
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the arguments of ``cardbox track``."""
-    add_options(parser, Request)
-    add = parser.add_argument_group("a folder of recordings (docs/many-recordings.md)").add_argument
-    add(
-        "--output",
-        type=Path,
-        metavar="DIR",
-        help="folder of the results; by default FOLDER_tracked in the current folder. A recording "
-        "that is finished there with the same inputs and settings is not tracked again",
-    )
-    add("--formats", nargs="+", choices=FORMATS, help="results of each recording; csv by default")
-    add(
-        "--jobs",
-        type=at_least(1),
-        metavar="N",
-        help="recordings that are tracked at a time, each on one core; one per core by default",
-    )
-    add(
-        "--scheduler",
-        metavar="ADDRESS",
-        help="in place of --jobs: track on the workers of this Dask cluster, such as tcp://HOST:8786",
-    )
+Arguments = TrackArguments
 
 
-def run(options: argparse.Namespace) -> None:
+def run(asked: Arguments) -> None:
     """Track the person and write the requested files."""
-    asked, path = Request.of(options), options.recording
-    if not is_one_recording(path) and recordings_in(path, options.output):
+    path = asked.recording
+    if not is_one_recording(path) and recordings_in(path, asked.output):
         from cardbox_tracker.commands.track_folder import track_folder
 
-        for fault in _without_effect(options, _OF_ONE, "a folder of recordings: give --formats"):
+        for fault in _without_effect(asked, _OF_ONE, "a folder of recordings: give --formats"):
             raise CardboxError(fault)
-        if None not in (options.jobs, options.scheduler):
+        if None not in (asked.jobs, asked.scheduler):
             raise CardboxError("--jobs has no effect with --scheduler: its workers are as many")
-        track_folder(asked, options)
+        track_folder(asked)
         return
-    faults = _without_effect(options, _OF_MANY, "which is one recording: give --csv")
+    faults = _without_effect(asked, _OF_MANY, "which is one recording: give --csv")
     track_one(replace(asked, csv=asked.csv or Path(f"{_name(path)}.csv")), faults)
 
 
@@ -112,10 +89,10 @@ def _name(recording: Path) -> Path:
     return Path(path.name if path.is_dir() else path.stem)
 
 
-def _without_effect(options: argparse.Namespace, names: tuple[str, ...], what: str) -> list[str]:
+def _without_effect(asked: Arguments, names: tuple[str, ...], what: str) -> list[str]:
     """Return a fault for each given option that has no effect, since the recording is ``what``."""
-    given = [name for name in names if getattr(options, name) is not None]
-    return [f"--{name} has no effect on {options.recording}, {what}" for name in given]
+    given = [name for name in names if getattr(asked, name) is not None]
+    return [f"--{name} has no effect on {asked.recording}, {what}" for name in given]
 
 
 def track_one(

@@ -6,7 +6,6 @@ it an interrupted run goes on, and only what changed is done again.
 
 from __future__ import annotations
 
-import argparse
 import csv
 import errno
 import hashlib
@@ -26,11 +25,9 @@ import numba
 import numpy as np
 
 import cardbox_tracker
-from cardbox_tracker.commands.request import Request, with_own_options
+from cardbox_tracker.commands.request import FORMATS, TABLES, TrackArguments, with_own_options
 from cardbox_tracker.commands.tracking import track
 from cardbox_tracker.commands.tracking_request import (
-    FORMATS,
-    TABLES,
     TrackFiles,
     TrackingRequest,
     tracking_request,
@@ -119,12 +116,12 @@ class Job(NamedTuple):
     program: str = ""  #: see :func:`digest_of_program`; empty if the process has this program
 
 
-def track_folder(asked: Request, options: argparse.Namespace) -> None:
+def track_folder(asked: TrackArguments) -> None:
     """Track each recording of a folder that is not finished, and print a summary."""
     folder = asked.recording
-    output = options.output or Path(f"{folder.resolve().name}_tracked")
+    output = asked.output or Path(f"{folder.resolve().name}_tracked")
     recordings = recordings_in(folder, output)
-    formats = _formats(options.formats or ())
+    formats = _formats(asked.formats or ())
     _check_output(output, folder, recordings, asked.force)
     before = _read_rows(output / SUMMARY)
     jobs, rows = _jobs(asked, recordings, formats)
@@ -137,11 +134,11 @@ def track_folder(asked: Request, options: argparse.Namespace) -> None:
         rows |= {name: before[name] for name in kept}
         if kept:
             print(f"{len(kept)} of {len(recordings)} recordings are finished; --force does again")
-    if options.scheduler is not None:
+    if asked.scheduler is not None:
         # Workers began elsewhere, and may have another version.
         here, program = Path.cwd(), digest_of_program()
         jobs = [job._replace(folder=here, program=program) for job in jobs]
-    remarks = _track_all(jobs, rows, output, formats, options.jobs, options.scheduler)
+    remarks = _track_all(jobs, rows, output, formats, asked.jobs, asked.scheduler)
     for row in rows.values():
         if row.status == FAILED:
             _remove(output, row.recording)
@@ -188,7 +185,7 @@ def _check_output(output: Path, folder: Path, recordings: Mapping[str, Path], fo
 
 
 def _jobs(
-    asked: Request, recordings: Mapping[str, Path], formats: Sequence[str]
+    asked: TrackArguments, recordings: Mapping[str, Path], formats: Sequence[str]
 ) -> tuple[list[Job], dict[str, Row]]:
     """Return a job for each recording, and the rows of those whose options are wrong."""
     program = digest_of_program()

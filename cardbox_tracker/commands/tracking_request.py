@@ -69,11 +69,6 @@ class PersonRequest:
     statures_m: tuple[float, ...] = ()  #: the statures that are given, by number
 
 
-TABLES = ("csv", "parquet")
-FORMATS = (*TABLES, "mp4", "bag")
-"""Results of a recording: a table in one of two formats, a video, a bag."""
-
-
 class TrackFiles(NamedTuple):
     """Files to write; None for one that is not wanted."""
 

@@ -6,14 +6,8 @@ import argparse
 import os
 from pathlib import Path
 
-from cardbox_tracker.commands.arguments import (
-    add_force,
-    add_options,
-    add_seed,
-    at_least,
-    check_outputs,
-)
-from cardbox_tracker.commands.request import TrackingOptions
+from cardbox_tracker.commands.arguments import add_options, at_least, check_outputs
+from cardbox_tracker.commands.request import Request
 from cardbox_tracker.commands.tracking_request import points_named
 
 
@@ -79,12 +73,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         action="store_true",
         help="with --sessions: also count the recoveries from disturbances",
     )
-    add_options(parser, TrackingOptions, "preset")
+    seed = {"help": "random seed of recordings and filters"}
+    add_options(parser, Request, "preset", "seed", "force", seed=seed)
     parser.add_argument(
         "--jobs", type=at_least(1), metavar="N", help="number of processes; one per core by default"
     )
-    add_seed(parser, "recordings and filters")
-    add_force(parser)
 
 
 def run(options: argparse.Namespace) -> None:
