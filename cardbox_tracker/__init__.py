@@ -10,7 +10,9 @@ first use, so that ``import cardbox_tracker`` is fast.
 
 from __future__ import annotations
 
+import ast as _ast
 from importlib import import_module
+from pathlib import Path as _Path
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
@@ -59,46 +61,13 @@ if TYPE_CHECKING:
 
 __version__ = "0.1.0"
 
-_MODULES = {
-    "person.model": ("BodyModel",),
-    "person.model_file": ("load_body_model", "save_body_model"),
-    "person.proportions": ("body_from_proportions",),
-    "person.skeleton": ("JOINT_NAMES", "KEYPOINT_NAMES"),
-    "common.errors": (
-        "BackgroundFileError",
-        "BagError",
-        "BodyModelError",
-        "CameraError",
-        "CardboxError",
-        "EncodingError",
-        "InitializationError",
-        "NotFiniteError",
-        "RosMissingError",
-    ),
-    "search.config": ("PRESETS", "TrackerConfig"),
-    "detectors.detector": ("Detector",),
-    "detectors.image_points": ("ImagePoints",),
-    "terms.depth": ("Depth",),
-    "camera.view": ("OtherCamera",),
-    "measuring.config": ("InitializationConfig", "InitializationResult"),
-    "measuring.measure": ("initialize_body",),
-    "measuring.scene_watch": ("SceneWatch",),
-    "tracking.estimate": ("Estimate",),
-    "tracking.observation": ("Observation",),
-    "tracking.session": ("Session",),
-    "tracking.tracker": ("Tracker",),
-    "segmentation.background": ("SilhouetteExtractor",),
-    "segmentation.background_config": ("BackgroundConfig",),
-    "camera.calibration_file": ("load_calibration",),
-    "camera.camera": ("Calibration", "Camera"),
-    "segmentation.empty_scene": ("BackgroundLearner", "BackgroundModel"),
-    "camera.extrinsics": ("Extrinsics",),
-    "camera.extrinsics_files": ("load_extrinsics",),
-    "applications.exporting.formats": ("Result", "read_result"),
-    "commands.request": ("Request",),
-    "commands.track": ("track",),
+# The names that type checkers see above, with their modules.
+_MODULE_OF: dict[str, str] = {
+    alias.name: str(node.module)
+    for node in _ast.walk(_ast.parse(_Path(__file__).read_text(encoding="utf-8")))
+    if isinstance(node, _ast.ImportFrom) and str(node.module).startswith("cardbox_tracker.")
+    for alias in node.names
 }
-_MODULE_OF = {name: module for module, names in _MODULES.items() for name in names}
 __all__ = sorted(_MODULE_OF)
 
 
@@ -106,7 +75,7 @@ def __getattr__(name: str) -> Any:
     """Import a name of ``__all__`` at its first use (PEP 562)."""
     if name not in _MODULE_OF:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    value = getattr(import_module(f"{__name__}.{_MODULE_OF[name]}"), name)
+    value = getattr(import_module(_MODULE_OF[name]), name)
     globals()[name] = value
     return value
 

@@ -193,13 +193,8 @@ def _words_of(one: Setting, default: Any) -> dict[str, Any]:
     return {"help": f"{text}{allowed}", "type": type(default), "metavar": "N"}
 
 
-def add_options(
-    parser: argparse.ArgumentParser, kind: type[Options], *names: str, **changed: dict[str, Any]
-) -> None:
-    """Add an option to a parser for each field of ``kind``, or for those with these names.
-
-    ``changed`` are other arguments of ``add_argument`` by the names of fields.
-    """
+def add_options(parser: argparse.ArgumentParser, kind: type[Options], *names: str) -> None:
+    """Add an option to a parser for each field of ``kind``, or for those with these names."""
     helps, group = _helps(kind), parser.add_argument_group(kind.group) if kind.group else parser
     for entry in fields(kind):
         if names and entry.name not in names:
@@ -211,7 +206,7 @@ def add_options(
             words |= _words_of(one, default)
         else:
             words |= {"type": _reader(entry), "help": helps.get(entry.name)}
-            words |= entry.metadata["words"] | changed.get(entry.name, {})
+            words |= entry.metadata["words"]
         if isinstance(default, bool):
             action = "store_false" if default else "store_true"
             words = {"dest": entry.name, "help": words["help"], "action": action}
@@ -246,11 +241,10 @@ class TrackedResults(Options):
         """Return the results of the person, or of the first one of several, which is said."""
         from cardbox_tracker.recordings.result_reader import read_results
 
-        path = self.results
-        results = read_results(path, self.person)
+        results = read_results(self.results, self.person)
         if results.has_others and self.person is None:
-            told = f"{path} has several people: person 1 is used; --person K gives another"
-            print_remarks([told])
+            told = "has several people: person 1 is used; --person K gives another"
+            print_remarks([f"{self.results} {told}"])
         return results
 
 

@@ -49,9 +49,9 @@ class References(Written):
         seed: random seed of the hypotheses
     """
 
-    front: tuple[float, float] = option("T0:T1", span, required=True)
-    side: tuple[float, float] = option("T0:T1", span, required=True)
-    arms: tuple[float, float] = option("T0:T1", span, required=True)
+    front: TimeSpan = option("T0:T1", span, required=True)
+    side: TimeSpan = option("T0:T1", span, required=True)
+    arms: TimeSpan = option("T0:T1", span, required=True)
     side_turn: str = choice(SIDE_TURNS, default="left")
     distance_m: float | None = option("M", flag="--distance")
     camera_pitch_deg: float | None = option("P")
@@ -61,7 +61,7 @@ class References(Written):
     @property
     def spans(self) -> dict[str, TimeSpan]:
         """The span of each posture."""
-        return {name: span(getattr(self, name)) for name in ("front", "side", "arms")}
+        return {name: getattr(self, name) for name in ("front", "side", "arms")}
 
 
 @dataclass(frozen=True)

@@ -9,11 +9,11 @@ import signal
 import sys
 from collections.abc import Callable, Container, Sequence
 from importlib import import_module
+from pathlib import Path
 from typing import Any
 
 from cardbox_tracker import __version__
 from cardbox_tracker.commands.arguments import add_options
-from cardbox_tracker.commands.checkout import LAB, from_checkout
 from cardbox_tracker.common import interrupts
 from cardbox_tracker.common.errors import CardboxError, plain
 
@@ -45,6 +45,16 @@ Its module has ``Arguments``, whose fields are its options, and ``run(arguments)
 work and prints the result, and raises CardboxError if the user can correct the cause. That of
 ``lab/`` has ``add_arguments(parser)`` in place of ``Arguments``.
 """
+
+_PACKAGE = Path(__file__).parents[1]
+LAB = {
+    "benchmark": ("lab.benchmarks.command", "'make benchmark'"),
+    "evaluate": (
+        "lab.evaluation.command",
+        "'make experiments', 'make sessions' or 'make people'",
+    ),
+}
+"""Module of each of these subcommands, and the commands of ``make`` that do the same."""
 
 # A folder of recordings has many reasons.
 _MOST_OF_AN_ERROR = 20_000
@@ -145,6 +155,28 @@ def _add(parser: argparse.ArgumentParser, name: str) -> Callable[[argparse.Names
     module = import_module(f"cardbox_tracker.commands.{name.replace('-', '_')}")
     add_options(parser, module.Arguments)
     return lambda options: module.run(module.Arguments.of(options))
+
+
+def from_checkout(module: str, targets: str) -> Any:
+    """Import from a checkout: the current directory, one above it, or this package's parent."""
+    folder = module.partition(".")[0]
+    for root in (Path.cwd(), *Path.cwd().parents, _PACKAGE.parent):
+        if (root / folder / "__init__.py").is_file() and (root / _PACKAGE.name).is_dir():
+            # At the end of the path, it does not replace the package that is running.
+            sys.path.append(str(root))
+            break
+    else:
+        raise CardboxError(
+            f"{folder}/ is not installed; run this in a checkout of {_PACKAGE.name}, or there "
+            f"{targets}"
+        )
+    try:
+        return import_module(module)
+    except ModuleNotFoundError as error:
+        raise CardboxError(
+            f"{module} needs {error.name}, which is not installed; "
+            "run 'pip install .' in the checkout"
+        ) from None
 
 
 class _Once(argparse._StoreAction):

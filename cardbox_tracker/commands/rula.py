@@ -60,7 +60,7 @@ class ScoreFiles(Written):
 
 
 @dataclass(frozen=True)
-class Arguments(RulaConfig, ScoreFiles, TrackingOptions):
+class Arguments(ScoreFiles, TrackingOptions, RulaConfig):
     """A recording, and what no image shows.
 
     Attributes:
@@ -71,10 +71,6 @@ class Arguments(RulaConfig, ScoreFiles, TrackingOptions):
 
     group = "what no image shows"
     images: str = choice(IMAGES, default=HIDDEN_HEAD)
-
-    def __post_init__(self) -> None:
-        """Read the values; the settings are checked in the same way."""
-        TrackingOptions.__post_init__(self)
 
 
 def run(asked: Arguments) -> None:

@@ -35,10 +35,6 @@ from cardbox_tracker.recordings.result_table import check_table
 from cardbox_tracker.recordings.track import TrackSummary
 from cardbox_tracker.tracking.precompile import compile_for_films
 
-_OF_ONE = ("csv", "bag", "video", "json", "export", "plot", "report")
-_OF_MANY = ("output", "formats", "jobs", "scheduler")
-
-
 Arguments = TrackArguments
 
 
@@ -48,13 +44,13 @@ def run(asked: Arguments) -> None:
     if not is_one_recording(path) and recordings_in(path, asked.output):
         from cardbox_tracker.commands.track_folder import track_folder
 
-        for fault in _without_effect(asked, _OF_ONE, "a folder of recordings: give --formats"):
+        for fault in _without_effect(asked, Request, "a folder of recordings: give --formats"):
             raise CardboxError(fault)
         if None not in (asked.jobs, asked.scheduler):
             raise CardboxError("--jobs has no effect with --scheduler: its workers are as many")
         track_folder(asked)
         return
-    faults = _without_effect(asked, _OF_MANY, "which is one recording: give --csv")
+    faults = _without_effect(asked, TrackArguments, "which is one recording: give --csv")
     track_one(replace(asked, csv=asked.csv or Path(f"{_name(path)}.csv")), faults)
 
 
@@ -89,10 +85,10 @@ def _name(recording: Path) -> Path:
     return Path(path.name if path.is_dir() else path.stem)
 
 
-def _without_effect(asked: Arguments, names: tuple[str, ...], what: str) -> list[str]:
-    """Return a fault for each given option that has no effect, since the recording is ``what``."""
-    given = [name for name in names if getattr(asked, name) is not None]
-    return [f"--{name} has no effect on {asked.recording}, {what}" for name in given]
+def _without_effect(asked: TrackArguments, kind: type[Request], what: str) -> list[str]:
+    """Return a fault for each given option of a class itself, which has no effect on ``what``."""
+    own = [flag for flag in asked.given() if flag[2:] in vars(kind) and flag != "--force"]
+    return [f"{flag} has no effect on {asked.recording}, {what}" for flag in own]
 
 
 def track_one(

@@ -77,17 +77,11 @@ class Row(NamedTuple):
     @classmethod
     def tracked(cls, recording: str, summary: TrackSummary, inputs: str) -> Row:
         """Return the row of a tracked recording."""
-        is_seen = summary.frames_tracked > 0
-        return cls(
-            recording,
-            TRACKED,
-            str(summary.frames),
-            str(summary.frames_tracked),
-            str(summary.frames_uncertain),
-            f"{summary.mean_cost_px:.1f}" if is_seen else "",
-            f"{summary.mean_iou:.4f}" if is_seen else "",
-            inputs=inputs,
-        )
+        tracked, uncertain = str(summary.frames_tracked), str(summary.frames_uncertain)
+        means = f"{summary.mean_cost_px:.1f}", f"{summary.mean_iou:.4f}"
+        cost_px, iou = means if summary.frames_tracked else ("", "")
+        counts = str(summary.frames), tracked, uncertain
+        return cls(recording, TRACKED, *counts, cost_px, iou, inputs=inputs)
 
     @classmethod
     def failed(cls, recording: str, error: Exception) -> Row:
@@ -251,11 +245,9 @@ def _prepared(job: Job, number: int, work: Path, formats: Sequence[str]) -> Job:
     place.parent.mkdir()
     paths = {ending: place.with_name(f"{place.name}.{ending}") for ending in formats}
     table = next(paths[ending] for ending in TABLES if ending in paths)
-    body = place.with_name(f"{place.name}{_BODY}")
-    scene = place.with_name(f"{place.name}{_SCENE}")
-    files = TrackFiles(table, paths.get("mp4"), paths.get("bag"), body, scene)
-    request = replace(job.request, files=files)
-    return job._replace(request=request)
+    beside = body_beside(table), scene_beside(table)
+    files = TrackFiles(table, paths.get("mp4"), paths.get("bag"), *beside)
+    return job._replace(request=replace(job.request, files=files))
 
 
 def track_job(job: Job) -> tuple[Job, Row, list[str]]:

@@ -107,18 +107,18 @@ def _with_unknown(remarks: Sequence[str], person: PersonRequest) -> list[str]:
     if person.stature_m is not None or person.model is not None:
         return [*remarks]
     others = [remark for remark in remarks if not remark.startswith(UNKNOWN_LENS)]
-    if len(others) == len(remarks):
-        return [
-            f"the stature is taken as that of most adults, {USUAL_STATURE_M:g} m, so sizes and "
-            "distances may be wrong by a tenth; give --stature M",
-            *others,
-        ]
-    return [
-        f"stature and field of view are unknown ({USUAL_STATURE_M:g} m and those of most cameras "
-        "are assumed), so distances may be wrong by half, and sizes by a tenth; give --stature M "
-        f"and --fov DEG ({FOV_HINT}); times, and mostly angles, are right all the same",
-        *others,
-    ]
+    unknown = (
+        f"the stature is taken as that of most adults, {USUAL_STATURE_M:g} m, so sizes and "
+        "distances may be wrong by a tenth; give --stature M"
+    )
+    if len(others) < len(remarks):
+        unknown = (
+            f"stature and field of view are unknown ({USUAL_STATURE_M:g} m and those of most "
+            "cameras are assumed), so distances may be wrong by half, and sizes by a tenth; give "
+            f"--stature M and --fov DEG ({FOV_HINT}); times, and mostly angles, are right all the "
+            "same"
+        )
+    return [unknown, *others]
 
 
 def _assumptions(request: TrackingRequest, scene: Scene) -> Iterator[str]:
@@ -131,7 +131,7 @@ def _assumptions(request: TrackingRequest, scene: Scene) -> Iterator[str]:
         whose = "" if person.people is None else f" of person {number}"
         yield f"distance{whose} {body.placement.distance_m:.2f} m ({distance})"
     if person.stature_m is not None:
-        each = " and ".join(f"{one:.2f}" for one in person.statures_m or (person.stature_m,))
+        each = " and ".join(f"{one:.2f}" for one in person.statures_m)
         yield f"stature {each} m (given), sizes from proportions"
     elif person.model is None:
         yield f"stature {USUAL_STATURE_M:.2f} m (the mean of adults), sizes from proportions"

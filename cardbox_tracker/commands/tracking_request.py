@@ -59,14 +59,17 @@ class PersonRequest:
     model: Path | None  #: the file of a measured person; None if only the stature is given
     start_s: float  #: seconds from the recording's start at which tracking starts
     is_pitch_given: bool  #: whether ``body`` has the camera's pitch; else it is to be found
-    #: the stature that is given, of the first person; None with ``model``
-    stature_m: float | None = None
     end_s: float = math.inf  #: the same at which it ends; inf for the end of the recording
     #: number of people to track, 0 for all who come; None for one without a number
     people: int | None = None
     others: tuple[BodyModel, ...] = ()  #: the bodies of the second and further people
     number: int = 1  #: whose results commands use that use those of one
     statures_m: tuple[float, ...] = ()  #: the statures that are given, by number
+
+    @property
+    def stature_m(self) -> float | None:
+        """The stature that is given, of the first person; None without one."""
+        return self.statures_m[0] if self.statures_m else None
 
 
 class TrackFiles(NamedTuple):
@@ -101,19 +104,16 @@ class Problems:
 
     def __init__(self, recording: Path, faults: Iterable[str] = ()) -> None:
         self._recording = recording
-        self._missing: list[str] = []
-        self._hints: list[str] = []
+        self._missing: dict[str, str] = {}
         self._faults = list(faults)
 
     def miss(self, option: str, hint: str = "") -> None:
         """Note that an ``option`` is missing; ``hint`` helps to choose its value."""
-        self._missing.append(option)
-        if hint:
-            self._hints.append(hint)
+        self._missing[option] = hint
 
-    def add(self, fault: str) -> None:
-        """Note a fault."""
-        self._faults.append(fault)
+    def add(self, *faults: str) -> None:
+        """Note faults."""
+        self._faults += faults
 
     def exclude(self, asked: RecordingOptions) -> None:
         """Note options that exclude each other."""
@@ -136,8 +136,8 @@ class Problems:
         if self._missing:
             *most, last = self._missing
             needed = f"{', '.join(most)}, and {last}" if most else last
-            hints = f" ({'; '.join(self._hints)})" if self._hints else ""
-            faults.insert(0, f"{self._recording} needs {needed}{hints}")
+            hints = "; ".join(filter(None, self._missing.values()))
+            faults.insert(0, f"{self._recording} needs {needed}{f' ({hints})' if hints else ''}")
         if faults:
             raise CardboxError("; also, ".join(faults))
 
@@ -157,8 +157,7 @@ def recording_request(
         points = problems.caught(lambda: points_named(asked.detector, asked.detector_class), None)
     silhouettes = _silhouettes(asked, points, problems)
     has_detector = any(isinstance(one, Detector) for one in (silhouettes, points))
-    for fault in _person_faults(asked.person, people, has_detector):
-        problems.add(fault)
+    problems.add(*_person_faults(asked.person, people, has_detector))
     names: tuple[str, ...] = ()
     names = problems.caught(lambda: tuple(camera_names(asked.cameras)), names)
     request = RecordingRequest(
@@ -170,8 +169,7 @@ def recording_request(
         _following(points, asked.person, people),
         camera,
     )
-    for fault in request.faults():
-        problems.add(fault)
+    problems.add(*request.faults())
     if asked.extrinsics is not None and len(names) < 2:
         problems.add("--extrinsics has no effect with one camera: name several with --cameras")
     return request
@@ -218,8 +216,7 @@ def tracking_request(asked: TrackingOptions, faults: Iterable[str] = ()) -> Trac
     assert not isinstance(people, str)
     recording = recording_request(asked, problems, people)
     person = _person(asked, people, problems, scene)
-    for fault in _tracking_faults(asked, people, isinstance(recording.points, Detector)):
-        problems.add(fault)
+    problems.add(*_tracking_faults(asked, people, isinstance(recording.points, Detector)))
     preset = PRESETS[asked.preset]()
     config = problems.caught(lambda: _config(asked, preset), preset)
     hands = problems.caught(installed_hands, None) if asked.hands else None
@@ -384,7 +381,6 @@ def _person(
         asked.scene if is_of_scene else asked.model,
         start_s,
         is_pitch_given=asked.model is not None or pitch_deg is not None or scene is not None,
-        stature_m=statures_m[0] if statures_m else None,
         end_s=end_s,
         people=people,
         others=tuple(bodies[1:]),
@@ -412,10 +408,8 @@ def _bodies(asked: TrackingOptions, problems: Problems) -> list[BodyModel]:
 
 
 def _measured(asked: TrackingOptions, model: Path, problems: Problems) -> BodyModel:
-    given = ("--distance", asked.distance_m), ("--camera-pitch-deg", asked.camera_pitch_deg)
-    for flag, value in given:
-        if value is not None:
-            problems.add(f"{flag} has no effect with --model, which contains it")
+    for flag in sorted({"--distance", "--camera-pitch-deg"} & asked.given().keys()):
+        problems.add(f"{flag} has no effect with --model, which contains it")
     body = problems.caught(lambda: load_body_model(model), BodyModel())
     if asked.start_s is None and body.source == MEASURED:
         problems.miss("--start T", "a measured person stands as for --front at T")

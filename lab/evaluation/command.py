@@ -73,8 +73,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         action="store_true",
         help="with --sessions: also count the recoveries from disturbances",
     )
-    seed = {"help": "random seed of recordings and filters"}
-    add_options(parser, Request, "preset", "seed", "force", seed=seed)
+    add_options(parser, Request, "preset", "seed", "force")
     parser.add_argument(
         "--jobs", type=at_least(1), metavar="N", help="number of processes; one per core by default"
     )

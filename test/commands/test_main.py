@@ -13,10 +13,8 @@ import pytest
 
 from cardbox_tracker import __version__
 from cardbox_tracker.commands import call as command
-from cardbox_tracker.commands import checkout
 from cardbox_tracker.commands import main as main_module
-from cardbox_tracker.commands.checkout import from_checkout
-from cardbox_tracker.commands.main import COMMANDS, build_parser
+from cardbox_tracker.commands.main import COMMANDS, build_parser, from_checkout
 from cardbox_tracker.common.errors import CardboxError
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -31,7 +29,6 @@ SHARED = {
     "scene",
     "tracking",
     "track_folder",
-    "checkout",
 }
 
 
@@ -259,7 +256,7 @@ def test_an_answer_that_was_the_last_status_is_printed_once(
 @pytest.fixture
 def installed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """A package that does not lie in a checkout, run from a folder elsewhere."""
-    monkeypatch.setattr(checkout, "_PACKAGE", tmp_path / "site-packages" / "cardbox_tracker")
+    monkeypatch.setattr(main_module, "_PACKAGE", tmp_path / "site-packages" / "cardbox_tracker")
     monkeypatch.setattr(sys, "path", list(sys.path))
     monkeypatch.chdir(tmp_path)
     return tmp_path
@@ -304,7 +301,7 @@ def test_a_missing_library_is_named(installed: Path, monkeypatch: pytest.MonkeyP
 def test_beside_the_package_it_is_found_from_anywhere(tmp_path: Path) -> None:
     program = (
         f"import sys; sys.path.insert(0, {str(ROOT)!r})\n"
-        "from cardbox_tracker.commands.checkout import from_checkout\n"
+        "from cardbox_tracker.commands.main import from_checkout\n"
         "print(from_checkout('lab.benchmarks.report', 'benchmark').COMMAND)"
     )
     done = subprocess.run(
