@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import FrozenInstanceError
+from dataclasses import FrozenInstanceError, replace
 from itertools import chain, combinations
 from pathlib import Path
 
@@ -69,6 +69,23 @@ def test_a_request_has_what_the_options_ask_for(film: Path) -> None:
     assert set(request.inputs) == {film, folder / "me.yaml", folder / "points.csv"}
     with pytest.raises(FrozenInstanceError):
         request.seed = 8  # type: ignore[misc]
+
+
+def test_python_asks_for_the_same_as_a_command_line(film: Path) -> None:
+    words = ("--background=0:1.5", "--person=120,80.5", "--stature=1.8,1.6", "--people=auto")
+    more = ("--cameras", "a", "b", "--set=lost_frames=9", "--set=relocalize=false", "--hands")
+    asked = Request(
+        film,
+        background=(0, 1.5),
+        person=(120, 80.5),
+        stature_m=(1.8, 1.6),
+        people="auto",
+        cameras=("a", "b"),
+        set={"lost_frames": 9, "relocalize": False},
+        hands=True,
+    )
+    assert asked == line(film, *words, *more) == replace(asked)
+    assert isinstance(asked.background, TimeSpan) and asked.statures_m == (1.8, 1.6)
 
 
 def test_a_stature_leaves_the_rest_to_be_found(film: Path) -> None:
