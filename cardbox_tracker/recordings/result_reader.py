@@ -24,7 +24,11 @@ from cardbox_tracker.common.files import (
 from cardbox_tracker.person.hands import HAND_NAMES, HAND_OPEN_NAMES
 from cardbox_tracker.person.legs import LEG_NAMES
 from cardbox_tracker.person.model import BodyModel
-from cardbox_tracker.person.model_file import load_body_model, loads_body_model
+from cardbox_tracker.person.model_file import (
+    dumps_body_model,
+    load_body_model,
+    loads_body_model,
+)
 from cardbox_tracker.person.sizes import FloatArray
 from cardbox_tracker.person.skeleton import (
     JOINT_NAMES,
@@ -44,15 +48,20 @@ from cardbox_tracker.recordings.outputs import (
     posture_from,
 )
 from cardbox_tracker.recordings.result_table import (
+    DECIMALS,
     PARQUET,
     PERSON,
     POINT_COLUMNS,
+    columns,
     deviation_columns,
     pyarrow_or_error,
+    row_of,
     text_columns,
     units,
 )
-from cardbox_tracker.tracking.estimate import LOST, NO_PERSON, TRACKING, UNCERTAIN
+from cardbox_tracker.recordings.silhouettes import RecordedFrame
+from cardbox_tracker.tracking.estimate import LOST, NO_PERSON, TRACKING, UNCERTAIN, Estimate
+from cardbox_tracker.tracking.tracker import Tracker
 
 MODEL = "/body_model"
 _STATE, _JOINTS, _STDDEV = "/tracking_state", "/joint_states", "/joint_states_stddev"
@@ -218,6 +227,41 @@ def _number(row: Mapping[str, Any], name: str, kind: Callable[[Any], Any] = floa
         return kind(row[name])
     except (TypeError, ValueError, OverflowError):
         raise ValueError(f"{name} is {quoted(str(row[name]))}") from None
+
+
+class KeptResults:
+    """Observer that keeps the results of each person as a table of CSV has them, in memory."""
+
+    def __init__(self, path: Path, has_points: bool, has_people: bool, has_hands: bool) -> None:
+        """Take the recording, and what :func:`~.result_table.result_table` takes."""
+        self._path, self._has = path, (has_points, has_people, has_hands)
+        self._rows: dict[int, _Rows] = {}
+        self._bodies: dict[int, BodyModel] = {}
+
+    def __call__(self, frame: RecordedFrame, estimate: Estimate, tracker: Tracker) -> None:
+        """Keep the row of an image; CardboxError if it is not after the one before."""
+        names, number = columns(*self._has), estimate.person or 1
+        self._bodies[number] = tracker.body
+        if number not in self._rows:
+            self._rows[number] = _Rows(self._path, names, _NEEDED)
+        estimate = estimate.as_camera_stands(tracker.body.camera_pose.roll_rad)
+        row = row_of(frame.stamp_ns, frame.time_s, estimate, *self._has)
+        cells = (round(float(cell), DECIMALS) if isinstance(cell, float) else cell for cell in row)
+        try:
+            self._rows[number].add(dict(zip(names, cells, strict=True)))
+        except ValueError as error:
+            raise CardboxError(f"{self._path}: {error}; record it again") from None
+
+    def results(self) -> dict[int, Results]:
+        """Return the results by the numbers of the people, with the body at the end."""
+        found = {}
+        for number, rows in self._rows.items():
+            # What a file does not keep is unknown here, too.
+            body = loads_body_model(dumps_body_model(self._bodies[number]))
+            results = rows.results(())
+            bodies = (body,) * len(results.state)
+            found[number] = replace(results, bodies=bodies, has_others=len(self._rows) > 1)
+        return found
 
 
 def read_results(path: Path, person: int | None = None) -> Results:

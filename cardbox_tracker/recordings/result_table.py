@@ -39,6 +39,8 @@ from cardbox_tracker.tracking.estimate import Estimate, Hand, Legs
 Cell = int | float | str | Decimal | None
 """A value of the table; None is unknown. A Decimal keeps the nine decimals of a stamp."""
 
+DECIMALS = 6
+"""Decimals of the numbers in CSV."""
 PARQUET = ".parquet"
 """Suffix of the tables that are not CSV."""
 
@@ -266,7 +268,7 @@ def _text(cell: Cell) -> str:
         case Decimal():
             return f"{cell:.9f}"
         case float():
-            return f"{cell:.6f}"
+            return f"{cell:.{DECIMALS}f}"
     return str(cell)
 
 

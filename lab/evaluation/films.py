@@ -7,7 +7,6 @@ truth is turned with them.
 
 from __future__ import annotations
 
-import argparse
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import replace
@@ -22,8 +21,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cardbox_tracker.applications.drawing.video import video_file
-from cardbox_tracker.commands.request import add_tracking, tracking_request
+from cardbox_tracker.commands.request import TrackingOptions
 from cardbox_tracker.commands.tracking import track
+from cardbox_tracker.commands.tracking_request import tracking_request
 from cardbox_tracker.common.errors import CardboxError
 from cardbox_tracker.common.files import write_file
 from cardbox_tracker.common.progress import progress_bar
@@ -241,14 +241,13 @@ def evaluate_films(
         load_session(folder)
     report.parent.mkdir(parents=True, exist_ok=True)
     compile_all()
-    words = ["--detector", "mediapipe", "--preset", preset]
     films: list[dict[str, Any]] = []
     with (
         progress_bar("evaluate") as show,
         ProcessPoolExecutor(jobs, mp_context=get_context("spawn")) as pool,
     ):
         work = [
-            pool.submit(_film, folder, shape, words, seeds)
+            pool.submit(_film, folder, shape, preset, seeds)
             for folder in folders
             for shape in SHAPES
         ]
@@ -266,25 +265,22 @@ def evaluate_films(
     write_file(report, films_report(results))
 
 
-def _film(folder: Path, shape: str, words: list[str], seeds: range) -> list[dict[str, Any]]:
+def _film(folder: Path, shape: str, preset: str, seeds: range) -> list[dict[str, Any]]:
     """Return the entries of one session in ``films.json``, one for all that is given."""
     from lab.evaluation.films import film_figures, make_film
 
-    parser, found = argparse.ArgumentParser(), list[dict[str, Any]]()
-    add_tracking(parser)
+    found = list[dict[str, Any]]()
     with TemporaryDirectory() as made:
         film = make_film(folder, shape, Path(made) / f"{folder.name}.mp4")
-        known = ["--fov", f"{film.fov_deg:.1f}", "--stature", str(film.session.truth.stature_m)]
-        for given, more in {"field of view, stature": known, "nothing": []}.items():
+        stature_m = film.session.truth.stature_m
+        known: dict[str, Any] = {"fov_deg": round(film.fov_deg, 1), "stature_m": stature_m}
+        for given, more in {"field of view, stature": known, "nothing": {}}.items():
             runs = []
             for seed in seeds:
-                typed = parser.parse_args([str(film.path), *words, *more, "--seed", str(seed)])
+                fixed: dict[str, Any] = {"detector": "mediapipe", "preset": preset, "seed": seed}
+                asked = tracking_request(TrackingOptions(film.path, **fixed, **more))
                 estimates: list[Estimate] = []
-                summary = track(
-                    tracking_request(typed),
-                    (partial(_keep, estimates),),
-                    lambda _: None,
-                )
+                summary = track(asked, (partial(_keep, estimates),), lambda _: None)
                 runs.append(film_figures(film, estimates, summary.body))
             found.append(
                 {

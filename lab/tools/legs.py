@@ -25,7 +25,7 @@ import numpy as np
 
 from cardbox_tracker.applications.ergonomics.reba import RebaConfig, Seen, score_table
 from cardbox_tracker.camera.camera import level_to_optical
-from cardbox_tracker.commands.request import points_named
+from cardbox_tracker.commands.tracking_request import points_named
 from cardbox_tracker.detectors.detector import Detector
 from cardbox_tracker.detectors.image_points import LEG_POINT_NAMES, POINT_INDEX, ImagePoints
 from cardbox_tracker.person.legs import LEG_KEYPOINT_NAMES, leg_angles

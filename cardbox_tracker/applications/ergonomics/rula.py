@@ -44,7 +44,7 @@ WRISTS = "left_wrist", "right_wrist"
 NOT_MEASURED = "declared, since it is not measured"
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class ErgonomicConfig(Settings):
     """What no image shows, of both methods.
 
@@ -63,7 +63,7 @@ class ErgonomicConfig(Settings):
     )
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class RulaConfig(ErgonomicConfig):
     """Settings of RULA."""
 

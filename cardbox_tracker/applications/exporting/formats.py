@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -101,9 +101,11 @@ def export(results: Results, path: Path, to: Format, model: BodyModel | None = N
 
 @dataclass(frozen=True)
 class Result(Results):
-    """Results of one person, with camera and people as of ``OUT.scene.yaml`` if they are known."""
+    """Results of one person."""
 
-    scene: Scene | None = None
+    scene: Scene | None = None  #: camera and people as of ``OUT.scene.yaml``, if they are known
+    #: those of ``track(..., people=...)`` by the numbers of the people; empty for one alone
+    people: Mapping[int, Result] = field(default_factory=dict)
 
     def to_pandas(self) -> Any:
         """Return a ``pandas.DataFrame`` with a row for each image and the columns of the table.
