@@ -38,9 +38,8 @@ if TYPE_CHECKING:
         InitializationResult,
     )
     from cardbox_tracker.measuring.measure import initialize_body
-    from cardbox_tracker.person.model import BodyModel
+    from cardbox_tracker.person.model import BodyModel, body_from_proportions
     from cardbox_tracker.person.model_file import load_body_model, save_body_model
-    from cardbox_tracker.person.proportions import body_from_proportions
     from cardbox_tracker.person.skeleton import JOINT_NAMES, KEYPOINT_NAMES
     from cardbox_tracker.search.config import PRESETS, TrackerConfig
     from cardbox_tracker.segmentation.background import SilhouetteExtractor

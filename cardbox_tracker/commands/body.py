@@ -48,8 +48,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> None:
     """Write the body model and print its sizes."""
+    from cardbox_tracker.person.model import body_from_proportions
     from cardbox_tracker.person.model_file import save_body_model
-    from cardbox_tracker.person.proportions import body_from_proportions
 
     check_outputs((options.output,), options.force)
     body = body_from_proportions(

@@ -55,7 +55,7 @@ def _track_film(output: Path, seed: int) -> None:
         TrackingRequest,
     )
     from cardbox_tracker.commands.tracking import track
-    from cardbox_tracker.person.proportions import body_from_proportions
+    from cardbox_tracker.person.model import body_from_proportions
     from cardbox_tracker.recordings.given_camera import GivenCamera
     from cardbox_tracker.recordings.recording import RecordingRequest
     from cardbox_tracker.recordings.result_reader import read_results

@@ -1,4 +1,4 @@
-"""The hands: rows of the skeleton behind the forearms, for people whose hands are measured.
+"""The hands behind the forearms, of people whose hands are measured.
 
 A hand turns about the forearm, bends to its palm, and then to the little finger:
 
@@ -14,43 +14,12 @@ to the little finger 30 degrees, with 20 degrees more for errors of the measurem
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
 
 import numpy as np
 
-from cardbox_tracker.person.parts import BodyParts
 from cardbox_tracker.person.sizes import FloatArray
-from cardbox_tracker.person.skeleton import REVOLUTE, Group, Joint, Point, Y
+from cardbox_tracker.person.skeleton import HAND_NAMES, Group, limits_of
 
-WRIST_SHARE = 0.75
-"""Where between elbow and knuckles the wrist is."""
-
-
-def _wrist_m(parts: BodyParts[float]) -> Point:
-    return 0.0, 0.0, WRIST_SHARE * parts.forearm.bottom_m
-
-
-def _hand(name: str, side: float) -> Iterator[Joint]:
-    """Yield the joints of a hand; ``side`` is +1 for the left one, -1 for the right."""
-    free, letter = (Group.NOTHING, REVOLUTE), name[0]
-    yield Joint(
-        *(f"{name}_forearm_turn", free[0], f"{name}_elbow_flexion", free[1]),
-        *((0.0, 0.0, -side), (-math.pi, math.pi), f"{letter}_y_wrist"),
-    )
-    yield Joint(
-        *(f"{name}_wrist_flexion", free[0], f"{name}_forearm_turn", free[1], (-side, 0.0, 0.0)),
-        *((math.radians(-90), math.radians(100)), f"{letter}_r_wrist", "", _wrist_m),
-    )
-    yield Joint(
-        *(f"{name}_wrist_deviation", free[0], f"{name}_wrist_flexion", free[1], Y),
-        *((math.radians(-40), math.radians(50)), f"{letter}_p_wrist", f"{name}_palm"),
-    )
-
-
-HANDS: tuple[Joint, ...] = (*_hand("left", 1.0), *_hand("right", -1.0))
-"""Joints of the hands, where they are measured (:mod:`.tracking.hands`)."""
-HAND_NAMES = tuple(joint.name for joint in HANDS)
-"""The 6 joints of the hands, three of the left one first; all are in rad."""
 WRIST_NAMES = HAND_NAMES[1:3], HAND_NAMES[4:6]
 """Flexion and deviation of the left and the right wrist."""
 HAND_OPEN_NAMES = "left_hand_open", "right_hand_open"
@@ -67,9 +36,6 @@ def turn_of(palm: FloatArray, forearm: FloatArray, side: float) -> float:
     return -side * math.atan2(side * float(x), -side * float(y))
 
 
-_LOWEST, _HIGHEST = np.array([joint.limits for joint in HANDS[:3]]).T
-
-
 def limited(joints_rad: FloatArray) -> FloatArray:
     """Return turn, flexion and deviation (3,) within their limits."""
-    return np.clip(joints_rad, _LOWEST, _HIGHEST)
+    return np.clip(joints_rad, *limits_of(Group.HAND, side="left").T)

@@ -21,24 +21,23 @@ from cardbox_tracker.common.files import (
     foreign,
     regular_file,
 )
-from cardbox_tracker.person.hands import HAND_NAMES, HAND_OPEN_NAMES
-from cardbox_tracker.person.legs import LEG_NAMES
+from cardbox_tracker.person.hands import HAND_OPEN_NAMES
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.model_file import load_body_model, loads_body_model
 from cardbox_tracker.person.sizes import FloatArray
 from cardbox_tracker.person.skeleton import (
     JOINT_NAMES,
     KEYPOINT_NAMES,
-    NECK_NAMES,
     PLACE_NAMES,
+    STATE_NAMES,
     KeypointState,
 )
 from cardbox_tracker.recordings.bag_reader import BagReader, stamp_ns_of
 from cardbox_tracker.recordings.open_images import is_bag
 from cardbox_tracker.recordings.outputs import (
     JointValues,
-    are_unseen,
     chances_of,
+    known_deviations,
     person_space,
     positions_of,
     posture_from,
@@ -420,12 +419,8 @@ class _Messages:
                 values = positions_of(joints_of(message))
                 found |= {name: values[name] for name in HAND_OPEN_NAMES if name in values}
             else:
-                values = positions_of(joints_of(message))
-                found |= zip(deviation_columns(values), values.values(), strict=True)
+                stddev = known_deviations(joints_of(message))
+                found |= zip(deviation_columns(stddev), stddev.values(), strict=True)
                 # Joints that are not known have a position, but no deviation.
-                unknown = {*NECK_NAMES, *HAND_NAMES} - values.keys()
-                if are_unseen(values):
-                    unknown |= set(LEG_NAMES)
-                    found |= dict.fromkeys(deviation_columns(LEG_NAMES))
-                for joint in unknown:
+                for joint in set(STATE_NAMES) - {*_POSTURE, *stddev}:
                     found.pop(joint, None)

@@ -30,12 +30,13 @@ from cardbox_tracker.camera.camera import Camera
 from cardbox_tracker.detectors.image_points import LEG_POINT_NAMES, POINT_INDEX, ImagePoints
 from cardbox_tracker.measuring.people_camera import is_inside
 from cardbox_tracker.person.kinematics import pose
-from cardbox_tracker.person.legs import HIP_SHARE, LEG_LIMITS, leg_angles, stature_of
+from cardbox_tracker.person.legs import leg_angles
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.parts import body_parts
 from cardbox_tracker.person.posture import TORSO_Y, YAW
+from cardbox_tracker.person.proportions import HIP_SHARE, stature_of
 from cardbox_tracker.person.sizes import FloatArray
-from cardbox_tracker.person.skeleton import KeypointState, rotation_z
+from cardbox_tracker.person.skeleton import LEG_LIMITS, KeypointState, rotation_z
 from cardbox_tracker.terms.term import Frame
 from cardbox_tracker.tracking import leg_fit
 from cardbox_tracker.tracking.estimate import Estimate, Legs

@@ -29,8 +29,8 @@ from cardbox_tracker.commands.request import points_named
 from cardbox_tracker.detectors.detector import Detector
 from cardbox_tracker.detectors.image_points import LEG_POINT_NAMES, POINT_INDEX, ImagePoints
 from cardbox_tracker.person.legs import LEG_KEYPOINT_NAMES, leg_angles
+from cardbox_tracker.person.model import body_from_proportions
 from cardbox_tracker.person.posture import PITCH
-from cardbox_tracker.person.proportions import body_from_proportions
 from cardbox_tracker.person.sizes import FloatArray
 from cardbox_tracker.person.skeleton import KEYPOINT_NAMES, rotation_z
 from cardbox_tracker.recordings.recording import RecordingRequest, Segmentation

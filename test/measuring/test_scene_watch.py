@@ -12,7 +12,7 @@ from cardbox_tracker.detectors.image_points import ImagePoints
 from cardbox_tracker.detectors.pose_network import LANDMARKS
 from cardbox_tracker.measuring.people_camera import FORWARD, HEIGHTS, LEVELS
 from cardbox_tracker.measuring.scene_watch import SceneWatch
-from cardbox_tracker.person.proportions import body_from_proportions
+from cardbox_tracker.person.model import body_from_proportions
 from cardbox_tracker.terms.term import Image
 from cardbox_tracker.tracking.observation import Observation
 from cardbox_tracker.tracking.session import Session

@@ -16,7 +16,7 @@ from cardbox_tracker.camera.camera import Camera
 from cardbox_tracker.common.errors import BagError, CardboxError
 from cardbox_tracker.person.kinematics import pose
 from cardbox_tracker.person.model import BodyModel
-from cardbox_tracker.person.skeleton import KeypointState
+from cardbox_tracker.person.skeleton import Group, KeypointState
 from cardbox_tracker.recordings import result_reader
 from cardbox_tracker.recordings.bag_reader import BagReader
 from cardbox_tracker.recordings.bag_writer import BagWriter
@@ -85,8 +85,8 @@ def assert_is_what_was_written(motion: Motion) -> None:
         assert motion.states[number, :12] == pytest.approx(one.posture, abs=1e-6)
         assert motion.keypoints_m[number] == pytest.approx(one.keypoints_m, abs=1e-6)
     assert motion.states[2, 12:] == pytest.approx([0.0, -0.05])
-    assert motion.neck[2] == pytest.approx([0.0, 0.2])
-    assert np.isnan(motion.neck[[0, 4]]).all()
+    assert motion.values_of(Group.NECK)[2] == pytest.approx([0.0, 0.2])
+    assert np.isnan(motion.values_of(Group.NECK)[[0, 4]]).all()
     assert motion.rate_hz == 10.0
 
 

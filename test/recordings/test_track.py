@@ -16,13 +16,13 @@ from cardbox_tracker.applications.drawing.video import overlay_video
 from cardbox_tracker.common.errors import BagError, CardboxError
 from cardbox_tracker.measuring.config import InitializationConfig
 from cardbox_tracker.person.kinematics import pose
-from cardbox_tracker.person.legs import LEG_NAMES
 from cardbox_tracker.person.model_file import loads_body_model
 from cardbox_tracker.person.skeleton import (
     JOINT_NAMES,
-    JOINT_STATE_NAMES,
     KEYPOINT_NAMES,
     PLACE_NAMES,
+    Group,
+    names_of,
 )
 from cardbox_tracker.person.urdf import LinkTransforms
 from cardbox_tracker.recordings.bag_reader import BagReader
@@ -274,7 +274,7 @@ def test_the_bag_of_results_holds_what_the_tracker_would_publish(
     ):
         for header in (state.header, points.header):
             assert header.stamp.sec * 10**9 + header.stamp.nanosec == int(row["stamp_ns"])
-        assert tuple(state.name) == (*JOINT_STATE_NAMES, *LEG_NAMES)
+        assert tuple(state.name) == names_of(*{*Group} - {Group.HAND})
         # Without a detector the table has no neck, which does not turn.
         expected = [float(row.get(name, 0.0)) for name in state.name]
         np.testing.assert_allclose(state.position, expected, atol=5.1e-7)

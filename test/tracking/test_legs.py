@@ -16,17 +16,14 @@ from cardbox_tracker.detectors.image_points import (
     LegPoints,
 )
 from cardbox_tracker.person.kinematics import pose
-from cardbox_tracker.person.legs import (
-    HIP_SHARE,
-    LEG_LIMITS,
-    leg_directions,
-    stature_of,
-)
+from cardbox_tracker.person.legs import leg_directions
+from cardbox_tracker.person.model import body_from_proportions
 from cardbox_tracker.person.parts import body_parts
 from cardbox_tracker.person.posture import TORSO_Y
-from cardbox_tracker.person.proportions import body_from_proportions
+from cardbox_tracker.person.proportions import HIP_SHARE, stature_of
 from cardbox_tracker.person.sizes import FloatArray
 from cardbox_tracker.person.skeleton import (
+    LEG_LIMITS,
     KeypointState,
     rotation_z,
 )

@@ -54,10 +54,10 @@ from cardbox_tracker.applications.ergonomics.rula import (
 from cardbox_tracker.common.errors import CardboxError
 from cardbox_tracker.common.settings import setting
 from cardbox_tracker.person.hands import WRIST_NAMES
-from cardbox_tracker.person.legs import LEG_KEYPOINT_NAMES, LEG_NAMES, leg_directions
+from cardbox_tracker.person.legs import LEG_KEYPOINT_NAMES, leg_directions
 from cardbox_tracker.person.posture import PITCH
 from cardbox_tracker.person.sizes import FloatArray
-from cardbox_tracker.person.skeleton import JOINT_NAMES, NECK_NAMES, KeypointState
+from cardbox_tracker.person.skeleton import JOINT_NAMES, LEG_NAMES, NECK_NAMES, KeypointState
 from cardbox_tracker.recordings.result_reader import Results
 from cardbox_tracker.recordings.result_table import LEG_POINT_COLUMNS, POINT_COLUMNS
 from cardbox_tracker.search.particles import normal_postures

@@ -18,21 +18,17 @@ import numpy as np
 from cardbox_tracker.applications.exporting.motion import Motion, floor_below, frames_of, held
 from cardbox_tracker.common.errors import CardboxError
 from cardbox_tracker.common.files import atomic_path
-from cardbox_tracker.person.legs import ANKLE_SHARE, HIP_SHARE, SHANK_SHARE, THIGH_SHARE, stature_of
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.parts import body_parts
-from cardbox_tracker.person.posture import (
-    ELBOW_ABDUCTION,
-    ELBOW_FLEXION,
-    FIRST_ANGLES,
-    PITCH,
-    ROLL,
-    SHOULDER_ABDUCTION,
-    SHOULDER_FLEXION,
-    YAW,
+from cardbox_tracker.person.proportions import (
+    ANKLE_SHARE,
+    HIP_SHARE,
+    SHANK_SHARE,
+    THIGH_SHARE,
+    stature_of,
 )
 from cardbox_tracker.person.sizes import FloatArray
-from cardbox_tracker.person.skeleton import head_from_pivot_m, neck_pivot_m
+from cardbox_tracker.person.skeleton import STATE, head_from_pivot_m, neck_pivot_m
 
 _FINGERS_TO_FOREARM = 0.25
 # Length of the clavicles in shoulder breadths: so a shoulder that turns about their inner ends is
@@ -44,6 +40,19 @@ _STRIDE = ("Xrotation", "Zrotation", "Yrotation")
 # From the ankle to the toes, as a share of the stature.
 _TOES = 0.1
 _PLACE = ("Xposition", "Yposition", "Zposition")
+# Rotations about the axes X, Y and Z of the joints, and the bones of the joints by the beginning of
+# their names.
+_CHANNELS = ("Zrotation", "Xrotation", "Yrotation")
+_BONES = {
+    "torso_yaw": "Hips",
+    "torso_pitch": "Spine",
+    "torso_roll": "Spine",
+    "neck": "Neck",
+    "shoulder": "Arm",
+    "elbow": "ForeArm",
+    "hip": "UpLeg",
+    "knee": "Leg",
+}
 _SIDES = (("Left", 1.0), ("Right", -1.0))
 
 
@@ -96,38 +105,28 @@ def _clavicle_m(body: BodyModel) -> float:
 
 
 def channel_values(motion: Motion, body: BodyModel) -> dict[str, FloatArray]:
-    """Return values (n, channels), m and deg, of joints that move; a gap repeats the last."""
-    frames = frames_of(motion, body)
-    parts = body_parts(body.sizes)
-    states, hip = held(motion.states), held(frames.hip - floor_below(body))
-    zero = np.zeros(len(states))
-    angles = {
-        "Hips": (states[:, YAW], zero, zero),
-        "Spine": (zero, states[:, PITCH], states[:, ROLL]),
-        "Neck": (*held(motion.neck).T, zero),
-    }
-    for (name, side), arm, first in zip(
-        _SIDES, (frames.left, frames.right), FIRST_ANGLES, strict=True
-    ):
+    """Return values (n, channels), m and deg, of bones in their order; a gap repeats the last."""
+    frames, parts = frames_of(motion, body), body_parts(body.sizes)
+    channels = {bone.name: bone.channels for bone in _in_order(skeleton(body))}
+    count = len(motion.joints)
+    values = {name: np.zeros((count, len(of))) for name, of in channels.items()}
+    for joint, angle in zip(STATE, motion.joints.T, strict=True):
+        what = joint.name.removeprefix(f"{joint.side}_")
+        bone = _BONES.get(what) or _BONES.get(what.partition("_")[0])
+        if bone is not None:
+            bone = joint.side.capitalize() + bone
+            sign, channel = sum(joint.axis), _CHANNELS[np.flatnonzero(joint.axis)[0]]
+            values[bone][:, channels[bone].index(channel)] = sign * held(angle[:, None])[:, 0]
+    for (name, side), arm in zip(_SIDES, (frames.left, frames.right), strict=True):
         local = np.einsum("nji,nj->ni", frames.torso_rotation, arm.shoulder - frames.hip)
         aside = side * local[:, 1] - (parts.shoulder_aside_m - _clavicle_m(body))
         up = local[:, 2] - parts.shoulder_height_m
         lift = held(side * np.arctan2(up, aside)[:, None])[:, 0]
-        turned = states[:, first : first + 4]
-        raised = side * turned[:, SHOULDER_ABDUCTION] - lift
-        angles[f"{name}Shoulder"] = (lift, zero, zero)
-        angles[f"{name}Arm"] = (raised, -turned[:, SHOULDER_FLEXION], zero)
-        bent = side * turned[:, ELBOW_ABDUCTION]
-        angles[f"{name}ForeArm"] = (bent, -turned[:, ELBOW_FLEXION], zero)
-    for number, (name, side) in enumerate(_SIDES):
-        flexion, abduction, rotation, bend = held(
-            motion.legs[:, 4 * number : 4 * number + 4]
-        ).T * np.array([[-1.0], [side], [-side], [1.0]])
-        angles[f"{name}UpLeg"] = (flexion, abduction, rotation)
-        angles[f"{name}Leg"] = (bend, zero, zero)
-    values = {name: np.degrees(np.stack(three, axis=1)) for name, three in angles.items()}
-    place_m = np.stack([hip[:, 1], hip[:, 2], hip[:, 0]], axis=1)
-    return values | {"Hips": np.hstack([place_m, values["Hips"]])}
+        values[f"{name}Shoulder"][:, 0] = lift
+        values[f"{name}Arm"][:, 0] -= lift
+    values = {name: np.degrees(of) for name, of in values.items()}
+    values["Hips"][:, :3] = held(frames.hip - floor_below(body))[:, [1, 2, 0]]
+    return values
 
 
 def write_bvh(path: Path, motion: Motion, body: BodyModel | None) -> None:
@@ -140,14 +139,10 @@ def write_bvh(path: Path, motion: Motion, body: BodyModel | None) -> None:
     even = motion.evenly()
     root = skeleton(body)
     values = channel_values(even, body)
-    columns = [
-        values.get(bone.name, np.zeros((len(even.states), len(bone.channels))))
-        for bone in _in_order(root)
-    ]
     with atomic_path(path) as temporary, temporary.open("w", encoding="utf-8") as file:
         file.write("HIERARCHY\n" + "\n".join(_hierarchy(root, 0)) + "\n")
-        file.write(f"MOTION\nFrames: {len(even.states)}\nFrame Time: {1 / even.rate_hz:.10f}\n")
-        for row in np.hstack(columns):
+        file.write(f"MOTION\nFrames: {len(even.joints)}\nFrame Time: {1 / even.rate_hz:.10f}\n")
+        for row in np.hstack([*values.values()]):
             file.write(" ".join(f"{value:.6f}" for value in row) + "\n")
 
 

@@ -14,19 +14,10 @@ from cardbox_tracker.applications.viewing.viewer import rerun
 from cardbox_tracker.camera.camera import level_to_optical
 from cardbox_tracker.camera.encodings import SentImage, decode_bgr
 from cardbox_tracker.common.errors import BagError, CardboxError, cut
-from cardbox_tracker.person.hands import HAND_NAMES
-from cardbox_tracker.person.legs import LEG_NAMES
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.model_file import loads_body_model
 from cardbox_tracker.person.sizes import FloatArray
-from cardbox_tracker.person.skeleton import (
-    CLAVICLE_NAMES,
-    JOINT_NAMES,
-    NECK_NAMES,
-    PLACE_NAMES,
-    UNITS,
-    KeypointState,
-)
+from cardbox_tracker.person.skeleton import HAND_NAMES, UNITS, Group, KeypointState, names_of
 from cardbox_tracker.person.urdf import ROOT_LINK, urdf_from_body
 from cardbox_tracker.recordings.bag_reader import BagReader, stamp_ns_of
 from cardbox_tracker.recordings.outputs import JointValues
@@ -40,14 +31,14 @@ _ROOT_FRAME = f"person/{ROOT_LINK}"
 # Entity below a plot that contains the uncertainty of its joints.
 _SPREAD = "within_two_deviations"
 _GROUPS: dict[str, tuple[str, ...]] = {
-    "left_arm": tuple(name for name in JOINT_NAMES if name.startswith("left")),
-    "right_arm": tuple(name for name in JOINT_NAMES if name.startswith("right")),
-    "torso": tuple(name for name in JOINT_NAMES[1:] if name.startswith("torso")),
-    "head": NECK_NAMES,
-    "place": ("torso_y", *PLACE_NAMES),
-    "shoulders": CLAVICLE_NAMES,
-    "left_leg": LEG_NAMES[:4],
-    "right_leg": LEG_NAMES[4:],
+    "left_arm": names_of(Group.ARM, side="left"),
+    "right_arm": names_of(Group.ARM, side="right"),
+    "torso": names_of(Group.TORSO)[1:],
+    "head": names_of(Group.NECK),
+    "place": ("torso_y", *names_of(Group.PLACE)),
+    "shoulders": names_of(Group.CLAVICLE),
+    "left_leg": names_of(Group.LEG, side="left"),
+    "right_leg": names_of(Group.LEG, side="right"),
     "hands": HAND_NAMES,
 }
 """Joints by plot: angles in degrees, place and rise of the shoulders in metres."""

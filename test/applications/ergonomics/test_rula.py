@@ -23,8 +23,8 @@ from cardbox_tracker.applications.ergonomics.rula import (
     sampled_scores,
     score_distribution,
 )
+from cardbox_tracker.person.model import body_from_proportions
 from cardbox_tracker.person.posture import TURNING_LIMITS
-from cardbox_tracker.person.proportions import body_from_proportions
 from cardbox_tracker.person.skeleton import JOINT_NAMES
 
 BODY = body_from_proportions(1.75, 2.0)

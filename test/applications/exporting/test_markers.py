@@ -77,9 +77,9 @@ def test_another_body_is_refused(motion_of: Callable, body: BodyModel) -> None:
 def test_images_of_another_body_are_gaps(motion_of: Callable, body: BodyModel) -> None:
     """In the first image the person is 0.2 m farther than with the body that follows."""
     motion = motion_of(np.zeros((3, 14)), body)
-    states = motion.states.copy()
-    states[0, 12] = 0.2
-    fitted = images_of_body(replace(motion, states=states), body)
+    joints = motion.joints.copy()
+    joints[0, 12] = 0.2
+    fitted = images_of_body(replace(motion, joints=joints), body)
     assert fitted.is_seen.tolist() == [False, True, True]
     assert np.isnan(markers_of(fitted, body).points_m[0]).all()
 

@@ -9,17 +9,10 @@ from hypothesis import settings as hypothesis_settings
 from hypothesis import strategies as st
 
 from cardbox_tracker.applications.teleoperation.full_body import NAMES, FullBodies, FullBody
-from cardbox_tracker.person.hands import HAND_NAMES
-from cardbox_tracker.person.legs import (
-    ANKLE_SHARE,
-    LEG_NAMES,
-    SHANK_SHARE,
-    THIGH_SHARE,
-    stature_of,
-)
+from cardbox_tracker.person.model import body_from_proportions
 from cardbox_tracker.person.parts import body_parts
-from cardbox_tracker.person.proportions import body_from_proportions
-from cardbox_tracker.person.skeleton import JOINT_NAMES, NECK_NAMES
+from cardbox_tracker.person.proportions import ANKLE_SHARE, SHANK_SHARE, THIGH_SHARE, stature_of
+from cardbox_tracker.person.skeleton import HAND_NAMES, JOINT_NAMES, LEG_NAMES, NECK_NAMES
 
 BODY = body_from_proportions(1.75, 2.0)
 PARTS = body_parts(BODY.sizes)
