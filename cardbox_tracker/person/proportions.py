@@ -13,6 +13,8 @@ body is less exact than a measured one.
 
 from __future__ import annotations
 
+import numpy as np
+
 from cardbox_tracker.person.parts import BodyParts
 from cardbox_tracker.person.sizes import DEFAULT_SIZES, SIZE_INDEX, FloatArray
 
@@ -24,9 +26,12 @@ USUAL_STATURE_M, USUAL_STDDEV_M = 1.69, 0.09
 
 HIP_SHARE, THIGH_SHARE, SHANK_SHARE, ANKLE_SHARE = 0.06, 0.245, 0.246, 0.039
 """Hip joint from the middle of the hips, thigh, shank to the ankle, and ankle above the floor."""
-WRIST_SHARE = 0.75
+WRIST_SHARE = 0.73
 """Place of the wrist between elbow and knuckles: forearm and half of the hand have 0.146 and 0.054
 of the stature."""
+MARKED_HEIGHTS: FloatArray = np.array([0.915, 0.932, 0.811, 0.507, 0.283, 0.063])
+"""Heights above the floor at which MediaPipe marks nose, ears, shoulders, hips, knees and ankles of
+people who stand upright."""
 _CROWN_SHARE = 0.83 / STATURE_M
 _SHARES = {"upper_arm_length": 0.160, "forearm_length": 0.2005, "shoulder_breadth": 0.197}
 
