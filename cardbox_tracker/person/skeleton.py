@@ -270,6 +270,13 @@ def names_of(*groups: Group, side: str = "") -> tuple[str, ...]:
 STATE = joints_of(*Group)
 """All movable joints: those of the state of a person, in the order of ``joint_states``."""
 STATE_NAMES = names_of(*Group)
+
+
+def rows_of(*groups: Group, side: str = "") -> list[int]:
+    """Return the indices of :func:`joints_of` in ``STATE``."""
+    return [STATE.index(joint) for joint in joints_of(*groups, side=side)]
+
+
 JOINT_NAMES = names_of(*POSTURE_GROUPS)
 """The 12 joints of a posture, d1..d12 (paper, equation (3))."""
 PLACE_NAMES = names_of(Group.PLACE)

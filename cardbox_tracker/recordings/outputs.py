@@ -15,7 +15,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from cardbox_tracker.person.hands import HAND_OPEN_NAMES, WRIST_NAMES
+from cardbox_tracker.person.hands import HAND_OPEN_NAMES
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.sizes import FloatArray
 from cardbox_tracker.person.skeleton import (
@@ -88,6 +88,24 @@ class JointValues(NamedTuple):
     values: FloatArray
     velocities: FloatArray | None = None
 
+    @property
+    def by_name(self) -> dict[str, float]:
+        """The values by name."""
+        return dict(zip(self.names, np.asarray(self.values).tolist(), strict=True))
+
+    def of(self, names: Sequence[str]) -> FloatArray:
+        """Return the values of joints, (n,); nan for one that is missing."""
+        by_name = self.by_name
+        return np.array([by_name.get(name, np.nan) for name in names])
+
+    @property
+    def posture(self) -> FloatArray:
+        """The posture (12,); raises ValueError if a joint is missing."""
+        missing = [name for name in JOINT_NAMES if name not in self.names]
+        if missing:
+            raise ValueError(f"joints {', '.join(missing)} are missing")
+        return self.of(JOINT_NAMES)
+
 
 Value = JointValues | KeypointStates | FloatArray | tuple[MarkerShape, ...] | str
 """Joints, states, points (n, 3), metres in the optical frame, shapes to show instead of all earlier
@@ -146,7 +164,7 @@ def _names(rows: NDArray[np.bool_]) -> tuple[str, ...]:
 def known_deviations(joints: JointValues) -> dict[str, float]:
     """Return the deviations by name of joints that are known."""
     anywhere = dict(zip(STATE_NAMES, _ANYWHERE.tolist(), strict=True))
-    found = {name: one for name, one in positions_of(joints).items() if name in anywhere}
+    found = {name: one for name, one in joints.by_name.items() if name in anywhere}
     return {name: one for name, one in found.items() if not abs(one - anywhere[name]) < 1e-6}
 
 
@@ -160,31 +178,11 @@ def open_hands(estimate: Estimate) -> JointValues | None:
     return JointValues(tuple(found), np.array([*found.values()])) if found else None
 
 
-def posture_from(joints: JointValues) -> FloatArray:
-    """Return the posture (12,) from named joints in any order; ValueError if one is missing."""
-    by_name = positions_of(joints)
-    missing = [name for name in JOINT_NAMES if name not in by_name]
-    if missing:
-        raise ValueError(f"joints {', '.join(missing)} are missing")
-    return np.array([by_name[name] for name in JOINT_NAMES])
-
-
-def values_from(joints: JointValues, names: Sequence[str]) -> FloatArray | None:
-    """Return the values (n,) of ``names`` from named joints; None if one is missing."""
-    by_name = positions_of(joints)
-    return np.array([by_name[name] for name in names]) if by_name.keys() >= set(names) else None
-
-
-def wrists_from(joints: JointValues) -> FloatArray:
-    """Return flexion and deviation of both wrists, (2, 2), rad; nan for one that is missing."""
-    by_name = positions_of(joints)
-    return np.array([[by_name.get(name, np.nan) for name in names] for names in WRIST_NAMES])
-
-
-def open_hands_from(joints: JointValues) -> FloatArray:
-    """Return how open both hands are, (2,), from their topic; nan for one that is missing."""
-    by_name = positions_of(joints)
-    return np.array([by_name.get(name, np.nan) for name in HAND_OPEN_NAMES])
+def joints_of(message: Any) -> JointValues:
+    """Return names and positions of a JointState; ValueError if they are not as many."""
+    if len(message.name) != len(message.position):
+        raise ValueError(f"{len(message.name)} joints with {len(message.position)} positions")
+    return JointValues(tuple(message.name), np.array(message.position, np.float64))
 
 
 def chances_of(message: Any) -> dict[str, tuple[str, float]]:
@@ -193,11 +191,6 @@ def chances_of(message: Any) -> dict[str, tuple[str, float]]:
         one.name: (one.message, float(one.values[0].value) if one.values else 1.0)
         for one in message.status
     }
-
-
-def positions_of(joints: JointValues) -> dict[str, float]:
-    """Return the joint values by name."""
-    return dict(zip(joints.names, np.asarray(joints.values).tolist(), strict=True))
 
 
 TOPICS = {

@@ -35,12 +35,10 @@ from cardbox_tracker.person.skeleton import (
 from cardbox_tracker.recordings.bag_reader import BagReader, stamp_ns_of
 from cardbox_tracker.recordings.open_images import is_bag
 from cardbox_tracker.recordings.outputs import (
-    JointValues,
     chances_of,
+    joints_of,
     known_deviations,
     person_space,
-    positions_of,
-    posture_from,
 )
 from cardbox_tracker.recordings.result_table import (
     PARQUET,
@@ -324,13 +322,6 @@ def namespace_of(bag: BagReader, person: int | None = None) -> str:
     return chosen[0]
 
 
-def joints_of(message: Any) -> JointValues:
-    """Return names and positions of a JointState; ValueError if they are not as many."""
-    if len(message.name) != len(message.position):
-        raise ValueError(f"{len(message.name)} joints with {len(message.position)} positions")
-    return JointValues(tuple(message.name), np.array(message.position, np.float64))
-
-
 def points_of(message: Any) -> FloatArray:
     """Return the positions (n, 3), metres, of a PoseArray."""
     points = [(p.position.x, p.position.y, p.position.z) for p in message.poses]
@@ -396,10 +387,10 @@ class _Messages:
                 raise ValueError(f"the stamp {stamp_ns} ns is before the one before")
             self._last_ns = stamp_ns
             joints = joints_of(message)
-            posture_from(joints)
             row: dict[str, Any] = {"state": self._state, "body": self._body}
+            row |= zip(JOINT_NAMES, joints.posture.tolist(), strict=True)
             # A node without the place of the torso keeps it constant.
-            row |= dict.fromkeys(PLACE_NAMES, 0.0) | positions_of(joints)
+            row |= dict.fromkeys(PLACE_NAMES, 0.0) | joints.by_name
             self.repeated += stamp_ns in self.by_stamp
             row |= self._keypoints.get(stamp_ns, {})
             self.by_stamp[stamp_ns] = row
@@ -416,7 +407,7 @@ class _Messages:
                     raise ValueError(f"{len(points_m) // 3} keypoints")
                 found |= zip(POINT_COLUMNS, points_m, strict=True)
             elif name == _HANDS:
-                values = positions_of(joints_of(message))
+                values = joints_of(message).by_name
                 found |= {name: values[name] for name in HAND_OPEN_NAMES if name in values}
             else:
                 stddev = known_deviations(joints_of(message))

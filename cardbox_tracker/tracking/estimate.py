@@ -18,17 +18,7 @@ from cardbox_tracker.camera.camera import roll_turn
 from cardbox_tracker.person.hands import limited
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.sizes import FloatArray
-from cardbox_tracker.person.skeleton import (
-    JOINT_NAMES,
-    LEG_NAMES,
-    NECK_NAMES,
-    PLACE_NAMES,
-    STATE,
-    STATE_NAMES,
-    Group,
-    KeypointState,
-    names_of,
-)
+from cardbox_tracker.person.skeleton import POSTURE_GROUPS, STATE, Group, KeypointState, rows_of
 
 OPEN, CLOSED = 0.75, 0.25
 """A hand is open above the first value of ``Hand.open``, and closed below the second."""
@@ -165,26 +155,23 @@ class Estimate:
 
         A place that the filter keeps constant is 0, as are shoulders that do not rise.
         """
-        known: dict[tuple[str, ...], tuple[FloatArray | None, FloatArray | None]] = {
-            JOINT_NAMES: (self.posture, self.posture_stddev),
-            PLACE_NAMES: (self.offset_m, self.offset_stddev_m),
-            NECK_NAMES: (self.neck, self.neck_stddev),
-            names_of(Group.CLAVICLE): (self.clavicles_m, self.clavicles_stddev_m),
-        }
-        for side, hand in zip(("left", "right"), self.hands or (), strict=False):
-            if hand is not None:
-                known[names_of(Group.HAND, side=side)] = hand.joints, hand.joints_stddev
-        if self.legs is not None:
-            known[LEG_NAMES] = self.legs.angles, self.legs.angles_stddev
-        found = np.full((2, len(STATE)), np.nan)
-        for row, posture in zip(found, (self.posture, self.posture_stddev), strict=True):
-            if posture is not None:
-                row[[joint.group in (Group.PLACE, Group.CLAVICLE) for joint in STATE]] = 0.0
-        for names, pair in known.items():
-            first = STATE_NAMES.index(names[0])
+        found, still = np.full((2, len(STATE)), np.nan), rows_of(Group.PLACE, Group.CLAVICLE)
+
+        def put(rows: list[int], *pair: FloatArray | float | None) -> None:
             for row, values in zip(found, pair, strict=True):
                 if values is not None:
-                    row[first : first + len(names)] = values
+                    row[rows] = values
+
+        put(still, *(None if one is None else 0.0 for one in (self.posture, self.posture_stddev)))
+        put(rows_of(*POSTURE_GROUPS), self.posture, self.posture_stddev)
+        put(rows_of(Group.PLACE), self.offset_m, self.offset_stddev_m)
+        put(rows_of(Group.NECK), self.neck, self.neck_stddev)
+        put(rows_of(Group.CLAVICLE), self.clavicles_m, self.clavicles_stddev_m)
+        for side, hand in zip(("left", "right"), self.hands or (), strict=False):
+            if hand is not None:
+                put(rows_of(Group.HAND, side=side), hand.joints, hand.joints_stddev)
+        if self.legs is not None:
+            put(rows_of(Group.LEG), self.legs.angles, self.legs.angles_stddev)
         return found
 
     @property

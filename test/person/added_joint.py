@@ -44,7 +44,7 @@ def found_in(folder: Path) -> dict[str, Any]:
     from cardbox_tracker.person.skeleton import neck_rotation
     from cardbox_tracker.person.urdf import LinkTransforms, rep155_urdf, urdf_from_body
     from cardbox_tracker.recordings.messages import message_of
-    from cardbox_tracker.recordings.outputs import OutputStream, joint_values, positions_of
+    from cardbox_tracker.recordings.outputs import OutputStream, joint_values
     from cardbox_tracker.recordings.result_reader import read_results
     from cardbox_tracker.recordings.result_table import result_table
     from cardbox_tracker.tracking.estimate import Estimate
@@ -78,7 +78,7 @@ def found_in(folder: Path) -> dict[str, Any]:
     export(results, folder / "a.bvh", FORMATS["bvh"])
     joints = joint_values(estimate)
     assert joints is not None
-    heads = LinkTransforms(urdf_from_body(body)).at(positions_of(joints))
+    heads = LinkTransforms(urdf_from_body(body)).at(joints.by_name)
     found["urdf"] = {one.parent: one.child for one in heads}
     values = Rep155Joints()(estimate.joints[0, : len(joint_names("a"))])
     robot = LinkTransforms(rep155_urdf(body, "a", "eye"))

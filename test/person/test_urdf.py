@@ -41,7 +41,7 @@ from cardbox_tracker.person.skeleton import (
     neck_rotation,
 )
 from cardbox_tracker.person.urdf import ROOT_LINK, rep155_urdf, urdf_from_body
-from cardbox_tracker.recordings.outputs import joint_values, positions_of
+from cardbox_tracker.recordings.outputs import joint_values
 from cardbox_tracker.search.config import PRESETS
 from cardbox_tracker.terms.kernel_arguments import BodyTuple, body_of, body_tuple
 from cardbox_tracker.tracking.estimate import TRACKING, Estimate
@@ -165,7 +165,7 @@ def test_urdf_and_joint_states_have_the_joints_where_keypoints_are(
         said = joint_values(found)
         assert said is not None
         assert said.names == ALL_NAMES
-        poses = link_poses(urdf_from_body(body, "eye"), positions_of(said))
+        poses = link_poses(urdf_from_body(body, "eye"), said.by_name)
         links = list(KEYPOINT_LINKS)
     to_eye = np.linalg.inv(poses["eye"])
     for point, link in zip(keypoints_m @ roll_turn(roll_rad), links, strict=True):

@@ -21,7 +21,7 @@ from cardbox_tracker.person.skeleton import (
     Group,
     KeypointState,
     joints_of,
-    names_of,
+    rows_of,
 )
 from cardbox_tracker.recordings.result_reader import Results
 from cardbox_tracker.recordings.result_table import (
@@ -84,8 +84,7 @@ class Motion:
 
     def values_of(self, *groups: Group, side: str = "") -> FloatArray:
         """Return the joints of groups of the skeleton, or of one side of them, (n, k)."""
-        names = names_of(*groups, side=side)
-        return self.joints[:, [name in names for name in STATE_NAMES]]
+        return self.joints[:, rows_of(*groups, side=side)]
 
     @property
     def states(self) -> FloatArray:

@@ -20,8 +20,8 @@ from cardbox_tracker.person.sizes import FloatArray
 from cardbox_tracker.person.skeleton import HAND_NAMES, UNITS, Group, KeypointState, names_of
 from cardbox_tracker.person.urdf import ROOT_LINK, urdf_from_body
 from cardbox_tracker.recordings.bag_reader import BagReader, stamp_ns_of
-from cardbox_tracker.recordings.outputs import JointValues
-from cardbox_tracker.recordings.result_reader import MODEL, joints_of, namespace_of, points_of
+from cardbox_tracker.recordings.outputs import JointValues, joints_of
+from cardbox_tracker.recordings.result_reader import MODEL, namespace_of, points_of
 from cardbox_tracker.recordings.truth import TrueFrame, beside_shoulders
 
 Rgb = tuple[int, int, int]
