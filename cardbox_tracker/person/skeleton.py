@@ -25,6 +25,15 @@ turned by half a circle. Flexion therefore ends at about 90 degrees, and abducti
 A forearm can point to either side, since the upper arm does not turn about its axis. The upper
 back, which is a part of the torso here, bends with the neck.
 
+**Hands.** A hand turns about the forearm, bends to its palm, then to the little finger:
+
+    R_palm = R_forearm Rz(-+turn) Rx(-+flexion) Ry(deviation)
+
+with the upper sign for the left hand. All is zero if the palm of a hanging arm faces the body. The
+turn is against the frame of the forearm, so it is known for a straight arm, too, and can have any
+value. The ranges are flexion 80, extension 70, deviation to the thumb 20 and to the little finger
+30 degrees, with 20 degrees more for errors of the measurement.
+
 **Clavicles.** The girdle raises the shoulder of a raised arm. A shoulder joint then moves along a
 straight line, upwards and a little inwards, by ``shoulder_rise`` times the shoulder breadth for
 each radian of the upper arm's elevation beyond ``RISE_FROM_RAD``. The arm's angles stay those
@@ -284,6 +293,8 @@ PLACE_NAMES = names_of(Group.PLACE)
 NECK_NAMES = names_of(Group.NECK)
 HAND_NAMES = names_of(Group.HAND)
 """The 6 joints of the hands, three of the left one first; all are in rad."""
+HAND_OPEN_NAMES = "left_hand_open", "right_hand_open"
+"""How open the hands are, 0 to 1."""
 LEG_NAMES = names_of(Group.LEG)
 """The 8 joints of the legs, four of the left one first; all are in rad."""
 UNITS = {joint.name: joint.unit for joint in SKELETON}
@@ -346,6 +357,16 @@ def _rotation(angle_rad: FloatArray, i: int, j: int) -> FloatArray:
     matrix[..., j, i] = np.sin(angle)
     matrix[..., i, j] = -matrix[..., j, i]
     return matrix
+
+
+def turn_of(palm: FloatArray, forearm: FloatArray, side: float) -> float:
+    """Return the turn of a hand about its forearm, rad.
+
+    ``palm`` (3,) is the normal out of the palm, ``forearm`` (3, 3) the rotation of its frame in the
+    same axes; ``side`` is +1 for the left hand, -1 for the right.
+    """
+    x, y, _ = forearm.T @ palm
+    return -side * math.atan2(side * float(x), -side * float(y))
 
 
 def neck_rotation(angles_rad: FloatArray) -> FloatArray:

@@ -15,10 +15,10 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from cardbox_tracker.person.hands import HAND_OPEN_NAMES
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.sizes import FloatArray
 from cardbox_tracker.person.skeleton import (
+    HAND_OPEN_NAMES,
     JOINT_NAMES,
     KEYPOINT_NAMES,
     POSTURE_GROUPS,

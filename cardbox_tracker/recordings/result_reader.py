@@ -21,11 +21,11 @@ from cardbox_tracker.common.files import (
     foreign,
     regular_file,
 )
-from cardbox_tracker.person.hands import HAND_OPEN_NAMES
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.model_file import load_body_model, loads_body_model
 from cardbox_tracker.person.sizes import FloatArray
 from cardbox_tracker.person.skeleton import (
+    HAND_OPEN_NAMES,
     JOINT_NAMES,
     KEYPOINT_NAMES,
     PLACE_NAMES,

@@ -15,10 +15,16 @@ from typing import NamedTuple
 import numpy as np
 
 from cardbox_tracker.camera.camera import roll_turn
-from cardbox_tracker.person.hands import limited
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.sizes import FloatArray
-from cardbox_tracker.person.skeleton import POSTURE_GROUPS, STATE, Group, KeypointState, rows_of
+from cardbox_tracker.person.skeleton import (
+    POSTURE_GROUPS,
+    STATE,
+    Group,
+    KeypointState,
+    limits_of,
+    rows_of,
+)
 
 OPEN, CLOSED = 0.75, 0.25
 """A hand is open above the first value of ``Hand.open``, and closed below the second."""
@@ -58,13 +64,14 @@ class Hand(NamedTuple):
     #: straight arm is nan.
     wrist: FloatArray
     wrist_stddev: FloatArray  #: their standard deviations, (3,), rad; nan where the rotation is
-    turn: float = 0.0  #: turn of the hand about the forearm's frame, rad (:mod:`.person.hands`)
+    turn: float = 0.0  #: turn of the hand about the forearm's frame, rad (:mod:`.skeleton`)
     turn_stddev: float = 0.0  #: its standard deviation, rad
 
     @property
     def joints(self) -> FloatArray:
         """Turn, flexion and deviation, (3,), rad, as joints within their limits."""
-        return limited(np.array([self.turn, *self.wrist[:2]]))
+        lowest, highest = limits_of(Group.HAND, side="left").T
+        return np.asarray(np.clip([self.turn, *self.wrist[:2]], lowest, highest))
 
     @property
     def joints_stddev(self) -> FloatArray:

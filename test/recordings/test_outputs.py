@@ -12,12 +12,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from cardbox_tracker.camera.camera import Camera
-from cardbox_tracker.person.hands import HAND_OPEN_NAMES
 from cardbox_tracker.person.kinematics import pose
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.posture import reference_posture
 from cardbox_tracker.person.skeleton import (
     HAND_NAMES,
+    HAND_OPEN_NAMES,
     JOINT_NAMES,
     LEG_NAMES,
     NECK_NAMES,

@@ -27,7 +27,6 @@ from cardbox_tracker.applications.retargeting.robot import Robot
 from cardbox_tracker.common.errors import CardboxError, quoted
 from cardbox_tracker.common.files import foreign
 from cardbox_tracker.common.small_yaml import parse_small_yaml, read_small_text
-from cardbox_tracker.person.hands import HAND_OPEN_NAMES
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.posture import (
     ELBOW_ABDUCTION,
@@ -37,7 +36,13 @@ from cardbox_tracker.person.posture import (
     RIGHT_ARM,
 )
 from cardbox_tracker.person.sizes import FloatArray
-from cardbox_tracker.person.skeleton import JOINT_NAMES, NECK_NAMES, Group, joints_of
+from cardbox_tracker.person.skeleton import (
+    HAND_OPEN_NAMES,
+    JOINT_NAMES,
+    NECK_NAMES,
+    Group,
+    joints_of,
+)
 
 WITH_HEAD_AND_HANDS: tuple[str, ...] = (*JOINT_NAMES, *NECK_NAMES, *HAND_OPEN_NAMES)
 """Order of a posture with head and hands, (16,)."""

@@ -14,7 +14,6 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from cardbox_tracker.person.hands import turn_of
 from cardbox_tracker.person.kinematics import pose
 from cardbox_tracker.person.legs import LEG_KEYPOINT_NAMES, leg_rotations, legs_m
 from cardbox_tracker.person.model import BodyModel
@@ -36,6 +35,7 @@ from cardbox_tracker.person.skeleton import (
     rotation_x,
     rotation_y,
     rotation_z,
+    turn_of,
 )
 from cardbox_tracker.tracking.estimate import TRACKING, UNCERTAIN
 

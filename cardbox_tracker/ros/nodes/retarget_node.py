@@ -23,8 +23,7 @@ from cardbox_tracker.applications.teleoperation.sending import ZmqSender, joints
 from cardbox_tracker.common.errors import CardboxError
 from cardbox_tracker.common.files import user_path
 from cardbox_tracker.common.settings import settings_of
-from cardbox_tracker.person.hands import HAND_OPEN_NAMES
-from cardbox_tracker.person.skeleton import POSTURE_GROUPS, Group, rows_of
+from cardbox_tracker.person.skeleton import HAND_OPEN_NAMES, POSTURE_GROUPS, Group, rows_of
 from cardbox_tracker.recordings.outputs import joints_of
 from cardbox_tracker.ros.messages.results import state_of
 from cardbox_tracker.ros.nodes.posture_input import PostureInput, Tracked
