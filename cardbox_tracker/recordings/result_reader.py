@@ -44,9 +44,9 @@ from cardbox_tracker.recordings.result_table import (
     PARQUET,
     PERSON,
     POINT_COLUMNS,
+    TEXT_COLUMNS,
     deviation_columns,
     pyarrow_or_error,
-    text_columns,
     units,
 )
 from cardbox_tracker.tracking.estimate import LOST, NO_PERSON, TRACKING, UNCERTAIN
@@ -132,9 +132,8 @@ class _Rows:
         found = set(names)
         self._path = path
         known = [name for name in units(*[True] * 3) if name in found and name not in _TIMES]
-        texts = set(text_columns())
-        self.names = [name for name in known if name not in (*texts, PERSON, "stamp")]
-        self._texts = [name for name in known if name in texts]
+        self.names = [name for name in known if name not in (*TEXT_COLUMNS, PERSON, "stamp")]
+        self._texts = [name for name in known if name in TEXT_COLUMNS]
         self._are_chances = np.array([name.endswith("_chance") for name in self.names], bool)
         are_deviations = np.array(["_stddev_" in name for name in self.names], bool)
         self._are_positive = self._are_chances | are_deviations

@@ -140,10 +140,11 @@ def deviation_columns(joints: Iterable[str]) -> list[str]:
     return list(_deviation_units(joints))
 
 
-def text_columns() -> tuple[str, ...]:
-    """Return the columns of texts."""
-    keypoints = (f"{name}_state" for name in (*KEYPOINT_NAMES, *LEG_KEYPOINT_NAMES))
-    return ("state", *keypoints, "place_state", "place_rests_on")
+TEXT_COLUMNS = (
+    *("state", "place_state", "place_rests_on"),
+    *(f"{name}_state" for name in (*KEYPOINT_NAMES, *LEG_KEYPOINT_NAMES)),
+)
+"""Columns of texts."""
 
 
 def row_of(
@@ -236,7 +237,7 @@ def result_table(
                 row_of(frame.stamp_ns, frame.time_s, estimate, *has)
             )
             whole = dict.fromkeys(("stamp_ns", PERSON), arrow.int64())
-            types = whole | dict.fromkeys(text_columns(), arrow.string())
+            types = whole | dict.fromkeys(TEXT_COLUMNS, arrow.string())
             schema = arrow.schema(
                 arrow.field(name, types.get(name, arrow.float64()), metadata={"unit": unit})
                 for name, unit in units(*has).items()

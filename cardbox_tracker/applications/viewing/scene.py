@@ -42,7 +42,6 @@ _GROUPS: dict[str, tuple[str, ...]] = {
     "hands": HAND_NAMES,
 }
 """Joints by plot: angles in degrees, place and rise of the shoulders in metres."""
-_METRES = ("place", "shoulders")
 # Interval, degrees and metres, at which that of a joint ends: a wider one tells nothing, and would
 # leave no room for the curve.
 _WIDEST = {"deg": 60.0, "m": 0.5}
@@ -299,7 +298,7 @@ def level_points(points_m: FloatArray, pitch_rad: float, roll_rad: float = 0.0) 
 
 
 def _unit_of(group: str) -> str:
-    return "m" if group in _METRES else "deg"
+    return "m" if group in ("place", "shoulders") else "deg"
 
 
 def _plot_of(joint: str) -> tuple[str, int]:

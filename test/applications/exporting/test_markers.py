@@ -96,7 +96,7 @@ def test_legs_and_hands_by_hand(motion_of: Callable) -> None:
     assert at["LKnee"] == pytest.approx([-2 + thigh, FLOOR_M, -aside])
     assert at["LAnkle"] == pytest.approx([-2 + thigh, FLOOR_M - shank, -aside])
     assert at["RAnkle"] == pytest.approx([-2, ankle, aside])
-    wrist = 0.75 * at["LHand"] + 0.25 * at["LElbow"]
+    wrist = 0.73 * at["LHand"] + 0.27 * at["LElbow"]
     assert at["LWrist"] == pytest.approx(wrist)
     assert at["LPalm"] == pytest.approx((wrist + at["LHand"]) / 2 + (0.0, 0.0, 0.05))
     assert np.isnan([at["RWrist"], at["RPalm"]]).all()
