@@ -64,19 +64,8 @@ _HAND = {"hand_open": "", **dict.fromkeys(("palm_x", "palm_y", "palm_z"), "")} |
 
 
 @cache
-def columns(
-    has_points: bool = False,
-    has_people: bool = False,
-    has_hands: bool = False,
-) -> tuple[str, ...]:
-    """Return the names of the columns, see :func:`units`."""
-    return tuple(units(has_points, has_people, has_hands))
-
-
 def units(
-    has_points: bool = False,
-    has_people: bool = False,
-    has_hands: bool = False,
+    has_points: bool = False, has_people: bool = False, has_hands: bool = False
 ) -> dict[str, str]:
     """Return the unit of each column by its name, in their order; empty for none.
 
@@ -147,16 +136,9 @@ TEXT_COLUMNS = (
 """Columns of texts."""
 
 
-def row_of(
-    stamp_ns: int,
-    time_s: float,
-    estimate: Estimate,
-    has_points: bool = False,
-    has_people: bool = False,
-    has_hands: bool = False,
-) -> list[Cell]:
-    """Return the row of one image, in the order of :func:`columns`."""
-    names = columns(has_points, has_people, has_hands)
+def row_of(stamp_ns: int, time_s: float, estimate: Estimate, **has: bool) -> list[Cell]:
+    """Return the row of one image; its columns, in their order, are those of ``units(**has)``."""
+    names = units(**has)
     stamp = Decimal(stamp_ns).scaleb(-9)
     known: dict[str, Cell] = {"stamp": stamp, "state": estimate.state}
     known |= {"stamp_ns": stamp_ns, "time_s": time_s, PERSON: estimate.person}
@@ -215,32 +197,26 @@ def check_table(path: Path) -> None:
 
 
 @contextmanager
-def result_table(
-    path: Path,
-    has_points: bool,
-    has_people: bool = False,
-    has_hands: bool = False,
-) -> Iterator[Callable[[RecordedFrame, Estimate], None]]:
+def result_table(path: Path, **has: bool) -> Iterator[Callable[[RecordedFrame, Estimate], None]]:
     """Context of a function that adds the row of an image to a table, which appears on exit.
 
     A ``path`` with the suffix .parquet is a Parquet file, else CSV; with ``has_people`` each person
-    of an image has a row. See :func:`columns`. Raises CardboxError if the file cannot be written,
-    or pyarrow is missing.
+    of an image has a row. The columns are ``units(**has)``. Raises CardboxError if the file cannot
+    be written, or pyarrow is missing.
     """
-    has = has_points, has_people, has_hands
-    names = columns(*has)
+    names = units(**has)
     if path.suffix == PARQUET:
         arrow, parquet = pyarrow_or_error()
         rows: list[list[Cell]] = []
         with atomic_path(path) as temporary:
             yield lambda frame, estimate: rows.append(
-                row_of(frame.stamp_ns, frame.time_s, estimate, *has)
+                row_of(frame.stamp_ns, frame.time_s, estimate, **has)
             )
             whole = dict.fromkeys(("stamp_ns", PERSON), arrow.int64())
             types = whole | dict.fromkeys(TEXT_COLUMNS, arrow.string())
             schema = arrow.schema(
                 arrow.field(name, types.get(name, arrow.float64()), metadata={"unit": unit})
-                for name, unit in units(*has).items()
+                for name, unit in units(**has).items()
             )
             for row in rows:
                 row[0] = float(row[0] or 0)
@@ -251,7 +227,7 @@ def result_table(
         table = csv.writer(file, lineterminator="\n")
         table.writerow(names)
         yield lambda frame, estimate: table.writerow(
-            map(_text, row_of(frame.stamp_ns, frame.time_s, estimate, *has))
+            map(_text, row_of(frame.stamp_ns, frame.time_s, estimate, **has))
         )
 
 

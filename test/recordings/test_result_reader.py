@@ -22,7 +22,7 @@ from cardbox_tracker.recordings.bag_reader import BagReader
 from cardbox_tracker.recordings.bag_writer import BagWriter
 from cardbox_tracker.recordings.result_bag import result_bag
 from cardbox_tracker.recordings.result_reader import read_results
-from cardbox_tracker.recordings.result_table import columns, result_table
+from cardbox_tracker.recordings.result_table import result_table, units
 from cardbox_tracker.recordings.silhouettes import RecordedFrame
 from cardbox_tracker.tracking.estimate import Estimate
 from cardbox_tracker.tracking.tracker import Tracker
@@ -143,7 +143,7 @@ def test_a_live_recording_of_people_beside_the_body_that_was_given(tmp_path: Pat
     assert read_results(tmp_path / "live", 2).state == read_results(tmp_path / "one").state
 
 
-STAMP_NS = columns().index("stamp_ns")
+STAMP_NS = tuple(units()).index("stamp_ns")
 
 
 def without_column(rows: list[list[str]]) -> None:

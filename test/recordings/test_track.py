@@ -29,7 +29,7 @@ from cardbox_tracker.recordings.bag_reader import BagReader
 from cardbox_tracker.recordings.initialize import describe, initialize_from_recording
 from cardbox_tracker.recordings.recording import Recording
 from cardbox_tracker.recordings.result_bag import result_bag
-from cardbox_tracker.recordings.result_table import columns
+from cardbox_tracker.recordings.result_table import units
 from cardbox_tracker.recordings.silhouettes import SilhouetteSource, TimeSpan
 from cardbox_tracker.recordings.track import TrackSummary, track_recording
 from cardbox_tracker.search.config import default_preset
@@ -122,7 +122,7 @@ def test_there_is_one_row_an_image_with_its_stamp(
 ) -> None:
     summary = track(recording, source, tmp_path / "person.csv")
     text = (tmp_path / "person.csv").read_text()
-    assert text.splitlines()[0] == ",".join(columns())
+    assert text.splitlines()[0] == ",".join(units())
     assert text.endswith("\n")
     assert "\r" not in text
     rows = rows_of(tmp_path / "person.csv")
@@ -172,7 +172,7 @@ def test_what_is_not_known_is_left_empty(
     assert len(empty) >= 20
     assert summary.frames_tracked <= len(rows) - len(empty)
     for row in rows:
-        names = [name for name in columns() if name not in KNOWN]
+        names = [name for name in units() if name not in KNOWN]
         # The plane of a hanging arm is not determined.
         values = {row[name] for name in names if not name.endswith("_plane_deg")}
         assert ("" in values) == (row["state"] in ("lost", "no_person"))
