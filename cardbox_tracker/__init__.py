@@ -42,9 +42,9 @@ if TYPE_CHECKING:
     from cardbox_tracker.measuring.measure import initialize_body as initialize_body
     from cardbox_tracker.measuring.scene_watch import SceneWatch as SceneWatch
     from cardbox_tracker.person.model import BodyModel as BodyModel
+    from cardbox_tracker.person.model import body_from_proportions as body_from_proportions
     from cardbox_tracker.person.model_file import load_body_model as load_body_model
     from cardbox_tracker.person.model_file import save_body_model as save_body_model
-    from cardbox_tracker.person.proportions import body_from_proportions as body_from_proportions
     from cardbox_tracker.person.skeleton import JOINT_NAMES as JOINT_NAMES
     from cardbox_tracker.person.skeleton import KEYPOINT_NAMES as KEYPOINT_NAMES
     from cardbox_tracker.search.config import PRESETS as PRESETS

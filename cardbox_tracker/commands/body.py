@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from cardbox_tracker.commands.arguments import Written, check_outputs, option
+from cardbox_tracker.person.model import body_from_proportions
 from cardbox_tracker.person.model_file import save_body_model
-from cardbox_tracker.person.proportions import body_from_proportions
 
 
 @dataclass(frozen=True, kw_only=True)

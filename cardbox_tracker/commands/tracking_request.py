@@ -27,9 +27,9 @@ from cardbox_tracker.detectors.own_network import OwnModel
 from cardbox_tracker.detectors.person_choice import PersonChoice
 from cardbox_tracker.detectors.point_table import PointTable
 from cardbox_tracker.measuring.scene import Scene, load_scene
-from cardbox_tracker.person.model import MEASURED, BodyModel
+from cardbox_tracker.person.model import MEASURED, BodyModel, body_from_proportions
 from cardbox_tracker.person.model_file import load_body_model
-from cardbox_tracker.person.proportions import USUAL_STATURE_M, body_from_proportions
+from cardbox_tracker.person.proportions import USUAL_STATURE_M
 from cardbox_tracker.recordings.given_camera import FOV_HINT, GivenCamera
 from cardbox_tracker.recordings.open_images import check_exists, is_bag, is_film, tells_lens
 from cardbox_tracker.recordings.other_silhouettes import PersonInView, Within

@@ -94,8 +94,9 @@ def track_recording(
     first, rng = recording.first, np.random.default_rng(seed)
     given = recording.others, people, look
     session, found = Session(bodies, first.camera, config, rng, *given), list[Quality]()
-    has = first.has_points, people is not None, look is not None
-    with nullcontext() if table is None else result_table(table, *has) as add_row:
+    has = {"has_points": first.has_points, "has_people": people is not None}
+    has["has_hands"] = look is not None
+    with nullcontext() if table is None else result_table(table, **has) as add_row:
         frames = 0
         for taken in recording.frames(start_s, end_s):
             frames += 1

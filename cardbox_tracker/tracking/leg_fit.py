@@ -11,7 +11,7 @@ from math import cos, exp, inf, isnan, sin, sqrt
 import numpy as np
 
 from cardbox_tracker.common.compiling import borrowing_kernel, inlined_kernel, kernel
-from cardbox_tracker.person.legs import LEG_LIMITS
+from cardbox_tracker.person.skeleton import LEG_LIMITS
 from cardbox_tracker.terms.kernel_arguments import Floats
 from cardbox_tracker.terms.linear_kernels import solve, write_normal
 

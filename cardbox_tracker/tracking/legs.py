@@ -30,12 +30,13 @@ from cardbox_tracker.camera.camera import Camera
 from cardbox_tracker.detectors.image_points import LEG_POINT_NAMES, POINT_INDEX, ImagePoints
 from cardbox_tracker.measuring.people_camera import is_inside
 from cardbox_tracker.person.kinematics import pose
-from cardbox_tracker.person.legs import HIP_SHARE, LEG_LIMITS, leg_angles, stature_of
+from cardbox_tracker.person.legs import leg_angles
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.parts import body_parts
 from cardbox_tracker.person.posture import TORSO_Y, YAW
+from cardbox_tracker.person.proportions import HIP_SHARE, MARKED_HEIGHTS, stature_of
 from cardbox_tracker.person.sizes import FloatArray
-from cardbox_tracker.person.skeleton import KeypointState, rotation_z
+from cardbox_tracker.person.skeleton import LEG_LIMITS, KeypointState, rotation_z
 from cardbox_tracker.terms.term import Frame
 from cardbox_tracker.tracking import leg_fit
 from cardbox_tracker.tracking.estimate import Estimate, Legs
@@ -54,9 +55,8 @@ _ENDS = [
 _HIPS = [POINT_INDEX[f"{side}_hip"] for side in ("left", "right")]
 _SHOULDERS = [POINT_INDEX[f"{side}_shoulder"] for side in ("left", "right")]
 
-# Where detectors mark knees and ankles: lengths of thigh and shank, and height of the ankle above
-# the floor, as shares of the stature (means of two real and two rendered people).
-_MARKED, _ANKLE_SHARE = np.array([0.236, 0.228]), 0.05
+# Lengths of thigh and shank, and height of the ankle, by where detectors mark them.
+_MARKED, _ANKLE_SHARE = -np.diff(MARKED_HEIGHTS[3:]), float(MARKED_HEIGHTS[5])
 # A point with a lower score is not seen.
 LEAST_SCORE = 0.5
 # Width of the image's border, as a share of its longer side, where the detector guesses points.

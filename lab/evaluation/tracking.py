@@ -13,9 +13,9 @@ from cardbox_tracker.common.errors import CardboxError
 from cardbox_tracker.detectors.detector import Detector
 from cardbox_tracker.detectors.point_table import PointTable
 from cardbox_tracker.measuring.config import InitializationConfig
-from cardbox_tracker.person.model import BodyModel
+from cardbox_tracker.person.model import BodyModel, body_from_proportions
 from cardbox_tracker.person.posture import N_JOINTS, POSTURE
-from cardbox_tracker.person.proportions import STATURE_LIMITS_M, body_from_proportions
+from cardbox_tracker.person.proportions import STATURE_LIMITS_M
 from cardbox_tracker.recordings.initialize import initialize_from_recording
 from cardbox_tracker.recordings.recording import STEREO, FrameSet, RecordingRequest
 from cardbox_tracker.recordings.silhouettes import SilhouetteSource, TimeSpan

@@ -17,9 +17,8 @@ from std_msgs.msg import String
 
 from cardbox_tracker.common.errors import CardboxError
 from cardbox_tracker.person.skeleton import PLACE_NAMES
-from cardbox_tracker.recordings.outputs import posture_from, values_from
+from cardbox_tracker.recordings.outputs import joints_of
 from cardbox_tracker.ros.messages.conversions import camera_info_message
-from cardbox_tracker.ros.messages.results import joint_values_of
 from cardbox_tracker.ros.runtime import qos
 from cardbox_tracker.ros.runtime.processes import Nodes
 from lab.tools.fault_nodes import header_of
@@ -85,8 +84,8 @@ class Line:
         if stamp_ns not in self._due:
             return
         number, sent_s, at_s = self._due.pop(stamp_ns)
-        joints = joint_values_of(message)
-        found = Found(stamp_ns, posture_from(joints), values_from(joints, PLACE_NAMES))
+        joints = joints_of(message)
+        found = Found(stamp_ns, joints.posture, joints.of(PLACE_NAMES))
         self.took_s.append(time.monotonic() - sent_s)
         self.errors_m.append(self._person.error_m(found, at_s))
         self.answered.add(number)

@@ -24,15 +24,16 @@ from typing import Any
 import numpy as np
 
 from cardbox_tracker.applications.ergonomics.reba import RebaConfig, Seen, score_table
+from cardbox_tracker.applications.ergonomics.rula import PARTS, POSTURE_ROWS
 from cardbox_tracker.camera.camera import level_to_optical
 from cardbox_tracker.commands.tracking_request import points_named
 from cardbox_tracker.detectors.detector import Detector
 from cardbox_tracker.detectors.image_points import LEG_POINT_NAMES, POINT_INDEX, ImagePoints
 from cardbox_tracker.person.legs import LEG_KEYPOINT_NAMES, leg_angles
+from cardbox_tracker.person.model import body_from_proportions
 from cardbox_tracker.person.posture import PITCH
-from cardbox_tracker.person.proportions import body_from_proportions
 from cardbox_tracker.person.sizes import FloatArray
-from cardbox_tracker.person.skeleton import KEYPOINT_NAMES, rotation_z
+from cardbox_tracker.person.skeleton import KEYPOINT_NAMES, STATE, rotation_z
 from cardbox_tracker.recordings.recording import RecordingRequest, Segmentation
 from cardbox_tracker.recordings.silhouettes import TimeSpan
 from cardbox_tracker.search.config import default_preset
@@ -127,15 +128,16 @@ def _seen(stamp_ns: int, estimate: Estimate, joints_m: Any, pitch_rad: float) ->
     shoulders_m = np.asarray(estimate.keypoints_m)[_SHOULDERS].mean(axis=0)
     trunk_m = float(np.linalg.norm(shoulders_m - legs.points_m[_HIPS].mean(axis=0)))
     is_seen = all(str(state) == "tracked" for state in legs.states) and np.isfinite(true).all()
-    wrists = np.full((2, 2, 2), np.nan)
     rest = stamp_ns, stamp_ns / 1e9, estimate.state
-    found = np.stack([legs.angles, legs.angles_stddev])
-    body = np.stack([estimate.posture, np.asarray(estimate.posture_stddev)])
+    found = estimate.joints[:, [*POSTURE_ROWS, *PARTS["legs"]]]
+    true = np.hstack([posture, true])
+    states = np.full((2, 2, len(STATE)), np.nan)
+    for state, values in zip(states, (found, true), strict=True):
+        state[:, POSTURE_ROWS] = values[:, : len(POSTURE_ROWS)]
+        if is_seen:
+            state[:, PARTS["legs"]] = values[:, len(POSTURE_ROWS) :]
     lengths = np.array([trunk_m, *found_m]), np.array([np.linalg.norm(trunk), *lengths_m.ravel()])
-    return (
-        Seen(*rest, body, None, wrists, found if is_seen else None, lengths[0]),
-        Seen(*rest, posture, None, wrists, true if is_seen else None, lengths[1]),
-    )
+    return Seen(*rest, states[0], lengths[0]), Seen(*rest, states[1], lengths[1])
 
 
 def _rated(pairs: list[tuple[Seen, Seen]]) -> str:
@@ -144,7 +146,7 @@ def _rated(pairs: list[tuple[Seen, Seen]]) -> str:
         [0 if row.scores is None else row.scores.parts["legs"].argmax() + 1 for row in rows]
         for rows in (score_table(images, RebaConfig(), 0) for images in zip(*pairs, strict=True))
     ]
-    are_seen = np.array([found.legs is not None for found, _ in pairs])
+    are_seen = np.array(["legs" in found.measured for found, _ in pairs])
     found, true = np.array(scores)[:, are_seen]
     return f"{found.mean():.2f}, {true.mean():.2f}, {np.mean(found == true):.0%}, {len(found)}"
 

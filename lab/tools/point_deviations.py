@@ -32,6 +32,7 @@ from numpy.typing import NDArray
 from cardbox_tracker.camera.camera import Camera
 from cardbox_tracker.common.errors import CardboxError
 from cardbox_tracker.detectors.image_points import ImagePoints
+from cardbox_tracker.person.proportions import WRIST_SHARE
 from cardbox_tracker.terms.joint_points import bones_of, level_sight, points_of
 from cardbox_tracker.terms.joint_points_kernels import (
     ELBOW,
@@ -43,7 +44,6 @@ from cardbox_tracker.terms.joint_points_kernels import (
     SHOULDERS,
     TRUNK,
     WRIST,
-    WRIST_SHARE,
 )
 from lab.tools.detected_sessions import first_camera_of, motions, opened, source_of, source_weights
 

@@ -24,8 +24,7 @@ from cardbox_tracker.detectors.detector import Detector
 from cardbox_tracker.measuring.first_sight import upper_body
 from cardbox_tracker.measuring.references import lateral_m
 from cardbox_tracker.measuring.stature import at_height_of
-from cardbox_tracker.person.model import BodyModel
-from cardbox_tracker.person.proportions import body_from_proportions
+from cardbox_tracker.person.model import BodyModel, body_from_proportions
 from cardbox_tracker.search.config import default_preset
 from cardbox_tracker.terms.whole_body import WholeBodyCost, iou_of
 from cardbox_tracker.tracking.estimate import Estimate

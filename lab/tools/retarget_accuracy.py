@@ -20,8 +20,7 @@ import numpy as np
 from cardbox_tracker.applications.retargeting.arm import ArmFollower, directions_of
 from cardbox_tracker.applications.retargeting.config import RetargetConfig
 from cardbox_tracker.applications.retargeting.robot import Robot, load_robot
-from cardbox_tracker.person.model import BodyModel
-from cardbox_tracker.person.proportions import body_from_proportions
+from cardbox_tracker.person.model import BodyModel, body_from_proportions
 from cardbox_tracker.person.sizes import FloatArray
 from lab.evaluation.angles import true_postures
 from lab.evaluation.people_report import replaced

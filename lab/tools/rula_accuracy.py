@@ -19,11 +19,13 @@ from pathlib import Path
 import numpy as np
 
 from cardbox_tracker.applications.ergonomics.rula import (
+    PARTS,
     RULA,
     SAMPLES,
     RulaConfig,
     ScoreArray,
     ScoreDistribution,
+    measured_parts,
     neck_samples,
     rula_scores,
     sampled_scores,
@@ -32,6 +34,7 @@ from cardbox_tracker.applications.ergonomics.rula import (
 from cardbox_tracker.detectors.detector import Detector
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.sizes import FloatArray
+from cardbox_tracker.person.skeleton import Group, rows_of
 from cardbox_tracker.recordings.truth import SHOULDERS
 from cardbox_tracker.search.config import PRESETS, TrackerConfig
 from cardbox_tracker.search.particles import normal_postures
@@ -54,8 +57,6 @@ TASKS = {
     "no load": RulaConfig(),
     "2 to 10 kg held": RulaConfig(arm_load=2, arm_muscle_use=1, body_load=2, body_muscle_use=1),
 }
-UNKNOWN = np.full((2, 2, 2), np.nan)
-"""Wrists, whose true flexion is not known."""
 LOW = 2
 """Highest score that is acceptable."""
 _HEAD = (
@@ -121,16 +122,18 @@ def score_errors(
         body[:] = [tracker.body]
         normal = normal_postures(estimate.posture, estimate.posture_stddev, SAMPLES, rng)
         particles = tracker.sample(estimate, SAMPLES, rng)
-        angles, deviations = neck = estimate.neck, estimate.neck_stddev
-        known = neck, UNKNOWN
+        joints = estimate.joints.copy()
+        # The true flexion of the wrists is not known.
+        joints[:, rows_of(Group.HAND)] = np.nan
+        angles, deviations = joints[:, PARTS["neck"]]
         for task, rula in tasks.items():
             drawn = [
-                sampled_scores(tracker.body, estimate.posture, postures, *known, rula, rng)[0]
+                sampled_scores(tracker.body, joints, postures, rula, rng)[0]
                 for postures in (normal, particles)
             ]
             mean = np.eye(RULA.highest)[drawn[0].of_mean - 1]
             necks = None
-            if angles is not None and deviations is not None:
+            if "neck" in measured_parts(joints):
                 necks = neck_samples(angles, deviations, SAMPLES, rng)
             whole = score_distribution(tracker.body, particles, rula, necks)
             ways = ScoreDistribution(mean, mean, mean), *drawn, whole

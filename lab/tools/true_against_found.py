@@ -23,9 +23,8 @@ from numpy.typing import NDArray
 from cardbox_tracker.commands.arguments import at_least
 from cardbox_tracker.common.compiling import kernel
 from cardbox_tracker.person.kinematics import jacobian
-from cardbox_tracker.person.model import BodyModel
+from cardbox_tracker.person.model import BodyModel, body_from_proportions
 from cardbox_tracker.person.posture import ARM_ANGLES, FIRST_ANGLES
-from cardbox_tracker.person.proportions import body_from_proportions
 from cardbox_tracker.recordings.truth import SHOULDERS, beside_shoulders
 from cardbox_tracker.search.config import PRESETS
 from cardbox_tracker.search.whole_body import WholeBodyFilter

@@ -19,9 +19,8 @@ from cardbox_tracker.detectors import detector as detector_module
 from cardbox_tracker.detectors.model_files import ModelFiles
 from cardbox_tracker.detectors.person_choice import PersonChoice
 from cardbox_tracker.detectors.point_table import PointTable
-from cardbox_tracker.person.model import BodyModel
+from cardbox_tracker.person.model import BodyModel, body_from_proportions
 from cardbox_tracker.person.model_file import save_body_model
-from cardbox_tracker.person.proportions import body_from_proportions
 from cardbox_tracker.recordings.given_camera import GivenCamera
 from cardbox_tracker.recordings.other_silhouettes import PersonInView
 from cardbox_tracker.recordings.silhouettes import TimeSpan

@@ -13,9 +13,8 @@ from cardbox_tracker.camera.camera import Camera
 from cardbox_tracker.camera.rasterisation import render
 from cardbox_tracker.detectors.image_points import POINT_INDEX, POINT_NAMES, ImagePoints
 from cardbox_tracker.person.cardbox import cardbox_patches
-from cardbox_tracker.person.model import BodyModel
+from cardbox_tracker.person.model import BodyModel, body_from_proportions
 from cardbox_tracker.person.posture import reference_posture
-from cardbox_tracker.person.proportions import body_from_proportions
 from cardbox_tracker.person.skeleton import KeypointState
 from cardbox_tracker.search.config import default_preset
 from cardbox_tracker.terms.term import Frame

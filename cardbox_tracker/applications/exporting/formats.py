@@ -21,7 +21,7 @@ from cardbox_tracker.measuring.scene import Scene, load_scene
 from cardbox_tracker.person.isb_angles import ISB_NAMES, isb_angles
 from cardbox_tracker.person.legs import floor_m
 from cardbox_tracker.person.model import BodyModel
-from cardbox_tracker.person.skeleton import JOINT_NAMES, NECK_NAMES, PLACE_NAMES, UNITS
+from cardbox_tracker.person.skeleton import POSTURE_GROUPS, Group, joints_of
 from cardbox_tracker.recordings import result_reader
 from cardbox_tracker.recordings.result_reader import Results
 from cardbox_tracker.recordings.result_table import units
@@ -30,15 +30,15 @@ from cardbox_tracker.tracking.estimate import UNCERTAIN
 
 def write_isb(path: Path, motion: Motion, body: BodyModel | None = None) -> None:
     """Write CSV with angles of the ISB in degrees, then our joints, or raise CardboxError."""
-    names = (*JOINT_NAMES, *PLACE_NAMES, *NECK_NAMES)
-    values = np.hstack([np.degrees(isb_angles(motion.states)), motion.states, motion.neck])
+    groups = *POSTURE_GROUPS, Group.PLACE, Group.NECK
+    values = np.hstack([np.degrees(isb_angles(motion.states)), motion.values_of(*groups)])
     rows = (
         (str(stamp_ns), f"{time_s:.6f}", state, *("" if v != v else f"{v:.6f}" for v in row))
         for stamp_ns, time_s, state, row in zip(
             motion.stamp_ns.tolist(), motion.time_s, motion.state, values.tolist(), strict=True
         )
     )
-    units = (f"{name}_{UNITS[name]}" for name in names)
+    units = (f"{joint.name}_{joint.unit}" for joint in joints_of(*groups))
     header = ("stamp_ns", "time_s", "state", *(f"{name}_deg" for name in ISB_NAMES), *units)
     write_table(path, header, rows)
 

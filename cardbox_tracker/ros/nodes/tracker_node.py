@@ -24,9 +24,8 @@ from cardbox_tracker.detectors.model_files import installed_hands
 from cardbox_tracker.measuring.scene_watch import SceneWatch
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.model_file import dumps_body_model, load_body_model, loads_body_model
-from cardbox_tracker.person.skeleton import PLACE_NAMES
+from cardbox_tracker.person.skeleton import PLACE_NAMES, STATE_NAMES
 from cardbox_tracker.person.urdf import urdf_from_body
-from cardbox_tracker.recordings.outputs import place_of
 from cardbox_tracker.ros.messages import conversions
 from cardbox_tracker.ros.nodes.camera_inputs import CameraInputs, Received
 from cardbox_tracker.ros.nodes.tracker_outputs import TrackedBodies, TrackerOutputs
@@ -117,8 +116,8 @@ class TrackingReport:
         if estimate.posture_stddev is not None:
             angles = estimate.posture_stddev[1:]
             values["largest deviation (deg)"] = f"{math.degrees(float(angles.max())):.1f}"
-        places = zip(PLACE_NAMES, place_of(estimate), strict=True)
-        return values | {f"{name} (m)": f"{value:.3f}" for name, value in places}
+        joints = dict(zip(STATE_NAMES, estimate.joints[0].tolist(), strict=True))
+        return values | {f"{name} (m)": f"{joints[name]:.3f}" for name in PLACE_NAMES}
 
 
 class OwnBody:

@@ -14,8 +14,8 @@ from cardbox_tracker.applications.ergonomics.rula import RulaConfig, ScoreDistri
 from cardbox_tracker.applications.retargeting.robot import load_robot
 from cardbox_tracker.applications.simulation.session import session_camera
 from cardbox_tracker.person.kinematics import pose
+from cardbox_tracker.person.model import body_from_proportions
 from cardbox_tracker.person.posture import reference_posture
-from cardbox_tracker.person.proportions import body_from_proportions
 from cardbox_tracker.search.config import default_preset
 from cardbox_tracker.tracking.estimate import TRACKING, Estimate
 from lab.evaluation.angles import true_postures

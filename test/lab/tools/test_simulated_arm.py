@@ -10,7 +10,7 @@ import pytest
 from cardbox_tracker.applications.retargeting.config import RetargetConfig
 from cardbox_tracker.applications.retargeting.recording import retarget_results, write_csv
 from cardbox_tracker.applications.retargeting.retargeter import make_retargeter
-from cardbox_tracker.person.proportions import body_from_proportions
+from cardbox_tracker.person.model import body_from_proportions
 from cardbox_tracker.person.skeleton import JOINT_NAMES
 from cardbox_tracker.recordings.result_reader import Results
 from cardbox_tracker.recordings.result_table import deviation_columns
