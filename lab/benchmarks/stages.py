@@ -39,7 +39,7 @@ def measure_stages(scene: BenchmarkScene) -> dict[str, dict[str, float]]:
         posture = filters.track(silhouette)
         torso, left, right = filters.all
         timed("silhouette from the image", extractor, image)
-        seen = timed("running sums of the silhouette", term.look, silhouette)
+        seen = timed("silhouette as bits", term.look, silhouette)
         rate_torsos = timed("arms of the last frame taken out", seen.torsos_beside, posture)
         timed("cost of all torsos", rate_torsos, torso.particles)
         rate_arms = timed("torso taken out", seen.arms_beside, posture[:4])
