@@ -29,6 +29,7 @@ from cardbox_tracker.applications.ergonomics.rula import (
     sampled_scores,
     score_distribution,
 )
+from cardbox_tracker.common.files import write_file
 from cardbox_tracker.detectors.detector import Detector
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.sizes import FloatArray
@@ -39,7 +40,6 @@ from cardbox_tracker.tracking.estimate import Estimate
 from cardbox_tracker.tracking.tracker import Tracker
 from lab.evaluation.angles import comparable, true_postures
 from lab.evaluation.people import torso_angles
-from lab.evaluation.people_report import replaced
 from lab.evaluation.session import RecordedSession, load_session
 from lab.evaluation.tracking import (
     ALL_INPUTS,
@@ -47,6 +47,7 @@ from lab.evaluation.tracking import (
     InputSelection,
     track_session,
 )
+from lab.pages import replaced, row, table
 
 DOCUMENT = Path(__file__).resolve().parents[2] / "docs" / "ergonomics.md"
 BEGIN, END = "<!-- rula-accuracy:begin -->", "<!-- rula-accuracy:end -->"
@@ -181,9 +182,9 @@ def score_error(scores: list[ScoreDistribution], truth: ScoreArray) -> ScoreErro
     )
 
 
-def row(name: str, task: str, way: str, error: ScoreError) -> str:
+def row_of(name: str, task: str, way: str, error: ScoreError) -> list[str]:
     """Return one row of the table."""
-    cells = (
+    return [
         name,
         task,
         way,
@@ -191,8 +192,7 @@ def row(name: str, task: str, way: str, error: ScoreError) -> str:
         *(f"{share:.0%}" for share in (error.equal, error.within_one, error.chance_of_truth)),
         f"{error.low:.0%}, {error.true_low:.0%}",
         f"{error.above:.0%}, {error.true_above:.0%}",
-    )
-    return f"| {' | '.join(cells)} |"
+    ]
 
 
 def load(folder: Path) -> RecordedSession:
@@ -226,7 +226,6 @@ def main(args: list[str] | None = None) -> int:
     parser.add_argument("sessions", nargs="+", type=Path, metavar="SESSION")
     parser.add_argument("--seed", type=int, default=0)
     given = parser.parse_args(args)
-    rows = [f"| {' | '.join(_HEAD)} |", "|---" * len(_HEAD) + "|"]
     found = {(task, way): list[ScoreError]() for task in TASKS for way in WAYS}
     for folder in given.sessions:
         session = load(folder)
@@ -238,12 +237,12 @@ def main(args: list[str] | None = None) -> int:
         for task, way in found:
             found[task, way].append(errors[task][way])
         for task in TASKS:
-            print(row(session.name, task, "particles", errors[task]["particles"]), flush=True)
-    rows += [row("**mean**", *which, mean_of(errors)) for which, errors in found.items()]
+            cells = row_of(session.name, task, "particles", errors[task]["particles"])
+            print(row(cells), flush=True)
+    means = table(_HEAD, (row_of("**mean**", *of, mean_of(one)) for of, one in found.items()))
     text = DOCUMENT.read_text(encoding="utf-8")
-    table = "\n".join(rows)
-    DOCUMENT.write_text(replaced(text, f"\n{table}\n", BEGIN, END), encoding="utf-8")
-    print(table)
+    write_file(DOCUMENT, replaced(text, f"\n{means}\n", BEGIN, END))
+    print(means)
     return 0
 
 
