@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import argparse
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
 from cardbox_tracker.common.files import write_file
 from lab.benchmarks.nodes import PERCENTILES
+from lab.evaluation.results import read_json, write_json
 from lab.pages import table
 
 COMMAND = "make benchmark"
@@ -25,6 +27,17 @@ _FRAMES = {
 def write_report(results: Mapping[str, Any], path: Path) -> None:
     """Write the report of ``results``, as ``benchmark.json`` holds them, to ``path``."""
     write_file(path, report(results))
+
+
+def replace_part(name: str, measure: Callable[[], Any], description: str | None) -> None:
+    """Measure one part of the results, and replace it in the files that the command line names."""
+    parser = argparse.ArgumentParser(description=description)
+    parser.add_argument("--json", type=Path, default=Path("docs/benchmarks.json"))
+    parser.add_argument("--report", type=Path, default=Path("docs/benchmarks.md"))
+    given = parser.parse_args()
+    results = read_json(given.json) | {name: measure()}
+    write_json(results, given.json)
+    write_report(results, given.report)
 
 
 def report(results: Mapping[str, Any]) -> str:
@@ -107,8 +120,7 @@ def _ratios(ratios: Mapping[str, Any] | None) -> list[str]:
         f"`python -m lab.benchmarks.ratios` (commit {ratios['commit']}) measures times in turns, "
         "on one core except the last. A start lasts until all nodes of a process wait for their "
         "input, with compiled code in the cache; `imports` are those of rclpy, numba, OpenCV and "
-        "numpy. `python -m lab.benchmarks.silhouette RECORDING` measures a recording's "
-        "silhouettes.",
+        "numpy.",
         table(("ratio", "median"), rows),
     ]
 

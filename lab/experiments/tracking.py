@@ -19,14 +19,13 @@ from cardbox_tracker.person.skeleton import JOINT_NAMES, KEYPOINT_NAMES
 from cardbox_tracker.search.config import TrackerConfig
 from cardbox_tracker.search.cycles import Cycles, MakeHierarchy
 from cardbox_tracker.search.resampling import gaussian_weights
+from cardbox_tracker.terms.silhouette import SilhouetteObservation, SilhouetteTerm
+from cardbox_tracker.terms.term import ArmCosts, Frame, TorsoCosts
 from cardbox_tracker.tracking.tracker import Tracker
 from lab.evaluation.metrics import align, angle_errors_deg, distances_m
-from lab.experiments.counting import CountingSilhouette
 from lab.experiments.models import make_silhouette_term
 from lab.experiments.parallel import Call
-from lab.experiments.peers.annealed import Annealed
-from lab.experiments.peers.cma_es import CmaEs
-from lab.experiments.peers.flat import Flat
+from lab.experiments.peers import Annealed, CmaEs, Flat
 from lab.experiments.sessions import Session
 
 FloatArray = NDArray[np.float64]
@@ -40,6 +39,50 @@ PEERS: dict[str, MakeHierarchy] = {"flat": Flat, "annealed": Annealed, "cma_es":
 RUNS_A_CALL = 10
 # More frames than any session has.
 _NEVER = 1_000_000
+
+
+class CountingSilhouette(SilhouetteTerm):
+    """Gives the costs of another term, so that searches are compared at equal numbers of ratings.
+
+    Attributes:
+        ratings: states rated so far: torsos, arms and whole postures.
+    """
+
+    def __init__(self, term: SilhouetteTerm) -> None:
+        """Count the ratings of ``term``."""
+        super().__init__(term.body, term.camera)
+        self._term = term
+        self.ratings = 0
+
+    def observe(self, frame: Frame) -> SilhouetteObservation:
+        """See :class:`SilhouetteTerm`."""
+        return _Counting(frame, self._term.observe(frame), self)
+
+    def count(self, costs: FloatArray) -> FloatArray:
+        """Count and return ``costs`` (N,)."""
+        self.ratings += len(costs)
+        return costs
+
+
+@dataclass(frozen=True)
+class _Counting(SilhouetteObservation):
+    frame: Frame
+    seen: SilhouetteObservation
+    counter: CountingSilhouette
+
+    def torsos_beside(self, arms: FloatArray | None) -> TorsoCosts:
+        rate = self.seen.torsos_beside(arms)
+        return lambda torsos: self.counter.count(rate(torsos))
+
+    def arms_beside(self, torso: FloatArray) -> ArmCosts:
+        rate = self.seen.arms_beside(torso)
+        return lambda side, arms: self.counter.count(rate(side, arms))
+
+    def postures(self, postures: FloatArray) -> FloatArray:
+        return self.counter.count(self.seen.postures(postures))
+
+    def overlap(self, posture: FloatArray) -> tuple[int, float]:
+        return self.seen.overlap(posture)
 
 
 @dataclass(frozen=True)
