@@ -12,7 +12,7 @@ import numpy as np
 
 from cardbox_tracker.search import doubt, whole_body
 from cardbox_tracker.search.config import default_preset, paper_preset
-from cardbox_tracker.search.cycles import Cycles
+from cardbox_tracker.search.hierarchy import Cycles
 from cardbox_tracker.search.whole_body import STAGES, WholeBodyFilter
 from cardbox_tracker.terms.compiled import CompiledSilhouette
 from cardbox_tracker.tracking.tracked_camera import TrackedCamera

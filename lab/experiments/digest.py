@@ -19,7 +19,6 @@ SOURCES = (
     "search/particle_filter.py",
     "search/particle_kernels.py",
     "search/resampling.py",
-    "search/cycles.py",
     "terms/compiled.py",
     "terms/cardbox_kernels.py",
     "terms/bit_masks.py",

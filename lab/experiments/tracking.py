@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from cardbox_tracker.person.posture import N_JOINTS, TURNS
 from cardbox_tracker.person.skeleton import JOINT_NAMES, KEYPOINT_NAMES
 from cardbox_tracker.search.config import TrackerConfig
-from cardbox_tracker.search.cycles import Cycles, MakeHierarchy
+from cardbox_tracker.search.hierarchy import Cycles, MakeHierarchy
 from cardbox_tracker.search.resampling import gaussian_weights
 from cardbox_tracker.terms.silhouette import SilhouetteObservation, SilhouetteTerm
 from cardbox_tracker.terms.term import ArmCosts, Frame, TorsoCosts
