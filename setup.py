@@ -136,7 +136,8 @@ setup(
         "joblib>=1.3,<2",
         "lz4>=4.3,<5",
         "matplotlib>=3.8,<4",
-        "numba>=0.60,<1",
+        # common/compiling.py calls what is inside numba, which other minor versions may change.
+        "numba>=0.60,<0.69",
         "numpy>=1.26,<3",
         "opencv-python-headless>=4.9,<6",
         "pillow>=10,<14",
