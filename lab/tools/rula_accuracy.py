@@ -13,8 +13,9 @@ from __future__ import annotations
 import argparse
 import sys
 from collections.abc import Mapping
-from dataclasses import dataclass, fields, replace
+from dataclasses import replace
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
@@ -76,31 +77,17 @@ the command; and for comparison these with the whole deviation, and the most fre
 the session."""
 
 
-@dataclass(frozen=True)
-class ScoreError:
-    """Errors of scores over the images with a true score.
+class ScoreError(NamedTuple):
+    """Errors of scores over the images with a true score."""
 
-    Attributes:
-        frames: number of images.
-        difference: mean absolute difference of the expected score.
-        equal: share of images whose likeliest score is the true one.
-        within_one: share of images where it is at most 1 off.
-        chance_of_truth: mean chance that the distribution gives the true score.
-        low: mean chance of a score up to ``LOW``.
-        true_low: share of images whose true score is up to ``LOW``.
-        above: mean chance of a score above ``RULA.above``.
-        true_above: share of images whose true score is above ``RULA.above``.
-    """
-
-    frames: int
-    difference: float
-    equal: float
-    within_one: float
-    chance_of_truth: float
-    low: float
-    true_low: float
-    above: float
-    true_above: float
+    difference: float  #: mean absolute difference of the expected score
+    equal: float  #: share of images whose likeliest score is the true one
+    within_one: float  #: share of images where it is at most 1 off
+    chance_of_truth: float  #: mean chance that the distribution gives the true score
+    low: float  #: mean chance of a score up to ``LOW``
+    true_low: float  #: share of images whose true score is up to ``LOW``
+    above: float  #: mean chance of a score above ``RULA.above``
+    true_above: float  #: share of images whose true score is above ``RULA.above``
 
 
 def score_errors(
@@ -170,7 +157,6 @@ def score_error(scores: list[ScoreDistribution], truth: ScoreArray) -> ScoreErro
     chances: FloatArray = np.array([one.grand for one in scores])
     off = np.abs(likeliest - truth)
     return ScoreError(
-        frames=len(truth),
         difference=float(np.abs(means - truth).mean()),
         equal=float((off == 0).mean()),
         within_one=float((off <= 1).mean()),
@@ -213,13 +199,6 @@ def load(folder: Path) -> RecordedSession:
     return replace(session, torso_rad=torso_angles(session))
 
 
-def mean_of(errors: list[ScoreError]) -> ScoreError:
-    """Return the mean over sessions; the frames are added."""
-    names = [field.name for field in fields(ScoreError) if field.name != "frames"]
-    means = {name: float(np.mean([getattr(one, name) for one in errors])) for name in names}
-    return ScoreError(frames=sum(one.frames for one in errors), **means)
-
-
 def main(args: list[str] | None = None) -> int:
     """Measure and write the table."""
     parser = argparse.ArgumentParser(description=__doc__)
@@ -239,7 +218,11 @@ def main(args: list[str] | None = None) -> int:
         for task in TASKS:
             cells = row_of(session.name, task, "particles", errors[task]["particles"])
             print(row(cells), flush=True)
-    means = table(_HEAD, (row_of("**mean**", *of, mean_of(one)) for of, one in found.items()))
+    every = (
+        row_of("**mean**", *of, ScoreError(*np.mean(errors, axis=0).tolist()))
+        for of, errors in found.items()
+    )
+    means = table(_HEAD, every)
     text = DOCUMENT.read_text(encoding="utf-8")
     write_file(DOCUMENT, replaced(text, f"\n{means}\n", BEGIN, END))
     print(means)
