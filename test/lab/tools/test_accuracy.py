@@ -90,7 +90,7 @@ def test_a_robot_that_can_points_as_the_person() -> None:
     postures = np.zeros((3, 12))
     postures[:, 8], postures[:, 11] = 0.4, (0.5, 0.7, 0.9)
     body = body_from_proportions(1.75, 2.0)
-    cells = retarget_accuracy.row(ROBOT, "arm", "right", body, postures).split(" | ")
+    cells = retarget_accuracy.row_of(ROBOT, "arm", "right", body, postures).split(" | ")
     assert cells[:2] == ["| arm", "right"]
     assert all(float(cell.split(" / ")[1].rstrip("°")) < 8.0 for cell in cells[2:5])
 
