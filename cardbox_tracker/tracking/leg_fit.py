@@ -27,8 +27,8 @@ _STEPS, _LARGEST_STEP, _NEAREST_M = 8, 0.6, 0.1
 # Deviation of a foot on the floor, m, and height above it from which a foot is lifted rather.
 _CONTACT_M, _LIFTED_M = 0.02, 0.06
 # Shares of the mass: trunk, head and arms; thighs; shanks; feet; and how far along thigh and shank
-# the centres are (D. Winter, Biomechanics and Motor Control of Human Movement, table 4.1). Middle of
-# the mass ahead of the ankles of somebody who stands, m.
+# the centres are (D. Winter, Biomechanics and Motor Control of Human Movement, table 4.1). The middle
+# of the mass ahead of the ankles of somebody who stands, m.
 _UPPER, _THIGHS, _SHANKS, _FEET, _ALONG, _AHEAD_M = 0.678, 0.2, 0.093, 0.029, 0.433, 0.05
 # Lowest and highest values; the lengths of people are within 12 %, floor and distance are free.
 _LOWEST = np.array([*LEG_LIMITS[:, 0], -0.12, -0.12, -inf, -inf])

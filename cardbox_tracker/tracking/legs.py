@@ -135,6 +135,7 @@ class LegReader:
         self._last_stddev = REST
         self._last_s = 0.0
         self._hips_px, self._up_s = np.full((2, 2), np.nan), -np.inf
+        self._is_level = False
 
     def see(self, frame: Frame, estimate: Estimate) -> Estimate:
         """Return the ``estimate`` with the legs, once points of the first camera show them."""
@@ -169,6 +170,8 @@ class LegReader:
         prior = self._last, np.asarray(change, np.float64), shared, root
         values, inverse, rms = fit.solve(seen, prior, self._stands(seen, fit.px_per_m))
         self._last, self._last_s = values[:_N], time_s
+        feet_m = leg_fit.points_of(values[None], fit.person)[0, [2, 5], 2]
+        self._is_level = abs(feet_m[0] - feet_m[1]) < _STILL_M
         if values[_KNEES].max() < _STRAIGHT_RAD:
             self._up_s = time_s
         covariance = inverse * max(1.0, rms) ** 2
@@ -191,7 +194,7 @@ class LegReader:
         is_up = self._time_s - self._up_s < _SITS_S
         if is_up and not (np.abs(seen.hips_px - self._hips_px) < _STILL_M * px_per_m).all():
             self._hips_px, self._up_s = seen.hips_px, self._time_s
-        return is_up
+        return is_up and self._is_level
 
 
 def _moved(estimate: Estimate, by_m: FloatArray, camera: Camera) -> Estimate:
@@ -230,7 +233,7 @@ class _Fit:
         self._turn = rotation_z(np.asarray(estimate.posture[YAW]))
         self._aside = self._turn[:, 1] * HIP_SHARE * stature_m
         self._lengths_m, ankle_m = _MARKED * stature_m, _ANKLE_SHARE * stature_m
-        self._person = self.hip_m, self._aside, self._turn, self._lengths_m, ankle_m
+        self.person = self.hip_m, self._aside, self._turn, self._lengths_m, ankle_m
         lens = float(camera.fx), float(camera.fy), float(camera.cx), float(camera.cy)
         self._view = camera.reference_to_optical_rotation(), lens
         place = estimate.place
@@ -290,7 +293,7 @@ class _Fit:
             balance = float(_UPPER_SHARE * upper_m[0]), _BALANCE_M if stands else np.inf
             others, shown, count = self._folded(seen, shared), (*seen[:4], balance), 4 + 8
         first = np.concatenate([before, shared])
-        found, gained, least = leg_fit.fit(first, others, (self._person, self._view, prior, shown))
+        found, gained, least = leg_fit.fit(first, others, (self.person, self._view, prior, shown))
         return found, np.asarray(np.linalg.inv(gained), np.float64), float(np.sqrt(least / count))
 
     def _folded(self, seen: _Seen, shared: FloatArray) -> FloatArray:
@@ -323,7 +326,7 @@ class _Fit:
         """Return the legs of a solution."""
         # The place of the hips has its own deviation.
         moved = values + DIFFERENCE * np.eye(N_VALUES)[:DISTANCE]
-        points_m = leg_fit.points_of(np.concatenate([values[None], moved]), self._person)
+        points_m = leg_fit.points_of(np.concatenate([values[None], moved]), self.person)
         slopes = ((points_m[1:] - points_m[0]) / DIFFERENCE).reshape(DISTANCE, -1)
         variance = ((covariance[:DISTANCE, :DISTANCE] @ slopes) * slopes).sum(axis=0)
         variance = variance.reshape(6, 3).sum(axis=1)
