@@ -37,7 +37,9 @@ PITCH_RAD = float(np.radians(8.0))
 CAMERA = Camera(480, 640, 500.0, 500.0, 239.5, 319.5, PITCH_RAD)
 BODY = body_from_proportions(1.75, 3.0, hip_height_m=-0.5, camera_pitch_rad=PITCH_RAD)
 STATURE_M = stature_of(body_parts(BODY.sizes))
-STANDING = np.radians([2.0, 4.0, 0.0, 4.0] * 2)
+# The middle of the mass is 5 cm ahead of the ankles.
+STANDING = np.radians([-2.0, 4.0, 0.0, 4.0] * 2)
+SQUATTING = np.radians([75.0, 10.0, 0.0, 105.0] * 2)
 SITTING = np.radians([85.0, 10.0, 0.0, 88.0, 85.0, 8.0, 0.0, 88.0])
 # Thigh and shank between the points that detectors mark.
 THIGH_SHARE, SHANK_SHARE = 0.224, 0.220
@@ -225,6 +227,39 @@ def test_lengths_approach_those_that_are_seen_and_do_not_run_away() -> None:
     off = np.abs(np.array(lengths) - shares)
     assert (off[-1] < off[0]).all()
     assert np.ptp(lengths[150:], axis=0).max() < 0.005
+
+
+def middle_m(result: Estimate) -> float:
+    """The middle of the mass ahead of the ankles, with the shares of Winter's table 4.1."""
+    assert result.legs is not None and result.keypoints_m is not None
+    level = CAMERA.optical_to_reference(result.legs.points_m)[:, 0].reshape(2, 3).mean(axis=0)
+    shoulders = CAMERA.optical_to_reference(np.array(result.keypoints_m))[[0, 3], 0].mean()
+    hip, knee, _ = level - level[2]
+    upper = hip + 0.626 * (shoulders - level[0])
+    thigh, shank = hip + 0.433 * (knee - hip), 0.567 * knee
+    return float(0.678 * upper + 0.2 * thigh + 0.093 * shank)
+
+
+@pytest.mark.parametrize("first", [STANDING, None], ids=["stood before", "sits"])
+def test_the_mass_of_who_squats_is_over_the_feet(first: FloatArray | None) -> None:
+    """The hips are behind the feet as on a chair; only who stood before cannot sit there."""
+    reader, found = LegReader(BODY, CAMERA), estimate()
+    if first is not None:
+        for _ in range(5):
+            reader.see(frame(seen(joints_m(first, found), found)), found)
+    low = estimate((0.0, -0.45))
+    points = seen(joints_m(SQUATTING, low), low)
+    for _ in range(3):
+        result = reader.see(frame(points), low)
+    if first is None:
+        assert middle_m(result) < -0.12
+        return
+    pressed_m = middle_m(result)
+    assert pressed_m > -0.06
+    for _ in range(40):
+        # Nobody squats so long without a motion.
+        result = reader.see(frame(points), low)
+    assert middle_m(result) < pressed_m - 0.02
 
 
 def test_the_floor_shows_the_distance() -> None:
