@@ -169,15 +169,12 @@ sessions: setup
 # The evaluation reads one person.
 PEOPLE = $(filter-out $(DATA)/real_two_people,$(patsubst %/ground_truth.json,%,\
 	$(wildcard $(DATA)/real_gestures/*/ground_truth.json $(DATA)/real_*/ground_truth.json)))
-REPORT := docs/evaluation/real-people.md
 .PHONY: people
 people: export XDG_DATA_HOME := $(CURDIR)/$(VENV)/data
 people: setup $(VENV)/extras
 	@if [ -z "$(PEOPLE)" ]; then echo "skipped: no films of people in $(DATA)"; else \
 		$(BIN)/python -m lab.tools.people_sheet $(PEOPLE) --output docs/images/real-people.jpg; \
 		$(BIN)/cardbox evaluate --sessions $(PEOPLE) --detector none mediapipe --output docs/evaluation --force; \
-		$(BIN)/python -m lab.tools.real_report --session $(DATA)/real_signs --output $(REPORT) \
-			--sheet docs/images/real.jpg; \
 		$(FIGURES); fi
 
 # This compares shape and place with the truth where stature, distance or pitch is wrong.

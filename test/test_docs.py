@@ -13,6 +13,7 @@ from pathlib import Path
 import pytest
 
 from cardbox_tracker.commands.main import build_parser
+from cardbox_tracker.common.health import WATCHES
 
 ROOT = Path(__file__).parents[1]
 DOCUMENTS = sorted(
@@ -206,7 +207,7 @@ def key_words(text: str) -> set[str]:
 @cache
 def spoken() -> list[set[str]]:
     """Return the key words of each text in the code but docstrings."""
-    texts = []
+    texts = [watch.words for watch in WATCHES.values()]
     for path in sorted((ROOT / "cardbox_tracker").rglob("*.py")):
         tree = ast.parse(path.read_text(encoding="utf-8"))
         silent = {id(n.value) for n in ast.walk(tree) if isinstance(n, ast.Expr)}
@@ -244,7 +245,6 @@ def test_a_made_up_quote_would_be_noticed() -> None:
 def test_joint_limits_of_the_conventions_are_those_of_the_code() -> None:
     import numpy as np
 
-    from cardbox_tracker.person.hands import HANDS
     from cardbox_tracker.person.posture import TURNING_LIMITS, place_limits
     from cardbox_tracker.person.skeleton import (
         JOINT_NAMES,
@@ -262,8 +262,8 @@ def test_joint_limits_of_the_conventions_are_those_of_the_code() -> None:
     limits["torso_y"] = TURNING_LIMITS[0]
     limits |= dict(zip(PLACE_NAMES, place_limits(2.0), strict=True))
     limits |= dict(zip(NECK_NAMES, np.degrees(NECK_LIMITS), strict=True))
-    limits |= {joint.name: joint.limits for joint in joints_of(Group.CLAVICLES)}
-    limits |= {joint.name: np.degrees(joint.limits) for joint in HANDS}
+    limits |= {joint.name: joint.limits for joint in joints_of(Group.CLAVICLE)}
+    limits |= {joint.name: np.degrees(joint.limits) for joint in joints_of(Group.HAND)}
     assert len(rows) == 16
     for name, lowest, highest in rows:
         assert (float(lowest), float(highest)) == pytest.approx(tuple(limits[name])), name

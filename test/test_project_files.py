@@ -51,6 +51,20 @@ def test_ci_runs_its_script_on_the_python_of_jazzy_and_the_oldest() -> None:
         assert f'"Programming Language :: Python :: {version}"' in setup
 
 
+@pytest.mark.parametrize(
+    ("name", "value"), [("licence", "Apache-2.0"), ("ros", "Jazzy"), ("python", "3.11 to 3.14")]
+)
+def test_badges_say_what_package_xml_and_setup_py_say(name: str, value: str) -> None:
+    badge = ElementTree.parse(ROOT / "docs" / "images" / "badges" / f"{name}.svg").getroot()
+    assert any((text.text or "").endswith(value) for text in badge.iter())
+    said = (ROOT / "setup.py").read_text("utf-8") + (ROOT / "package.xml").read_text("utf-8")
+    if name == "python":
+        versions = re.findall(r"Python :: (3\.\d+)\"", said)
+        assert value == f"{versions[0]} to {versions[-1]}"
+    else:
+        assert re.search(value, said, re.IGNORECASE)
+
+
 @pytest.mark.parametrize("hook", hooks(), ids=lambda hook: hook["id"])
 def test_hooks_run_what_make_setup_installs(hook: dict[str, Any]) -> None:
     assert hook["language"] == "system"

@@ -10,12 +10,13 @@ from dataclasses import replace
 from typing import Any
 
 from cardbox_tracker.camera.camera import Calibration
-from cardbox_tracker.camera.camera_info import calibration_from_info, info_array, info_remark
+from cardbox_tracker.camera.camera_info import calibration_from_info, info_remark
 from cardbox_tracker.camera.zoom import ZoomWitness
 from cardbox_tracker.common.errors import CameraError
+from cardbox_tracker.common.health import WATCHES
 
-LASTING = 30
-"""A change is accepted after this many equal calibrations in a row, one or two seconds."""
+LASTING = round(WATCHES["other calibration"].limit) + 1
+"""A change is accepted after this many equal calibrations in a row."""
 
 # A remark is removed after this many valid calibrations.
 _REMEMBERED = 150
@@ -44,8 +45,6 @@ class CalibrationWatch:
         self._topic = topic
         self._image_topic = image_topic
         self._other: Calibration | None = None
-        # A driver sends the same with each image, so it is checked once.
-        self._content: tuple[Any, ...] = ()
         self._count = 0
         self._is_contradicted = False
         self._good = 0
@@ -55,10 +54,7 @@ class CalibrationWatch:
 
         Raises CameraError if the message is invalid and no valid one has arrived yet.
         """
-        self.seen, content = True, _content(message)
-        if self.current is not None and content == self._content:
-            self._back_to_good()
-            return False
+        self.seen = True
         try:
             calibration = calibration_from_info(message, self._image_topic, self._topic)
             calibration = replace(calibration, roll_rad=self._roll_rad)
@@ -73,24 +69,15 @@ class CalibrationWatch:
             )
             return False
         if self.current is not None and self.current.is_same(calibration):
-            self._content = content
             self._back_to_good()
             return False
         if self.current is not None and not self._lasts(calibration):
-            self._ignore(
-                f"the CameraInfo on {self._topic} has changed ({calibration} instead of "
-                f"{self.current}), but the images on {self._image_topic} have not, so it is wrong "
-                "and the one before is used: see who publishes it with 'ros2 topic info --verbose "
-                f"{self._topic}'; if the one before was wrong, start this node again"
-                if self._is_contradicted
-                else f"a CameraInfo on {self._topic} that differs from those before ({calibration} "
-                f"instead of {self.current}) is ignored; the background is kept. If the camera "
-                f"was really changed, it is followed after {LASTING} of them in a row; if not, "
-                f"see who publishes it: ros2 topic info --verbose {self._topic}"
-            )
+            name = "wrong calibration" if self._is_contradicted else "other calibration"
+            given = {"topic": self._topic, "image_topic": self._image_topic, "lasting": LASTING}
+            given |= {"other": calibration, "current": self.current}
+            self._ignore(WATCHES[name].words.format(**given))
             return False
         self.current, self._other, self._count = calibration, None, 0
-        self._content = content
         self.remark, self.doubt = "", info_remark(message, self._topic)
         return True
 
@@ -124,14 +111,3 @@ class CalibrationWatch:
             self.images.remember()
         if self._good >= _REMEMBERED:
             self.remark = ""
-
-
-def _content(message: Any) -> tuple[Any, ...]:
-    """Return what the calibration of a CameraInfo follows from."""
-    roi = message.roi
-    return (
-        *(info_array(message, name).tobytes() for name in ("k", "d", "p")),
-        *(message.header.frame_id, message.distortion_model, message.width, message.height),
-        *(message.binning_x, message.binning_y),
-        *(roi.x_offset, roi.y_offset, roi.width, roi.height),
-    )

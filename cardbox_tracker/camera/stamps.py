@@ -6,17 +6,17 @@ tracking with every image.
 
 from __future__ import annotations
 
-from bisect import insort
 from collections import Counter, deque
 from collections.abc import Iterable
 from enum import Enum
+from statistics import median_low
+
+from cardbox_tracker.common.health import WATCHES
 
 WINDOW = 120
 _PAUSE_NS = 2_000_000_000
 # The network does not reorder messages over this time, so the source was restarted.
 _RESTART_NS = 1_000_000_000
-# A clock that is set forward by more, while the recorder's goes on.
-_CLOCK_SET_NS = 10_000_000_000
 # After this many consecutive images of one clock the other clock is forgotten.
 _PATIENCE = 5
 # The period is known from this number of spacings on.
@@ -42,6 +42,15 @@ class StampOrder(Enum):
     def is_usable(self) -> bool:
         """Whether the image can be processed as the next one."""
         return self not in (StampOrder.LATE, StampOrder.REPEATED, StampOrder.FOREIGN)
+
+
+_FAULTS = {
+    StampOrder.UNSTAMPED: WATCHES["stamps that are zero"],
+    StampOrder.REPEATED: WATCHES["stamps that repeat"],
+    StampOrder.FOREIGN: WATCHES["stamps of two clocks"],
+    StampOrder.LATE: WATCHES["stamps that are late"],
+    StampOrder.RESTART: WATCHES["stamps that go back"],
+}
 
 
 class StampSequence:
@@ -121,9 +130,6 @@ class StreamStatistics:
         self._sequence = StampSequence()
         self._last_ns: int | None = None
         self._spacings_ns: deque[int] = deque()
-        # A low spacing of each group, since the period is needed with every image.
-        self._group_ns: list[int] = []
-        self._low_ns: deque[int] = deque(maxlen=WINDOW // _GROUP)
         self._latest: deque[StampOrder] = deque(maxlen=remembered)
 
     def add(self, stamp_ns: int) -> StampOrder:
@@ -138,21 +144,11 @@ class StreamStatistics:
         if order is StampOrder.RESTART:
             self._dropped_before = self.dropped
             self._spacings_ns.clear()
-            self._low_ns.clear()
-            self._group_ns.clear()
         elif order is StampOrder.NEXT and last_ns is not None:
-            self._note(stamp_ns - last_ns)
+            if len(self._spacings_ns) == WINDOW:
+                self._dropped_before += self._lost_in([self._spacings_ns.popleft()])
+            self._spacings_ns.append(stamp_ns - last_ns)
         return order
-
-    def _note(self, spacing_ns: int) -> None:
-        if len(self._spacings_ns) == WINDOW:
-            self._dropped_before += self._lost_in([self._spacings_ns.popleft()])
-        self._spacings_ns.append(spacing_ns)
-        if len(self._group_ns) % _GROUP == 0:
-            self._group_ns.clear()
-            self._low_ns.append(spacing_ns)
-        insort(self._group_ns, spacing_ns)
-        self._low_ns[-1] = self._group_ns[min(1, len(self._group_ns) - 1)]
 
     @property
     def dropped(self) -> int:
@@ -176,7 +172,9 @@ class StreamStatistics:
     @property
     def period_ns(self) -> int:
         """Spacing of the stamps without losses, ns: a low one, as most images may be lost."""
-        return sorted(self._low_ns)[(len(self._low_ns) - 1) // 2] if self._low_ns else 0
+        known = [*self._spacings_ns]
+        groups = [sorted(known[at : at + _GROUP]) for at in range(0, len(known), _GROUP)]
+        return median_low(group[:2][-1] for group in groups) if groups else 0
 
     @property
     def loss(self) -> float:
@@ -188,57 +186,29 @@ class StreamStatistics:
 
     def remarks(self) -> dict[str, str]:
         """Return texts on faults of the latest stamps by kind; a single late image is no fault."""
-        texts = {}
-        latest = Counter(self._latest)
-        count = len(self._latest)
+        latest, of = Counter(self._latest), len(self._latest)
         # All images of a recording count, and of a stream only what happens often.
-        most, most_restarts = (0, 0) if self._latest.maxlen is None else (count // 10 + 1, 2)
-        if latest[StampOrder.UNSTAMPED]:
-            texts["stamps that are zero"] = (
-                "the images have no stamp (it is zero), so they are used in the order of arrival "
-                "and losses are not seen; set header.stamp in the camera's driver"
-            )
-        if latest[StampOrder.REPEATED] > most:
-            texts["stamps that repeat"] = (
-                f"{latest[StampOrder.REPEATED]} of the latest {count} images repeat the stamp of "
-                "the one before and are left out; does the driver send them twice, or are there "
-                "two publishers?"
-            )
-        if latest[StampOrder.FOREIGN]:
-            texts["stamps of two clocks"] = (
-                "the stamps jump to and fro between two times, and images of one of them are left "
-                "out; expected one camera with one clock: see 'ros2 topic info --verbose'"
-            )
-        if latest[StampOrder.LATE] > most:
-            texts["stamps that are late"] = (
-                f"{latest[StampOrder.LATE]} of the latest {count} images have stamps that go back "
-                "by less than a second and are left out; are images sent twice, or is a recording "
-                "played in a loop?"
-            )
-        if latest[StampOrder.RESTART] > most_restarts:
-            texts["stamps that go back"] = (
-                f"the stamps of the latest {count} images went back {latest[StampOrder.RESTART]} "
-                "times by more than a second, and tracking started again each time; is "
-                "the clock of the camera's computer being set, or a recording played in a loop?"
-            )
-        return texts
+        is_recording = self._latest.maxlen is None
+        return {
+            watch.name: watch.words.format(value=latest[order], of=of)
+            for order, watch in _FAULTS.items()
+            if watch.is_beyond(latest[order]) or (is_recording and latest[order])
+        }
 
 
 # A burst begins with an image that is so much later, after its stamp, than those before it.
 _HELD_BACK_S = 0.3
 # Stamps of one burst lie within this share of the time to the next, if they are of the arrival.
 _MOMENT = 0.05
-# So many bursts within this time are told.
-_BURSTS, _BURSTS_WITHIN_S = 3, 10.0
-# Stamps that are farther ahead of this computer's clock are of another one.
-_AHEAD_S = 1.0
+# Time for which a burst counts.
+_BURSTS_WITHIN_S = 10.0
 
 
 class ArrivalWatch:
     """Tells images that arrive in bursts, and stamps in the future, of a live stream."""
 
     def __init__(self) -> None:
-        self._bursts_s: deque[float] = deque(maxlen=_BURSTS)
+        self._bursts_s: deque[float] = deque(maxlen=round(WATCHES["bursts"].limit) + 1)
         # Least and largest delay since the last burst has begun.
         self._delays_s = float("inf"), -float("inf")
         # Stamps since the last gap: the first one, the last one.
@@ -282,22 +252,13 @@ class ArrivalWatch:
 
     def remarks(self) -> dict[str, str]:
         """Return texts on the latest messages by kind."""
-        texts, recent_s = {}, self._recent_s
-        if len(recent_s) == _BURSTS:
-            period_s = (recent_s[-1] - recent_s[0]) / (_BURSTS - 1)
-            texts["bursts"] = (
-                f"the images arrive in bursts, one every {period_s:.1f} s, so results come "
-                "late and most images are left out: the driver or the network holds them back; "
-                "connect the camera by cable, switch the power saving of Wi-Fi off, or let the "
-                "driver send each image at once"
-            )
-        if self._ahead_s > _AHEAD_S:
-            texts["stamps ahead"] = (
-                f"the stamps are {self._ahead_s:.1f} s ahead of this computer's clock, so whoever "
-                "looks up TF at them waits: synchronize the clocks of the camera's computer and of "
-                "this one, for example with chrony"
-            )
-        return texts
+        recent_s = self._recent_s
+        period_s = (recent_s[-1] - recent_s[0]) / max(len(recent_s) - 1, 1) if recent_s else 0.0
+        found = {
+            "bursts": WATCHES["bursts"].remark(len(recent_s), period_s=period_s),
+            "stamps ahead": WATCHES["stamps ahead"].remark(self._ahead_s),
+        }
+        return {kind: text for kind, text in found.items() if text}
 
 
 class RecordedStamps:
@@ -314,7 +275,7 @@ class RecordedStamps:
         self.statistics = StreamStatistics(remembered=None)
         self._last: tuple[int, int] | None = None
         self._ahead_ns = 0
-        self._jump_ns = 0
+        self._jump_s = 0.0
 
     def add(self, stamp_ns: int, recorded_ns: int) -> int | None:
         """Return the time of the next message, ns, by its stamp (0: none); None to leave it out."""
@@ -326,9 +287,10 @@ class RecordedStamps:
         is_back = is_unstamped or order is StampOrder.RESTART
         before_ns, recorded_before_ns = self._last or (time_ns, recorded_ns)
         ahead_ns, waited_ns = time_ns - before_ns, recorded_ns - recorded_before_ns
-        is_set = not is_unstamped and ahead_ns - waited_ns > _CLOCK_SET_NS and waited_ns < _PAUSE_NS
+        jump_s = 0.0 if is_unstamped or waited_ns >= _PAUSE_NS else (ahead_ns - waited_ns) / 1e9
+        is_set = WATCHES["clock set"].is_beyond(jump_s)
         if is_set:
-            self._jump_ns = self._jump_ns or ahead_ns - waited_ns
+            self._jump_s = self._jump_s or jump_s
         if self._last is not None and (is_back or is_set or time_ns <= before_ns):
             time_ns = before_ns + max(waited_ns, 1)
             if not is_unstamped:
@@ -338,11 +300,5 @@ class RecordedStamps:
 
     def remarks(self) -> list[str]:
         """Return texts on all faults, as :meth:`StreamStatistics.remarks`."""
-        found = [*self.statistics.remarks().values()]
-        if self._jump_ns:
-            found.append(
-                f"the stamps jump forward by {self._jump_ns / 1e9:.0f} s while the recorder's "
-                "clock goes on: the clock of the camera's computer was set. Times go on with the "
-                "recorder's clock"
-            )
-        return found
+        jump = WATCHES["clock set"].remark(self._jump_s)
+        return [*self.statistics.remarks().values(), *([jump] if jump else [])]

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from cardbox_tracker.camera.camera import Calibration
 from cardbox_tracker.camera.encodings import brightness_of
+from cardbox_tracker.common.health import WATCHES
 
 FloatImage = NDArray[np.float32]
 
@@ -21,8 +22,8 @@ FloatImage = NDArray[np.float32]
 _WIDTH, _BLUR_PX = 96, 4.0
 # A change that moves no corner of a copy by more is as small as by an autofocus, px.
 _LEAST_PX = 2.0
-# Correlation of images that are the same but for people and noise, and what the other lacks.
-_SAME, _BETTER = 0.3, 0.1
+# Correlation of images that are the same but for people and noise.
+_SAME = 0.3
 # Pixels at the edge of a scaled copy are made up.
 _EDGE = np.ones((9, 9), np.uint8)
 # Copies from before a change, in which a driver may have zoomed before it said so.
@@ -60,7 +61,8 @@ class ZoomWitness:
         step = _scaled_less_same(self._before, self._after, old, new)
         now = _copy(self._newest[-1])
         since = [_scaled_less_same(one, now, old, new) for one in self._earlier]
-        return step < -_BETTER and not (since and min(since) > _BETTER)
+        wrong = WATCHES["wrong calibration"]
+        return wrong.is_beyond(-step) and not (since and wrong.is_beyond(min(since)))
 
 
 def _copy(image: NDArray[np.uint8]) -> FloatImage:

@@ -5,17 +5,20 @@ from __future__ import annotations
 import argparse
 import math
 import os
+import re
 import sys
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import suppress
-from dataclasses import fields
+from dataclasses import MISSING, Field, dataclass, field, fields
+from inspect import cleandoc
 from itertools import chain
+from operator import index
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any, ClassVar, Self, TypeVar
 
 from cardbox_tracker.common.errors import CardboxError, plain
 from cardbox_tracker.common.files import check_writable, is_written_in_place
-from cardbox_tracker.common.settings import settings_of
+from cardbox_tracker.common.settings import Setting, check
 
 if TYPE_CHECKING:
     from cardbox_tracker.recordings.result_reader import Results
@@ -23,48 +26,53 @@ if TYPE_CHECKING:
 
 T = TypeVar("T")
 
-REFERENCES = {
-    "front": "faces the camera, arms hanging 20 degrees away from the body",
-    "side": "stands the same, turned by 90 degrees",
-    "arms": "faces the camera, both arms stretched sideways, hands open",
-}
-"""Reference postures by name, with the description for the person."""
-
 
 def parsed(
-    kind: Callable[[str], T], expected: str, is_right: Callable[[T], bool] = lambda _: True
-) -> Callable[[str], T]:
-    """Return a parser of ``kind`` that raises ArgumentTypeError unless the value ``is_right``."""
+    kind: Callable[[Any], T], expected: str, is_right: Callable[[T], bool] = lambda _: True
+) -> Callable[[Any], T]:
+    """Return a reader of texts, and of values of Python, by ``kind``.
 
-    def parse(text: str) -> T:
-        with suppress(ValueError):
-            value = kind(text)
-            if is_right(value):
+    It raises ArgumentTypeError unless the value ``is_right``.
+    """
+
+    def read(given: Any) -> T:
+        with suppress(ValueError, TypeError, OverflowError):
+            value = kind(given)
+            if is_right(value) and not isinstance(given, bool):
                 return value
-        raise argparse.ArgumentTypeError(f"expected {expected}, got {text!r}")
+        raise argparse.ArgumentTypeError(f"expected {expected}, got {given!r}")
 
-    return parse
+    return read
 
 
-def _span(text: str) -> TimeSpan:
+def _span(given: str | Iterable[float]) -> TimeSpan:
     from cardbox_tracker.recordings.silhouettes import TimeSpan
 
-    return TimeSpan.parse(text)
+    return TimeSpan.parse(given if isinstance(given, str) else ":".join(map(str, given)))
 
 
 span = parsed(_span, "T0:T1, seconds from the start of the recording with T0 before T1")
-"""Parser of a span ``T0:T1``."""
+"""Reader of a span ``T0:T1``, or of its two times."""
 time = parsed(float, "seconds from the start of the recording", lambda one: 0.0 <= one < math.inf)
-"""Parser of a time."""
+"""Reader of a time."""
+number = parsed(float, "a number")
+"""Reader of a number."""
+path = parsed(Path, "a path")
+"""Reader of a path."""
 
 
-def at_least(lowest: int) -> Callable[[str], int]:
-    """Return a parser of whole numbers of ``lowest`` or more."""
-    return parsed(int, f"a whole number of {lowest} or more", lambda one: one >= lowest)
+def whole(given: Any) -> int:
+    """Return a whole number, or raise ValueError or TypeError."""
+    return int(given) if isinstance(given, str) else index(given)
 
 
-def between(lowest: float, highest: float) -> Callable[[str], float]:
-    """Return a parser of numbers in a range, 0 excluded if it is the lowest."""
+def at_least(lowest: int) -> Callable[[Any], int]:
+    """Return a reader of whole numbers of ``lowest`` or more."""
+    return parsed(whole, f"a whole number of {lowest} or more", lambda one: one >= lowest)
+
+
+def between(lowest: float, highest: float) -> Callable[[Any], float]:
+    """Return a reader of numbers in a range, 0 excluded if it is the lowest."""
     least = "above" if lowest == 0.0 else "from"
     return parsed(
         float,
@@ -73,101 +81,171 @@ def between(lowest: float, highest: float) -> Callable[[str], float]:
     )
 
 
-def add_references(parser: argparse.ArgumentParser) -> None:
-    """Add the spans of the reference postures, and ``--side-turn``."""
-    from cardbox_tracker.person.posture import SIDE_TURNS
-
-    for name, posture in REFERENCES.items():
-        parser.add_argument(
-            f"--{name}",
-            type=span,
-            required=True,
-            metavar="T0:T1",
-            help=f"seconds during which the person {posture}",
-        )
-    parser.add_argument(
-        "--side-turn",
-        choices=SIDE_TURNS,
-        default="left",
-        help="which way the person turns for --side, as they see it",
-    )
+camera_count = parsed(whole, "a number from 1 to 4", lambda one: 1 <= one <= 4)
+"""Reader of a number of cameras."""
 
 
-def add_preset(parser: argparse.ArgumentParser) -> None:
-    """Add ``--preset``, a name of ``search.config.PRESETS``."""
-    from cardbox_tracker.search.config import PRESETS
-
-    parser.add_argument(
-        "--preset",
-        choices=PRESETS,
-        default="default",
-        help="tracker settings: paper is Table I of the paper, default tracks best",
-    )
+def one_of(names: Iterable[str]) -> Callable[[Any], Any]:
+    """Return a reader of one of several texts."""
+    return parsed(str, f"one of {', '.join(names)}", lambda one: one in names)
 
 
-def add_seed(parser: argparse.ArgumentParser, what: str) -> None:
-    """Add ``--seed``; ``what`` names the random numbers that it determines."""
-    parser.add_argument("--seed", type=at_least(0), default=0, help=f"random seed of {what}")
+def _switch(given: Any) -> bool:
+    if isinstance(given, bool):
+        return given
+    raise argparse.ArgumentTypeError(f"expected True or False, got {given!r}")
 
 
-def add_camera_count(parser: argparse.ArgumentParser, several: str) -> None:
-    """Add ``--cameras``, a number; ``several`` describes the purpose of more than one."""
-    parser.add_argument(
-        "--cameras",
-        type=int,
-        choices=range(1, 5),
-        default=1,
-        metavar="N",
-        help=f"1 to 4; {several}",
-    )
+# Readers by the types of fields.
+_READERS: dict[str, Callable[[Any], Any]] = {
+    "Path": path,
+    "float": number,
+    "str": str,
+    "bool": _switch,
+}
 
 
-def add_camera_pitch(parser: argparse.ArgumentParser, found: str = "") -> None:
-    """Add ``--camera-pitch-deg``, None by default if ``found`` says how it is found, else 0."""
-    text = "positive when the camera looks down"
-    parser.add_argument(
-        "--camera-pitch-deg",
-        type=float,
-        default=None if found else 0.0,
-        metavar="P",
-        help=f"{text} (default: {found})" if found else text,
-    )
+def option(
+    metavar: str | None = None,
+    read: Callable[[Any], Any] | None = None,
+    default: Any = None,
+    flag: str = "",
+    **words: Any,
+) -> Any:
+    """Return a field of :class:`Options`.
+
+    ``read`` returns the value of a text, or of what Python gives; without it, the field's type
+    tells. MISSING is no default; ``flag`` is the option if it has not the name of the field, and
+    without hyphens a place. The rest are arguments of ``add_argument``, such as the ``type`` of one
+    of several words.
+    """
+    words = {"metavar": metavar, **words}
+    return field(default=default, metadata={"words": words, "read": read, "flag": flag})
 
 
-def add_settings(parser: argparse.ArgumentParser, kind: Any, title: str) -> None:
-    """Add an option, a switch for a bool, for each setting of ``kind``, below ``title``."""
-    group = parser.add_argument_group(title)
-    defaults = {entry.name: entry.default for entry in fields(kind)}
-    for name, setting in settings_of(kind).items():
-        flag, default = f"--{name.replace('_', '-')}", defaults[name]
-        text = setting.description.replace("%", "%%")
+def choice(names: Iterable[str], **given: Any) -> Any:
+    """Return a field of :class:`Options` for one of several texts."""
+    return option(f"{{{','.join(names)}}}", one_of(names), **given)
+
+
+@dataclass(frozen=True)
+class Options:
+    """Base of the dataclasses whose fields are options: made by :func:`option`, or settings.
+
+    What the docstring says of an attribute is also the help of its option. Python may give a value
+    as it is typed, too. Raises CardboxError if one is wrong.
+    """
+
+    #: heading of the settings, or of the fields of the class itself
+    group: ClassVar[str] = ""
+
+    def __post_init__(self) -> None:
+        """Read the values; None stands for the default."""
+        for entry in fields(self):
+            given = getattr(self, entry.name)
+            value = entry.default if given is None else given
+            if value is not entry.default and "read" in entry.metadata:
+                try:
+                    value = _reader(entry)(given)
+                except argparse.ArgumentTypeError as error:
+                    raise CardboxError(f"argument {_flag(entry)}: {error}") from None
+            object.__setattr__(self, entry.name, value)
+        try:
+            check(self)
+        except ValueError as error:
+            name, _, rest = str(error).partition(" ")
+            raise CardboxError(f"--{name.replace('_', '-')} {rest}") from None
+
+    @classmethod
+    def of(cls, options: argparse.Namespace) -> Self:
+        """Return the values of :func:`add_options`."""
+        return cls(**{entry.name: getattr(options, entry.name) for entry in fields(cls)})
+
+    def given(self) -> dict[str, Any]:
+        """Return the values that are not the default, by their options."""
+        values = ((entry, getattr(self, entry.name)) for entry in fields(self))
+        return {_flag(entry): value for entry, value in values if value != entry.default}
+
+
+def _helps(kind: type[Options]) -> dict[str, str]:
+    """Return what the docstrings of a class and of its bases say of each attribute."""
+    texts = "\n".join(cleandoc(each.__doc__ or "") for each in reversed(kind.__mro__))
+    found = re.findall(r"(?m)^    (\w+): (.*(?:\n {8}.*)*)", texts)
+    return {name: " ".join(text.split()) for name, text in found}
+
+
+def _flag(entry: Field[Any]) -> str:
+    flag: str = entry.metadata.get("flag") or f"--{entry.name.replace('_', '-')}"
+    return entry.name if entry.default is MISSING else flag
+
+
+def _reader(entry: Field[Any]) -> Callable[[Any], Any]:
+    found: Callable[[Any], Any] | None = entry.metadata["read"]
+    return _READERS[str(entry.type).removesuffix(" | None")] if found is None else found
+
+
+def _words_of(one: Setting, default: Any) -> dict[str, Any]:
+    unit = f" [{one.unit}]" if one.unit else ""
+    text = one.description.replace("%", "%%") + unit
+    if one.choices:
+        return {"help": text, "choices": one.choices}
+    allowed = f"; {one.range_text}" if one.range_text else ""
+    return {"help": f"{text}{allowed}", "type": type(default), "metavar": "N"}
+
+
+def add_options(parser: argparse.ArgumentParser, kind: type[Options], *names: str) -> None:
+    """Add an option to a parser for each field of ``kind``, or for those with these names."""
+    helps, group = _helps(kind), parser.add_argument_group(kind.group) if kind.group else parser
+    for entry in fields(kind):
+        if names and entry.name not in names:
+            continue
+        flag, default, words = _flag(entry), entry.default, dict[str, Any]()
+        if flag.startswith("-"):
+            words = {"dest": entry.name, "default": None if default == () else default}
+        if (one := entry.metadata.get("setting")) is not None:
+            words |= _words_of(one, default)
+        else:
+            words |= {"type": _reader(entry), "help": helps.get(entry.name)}
+            words |= entry.metadata["words"]
         if isinstance(default, bool):
-            group.add_argument(flag, action="store_true", help=text)
-            continue
-        unit = f" [{setting.unit}]" if setting.unit else ""
-        if setting.choices:
-            group.add_argument(flag, choices=setting.choices, default=default, help=text)
-            continue
-        allowed = f"; {setting.range_text}" if setting.range_text else ""
-        group.add_argument(
-            flag, type=type(default), default=default, metavar="N", help=f"{text}{unit}{allowed}"
-        )
+            action = "store_false" if default else "store_true"
+            words = {"dest": entry.name, "help": words["help"], "action": action}
+        is_own = one is not None or entry.name in vars(kind)
+        (group if is_own else parser).add_argument(flag, **words)
 
 
-def settings_from(options: argparse.Namespace, kind: type[T]) -> T:
-    """Return the settings of the dataclass ``kind`` from the options of :func:`add_settings`."""
-    try:
-        return kind(**{name: getattr(options, name) for name in settings_of(kind)})
-    except ValueError as error:
-        name, _, rest = str(error).partition(" ")
-        raise CardboxError(f"--{name.replace('_', '-')} {rest}") from None
+@dataclass(frozen=True, kw_only=True)
+class Written(Options):
+    """A command that writes results.
+
+    Attributes:
+        force: replace results that exist; without it, refuse
+    """
+
+    force: bool = option(default=False)
 
 
-def add_force(parser: argparse.ArgumentParser) -> None:
-    """Add ``--force``."""
-    parser.add_argument(
-        "--force", action="store_true", help="replace results that exist; without it, refuse"
-    )
+@dataclass(frozen=True, kw_only=True)
+class TrackedResults(Options):
+    """Results of tracking.
+
+    Attributes:
+        results: table of 'cardbox track' (CSV or Parquet), or its bag
+        person: results of several people: the number of the person (default: 1)
+    """
+
+    results: Path = option("RESULTS", default=MISSING)
+    person: int | None = option("K", at_least(1))
+
+    def read(self) -> Results:
+        """Return the results of the person, or of the first one of several, which is said."""
+        from cardbox_tracker.recordings.result_reader import read_results
+
+        results = read_results(self.results, self.person)
+        if results.has_others and self.person is None:
+            told = "has several people: person 1 is used; --person K gives another"
+            print_remarks([f"{self.results} {told}"])
+        return results
 
 
 def check_outputs(
@@ -221,32 +299,6 @@ def _is_same(path: Path, other: Path) -> bool:
         return os.path.samefile(path, other)
     except OSError:
         return False
-
-
-def add_results(parser: argparse.ArgumentParser) -> None:
-    """Add ``RESULTS``, and ``--person``, the number of one of several people in them."""
-    parser.add_argument(
-        "results",
-        type=Path,
-        metavar="RESULTS",
-        help="table of 'cardbox track' (CSV or Parquet), or its bag",
-    )
-    parser.add_argument(
-        "--person",
-        type=at_least(1),
-        metavar="K",
-        help="results of several people: the number of the person (default: 1)",
-    )
-
-
-def results_of(path: Path, person: int | None) -> Results:
-    """Return the results of a person, or of the first one of several, which is said."""
-    from cardbox_tracker.recordings.result_reader import read_results
-
-    results = read_results(path, person)
-    if results.has_others and person is None:
-        print_remarks([f"{path} has several people: person 1 is used; --person K gives another"])
-    return results
 
 
 def print_remarks(*remarks: Iterable[str]) -> None:

@@ -2,63 +2,49 @@
 
 from __future__ import annotations
 
-import argparse
 import math
+from dataclasses import dataclass
 from pathlib import Path
 
-from cardbox_tracker.commands.arguments import add_camera_pitch, add_force, check_outputs
+from cardbox_tracker.commands.arguments import Written, check_outputs, option
+from cardbox_tracker.person.model import body_from_proportions
+from cardbox_tracker.person.model_file import save_body_model
 
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the arguments of ``cardbox body``."""
-    parser.add_argument(
-        "--stature",
-        type=float,
-        required=True,
-        metavar="M",
-        help="height of the person, metres, crown to floor",
-    )
-    parser.add_argument(
-        "--distance",
-        type=float,
-        metavar="M",
-        help="from the camera to the person, metres along the floor; without it, it is found from "
-        "the first silhouette, to about a fifth",
-    )
-    parser.add_argument(
-        "--shoulder-breadth",
-        type=float,
-        metavar="M",
-        help="between the shoulder joints, metres; by default it is fitted to the first "
-        "silhouette, like all other breadths",
-    )
-    parser.add_argument(
-        "--hip-height",
-        type=float,
-        metavar="M",
-        help="of the middle of the hips above the camera's centre, metres, negative below it; "
-        "by default it is fitted to the first silhouette",
-    )
-    add_camera_pitch(parser)
-    parser.add_argument(
-        "--output", type=Path, required=True, metavar="MODEL.yaml", help="body model to write"
-    )
-    add_force(parser)
+@dataclass(frozen=True, kw_only=True)
+class Arguments(Written):
+    """A person of a stature.
+
+    Attributes:
+        stature_m: height of the person, metres, crown to floor
+        distance_m: from the camera to the person, metres along the floor; without it, it is found
+            from the first silhouette, to about a fifth
+        shoulder_breadth_m: between the shoulder joints, metres; by default it is fitted to the
+            first silhouette, like all other breadths
+        hip_height_m: of the middle of the hips above the camera's centre, metres, negative below
+            it; by default it is fitted to the first silhouette
+        camera_pitch_deg: positive when the camera looks down
+        output: body model to write
+    """
+
+    stature_m: float = option("M", flag="--stature", required=True)
+    distance_m: float | None = option("M", flag="--distance")
+    shoulder_breadth_m: float | None = option("M", flag="--shoulder-breadth")
+    hip_height_m: float | None = option("M", flag="--hip-height")
+    camera_pitch_deg: float = option("P", default=0.0)
+    output: Path = option("MODEL.yaml", required=True)
 
 
-def run(options: argparse.Namespace) -> None:
+def run(given: Arguments) -> None:
     """Write the body model and print its sizes."""
-    from cardbox_tracker.person.model_file import save_body_model
-    from cardbox_tracker.person.proportions import body_from_proportions
-
-    check_outputs((options.output,), options.force)
+    check_outputs((given.output,), given.force)
     body = body_from_proportions(
-        options.stature,
-        options.distance,
-        options.shoulder_breadth,
-        options.hip_height,
-        math.radians(options.camera_pitch_deg),
+        given.stature_m,
+        given.distance_m,
+        given.shoulder_breadth_m,
+        given.hip_height_m,
+        math.radians(given.camera_pitch_deg),
     )
-    save_body_model(body, options.output)
+    save_body_model(body, given.output)
     print(body)
-    print(f"wrote {options.output}")
+    print(f"wrote {given.output}")

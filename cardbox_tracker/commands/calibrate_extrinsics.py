@@ -2,93 +2,62 @@
 
 from __future__ import annotations
 
-import argparse
 import math
+from dataclasses import MISSING, dataclass
 from pathlib import Path
 
-from cardbox_tracker.commands.arguments import (
-    REFERENCES,
-    add_camera_pitch,
-    add_force,
-    add_references,
-    add_seed,
-    check_outputs,
-    span,
-)
-from cardbox_tracker.commands.initialize import measuring_config
+from cardbox_tracker.commands.arguments import check_outputs, option, span
+from cardbox_tracker.commands.initialize import References, measuring_config
+from cardbox_tracker.recordings.silhouettes import TimeSpan
 
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the arguments of ``cardbox calibrate-extrinsics``."""
-    parser.add_argument(
-        "recording", type=Path, metavar="BAG", help="rosbag2 folder or file of all cameras"
-    )
-    parser.add_argument(
-        "--background",
-        type=span,
-        required=True,
-        metavar="T0:T1",
-        help="seconds during which nobody is in view",
-    )
-    parser.add_argument(
-        "--cameras",
-        nargs="+",
-        required=True,
-        metavar="NAMESPACE",
-        help="cameras of the recording that see the person, such as cam0 cam1, the one that the "
-        "person faced first",
-    )
-    add_references(parser)
-    parser.add_argument(
-        "--motion",
-        type=span,
-        required=True,
-        metavar="T0:T1",
-        help="seconds in which the person moves, at first standing as for --front; 10 s or more "
-        "in which the arms are raised and the person turns and steps about",
-    )
-    parser.add_argument(
-        "--distance",
-        type=float,
-        required=True,
-        metavar="M",
-        help="from the first camera to the person, metres along the floor; distances between the "
-        "cameras are proportional to it",
-    )
-    add_camera_pitch(parser)
-    add_seed(parser, "the hypotheses and the filter")
-    parser.add_argument(
-        "--output",
-        type=Path,
-        required=True,
-        metavar="EXTRINSICS.yaml",
-        help="camchain as of Kalibr to write, for --extrinsics",
-    )
-    add_force(parser)
+@dataclass(frozen=True, kw_only=True)
+class Arguments(References):
+    """A recording of the reference postures, and of a motion, by several cameras.
+
+    Attributes:
+        recording: rosbag2 folder or file of all cameras
+        background: seconds during which nobody is in view
+        cameras: cameras of the recording that see the person, such as cam0 cam1, the one that the
+            person faced first
+        motion: seconds in which the person moves, at first standing as for --front; 10 s or more in
+            which the arms are raised and the person turns and steps about
+        distance_m: from the first camera to the person, metres along the floor; distances between
+            the cameras are proportional to it
+        seed: random seed of the hypotheses and the filter
+        output: camchain as of Kalibr to write, for --extrinsics
+    """
+
+    recording: Path = option("BAG", default=MISSING)
+    background: TimeSpan = option("T0:T1", span, required=True)
+    cameras: tuple[str, ...] = option("NAMESPACE", tuple, type=str, nargs="+", required=True)
+    motion: TimeSpan = option("T0:T1", span, required=True)
+    distance_m: float = option("M", flag="--distance", required=True)
+    camera_pitch_deg: float = option("P", default=0.0)
+    output: Path = option("EXTRINSICS.yaml", required=True)
 
 
-def run(options: argparse.Namespace) -> None:
+def run(given: Arguments) -> None:
     """Estimate the extrinsics, write them and print their uncertainty."""
     from cardbox_tracker.camera.extrinsics_files import save_camchain
     from cardbox_tracker.common.progress import progress_bar
     from cardbox_tracker.recordings.calibrate import calibrate_recording
 
-    check_outputs((options.output,), options.force, inputs=(options.recording,))
-    pitch_rad = math.radians(options.camera_pitch_deg)
-    config = measuring_config(options, options.distance, pitch_rad)
-    references = {name: getattr(options, name) for name in REFERENCES}
+    check_outputs((given.output,), given.force, inputs=(given.recording,))
+    pitch_rad = math.radians(given.camera_pitch_deg)
+    config = measuring_config(given, given.distance_m, pitch_rad)
     with progress_bar("calibrate") as show:
         result = calibrate_recording(
-            options.recording,
-            options.cameras,
-            options.background,
-            references,
-            options.motion,
+            given.recording,
+            given.cameras,
+            given.background,
+            given.spans,
+            given.motion,
             config,
             show,
         )
     found = {name: camera.extrinsics for name, camera in result.found.items()}
-    save_camchain(options.output, result.cameras, found)
+    save_camchain(given.output, result.cameras, found)
     for name, camera in result.found.items():
         print(f"{name}: {camera}")
-    print(f"wrote {options.output}")
+    print(f"wrote {given.output}")

@@ -2,17 +2,24 @@
 
 from __future__ import annotations
 
-import argparse
+from dataclasses import MISSING, dataclass
 
+from cardbox_tracker.commands.arguments import Options, option
 from cardbox_tracker.common.errors import RosMissingError
 
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the arguments of ``cardbox call``."""
-    parser.add_argument("service", metavar="SERVICE", help="such as initializer/initialize")
+@dataclass(frozen=True)
+class Arguments(Options):
+    """A service of the running nodes.
+
+    Attributes:
+        service: such as initializer/initialize
+    """
+
+    service: str = option("SERVICE", default=MISSING)
 
 
-def run(options: argparse.Namespace) -> None:
+def run(given: Arguments) -> None:
     """Call the service and print its answer."""
     try:
         from cardbox_tracker.ros.runtime.call import call_service
@@ -24,7 +31,7 @@ def run(options: argparse.Namespace) -> None:
         said.append(text)
         print(text, flush=True)
 
-    answer = call_service(options.service, say)
+    answer = call_service(given.service, say)
     # Some answers repeat the last status of a node.
     if answer != said[-1]:
         print(answer)

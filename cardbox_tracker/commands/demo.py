@@ -2,82 +2,77 @@
 
 from __future__ import annotations
 
-import argparse
 import json
+from dataclasses import dataclass
 from pathlib import Path
 
-from cardbox_tracker.commands.arguments import add_camera_count, add_preset, add_seed
+from cardbox_tracker.commands.arguments import Options, at_least, camera_count, choice, option
+from cardbox_tracker.commands.request import Request
 from cardbox_tracker.common.errors import CardboxError, RosMissingError
 from cardbox_tracker.common.files import make_folder, write_file
+from cardbox_tracker.search.config import PRESETS
 
 _PRESET = "default"
 
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the arguments of ``cardbox demo``."""
-    parser.add_argument(
-        "--output", type=Path, default=Path("demo_output"), metavar="DIR", help="folder of results"
-    )
-    parser.add_argument(
-        "--live",
-        action="store_true",
-        help="with ROS 2: run the whole chain through the nodes, on a synthetic recording",
-    )
-    add_preset(parser)
-    add_camera_count(parser, "with --live; several see the person together, with default")
-    add_seed(parser, "the recording and the filters")
+@dataclass(frozen=True)
+class Arguments(Options):
+    """The film, or the nodes.
+
+    Attributes:
+        output: folder of results
+        live: with ROS 2: run the whole chain through the nodes, on a synthetic recording
+        preset: tracker settings: paper is Table I of the paper, default tracks best
+        cameras: 1 to 4; with --live; several see the person together, with default
+        seed: random seed of the recording and the filters
+    """
+
+    output: Path = option("DIR", default=Path("demo_output"))
+    live: bool = option(default=False)
+    preset: str = choice(PRESETS, default=_PRESET)
+    cameras: int = option("N", camera_count, default=1)
+    seed: int = option(read=at_least(0), default=0)
 
 
-def run(options: argparse.Namespace) -> None:
+def run(given: Arguments) -> None:
     """Track the film, or run the nodes; write the results."""
-    if options.live:
+    if given.live:
         try:
             from cardbox_tracker.ros.demo.run import run_demo
         except ImportError as error:
             raise RosMissingError(error) from None
-        run_demo(options.output, options.preset, options.seed, options.cameras)
-    elif options.cameras > 1 or options.preset != _PRESET:
+        run_demo(given.output, given.preset, given.seed, given.cameras)
+    elif given.cameras > 1 or given.preset != _PRESET:
         raise CardboxError("--cameras and --preset are for the nodes: give --live, too")
     else:
-        _track_film(options.output, options.seed)
+        _track_film(given.output, given.seed)
 
 
 def _track_film(output: Path, seed: int) -> None:
     import numpy as np
 
     from cardbox_tracker.applications.demo.film import SOURCE, DemoFilm
-    from cardbox_tracker.applications.exporting.markers import write_trc
     from cardbox_tracker.applications.exporting.motion import Motion
     from cardbox_tracker.applications.reporting.page import space_view
-    from cardbox_tracker.commands.request import (
-        PersonRequest,
-        TrackFiles,
-        TrackingRequest,
-    )
-    from cardbox_tracker.commands.tracking import track
-    from cardbox_tracker.person.proportions import body_from_proportions
-    from cardbox_tracker.recordings.given_camera import GivenCamera
-    from cardbox_tracker.recordings.recording import RecordingRequest
-    from cardbox_tracker.recordings.result_reader import read_results
-    from cardbox_tracker.search.config import PRESETS
-    from cardbox_tracker.tracking.precompile import compile_for_films
+    from cardbox_tracker.commands.track import track_one
 
     make_folder(output)
     film = DemoFilm.load()
     print(f"film: {SOURCE}", flush=True)
-    compile_for_films()
-    detector, camera = film.detector, GivenCamera(film.fov_deg)
-    recording = RecordingRequest(film.path, detector, points=detector, camera=camera)
-    body = body_from_proportions(film.stature_m)
-    table = output / "angles.csv"
-    files = TrackFiles(table, output / "overlay.mp4", body=output / "angles.body.yaml")
-    person = PersonRequest(body, None, 0.0, False, film.stature_m)
-    config = PRESETS[_PRESET]()
-    track(TrackingRequest(recording, person, _PRESET, config, seed, (), files=files))
-
-    results = read_results(table)
+    asked = Request(
+        film.path,
+        detector=film.detector,
+        fov_deg=film.fov_deg,
+        stature_m=film.stature_m,
+        seed=seed,
+        csv=output / "angles.csv",
+        video=output / "overlay.mp4",
+        export="trc",
+        force=True,
+    )
+    _, people = track_one(asked)
+    results = people[1]
     motion = Motion.of(results)
-    write_trc(output / "markers.trc", motion, results.body)
     ours_m, theirs_m = film.errors_m(motion.keypoints_m), film.errors_m(film.mediapipe_m())
     pictures = {
         "space.png": space_view(motion, results.body, film.true_m),
@@ -105,4 +100,4 @@ def _track_film(output: Path, seed: int) -> None:
         f"MediaPipe Pose beside the shoulders: {theirs_cm:.1f} cm, or {turned_cm:.1f} cm if its "
         "points are turned by the camera's pitch that was found here"
     )
-    print(f"see {output}/overlay.mp4, space.png and error.png; angles.csv and markers.trc are data")
+    print(f"see {output}/overlay.mp4, space.png and error.png; angles.csv and angles.trc are data")

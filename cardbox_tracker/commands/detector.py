@@ -2,28 +2,27 @@
 
 from __future__ import annotations
 
-import argparse
+from dataclasses import dataclass
 from pathlib import Path
 
-
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the arguments of ``cardbox detector``."""
-    parser.add_argument(
-        "--install",
-        action="store_true",
-        help="take the files out of the wheel of mediapipe 0.10.21, which pip downloads; nothing "
-        "is downloaded later",
-    )
-    parser.add_argument(
-        "--wheel",
-        type=Path,
-        default=None,
-        metavar="FILE",
-        help="with --install: a wheel that is on this machine already, of any platform",
-    )
+from cardbox_tracker.commands.arguments import Options, option
 
 
-def run(options: argparse.Namespace) -> None:
+@dataclass(frozen=True)
+class Arguments(Options):
+    """What is installed.
+
+    Attributes:
+        install: take the files out of the wheel of mediapipe 0.10.21, which pip downloads; nothing
+            is downloaded later
+        wheel: with --install: a wheel that is on this machine already, of any platform
+    """
+
+    install: bool = option(default=False)
+    wheel: Path | None = option("FILE")
+
+
+def run(given: Arguments) -> None:
     """Install the files if asked to, load the networks, and print their places."""
     from cardbox_tracker.detectors.hand_network import HandNetwork
     from cardbox_tracker.detectors.model_files import (
@@ -33,7 +32,7 @@ def run(options: argparse.Namespace) -> None:
     )
     from cardbox_tracker.detectors.pose_network import PoseNetwork
 
-    models = install_models(options.wheel) if options.install else installed_models()
+    models = install_models(given.wheel) if given.install else installed_models()
     hands = installed_hands()
     PoseNetwork(*models)
     HandNetwork(hands)

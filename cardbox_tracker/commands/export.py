@@ -2,57 +2,51 @@
 
 from __future__ import annotations
 
-import argparse
+from dataclasses import dataclass
 from pathlib import Path
 
-from cardbox_tracker.commands.arguments import add_force, add_results, check_outputs, results_of
+from cardbox_tracker.applications.exporting.formats import export, formats
+from cardbox_tracker.commands.arguments import (
+    TrackedResults,
+    Written,
+    check_outputs,
+    one_of,
+    option,
+)
 from cardbox_tracker.common.files import body_beside, body_of_person
+from cardbox_tracker.person.model_file import load_body_model
 
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the arguments of ``cardbox export``."""
-    from cardbox_tracker.applications.exporting.formats import formats
+@dataclass(frozen=True, kw_only=True)
+class Arguments(TrackedResults, Written):
+    """Results, and the format to write.
 
-    add_results(parser)
-    parser.add_argument(
-        "--to",
-        choices=formats(),
-        required=True,
-        help="trc: markers for OpenSim and Pose2Sim; mot: coordinates for OpenSim; bvh: skeleton "
-        "for Blender; c3d: markers, with ezc3d; isb: CSV with joint angles by the recommendations "
-        "of the ISB (docs/export.md); or a format that another package adds",
-    )
-    parser.add_argument(
-        "--output",
-        type=Path,
-        metavar="FILE",
-        help="file to write; by default it has the name of the results and is in the current "
-        "folder",
-    )
-    parser.add_argument(
-        "--model",
-        type=Path,
-        metavar="MODEL.yaml",
-        help="the person with whom the results were tracked, which bvh needs; trc, mot "
-        "and c3d take the pitch of the camera and the floor from it, and the places of hips and "
-        "neck. A bag contains it, and OUT.body.yaml beside the table OUT.csv is found",
-    )
-    add_force(parser)
+    Attributes:
+        to: trc: markers for OpenSim and Pose2Sim; mot: coordinates for OpenSim; bvh: skeleton for
+            Blender; c3d: markers, with ezc3d; isb: CSV with joint angles by the recommendations of
+            the ISB (docs/export.md); or a format that another package adds
+        output: file to write; by default it has the name of the results and is in the current
+            folder
+        model: the person with whom the results were tracked, which bvh needs; trc, mot and c3d take
+            the pitch of the camera and the floor from it, and the places of hips and neck. A bag
+            contains it, and OUT.body.yaml beside the table OUT.csv is found
+    """
+
+    to: str = option("FORMAT", lambda given: one_of(formats())(given), required=True)
+    output: Path | None = option("FILE")
+    model: Path | None = option("MODEL.yaml")
 
 
-def run(options: argparse.Namespace) -> None:
+def run(given: Arguments) -> None:
     """Read the results and write the file."""
-    from cardbox_tracker.applications.exporting.formats import export, formats
-    from cardbox_tracker.person.model_file import load_body_model
-
-    chosen = formats()[options.to]
-    output = options.output or Path(options.results.resolve().stem + chosen.suffix)
-    beside = body_of_person(body_beside(options.results), options.person or 1)
-    check_outputs((output,), options.force, inputs=(options.results, options.model, beside))
+    chosen = formats()[given.to]
+    output = given.output or Path(given.results.resolve().stem + chosen.suffix)
+    beside = body_of_person(body_beside(given.results), given.person or 1)
+    check_outputs((output,), given.force, inputs=(given.results, given.model, beside))
     chosen.check()
-    given = None if options.model is None else load_body_model(options.model)
-    results = results_of(options.results, options.person)
-    remarks = export(results, output, chosen, given)
-    if given is None and chosen.has_places and beside.is_file():
+    model = None if given.model is None else load_body_model(given.model)
+    results = given.read()
+    remarks = export(results, output, chosen, model)
+    if model is None and chosen.has_places and beside.is_file():
         print(f"took the body of {beside}; --model gives another")
     print(*remarks, f"wrote {output}", sep="\n")

@@ -2,86 +2,113 @@
 
 from __future__ import annotations
 
-import argparse
 import math
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from cardbox_tracker.commands.arguments import (
-    REFERENCES,
-    add_camera_pitch,
-    add_force,
-    add_references,
-    add_seed,
+    Written,
+    at_least,
     check_outputs,
+    choice,
+    option,
     print_remarks,
+    span,
 )
-from cardbox_tracker.commands.request import Problems, add_recording, inputs_of, recording_request
+from cardbox_tracker.commands.request import RecordingOptions
 from cardbox_tracker.commands.scene import tilt_in
+from cardbox_tracker.commands.tracking_request import Problems, inputs_of, recording_request
 from cardbox_tracker.common.progress import progress_bar
 from cardbox_tracker.measuring.config import InitializationConfig
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.model_file import save_body_model
+from cardbox_tracker.person.posture import SIDE_TURNS
 from cardbox_tracker.recordings.initialize import (
     describe,
     initialize_at_scale,
     initialize_from_recording,
 )
+from cardbox_tracker.recordings.silhouettes import TimeSpan
 
 # Initial distance of the search where depth images or two cameras measure it.
 _GUESSED_M = 2.0
 
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the arguments of ``cardbox initialize``."""
-    add_recording(parser)
-    add_references(parser)
-    parser.add_argument(
-        "--distance",
-        type=float,
-        metavar="M",
-        help="from the camera to the person, metres along the floor; all sizes are proportional "
-        "to it; not needed with --depth, or with two or more --cameras, which measure it",
-    )
-    add_camera_pitch(parser, "0; found in the --front images where a detector finds silhouettes")
-    add_seed(parser, "the hypotheses")
-    parser.add_argument(
-        "--output", type=Path, required=True, metavar="MODEL.yaml", help="body model to write"
-    )
-    add_force(parser)
+@dataclass(frozen=True, kw_only=True)
+class References(Written):
+    """The reference postures in a recording.
+
+    Attributes:
+        front: seconds during which the person faces the camera, arms hanging 20 degrees away from
+            the body
+        side: seconds during which the person stands the same, turned by 90 degrees
+        arms: seconds during which the person faces the camera, both arms stretched sideways, hands
+            open
+        side_turn: which way the person turns for --side, as they see it
+        camera_pitch_deg: positive when the camera looks down
+        seed: random seed of the hypotheses
+    """
+
+    front: TimeSpan = option("T0:T1", span, required=True)
+    side: TimeSpan = option("T0:T1", span, required=True)
+    arms: TimeSpan = option("T0:T1", span, required=True)
+    side_turn: str = choice(SIDE_TURNS, default="left")
+    distance_m: float | None = option("M", flag="--distance")
+    camera_pitch_deg: float | None = option("P")
+    seed: int = option(read=at_least(0), default=0)
+    output: Path = option("MODEL.yaml", required=True)
+
+    @property
+    def spans(self) -> dict[str, TimeSpan]:
+        """The span of each posture."""
+        return {name: getattr(self, name) for name in ("front", "side", "arms")}
+
+
+@dataclass(frozen=True)
+class Arguments(References, RecordingOptions):
+    """A recording of the reference postures.
+
+    Attributes:
+        distance_m: from the camera to the person, metres along the floor; all sizes are
+            proportional to it; not needed with --depth, or with two or more --cameras, which
+            measure it
+        camera_pitch_deg: positive when the camera looks down (default: 0; found in the --front
+            images where a detector finds silhouettes)
+        output: body model to write
+    """
 
 
 def measuring_config(
-    options: argparse.Namespace, distance_m: float, pitch_rad: float
+    given: References, distance_m: float, pitch_rad: float
 ) -> InitializationConfig:
     """Return the settings of a measurement."""
     # The body model refuses an impossible distance or pitch by name.
     BodyModel.of(distance_m=distance_m, camera_pitch_rad=pitch_rad)
-    return InitializationConfig(distance_m, pitch_rad, options.side_turn, seed=options.seed)
+    return InitializationConfig(distance_m, pitch_rad, given.side_turn, seed=given.seed)
 
 
-def run(options: argparse.Namespace) -> None:
+def run(asked: Arguments) -> None:
     """Measure the person, write the body model and print its sizes."""
-    problems = Problems(options.recording)
+    problems = Problems(asked.recording)
     # The silhouettes alone are measured.
-    recording = replace(recording_request(options, problems), points=None)
-    is_given = options.distance is not None
-    if not is_given and options.depth is None and len(options.cameras) < 2:
+    recording = replace(recording_request(asked, problems), points=None)
+    is_given = asked.distance_m is not None
+    if not is_given and asked.depth is None and len(asked.cameras) < 2:
         problems.miss("--distance M or --depth TOPIC or two --cameras", "one camera has no scale")
-    if is_given and options.depth is not None and options.within is None:
+    if is_given and asked.depth is not None and asked.within_m is None:
         problems.add(
             "--depth and --distance both give the distance of the person; leave one of them out, "
             "or give --within M in place of --background"
         )
-    distance_m = options.distance if is_given else _GUESSED_M
-    pitch_rad = math.radians(options.camera_pitch_deg or 0.0)
+    distance_m = _GUESSED_M if asked.distance_m is None else asked.distance_m
+    pitch_rad = math.radians(asked.camera_pitch_deg or 0.0)
     config = problems.caught(
-        lambda: measuring_config(options, distance_m, pitch_rad), InitializationConfig()
+        lambda: measuring_config(asked, distance_m, pitch_rad), InitializationConfig()
     )
     problems.check()
-    check_outputs((options.output,), options.force, inputs_of(options))
-    spans = {name: getattr(options, name) for name in REFERENCES}
-    if options.camera_pitch_deg is None and recording.detector is not None:
+    check_outputs((asked.output,), asked.force, inputs_of(asked))
+    spans = asked.spans
+    if asked.camera_pitch_deg is None and recording.detector is not None:
         pitch_rad, recording = tilt_in(recording, spans["front"])
         config = replace(config, camera_pitch_rad=pitch_rad)
     if is_given:
@@ -94,6 +121,6 @@ def run(options: argparse.Namespace) -> None:
         remarks, accounts = source.first.remarks, [one.account for one in source.sources]
     print_remarks(remarks)
     roll_rad = recording.camera.stands_rad
-    save_body_model(result.body.with_values(camera_roll_rad=roll_rad), options.output)
+    save_body_model(result.body.with_values(camera_roll_rad=roll_rad), asked.output)
     print(describe(result))
-    print(f"wrote {options.output}", *accounts, sep="\n")
+    print(f"wrote {asked.output}", *accounts, sep="\n")

@@ -7,12 +7,13 @@ import io
 import os
 import signal
 import sys
-from collections.abc import Container, Sequence
+from collections.abc import Callable, Container, Sequence
 from importlib import import_module
+from pathlib import Path
 from typing import Any
 
 from cardbox_tracker import __version__
-from cardbox_tracker.commands.checkout import LAB, from_checkout
+from cardbox_tracker.commands.arguments import add_options
 from cardbox_tracker.common import interrupts
 from cardbox_tracker.common.errors import CardboxError, plain
 
@@ -40,9 +41,20 @@ COMMANDS = {
 }
 """Each subcommand with one line for ``cardbox --help``, without a capital letter or a full stop.
 
-Its module, of this folder or of ``lab/``, has ``add_arguments(parser)`` and ``run(options)``, which
-does the work and prints the result, and raises CardboxError if the user can correct the cause.
+Its module has ``Arguments``, whose fields are its options, and ``run(arguments)``, which does the
+work and prints the result, and raises CardboxError if the user can correct the cause. That of
+``lab/`` has ``add_arguments(parser)`` in place of ``Arguments``.
 """
+
+_PACKAGE = Path(__file__).parents[1]
+LAB = {
+    "benchmark": ("lab.benchmarks.command", "'make benchmark'"),
+    "evaluate": (
+        "lab.evaluation.command",
+        "'make experiments', 'make sessions' or 'make people'",
+    ),
+}
+"""Module of each of these subcommands, and the commands of ``make`` that do the same."""
 
 # A folder of recordings has many reasons.
 _MOST_OF_AN_ERROR = 20_000
@@ -129,16 +141,42 @@ def build_parser(words: Container[str] = COMMANDS) -> argparse.ArgumentParser:
         )
         added.register("action", None, _Once)
         if name in words:
-            module = _module(name)
-            module.add_arguments(added)
-            added.set_defaults(run=module.run)
+            added.set_defaults(run=_add(added, name))
     return parser
 
 
-def _module(name: str) -> Any:
+def _add(parser: argparse.ArgumentParser, name: str) -> Callable[[argparse.Namespace], None]:
+    """Add the arguments of a subcommand; return the function that runs it."""
     if name in LAB:
-        return from_checkout(*LAB[name])
-    return import_module(f"cardbox_tracker.commands.{name.replace('-', '_')}")
+        module = from_checkout(*LAB[name])
+        module.add_arguments(parser)
+        run: Callable[[argparse.Namespace], None] = module.run
+        return run
+    module = import_module(f"cardbox_tracker.commands.{name.replace('-', '_')}")
+    add_options(parser, module.Arguments)
+    return lambda options: module.run(module.Arguments.of(options))
+
+
+def from_checkout(module: str, targets: str) -> Any:
+    """Import from a checkout: the current directory, one above it, or this package's parent."""
+    folder = module.partition(".")[0]
+    for root in (Path.cwd(), *Path.cwd().parents, _PACKAGE.parent):
+        if (root / folder / "__init__.py").is_file() and (root / _PACKAGE.name).is_dir():
+            # At the end of the path, it does not replace the package that is running.
+            sys.path.append(str(root))
+            break
+    else:
+        raise CardboxError(
+            f"{folder}/ is not installed; run this in a checkout of {_PACKAGE.name}, or there "
+            f"{targets}"
+        )
+    try:
+        return import_module(module)
+    except ModuleNotFoundError as error:
+        raise CardboxError(
+            f"{module} needs {error.name}, which is not installed; "
+            "run 'pip install .' in the checkout"
+        ) from None
 
 
 class _Once(argparse._StoreAction):

@@ -2,46 +2,45 @@
 
 from __future__ import annotations
 
-import argparse
+from dataclasses import MISSING, dataclass
 from pathlib import Path
 
 from cardbox_tracker import __version__
 from cardbox_tracker.applications.ergonomics.reba import REBA, RebaConfig, images_of, score_table
 from cardbox_tracker.applications.ergonomics.report import PageContent
 from cardbox_tracker.commands.arguments import (
-    add_force,
-    add_seed,
-    add_settings,
+    TrackedResults,
     at_least,
     check_outputs,
-    results_of,
-    settings_from,
+    option,
 )
-from cardbox_tracker.commands.rula import add_score_outputs, outputs_of, write_scores
+from cardbox_tracker.commands.rula import ScoreFiles, write_scores
 
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the arguments of ``cardbox reba``."""
-    add = parser.add_argument
-    add("table", type=Path, metavar="TABLE.csv", help="table of 'cardbox track --detector'")
-    add_score_outputs(parser)
-    add("--person", type=at_least(1), metavar="K", help="whom of several people (default: 1)")
-    add_seed(parser, "the samples of the postures")
-    add_force(parser)
-    add_settings(parser, RebaConfig, "what no image shows")
+@dataclass(frozen=True, kw_only=True)
+class Arguments(TrackedResults, ScoreFiles, RebaConfig):
+    """A table, and what no image shows.
+
+    Attributes:
+        results: table of 'cardbox track --detector'
+        person: whom of several people (default: 1)
+        seed: random seed of the samples of the postures
+    """
+
+    group = "what no image shows"
+    results: Path = option("TABLE.csv", default=MISSING)
+    seed: int = option(read=at_least(0), default=0)
 
 
-def run(options: argparse.Namespace) -> None:
+def run(given: Arguments) -> None:
     """Score every image, and print times, part scores and declared inputs."""
-    check_outputs(outputs_of(options), options.force, inputs=(options.table,))
-    config = settings_from(options, RebaConfig)
-    results = results_of(options.table, options.person)
-    rows = score_table(images_of(results), config, options.seed)
+    check_outputs(given.outputs, given.force, inputs=(given.results,))
+    rows = score_table(images_of(given.read()), given, given.seed)
     span = f"{rows[0].time_s:.1f} to {rows[-1].time_s:.1f} s, {len(rows)} images"
     facts = {
-        "Table": f"{options.table.name}, {span}",
+        "Table": f"{given.results.name}, {span}",
         "Program": f"cardbox_tracker {__version__}",
-        "Random seed": str(options.seed),
+        "Random seed": str(given.seed),
     }
-    title = options.title or f"REBA of {options.table.name}"
-    write_scores(options, PageContent(title, facts, config, rows, method=REBA))
+    title = given.title or f"REBA of {given.results.name}"
+    write_scores(given, PageContent(title, facts, given, rows, method=REBA))

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-import argparse
 from collections.abc import Sequence
+from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
 
@@ -13,18 +13,22 @@ from cardbox_tracker.applications.ergonomics.recording import MomentImages, Rula
 from cardbox_tracker.applications.ergonomics.report import PageContent
 from cardbox_tracker.applications.ergonomics.rula import RulaConfig
 from cardbox_tracker.commands.arguments import (
-    add_force,
-    add_settings,
+    Written,
     check_outputs,
+    choice,
+    option,
     print_remarks,
-    settings_from,
 )
-from cardbox_tracker.commands.request import add_tracking, tracking_request
+from cardbox_tracker.commands.request import TrackingOptions
 from cardbox_tracker.commands.tracking import track
+from cardbox_tracker.commands.tracking_request import tracking_request
 from cardbox_tracker.common.errors import CardboxError
 from cardbox_tracker.common.files import write_file
 from cardbox_tracker.person.proportions import USUAL_STATURE_M
+from cardbox_tracker.recordings.silhouettes import RecordedFrame
 from cardbox_tracker.recordings.track import TrackSummary
+from cardbox_tracker.tracking.estimate import Estimate
+from cardbox_tracker.tracking.tracker import Tracker
 
 HIDDEN_HEAD, _, NO_IMAGES = IMAGES = ("hidden-head", "shown", "none")
 
@@ -33,93 +37,92 @@ _SIZES_FROM = {"measured": "reference postures", "proportions": "proportions of 
 _LEAST_CLOCK_S = 1e9
 
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the arguments of ``cardbox rula``."""
-    add_tracking(parser)
-    add_score_outputs(parser)
-    parser.add_argument(
-        "--images",
-        choices=IMAGES,
-        default=IMAGES[0],
-        help="images of the worst moments in --html: with the head of the tracked person made "
-        "unrecognizable, as they are, or none",
-    )
-    parser.add_argument(
-        "--hands",
-        action="store_true",
-        help="with --detector mediapipe: also measure the wrists, which are declared otherwise",
-    )
-    add_force(parser)
-    add_settings(parser, RulaConfig, "what no image shows")
+@dataclass(frozen=True, kw_only=True)
+class ScoreFiles(Written):
+    """The files that both methods write.
+
+    Attributes:
+        csv: table to write, one row per image: its score, the chance of each
+        plot: draw the scores over time
+        html: write a page that prints: scores, shares of time, worst moments
+        title: heading of --html, such as the task
+    """
+
+    csv: Path | None = option("OUT.csv")
+    plot: Path | None = option("OUT.png")
+    html: Path | None = option("OUT.html")
+    title: str | None = option("TEXT")
+
+    @property
+    def outputs(self) -> tuple[Path | None, ...]:
+        """The files; None for each that is not wanted."""
+        return self.csv, self.plot, self.html
 
 
-def run(options: argparse.Namespace) -> None:
+@dataclass(frozen=True)
+class Arguments(ScoreFiles, TrackingOptions, RulaConfig):
+    """A recording, and what no image shows.
+
+    Attributes:
+        hands: with --detector mediapipe: also measure the wrists, which are declared otherwise
+        images: images of the worst moments in --html: with the head of the tracked person made
+            unrecognizable, as they are, or none
+    """
+
+    group = "what no image shows"
+    images: str = choice(IMAGES, default=HIDDEN_HEAD)
+
+
+def run(asked: Arguments) -> None:
     """Track the person, score every image, and print times, part scores and declared inputs."""
-    if options.html is None and (options.title is not None or options.images != IMAGES[0]):
+    if asked.html is None and (asked.title is not None or asked.images != IMAGES[0]):
         raise CardboxError("--images and --title change the page of --html; give --html OUT.html")
-    request = tracking_request(options)
-    check_outputs(outputs_of(options), options.force, inputs=request.inputs)
-    config = settings_from(options, RulaConfig)
+    request = tracking_request(asked)
+    check_outputs(asked.outputs, asked.force, inputs=request.inputs)
     images = None
-    if options.html is not None and options.images != NO_IMAGES:
-        images = MomentImages(is_head_hidden=options.images == HIDDEN_HEAD)
-    observer = RulaObserver(config, options.seed, images)
-    if options.people is not None and options.person is None:
+    if asked.html is not None and asked.images != NO_IMAGES:
+        images = MomentImages(is_head_hidden=asked.images == HIDDEN_HEAD)
+    observer = RulaObserver(asked, asked.seed, images)
+    if asked.people is not None and asked.person is None:
         print_remarks(["of several people, person 1 is scored; --person K gives another"])
-    summary = track(request, observers=(observer,))
-    write_scores(options, _content(options, config, observer.rows, summary, images))
+
+    def observe(frame: RecordedFrame, estimate: Estimate, tracker: Tracker) -> None:
+        if estimate.person in (None, asked.number):
+            observer(frame, estimate, tracker)
+
+    summary = track(request, observers=(observe,))
+    write_scores(asked, _content(asked, observer.rows, summary, images))
 
 
-def add_score_outputs(parser: argparse.ArgumentParser) -> None:
-    """Add the options of the files that both methods write."""
-    for flag, name, text in (
-        ("--csv", "OUT.csv", "table to write, one row per image: its score, the chance of each"),
-        ("--plot", "OUT.png", "draw the scores over time"),
-        ("--html", "OUT.html", "write a page that prints: scores, shares of time, worst moments"),
-    ):
-        parser.add_argument(flag, type=Path, metavar=name, help=text)
-    parser.add_argument("--title", metavar="TEXT", help="heading of --html, such as the task")
-
-
-def outputs_of(options: argparse.Namespace) -> tuple[Path | None, ...]:
-    """Return the files of :func:`add_score_outputs`; None for each that is not wanted."""
-    return options.csv, options.plot, options.html
-
-
-def write_scores(options: argparse.Namespace, content: PageContent) -> None:
+def write_scores(files: ScoreFiles, content: PageContent) -> None:
     """Print times, part scores and declared inputs, and write the files."""
     rows, config, method = content.rows, content.config, content.method
     shares = recording.score_shares(rows, config, method)
     for line in report.report_lines(recording.summarize(rows, method), shares, config, method):
         print(line)
-    if options.csv is not None:
-        recording.write_csv(rows, options.csv, method)
-    if options.plot is not None:
-        write_file(options.plot, report.score_plot(rows, (), method))
-    if options.html is not None:
-        report.write_page(content, options.html)
-    for path in outputs_of(options):
+    if files.csv is not None:
+        recording.write_csv(rows, files.csv, method)
+    if files.plot is not None:
+        write_file(files.plot, report.score_plot(rows, (), method))
+    if files.html is not None:
+        report.write_page(content, files.html)
+    for path in files.outputs:
         if path is not None:
             print(f"wrote {path}")
 
 
 def _content(
-    options: argparse.Namespace,
-    config: RulaConfig,
+    asked: Arguments,
     rows: Sequence[RulaRow],
     summary: TrackSummary,
     images: MomentImages | None,
 ) -> PageContent:
-    name = options.recording.resolve().name
-    number = options.person if options.people is not None and options.person else 1
-    statures = options.stature or (USUAL_STATURE_M,)
-    person = (
-        f"stature {statures[min(number, len(statures)) - 1]} m"
-        if options.model is None
-        else options.model.name
-    )
-    if options.people is not None:
-        person = f"person {number}, {person}"
+    name = asked.recording.resolve().name
+    statures_m = asked.statures_m or (USUAL_STATURE_M,)
+    stature_m = statures_m[min(asked.number, len(statures_m)) - 1]
+    person = f"stature {stature_m} m" if asked.model is None else asked.model.name
+    if asked.people is not None:
+        person = f"person {asked.number}, {person}"
     if summary.body is not None:
         person += f"; sizes from {_SIZES_FROM[summary.body.source]}"
     span = f"{rows[0].time_s:.1f} to {rows[-1].time_s:.1f} s, {len(rows)} images"
@@ -128,14 +131,14 @@ def _content(
     begin_s = rows[0].stamp_ns / 1e9
     if begin_s > _LEAST_CLOCK_S:
         facts["Begin"] = f"{datetime.fromtimestamp(begin_s, UTC):%Y-%m-%d %H:%M:%S} UTC"
-    points = options.detector or "none, so the neck is declared"
-    facts["Points of a detector"] = points
-    facts["Tracker"] = f"cardbox_tracker {__version__}, preset {options.preset}"
-    facts["Random seed"] = str(options.seed)
+    points = asked.detector or asked.detector_class or "none, so the neck is declared"
+    facts["Points of a detector"] = str(points)
+    facts["Tracker"] = f"cardbox_tracker {__version__}, preset {asked.preset}"
+    facts["Random seed"] = str(asked.seed)
     return PageContent(
-        options.title or f"RULA of {name}",
+        asked.title or f"RULA of {name}",
         facts,
-        config,
+        asked,
         rows,
         None if images is None else images.by_stamp(),
         images is None or images.is_head_hidden,

@@ -9,7 +9,7 @@ from dataclasses import replace
 
 from cardbox_tracker.camera.camera import Camera
 from cardbox_tracker.commands.arguments import print_remarks
-from cardbox_tracker.commands.request import PersonRequest
+from cardbox_tracker.commands.tracking_request import PersonRequest
 from cardbox_tracker.measuring.people_camera import PITCH_PRIOR, USUAL_PITCH
 from cardbox_tracker.measuring.scene import FOUND, GIVEN, USUAL, Scene, SceneCamera, Value
 from cardbox_tracker.measuring.scene_camera import (
@@ -109,13 +109,12 @@ def found_camera(
     if recording.detector is None and recording.points is None:
         pitch = Value(0.0, math.hypot(USUAL_PITCH, PITCH_PRIOR), USUAL)
         if given is None:
-            print_remarks(
-                [
-                    "nothing tells the camera's pitch without a detector: a level camera is "
-                    "assumed, so every posture is at best uncertain; give --camera-pitch-deg "
-                    "(0 for a level camera)"
-                ]
+            level = (
+                "nothing tells the camera's pitch without a detector: a level camera is assumed, "
+                "so every posture is at best uncertain; give --camera-pitch-deg (0 for a level "
+                "camera)"
             )
+            print_remarks([level])
         else:
             pitch = Value(*given, GIVEN)
         return FoundCamera(SceneCamera(lens_of(camera), pitch, Value(0.0, 0.0, USUAL)))

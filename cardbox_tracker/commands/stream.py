@@ -2,48 +2,47 @@
 
 from __future__ import annotations
 
-import argparse
 import sys
 from contextlib import closing, nullcontext
+from dataclasses import dataclass
 
-from cardbox_tracker.commands.arguments import add_results, between, results_of
-
-
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the arguments of ``cardbox stream``."""
-    from cardbox_tracker.applications.teleoperation.sending import PACKETS
-
-    add_results(parser)
-    parser.add_argument(
-        "--to",
-        choices=PACKETS,
-        required=True,
-        help="sonic: frames of its protocol v3; isaac: msgpack of Isaac Teleop's full body; json: "
-        "a line for each time (docs/retargeting.md)",
-    )
-    parser.add_argument(
-        "--rate", type=between(1, 1000), default=50.0, metavar="HZ", help="packets a second"
-    )
-    parser.add_argument(
-        "--address",
-        metavar="ADDRESS",
-        help="publish by ZMQ, as tcp://127.0.0.1:5556 (default: the standard output)",
-    )
-    parser.add_argument("--fast", action="store_true", help="do not wait for the time of a packet")
+from cardbox_tracker.applications.teleoperation.full_body import at_rate, bodies_of
+from cardbox_tracker.applications.teleoperation.sending import (
+    PACKETS,
+    ZmqSender,
+    in_real_time,
+    packet,
+)
+from cardbox_tracker.commands.arguments import TrackedResults, between, choice, option
 
 
-def run(options: argparse.Namespace) -> None:
+@dataclass(frozen=True, kw_only=True)
+class Arguments(TrackedResults):
+    """Results, and how they are sent.
+
+    Attributes:
+        to: sonic: frames of its protocol v3; isaac: msgpack of Isaac Teleop's full body; json: a
+            line for each time (docs/retargeting.md)
+        rate: packets a second
+        address: publish by ZMQ, as tcp://127.0.0.1:5556 (default: the standard output)
+        fast: do not wait for the time of a packet
+    """
+
+    to: str = choice(PACKETS, required=True)
+    rate: float = option("HZ", between(1, 1000), default=50.0)
+    address: str | None = option("ADDRESS")
+    fast: bool = option(default=False)
+
+
+def run(given: Arguments) -> None:
     """Read the results and send them."""
-    from cardbox_tracker.applications.teleoperation.full_body import at_rate, bodies_of
-    from cardbox_tracker.applications.teleoperation.sending import ZmqSender, in_real_time, packet
-
-    results = results_of(options.results, options.person)
+    results = given.read()
     results.check_body()
-    bodies = at_rate(bodies_of(results), options.rate)
+    bodies = at_rate(bodies_of(results), given.rate)
     sent = number = 0
-    with closing(ZmqSender(options.address)) if options.address else nullcontext() as sender:
-        for body in bodies if options.fast else in_real_time(bodies, options.rate):
-            made = packet(options.to, body, number)
+    with closing(ZmqSender(given.address)) if given.address else nullcontext() as sender:
+        for body in bodies if given.fast else in_real_time(bodies, given.rate):
+            made = packet(given.to, body, number)
             number += 1
             if made is None:
                 continue

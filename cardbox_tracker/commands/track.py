@@ -1,20 +1,24 @@
-"""``cardbox track``: the posture in each image of a recording, or of a folder of recordings."""
+"""``cardbox track``: the posture in each image of a recording, or of a folder of recordings.
+
+:func:`track` does the same from Python (``docs/python.md``).
+"""
 
 from __future__ import annotations
 
-import argparse
 import json
-from collections.abc import Callable, Iterator, Mapping
-from dataclasses import replace
+import os
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import fields, replace
 from itertools import chain
 from pathlib import Path
 from typing import Any
 
-from cardbox_tracker.applications.exporting.formats import Format, export, formats
+from cardbox_tracker.applications.exporting.formats import Format, Result, export, formats
 from cardbox_tracker.applications.reporting.page import angles_plot, write_page
-from cardbox_tracker.commands.arguments import add_force, at_least, check_outputs
-from cardbox_tracker.commands.request import FORMATS, TrackFiles, add_tracking, tracking_request
-from cardbox_tracker.commands.tracking import track
+from cardbox_tracker.commands.arguments import check_outputs
+from cardbox_tracker.commands.request import Request, TrackArguments
+from cardbox_tracker.commands.tracking import track as track_request
+from cardbox_tracker.commands.tracking_request import TrackFiles, tracking_request
 from cardbox_tracker.common.errors import CardboxError
 from cardbox_tracker.common.files import (
     body_beside,
@@ -23,190 +27,150 @@ from cardbox_tracker.common.files import (
     scene_beside,
     write_file,
 )
+from cardbox_tracker.common.settings import suggestion
+from cardbox_tracker.measuring.scene import dumps_scene, loads_scene
 from cardbox_tracker.recordings.open_images import is_one_recording, recordings_in
-from cardbox_tracker.recordings.result_reader import read_results
+from cardbox_tracker.recordings.result_reader import KeptResults, Results
 from cardbox_tracker.recordings.result_table import check_table
 from cardbox_tracker.recordings.track import TrackSummary
 from cardbox_tracker.tracking.precompile import compile_for_films
 
-_OF_ONE = ("csv", "bag", "video", "json", "export", "plot", "report")
-_OF_MANY = ("output", "formats", "jobs", "scheduler")
+Arguments = TrackArguments
 
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the arguments of ``cardbox track``."""
-    add_tracking(parser)
-    parser.add_argument(
-        "--csv",
-        type=Path,
-        metavar="OUT.csv|OUT.parquet",
-        help="table to write, one row per image (docs/results.md); by default it has the name of "
-        "the recording and is in the current folder. OUT.body.yaml beside it is the body that "
-        "was used",
-    )
-    parser.add_argument(
-        "--bag", type=Path, metavar="OUT", help="also write the topics of the tracker"
-    )
-    parser.add_argument(
-        "--hands",
-        action="store_true",
-        help="with --detector mediapipe: also tell open from closed hands, and measure palms and "
-        "wrists, in further columns and in the video (docs/results.md)",
-    )
-    parser.add_argument("--video", type=Path, metavar="OUT.mp4", help="also write an overlay video")
-    parser.add_argument(
-        "--json",
-        type=Path,
-        metavar="OUT.json",
-        help="also write what is printed at the end: what was tracked, used, left out and assumed",
-    )
-    parser.add_argument(
-        "--export",
-        type=_formats,
-        metavar="FORMAT[,...]",
-        help="also write the table in formats of 'cardbox export' beside it, such as trc,bvh",
-    )
-    parser.add_argument(
-        "--plot",
-        type=Path,
-        metavar="OUT.png",
-        help="also plot the angles, with bands of one standard deviation",
-    )
-    parser.add_argument(
-        "--report",
-        type=Path,
-        metavar="OUT.html",
-        help="also write a page with the overlay video (OUT.overlay.mp4 without --video), the "
-        "skeleton from aside, the angles and the times to look at",
-    )
-    many = parser.add_argument_group("a folder of recordings (docs/many-recordings.md)")
-    many.add_argument(
-        "--output",
-        type=Path,
-        metavar="DIR",
-        help="folder of the results; by default FOLDER_tracked in the current folder. A recording "
-        "that is finished there with the same inputs and settings is not tracked again",
-    )
-    many.add_argument(
-        "--formats", nargs="+", choices=FORMATS, help="results of each recording; csv by default"
-    )
-    many.add_argument(
-        "--jobs",
-        type=at_least(1),
-        metavar="N",
-        help="recordings that are tracked at a time, each on one core; one per core by default",
-    )
-    many.add_argument(
-        "--scheduler",
-        metavar="ADDRESS",
-        help="in place of --jobs: track on the workers of this Dask cluster, such as tcp://HOST:8786",
-    )
-    add_force(parser)
-
-
-def run(options: argparse.Namespace) -> None:
+def run(asked: Arguments) -> None:
     """Track the person and write the requested files."""
-    path = options.recording
-    if not is_one_recording(path) and recordings_in(path, options.output):
+    path = asked.recording
+    if not is_one_recording(path) and recordings_in(path, asked.output):
         from cardbox_tracker.commands.track_folder import track_folder
 
-        for fault in _without_effect(options, _OF_ONE, "a folder of recordings: give --formats"):
+        for fault in _without_effect(asked, Request, "a folder of recordings: give --formats"):
             raise CardboxError(fault)
-        if None not in (options.jobs, options.scheduler):
+        if None not in (asked.jobs, asked.scheduler):
             raise CardboxError("--jobs has no effect with --scheduler: its workers are as many")
-        track_folder(options)
-    else:
-        track_one(options)
+        track_folder(asked)
+        return
+    faults = _without_effect(asked, TrackArguments, "which is one recording: give --csv")
+    track_one(replace(asked, csv=asked.csv or Path(f"{_name(path)}.csv")), faults)
 
 
-def _formats(text: str) -> dict[str, Format]:
-    known, names = formats(), dict.fromkeys(text.split(","))
-    if not known.keys() >= names.keys():
-        raise argparse.ArgumentTypeError(
-            f"expected formats of {', '.join(known)}, such as trc,bvh: {text!r}"
-        )
-    return {name: known[name] for name in names}
+def track(recording: Request | str | os.PathLike[str], **options: Any) -> Result:
+    """Track a recording as ``cardbox track`` does; return the results, of ``person`` or the first.
+
+    Either a :class:`Request` or a recording and the fields of one as keywords. ``Result.people``
+    has each of several people. Without ``csv`` no table is kept. Raises CardboxError if the request
+    is wrong, or a file cannot be read or written.
+    """
+    known = [entry.name for entry in fields(Request)][1:]
+    for name in options.keys() - {*known}:
+        near = suggestion(name, known)
+        raise CardboxError(f"track has no keyword {name}; {near}expected any of {', '.join(known)}")
+    asked = recording if isinstance(recording, Request) else Request(Path(recording))
+    asked = replace(asked, **options)
+    path = asked.recording
+    if asked.export and asked.csv is None:
+        raise CardboxError("export writes beside the table: give csv, or save the result")
+    if path.is_dir() and not is_one_recording(path):
+        raise CardboxError(f"{path} is no recording; track its recordings one by one")
+    summary, kept = track_one(asked, show=lambda _: None)
+    scene = summary.scene and loads_scene(dumps_scene(summary.scene))
+    people = {number: Result(**vars(one), scene=scene) for number, one in kept.items()}
+    if asked.number not in people:
+        raise CardboxError(f"{path} shows {len(people)} people, and no person {asked.number}")
+    return replace(people[asked.number], people={} if asked.people is None else people)
 
 
-def _without_effect(options: argparse.Namespace, names: tuple[str, ...], what: str) -> list[str]:
-    """Return a fault for each given option that has no effect, since the recording is ``what``."""
-    given = [name for name in names if getattr(options, name) is not None]
-    return [f"--{name} has no effect on {options.recording}, {what}" for name in given]
+def _name(recording: Path) -> Path:
+    path = recording.resolve()
+    return Path(path.name if path.is_dir() else path.stem)
 
 
-def track_one(options: argparse.Namespace, show: Callable[[float], None] | None = None) -> None:
-    """Track one recording and write the requested files; see :func:`~.tracking.track`."""
-    faults = _without_effect(options, _OF_MANY, "which is one recording: give --csv")
-    request = tracking_request(options, faults)
-    recording = options.recording.resolve()
-    name = Path(recording.name if recording.is_dir() else recording.stem)
-    table = options.csv or Path(f"{name}.csv")
-    check_table(table)
-    # There is no place for a further file beside a pipe.
-    is_piped = is_written_in_place(table)
-    beside = name if is_piped else table
-    has_body = not is_piped or request.person.model is None
-    body = body_beside(beside) if has_body else None
-    scene = scene_beside(beside)
-    video = options.video
-    if options.report is not None and video is None:
-        video = options.report.with_suffix(".overlay.mp4")
-    exports = {
-        form: beside.with_name(beside.stem + form.suffix)
-        for form in (options.export or {}).values()
-    }
-    derived = (*exports.values(), options.plot, options.report)
-    _check_derived(options, is_piped)
-    files = TrackFiles(table, video, options.bag, body, scene)
-    written = (table, body, scene, video, options.json)
-    every = (*written, *derived)
-    check_outputs(every, options.force, request.inputs, results=(options.bag,))
+def _without_effect(asked: TrackArguments, kind: type[Request], what: str) -> list[str]:
+    """Return a fault for each given option of a class itself, which has no effect on ``what``."""
+    own = [flag for flag in asked.given() if flag[2:] in vars(kind) and flag != "--force"]
+    return [f"{flag} has no effect on {asked.recording}, {what}" for flag in own]
+
+
+def track_one(
+    asked: Request, faults: Iterable[str] = (), show: Callable[[float], None] | None = None
+) -> tuple[TrackSummary, dict[int, Results]]:
+    """Track one recording and write the requested files; see :func:`.tracking.track`.
+
+    The results of each person are kept and returned with ``show``, or if a file is made of them.
+    """
+    request = tracking_request(asked, faults)
+    for flag, suffix in (("plot", ".png"), ("report", ".html"), ("video", ".mp4")):
+        path = getattr(asked, flag)
+        if path is not None and path.suffix != suffix:
+            raise CardboxError(f"--{flag} {path}: its name must end in {suffix}")
+    files, exports = _files(asked, request.person.model is None)
+    written = (files.table, files.body, files.scene, files.video, asked.json)
+    derived = (*exports.values(), asked.plot, asked.report)
+    check_outputs((*written, *derived), asked.force, request.inputs, results=(asked.bag,))
     if request.preset == "default":
         compile_for_films()
-    summary = track(replace(request, files=files, force=options.force), show=show)
-    if options.json is not None:
-        write_file(options.json, json.dumps(_account(summary), indent=1) + "\n")
-    lines = [f"wrote {path}" for path in (*written, options.bag) if path is not None]
-    more = _derived(options, summary, table, video, exports) if any(derived) else ()
+    has_points, has_people = request.recording.points is not None, request.person.people is not None
+    has = {
+        "has_points": has_points,
+        "has_people": has_people,
+        "has_hands": request.hands is not None,
+    }
+    kept = KeptResults(asked.recording, **has)
+    observers = (kept,) if show is not None or any(derived) else ()
+    summary = track_request(replace(request, files=files, force=asked.force), observers, show)
+    if asked.json is not None:
+        write_file(asked.json, json.dumps(_account(summary), indent=1) + "\n")
+    people = kept.results()
+    lines = [f"wrote {path}" for path in (*written, asked.bag) if path is not None]
+    more = _derived(asked, summary, people, files.video, exports) if any(derived) else ()
     # If an export fails, what was written before it is told.
     for line in chain(lines, summary.accounts, more):
         if show is None:
             print(line)
+    return summary, people
 
 
-def _check_derived(options: argparse.Namespace, is_piped: bool) -> None:
-    """Check what is made of the finished table, before it is."""
-    for form in (options.export or {}).values():
+def _files(asked: Request, is_new_body: bool) -> tuple[TrackFiles, dict[Format, Path]]:
+    """Return the files that are written while a recording is tracked, and then in formats."""
+    table, video = asked.csv, asked.video
+    if asked.report is not None and video is None:
+        video = asked.report.with_suffix(".overlay.mp4")
+    if table is None:
+        return TrackFiles(None, video, asked.bag), {}
+    check_table(table)
+    # There is no place for a further file beside a pipe.
+    is_piped = is_written_in_place(table)
+    beside = _name(asked.recording) if is_piped else table
+    body = body_beside(beside) if is_new_body or not is_piped else None
+    chosen = [formats()[name] for name in asked.export or ()]
+    for form in chosen:
         form.check()
-    for flag, suffix in (("plot", ".png"), ("report", ".html"), ("video", ".mp4")):
-        path = getattr(options, flag)
-        if path is not None and path.suffix != suffix:
-            raise CardboxError(f"--{flag} {path}: its name must end in {suffix}")
-    given = [flag for flag in _OF_ONE[-3:] if getattr(options, flag) is not None]
-    if given and is_piped:
-        raise CardboxError(f"--{given[0]} reads the table, so --csv must name a file")
+    exports = {form: beside.with_name(beside.stem + form.suffix) for form in chosen}
+    return TrackFiles(table, video, asked.bag, body, scene_beside(beside)), exports
 
 
 def _derived(
-    options: argparse.Namespace,
+    asked: Request,
     summary: TrackSummary,
-    table: Path,
+    people: Mapping[int, Results],
     video: Path | None,
     exports: Mapping[Format, Path],
 ) -> Iterator[str]:
-    """Write what is made of the finished table, of several people files of each, and say it."""
+    """Write what is made of the results, of several people files of each, and say it."""
     tracked = (number for number, one in summary.people.items() if one.frames_tracked)
-    people = {number: read_results(table, number) for number in tracked} or {1: read_results(table)}
-    if options.plot is not None:
+    people = {number: people[number] for number in tracked} or people
+    if not people:
+        raise CardboxError(f"{asked.recording} shows nobody to export, plot or report")
+    if asked.plot is not None:
         for number, results in people.items():
-            path = of_person(options.plot, number, options.plot.suffix)
+            path = of_person(asked.plot, number, asked.plot.suffix)
             write_file(path, angles_plot(results))
             yield f"wrote {path}"
-    if options.report is not None and video is not None:
+    if asked.report is not None and video is not None:
         named = {f"Person {k}" if summary.people else "Person": one for k, one in people.items()}
         lines = (*summary.assumptions, *summary.remarks, *summary.accounts)
-        write_page(options.report, video, f"Posture in {options.recording.name}", named, lines)
-        yield f"wrote {options.report}"
+        write_page(asked.report, video, f"Posture in {asked.recording.name}", named, lines)
+        yield f"wrote {asked.report}"
     for form, path in exports.items():
         for number, results in people.items():
             output = of_person(path, number, form.suffix)
@@ -220,7 +184,7 @@ def _account(summary: TrackSummary) -> dict[str, Any]:
         "uncertain": summary.frames_uncertain,
         "used": dict(summary.used),
         "assumed": summary.assumptions,
-        "scene": summary.scene,
+        "scene": {} if summary.scene is None else summary.scene.numbers(),
         "remarks": summary.remarks,
         "cameras": summary.accounts,
     }

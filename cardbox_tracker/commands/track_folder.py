@@ -6,7 +6,6 @@ it an interrupted run goes on, and only what changed is done again.
 
 from __future__ import annotations
 
-import argparse
 import csv
 import errno
 import hashlib
@@ -26,15 +25,13 @@ import numba
 import numpy as np
 
 import cardbox_tracker
-from cardbox_tracker.commands.request import (
-    FORMATS,
-    TABLES,
+from cardbox_tracker.commands.request import FORMATS, TABLES, TrackArguments, with_own_options
+from cardbox_tracker.commands.tracking import track
+from cardbox_tracker.commands.tracking_request import (
     TrackFiles,
     TrackingRequest,
     tracking_request,
-    with_own_options,
 )
-from cardbox_tracker.commands.tracking import track
 from cardbox_tracker.common import interrupts
 from cardbox_tracker.common.errors import CardboxError, plain
 from cardbox_tracker.common.files import (
@@ -80,17 +77,11 @@ class Row(NamedTuple):
     @classmethod
     def tracked(cls, recording: str, summary: TrackSummary, inputs: str) -> Row:
         """Return the row of a tracked recording."""
-        is_seen = summary.frames_tracked > 0
-        return cls(
-            recording,
-            TRACKED,
-            str(summary.frames),
-            str(summary.frames_tracked),
-            str(summary.frames_uncertain),
-            f"{summary.mean_cost_px:.1f}" if is_seen else "",
-            f"{summary.mean_iou:.4f}" if is_seen else "",
-            inputs=inputs,
-        )
+        tracked, uncertain = str(summary.frames_tracked), str(summary.frames_uncertain)
+        means = f"{summary.mean_cost_px:.1f}", f"{summary.mean_iou:.4f}"
+        cost_px, iou = means if summary.frames_tracked else ("", "")
+        counts = str(summary.frames), tracked, uncertain
+        return cls(recording, TRACKED, *counts, cost_px, iou, inputs=inputs)
 
     @classmethod
     def failed(cls, recording: str, error: Exception) -> Row:
@@ -119,29 +110,29 @@ class Job(NamedTuple):
     program: str = ""  #: see :func:`digest_of_program`; empty if the process has this program
 
 
-def track_folder(options: argparse.Namespace) -> None:
+def track_folder(asked: TrackArguments) -> None:
     """Track each recording of a folder that is not finished, and print a summary."""
-    folder = options.recording
-    output = options.output or Path(f"{folder.resolve().name}_tracked")
+    folder = asked.recording
+    output = asked.output or Path(f"{folder.resolve().name}_tracked")
     recordings = recordings_in(folder, output)
-    formats = _formats(options.formats or ())
-    _check_output(output, folder, recordings, options.force)
+    formats = _formats(asked.formats or ())
+    _check_output(output, folder, recordings, asked.force)
     before = _read_rows(output / SUMMARY)
-    jobs, rows = _jobs(options, recordings, formats)
+    jobs, rows = _jobs(asked, recordings, formats)
     reasons = list(_reasons(rows.values(), recordings))
     if len(rows) == len(recordings) > 1 and len(reasons) == 1:
         raise CardboxError(f"{reasons[0][1]} (the same for all {len(rows)} recordings)")
-    if not options.force:
+    if not asked.force:
         kept = {job.name for job in jobs if _is_finished(job, before, output, formats)}
         jobs = [job for job in jobs if job.name not in kept]
         rows |= {name: before[name] for name in kept}
         if kept:
             print(f"{len(kept)} of {len(recordings)} recordings are finished; --force does again")
-    if options.scheduler is not None:
+    if asked.scheduler is not None:
         # Workers began elsewhere, and may have another version.
         here, program = Path.cwd(), digest_of_program()
         jobs = [job._replace(folder=here, program=program) for job in jobs]
-    remarks = _track_all(jobs, rows, output, formats, options.jobs, options.scheduler)
+    remarks = _track_all(jobs, rows, output, formats, asked.jobs, asked.scheduler)
     for row in rows.values():
         if row.status == FAILED:
             _remove(output, row.recording)
@@ -188,16 +179,15 @@ def _check_output(output: Path, folder: Path, recordings: Mapping[str, Path], fo
 
 
 def _jobs(
-    options: argparse.Namespace, recordings: Mapping[str, Path], formats: Sequence[str]
+    asked: TrackArguments, recordings: Mapping[str, Path], formats: Sequence[str]
 ) -> tuple[list[Job], dict[str, Row]]:
     """Return a job for each recording, and the rows of those whose options are wrong."""
     program = digest_of_program()
     jobs, rows = [], {}
     for name, path in recordings.items():
         try:
-            own = with_own_options(options, options.recording, name)
-            own.recording = path
-            request = replace(tracking_request(own), force=True)
+            own = with_own_options(asked, asked.recording, name)
+            request = replace(tracking_request(replace(own, recording=path)), force=True)
             jobs.append(Job(name, request, digest_of_inputs(request, formats, program)))
         except (CardboxError, OSError) as error:
             rows[name] = Row.failed(name, error)
@@ -255,11 +245,9 @@ def _prepared(job: Job, number: int, work: Path, formats: Sequence[str]) -> Job:
     place.parent.mkdir()
     paths = {ending: place.with_name(f"{place.name}.{ending}") for ending in formats}
     table = next(paths[ending] for ending in TABLES if ending in paths)
-    body = place.with_name(f"{place.name}{_BODY}")
-    scene = place.with_name(f"{place.name}{_SCENE}")
-    files = TrackFiles(table, paths.get("mp4"), paths.get("bag"), body, scene)
-    request = replace(job.request, files=files)
-    return job._replace(request=request)
+    beside = body_beside(table), scene_beside(table)
+    files = TrackFiles(table, paths.get("mp4"), paths.get("bag"), *beside)
+    return job._replace(request=replace(job.request, files=files))
 
 
 def track_job(job: Job) -> tuple[Job, Row, list[str]]:

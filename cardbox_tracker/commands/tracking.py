@@ -5,13 +5,12 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack
 from dataclasses import replace
-from functools import partial
 
 from cardbox_tracker.applications.drawing.overlay import draw_sharp_overlay
 from cardbox_tracker.applications.drawing.video import overlay_video
 from cardbox_tracker.commands.arguments import print_remarks
-from cardbox_tracker.commands.request import PersonRequest, TrackingRequest
 from cardbox_tracker.commands.scene import measured_scene
+from cardbox_tracker.commands.tracking_request import PersonRequest, TrackingRequest
 from cardbox_tracker.common.files import body_of_person
 from cardbox_tracker.common.progress import progress_bar
 from cardbox_tracker.detectors.hand_network import HandNetwork
@@ -21,10 +20,7 @@ from cardbox_tracker.person.proportions import USUAL_STATURE_M
 from cardbox_tracker.recordings.given_camera import FOV_HINT, UNKNOWN_LENS
 from cardbox_tracker.recordings.recording import Recording
 from cardbox_tracker.recordings.result_bag import result_bag
-from cardbox_tracker.recordings.silhouettes import RecordedFrame
 from cardbox_tracker.recordings.track import Observer, TrackSummary, track_recording
-from cardbox_tracker.tracking.estimate import Estimate
-from cardbox_tracker.tracking.tracker import Tracker
 
 
 def track(
@@ -32,70 +28,78 @@ def track(
     observers: tuple[Observer, ...] = (),
     show: Callable[[float], None] | None = None,
 ) -> TrackSummary:
-    """Track a recording, print remarks and return the summary.
+    """Track a recording, print remarks, write the files and return the summary.
 
     ``observers`` are called after each image. ``show`` receives the finished fraction, 0 to 1;
     without it, there are a progress bar and lines on assumptions and quality. Raises CardboxError
     if the recording cannot be read, or a result cannot be written.
     """
-    recording, person = request.recording, request.person
-    start_s = person.start_s
+    recording, person, files = request.recording, request.person, request.files
     if person.model is not None and person.body.doubt:
         print(f"{person.model}: {person.body.doubt}")
-    if person.people is not None:
-        observers = tuple(partial(_of_person, person.number, observe) for observe in observers)
-
     with measured_scene(recording, person, request.config, request.seed) as (source, scene):
         # Hands and the overlay are seen at the resolution of the recording.
-        source.first.has_pictures = request.hands is not None or request.files.video is not None
+        source.first.has_pictures = request.hands is not None or files.video is not None
         early = source.first.remarks
         print_remarks(_with_unknown(early, person))
-        total_s = max(1e-9, min(source.first.duration_s, person.end_s) - start_s)
-        with ExitStack() as stack:
-            observers = (*_writers(request, source, stack), *observers)
-            advance = show or stack.enter_context(progress_bar("track"))
-            summary = track_recording(
-                source,
-                scene.people,
-                request.config,
-                request.seed,
-                start_s,
-                request.files.table,
-                (*observers, lambda frame, *_: advance((frame.time_s - start_s) / total_s)),
-                person.end_s,
-                person.people,
-                None if request.hands is None else HandNetwork(request.hands),
-            )
-        remarks = [remark for remark in source.first.remarks if remark not in early]
+        summary = _tracked(request, source, scene, observers, show)
+        print_remarks(one for one in source.first.remarks if one not in early)
         accounts = tuple(one.account for one in source.sources)
         assumptions = tuple(_assumptions(request, scene))
-    summary = replace(summary, accounts=accounts, assumptions=assumptions, scene=scene.numbers())
-    if show is None and not summary.people:
-        print(f"tracked {summary.frames_tracked} of {summary.frames} images")
-    print_remarks(remarks, summary.remarks)
+    summary = replace(summary, accounts=accounts, assumptions=assumptions, scene=scene)
+    print_remarks(summary.remarks)
     if show is None:
-        print(f"assumed: {', '.join(summary.assumptions)}")
-        for line in summary.quality if person.people is None else ():
-            print(line)
-        unseen = 0
-        for number, one in summary.people.items():
-            if not one.frames_tracked:
-                unseen += 1
-                continue
-            print(f"person {number}: tracked {one.frames_tracked} of {one.frames} images")
-            print(*one.quality, sep="\n")
-        if unseen:
-            print(f"{unseen} more, of {len(summary.people)} people, in no image")
-        if summary.used_text:
-            print(summary.used_text)
+        print(*_lines(summary), sep="\n")
     for number, one in (summary.people or {1: summary}).items():
-        if request.files.body is not None and one.body is not None:
-            save_body_model(one.body, body_of_person(request.files.body, number))
-    if request.files.scene is not None:
-        save_scene(scene, request.files.scene)
+        if files.body is not None and one.body is not None:
+            save_body_model(one.body, body_of_person(files.body, number))
+    if files.scene is not None:
+        save_scene(scene, files.scene)
     one = summary.people.get(person.number, summary)
     names = "remarks", "accounts", "assumptions", "scene", "people"
     return replace(one, **{name: getattr(summary, name) for name in names})
+
+
+def _tracked(
+    request: TrackingRequest,
+    source: Recording,
+    scene: Scene,
+    observers: tuple[Observer, ...],
+    show: Callable[[float], None] | None,
+) -> TrackSummary:
+    person, start_s = request.person, request.person.start_s
+    total_s = max(1e-9, min(source.first.duration_s, person.end_s) - start_s)
+    with ExitStack() as stack:
+        observers = (*_writers(request, source, stack), *observers)
+        advance = show or stack.enter_context(progress_bar("track"))
+        return track_recording(
+            source,
+            scene.people,
+            request.config,
+            request.seed,
+            start_s,
+            request.files.table,
+            (*observers, lambda frame, *_: advance((frame.time_s - start_s) / total_s)),
+            person.end_s,
+            person.people,
+            None if request.hands is None else HandNetwork(request.hands),
+        )
+
+
+def _lines(summary: TrackSummary) -> Iterator[str]:
+    """Yield what was tracked, on what it rests, and how sure it is."""
+    if not summary.people:
+        yield f"tracked {summary.frames_tracked} of {summary.frames} images"
+    yield f"assumed: {', '.join(summary.assumptions)}"
+    yield from () if summary.people else summary.quality
+    seen = {number: one for number, one in summary.people.items() if one.frames_tracked}
+    for number, one in seen.items():
+        yield f"person {number}: tracked {one.frames_tracked} of {one.frames} images"
+        yield from one.quality
+    if unseen := len(summary.people) - len(seen):
+        yield f"{unseen} more, of {len(summary.people)} people, in no image"
+    if summary.used_text:
+        yield summary.used_text
 
 
 def _with_unknown(remarks: Sequence[str], person: PersonRequest) -> list[str]:
@@ -103,26 +107,18 @@ def _with_unknown(remarks: Sequence[str], person: PersonRequest) -> list[str]:
     if person.stature_m is not None or person.model is not None:
         return [*remarks]
     others = [remark for remark in remarks if not remark.startswith(UNKNOWN_LENS)]
-    if len(others) == len(remarks):
-        return [
-            f"the stature is taken as that of most adults, {USUAL_STATURE_M:g} m, so sizes and "
-            "distances may be wrong by a tenth; give --stature M",
-            *others,
-        ]
-    return [
-        f"stature and field of view are unknown ({USUAL_STATURE_M:g} m and those of most cameras "
-        "are assumed), so distances may be wrong by half, and sizes by a tenth; give --stature M "
-        f"and --fov DEG ({FOV_HINT}); times, and mostly angles, are right all the same",
-        *others,
-    ]
-
-
-def _of_person(
-    number: int, observe: Observer, frame: RecordedFrame, estimate: Estimate, tracker: Tracker
-) -> None:
-    """Pass on the results of one of several people."""
-    if estimate.person == number:
-        observe(frame, estimate, tracker)
+    unknown = (
+        f"the stature is taken as that of most adults, {USUAL_STATURE_M:g} m, so sizes and "
+        "distances may be wrong by a tenth; give --stature M"
+    )
+    if len(others) < len(remarks):
+        unknown = (
+            f"stature and field of view are unknown ({USUAL_STATURE_M:g} m and those of most "
+            "cameras are assumed), so distances may be wrong by half, and sizes by a tenth; give "
+            f"--stature M and --fov DEG ({FOV_HINT}); times, and mostly angles, are right all the "
+            "same"
+        )
+    return [unknown, *others]
 
 
 def _assumptions(request: TrackingRequest, scene: Scene) -> Iterator[str]:
@@ -135,7 +131,7 @@ def _assumptions(request: TrackingRequest, scene: Scene) -> Iterator[str]:
         whose = "" if person.people is None else f" of person {number}"
         yield f"distance{whose} {body.placement.distance_m:.2f} m ({distance})"
     if person.stature_m is not None:
-        each = " and ".join(f"{one:.2f}" for one in person.statures_m or (person.stature_m,))
+        each = " and ".join(f"{one:.2f}" for one in person.statures_m)
         yield f"stature {each} m (given), sizes from proportions"
     elif person.model is None:
         yield f"stature {USUAL_STATURE_M:.2f} m (the mean of adults), sizes from proportions"

@@ -2,24 +2,29 @@
 
 from __future__ import annotations
 
-import argparse
+from dataclasses import MISSING, dataclass
 from pathlib import Path
 
-
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the arguments of ``cardbox urdf``."""
-    parser.add_argument("model", type=Path, metavar="MODEL.yaml", help="the person")
-    parser.add_argument(
-        "--no-torso-place",
-        dest="torso_place",
-        action="store_false",
-        help="leave out the joints of place, neck and clavicles, for joint states without them",
-    )
+from cardbox_tracker.commands.arguments import Options, option
 
 
-def run(options: argparse.Namespace) -> None:
+@dataclass(frozen=True)
+class Arguments(Options):
+    """A measured person.
+
+    Attributes:
+        model: the person
+        torso_place: leave out the joints of place, neck and clavicles, for joint states without
+            them
+    """
+
+    model: Path = option("MODEL.yaml", default=MISSING)
+    torso_place: bool = option(default=True, flag="--no-torso-place")
+
+
+def run(given: Arguments) -> None:
     """Print the URDF."""
     from cardbox_tracker.person.model_file import load_body_model
     from cardbox_tracker.person.urdf import urdf_from_body
 
-    print(urdf_from_body(load_body_model(options.model), torso_place=options.torso_place))
+    print(urdf_from_body(load_body_model(given.model), torso_place=given.torso_place))

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-import argparse
 import time
 from collections.abc import Mapping
 from contextlib import suppress
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from cardbox_tracker.commands.arguments import add_force, at_least, check_outputs
+from cardbox_tracker.commands.arguments import Written, at_least, check_outputs, option
 from cardbox_tracker.common.errors import CardboxError, RosMissingError
 
 if TYPE_CHECKING:
@@ -19,39 +19,44 @@ if TYPE_CHECKING:
 _TRUTH = "ground_truth.json"
 
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the arguments of ``cardbox view``."""
-    add = parser.add_argument
-    add("results", type=Path, nargs="?", metavar="BAG", help="bag of 'cardbox track --bag'")
-    add("--live", action="store_true", help="show the results of the running nodes")
-    add("--save", type=Path, metavar="FILE.rrd", help="write a file for the viewer")
-    add("--web", action="store_true", help="serve the viewer to a browser on this computer")
-    add(
-        "--truth",
-        type=Path,
-        metavar="FILE",
-        help=f"{_TRUTH} of the recording, to plot the error; not needed if it lies beside BAG",
-    )
-    add("--person", type=at_least(1), metavar="K", help="whom of several people (default: 1)")
-    add_force(parser)
+@dataclass(frozen=True, kw_only=True)
+class Arguments(Written):
+    """A bag of results or the running nodes, and how they are shown.
+
+    Attributes:
+        results: bag of 'cardbox track --bag'
+        live: show the results of the running nodes
+        save: write a file for the viewer
+        web: serve the viewer to a browser on this computer
+        truth: ground_truth.json of the recording, to plot the error; not needed if it lies beside
+            BAG
+        person: whom of several people (default: 1)
+    """
+
+    results: Path | None = option("BAG", flag="results", nargs="?")
+    live: bool = option(default=False)
+    save: Path | None = option("FILE.rrd")
+    web: bool = option(default=False)
+    truth: Path | None = option("FILE")
+    person: int | None = option("K", at_least(1))
 
 
-def run(options: argparse.Namespace) -> None:
+def run(given: Arguments) -> None:
     """Show a bag of results, or the running nodes."""
-    results: Path | None = options.results
-    if options.live == (results is not None):
+    results = given.results
+    if given.live == (results is not None):
         raise CardboxError("expected either BAG or --live")
-    if options.person is not None and options.live:
+    if given.person is not None and given.live:
         raise CardboxError("--person chooses in results: leave out --live")
-    check_outputs((options.save,), options.force, inputs=(results, options.truth))
+    check_outputs((given.save,), given.force, inputs=(results, given.truth))
     # A wrong input is reported before a missing library or display.
-    truth = None if results is None else _truth_of(results, options.truth, options.person)
+    truth = None if results is None else _truth_of(results, given.truth, given.person)
     from cardbox_tracker.applications.viewing.scene import Scene, layout, show_results
     from cardbox_tracker.applications.viewing.viewer import recording
     from cardbox_tracker.common.progress import progress_bar
 
-    blueprint = layout(has_truth=truth is not None, is_live=options.live)
-    with recording(blueprint, options.save, options.web) as (stream, address):
+    blueprint = layout(has_truth=truth is not None, is_live=given.live)
+    with recording(blueprint, given.save, given.web) as (stream, address):
         if address:
             print(f"open {address} in a browser; Ctrl-C ends", flush=True)
         scene = Scene(stream, truth)
@@ -59,15 +64,15 @@ def run(options: argparse.Namespace) -> None:
             _show_nodes(scene)
         else:
             with progress_bar("view") as show:
-                count = show_results(results, scene, show, options.person)
+                count = show_results(results, scene, show, given.person)
             print(f"shown: {count} images with a posture", flush=True)
-            if options.web:
+            if given.web:
                 stream.flush()
                 with suppress(KeyboardInterrupt):
                     while True:
                         time.sleep(1.0)
-    if options.save is not None:
-        print(f"wrote {options.save}; look at it with 'rerun {options.save}'")
+    if given.save is not None:
+        print(f"wrote {given.save}; look at it with 'rerun {given.save}'")
 
 
 def _show_nodes(scene: Scene) -> None:

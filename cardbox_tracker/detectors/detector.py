@@ -11,11 +11,17 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from cardbox_tracker.detectors.image_points import ImagePoints
 from cardbox_tracker.detectors.model_files import ModelFiles, installed_models
 from cardbox_tracker.detectors.own_network import OwnModel, OwnNetwork
 from cardbox_tracker.detectors.people_network import PeopleNetwork
 from cardbox_tracker.detectors.person_choice import PersonChoice
-from cardbox_tracker.detectors.pose_network import Detection, PoseNetwork
+from cardbox_tracker.detectors.pose_network import (
+    Detection,
+    PoseNetwork,
+    image_points,
+    silhouette_of,
+)
 
 Image = NDArray[np.uint8]
 
@@ -24,7 +30,7 @@ MEDIAPIPE = "mediapipe"
 
 
 class Detector(NamedTuple):
-    """The installed detector, or one of the user's own."""
+    """The installed detector, or one of the user's own; ``start()`` makes it ready for a camera."""
 
     models: ModelFiles | OwnModel  #: its network files, or the class of one's own
     #: whom to follow, px of the camera's own image; None for the most certain person.
@@ -33,9 +39,9 @@ class Detector(NamedTuple):
     people: int = 0
 
     @classmethod
-    def installed(cls) -> Detector:
+    def installed(cls, people: int = 0) -> Detector:
         """Return the installed detector; raise CardboxError if it is not installed."""
-        return cls(installed_models())
+        return cls(installed_models(), people=people)
 
     def start(self, across: float = 1.0, down: float = 1.0) -> PersonDetector:
         """Return a detector for the images of one camera.
@@ -50,6 +56,18 @@ class Detector(NamedTuple):
         if self.person is not None:
             network.choose = self.person.scaled(across, down)
         return PersonDetector(network, PeopleNetwork(network, self.people) if self.people else None)
+
+
+class Found(NamedTuple):
+    """The people in an image; the channels of an :class:`~cardbox_tracker.Observation`."""
+
+    silhouette: Image  #: (H, W), 255 where one of them is, else 0
+    people: tuple[ImagePoints, ...]  #: the points of each of several people
+
+    @property
+    def points(self) -> ImagePoints | None:
+        """The points of the one who is followed; None if nobody is seen."""
+        return self.people[0] if self.people else None
 
 
 class PersonDetector:
@@ -82,6 +100,11 @@ class PersonDetector:
         found = own.people_in(color(image)) if own else self._people(color(image), stamp_ns)
         self.missed += not found
         return found
+
+    def detect(self, image: Image, stamp_ns: int) -> Found:
+        """Return what an image as above, of a time, ns, shows, as an observation takes it."""
+        found = self.all_in(stamp_ns, image)
+        return Found(silhouette_of(found, image.shape), tuple(map(image_points, found)))
 
     @property
     def remark(self) -> str:

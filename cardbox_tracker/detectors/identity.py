@@ -12,6 +12,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from cardbox_tracker.common.health import Verdict
 from cardbox_tracker.detectors.figure import Figure
 from cardbox_tracker.person.sizes import FloatArray
 
@@ -34,9 +35,8 @@ _PLACE, _PLACE_PER_S = 0.5, 2.0
 _COLOURS = 0.3
 # Length of a trunk, m; speed of a person who runs, m/s, and error of a place, m.
 _TRUNK_M, _RUN_M_PER_S, _ERROR_M = 0.5, 4.0, 0.2
-# Weight of an image in the colours, and images in a row with other colours that nothing that is
-# held before the trunk explains for so short a time.
-_LEARN_RATE, _OTHER_IMAGES = 0.1, 3
+# Weight of an image in the colours.
+_LEARN_RATE = 0.1
 # Fewest pixels whose colours count, and time without anybody after which whoever comes is new, ns.
 _LEAST_PX, _EMPTY_NS = 20, 60_000_000_000
 
@@ -119,12 +119,7 @@ def cheapest(costs: Sequence[Sequence[float]]) -> dict[int, int]:
 
 
 class Identity:
-    """The one person who is followed in the images of a camera.
-
-    Attributes:
-        is_doubtful: whether the place goes on, but the colours have been others for some images, as
-            those of somebody who stands before the person, or of a thing that the person holds.
-    """
+    """The one person who is followed in the images of a camera."""
 
     def __init__(self) -> None:
         self.forget()
@@ -134,8 +129,16 @@ class Identity:
         self._figure: Figure | None = None
         self._colours: FloatArray | None = None
         self._seen_ns = self._anybody_ns = 0
-        self._images = self._others = 0
-        self._is_away = self.is_doubtful = False
+        self._images, self._is_away = 0, False
+        self._others = Verdict("other person")
+
+    @property
+    def is_doubtful(self) -> bool:
+        """Whether the place goes on, but the colours have been others for some images.
+
+        Somebody stands before the person, or the person holds a thing.
+        """
+        return self._others.holds
 
     @property
     def is_new(self) -> bool:
@@ -181,9 +184,8 @@ class Identity:
             return False
         self._figure, self._seen_ns, self._is_away = figure, now_ns, False
         self._images += 1
-        self._others = self._others + 1 if self.is_other(colours) else 0
-        self.is_doubtful = self._others >= _OTHER_IMAGES
-        if colours is not None and not self._others:
+        self._others.count(self.is_other(colours))
+        if colours is not None and not self._others.value:
             self._colours = learned(self._colours, colours)
         return True
 

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import os
 import sys
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from math import atan2, cos, hypot, pi, sin
 from pathlib import Path
@@ -389,6 +389,14 @@ def _chance(logits: NDArray[Any]) -> FloatArray:
 
 _USED = np.array([LANDMARKS.index(name) for name in POINT_NAMES])
 _LEGS = np.array([LANDMARKS.index(name) for name in LEG_POINT_NAMES])
+
+
+def silhouette_of(found: Iterable[Detection], shape: tuple[int, ...]) -> NDArray[np.uint8]:
+    """Return the silhouette (H, W) of all these people in an image of this shape, 0 or 255."""
+    silhouette = np.zeros(shape[:2], np.uint8)
+    for one in found:
+        silhouette |= one.silhouette()
+    return silhouette
 
 
 def image_points(found: Detection) -> ImagePoints:

@@ -32,7 +32,7 @@ from cardbox_tracker.common.least_squares import (
     rules_of,
 )
 from cardbox_tracker.detectors.image_points import LEG_POINT_NAMES, POINT_INDEX, ImagePoints
-from cardbox_tracker.person.proportions import USUAL_STATURE_M, USUAL_STDDEV_M
+from cardbox_tracker.person.proportions import MARKED_HEIGHTS, USUAL_STATURE_M, USUAL_STDDEV_M
 from cardbox_tracker.person.sizes import FloatArray
 
 Sightings = Sequence[tuple[float, ImagePoints]]
@@ -45,9 +45,8 @@ ROLL_PRIOR = np.radians(15.0)
 FOUND_STDDEV = float(np.radians(9.5))
 """Standard deviation from which on a pitch is mostly that of most cameras, and not found, rad."""
 LEVELS = ("nose", "ear", "shoulder", "hip", "knee", "ankle")
-# Height above the floor and distance before the ankles of each level where MediaPipe marks the
-# joints of people who stand upright, and their standard deviations among people.
-HEIGHTS = np.array([0.915, 0.932, 0.811, 0.507, 0.283, 0.063])
+# Distance before the ankles of each level where MediaPipe marks the joints of people who stand
+# upright, and the standard deviations among people of heights and distances.
 FORWARD = np.array([0.09, 0.045, 0.0, 0.0, 0.01, 0.0])
 _HEIGHT_STDDEVS = np.array([0.025, 0.016, 0.013, 0.016, 0.014, 0.010])
 _FORWARD_STDDEVS = np.array([0.03, 0.02, 0.015, 0.015, 0.015, 0.01])
@@ -161,7 +160,7 @@ def people_camera(
     seen = _Seen(*(np.concatenate(one) for one in zip(*shown, strict=True)))
     images = len(seen.rays)
     known = np.isfinite(seen.stddevs[..., 0])
-    heights = np.where(known, HEIGHTS, np.nan)
+    heights = np.where(known, MARKED_HEIGHTS, np.nan)
     rows = np.where(known, seen.rays[..., 1], np.nan)
     columns = np.where(known, seen.rays[..., 0], np.nan)
     looks = np.hypot(np.ptp(_ends(rows), axis=1), np.ptp(_ends(columns), axis=1))
@@ -261,7 +260,7 @@ def _rays(seen: _Seen, unknowns: FloatArray) -> FloatArray:
     """Return the rays (..., n, 6, 2) of the levels for the unknowns (..., n, k) of each image."""
     count = len(LEVELS)
     pitch, roll, height_m, log_focal, log_stature = np.moveaxis(unknowns[..., :5, None], -2, 0)
-    heights = HEIGHTS + unknowns[..., 5 : 5 + count]
+    heights = MARKED_HEIGHTS + unknowns[..., 5 : 5 + count]
     forward = FORWARD + unknowns[..., 5 + count : 5 + 2 * count]
     leans, changes = unknowns[..., 5 + 2 * count : 8 + 2 * count], unknowns[..., -5:-2]
     aside, far = unknowns[..., -7:-6], np.exp(np.clip(unknowns[..., -6:-5], _NEAREST, _FARTHEST))

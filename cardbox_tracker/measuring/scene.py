@@ -99,10 +99,12 @@ def save_scene(scene: Scene, path: str | os.PathLike[str]) -> None:
 def load_scene(path: str | os.PathLike[str]) -> Scene:
     """Read a scene; CardboxError says what is wrong if it cannot be read or is none."""
     with foreign(path, CardboxError, "a file OUT.scene.yaml that 'cardbox track' has written"):
-        return _scene_of(parse_small_yaml(read_small_text(path)))
+        return loads_scene(read_small_text(path))
 
 
-def _scene_of(data: Any) -> Scene:
+def loads_scene(text: str) -> Scene:
+    """Return the scene of a text of :func:`dumps_scene`; ValueError if it is none."""
+    data = parse_small_yaml(text)
     keys = {"format", "camera", "people"}
     if not isinstance(data, dict) or set(data) != keys:
         raise ValueError(f"expected a mapping of {', '.join(sorted(keys))}")

@@ -10,7 +10,6 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Iterable
-from enum import Enum
 from math import atan2, sqrt
 from typing import NamedTuple
 
@@ -20,6 +19,7 @@ from numpy.typing import NDArray
 
 from cardbox_tracker.camera.camera import Camera
 from cardbox_tracker.camera.extrinsics import Extrinsics
+from cardbox_tracker.common.health import Verdict
 from cardbox_tracker.person.sizes import FloatArray
 from cardbox_tracker.terms.term import Silhouette
 
@@ -189,22 +189,10 @@ def _highest(hull: _Hull, axes: FloatArray) -> tuple[FloatArray, bool]:
     return rays[number], bool(inside[number])
 
 
-# Samples in a window, and the least number for a verdict.
-_WINDOW, _LEAST = 15, 6
 # Frames between samples, and between those of the first frames, so that a verdict comes early.
 _EVERY, _EVERY_AT_FIRST, _FIRST = 6, 2, 60
-# Least median heights of an inverted pose and of any wrong pose, rad. Right poses have at most
-# 0.7 degrees (docs/research.md#several-cameras).
-_INVERTED_RAD, _WRONG_RAD = np.radians(0.3), np.radians(2.5)
 # An inverted pose's height is more than that of its inverse divided by this.
 _BETTER = 0.25
-
-
-class PoseFault(Enum):
-    """A gross error of a camera's pose."""
-
-    INVERTED = "inverted"
-    CONTRADICTED = "contradicted"
 
 
 class PoseDirection:
@@ -223,13 +211,19 @@ class PoseDirection:
         raw = Extrinsics(roll @ given.rotation, roll @ given.translation_m).inverse()
         inverse = Extrinsics(roll.T @ raw.rotation, roll.T @ raw.translation_m)
         self._pencils = [self._tangents.pencil(pose) for pose in (given, inverse)]
-        self._per_px = 1.0 / other.fx
-        self._heights_rad = deque[tuple[float, float]](maxlen=_WINDOW)
+        self._per_px = np.degrees(1.0 / other.fx)
         self._frames = 0
-        self.fault: PoseFault | None = None
+        self._inverted, self._wrong = Verdict("inverted", _explained), Verdict("contradicted")
+
+    @property
+    def fault(self) -> Verdict | None:
         """The error according to the latest samples; None for a pose without a gross error."""
-        self.height_rad = 0.0
-        """Median distance between both cameras' tangent planes, rad."""
+        return next((one for one in (self._inverted, self._wrong) if one.holds), None)
+
+    @property
+    def height_deg(self) -> float:
+        """Median angle between both cameras' tangent planes, degrees; 0 while unknown."""
+        return self._wrong.value
 
     def see(self, first: Silhouette, other: Silhouette) -> None:
         """Add a frame with silhouettes (H, W), 0 or 255, whether a posture fits them or not."""
@@ -245,14 +239,10 @@ class PoseDirection:
         if not np.isfinite(given):
             return
         # The inverse pose is no better if it does not even show the top.
-        self._heights_rad.append((given, inverse if np.isfinite(inverse) else np.inf))
-        if len(self._heights_rad) >= _LEAST:
-            self._judge()
+        self._inverted.see(given, inverse if np.isfinite(inverse) else np.inf)
+        self._wrong.see(given)
 
-    def _judge(self) -> None:
-        given, inverse = np.median(np.array(self._heights_rad), axis=0).tolist()
-        self.height_rad, self.fault = given, None
-        if given > _INVERTED_RAD and inverse < _BETTER * given:
-            self.fault = PoseFault.INVERTED
-        elif given > _WRONG_RAD:
-            self.fault = PoseFault.CONTRADICTED
+
+def _explained(given: float, inverse: float) -> float:
+    """Return the height that the given pose leaves and the inverse one explains, or 0."""
+    return given if inverse < _BETTER * given else 0.0

@@ -149,7 +149,7 @@ class PosedBodies(NamedTuple):
 
     points_m: FloatArray  #: points of ``POINT_NAMES``, (..., 9, 3), metres
     rotations: FloatArray  #: rotations from the frames of ``FRAME_NAMES``, (..., 5, 3, 3)
-    #: rise of the left and right shoulder, (..., 2), metres: the values of ``CLAVICLE_NAMES``.
+    #: rise of the left and right shoulder, (..., 2), metres: the values of ``Group.CLAVICLE``.
     clavicles_m: FloatArray
 
     @property

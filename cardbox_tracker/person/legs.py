@@ -1,4 +1,4 @@
-"""The legs: rows of the skeleton behind the others, for people whose legs are measured.
+"""The legs: directions and places of their bones.
 
 A thigh turns forwards, outwards, then inwards about its own axis; then the knee bends:
 
@@ -14,37 +14,24 @@ gives way under the weight of a person who squats or sits low, so they have up t
 
 from __future__ import annotations
 
-import math
-from collections.abc import Iterator
-
 import numpy as np
 
 from cardbox_tracker.person.model import BodyModel
-from cardbox_tracker.person.parts import BodyParts, body_parts
-from cardbox_tracker.person.sizes import FloatArray
-from cardbox_tracker.person.skeleton import (
-    FIXED,
-    REVOLUTE,
-    Group,
-    Joint,
-    X,
-    Y,
-    rotation_x,
-    rotation_y,
-    rotation_z,
+from cardbox_tracker.person.parts import body_parts
+from cardbox_tracker.person.proportions import (
+    ANKLE_SHARE,
+    HIP_SHARE,
+    SHANK_SHARE,
+    THIGH_SHARE,
+    stature_of,
 )
+from cardbox_tracker.person.sizes import FloatArray
+from cardbox_tracker.person.skeleton import rotation_x, rotation_y, rotation_z
 
-HIP_SHARE, THIGH_SHARE, SHANK_SHARE = 0.06, 0.245, 0.246
-"""Hip joint from the middle of the hips, thigh, and shank up to the ankle, as shares of the
-stature; the latter two are those of Drillis & Contini (:mod:`.proportions`)."""
-ANKLE_SHARE = 0.039
-"""Height of the ankle above the floor, as a share of the stature (Drillis & Contini)."""
-_CROWN_SHARE = 0.83 / 1.72
-
-
-def stature_of(parts: BodyParts[float]) -> float:
-    """Return the stature of a person with this trunk and head, m, see :mod:`.proportions`."""
-    return parts.head.top_m / _CROWN_SHARE
+LEG_KEYPOINT_NAMES: tuple[str, ...] = (
+    *("left_hip", "left_knee", "left_ankle"),
+    *("right_hip", "right_knee", "right_ankle"),
+)
 
 
 def floor_m(body: BodyModel) -> float | None:
@@ -74,53 +61,6 @@ def legs_m(body: BodyModel, hips_m: FloatArray, yaw: FloatArray, angles: FloatAr
         ankle = knee + stature_m * np.einsum("nij,nj->ni", turn, SHANK_SHARE * shank)
         points += [hip, knee, ankle]
     return np.stack(points, axis=1)
-
-
-def _deg(lowest: float, highest: float) -> tuple[float, float]:
-    return math.radians(lowest), math.radians(highest)
-
-
-def _leg(name: str, side: float) -> Iterator[Joint]:
-    """Yield the joints of a leg; ``side`` is +1 for the left one, -1 for the right."""
-    free, letter = (Group.NOTHING, REVOLUTE), name[0]
-
-    def joint(what: str, parent: str, *rest: object, **more: object) -> Joint:
-        group, kind = free
-        return Joint(f"{name}_{what}", group, parent, kind, *rest, **more)  # type: ignore[arg-type]
-
-    yield joint(
-        *("hip_flexion", "torso_yaw", (0.0, -1.0, 0.0), _deg(-40, 125), f"{letter}_p_hip"),
-        offset=lambda parts: (0.0, side * HIP_SHARE * stature_of(parts), 0.0),
-    )
-    yield joint(
-        "hip_abduction", f"{name}_hip_flexion", (side, 0.0, 0.0), _deg(-35, 65), f"{letter}_r_hip"
-    )
-    yield joint(
-        *("hip_rotation", f"{name}_hip_abduction", (0.0, 0.0, -side), _deg(-50, 50)),
-        *(f"{letter}_y_hip", f"{name}_thigh"),
-    )
-    yield joint(
-        *("knee_flexion", f"{name}_hip_rotation", Y, _deg(0, 150), f"{letter}_knee"),
-        *(f"{name}_shank", lambda parts: (0.0, 0.0, -THIGH_SHARE * stature_of(parts))),
-    )
-    yield Joint(
-        *(f"{name}_ankle", Group.NOTHING, f"{name}_knee_flexion", FIXED, X, (0.0, 0.0)),
-        *(f"{letter}_ankle", f"{name}_foot"),
-        lambda parts: (0.0, 0.0, -SHANK_SHARE * stature_of(parts)),
-    )
-
-
-LEGS: tuple[Joint, ...] = (*_leg("left", 1.0), *_leg("right", -1.0))
-"""Joints of the legs, which follow the others where legs are measured (:mod:`.tracking.legs`)."""
-LEG_NAMES = tuple(joint.name for joint in LEGS if joint.kind == REVOLUTE)
-"""The 8 joints of the legs, four of the left one first; all are in rad."""
-LEG_LIMITS: FloatArray = np.array([joint.limits for joint in LEGS if joint.kind == REVOLUTE])
-"""Shape (8, 2): lowest and highest value of each of ``LEG_NAMES``, rad."""
-LEG_LIMITS.setflags(write=False)
-LEG_KEYPOINT_NAMES: tuple[str, ...] = (
-    *("left_hip", "left_knee", "left_ankle"),
-    *("right_hip", "right_knee", "right_ankle"),
-)
 
 
 def leg_directions(

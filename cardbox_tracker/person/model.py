@@ -19,6 +19,7 @@ import numpy as np
 from cardbox_tracker.common.errors import BodyModelError, quoted
 from cardbox_tracker.person.appearance import Appearance
 from cardbox_tracker.person.posture import N_STATE, POSTURE, SIDE_TURNS, TORSO_Y, reference_posture
+from cardbox_tracker.person.proportions import BREADTHS, STATURE_LIMITS_M, sizes_of_stature
 from cardbox_tracker.person.sizes import (
     DEFAULT_SIZES,
     N_SIZES,
@@ -262,3 +263,36 @@ class BodyModel:
             return ""
         text = "sizes from the proportions of people, not measured: less exact"
         return f"{text}; unknown: {', '.join(self.unknown)}" if self.unknown else text
+
+
+def body_from_proportions(
+    stature_m: float,
+    distance_m: float | None = None,
+    shoulder_breadth_m: float | None = None,
+    hip_height_m: float | None = None,
+    camera_pitch_rad: float = 0.0,
+) -> BodyModel:
+    """Return a body of the given stature; values that are not given are marked as unknown.
+
+    The distance is level, the breadth between the shoulder joints, the height that of the middle of
+    the hips above the camera's centre. Raises BodyModelError if one is out of range.
+    """
+    check_range("stature", stature_m, *STATURE_LIMITS_M, "m")
+    sizes = sizes_of_stature(stature_m)
+    given = {"distance_m": distance_m, "hip_height_m": hip_height_m}
+    unknown = [name for name, value in given.items() if value is None]
+    breadths = list(BREADTHS)
+    if shoulder_breadth_m is not None:
+        breadth, top = SIZE_INDEX["shoulder_breadth"], SIZE_INDEX["torso_top_width"]
+        limits = SIZES[breadth].minimum_m, SIZES[breadth].maximum_m
+        check_range("shoulder_breadth", shoulder_breadth_m, *limits, "m")
+        sizes[top] *= shoulder_breadth_m / sizes[breadth]
+        sizes[breadth] = shoulder_breadth_m
+        breadths.remove("shoulder_breadth")
+    return BodyModel.of(
+        sizes.round(4),
+        camera_pitch_rad=camera_pitch_rad,
+        source=PROPORTIONS,
+        unknown=(*unknown, *breadths),
+        **{name: value for name, value in given.items() if value is not None},
+    )

@@ -18,8 +18,10 @@ from cardbox_tracker.person.sizes import FloatArray
 from cardbox_tracker.person.skeleton import (
     JOINT_NAMES,
     PLACE_NAMES,
+    POSTURE_GROUPS,
     Group,
     joints_of,
+    limits_of,
 )
 
 N_JOINTS, N_STATE = len(JOINT_NAMES), len(JOINT_NAMES) + len(PLACE_NAMES)
@@ -38,14 +40,13 @@ LEFT_ARM, RIGHT_ARM = (slice(first, first + ARM_ANGLES) for first in FIRST_ANGLE
 POSTURE, PLACE = slice(0, N_JOINTS), slice(N_JOINTS, N_STATE)
 
 
-TURNING_LIMITS: FloatArray = np.array([joint.limits for joint in joints_of(Group.POSTURE)])
+TURNING_LIMITS: FloatArray = limits_of(*POSTURE_GROUPS)
 """Shape (12, 2): lowest and highest value of each joint, rad (metres for ``torso_y``), of a person
 who also turns with the feet, to walk, to look aside, or around."""
 JOINT_LIMITS: FloatArray = TURNING_LIMITS.copy()
 """Shape (12, 2): the same of a person who stands, with which the paper's filter searches."""
 JOINT_LIMITS[PITCH, 1] = np.radians(90.0)
 JOINT_LIMITS[YAW] = np.radians([-60.0, 60.0])
-TURNING_LIMITS.setflags(write=False)
 JOINT_LIMITS.setflags(write=False)
 
 _ASIDE_RAD = np.radians(100.0)

@@ -1,6 +1,6 @@
-"""Estimates a body from the stature: the mean sizes of people of that stature.
+"""Mean sizes and lengths of bones of people of a stature, as shares of it.
 
-Every size is a fraction of the stature. The lengths of the trunk are from Drillis & Contini, "Body
+The lengths of trunk and legs, and the place of the wrist, are from Drillis & Contini, "Body
 Segment Parameters", 1966 (also in Winter, "Biomechanics and Motor Control of Human Movement").
 Upper arm, and forearm with the hand up to its knuckles, are the means of men and women of de Leva,
 "Adjustments to Zatsiorsky-Seluyanov's Segment Inertia Parameters", 1996. Breadths and depths are
@@ -13,8 +13,10 @@ body is less exact than a measured one.
 
 from __future__ import annotations
 
-from cardbox_tracker.person.model import PROPORTIONS, BodyModel, check_range
-from cardbox_tracker.person.sizes import DEFAULT_SIZES, SIZE_INDEX, SIZES, FloatArray
+import numpy as np
+
+from cardbox_tracker.person.parts import BodyParts
+from cardbox_tracker.person.sizes import DEFAULT_SIZES, SIZE_INDEX, FloatArray
 
 STATURE_M = 1.72
 """Stature that ``DEFAULT_SIZES`` belongs to, metres."""
@@ -22,6 +24,15 @@ STATURE_M = 1.72
 USUAL_STATURE_M, USUAL_STDDEV_M = 1.69, 0.09
 """Mean stature of adults, women and men alike, and its standard deviation, metres."""
 
+HIP_SHARE, THIGH_SHARE, SHANK_SHARE, ANKLE_SHARE = 0.06, 0.245, 0.246, 0.039
+"""Hip joint from the middle of the hips, thigh, shank to the ankle, and ankle above the floor."""
+WRIST_SHARE = 0.73
+"""Place of the wrist between elbow and knuckles: forearm and half of the hand have 0.146 and 0.054
+of the stature."""
+MARKED_HEIGHTS: FloatArray = np.array([0.915, 0.932, 0.811, 0.507, 0.283, 0.063])
+"""Heights above the floor at which MediaPipe marks nose, ears, shoulders, hips, knees and ankles of
+people who stand upright."""
+_CROWN_SHARE = 0.83 / STATURE_M
 _SHARES = {"upper_arm_length": 0.160, "forearm_length": 0.2005, "shoulder_breadth": 0.197}
 
 STATURE_LIMITS_M = (1.1, 2.2)
@@ -47,34 +58,6 @@ def sizes_of_stature(stature_m: float) -> FloatArray:
     return sizes
 
 
-def body_from_proportions(
-    stature_m: float,
-    distance_m: float | None = None,
-    shoulder_breadth_m: float | None = None,
-    hip_height_m: float | None = None,
-    camera_pitch_rad: float = 0.0,
-) -> BodyModel:
-    """Return a body of the given stature; values that are not given are marked as unknown.
-
-    The distance is level, the breadth between the shoulder joints, the height that of the middle of
-    the hips above the camera's centre. Raises BodyModelError if one is out of range.
-    """
-    check_range("stature", stature_m, *STATURE_LIMITS_M, "m")
-    sizes = sizes_of_stature(stature_m)
-    given = {"distance_m": distance_m, "hip_height_m": hip_height_m}
-    unknown = [name for name, value in given.items() if value is None]
-    breadths = list(BREADTHS)
-    if shoulder_breadth_m is not None:
-        breadth, top = SIZE_INDEX["shoulder_breadth"], SIZE_INDEX["torso_top_width"]
-        limits = SIZES[breadth].minimum_m, SIZES[breadth].maximum_m
-        check_range("shoulder_breadth", shoulder_breadth_m, *limits, "m")
-        sizes[top] *= shoulder_breadth_m / sizes[breadth]
-        sizes[breadth] = shoulder_breadth_m
-        breadths.remove("shoulder_breadth")
-    return BodyModel.of(
-        sizes.round(4),
-        camera_pitch_rad=camera_pitch_rad,
-        source=PROPORTIONS,
-        unknown=(*unknown, *breadths),
-        **{name: value for name, value in given.items() if value is not None},
-    )
+def stature_of(parts: BodyParts[float]) -> float:
+    """Return the stature of a person with this trunk and head, metres."""
+    return parts.head.top_m / _CROWN_SHARE

@@ -35,11 +35,11 @@ from typing import Any
 import numpy as np
 
 from cardbox_tracker.person.parts import BodyParts
-from cardbox_tracker.person.posture import LEFT_ARM, RIGHT_ARM, TORSO
+from cardbox_tracker.person.posture import LEFT_ARM, RIGHT_ARM
 from cardbox_tracker.person.sizes import FloatArray
 from cardbox_tracker.person.skeleton import (
     FIXED,
-    NECK_LIMITS,
+    POSTURE_GROUPS,
     SKELETON,
     Group,
     Joint,
@@ -48,6 +48,7 @@ from cardbox_tracker.person.skeleton import (
     X,
     arm_rotations,
     joints_of,
+    names_of,
     rotation_x,
     rotation_z,
 )
@@ -58,20 +59,17 @@ LOWEST_BEND_RAD = -math.pi / 6
 """Lowest e of the elbow, which REP-155 bends in one direction only, rad."""
 _FULL = (-2 * math.pi, 2 * math.pi)
 
+_GROUPS = (*POSTURE_GROUPS, Group.PLACE, Group.NECK, Group.CLAVICLE)
+_PITCH = names_of(*_GROUPS).index("neck_pitch")
+
 # Nearer than this to the singular direction the other angle is kept.
 _MEANINGLESS_RAD = 1e-3
 
 
 def joint_names(body_id: str, torso_place: bool = True) -> list[str]:
     """Return the names of the joints of ``body_id``: 12, or 18 with place, head and clavicles."""
-    others = (Group.PLACE, Group.NECK, Group.CLAVICLES) if torso_place else ()
-    return [f"{joint.rep155}_{body_id}" for joint in joints_of(Group.POSTURE, *others)]
-
-
-def head_joints(neck: FloatArray) -> FloatArray:
-    """Return ``y_head`` and ``p_head``, (2,), of ``neck_yaw`` and ``neck_pitch``, rad."""
-    yaw, pitch = neck
-    return np.array([yaw, -pitch])
+    groups = _GROUPS if torso_place else POSTURE_GROUPS
+    return [f"{joint.rep155}_{body_id}" for joint in joints_of(*groups)]
 
 
 def rep155_skeleton() -> Iterator[Joint]:
@@ -80,10 +78,11 @@ def rep155_skeleton() -> Iterator[Joint]:
     They have no ending. The parts of the upper body hang on ``torso``, a frame between the
     shoulders.
     """
-    names, joints = {joint.name: joint.rep155 for joint in SKELETON}, joints_of(Group.POSTURE)
-    _, (lowest, highest) = NECK_LIMITS.tolist()
+    skeleton = [joint for joint in SKELETON if joint.group in (*_GROUPS, Group.END)]
+    names, joints = {joint.name: joint.rep155 for joint in skeleton}, joints_of(*_GROUPS)
+    lowest, highest = joints[_PITCH].limits
     changed: dict[str, dict[str, Any]] = {
-        "neck_pitch": {"axis": (0.0, -1.0, 0.0), "limits": (-highest, -lowest)}
+        joints[_PITCH].name: {"axis": (0.0, -1.0, 0.0), "limits": (-highest, -lowest)}
     }
     for arm, letter, side in ((joints[LEFT_ARM], "l", 1.0), (joints[RIGHT_ARM], "r", -1.0)):
         (first, second, third, fourth), elbow = (joint.name for joint in arm), arm[2].offset
@@ -93,9 +92,9 @@ def rep155_skeleton() -> Iterator[Joint]:
         changed[third] = {"axis": (0.0, 0.0, side), "limits": _FULL, "offset": arm[0].offset}
         changed[third]["moves"] = f"{letter}_shoulder"
         changed[fourth] = {"limits": bend, "offset": elbow}
-    fixed = Group.NOTHING, "r_waist", FIXED, X, (0.0, 0.0)
+    fixed = Group.END, "r_waist", FIXED, X, (0.0, 0.0)
     yield Joint("torso", *fixed, "torso", "torso", _shoulders)
-    for joint in SKELETON:
+    for joint in skeleton:
         name = joint.rep155
         row = joint._replace(name=name, parent=names.get(joint.parent, ""), moves=name)
         if joint.parent == "torso_roll":
@@ -122,11 +121,16 @@ class Rep155Joints:
         """Start with all angles 0."""
         self._last = {1.0: np.zeros(4), -1.0: np.zeros(4)}
 
-    def __call__(self, posture: FloatArray) -> FloatArray:
-        """Return the values of the first 12 joints, rad and metres, of a posture (12,)."""
-        return np.concatenate(
-            [posture[TORSO], self._arm(posture[LEFT_ARM], 1.0), self._arm(posture[RIGHT_ARM], -1.0)]
-        )
+    def __call__(self, values: FloatArray) -> FloatArray:
+        """Return the joints of :func:`joint_names`, rad and metres, of our joints in that order.
+
+        They are a posture (12,), or begin with one.
+        """
+        found = np.array(values)
+        for arm, side in ((LEFT_ARM, 1.0), (RIGHT_ARM, -1.0)):
+            found[arm] = self._arm(found[arm], side)
+        found[_PITCH : _PITCH + 1] *= -1.0
+        return found
 
     def _arm(self, angles: FloatArray, side: float) -> FloatArray:
         upper_arm, forearm = arm_rotations(angles, side)

@@ -25,6 +25,15 @@ turned by half a circle. Flexion therefore ends at about 90 degrees, and abducti
 A forearm can point to either side, since the upper arm does not turn about its axis. The upper
 back, which is a part of the torso here, bends with the neck.
 
+**Hands.** A hand turns about the forearm, bends to its palm, then to the little finger:
+
+    R_palm = R_forearm Rz(-+turn) Rx(-+flexion) Ry(deviation)
+
+with the upper sign for the left hand. All is zero if the palm of a hanging arm faces the body. The
+turn is against the frame of the forearm, so it is known for a straight arm, too, and can have any
+value. The ranges are flexion 80, extension 70, deviation to the thumb 20 and to the little finger
+30 degrees, with 20 degrees more for errors of the measurement.
+
 **Clavicles.** The girdle raises the shoulder of a raised arm. A shoulder joint then moves along a
 straight line, upwards and a little inwards, by ``shoulder_rise`` times the shoulder breadth for
 each radian of the upper arm's elevation beyond ``RISE_FROM_RAD``. The arm's angles stay those
@@ -39,11 +48,19 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator
 from enum import StrEnum
+from functools import reduce
 from typing import NamedTuple
 
 import numpy as np
 
 from cardbox_tracker.person.parts import BodyParts
+from cardbox_tracker.person.proportions import (
+    HIP_SHARE,
+    SHANK_SHARE,
+    THIGH_SHARE,
+    WRIST_SHARE,
+    stature_of,
+)
 from cardbox_tracker.person.sizes import FloatArray
 
 Point = tuple[float, float, float]
@@ -51,25 +68,24 @@ Offset = Callable[[BodyParts[float]], Point]
 
 PRISMATIC, REVOLUTE, FIXED = "prismatic", "revolute", "fixed"
 X, Y, Z = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
-_BACK_Y = (0.0, -1.0, 0.0)
+_BACK_Y, _DOWN = (0.0, -1.0, 0.0), (0.0, 0.0, -1.0)
 
 
 class Group(StrEnum):
-    """What determines a joint."""
+    """What a joint belongs to, and what its values come from."""
 
-    POSTURE = "posture"
-    """Searched: d1..d12."""
-    PLACE = "place"
-    """Searched, but constant in the paper."""
-    NECK = "neck"
-    """Points of the face."""
-    CLAVICLES = "clavicles"
-    """The arms, which they follow."""
-    NOTHING = "nothing"
-    """Fixed, until something sees it: the hands at the wrists, for example."""
+    TORSO = "torso"  #: searched
+    ARM = "arm"  #: searched
+    PLACE = "place"  #: searched, but constant in the paper
+    NECK = "neck"  #: from points of the face
+    CLAVICLE = "clavicle"  #: from the arms, which they follow
+    END = "end"  #: fixed frames at the ends of neck and arms
+    HAND = "hand"  #: from points of the hands, for people whose hands are measured
+    LEG = "leg"  #: from points of the legs
 
 
-_POSTURE, _PLACE, _NECK, _CLAVICLES, _NOTHING = Group
+POSTURE_GROUPS = Group.TORSO, Group.ARM
+"""Groups of a posture, d1..d12 (paper, equation (3))."""
 
 SHOULDER_RISE = 0.077
 """Rise of a shoulder joint per radian of elevation of its arm, in shoulder breadths."""
@@ -87,7 +103,7 @@ class Joint(NamedTuple):
     """A joint; the first values are those of the frame that its parent moves, at rest."""
 
     name: str  #: its name in joint states and tables
-    group: str  #: what determines it, see :class:`Group`
+    group: Group  #: what it belongs to
     parent: str  #: name of the joint that carries it; empty for the middle of the hips as measured
     kind: str  #: ``prismatic`` (metres), ``revolute`` (rad) or ``fixed``
     axis: Point  #: unit vector
@@ -107,6 +123,17 @@ class Joint(NamedTuple):
         """Unit of its values, ``m`` or ``rad``."""
         return "m" if self.kind == PRISMATIC else "rad"
 
+    @property
+    def side(self) -> str:
+        """``left`` or ``right``; empty for the middle of the body."""
+        side = self.name.partition("_")[0]
+        return side if side in ("left", "right") else ""
+
+    @property
+    def any_stddev(self) -> float:
+        """Standard deviation, m or rad, of a value that is somewhere in its range."""
+        return (self.limits[1] - self.limits[0]) / math.sqrt(12.0)
+
 
 def _deg(lowest: float, highest: float) -> tuple[float, float]:
     return math.radians(lowest), math.radians(highest)
@@ -125,40 +152,70 @@ def head_from_pivot_m(parts: BodyParts[float]) -> Point:
 
 _NO_RANGE = 0.0, 0.0
 # Joints of one side, without its name; the directions are those of the left side.
-_ARM: tuple[Joint, ...] = (
+_LIMBS: tuple[Joint, ...] = (
     Joint(
-        *("clavicle_elevation", _CLAVICLES, "torso_roll", PRISMATIC),
-        *((0.0, -RISE_INWARDS, RISE_UPWARDS), (0.0, 0.15), "clavicle", "clavicle"),
-        lambda parts: (0.0, parts.shoulder_aside_m, parts.shoulder_height_m),
-    ),
-    Joint(
-        *("shoulder_abduction", _POSTURE, "clavicle_elevation", REVOLUTE),
+        *("shoulder_abduction", Group.ARM, "clavicle_elevation", REVOLUTE),
         *(X, _deg(-45, 180), "y_shoulder", "shoulder_link"),
     ),
     Joint(
-        *("shoulder_flexion", _POSTURE, "shoulder_abduction", REVOLUTE),
+        *("shoulder_flexion", Group.ARM, "shoulder_abduction", REVOLUTE),
         *(_BACK_Y, _deg(-60, 90), "p_shoulder", "upper_arm"),
     ),
     Joint(
-        *("elbow_abduction", _POSTURE, "shoulder_flexion", REVOLUTE),
+        *("elbow_abduction", Group.ARM, "shoulder_flexion", REVOLUTE),
         *(X, _deg(-150, 150), "r_shoulder", "elbow_link"),
         lambda parts: (0.0, 0.0, parts.upper_arm.bottom_m),
     ),
     Joint(
-        *("elbow_flexion", _POSTURE, "elbow_abduction", REVOLUTE),
+        *("elbow_flexion", Group.ARM, "elbow_abduction", REVOLUTE),
         *(_BACK_Y, _deg(-10, 95), "elbow", "forearm"),
     ),
     Joint(
-        *("wrist", _NOTHING, "elbow_flexion", FIXED, X, _NO_RANGE, "wrist", "hand"),
+        *("clavicle_elevation", Group.CLAVICLE, "torso_roll", PRISMATIC),
+        *((0.0, -RISE_INWARDS, RISE_UPWARDS), (0.0, 0.15), "clavicle", "clavicle"),
+        lambda parts: (0.0, parts.shoulder_aside_m, parts.shoulder_height_m),
+    ),
+    Joint(
+        *("wrist", Group.END, "elbow_flexion", FIXED, X, _NO_RANGE, "wrist", "hand"),
         lambda parts: (0.0, 0.0, parts.forearm.bottom_m),
+    ),
+    Joint(
+        *("forearm_turn", Group.HAND, "elbow_flexion", REVOLUTE),
+        *(_DOWN, _deg(-180, 180), "y_wrist"),
+    ),
+    Joint(
+        *("wrist_flexion", Group.HAND, "forearm_turn", REVOLUTE),
+        *((-1.0, 0.0, 0.0), _deg(-90, 100), "r_wrist", ""),
+        lambda parts: (0.0, 0.0, WRIST_SHARE * parts.forearm.bottom_m),
+    ),
+    Joint(
+        *("wrist_deviation", Group.HAND, "wrist_flexion", REVOLUTE),
+        *(Y, _deg(-40, 50), "p_wrist", "palm"),
+    ),
+    Joint(
+        *("hip_flexion", Group.LEG, "torso_yaw", REVOLUTE, _BACK_Y, _deg(-40, 125), "p_hip", ""),
+        lambda parts: (0.0, HIP_SHARE * stature_of(parts), 0.0),
+    ),
+    Joint("hip_abduction", Group.LEG, "hip_flexion", REVOLUTE, X, _deg(-35, 65), "r_hip"),
+    Joint(
+        *("hip_rotation", Group.LEG, "hip_abduction", REVOLUTE),
+        *(_DOWN, _deg(-50, 50), "y_hip", "thigh"),
+    ),
+    Joint(
+        *("knee_flexion", Group.LEG, "hip_rotation", REVOLUTE, Y, _deg(0, 150), "knee", "shank"),
+        lambda parts: (0.0, 0.0, -THIGH_SHARE * stature_of(parts)),
+    ),
+    Joint(
+        *("ankle", Group.LEG, "knee_flexion", FIXED, X, _NO_RANGE, "ankle", "foot"),
+        lambda parts: (0.0, 0.0, -SHANK_SHARE * stature_of(parts)),
     ),
 )
 
 
-def _arms(group: Group) -> Iterator[Joint]:
-    """Yield the joints of both arms in a group; the right ones mirror the left ones."""
+def _limbs(group: Group) -> Iterator[Joint]:
+    """Yield the joints of a group on both sides; the right ones mirror the left ones."""
     for name, side in (("left", 1.0), ("right", -1.0)):
-        for joint in _ARM:
+        for joint in _LIMBS:
             if joint.group == group:
                 yield _of_side(joint, name, side)
 
@@ -183,46 +240,76 @@ def _of_side(joint: Joint, name: str, side: float) -> Joint:
 
 
 SKELETON: tuple[Joint, ...] = (
-    Joint("torso_y", _POSTURE, "torso_z", PRISMATIC, Y, (-3.0, 3.0), "body"),
-    Joint("torso_roll", _POSTURE, "torso_pitch", REVOLUTE, X, _deg(-45, 45), "r_waist", "torso"),
-    Joint("torso_pitch", _POSTURE, "torso_yaw", REVOLUTE, Y, _deg(-25, 100), "waist"),
-    Joint("torso_yaw", _POSTURE, "torso_y", REVOLUTE, Z, _deg(-280, 280), "y_waist"),
-    *_arms(_POSTURE),
-    Joint("torso_x", _PLACE, "", PRISMATIC, X, (-math.inf, math.inf), "x_body"),
+    Joint("torso_y", Group.TORSO, "torso_z", PRISMATIC, Y, (-3.0, 3.0), "body"),
+    Joint("torso_roll", Group.TORSO, "torso_pitch", REVOLUTE, X, _deg(-45, 45), "r_waist", "torso"),
+    Joint("torso_pitch", Group.TORSO, "torso_yaw", REVOLUTE, Y, _deg(-25, 100), "waist"),
+    Joint("torso_yaw", Group.TORSO, "torso_y", REVOLUTE, Z, _deg(-280, 280), "y_waist"),
+    *_limbs(Group.ARM),
+    Joint("torso_x", Group.PLACE, "", PRISMATIC, X, (-math.inf, math.inf), "x_body"),
     # Between sitting on a low stool and standing on tiptoe.
-    Joint("torso_z", _PLACE, "torso_x", PRISMATIC, Z, (-0.6, 0.3), "z_body"),
-    Joint("neck_yaw", _NECK, "torso_roll", REVOLUTE, Z, _deg(-80, 80), "y_head", "", neck_pivot_m),
-    Joint("neck_pitch", _NECK, "neck_yaw", REVOLUTE, Y, _deg(-60, 60), "p_head"),
-    *_arms(_CLAVICLES),
-    Joint("neck", _NOTHING, "neck_pitch", FIXED, X, _NO_RANGE, "head", "head", head_from_pivot_m),
-    *_arms(_NOTHING),
+    Joint("torso_z", Group.PLACE, "torso_x", PRISMATIC, Z, (-0.6, 0.3), "z_body"),
+    Joint(
+        *("neck_yaw", Group.NECK, "torso_roll", REVOLUTE, Z, _deg(-80, 80), "y_head", ""),
+        neck_pivot_m,
+    ),
+    Joint("neck_pitch", Group.NECK, "neck_yaw", REVOLUTE, Y, _deg(-60, 60), "p_head"),
+    *_limbs(Group.CLAVICLE),
+    Joint("neck", Group.END, "neck_pitch", FIXED, X, _NO_RANGE, "head", "head", head_from_pivot_m),
+    *_limbs(Group.END),
+    *_limbs(Group.HAND),
+    *_limbs(Group.LEG),
 )
 """All joints; the movable ones in the order of joint states, to which new ones are appended."""
 
 
-def joints_of(*groups: str) -> tuple[Joint, ...]:
-    """Return the joints of some groups, in the order of the table."""
-    return tuple(joint for joint in SKELETON if joint.group in groups)
+def joints_of(*groups: Group, side: str = "") -> tuple[Joint, ...]:
+    """Return the movable joints of some groups, or of one side of them, in the table's order."""
+    return tuple(
+        joint
+        for joint in SKELETON
+        if joint.kind != FIXED and joint.group in groups and side in ("", joint.side)
+    )
 
 
-def _names(*groups: str) -> tuple[str, ...]:
-    return tuple(joint.name for joint in joints_of(*groups))
+def names_of(*groups: Group, side: str = "") -> tuple[str, ...]:
+    """Return the names of :func:`joints_of`."""
+    return tuple(joint.name for joint in joints_of(*groups, side=side))
 
 
-JOINT_NAMES = _names(Group.POSTURE)
+STATE = joints_of(*Group)
+"""All movable joints: those of the state of a person, in the order of ``joint_states``."""
+STATE_NAMES = names_of(*Group)
+
+
+def rows_of(*groups: Group, side: str = "") -> list[int]:
+    """Return the indices of :func:`joints_of` in ``STATE``."""
+    return [STATE.index(joint) for joint in joints_of(*groups, side=side)]
+
+
+JOINT_NAMES = names_of(*POSTURE_GROUPS)
 """The 12 joints of a posture, d1..d12 (paper, equation (3))."""
-PLACE_NAMES = _names(Group.PLACE)
+PLACE_NAMES = names_of(Group.PLACE)
 """How far the hips are nearer to the camera, and higher, than where they were measured, metres."""
-NECK_NAMES = _names(Group.NECK)
-CLAVICLE_NAMES = _names(Group.CLAVICLES)
-JOINT_STATE_NAMES = _names(Group.POSTURE, Group.PLACE, Group.NECK, Group.CLAVICLES)
-"""Joints of ``joint_states``: those of the posture, the person's place, the neck, the clavicles."""
+NECK_NAMES = names_of(Group.NECK)
+HAND_NAMES = names_of(Group.HAND)
+"""The 6 joints of the hands, three of the left one first; all are in rad."""
+HAND_OPEN_NAMES = "left_hand_open", "right_hand_open"
+"""How open the hands are, 0 to 1."""
+LEG_NAMES = names_of(Group.LEG)
+"""The 8 joints of the legs, four of the left one first; all are in rad."""
 UNITS = {joint.name: joint.unit for joint in SKELETON}
 """Unit of each joint by its name, ``m`` or ``rad``."""
 
-NECK_LIMITS: FloatArray = np.array([joint.limits for joint in joints_of(Group.NECK)])
-"""Shape (2, 2): lowest and highest value of each of ``NECK_NAMES``, rad."""
-NECK_LIMITS.setflags(write=False)
+
+def limits_of(*groups: Group, side: str = "") -> FloatArray:
+    """Return lowest and highest value, (n, 2), rad or m, of :func:`joints_of`; not writable."""
+    limits: FloatArray = np.array([joint.limits for joint in joints_of(*groups, side=side)])
+    limits.setflags(write=False)
+    return limits
+
+
+NECK_LIMITS = limits_of(Group.NECK)
+LEG_LIMITS = limits_of(Group.LEG)
 
 KEYPOINT_NAMES: tuple[str, ...] = (
     *("left_shoulder", "left_elbow", "left_hand"),
@@ -272,10 +359,22 @@ def _rotation(angle_rad: FloatArray, i: int, j: int) -> FloatArray:
     return matrix
 
 
+def turn_of(palm: FloatArray, forearm: FloatArray, side: float) -> float:
+    """Return the turn of a hand about its forearm, rad.
+
+    ``palm`` (3,) is the normal out of the palm, ``forearm`` (3, 3) the rotation of its frame in the
+    same axes; ``side`` is +1 for the left hand, -1 for the right.
+    """
+    x, y, _ = forearm.T @ palm
+    return -side * math.atan2(side * float(x), -side * float(y))
+
+
 def neck_rotation(angles_rad: FloatArray) -> FloatArray:
-    """Return the rotations (..., 3, 3) from head to torso at angles (..., 2) of the neck."""
-    angles = np.asarray(angles_rad, dtype=np.float64)
-    return rotation_z(angles[..., 0]) @ rotation_y(angles[..., 1])
+    """Return the rotations (..., 3, 3) from head to torso at angles (..., n) of the neck."""
+    angles = np.moveaxis(np.asarray(angles_rad, dtype=np.float64), -1, 0)
+    about = {X: rotation_x, Y: rotation_y, Z: rotation_z}
+    turns = zip(joints_of(Group.NECK), angles, strict=True)
+    return reduce(np.matmul, [about[joint.axis](angle) for joint, angle in turns])
 
 
 def arm_rotations(angles_rad: FloatArray, side: float) -> tuple[FloatArray, FloatArray]:

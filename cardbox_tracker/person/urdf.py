@@ -43,20 +43,21 @@ from xml.etree import ElementTree as Xml
 
 import numpy as np
 
-from cardbox_tracker.person.hands import HANDS
-from cardbox_tracker.person.legs import (
-    LEGS,
-    SHANK_SHARE,
-    THIGH_SHARE,
-    floor_m,
-    stature_of,
-)
+from cardbox_tracker.person.legs import floor_m
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.parts import Part, body_parts
 from cardbox_tracker.person.posture import place_limits
+from cardbox_tracker.person.proportions import SHANK_SHARE, THIGH_SHARE, stature_of
 from cardbox_tracker.person.rep155 import rep155_skeleton
 from cardbox_tracker.person.sizes import FloatArray
-from cardbox_tracker.person.skeleton import FIXED, PRISMATIC, SKELETON, Group, Joint
+from cardbox_tracker.person.skeleton import (
+    FIXED,
+    POSTURE_GROUPS,
+    PRISMATIC,
+    SKELETON,
+    Group,
+    Joint,
+)
 
 Vector = tuple[float, float, float]
 Quaternion = tuple[float, float, float, float]
@@ -98,8 +99,8 @@ def urdf_from_body(
     if height_m is not None:
         robot.fix("camera_to_floor", ROOT_LINK, "floor", (0.0, 0.0, height_m), _ZERO)
     robot.fix("camera_to_hips", ROOT_LINK, "hips", hips_m, (0.0, 0.0, math.pi))
-    more = *(HANDS if hands else ()), *(LEGS if torso_place else ())
-    robot.add(body, (*SKELETON, *more), torso_place, "hips")
+    moving = {*Group} - {Group.HAND} if torso_place else {*POSTURE_GROUPS}
+    robot.add(body, SKELETON, moving | ({Group.HAND} if hands else set()), "hips")
     parts = body_parts(body.sizes)
     robot.show("torso", "torso", parts.torso)
     lid = parts.torso.depth_m, parts.torso.top_width_m, PATCH_THICKNESS_M
@@ -126,7 +127,8 @@ def rep155_urdf(body: BodyModel, body_id: str, optical_frame: str, torso_place: 
     """
     robot = _Robot(f"human_{body_id}", optical_frame, f"_{body_id}")
     hips_m, turned = _seen_from_camera(body)
-    robot.add(body, tuple(rep155_skeleton()), torso_place, optical_frame, hips_m, turned)
+    moving = {*(Group if torso_place else POSTURE_GROUPS)}
+    robot.add(body, tuple(rep155_skeleton()), moving, optical_frame, hips_m, turned)
     parts = body_parts(body.sizes)
     robot.show("r_waist", "torso", parts.waist)
     robot.show("torso", "torso", parts.torso, parts.shoulder_height_m)
@@ -150,14 +152,14 @@ class _Robot:
         self,
         body: BodyModel,
         skeleton: Sequence[Joint],
-        has_all: bool,
+        moving: set[Group],
         root: str,
         xyz_m: Vector = _ZERO,
         rpy: Vector = _ZERO,
     ) -> None:
-        """Add a skeleton from ``root`` on; without ``has_all``, only joints of the posture move."""
+        """Add a skeleton from ``root`` on; of its joints, those of groups that move."""
         parts, joints = body_parts(body.sizes), {joint.name: joint for joint in skeleton}
-        used = {Group.POSTURE, Group.NOTHING, *(Group if has_all else ())}
+        used = moving | {Group.END}
         places = iter(place_limits(body.placement.distance_m).tolist())
         limits = {j.name: next(places) if j.group == Group.PLACE else j.limits for j in skeleton}
         waiting = [joint for joint in skeleton if joint.group in used]

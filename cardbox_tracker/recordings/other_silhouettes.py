@@ -17,6 +17,7 @@ from cardbox_tracker.camera.pairing import TOLERANCE_NS, side_by_side
 from cardbox_tracker.common.errors import BagError, CardboxError
 from cardbox_tracker.detectors.detector import Detector
 from cardbox_tracker.detectors.point_table import PointTable
+from cardbox_tracker.detectors.pose_network import silhouette_of
 from cardbox_tracker.recordings.bag_reader import IMAGE_TYPES, BagReader
 from cardbox_tracker.recordings.open_images import ImageRecording
 from cardbox_tracker.recordings.silhouettes import PreparedImage, RecordedFrame, SilhouetteSource
@@ -142,10 +143,7 @@ class DetectorSilhouetteSource(SilhouetteSource):
 
     def _silhouette(self, prepared: PreparedImage) -> NDArray[np.uint8]:
         """Return the masks of all whom the detector finds."""
-        silhouette = np.zeros(prepared.image.shape[:2], np.uint8)
-        for one in prepared.found:
-            silhouette |= one.silhouette()
-        return silhouette
+        return silhouette_of(prepared.found, prepared.image.shape)
 
 
 # A standing person sways too slowly to be seen in images at a higher rate than the live nodes'.

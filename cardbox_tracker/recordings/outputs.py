@@ -1,29 +1,30 @@
 """The tracker's outputs for an image: topics and joints.
 
 :mod:`.recordings.messages` encodes them as messages of nodes and bags, and
-:mod:`.recordings.result_table` as rows of a table. Add a joint to :mod:`.person.skeleton`,
-``joint_values`` and ``joint_deviations``, and a topic to ``TOPICS`` and ``OutputStream``.
+:mod:`.recordings.result_table` as rows of a table. Add a topic to ``TOPICS`` and
+``OutputStream``.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from itertools import compress
 from types import MappingProxyType
 from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
-from cardbox_tracker.person.hands import HAND_NAMES, HAND_OPEN_NAMES, WRIST_NAMES
-from cardbox_tracker.person.legs import LEG_LIMITS, LEG_NAMES
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.sizes import FloatArray
 from cardbox_tracker.person.skeleton import (
-    CLAVICLE_NAMES,
+    HAND_OPEN_NAMES,
     JOINT_NAMES,
-    JOINT_STATE_NAMES,
     KEYPOINT_NAMES,
-    NECK_NAMES,
-    PLACE_NAMES,
+    POSTURE_GROUPS,
+    STATE,
+    STATE_NAMES,
+    Group,
     KeypointState,
 )
 from cardbox_tracker.recordings.markers import MarkerShape, marker_shapes
@@ -87,16 +88,34 @@ class JointValues(NamedTuple):
     values: FloatArray
     velocities: FloatArray | None = None
 
+    @property
+    def by_name(self) -> dict[str, float]:
+        """The values by name."""
+        return dict(zip(self.names, np.asarray(self.values).tolist(), strict=True))
+
+    def of(self, names: Sequence[str]) -> FloatArray:
+        """Return the values of joints, (n,); nan for one that is missing."""
+        by_name = self.by_name
+        return np.array([by_name.get(name, np.nan) for name in names])
+
+    @property
+    def posture(self) -> FloatArray:
+        """The posture (12,); raises ValueError if a joint is missing."""
+        missing = [name for name in JOINT_NAMES if name not in self.names]
+        if missing:
+            raise ValueError(f"joints {', '.join(missing)} are missing")
+        return self.of(JOINT_NAMES)
+
 
 Value = JointValues | KeypointStates | FloatArray | tuple[MarkerShape, ...] | str
 """Joints, states, points (n, 3), metres in the optical frame, shapes to show instead of all earlier
 ones, or a text."""
 
 
-_NECK = [JOINT_STATE_NAMES.index(name) for name in NECK_NAMES]
-_LEGS = slice(-len(LEG_NAMES), None)
-# Standard deviation of values all over their range.
-_ANY_LEGS = np.ptp(LEG_LIMITS, axis=1) / np.sqrt(12.0)
+# Joints that an image may not show.
+_MAY_BE_HIDDEN = np.array([joint.group not in (*POSTURE_GROUPS, Group.PLACE) for joint in STATE])
+# Deviations of legs that are not known.
+_ANYWHERE = np.array([joint.any_stddev if joint.group == Group.LEG else np.nan for joint in STATE])
 # The mean velocity over a longer gap is not that of the moment.
 _LONGEST_NS = 1_000_000_000
 
@@ -109,20 +128,13 @@ def person_space(number: int) -> str:
 def joint_values(estimate: Estimate, torso_place: bool = True) -> JointValues | None:
     """Return the joints of an estimate; None without a posture.
 
-    Without ``torso_place``, these are the 12 joints of the posture. The legs are the last ones,
-    behind the hands where those are measured; joints that are not known are 0.
+    Without ``torso_place``, these are the 12 joints of the posture. Hands are among them where they
+    are measured; joints that are not known are 0.
     """
-    if estimate.posture is None or not torso_place:
-        return _joints(JOINT_NAMES, estimate.posture)
-    names, known = (
-        JOINT_STATE_NAMES,
-        [place_of(estimate), neck_of(estimate), clavicles_of(estimate)],
-    )
-    if estimate.hands is not None:
-        names = *names, *HAND_NAMES
-        known += [np.zeros(3) if hand is None else hand.joints for hand in estimate.hands]
-    known.append(np.zeros(len(LEG_NAMES)) if estimate.legs is None else estimate.legs.angles)
-    return _joints((*names, *LEG_NAMES), estimate.posture, *known)
+    if estimate.posture is None:
+        return None
+    rows, values = _rows(estimate, torso_place), estimate.joints[0]
+    return JointValues(_names(rows), np.where(_MAY_BE_HIDDEN & np.isnan(values), 0.0, values)[rows])
 
 
 def joint_deviations(estimate: Estimate, torso_place: bool = True) -> JointValues | None:
@@ -131,24 +143,29 @@ def joint_deviations(estimate: Estimate, torso_place: bool = True) -> JointValue
     Neck and hands are among them only if they were seen; unknown legs may be anywhere in their
     range.
     """
-    if estimate.posture_stddev is None or not torso_place:
-        return _joints(JOINT_NAMES, estimate.posture_stddev)
-    names, known = [*JOINT_NAMES, *PLACE_NAMES], [_or_zeros(estimate.offset_stddev_m)]
-    if estimate.neck_stddev is not None:
-        names, known = [*names, *NECK_NAMES], [*known, estimate.neck_stddev]
-    names, known = [*names, *CLAVICLE_NAMES], [*known, _or_zeros(estimate.clavicles_stddev_m)]
-    for number, hand in enumerate(estimate.hands or ()):
-        if hand is not None:
-            names = [*names, *HAND_NAMES[3 * number : 3 * number + 3]]
-            known = [*known, hand.joints_stddev]
-    known = [*known, _ANY_LEGS if estimate.legs is None else estimate.legs.angles_stddev]
-    return _joints((*names, *LEG_NAMES), estimate.posture_stddev, *known)
+    if estimate.posture_stddev is None:
+        return None
+    stddev = np.where(np.isnan(estimate.joints[1]), _ANYWHERE, estimate.joints[1])
+    rows = _rows(estimate, torso_place) & np.isfinite(stddev)
+    return JointValues(_names(rows), stddev[rows])
 
 
-def are_unseen(deviations: Mapping[str, float]) -> bool:
-    """Return whether deviations by joint are those of legs that are not known."""
-    found = [deviations.get(name, 0.0) for name in LEG_NAMES]
-    return bool(np.allclose(found, _ANY_LEGS, atol=1e-6))
+def _rows(estimate: Estimate, torso_place: bool) -> NDArray[np.bool_]:
+    """Return which joints of ``STATE`` are published, (n,)."""
+    without = set() if estimate.hands is not None else {Group.HAND}
+    groups = {*Group} - without if torso_place else {*POSTURE_GROUPS}
+    return np.array([joint.group in groups for joint in STATE])
+
+
+def _names(rows: NDArray[np.bool_]) -> tuple[str, ...]:
+    return tuple(compress(STATE_NAMES, rows))
+
+
+def known_deviations(joints: JointValues) -> dict[str, float]:
+    """Return the deviations by name of joints that are known."""
+    anywhere = dict(zip(STATE_NAMES, _ANYWHERE.tolist(), strict=True))
+    found = {name: one for name, one in joints.by_name.items() if name in anywhere}
+    return {name: one for name, one in found.items() if not abs(one - anywhere[name]) < 1e-6}
 
 
 def open_hands(estimate: Estimate) -> JointValues | None:
@@ -161,56 +178,11 @@ def open_hands(estimate: Estimate) -> JointValues | None:
     return JointValues(tuple(found), np.array([*found.values()])) if found else None
 
 
-def place_of(estimate: Estimate) -> FloatArray:
-    """Return ``torso_x`` and ``torso_z`` (2,), metres; 0 if the filter keeps them constant."""
-    return _or_zeros(estimate.offset_m)
-
-
-def neck_of(estimate: Estimate) -> FloatArray:
-    """Return ``neck_yaw`` and ``neck_pitch`` (2,), rad; 0 if the face was not seen."""
-    return _or_zeros(estimate.neck)
-
-
-def clavicles_of(estimate: Estimate) -> FloatArray:
-    """Return the rise of both shoulders, (2,), metres; 0 if it is not known."""
-    return _or_zeros(estimate.clavicles_m)
-
-
-def _or_zeros(pair: FloatArray | None) -> FloatArray:
-    return np.zeros(2) if pair is None else pair
-
-
-def _joints(
-    names: tuple[str, ...], posture: FloatArray | None, *others: FloatArray
-) -> JointValues | None:
-    return None if posture is None else JointValues(names, np.concatenate([posture, *others]))
-
-
-def posture_from(joints: JointValues) -> FloatArray:
-    """Return the posture (12,) from named joints in any order; ValueError if one is missing."""
-    by_name = positions_of(joints)
-    missing = [name for name in JOINT_NAMES if name not in by_name]
-    if missing:
-        raise ValueError(f"joints {', '.join(missing)} are missing")
-    return np.array([by_name[name] for name in JOINT_NAMES])
-
-
-def values_from(joints: JointValues, names: Sequence[str]) -> FloatArray | None:
-    """Return the values (n,) of ``names`` from named joints; None if one is missing."""
-    by_name = positions_of(joints)
-    return np.array([by_name[name] for name in names]) if by_name.keys() >= set(names) else None
-
-
-def wrists_from(joints: JointValues) -> FloatArray:
-    """Return flexion and deviation of both wrists, (2, 2), rad; nan for one that is missing."""
-    by_name = positions_of(joints)
-    return np.array([[by_name.get(name, np.nan) for name in names] for names in WRIST_NAMES])
-
-
-def open_hands_from(joints: JointValues) -> FloatArray:
-    """Return how open both hands are, (2,), from their topic; nan for one that is missing."""
-    by_name = positions_of(joints)
-    return np.array([by_name.get(name, np.nan) for name in HAND_OPEN_NAMES])
+def joints_of(message: Any) -> JointValues:
+    """Return names and positions of a JointState; ValueError if they are not as many."""
+    if len(message.name) != len(message.position):
+        raise ValueError(f"{len(message.name)} joints with {len(message.position)} positions")
+    return JointValues(tuple(message.name), np.array(message.position, np.float64))
 
 
 def chances_of(message: Any) -> dict[str, tuple[str, float]]:
@@ -219,11 +191,6 @@ def chances_of(message: Any) -> dict[str, tuple[str, float]]:
         one.name: (one.message, float(one.values[0].value) if one.values else 1.0)
         for one in message.status
     }
-
-
-def positions_of(joints: JointValues) -> dict[str, float]:
-    """Return the joint values by name."""
-    return dict(zip(joints.names, np.asarray(joints.values).tolist(), strict=True))
 
 
 TOPICS = {
@@ -247,7 +214,7 @@ class OutputStream:
     def __init__(self, torso_place: bool = True) -> None:
         """Begin before the first image; see :func:`joint_values` for ``torso_place``."""
         self._torso_place, self._state = torso_place, ""
-        self._last: tuple[int, FloatArray, tuple[bool, bool], Tracker, BodyModel] | None = None
+        self._last: tuple[int, FloatArray, Tracker, BodyModel] | None = None
 
     def values(
         self,
@@ -263,8 +230,8 @@ class OutputStream:
         for topic in filter(wanted, TOPICS):
             value = self._value(topic, estimate, tracker, is_new)
             if topic == "joint_states" and isinstance(value, JointValues):
-                some = None if velocities is None else velocities[: len(value.names)]
-                value = value._replace(velocities=some)
+                rows = _rows(estimate, self._torso_place)
+                value = value._replace(velocities=None if velocities is None else velocities[rows])
             if value is not None:
                 yield topic, value
 
@@ -294,28 +261,21 @@ class OutputStream:
         return marker_shapes(body, estimate.posture, estimate.neck)
 
     def _velocities(self, stamp_ns: int, estimate: Estimate, tracker: Tracker) -> FloatArray | None:
-        """Return those of :func:`joint_values`, rad/s and m/s; None without an image before.
+        """Return those of ``STATE``, (n,), rad/s and m/s; None without an image before.
 
         It has a posture of the same version of the same body and is at most ``_LONGEST_NS`` old.
         """
         before, self._last = self._last, None
-        joints = joint_values(estimate)
-        if joints is None:
+        if estimate.posture is None:
             return None
-        has = estimate.neck is not None, estimate.legs is not None
-        self._last = stamp_ns, joints.values, has, tracker, tracker.body
-        if before is None or before[3] is not tracker or before[4] is not tracker.body:
+        self._last = stamp_ns, estimate.joints[0], tracker, tracker.body
+        if before is None or before[2] is not tracker or before[3] is not tracker.body:
             return None
         step_ns = stamp_ns - before[0]
         if not 0 < step_ns <= _LONGEST_NS:
             return None
-        found: FloatArray = (joints.values - before[1]) / (step_ns / 1e9)
+        found: FloatArray = (estimate.joints[0] - before[1]) / (step_ns / 1e9)
+        # A hand is looked at every other image at most, and may not be known in one.
+        found[[joint.group == Group.HAND for joint in STATE]] = 0.0
         # A face that appears does not turn, and legs that appear do not move.
-        if not (has[0] and before[2][0]):
-            found[_NECK] = 0.0
-        if not (has[1] and before[2][1]):
-            found[_LEGS] = 0.0
-        if estimate.hands is not None:
-            # A hand is looked at every other image at most, and may not be known in one.
-            found[[name in HAND_NAMES for name in joints.names]] = 0.0
-        return found
+        return np.nan_to_num(found)

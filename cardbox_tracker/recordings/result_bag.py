@@ -18,7 +18,6 @@ from cardbox_tracker.recordings.outputs import (
     OutputStream,
     joint_values,
     person_space,
-    positions_of,
 )
 from cardbox_tracker.recordings.silhouettes import RecordedFrame
 from cardbox_tracker.recordings.track import Observer
@@ -131,4 +130,4 @@ class _ResultBag:
             bag.write(f"{self._space}/{topic}", message, stamp)
         joints = joint_values(estimate)
         if joints is not None:
-            transforms.write(stamp, positions_of(joints))
+            transforms.write(stamp, joints.by_name)

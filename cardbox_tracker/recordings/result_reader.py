@@ -21,38 +21,43 @@ from cardbox_tracker.common.files import (
     foreign,
     regular_file,
 )
-from cardbox_tracker.person.hands import HAND_NAMES, HAND_OPEN_NAMES
-from cardbox_tracker.person.legs import LEG_NAMES
 from cardbox_tracker.person.model import BodyModel
-from cardbox_tracker.person.model_file import load_body_model, loads_body_model
+from cardbox_tracker.person.model_file import (
+    dumps_body_model,
+    load_body_model,
+    loads_body_model,
+)
 from cardbox_tracker.person.sizes import FloatArray
 from cardbox_tracker.person.skeleton import (
+    HAND_OPEN_NAMES,
     JOINT_NAMES,
     KEYPOINT_NAMES,
-    NECK_NAMES,
     PLACE_NAMES,
+    STATE_NAMES,
     KeypointState,
 )
 from cardbox_tracker.recordings.bag_reader import BagReader, stamp_ns_of
 from cardbox_tracker.recordings.open_images import is_bag
 from cardbox_tracker.recordings.outputs import (
-    JointValues,
-    are_unseen,
     chances_of,
+    joints_of,
+    known_deviations,
     person_space,
-    positions_of,
-    posture_from,
 )
 from cardbox_tracker.recordings.result_table import (
+    DECIMALS,
     PARQUET,
     PERSON,
     POINT_COLUMNS,
+    TEXT_COLUMNS,
     deviation_columns,
     pyarrow_or_error,
-    text_columns,
+    row_of,
     units,
 )
-from cardbox_tracker.tracking.estimate import LOST, NO_PERSON, TRACKING, UNCERTAIN
+from cardbox_tracker.recordings.silhouettes import RecordedFrame
+from cardbox_tracker.tracking.estimate import LOST, NO_PERSON, TRACKING, UNCERTAIN, Estimate
+from cardbox_tracker.tracking.tracker import Tracker
 
 MODEL = "/body_model"
 _STATE, _JOINTS, _STDDEV = "/tracking_state", "/joint_states", "/joint_states_stddev"
@@ -135,9 +140,8 @@ class _Rows:
         found = set(names)
         self._path = path
         known = [name for name in units(*[True] * 3) if name in found and name not in _TIMES]
-        texts = set(text_columns())
-        self.names = [name for name in known if name not in (*texts, PERSON, "stamp")]
-        self._texts = [name for name in known if name in texts]
+        self.names = [name for name in known if name not in (*TEXT_COLUMNS, PERSON, "stamp")]
+        self._texts = [name for name in known if name in TEXT_COLUMNS]
         self._are_chances = np.array([name.endswith("_chance") for name in self.names], bool)
         are_deviations = np.array(["_stddev_" in name for name in self.names], bool)
         self._are_positive = self._are_chances | are_deviations
@@ -218,6 +222,41 @@ def _number(row: Mapping[str, Any], name: str, kind: Callable[[Any], Any] = floa
         return kind(row[name])
     except (TypeError, ValueError, OverflowError):
         raise ValueError(f"{name} is {quoted(str(row[name]))}") from None
+
+
+class KeptResults:
+    """Observer that keeps the results of each person as a table of CSV has them, in memory."""
+
+    def __init__(self, path: Path, **has: bool) -> None:
+        """Take the recording, and what :func:`~.result_table.result_table` takes."""
+        self._path, self._has = path, has
+        self._rows: dict[int, _Rows] = {}
+        self._bodies: dict[int, BodyModel] = {}
+
+    def __call__(self, frame: RecordedFrame, estimate: Estimate, tracker: Tracker) -> None:
+        """Keep the row of an image; CardboxError if it is not after the one before."""
+        names, number = units(**self._has), estimate.person or 1
+        self._bodies[number] = tracker.body
+        if number not in self._rows:
+            self._rows[number] = _Rows(self._path, names, _NEEDED)
+        estimate = estimate.as_camera_stands(tracker.body.camera_pose.roll_rad)
+        row = row_of(frame.stamp_ns, frame.time_s, estimate, **self._has)
+        cells = (round(float(cell), DECIMALS) if isinstance(cell, float) else cell for cell in row)
+        try:
+            self._rows[number].add(dict(zip(names, cells, strict=True)))
+        except ValueError as error:
+            raise CardboxError(f"{self._path}: {error}; record it again") from None
+
+    def results(self) -> dict[int, Results]:
+        """Return the results by the numbers of the people, with the body at the end."""
+        found = {}
+        for number, rows in self._rows.items():
+            # What a file does not keep is unknown here, too.
+            body = loads_body_model(dumps_body_model(self._bodies[number]))
+            results = rows.results(())
+            bodies = (body,) * len(results.state)
+            found[number] = replace(results, bodies=bodies, has_others=len(self._rows) > 1)
+        return found
 
 
 def read_results(path: Path, person: int | None = None) -> Results:
@@ -325,13 +364,6 @@ def namespace_of(bag: BagReader, person: int | None = None) -> str:
     return chosen[0]
 
 
-def joints_of(message: Any) -> JointValues:
-    """Return names and positions of a JointState; ValueError if they are not as many."""
-    if len(message.name) != len(message.position):
-        raise ValueError(f"{len(message.name)} joints with {len(message.position)} positions")
-    return JointValues(tuple(message.name), np.array(message.position, np.float64))
-
-
 def points_of(message: Any) -> FloatArray:
     """Return the positions (n, 3), metres, of a PoseArray."""
     points = [(p.position.x, p.position.y, p.position.z) for p in message.poses]
@@ -397,10 +429,10 @@ class _Messages:
                 raise ValueError(f"the stamp {stamp_ns} ns is before the one before")
             self._last_ns = stamp_ns
             joints = joints_of(message)
-            posture_from(joints)
             row: dict[str, Any] = {"state": self._state, "body": self._body}
+            row |= zip(JOINT_NAMES, joints.posture.tolist(), strict=True)
             # A node without the place of the torso keeps it constant.
-            row |= dict.fromkeys(PLACE_NAMES, 0.0) | positions_of(joints)
+            row |= dict.fromkeys(PLACE_NAMES, 0.0) | joints.by_name
             self.repeated += stamp_ns in self.by_stamp
             row |= self._keypoints.get(stamp_ns, {})
             self.by_stamp[stamp_ns] = row
@@ -417,15 +449,11 @@ class _Messages:
                     raise ValueError(f"{len(points_m) // 3} keypoints")
                 found |= zip(POINT_COLUMNS, points_m, strict=True)
             elif name == _HANDS:
-                values = positions_of(joints_of(message))
+                values = joints_of(message).by_name
                 found |= {name: values[name] for name in HAND_OPEN_NAMES if name in values}
             else:
-                values = positions_of(joints_of(message))
-                found |= zip(deviation_columns(values), values.values(), strict=True)
+                stddev = known_deviations(joints_of(message))
+                found |= zip(deviation_columns(stddev), stddev.values(), strict=True)
                 # Joints that are not known have a position, but no deviation.
-                unknown = {*NECK_NAMES, *HAND_NAMES} - values.keys()
-                if are_unseen(values):
-                    unknown |= set(LEG_NAMES)
-                    found |= dict.fromkeys(deviation_columns(LEG_NAMES))
-                for joint in unknown:
+                for joint in set(STATE_NAMES) - {*_POSTURE, *stddev}:
                     found.pop(joint, None)

@@ -15,23 +15,22 @@ import numpy as np
 
 from cardbox_tracker.common.extensions import optional
 from cardbox_tracker.common.files import atomic_path
-from cardbox_tracker.person.hands import HAND_NAMES
 from cardbox_tracker.person.isb_angles import ANATOMICAL_NAMES, anatomical_angles
-from cardbox_tracker.person.legs import LEG_KEYPOINT_NAMES, LEG_NAMES
+from cardbox_tracker.person.legs import LEG_KEYPOINT_NAMES
 from cardbox_tracker.person.skeleton import (
-    CLAVICLE_NAMES,
     JOINT_NAMES,
     KEYPOINT_NAMES,
+    LEG_NAMES,
     NECK_NAMES,
     PLACE_NAMES,
+    STATE_NAMES,
     UNITS,
+    Group,
     KeypointState,
+    names_of,
 )
 from cardbox_tracker.recordings.outputs import (
-    joint_deviations,
-    joint_values,
     keypoint_states,
-    positions_of,
 )
 from cardbox_tracker.recordings.silhouettes import RecordedFrame
 from cardbox_tracker.tracking.estimate import Estimate, Hand, Legs
@@ -39,6 +38,8 @@ from cardbox_tracker.tracking.estimate import Estimate, Hand, Legs
 Cell = int | float | str | Decimal | None
 """A value of the table; None is unknown. A Decimal keeps the nine decimals of a stamp."""
 
+DECIMALS = 6
+"""Decimals of the numbers in CSV."""
 PARQUET = ".parquet"
 """Suffix of the tables that are not CSV."""
 
@@ -47,7 +48,7 @@ PERSON = "person"
 PERSON_CHANCE = "person_chance"
 """Column of the probability that it is the person who had this number before, behind it."""
 
-_BODY_NAMES = (*JOINT_NAMES, *PLACE_NAMES)
+_CLAVICLES = names_of(Group.CLAVICLE)
 
 POINT_COLUMNS = tuple(f"{name}_{axis}" for name in KEYPOINT_NAMES for axis in "xyz")
 """Columns of the keypoints, m in the optical frame of the first camera."""
@@ -65,19 +66,8 @@ _HAND = {"hand_open": "", **dict.fromkeys(("palm_x", "palm_y", "palm_z"), "")} |
 
 
 @cache
-def columns(
-    has_points: bool = False,
-    has_people: bool = False,
-    has_hands: bool = False,
-) -> tuple[str, ...]:
-    """Return the names of the columns, see :func:`units`."""
-    return tuple(units(has_points, has_people, has_hands))
-
-
 def units(
-    has_points: bool = False,
-    has_people: bool = False,
-    has_hands: bool = False,
+    has_points: bool = False, has_people: bool = False, has_hands: bool = False
 ) -> dict[str, str]:
     """Return the unit of each column by its name, in their order; empty for none.
 
@@ -94,11 +84,11 @@ def units(
         **_units(PLACE_NAMES),
         "stamp_ns": "ns",
         "time_s": "s",
-        **_deviation_units(_BODY_NAMES),
+        **_deviation_units((*JOINT_NAMES, *PLACE_NAMES)),
         **{f"{name}_{what}": "" for what in ("state", "chance") for name in KEYPOINT_NAMES},
         **(_units(NECK_NAMES) | _deviation_units(NECK_NAMES) if has_points else {}),
-        **_units(CLAVICLE_NAMES),
-        **_deviation_units(CLAVICLE_NAMES),
+        **_units(_CLAVICLES),
+        **_deviation_units(_CLAVICLES),
         "place_state": "",
         "place_chance": "",
         "place_rests_on": "",
@@ -120,7 +110,7 @@ LEG_POINT_COLUMNS = tuple(f"{name}_{axis}" for name in LEG_KEYPOINT_NAMES for ax
 
 def _leg_units() -> dict[str, str]:
     return {
-        **dict.fromkeys(LEG_NAMES, "rad"),
+        **_units(LEG_NAMES),
         **_deviation_units(LEG_NAMES),
         **dict.fromkeys(LEG_POINT_COLUMNS, "m"),
         **{f"{name}_state": "" for name in LEG_KEYPOINT_NAMES},
@@ -133,8 +123,7 @@ def _units(joints: Iterable[str]) -> dict[str, str]:
 
 
 def _deviation_units(joints: Iterable[str]) -> dict[str, str]:
-    known = {name: UNITS.get(name, "rad") for name in joints}
-    return {f"{name}_stddev_{unit}": unit for name, unit in known.items()}
+    return {f"{name}_stddev_{unit}": unit for name, unit in _units(joints).items()}
 
 
 def deviation_columns(joints: Iterable[str]) -> list[str]:
@@ -142,38 +131,29 @@ def deviation_columns(joints: Iterable[str]) -> list[str]:
     return list(_deviation_units(joints))
 
 
-def text_columns() -> tuple[str, ...]:
-    """Return the columns of texts."""
-    keypoints = (f"{name}_state" for name in (*KEYPOINT_NAMES, *LEG_KEYPOINT_NAMES))
-    return ("state", *keypoints, "place_state", "place_rests_on")
+TEXT_COLUMNS = (
+    *("state", "place_state", "place_rests_on"),
+    *(f"{name}_state" for name in (*KEYPOINT_NAMES, *LEG_KEYPOINT_NAMES)),
+)
+"""Columns of texts."""
 
 
-def row_of(
-    stamp_ns: int,
-    time_s: float,
-    estimate: Estimate,
-    has_points: bool = False,
-    has_people: bool = False,
-    has_hands: bool = False,
-) -> list[Cell]:
-    """Return the row of one image, in the order of :func:`columns`."""
-    names = columns(has_points, has_people, has_hands)
+def row_of(stamp_ns: int, time_s: float, estimate: Estimate, **has: bool) -> list[Cell]:
+    """Return the row of one image; its columns, in their order, are those of ``units(**has)``."""
+    names = units(**has)
     stamp = Decimal(stamp_ns).scaleb(-9)
     known: dict[str, Cell] = {"stamp": stamp, "state": estimate.state}
     known |= {"stamp_ns": stamp_ns, "time_s": time_s, PERSON: estimate.person}
     known[PERSON_CHANCE] = estimate.person_chance
-    joints, deviations = joint_values(estimate), joint_deviations(estimate)
-    if joints is None or estimate.keypoints_m is None:
+    if estimate.posture is None or estimate.keypoints_m is None:
         return [known.get(name) for name in names]
-    known |= positions_of(joints)
+    for columns_of, values in zip((_units, _deviation_units), estimate.joints, strict=True):
+        known |= zip(columns_of(STATE_NAMES), map(_known, values), strict=True)
     angles = anatomical_angles(np.asarray(estimate.posture, float)).tolist()
     known |= {name: x for name, x in zip(ANATOMICAL_NAMES, angles, strict=True) if x == x}
     points_m = np.asarray(estimate.keypoints_m, float).ravel()
     known |= zip(POINT_COLUMNS, points_m.tolist(), strict=True)
     known |= {"cost": estimate.cost_px, "iou": estimate.iou}
-    stddevs = {} if deviations is None else positions_of(deviations)
-    stddevs = {name: value for name, value in stddevs.items() if name in UNITS}
-    known |= zip(_deviation_units(stddevs), stddevs.values(), strict=True)
     states = keypoint_states(estimate)
     if states is not None:
         for name, state, chance in zip(*states[:3], strict=True):
@@ -182,11 +162,7 @@ def row_of(
         place = estimate.place
         known |= {"place_state": str(place.state), "place_chance": place.chance}
         known["place_rests_on"] = place.rests_on
-    # Joints that are not known are not 0 here.
-    known |= dict.fromkeys((*HAND_NAMES, *LEG_NAMES))
     known |= {f"{name}_state": str(KeypointState.HIDDEN) for name in LEG_KEYPOINT_NAMES}
-    if estimate.neck is None:
-        known |= dict.fromkeys((*NECK_NAMES, *_deviation_units(NECK_NAMES)))
     for side, hand in zip(_SIDES, estimate.hands or (None, None), strict=True):
         if hand is not None:
             known |= _hand_cells(side, hand)
@@ -203,9 +179,13 @@ def _hand_cells(side: str, hand: Hand) -> dict[str, Cell]:
 
 
 def _leg_cells(legs: Legs) -> dict[str, Cell]:
-    values = [*legs.angles.tolist(), *legs.angles_stddev.tolist(), *legs.points_m.ravel().tolist()]
-    cells = [*values, *map(str, legs.states), *legs.points_stddev_m.tolist()]
-    return dict(zip(_leg_units(), cells, strict=True))
+    cells: dict[str, Cell] = dict(
+        zip(LEG_POINT_COLUMNS, legs.points_m.ravel().tolist(), strict=True)
+    )
+    each = zip(LEG_KEYPOINT_NAMES, legs.states, legs.points_stddev_m.tolist(), strict=True)
+    for name, state, stddev_m in each:
+        cells |= {f"{name}_state": str(state), f"{name}_stddev_m": stddev_m}
+    return cells
 
 
 def _known(value: float) -> float | None:
@@ -219,32 +199,26 @@ def check_table(path: Path) -> None:
 
 
 @contextmanager
-def result_table(
-    path: Path,
-    has_points: bool,
-    has_people: bool = False,
-    has_hands: bool = False,
-) -> Iterator[Callable[[RecordedFrame, Estimate], None]]:
+def result_table(path: Path, **has: bool) -> Iterator[Callable[[RecordedFrame, Estimate], None]]:
     """Context of a function that adds the row of an image to a table, which appears on exit.
 
     A ``path`` with the suffix .parquet is a Parquet file, else CSV; with ``has_people`` each person
-    of an image has a row. See :func:`columns`. Raises CardboxError if the file cannot be written,
-    or pyarrow is missing.
+    of an image has a row. The columns are ``units(**has)``. Raises CardboxError if the file cannot
+    be written, or pyarrow is missing.
     """
-    has = has_points, has_people, has_hands
-    names = columns(*has)
+    names = units(**has)
     if path.suffix == PARQUET:
         arrow, parquet = pyarrow_or_error()
         rows: list[list[Cell]] = []
         with atomic_path(path) as temporary:
             yield lambda frame, estimate: rows.append(
-                row_of(frame.stamp_ns, frame.time_s, estimate, *has)
+                row_of(frame.stamp_ns, frame.time_s, estimate, **has)
             )
             whole = dict.fromkeys(("stamp_ns", PERSON), arrow.int64())
-            types = whole | dict.fromkeys(text_columns(), arrow.string())
+            types = whole | dict.fromkeys(TEXT_COLUMNS, arrow.string())
             schema = arrow.schema(
                 arrow.field(name, types.get(name, arrow.float64()), metadata={"unit": unit})
-                for name, unit in units(*has).items()
+                for name, unit in units(**has).items()
             )
             for row in rows:
                 row[0] = float(row[0] or 0)
@@ -255,7 +229,7 @@ def result_table(
         table = csv.writer(file, lineterminator="\n")
         table.writerow(names)
         yield lambda frame, estimate: table.writerow(
-            map(_text, row_of(frame.stamp_ns, frame.time_s, estimate, *has))
+            map(_text, row_of(frame.stamp_ns, frame.time_s, estimate, **has))
         )
 
 
@@ -266,7 +240,7 @@ def _text(cell: Cell) -> str:
         case Decimal():
             return f"{cell:.9f}"
         case float():
-            return f"{cell:.6f}"
+            return f"{cell:.{DECIMALS}f}"
     return str(cell)
 
 

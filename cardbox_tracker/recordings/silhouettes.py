@@ -197,7 +197,7 @@ class SilhouetteSource:
         self._given: GivenPoints | None = None
         self._points: FindPoints = lambda prepared, silhouette: None
         if self._detector is not None:
-            self._points = lambda prepared, silhouette: points_of(prepared.found)
+            self._points = lambda prepared, _: next(map(image_points, prepared.found), None)
         elif isinstance(points, PointTable):
             calibration = self._pipeline.calibration
             given = points.read(camera, (calibration.width, calibration.height))
@@ -420,8 +420,3 @@ class SilhouetteSource:
         except (CameraError, EncodingError) as error:
             return number, image, str(error)
         return number, replace(image, _decode=lambda: sent), prepared
-
-
-def points_of(found: Sequence[Detection]) -> ImagePoints | None:
-    """Return the points of the first of the people in an image; None if there is nobody."""
-    return image_points(found[0]) if found else None

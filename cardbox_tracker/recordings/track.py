@@ -12,6 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from cardbox_tracker.common.errors import CardboxError
+from cardbox_tracker.measuring.scene import Scene
 from cardbox_tracker.person.kinematics import pose
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.skeleton import JOINT_NAMES, KEYPOINT_NAMES, UNITS, KeypointState
@@ -42,8 +43,7 @@ class TrackSummary:
     accounts: tuple[str, ...] = ()  #: for each camera, what was used of it and what was left out
     #: what the results rest on, with its numbers and where they are from.
     assumptions: tuple[str, ...] = ()
-    #: mean, deviation and origin of the camera's numbers by name.
-    scene: Mapping[str, Mapping[str, float | str]] = field(default_factory=dict)
+    scene: Scene | None = None  #: camera, floor and people
     #: in how many images each optional input was used, by its name.
     used: Mapping[str, int] = field(default_factory=dict)
     quality: tuple[str, ...] = ()  #: see :meth:`Quality.lines`; empty for several people
@@ -94,8 +94,9 @@ def track_recording(
     first, rng = recording.first, np.random.default_rng(seed)
     given = recording.others, people, look
     session, found = Session(bodies, first.camera, config, rng, *given), list[Quality]()
-    has = first.has_points, people is not None, look is not None
-    with nullcontext() if table is None else result_table(table, *has) as add_row:
+    has = {"has_points": first.has_points, "has_people": people is not None}
+    has["has_hands"] = look is not None
+    with nullcontext() if table is None else result_table(table, **has) as add_row:
         frames = 0
         for taken in recording.frames(start_s, end_s):
             frames += 1

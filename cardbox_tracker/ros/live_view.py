@@ -11,7 +11,8 @@ from sensor_msgs.msg import Image, JointState
 from std_msgs.msg import String
 
 from cardbox_tracker.applications.viewing.scene import Handler, Scene, handlers_of
-from cardbox_tracker.ros.messages import conversions, results
+from cardbox_tracker.recordings.outputs import joints_of
+from cardbox_tracker.ros.messages import conversions
 from cardbox_tracker.ros.runtime import qos
 from cardbox_tracker.ros.runtime.node import CardboxNode, run_node
 
@@ -54,7 +55,7 @@ class LiveView(CardboxNode):
     def _on_robot_joints(self, message: JointState, _: int) -> None:
         stamp_ns = conversions.stamp_ns(message.header.stamp) or self._latest_ns
         if stamp_ns:
-            self._scene.robot_joints(stamp_ns, _ROBOT, results.joint_values_of(message))
+            self._scene.robot_joints(stamp_ns, _ROBOT, joints_of(message))
 
 
 def show_nodes(scene: Scene) -> int:

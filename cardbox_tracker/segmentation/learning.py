@@ -6,9 +6,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cardbox_tracker.camera.encodings import brightness_of
+from cardbox_tracker.common.health import WATCHES
 from cardbox_tracker.segmentation.empty_scene import BackgroundLearner, BackgroundModel
 from cardbox_tracker.segmentation.partial_scene import PartialScene
-from cardbox_tracker.segmentation.scene_motion import STILL, SceneMotion
+from cardbox_tracker.segmentation.scene_motion import SceneMotion
 
 ImageArray = NDArray[np.uint8]
 
@@ -63,7 +64,7 @@ class StillLearning(Learning):
     def add(self, image: ImageArray) -> None:
         """Learn from one prepared image, or start again if something has moved."""
         share = self._motion.add(brightness_of(image))
-        if share > STILL:
+        if WATCHES["motion"].is_beyond(share):
             self._moving = share
             self._motion = SceneMotion(self.images)
             self._learner = BackgroundLearner()
@@ -79,12 +80,7 @@ class StillLearning(Learning):
         """Describe the images that are needed and the motion that delays them."""
         if self._moving == 0.0:
             return super().waits_for(topic)
-        return (
-            f"a still scene on {topic}: something moves in it, so the background is not learned "
-            f"yet. Leave the image for {self.images} images; if you cannot, start with "
-            "learning:=person_in_view; if something always moves there (a tree, a fan, a "
-            "screen), with learning:=always"
-        )
+        return WATCHES["motion"].words.format(topic=topic, images=self.images)
 
 
 class PersonInViewLearning(Learning):

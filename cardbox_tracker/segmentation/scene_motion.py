@@ -17,9 +17,6 @@ FloatImage = NDArray[np.float32]
 ImageArray = NDArray[np.uint8]
 Mask = NDArray[np.bool_]
 
-STILL = 0.006
-"""Largest share of moving pixels in a still scene."""
-
 # Motion is detected at half the resolution, where averaging halves the noise.
 _SCALE = 2
 _SMOOTHING_PX = 0.8

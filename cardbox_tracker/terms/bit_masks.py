@@ -1,7 +1,6 @@
 """Compiled sums of (1 - 2 f) over the union of patches, drawn as bits of :mod:`.bit_planes`.
 
-No step depends on the order of the patches in a row, so this is faster than runs of columns
-(:mod:`.union`) where many patches overlap. The results are equal.
+No step depends on the order of the patches in a row.
 """
 
 from __future__ import annotations

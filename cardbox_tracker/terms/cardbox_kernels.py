@@ -5,9 +5,9 @@ equation (2) becomes
 
     W = sum of f + sum over the pixels covered by the model of (1 - 2 f)
 
-The first sum is a constant of the image. The second is read from the row sums, see
-:mod:`cardbox_tracker.terms.union`. For the arms, the row sums are constant on pixels that
-the trunk covers, so an arm particle draws only its own 4 patches instead of 11.
+The first sum is a constant of the image. The second is counted in bits, see
+:mod:`cardbox_tracker.terms.bit_masks`. For the arms, pixels that the trunk covers do not count, so
+an arm particle draws only its own 4 patches instead of 11.
 """
 
 from __future__ import annotations
@@ -30,6 +30,8 @@ from cardbox_tracker.person.parts import (
     UPPER_ARM,
     WAIST,
 )
+from cardbox_tracker.terms.bit_masks import Masks, cover_masks, new_masks, sum_masks
+from cardbox_tracker.terms.bit_planes import Planes
 from cardbox_tracker.terms.body_outline import lid
 from cardbox_tracker.terms.kernel_arguments import (
     Cardbox,
@@ -41,13 +43,12 @@ from cardbox_tracker.terms.kernel_arguments import (
     cardbox_of,
 )
 from cardbox_tracker.terms.rasterisation import Workspace, draw, new_workspace
-from cardbox_tracker.terms.row_sums import RowSums
-from cardbox_tracker.terms.union import cover_patches, sum_union
 
 TRUNK_PATCHES = 8
 """7 patches of the paper and a neck, which is empty at width 0; a multiple of four for loops."""
 ARM_PATCHES = 4
 _BODY_PATCHES = TRUNK_PATCHES + 2 * ARM_PATCHES
+Size = tuple[int, int]
 # With an unsigned index, numba compiles no code for negative indices.
 _index = np.uint64
 
@@ -153,48 +154,62 @@ def _place_body(work: Workspace, posture: Floats, model: Cardbox) -> None:
         _place_arm(work, first, angles_in(posture, arm), side_of(arm), model)
 
 
+@inlined_kernel
+def _sum(
+    work: Workspace, camera: Intrinsics, size: Size, planes: Planes, masks: Masks
+) -> tuple[int, int]:
+    """Draw all patches; return their sum of (1 - 2 f) and their area, px."""
+    has_cuts = draw(work, camera, size[0], size[1])
+    return sum_masks(work, has_cuts, size[1], planes, masks)
+
+
 @kernel
 def trunk_costs(
-    postures: Floats, cardbox: CardboxTuple, row_sums: RowSums, base: int, costs: Counts
+    postures: Floats, cardbox: CardboxTuple, size: Size, planes: Planes, base: int, costs: Counts
 ) -> None:
-    """Write the costs (N,) of trunks (N, 4), given the cost ``base`` of drawing nothing."""
+    """Write the costs (N,) of trunks (N, 4), given the cost ``base`` of drawing nothing.
+
+    Here and below, ``size`` is the number of rows that count, and the width, px.
+    """
     model = cardbox_of(cardbox)
-    rows, width = row_sums.shape[0], row_sums.shape[1] - 1
-    work = new_workspace(TRUNK_PATCHES, rows)
+    work, masks = new_workspace(TRUNK_PATCHES, planes.shape[2]), new_masks(TRUNK_PATCHES, planes)
     _shape_trunk(model.parts, work.shape)
     for i in range(postures.shape[0]):
         torso_pose(postures[i], model.place, model.camera, work.torso, work.hip)
         _place_trunk(work)
-        draw(work, model.camera, rows, width)
-        costs[i] = base + sum_union(work, row_sums)[0]
+        costs[i] = base + _sum(work, model.camera, size, planes, masks)[0]
 
 
 @kernel
-def cover_trunk(torso: Floats, cardbox: CardboxTuple, row_sums: RowSums, covered: RowSums) -> int:
-    """Write the row sums outside of a trunk (4,) to ``covered``; return the gain of the trunk."""
+def cover_trunk(
+    torso: Floats, cardbox: CardboxTuple, size: Size, planes: Planes, covered: Planes
+) -> int:
+    """Write the planes outside of a trunk (4,) to ``covered``; return the gain of the trunk."""
     model = cardbox_of(cardbox)
-    rows, width = row_sums.shape[0], row_sums.shape[1] - 1
-    work = new_workspace(TRUNK_PATCHES, rows)
+    work, masks = new_workspace(TRUNK_PATCHES, planes.shape[2]), new_masks(TRUNK_PATCHES, planes)
     _shape_trunk(model.parts, work.shape)
     torso_pose(torso, model.place, model.camera, work.torso, work.hip)
     _place_trunk(work)
-    draw(work, model.camera, rows, width)
-    return cover_patches(work.sides, work.extent, row_sums, covered)
+    gain = _sum(work, model.camera, size, planes, masks)[0]
+    cover_masks(masks, planes, covered)
+    return gain
 
 
 @kernel
-def cover_arms(posture: Floats, cardbox: CardboxTuple, row_sums: RowSums, covered: RowSums) -> int:
-    """Write the row sums outside of the arms of a posture (12,); return the gain of the arms."""
-    model = cardbox_of(cardbox)
-    rows, width = row_sums.shape[0], row_sums.shape[1] - 1
-    work = new_workspace(2 * ARM_PATCHES, rows)
+def cover_arms(
+    posture: Floats, cardbox: CardboxTuple, size: Size, planes: Planes, covered: Planes
+) -> int:
+    """Write the planes outside of the arms of a posture (12,); return the gain of the arms."""
+    model, patches = cardbox_of(cardbox), 2 * ARM_PATCHES
+    work, masks = new_workspace(patches, planes.shape[2]), new_masks(patches, planes)
     torso_pose(posture, model.place, model.camera, work.torso, work.hip)
     for arm in range(2):
         first = ARM_PATCHES * arm
         _shape_arm(model.parts, first, work.shape)
         _place_arm(work, first, angles_in(posture, arm), side_of(arm), model)
-    draw(work, model.camera, rows, width)
-    return cover_patches(work.sides, work.extent, row_sums, covered)
+    gain = _sum(work, model.camera, size, planes, masks)[0]
+    cover_masks(masks, planes, covered)
+    return gain
 
 
 @kernel
@@ -203,72 +218,65 @@ def arm_costs(
     side: float,
     torso: Floats,
     cardbox: CardboxTuple,
-    covered: RowSums,
+    size: Size,
+    covered: Planes,
     base: int,
     costs: Counts,
 ) -> None:
-    """Write the costs (N,) of arms (N, 4) beside a trunk (4,), given its row sums and its cost."""
+    """Write the costs (N,) of arms (N, 4) beside a trunk (4,), given its planes and its cost."""
     model = cardbox_of(cardbox)
-    rows, width = covered.shape[0], covered.shape[1] - 1
-    work = new_workspace(ARM_PATCHES, rows)
+    work, masks = new_workspace(ARM_PATCHES, covered.shape[2]), new_masks(ARM_PATCHES, covered)
     _shape_arm(model.parts, 0, work.shape)
     torso_pose(torso, model.place, model.camera, work.torso, work.hip)
     for i in range(postures.shape[0]):
         _place_arm(work, 0, postures[i], side, model)
-        draw(work, model.camera, rows, width)
-        costs[i] = base + sum_union(work, covered)[0]
+        costs[i] = base + _sum(work, model.camera, size, covered, masks)[0]
 
 
 @kernel
 def full_costs(
     postures: Floats,
     cardbox: CardboxTuple,
-    row_sums: RowSums,
+    size: Size,
+    planes: Planes,
     base: int,
     costs: Counts,
     areas: Counts,
 ) -> None:
     """Write costs and drawn areas (N,), px, of whole postures (N, 12)."""
     model = cardbox_of(cardbox)
-    rows, width = row_sums.shape[0], row_sums.shape[1] - 1
-    work = new_workspace(_BODY_PATCHES, rows)
+    work, masks = new_workspace(_BODY_PATCHES, planes.shape[2]), new_masks(_BODY_PATCHES, planes)
     _shape_body(model.parts, work.shape)
     for i in range(postures.shape[0]):
         _place_body(work, postures[i], model)
-        draw(work, model.camera, rows, width)
-        gain, area = sum_union(work, row_sums)
+        gain, areas[i] = _sum(work, model.camera, size, planes, masks)
         costs[i] = base + gain
-        areas[i] = area
 
 
 @kernel
 def body_costs(
-    postures: Floats, bodies: CardboxTuple, row_sums: RowSums, base: int, costs: Counts
+    postures: Floats, bodies: CardboxTuple, size: Size, planes: Planes, base: int, costs: Counts
 ) -> None:
     """Write the costs (N,) of N ``bodies`` at one place in the N ``postures`` (N, 12)."""
-    rows, width = row_sums.shape[0], row_sums.shape[1] - 1
-    work = new_workspace(_BODY_PATCHES, rows)
+    work, masks = new_workspace(_BODY_PATCHES, planes.shape[2]), new_masks(_BODY_PATCHES, planes)
     parts, shoulders, place, camera = bodies
     for i in range(postures.shape[0]):
         model = cardbox_of((parts[i], shoulders[i], place, camera))
         _shape_body(model.parts, work.shape)
         _place_body(work, postures[i], model)
-        draw(work, model.camera, rows, width)
-        costs[i] = base + sum_union(work, row_sums)[0]
+        costs[i] = base + _sum(work, model.camera, size, planes, masks)[0]
 
 
 @kernel
 def polygon_costs(
-    corners_m: Floats, camera: IntrinsicsTuple, row_sums: RowSums, base: int, costs: Counts
+    corners_m: Floats, camera: IntrinsicsTuple, size: Size, planes: Planes, base: int, costs: Counts
 ) -> None:
     """Write the costs (N,) of quadrilaterals (N, K, 4, 3) in the optical frame, metres."""
-    rows, width = row_sums.shape[0], row_sums.shape[1] - 1
     count = corners_m.shape[1]
-    work = new_workspace(count, rows)
+    work, masks = new_workspace(count, planes.shape[2]), new_masks(count, planes)
     for i in range(corners_m.shape[0]):
         for p in range(count):
             for c in range(4):
                 for axis in range(3):
                     work.corners[axis, c * count + p] = corners_m[i, p, c, axis]
-        draw(work, Intrinsics(*camera), rows, width)
-        costs[i] = base + sum_union(work, row_sums)[0]
+        costs[i] = base + _sum(work, Intrinsics(*camera), size, planes, masks)[0]

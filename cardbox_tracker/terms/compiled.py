@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,8 +14,8 @@ from cardbox_tracker.person.parts import shape_of
 from cardbox_tracker.person.posture import LEFT_ARM, N_JOINTS, TORSO
 from cardbox_tracker.person.sizes import FloatArray
 from cardbox_tracker.terms import cardbox_kernels as kernels
+from cardbox_tracker.terms.bit_planes import Planes, fill_planes, new_planes
 from cardbox_tracker.terms.kernel_arguments import CardboxTuple, intrinsics_of, place_of
-from cardbox_tracker.terms.row_sums import fill_row_sums
 from cardbox_tracker.terms.silhouette import SilhouetteObservation, SilhouetteTerm
 from cardbox_tracker.terms.term import ArmCosts, Frame, Silhouette, TorsoCosts
 
@@ -33,8 +32,6 @@ class CompiledSilhouette(SilhouetteTerm):
         """Prepare for one body and one camera."""
         super().__init__(body, camera)
         self._cardbox = (*shape_of(body.sizes), place_of(body), intrinsics_of(camera))
-        # 16 bits suffice for images narrower than 32768 px, and less memory stays in the cache.
-        self._sums = np.int16 if camera.width < 2**15 else np.int32
 
     def warm_up(self) -> None:
         """Run every kernel once, so that no live image waits for the compiler."""
@@ -55,9 +52,9 @@ class CompiledSilhouette(SilhouetteTerm):
         check_array("silhouette", frame.silhouette, size)
         upper = np.ascontiguousarray(frame.silhouette[: self.rows])
         words = upper.view(np.uint64) if upper.shape[1] % 8 == 0 else _NO_WORDS
-        row_sums = np.empty((self.rows, self.camera.width + 1), self._sums)
-        fill_row_sums(upper, words, row_sums)
-        return CompiledObservation(frame, row_sums, self._cardbox)
+        planes = new_planes(self.camera.width, self.rows)
+        fill_planes(upper, words, planes)
+        return CompiledObservation(frame, planes, (self.rows, self.camera.width), self._cardbox)
 
     def look(self, silhouette: Silhouette) -> CompiledObservation:
         """See :class:`SilhouetteTerm`."""
@@ -66,24 +63,25 @@ class CompiledSilhouette(SilhouetteTerm):
 
 @dataclass(frozen=True, eq=False)
 class CompiledObservation(SilhouetteObservation):
-    """One silhouette as running sums along its rows."""
+    """One silhouette as bits."""
 
     frame: Frame  #: the frame
-    row_sums: NDArray[Any]  #: running sums of 1 - 2 f along each row, (rows, W + 1)
+    planes: Planes  #: pixels that count, and foreground, (2, words, rows)
+    size: tuple[int, int]  #: number of rows that count, and width, px
     cardbox: CardboxTuple  #: fields of :class:`~cardbox_tracker.terms.kernel_arguments.Cardbox`
 
     def torsos_beside(self, arms: FloatArray | None) -> TorsoCosts:
         """See :class:`SilhouetteObservation`."""
-        row_sums, base = self.row_sums, self.frame.foreground_px
+        planes, base = self.planes, self.frame.foreground_px
         if arms is not None:
-            row_sums = np.empty_like(self.row_sums)
+            planes = np.empty_like(self.planes)
             posture = np.array(arms, dtype=np.float64)
-            base += kernels.cover_arms(posture, self.cardbox, self.row_sums, row_sums)
+            base += kernels.cover_arms(posture, self.cardbox, self.size, self.planes, planes)
 
         def costs(torsos: FloatArray) -> FloatArray:
             particles = np.ascontiguousarray(torsos, dtype=np.float64)
             counts = np.empty(len(particles), np.int64)
-            kernels.trunk_costs(particles, self.cardbox, row_sums, base, counts)
+            kernels.trunk_costs(particles, self.cardbox, self.size, planes, base, counts)
             return counts.astype(np.float64)
 
         return costs
@@ -91,15 +89,15 @@ class CompiledObservation(SilhouetteObservation):
     def arms_beside(self, torso: FloatArray) -> ArmCosts:
         """See :class:`SilhouetteObservation`."""
         pose = np.array(torso, dtype=np.float64)
-        covered = np.empty_like(self.row_sums)
-        gain = kernels.cover_trunk(pose, self.cardbox, self.row_sums, covered)
+        covered = np.empty_like(self.planes)
+        gain = kernels.cover_trunk(pose, self.cardbox, self.size, self.planes, covered)
         base = self.frame.foreground_px + gain
 
         def costs(side: str, arms: FloatArray) -> FloatArray:
             particles = np.ascontiguousarray(arms, dtype=np.float64)
             counts = np.empty(len(particles), np.int64)
-            sign = _SIDE_SIGN[side]
-            kernels.arm_costs(particles, sign, pose, self.cardbox, covered, base, counts)
+            beside = _SIDE_SIGN[side], pose, self.cardbox, self.size
+            kernels.arm_costs(particles, *beside, covered, base, counts)
             return counts.astype(np.float64)
 
         return costs
@@ -123,7 +121,8 @@ class CompiledObservation(SilhouetteObservation):
         kernels.body_costs(
             np.ascontiguousarray(postures, dtype=np.float64),
             (*shape_of(np.asarray(sizes, dtype=np.float64)), *self.cardbox[2:]),
-            self.row_sums,
+            self.size,
+            self.planes,
             self.frame.foreground_px,
             costs,
         )
@@ -137,7 +136,8 @@ class CompiledObservation(SilhouetteObservation):
         kernels.polygon_costs(
             contiguous,
             self.cardbox[3],
-            self.row_sums,
+            self.size,
+            self.planes,
             self.frame.foreground_px,
             costs,
         )
@@ -151,7 +151,8 @@ class CompiledObservation(SilhouetteObservation):
         kernels.full_costs(
             contiguous,
             self.cardbox,
-            self.row_sums,
+            self.size,
+            self.planes,
             self.frame.foreground_px,
             costs,
             areas,

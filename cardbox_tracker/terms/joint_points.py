@@ -58,8 +58,8 @@ _JOINT_M_PER_S = {SHOULDER: 0.2, ELBOW: 0.5, WRIST: 0.8, KNUCKLES: 0.9}
 _TRUNK_M, _TRUNK_M_PER_S = 0.05, 0.25
 _POINT_PX = 1.5
 # Bones (upper arm, forearm, shoulders, trunk): deviation of the component along the line of sight,
-# and mean difference of the detector's from the true one (lab/tools/point_deviations.py). That of
-# the shoulders also covers the errors of their curve, see _turned.
+# and mean difference of the detector's from the true one (docs/research.md). That of the shoulders
+# also covers the errors of their curve, see _turned.
 _BONE_DEVIATIONS = np.array([0.22, 0.32, 0.22, 0.32, 0.2, 0.12])
 _BONE_OFFSETS = np.array([0.06, -0.13, 0.06, -0.13, 0.05, -0.1])
 _OLDEST_S = 1.0

@@ -31,6 +31,7 @@ from cardbox_tracker.person.kinematics import (
 )
 from cardbox_tracker.person.parts import BOTTOM, FORWARD, HEAD, HEIGHT
 from cardbox_tracker.person.posture import N_STATE
+from cardbox_tracker.person.proportions import WRIST_SHARE
 from cardbox_tracker.terms.kernel_arguments import (
     Body,
     BodyTuple,
@@ -56,9 +57,6 @@ MOST = 16.0
 """Limit of a squared residual in a rating."""
 PULL = 4.0 * MOST
 """The same in a fit: a point that is too far away to count in the cost still pulls."""
-WRIST_SHARE = 0.73
-"""Place of the wrist between elbow and knuckles: forearm and half of the hand have 0.146 and 0.054
-of the stature (Drillis & Contini 1966)."""
 _NEAREST_M = 0.1
 
 

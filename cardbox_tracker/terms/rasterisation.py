@@ -55,12 +55,6 @@ class Workspace(NamedTuple):
     """(K, 2, rows): the two columns where a row crosses the outline of a patch, in any order."""
     extent: Counts
     """(K, 2): first and end row of a patch."""
-    runs: Whole
-    """(2, K): first and end columns of the runs of one row."""
-    active: Counts
-    """(K,): patches that meet a row."""
-    joined: Whole
-    """(2, rows): joined runs of two patches."""
     outline: Floats
     """(2, 6): corners of a patch that the near plane cuts, pixels. Rounding can give a sixth corner
     to a patch that lies in the near plane."""
@@ -83,9 +77,6 @@ def new_workspace(patches: int, rows: int) -> Workspace:
         edges=np.empty((4, 4 * patches), np.int32),
         sides=np.empty((patches, 2, rows), np.int32),
         extent=np.empty((patches, 2), np.int64),
-        runs=np.empty((2, patches), np.int32),
-        active=np.empty(patches, np.int64),
-        joined=np.empty((2, rows), np.int32),
         outline=np.empty((2, 6)),
         torso=np.empty((3, 3)),
         upper_arm=np.empty((3, 3)),

@@ -9,15 +9,22 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
 
 from cardbox_tracker.camera.camera import roll_turn
-from cardbox_tracker.person.hands import limited
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.sizes import FloatArray
-from cardbox_tracker.person.skeleton import KeypointState
+from cardbox_tracker.person.skeleton import (
+    POSTURE_GROUPS,
+    STATE,
+    Group,
+    KeypointState,
+    limits_of,
+    rows_of,
+)
 
 OPEN, CLOSED = 0.75, 0.25
 """A hand is open above the first value of ``Hand.open``, and closed below the second."""
@@ -57,13 +64,14 @@ class Hand(NamedTuple):
     #: straight arm is nan.
     wrist: FloatArray
     wrist_stddev: FloatArray  #: their standard deviations, (3,), rad; nan where the rotation is
-    turn: float = 0.0  #: turn of the hand about the forearm's frame, rad (:mod:`.person.hands`)
+    turn: float = 0.0  #: turn of the hand about the forearm's frame, rad (:mod:`.skeleton`)
     turn_stddev: float = 0.0  #: its standard deviation, rad
 
     @property
     def joints(self) -> FloatArray:
         """Turn, flexion and deviation, (3,), rad, as joints within their limits."""
-        return limited(np.array([self.turn, *self.wrist[:2]]))
+        lowest, highest = limits_of(Group.HAND, side="left").T
+        return np.asarray(np.clip([self.turn, *self.wrist[:2]], lowest, highest))
 
     @property
     def joints_stddev(self) -> FloatArray:
@@ -147,6 +155,31 @@ class Estimate:
         if legs is not None:
             legs = legs._replace(points_m=legs.points_m @ turn)
         return replace(self, keypoints_m=self.keypoints_m @ turn, hands=hands, legs=legs)
+
+    @cached_property
+    def joints(self) -> FloatArray:
+        """Values and deviations of ``STATE_NAMES``, (2, n), rad and m; nan where they are unknown.
+
+        A place that the filter keeps constant is 0, as are shoulders that do not rise.
+        """
+        found, still = np.full((2, len(STATE)), np.nan), rows_of(Group.PLACE, Group.CLAVICLE)
+
+        def put(rows: list[int], *pair: FloatArray | float | None) -> None:
+            for row, values in zip(found, pair, strict=True):
+                if values is not None:
+                    row[rows] = values
+
+        put(still, *(None if one is None else 0.0 for one in (self.posture, self.posture_stddev)))
+        put(rows_of(*POSTURE_GROUPS), self.posture, self.posture_stddev)
+        put(rows_of(Group.PLACE), self.offset_m, self.offset_stddev_m)
+        put(rows_of(Group.NECK), self.neck, self.neck_stddev)
+        put(rows_of(Group.CLAVICLE), self.clavicles_m, self.clavicles_stddev_m)
+        for side, hand in zip(("left", "right"), self.hands or (), strict=False):
+            if hand is not None:
+                put(rows_of(Group.HAND, side=side), hand.joints, hand.joints_stddev)
+        if self.legs is not None:
+            put(rows_of(Group.LEG), self.legs.angles, self.legs.angles_stddev)
+        return found
 
     @property
     def placed_posture(self) -> FloatArray:

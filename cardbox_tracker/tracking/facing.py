@@ -14,6 +14,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from cardbox_tracker.common.health import WATCHES
 from cardbox_tracker.person.appearance import COLOR_STEPS, HAND, HEAD, steps_of_levels
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.posture import PITCH, YAW
@@ -26,8 +27,8 @@ from cardbox_tracker.terms.term import Frame, Image, Posed, Silhouette
 _ACROSS, _DOWN, _LEAST_PX = np.linspace(-0.6, 0.6, 8), np.linspace(-0.3, 0.2, 6), 12
 # Log-likelihood ratio of skin and head below which a colour is hair.
 _HAIR_NATS = -0.7
-# Least share of hair of a back, least excess over the usual share, and their hysteresis.
-_BACK, _EXCESS, _HYSTERESIS = 0.32, 0.25, 0.1
+# Least usual share of hair, so that a back has a third in all.
+_LEAST_USUAL = 0.07
 # Time between samples, and time constants of the present share and of the usual one, s.
 _EVERY_S, _NOW_S, _USUAL_S = 0.2, 0.5, 4.0
 # Time with the face after which the usual share is known, s; its largest change by a sample.
@@ -92,8 +93,8 @@ class Facing:
         self._now = now = before + (1.0 - float(np.exp(-passed_s / _NOW_S))) * (hair - before)
         is_known = self._known_s >= _KNOWN_S
         if is_known:
-            least = max(_BACK, self._usual + _EXCESS)
-            self.shows_back = now > least - _HYSTERESIS * self.shows_back
+            excess = now - max(self._usual, _LEAST_USUAL)
+            self.shows_back = WATCHES["back"].is_beyond(excess, self.shows_back)
         is_usual = not is_known or abs(now - self._usual) < _USUAL_CHANGE
         if is_frontal and is_usual and not self.shows_back:
             self._known_s += passed_s

@@ -36,11 +36,11 @@ from cardbox_tracker.detectors.detector import color
 from cardbox_tracker.detectors.hand_network import FINGERS, WRIST, HandPoints
 from cardbox_tracker.detectors.image_points import POINT_INDEX, ImagePoints
 from cardbox_tracker.detectors.pose_network import ColorImage, Square
-from cardbox_tracker.person.hands import WRIST_SHARE, turn_of
 from cardbox_tracker.person.kinematics import pose
 from cardbox_tracker.person.model import BodyModel
+from cardbox_tracker.person.proportions import WRIST_SHARE
 from cardbox_tracker.person.sizes import FloatArray
-from cardbox_tracker.person.skeleton import FRAME_NAMES, KeypointState
+from cardbox_tracker.person.skeleton import FRAME_NAMES, KeypointState, turn_of
 from cardbox_tracker.tracking.estimate import HAND_KEYPOINTS, Estimate, Hand
 
 # A finger is open if its end is bent by less than the first angle from the direction of its base,

@@ -9,8 +9,8 @@ head:
     R_head = R_torso Rz(yaw) Ry(pitch) Rx(roll)
 
 The signs are those of the torso's angles: a positive yaw turns the face to the person's left, a
-positive pitch lowers it. Both are 0 if the face looks along the torso's forward axis. The roll is
-estimated and not returned.
+positive pitch lowers it. Both are 0 if the face looks along the torso's forward axis. Only joints
+of the skeleton are returned, so the roll is not.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ from cardbox_tracker.detectors.image_points import POINT_INDEX, ImagePoints
 from cardbox_tracker.person.kinematics import pose
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.parts import body_parts
-from cardbox_tracker.person.posture import PITCH, YAW
+from cardbox_tracker.person.posture import PITCH, ROLL, YAW
 from cardbox_tracker.person.sizes import FloatArray
 from cardbox_tracker.person.skeleton import NECK_LIMITS
 from cardbox_tracker.terms.kernel_arguments import Floats
@@ -96,6 +96,9 @@ LARGEST_STDDEV_RAD = np.radians(20.0)
 """Angles that the points determine less exactly are not returned."""
 LARGEST_RMS = 2.5
 """Largest residual in its standard deviations; points that fit worse are not those of a face."""
+_N = len(NECK_LIMITS)
+# Angles of the torso about the axes of the neck.
+_OF_TORSO = [YAW, PITCH, ROLL][:_N]
 _BEYOND_LIMITS_RAD = np.radians(15.0)
 _FARTHEST_M = 0.3
 
@@ -125,7 +128,7 @@ lengths and principal point, px; the points' deviation, px."""
 class Neck(NamedTuple):
     """Direction of the head relative to the torso."""
 
-    angles: FloatArray  #: yaw and pitch, (2,), rad
+    angles: FloatArray  #: ``NECK_NAMES``, (2,), rad
     stddev: FloatArray  #: their standard deviations, (2,), rad
 
 
@@ -158,9 +161,9 @@ def fit_neck(
     values, information = found.values[best], found.information[best]
     # Priors add as many residuals as there are unknowns, so the points are the degrees of freedom.
     rms = float(np.sqrt(found.total[best] / (2 * np.count_nonzero(known))))
-    angles = values[:2]
+    angles = values[:_N]
     beyond = np.maximum(NECK_LIMITS[:, 0] - angles, angles - NECK_LIMITS[:, 1])
-    stddev = np.sqrt(np.diag(np.linalg.inv(information))[:2]) * max(1.0, rms)
+    stddev = np.sqrt(np.diag(np.linalg.inv(information))[:_N]) * max(1.0, rms)
     is_face = rms <= LARGEST_RMS and np.hypot(*values[3:5]) <= _FARTHEST_M
     if not is_face or (beyond > _BEYOND_LIMITS_RAD).any() or (stddev > LARGEST_STDDEV_RAD).any():
         return None
@@ -242,4 +245,4 @@ class HeadTracker:
         neck = fit_neck(points, self._body, self._camera, found.placed_posture)
         if neck is None or found.posture_stddev is None:
             return neck
-        return neck._replace(stddev=np.hypot(neck.stddev, found.posture_stddev[[YAW, PITCH]]))
+        return neck._replace(stddev=np.hypot(neck.stddev, found.posture_stddev[_OF_TORSO]))

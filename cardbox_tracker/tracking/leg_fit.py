@@ -12,7 +12,7 @@ import numpy as np
 
 from cardbox_tracker.common.compiling import borrowing_kernel, inlined_kernel, kernel
 from cardbox_tracker.common.least_squares import Equations, Solution, minimize_compiled, rules_of
-from cardbox_tracker.person.legs import LEG_LIMITS
+from cardbox_tracker.person.skeleton import LEG_LIMITS
 from cardbox_tracker.terms.kernel_arguments import Floats
 
 N_ANGLES, N_VALUES = 8, 12
@@ -21,11 +21,15 @@ DIFFERENCE = 1e-5
 """Change of a value for its derivatives."""
 REST = np.tile(np.radians([60.0, 15.0, 15.0, 60.0]), 2)
 """Deviations of the angles from those of hanging legs, (8,), rad."""
-# Of each leg: two points in the image, two slopes, and the foot; then the priors.
-_OF_LEG, _N_RESIDUALS = 7, 2 * 7 + 2 * N_ANGLES + 4
+# Of each leg: two points in the image, two slopes, and the foot; then the priors and the balance.
+_OF_LEG, _N_RESIDUALS = 7, 2 * 7 + 2 * N_ANGLES + 4 + 1
 _NEAREST_M = 0.1
 # Deviation of a foot on the floor, m, and height above it from which a foot is lifted rather.
 _CONTACT_M, _LIFTED_M = 0.02, 0.06
+# Shares of the mass: trunk, head and arms; thighs; shanks; feet; and how far along thigh and shank
+# the centres are (D. Winter, Biomechanics and Motor Control of Human Movement, table 4.1). Then how
+# far the middle of the mass of somebody who stands is ahead of the ankles, m.
+_UPPER, _THIGHS, _SHANKS, _FEET, _ALONG, _AHEAD_M = 0.678, 0.2, 0.093, 0.029, 0.433, 0.05
 # Lowest and highest values; the lengths of people are within 12 %, floor and distance are free.
 _LOWEST = np.array([*LEG_LIMITS[:, 0], -0.12, -0.12, -inf, -inf])
 _HIGHEST = np.array([*LEG_LIMITS[:, 1], 0.12, 0.12, inf, inf])
@@ -41,9 +45,11 @@ View = tuple[Floats, tuple[float, float, float, float]]
 Prior = tuple[Floats, Floats, Floats, Floats]
 """Angles of the image before (8,) and deviations of their change; what images share (4,), and the
 lower root (4, 4) of its information."""
-Shown = tuple[Floats, Floats, Floats, Floats]
+Shown = tuple[Floats, Floats, Floats, Floats, tuple[float, float]]
 """Knees and ankles in the image (2, 2, 2), their deviations (2, 2), px, inf for unknown ones;
-slopes of thighs and shanks (2, 2), nan for unknown ones, and their deviations (2, 2)."""
+slopes of thighs and shanks (2, 2), nan for unknown ones, and their deviations (2, 2); how much
+nearer to the camera than the hips the mass of trunk, head and arms is, m, and the deviation of the
+middle of the whole mass from that of somebody who stands, m, inf for who does not."""
 Given = tuple[Person, View, Prior, Shown]
 
 
@@ -84,7 +90,7 @@ def points_of(values: Floats, of: Person) -> Floats:
 def _write_residuals(values: Floats, given: Given, points_m: Floats, residuals: Floats) -> float:
     """Write the residuals (34,) of values (12,), and return the sum of their squares."""
     of, (axes, (fx, fy, cx, cy)), (before, change, expected, root), shown = given
-    px, sigma_px, slopes, sigma_slopes = shown
+    px, sigma_px, slopes, sigma_slopes, (upper_m, sigma_m) = shown
     _place(values, of, points_m)
     for leg in range(2):
         at = _OF_LEG * leg
@@ -115,6 +121,13 @@ def _write_residuals(values: Floats, given: Given, points_m: Floats, residuals: 
         residuals[at + i] = 0.0
         for j in range(i, 4):
             residuals[at + i] += root[j, i] * (values[LENGTHS + j] - expected[j])
+    # Along the line of sight, which the image shows poorly.
+    middle_m = 0.0
+    for leg in range(2):
+        hip, knee, ankle = points_m[3 * leg, 0], points_m[3 * leg + 1, 0], points_m[3 * leg + 2, 0]
+        middle_m += _UPPER * (hip + upper_m) + _THIGHS * (hip + _ALONG * (knee - hip))
+        middle_m += _SHANKS * (knee + _ALONG * (ankle - knee)) + (_FEET - 1.0) * ankle
+    residuals[at + 4] = (middle_m / 2 - _AHEAD_M * of[2][0, 0]) / sigma_m
     total = 0.0
     for i in range(_N_RESIDUALS):
         total += residuals[i] ** 2

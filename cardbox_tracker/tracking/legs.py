@@ -8,7 +8,9 @@ units of its deviation:
 - the slope of thigh and shank along the line of sight, from the detector's points in space;
 - the height of each ankle above the floor. It may not be below; near the floor it is pulled there,
   and a foot that is lifted is not;
-- the angles, from those of the image before and from a leg that hangs.
+- the angles, from those of the image before and from a leg that hangs;
+- the middle of the mass over the feet of somebody who stands, who would fall otherwise: one image
+  shows poorly how far the hips of who squats are behind the feet.
 
 Lengths of thigh and shank, and the height of the floor, are the same in all images. They are
 unknowns of each fit whose prior is what the images before have shown, and the floor that is given.
@@ -30,12 +32,13 @@ from cardbox_tracker.camera.camera import Camera
 from cardbox_tracker.detectors.image_points import LEG_POINT_NAMES, POINT_INDEX, ImagePoints
 from cardbox_tracker.measuring.people_camera import is_inside
 from cardbox_tracker.person.kinematics import pose
-from cardbox_tracker.person.legs import HIP_SHARE, LEG_LIMITS, leg_angles, stature_of
+from cardbox_tracker.person.legs import leg_angles
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.parts import body_parts
 from cardbox_tracker.person.posture import TORSO_Y, YAW
+from cardbox_tracker.person.proportions import HIP_SHARE, MARKED_HEIGHTS, stature_of
 from cardbox_tracker.person.sizes import FloatArray
-from cardbox_tracker.person.skeleton import KeypointState, rotation_z
+from cardbox_tracker.person.skeleton import LEG_LIMITS, KeypointState, rotation_z
 from cardbox_tracker.terms.term import Frame
 from cardbox_tracker.tracking import leg_fit
 from cardbox_tracker.tracking.estimate import Estimate, Legs
@@ -51,12 +54,12 @@ _ENDS = [
     [LEG_POINT_NAMES.index(f"{side}_{name}") for name in ("knee", "ankle")]
     for side in ("left", "right")
 ]
+_KNEES = [3, 7]
 _HIPS = [POINT_INDEX[f"{side}_hip"] for side in ("left", "right")]
 _SHOULDERS = [POINT_INDEX[f"{side}_shoulder"] for side in ("left", "right")]
 
-# Where detectors mark knees and ankles: lengths of thigh and shank, and height of the ankle above
-# the floor, as shares of the stature (means of two real and two rendered people).
-_MARKED, _ANKLE_SHARE = np.array([0.236, 0.228]), 0.05
+# Lengths of thigh and shank, and height of the ankle, by where detectors mark them.
+_MARKED, _ANKLE_SHARE = -np.diff(MARKED_HEIGHTS[3:]), float(MARKED_HEIGHTS[5])
 # A point with a lower score is not seen.
 LEAST_SCORE = 0.5
 # Width of the image's border, as a share of its longer side, where the detector guesses points.
@@ -74,6 +77,12 @@ _LENGTH, _FLOOR_M = 0.04, 0.12
 # Relative deviations of the tracker's distance of the hips, in all images and in each.
 _DISTANCE_SHARE, _DISTANCE_CHANGE = 0.03, 0.02
 _FIXED = 1e-6
+# Deviation of the middle of the mass of somebody who stands, m, and where that of trunk, head and
+# arms is on the way from the hips to the shoulders (see :mod:`.leg_fit`).
+_BALANCE_M, _UPPER_SHARE = 0.03, 0.626
+# Knees of somebody who stands are bent less, rad; who bends them for longer without moving the hips
+# as far sits, s and m.
+_STRAIGHT_RAD, _SITS_S, _STILL_M = np.radians(60.0), 2.0, 0.08
 # Images whose information counts for what they share, because their errors are alike, and time over
 # which it is averaged, s.
 _IMAGES, _AVERAGED_S = 2.0, 3.0
@@ -84,7 +93,7 @@ _UNCERTAIN_M, _WRONG_RMS = 0.15, 3.0
 _LEAST_M = 0.05
 # What an image without legs shows to the fit.
 _UNKNOWN = np.full((2, 2), np.nan)
-_NOTHING = np.zeros((2, 2, 2)), np.full((2, 2), np.inf), _UNKNOWN, np.ones((2, 2))
+_NOTHING = np.zeros((2, 2, 2)), np.full((2, 2), np.inf), _UNKNOWN, np.ones((2, 2)), (0.0, np.inf)
 
 
 class _Seen(NamedTuple):
@@ -96,6 +105,7 @@ class _Seen(NamedTuple):
     slopes: FloatArray
     sigma_slopes: FloatArray  #: their deviations, (2, 2)
     scores: FloatArray  #: of hip, knee and ankle, (2, 3)
+    hips_px: FloatArray  #: both hips, (2, 2)
     #: whether the tracker and the detector exchange left and right, as they do for a person seen
     #: from behind, whose knees then bend to the wrong side.
     shows_back: bool
@@ -124,6 +134,8 @@ class LegReader:
         self._last: FloatArray | None = None
         self._last_stddev = REST
         self._last_s = 0.0
+        self._hips_px, self._up_s = np.full((2, 2), np.nan), -np.inf
+        self._is_level = False
 
     def see(self, frame: Frame, estimate: Estimate) -> Estimate:
         """Return the ``estimate`` with the legs, once points of the first camera show them."""
@@ -156,8 +168,12 @@ class LegReader:
         vector = information @ shared
         root = np.asarray(np.linalg.cholesky(information), np.float64)
         prior = self._last, np.asarray(change, np.float64), shared, root
-        values, inverse, rms = fit.solve(seen, prior)
+        values, inverse, rms = fit.solve(seen, prior, self._stands(seen, fit.px_per_m))
         self._last, self._last_s = values[:_N], time_s
+        feet_m = leg_fit.points_of(values[None], fit.person)[0, [2, 5], 2]
+        self._is_level = abs(feet_m[0] - feet_m[1]) < _STILL_M
+        if values[_KNEES].max() < _STRAIGHT_RAD:
+            self._up_s = time_s
         covariance = inverse * max(1.0, rms) ** 2
         self._last_stddev = np.minimum(np.sqrt(np.diag(covariance)[:_N]), REST)
         estimate = _moved(estimate, fit.hip_m * (np.exp(values[DISTANCE]) - 1.0), camera)
@@ -170,6 +186,15 @@ class LegReader:
             self._mean_information += share * (0.5 * (new + new.T) - self._mean_information)
             self._mean_vector += share * (after @ values[_SHARED] - vector - self._mean_vector)
         return replace(estimate, legs=fit.legs(seen, values, rms, covariance))
+
+    def _stands(self, seen: _Seen | None, px_per_m: float) -> bool:
+        """Return whether the person stands or squats, on both feet, rather than sits."""
+        if seen is None or seen.scores.min() < LEAST_SCORE:
+            return False
+        is_up = self._time_s - self._up_s < _SITS_S
+        if is_up and not (np.abs(seen.hips_px - self._hips_px) < _STILL_M * px_per_m).all():
+            self._hips_px, self._up_s = seen.hips_px, self._time_s
+        return is_up and self._is_level
 
 
 def _moved(estimate: Estimate, by_m: FloatArray, camera: Camera) -> Estimate:
@@ -204,10 +229,11 @@ class _Fit:
         assert estimate.posture is not None
         self._estimate, self._camera = estimate, camera
         self.hip_m = pose(body, estimate.placed_posture).hip
+        self.px_per_m = camera.fx / max(float(camera.reference_to_optical(self.hip_m)[2]), 0.3)
         self._turn = rotation_z(np.asarray(estimate.posture[YAW]))
         self._aside = self._turn[:, 1] * HIP_SHARE * stature_m
         self._lengths_m, ankle_m = _MARKED * stature_m, _ANKLE_SHARE * stature_m
-        self._person = self.hip_m, self._aside, self._turn, self._lengths_m, ankle_m
+        self.person = self.hip_m, self._aside, self._turn, self._lengths_m, ankle_m
         lens = float(camera.fx), float(camera.fy), float(camera.cx), float(camera.cy)
         self._view = camera.reference_to_optical_rotation(), lens
         place = estimate.place
@@ -230,8 +256,7 @@ class _Fit:
         scores[:, 1] *= inside[2:].reshape(3, 2).all(axis=0)
         px, scores = np.where(known[..., None], px, 0.0), np.where(known, scores, 0.0)
         is_seen = scores >= LEAST_SCORE
-        depth_m = float(self._camera.reference_to_optical(self.hip_m)[2])
-        sigma_px = np.hypot(_POINT_PX, self._camera.fx * _POINT_M / max(depth_m, 0.3))
+        sigma_px = np.hypot(_POINT_PX, self.px_per_m * _POINT_M)
         sigma_px = np.where(is_seen, sigma_px, _UNSEEN * sigma_px)
         sigma_px = np.where(known, sigma_px, np.inf)
         slopes = _UNKNOWN
@@ -243,7 +268,7 @@ class _Fit:
         sigma_slopes = np.where(is_seen, _SLOPES, _UNSEEN_SLOPE * _SLOPES)
         hips = points.scores[_HIPS][:, None]
         scores = np.concatenate([hips, scores], axis=1)
-        return _Seen(px, sigma_px, slopes, sigma_slopes, scores, shows_back)
+        return _Seen(px, sigma_px, slopes, sigma_slopes, scores, points.px[_HIPS], shows_back)
 
     def _is_exchanged(self, points: ImagePoints) -> bool:
         """Return whether the tracker takes the detector's left shoulder for the right one."""
@@ -252,7 +277,9 @@ class _Fit:
         seen = points.px[_SHOULDERS]
         return bool((seen[0] - seen[1]) @ (shoulders[0] - shoulders[1]) < 0.0)
 
-    def solve(self, seen: _Seen | None, prior: Prior) -> tuple[FloatArray, FloatArray, float]:
+    def solve(
+        self, seen: _Seen | None, prior: Prior, stands: bool
+    ) -> tuple[FloatArray, FloatArray, float]:
         """Return the best of the fits that start at the angles before and at what is seen.
 
         It has values (12,), the inverse (12, 12) of their information, and the residuals' rms.
@@ -260,9 +287,13 @@ class _Fit:
         before, _, shared, _ = prior
         others, shown, count = np.empty((0, N_VALUES)), _NOTHING, 1
         if seen is not None:
-            others, shown, count = self._folded(seen, shared), seen[:4], 4 + 8
+            assert self._estimate.keypoints_m is not None
+            shoulders_m = np.asarray(self._estimate.keypoints_m)[[0, 3]].mean(axis=0)
+            upper_m = self._camera.optical_to_reference(shoulders_m) - self.hip_m
+            balance = float(_UPPER_SHARE * upper_m[0]), _BALANCE_M if stands else np.inf
+            others, shown, count = self._folded(seen, shared), (*seen[:4], balance), 4 + 8
         first = np.concatenate([before, shared])
-        found, gained, least = leg_fit.fit(first, others, (self._person, self._view, prior, shown))
+        found, gained, least = leg_fit.fit(first, others, (self.person, self._view, prior, shown))
         return found, np.asarray(np.linalg.inv(gained), np.float64), float(np.sqrt(least / count))
 
     def _folded(self, seen: _Seen, shared: FloatArray) -> FloatArray:
@@ -295,7 +326,7 @@ class _Fit:
         """Return the legs of a solution."""
         # The place of the hips has its own deviation.
         moved = values + DIFFERENCE * np.eye(N_VALUES)[:DISTANCE]
-        points_m = leg_fit.points_of(np.concatenate([values[None], moved]), self._person)
+        points_m = leg_fit.points_of(np.concatenate([values[None], moved]), self.person)
         slopes = ((points_m[1:] - points_m[0]) / DIFFERENCE).reshape(DISTANCE, -1)
         variance = ((covariance[:DISTANCE, :DISTANCE] @ slopes) * slopes).sum(axis=0)
         variance = variance.reshape(6, 3).sum(axis=1)

@@ -24,6 +24,7 @@ from math import erfc, hypot, log, sqrt, tan
 import numpy as np
 
 from cardbox_tracker.camera.camera import Camera
+from cardbox_tracker.common.health import Verdict
 from cardbox_tracker.detectors.image_points import POINT_INDEX, ImagePoints
 from cardbox_tracker.person.kinematics import pose
 from cardbox_tracker.person.model import MEASURED, BodyModel
@@ -41,11 +42,9 @@ and people of one stature differ in the lengths of trunk and arms by 4 to 6 %.""
 DISTANCE_STDDEV = 0.05
 """Relative standard deviation of a given distance, which people measure or estimate."""
 
-# Seconds and least number of images over which two sources are compared, deviations by which they
-# may differ, those by which they still do after a contradiction, and the relative deviation of the
-# distance of points (0.89 to 1.11 of the true one in 32 recordings).
-_COMPARED_S, _LEAST_COMPARED, _CONTRADICTING, _AGREEING = 1.5, 5, 1.95, 1.0
-_POINTS_STDDEV = 0.045
+# Seconds over which two sources are compared, and the relative deviation of the distance of points
+# (0.89 to 1.11 of the true one in 32 recordings).
+_COMPARED_S, _POINTS_STDDEV = 1.5, 0.045
 
 _TRUNK, _ARM = ("shoulder", "hip"), ("shoulder", "elbow", "wrist")
 # Lengths between a detector's points as shares of the length of an arm up to the knuckles, whose
@@ -113,7 +112,8 @@ class PlaceWatch:
         self._scale = MEASURED_BODY if body.source == MEASURED else STATURE
         is_found = body.is_distance_found or "distance_m" in body.unknown
         self._is_given = body.source != MEASURED and not is_found
-        self._compared: list[tuple[float, float]] = []
+        stddev = hypot(_POINTS_STDDEV, DISTANCE_STDDEV, camera.focal_stddev)
+        self._compared = Verdict("distance", lambda one, other: abs(log(one / other)) / stddev)
         self._first_ns: int | None = None
         self._apart_m = 0.0
         self.contradiction, self.is_too_large, self.scale = "", False, 1.0
@@ -178,19 +178,11 @@ class PlaceWatch:
         keypoints_m = estimate.keypoints_m
         if not is_second:
             keypoints_m = pose(body, np.zeros(N_JOINTS), self._camera.pitch_rad).keypoints_m
-        self._compared.append((found_m, float(keypoints_m[[0, 3], 2].mean())))
-        if len(self._compared) < _LEAST_COMPARED:
-            return
-        shown_m, other_m = np.median(self._compared, axis=0).tolist()
-        stddev = hypot(_POINTS_STDDEV, DISTANCE_STDDEV, self._camera.focal_stddev)
-        apart = abs(log(shown_m / other_m)) / stddev
-        is_apart = apart > (_AGREEING if self.contradiction else _CONTRADICTING)
-        self._apart_m, self.contradiction, self.scale = 0.0, "", 1.0
-        self.is_too_large = is_apart and shown_m > other_m
-        if is_apart:
-            self._apart_m, self.scale = abs(shown_m - other_m), other_m / shown_m
-            self.contradiction = (
-                f"by the {self._scale} the person is {shown_m:.1f} m away, by the "
-                f"{rests_on if is_second else 'given distance'} {other_m:.1f} m: one of them or "
-                "the field of view is wrong, so the place is uncertain"
-            )
+        is_apart = self._compared.see(found_m, float(keypoints_m[[0, 3], 2].mean()))
+        shown_m, other_m = self._compared.medians if is_apart else (1.0, 1.0)
+        self._apart_m, self.scale = abs(shown_m - other_m), other_m / shown_m
+        self.is_too_large = shown_m > other_m
+        other = rests_on if is_second else "given distance"
+        self.contradiction = self._compared.remark(
+            scale=self._scale, shown_m=shown_m, other=other, other_m=other_m
+        )

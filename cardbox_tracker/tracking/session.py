@@ -15,7 +15,7 @@ person. Somebody whom others hide in all cameras stays where they were, and is `
 from __future__ import annotations
 
 from collections.abc import Container, Iterator, Mapping, Sequence
-from concurrent.futures import Executor
+from concurrent.futures import Executor, Future
 from dataclasses import replace
 from itertools import combinations
 from typing import NamedTuple
@@ -27,6 +27,7 @@ from cardbox_tracker.camera.camera import Camera
 from cardbox_tracker.camera.extrinsics import meeting_m
 from cardbox_tracker.camera.tilt import tilted_body, tilted_states
 from cardbox_tracker.camera.view import OtherCamera
+from cardbox_tracker.common.health import Verdict
 from cardbox_tracker.detectors.figure import Figure, figure_of_points
 from cardbox_tracker.detectors.identity import (
     ALIKE,
@@ -65,8 +66,6 @@ MOST_PEOPLE = 6
 _EMPTY_IMAGES = 5
 # Change of that distance that changes the odds of being the same person by a factor of e.
 _ALIKE_SPREAD = 0.07
-# Images in a row with the colours of somebody else after which a person is given up.
-_OTHERS_IMAGES = 3
 # Share of a figure that others may cover when its colours are learned.
 _LEARNS = 0.1
 # Share of a figure in those of others from which it is hidden, and from which it is a mere mixture.
@@ -124,7 +123,7 @@ class _Person:
         self.number, self.tracker, self._measuring = number or 1, tracker, measuring
         self.estimate = Estimate(NO_PERSON, person=number)
         self.sights = [_Sight() for _ in tracker.cameras]
-        self.fitted_ns = self.others_images = 0
+        self.fitted_ns, self.others = 0, Verdict("other person")
         self.chance = 1.0
 
     def track(
@@ -227,6 +226,7 @@ class Session:
         # Images in a row with somebody new, by camera.
         self._new = [0] * (1 + len(self._others))
         self._last_ns: int | None = None
+        self._checked: Future[None] | None = None
         for number in [None] if people is None else range(1, people + 1):
             self._add(number)
 
@@ -256,10 +256,19 @@ class Session:
         return self._people[0].tracker.agreement if self._people else None
 
     def check_cameras(self, is_last: bool = False) -> None:
-        """Estimate the rotation of further cameras if it is due, see :class:`.CameraAgreement`."""
+        """Estimate the rotation of further cameras if it is due, see :class:`.CameraAgreement`.
+
+        While images come, an executor ``beside`` does it.
+        """
         agreement = self.agreement
-        if agreement is not None and (agreement.is_due or is_last):
+        if agreement is None or not (agreement.is_due or is_last):
+            return
+        if self._beside is None or is_last:
             agreement.check(is_last)
+        elif self._checked is None or self._checked.done():
+            if self._checked is not None:
+                self._checked.result()
+            self._checked = self._beside.submit(agreement.check)
 
     def remarks(self, names: Sequence[str], is_all: bool = False) -> list[str]:
         """Return warnings about images that contradict each other; ``is_all`` adds past ones."""
@@ -524,9 +533,7 @@ class Session:
             colours = _colours_of(Shown(None, None, own), seen.image, own)
         if colours is None or known is None:
             return False
-        is_other = apart(known, colours) > ALIKE
-        person.others_images = person.others_images + 1 if is_other else 0
-        return person.others_images >= _OTHERS_IMAGES
+        return person.others.count(apart(known, colours) > ALIKE)
 
     def _shares(
         self, camera: int, silhouette: Silhouette, seen: Container[int]

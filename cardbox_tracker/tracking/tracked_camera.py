@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections import deque
 from collections.abc import Callable
 from typing import Any
 
@@ -12,6 +11,7 @@ from numpy.typing import NDArray
 
 from cardbox_tracker.camera.camera import Camera
 from cardbox_tracker.camera.view import OtherCamera, View
+from cardbox_tracker.common.health import Verdict
 from cardbox_tracker.detectors.figure import Figure, figure_of_points
 from cardbox_tracker.detectors.identity import Identity, colours_in
 from cardbox_tracker.person.model import BodyModel
@@ -42,11 +42,8 @@ _JUMP_M, _JUMP_SHARE = 0.06, 0.02
 _FAR_M = 100.0
 # Fewest pairs of an image that count, and largest number that are compared.
 _LEAST_PAIRS, _MOST_PAIRS = 20, 120
-# Images in a window, and the fewest for a verdict; images between samples.
-_WINDOW, _LEAST, _EVERY = 15, 6, 3
-# Mean surpluses below which depth is refused, and above which it is taken again; depth of the
-# same view has 0.5 and more, also from a pair of cameras.
-_OTHER_VIEW, _SAME_VIEW = 0.25, 0.35
+# Images between samples.
+_EVERY = 3
 # Points of a figure by their rows in :func:`projected`.
 _PROJECTED = {
     f"{side}_{name}": first + row
@@ -101,18 +98,16 @@ def _pairs(silhouette: Silhouette) -> tuple[NDArray[np.int64], NDArray[np.int64]
     return inner[is_across], outer[is_across]
 
 
-class DepthAgreement:
+class DepthAgreement(Verdict):
     """Says over about a second whether depth images show the view of the silhouettes.
 
     Those of another camera may have the same size. In the same view, the depth grows outwards at
     the outline of a person; elsewhere it shrinks as often (``docs/research.md#several-cameras``).
-    ``is_other_view`` says that the depth belongs to another view and must not be used.
     """
 
     def __init__(self) -> None:
         """Trust the depth until images contradict it."""
-        self.is_other_view = False
-        self._surpluses = deque[float](maxlen=_WINDOW)
+        super().__init__("other view")
         self._frames = 0
 
     def accepted(self, silhouette: Silhouette, depth_m: DepthImage | None) -> DepthImage | None:
@@ -123,29 +118,8 @@ class DepthAgreement:
         if self._frames % _EVERY == 0:
             surplus = surplus_of_jumps(silhouette, depth_m)
             if surplus is not None:
-                self._surpluses.append(surplus)
-                self._judge()
-        return None if self.is_other_view else depth_m
-
-    def _judge(self) -> None:
-        if len(self._surpluses) < _LEAST:
-            return
-        mean = float(np.mean(self._surpluses))
-        self.is_other_view = mean < (_SAME_VIEW if self.is_other_view else _OTHER_VIEW)
-
-    @property
-    def remark(self) -> str:
-        """A warning about the depth of another view; empty if there is none."""
-        if not self.is_other_view:
-            return ""
-        percent = 100.0 * float(np.mean(self._surpluses))
-        return (
-            "the depth images show another view than the silhouettes, so they are not used: at "
-            f"the person's outline the depth grows outwards only {percent:.0f} % oftener than it "
-            f"shrinks, expected at least {100 * _OTHER_VIEW:.0f} %. Give depth that is registered "
-            "to the first camera (often .../aligned_depth_to_color/image_raw) and of the same "
-            "time; wrong silhouettes have the same effect"
-        )
+                self.see(100.0 * surplus)
+        return None if self.holds else depth_m
 
 
 class TrackedCamera:

@@ -20,8 +20,8 @@ from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.posture import LEFT_ARM, RIGHT_ARM, TURNING_LIMITS, TURNS
 from cardbox_tracker.person.sizes import FloatArray
 from cardbox_tracker.search.config import TrackerConfig
-from cardbox_tracker.search.cycles import Cycles
 from cardbox_tracker.search.doubt import doubted
+from cardbox_tracker.search.hierarchy import Cycles
 from cardbox_tracker.search.particles import Particles, likely_postures
 from cardbox_tracker.search.pose_filter import MakeFilter, PoseFilter, Presence
 from cardbox_tracker.search.whole_body import WholeBodyFilter
@@ -190,7 +190,7 @@ class Tracker:
 
     def remarks(self, names: Sequence[str] = (), is_all: bool = False) -> list[str]:
         """Return warnings about images that contradict each other, see :class:`.CameraFaults`."""
-        depths = (camera.depth.remark for camera in self.cameras)
+        depths = (camera.depth.remark() for camera in self.cameras)
         found = *self.faults.remarks(names, is_all), *depths, self.place.contradiction
         return [text for text in found if text]
 

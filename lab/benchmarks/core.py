@@ -18,17 +18,17 @@ from cardbox_tracker.person.posture import N_JOINTS, clip_to_limits, reference_p
 from cardbox_tracker.search.config import TrackerConfig, default_preset, paper_preset
 from cardbox_tracker.terms.compiled import CompiledSilhouette
 from cardbox_tracker.tracking.tracker import Tracker
-from lab.benchmarks.default_stages import measure_default_stages
-from lab.benchmarks.scene import BenchmarkScene, make_scene
-from lab.benchmarks.stages import measure_stages
-from lab.benchmarks.tools import (
+from lab.benchmarks.scene import (
     WARM_UP,
+    BenchmarkScene,
     Times,
     extractor_of,
+    make_scene,
     pinned,
     rss_mb,
     summary,
 )
+from lab.benchmarks.stages import measure_default_stages, measure_ratings
 from lab.experiments.models import make_silhouette_term
 from lab.experiments.volumetric import volumetric_faces
 
@@ -183,7 +183,7 @@ def measure_core(frames: int, report: Callable[[float], None]) -> dict[str, Any]
         memory = rss_mb()
         pauses = measure_after_pauses(scene)
         report(0.3)
-        stages = measure_stages(scene)
+        stages = measure_ratings(scene)
         default_stages = measure_default_stages(scene)
         volumetric = measure_models(scene)
         report(0.4)

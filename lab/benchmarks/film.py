@@ -9,7 +9,6 @@ threads of their own, so that their time counts for the step that calls them.
 
 from __future__ import annotations
 
-import argparse
 import os
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -47,8 +46,8 @@ from cardbox_tracker.tracking.legs import LegReader
 from cardbox_tracker.tracking.session import Session
 from cardbox_tracker.tracking.tracked_camera import TrackedCamera
 from cardbox_tracker.tracking.tracker import Tracker
-from lab.benchmarks.report import write_report
-from lab.evaluation.results import commit, read_json, write_json
+from lab.benchmarks.report import replace_part
+from lab.evaluation.results import commit
 
 STEPS: Mapping[str, Sequence[tuple[Any, str]]] = {
     "decoding": [(video_reader, "_next")],
@@ -204,16 +203,5 @@ def _measured(arguments: Sequence[str]) -> tuple[dict[str, float], float]:
     return {**clock.spent_s, REST: spent_s - sum(clock.spent_s.values())}, whole_s
 
 
-def main() -> None:
-    """Measure, and replace the times in the files of the benchmark."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--json", type=Path, default=Path("docs/benchmarks.json"))
-    parser.add_argument("--report", type=Path, default=Path("docs/benchmarks.md"))
-    given = parser.parse_args()
-    results = read_json(given.json) | {"film": measure_films()}
-    write_json(results, given.json)
-    write_report(results, given.report)
-
-
 if __name__ == "__main__":
-    main()
+    replace_part("film", measure_films, __doc__)

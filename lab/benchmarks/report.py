@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import argparse
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
 from cardbox_tracker.common.files import write_file
 from lab.benchmarks.nodes import PERCENTILES
+from lab.evaluation.results import read_json, write_json
+from lab.pages import table
 
 COMMAND = "make benchmark"
 PICTURE_OF_WAY = "images/way.png"
@@ -26,6 +29,17 @@ def write_report(results: Mapping[str, Any], path: Path) -> None:
     write_file(path, report(results))
 
 
+def replace_part(name: str, measure: Callable[[], Any], description: str | None) -> None:
+    """Measure one part of the results, and replace it in the files that the command line names."""
+    parser = argparse.ArgumentParser(description=description)
+    parser.add_argument("--json", type=Path, default=Path("docs/benchmarks.json"))
+    parser.add_argument("--report", type=Path, default=Path("docs/benchmarks.md"))
+    given = parser.parse_args()
+    results = read_json(given.json) | {name: measure()}
+    write_json(results, given.json)
+    write_report(results, given.report)
+
+
 def report(results: Mapping[str, Any]) -> str:
     """Return the whole report."""
     versions = ", ".join(f"{name} {version}" for name, version in results["versions"].items())
@@ -38,7 +52,7 @@ def report(results: Mapping[str, Any]) -> str:
         f"{results['measured_frames']} images (320x240) of a synthetic person who waves. The "
         "compared trackers take turns of ten images. p95 is the 95th percentile.",
         "## One image",
-        _table(
+        table(
             ("600 particles unless the preset says otherwise", "median", "p95"),
             [(_FRAMES[name], *_ms(times)) for name, times in results["frames"].items()],
         ),
@@ -52,7 +66,7 @@ def report(results: Mapping[str, Any]) -> str:
         _stages(results["default_stages"]),
         "## Resolution and particles",
         f"Twice the width and height take {results['ratio_double_resolution']:.2f} times as long.",
-        _table(
+        table(
             ("image", "median", "p95"),
             [(name, *_ms(times)) for name, times in results["resolutions"].items()],
         ),
@@ -106,9 +120,8 @@ def _ratios(ratios: Mapping[str, Any] | None) -> list[str]:
         f"`python -m lab.benchmarks.ratios` (commit {ratios['commit']}) measures times in turns, "
         "on one core except the last. A start lasts until all nodes of a process wait for their "
         "input, with compiled code in the cache; `imports` are those of rclpy, numba, OpenCV and "
-        "numpy. `python -m lab.benchmarks.silhouette RECORDING` measures a recording's "
-        "silhouettes.",
-        _table(("ratio", "median"), rows),
+        "numpy.",
+        table(("ratio", "median"), rows),
     ]
 
 
@@ -138,7 +151,7 @@ def _film(film: Mapping[str, Any] | None) -> list[str]:
         "resizes, one detects, and one draws and encodes, beside the one that does the rest. Hands "
         "and video need large images, so that film is decoded twice. The load of the machine was "
         f"{film['load']:.1f}; above the number of cores, times are longer than on a quiet one.",
-        _table(("step", *runs), rows),
+        table(("step", *runs), rows),
     ]
 
 
@@ -176,7 +189,7 @@ def _way(ways: Mapping[str, Any] | None) -> list[str]:
     return [
         "### Where the milliseconds are",
         "Grey images of 320x240 at 30 Hz; median and 95th percentile of each step.",
-        _table(("step", *ways), rows),
+        table(("step", *ways), rows),
         f"![Medians of the steps]({PICTURE_OF_WAY})",
     ]
 
@@ -228,7 +241,7 @@ def _with_robot(nodes: Mapping[str, Any]) -> list[str]:
         "### Up to the command to a robot",
         "The node `retarget` moves the [example arm](retargeting.md); time from the image's stamp "
         "until it has sent its command.",
-        _table(titles, rows),
+        table(titles, rows),
     ]
 
 
@@ -255,7 +268,7 @@ def _streams(measured: Mapping[str, Any]) -> list[str]:
     titles = (*(f"p{p}" for p in PERCENTILES), "arrived")
     titles = (*titles, *(["points"] if has_points else []), *processes)
     return [
-        _table(
+        table(
             (
                 "stream",
                 *titles,
@@ -270,14 +283,8 @@ def _streams(measured: Mapping[str, Any]) -> list[str]:
 
 def _stages(stages: Mapping[str, Mapping[str, float]]) -> str:
     rows = [(name, *_ms(times)) for name, times in stages.items()]
-    return _table(("step", "median", "p95"), rows)
+    return table(("step", "median", "p95"), rows)
 
 
 def _ms(times: Mapping[str, float]) -> tuple[str, str]:
     return f"{times['median_ms']:.3g} ms", f"{times['p95_ms']:.3g} ms"
-
-
-def _table(header: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
-    lines = ["| " + " | ".join(cells) + " |" for cells in (header, *rows)]
-    lines.insert(1, "|" + "---|" * len(header))
-    return "\n".join(lines)

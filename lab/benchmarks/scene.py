@@ -1,7 +1,13 @@
-"""The input of the benchmarks: a drawn person who waves, at any resolution, or a recorded one."""
+"""The input of the benchmarks: a drawn person who waves, at any resolution, or a recorded one.
+
+With what all of them need to measure.
+"""
 
 from __future__ import annotations
 
+import os
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -17,10 +23,16 @@ from cardbox_tracker.camera.camera import Camera
 from cardbox_tracker.common.errors import CardboxError
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.recordings.open_images import open_images
+from cardbox_tracker.segmentation.background import SilhouetteExtractor
+from cardbox_tracker.segmentation.empty_scene import BackgroundLearner
 from lab.evaluation.session import load_session
 from lab.evaluation.tracking import person_of
 
 Images = NDArray[np.uint8]
+Times = NDArray[np.float64]
+
+WARM_UP = 5
+"""Number of first images that do not count, as they allocate memory and compile code."""
 
 
 @dataclass(frozen=True)
@@ -102,3 +114,40 @@ def recorded_scene(folder: Path, count: int, empty: int = 30) -> BenchmarkScene:
         pictures[empty:],
         np.zeros((0, lens.height, lens.width), np.uint8),
     )
+
+
+@contextmanager
+def pinned(cores: int) -> Iterator[int]:
+    """Pin this thread, and those it starts, to the first ``cores`` cores; yield their number."""
+    before = os.sched_getaffinity(0)
+    chosen = sorted(before)[:cores]
+    os.sched_setaffinity(0, chosen)
+    try:
+        yield len(chosen)
+    finally:
+        os.sched_setaffinity(0, before)
+
+
+def summary(milliseconds: Times | list[float]) -> dict[str, float]:
+    """Return median and 95th percentile."""
+    return {
+        "median_ms": float(np.median(milliseconds)),
+        "p95_ms": float(np.percentile(milliseconds, 95)),
+    }
+
+
+def extractor_of(scene: BenchmarkScene) -> SilhouetteExtractor:
+    """Return an extractor of silhouettes with the learned background of ``scene``."""
+    learner = BackgroundLearner()
+    for image in scene.empty:
+        learner.add(image)
+    return SilhouetteExtractor(learner.model())
+
+
+def rss_mb() -> float:
+    """Return the resident memory of this process in MB, or NaN where the system hides it."""
+    try:
+        pages = int(Path("/proc/self/statm").read_text(encoding="ascii").split()[1])
+    except OSError:
+        return float("nan")
+    return pages * os.sysconf("SC_PAGE_SIZE") / 1e6

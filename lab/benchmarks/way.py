@@ -9,16 +9,13 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
-import matplotlib
 import numpy as np
 
-from cardbox_tracker.common.files import atomic_path
 from cardbox_tracker.person.model_file import save_body_model
 from cardbox_tracker.ros.runtime.processes import Nodes, isolate
 from lab.benchmarks.nodes import SEPARATE, TOGETHER, CameraAndListener
 from lab.benchmarks.scene import make_scene
-
-matplotlib.use("Agg")
+from lab.pages import plot
 
 STEPS = (
     "to the background node",
@@ -36,7 +33,6 @@ RATE_HZ = 30.0
 
 _ORDER = ("received", "converted", "cut out", "delivered", "tracked")
 _TRACED = Path(__file__).with_name("traced_nodes.py")
-_DPI = 90
 
 
 class _TracedNodes(Nodes):
@@ -117,19 +113,15 @@ def steps_of(
 
 def plot_way(ways: Mapping[str, Any], path: Path) -> None:
     """Plot the medians of the steps of each way as one bar each."""
-    from matplotlib import pyplot
-
-    figure, axis = pyplot.subplots(figsize=(8.0, 2.2))
-    colours = pyplot.get_cmap("tab10")
-    for row, (way, measured) in enumerate(ways.items()):
-        begin_ms = 0.0
-        for number, step in enumerate(STEPS):
-            length_ms = max(measured[step]["p50_ms"], 0.0)
-            label = step if row == 0 else None
-            axis.barh(way, length_ms, left=begin_ms, color=colours(number), label=label)
-            begin_ms += length_ms
-    axis.set_xlabel("median time since the image's stamp [ms]")
-    axis.legend(fontsize=7, ncols=4, loc="lower center", bbox_to_anchor=(0.5, 1.0), frameon=False)
-    with atomic_path(path) as temporary:
-        figure.savefig(temporary, dpi=_DPI, bbox_inches="tight", format="png")
-    pyplot.close(figure)
+    with plot(path, (1, 1), (8.0, 2.2), dpi=90, layout=None) as axes:
+        (axis,) = axes[0]
+        for row, (way, measured) in enumerate(ways.items()):
+            begin_ms = 0.0
+            for number, step in enumerate(STEPS):
+                length_ms = max(measured[step]["p50_ms"], 0.0)
+                label = step if row == 0 else None
+                axis.barh(way, length_ms, left=begin_ms, color=f"C{number}", label=label)
+                begin_ms += length_ms
+        axis.set_xlabel("median time since the image's stamp [ms]")
+        place = {"loc": "lower center", "bbox_to_anchor": (0.5, 1.0)}
+        axis.legend(fontsize=7, ncols=4, frameon=False, **place)

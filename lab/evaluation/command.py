@@ -6,14 +6,9 @@ import argparse
 import os
 from pathlib import Path
 
-from cardbox_tracker.commands.arguments import (
-    add_force,
-    add_preset,
-    add_seed,
-    at_least,
-    check_outputs,
-)
-from cardbox_tracker.commands.request import points_named
+from cardbox_tracker.commands.arguments import add_options, at_least, check_outputs
+from cardbox_tracker.commands.request import Request
+from cardbox_tracker.commands.tracking_request import points_named
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -78,12 +73,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         action="store_true",
         help="with --sessions: also count the recoveries from disturbances",
     )
-    add_preset(parser)
+    add_options(parser, Request, "preset", "seed", "force")
     parser.add_argument(
         "--jobs", type=at_least(1), metavar="N", help="number of processes; one per core by default"
     )
-    add_seed(parser, "recordings and filters")
-    add_force(parser)
 
 
 def run(options: argparse.Namespace) -> None:

@@ -15,9 +15,8 @@ from cardbox_tracker.search.config import PRESETS
 from cardbox_tracker.tracking.precompile import compile_all
 from lab.evaluation.figures import figures
 from lab.evaluation.people import people_figures
-from lab.evaluation.people_report import people_report
 from lab.evaluation.plan import NO_POINTS, Plan, Way, ways_of
-from lab.evaluation.report import sessions_report
+from lab.evaluation.report import people_report, sessions_report
 from lab.evaluation.results import provenance, write_json
 from lab.evaluation.session import RecordedSession, load_session
 from lab.evaluation.tracking import (

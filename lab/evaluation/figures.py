@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.parts import body_parts
-from cardbox_tracker.person.skeleton import JOINT_NAMES, KEYPOINT_NAMES, KeypointState
+from cardbox_tracker.person.skeleton import JOINT_NAMES, KeypointState
 from cardbox_tracker.recordings.truth import SHOULDERS, beside_shoulders
 from cardbox_tracker.search.doubt import FAR_M, HANDS
 from cardbox_tracker.tracking.estimate import TRACKING
@@ -117,28 +117,15 @@ def figures(session: RecordedSession, run: SessionRun) -> dict[str, Any]:
         "absolute": float(distance.mean()),
         "aligned": float(aligned.mean()),
         "pa": float(np.linalg.norm(align(estimates, truth) - truth, axis=2).mean()),
-        "by_keypoint": dict(zip(KEYPOINT_NAMES, distance.mean(axis=0).tolist(), strict=True)),
     }
-    for axis, name in enumerate(("sideways", "vertical", "depth")):
-        result[name] = float(difference[..., axis].mean())
-        for i, kind in enumerate(KINDS):
-            result[f"{kind}_{name}"] = float(difference[:, [i, i + 3], axis].mean())
     for i, kind in enumerate(KINDS):
-        result[kind] = float(distance[:, [i, i + 3]].mean())
+        result[f"{kind}_depth"] = float(difference[:, [i, i + 3], 2].mean())
         result[f"aligned_{kind}"] = float(aligned[:, [i, i + 3]].mean())
     off_m = run.keypoints_m - session.keypoints_m
     far = distance.mean(axis=1) > FAR_CM
-    segments = session.segments[have]
     result |= {
         "far": int(far.sum()),
         "far_but_tracking": int((far & is_tracking[have]).sum()),
-        "by_motion": {
-            str(name): {
-                "aligned": float(aligned[segments == name].mean()),
-                "absolute": float(distance[segments == name].mean()),
-            }
-            for name in dict.fromkeys(segments.tolist())
-        },
         "acceleration": acceleration_error(off_m, session.stamps_ns),
         "acceleration_beside": acceleration_error(beside_shoulders(off_m), session.stamps_ns),
         "coverage": coverage(session, run),

@@ -7,8 +7,7 @@ truth is turned with them.
 
 from __future__ import annotations
 
-import argparse
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import replace
 from functools import partial
@@ -22,8 +21,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cardbox_tracker.applications.drawing.video import video_file
-from cardbox_tracker.commands.request import add_tracking, tracking_request
+from cardbox_tracker.commands.request import TrackingOptions
 from cardbox_tracker.commands.tracking import track
+from cardbox_tracker.commands.tracking_request import tracking_request
 from cardbox_tracker.common.errors import CardboxError
 from cardbox_tracker.common.files import write_file
 from cardbox_tracker.common.progress import progress_bar
@@ -39,6 +39,7 @@ from lab.evaluation.people import people_figures
 from lab.evaluation.results import provenance, write_json
 from lab.evaluation.session import RecordedSession, load_session
 from lab.evaluation.tracking import run_of
+from lab.pages import number, table
 
 FloatArray = NDArray[np.float64]
 
@@ -170,56 +171,56 @@ def _placed(session: RecordedSession, by_stamp: Mapping[int, Estimate]) -> tuple
 
 def films_report(results: Mapping[str, Any]) -> str:
     """Return the report in Markdown of the contents of ``films.json``."""
-    lines = [
+    groups: dict[tuple[str, ...], list[Mapping[str, Any]]] = {}
+    for film in results["films"]:
+        groups.setdefault((film["group"], film["shape"], film["given"]), []).append(film)
+    rows = [_cells(film["name"], [film]) for film in results["films"]]
+    rows += [
+        _cells(f"**mean of {len(films)} in {group}, {shape}**", films)
+        for (group, shape, _), films in groups.items()
+        if len(films) > 1
+    ]
+    parts = [
         "# Sessions as films",
-        "",
         "Each session is tracked by `cardbox track FILM --detector mediapipe` with what is given, "
         "and without an empty scene. Errors are those of shoulders, elbows and hands, cm; "
         "*aligned*: beside the middle of the shoulders. Settings were chosen on the same "
         "recordings. An image is beyond 30 cm if a joint is, place included. *Placed*: the state "
         "is `tracking`, and that of the place is `tracked`.",
-        "",
-        "| film | given | aligned | absolute | MediaPipe aligned | `tracking`, % | of these beyond "
-        "30 cm, % | placed, % | of these beyond 30 cm, % | without posture, % | pitch found / "
-        "true, degrees |",
-        "|---" * 11 + "|",
+        table(_HEAD, rows),
+        f"Made by `{results['command']}` at commit {results['provenance']['commit']}.",
     ]
-    groups: dict[tuple[str, ...], list[Mapping[str, Any]]] = {}
-    for film in results["films"]:
-        lines.append(_row(film["name"], [film]))
-        groups.setdefault((film["group"], film["shape"], film["given"]), []).append(film)
-    for (group, shape, _), films in groups.items():
-        if len(films) > 1:
-            lines.append(_row(f"**mean of {len(films)} in {group}, {shape}**", films))
-    made = f"Made by `{results['command']}` at commit {results['provenance']['commit']}."
-    return "\n".join([*lines, "", made, ""])
+    return "\n\n".join(parts) + "\n"
 
 
-def _row(name: str, films: Sequence[Mapping[str, Any]]) -> str:
+_BEYOND = "of these beyond 30 cm, %"
+_HEAD = (
+    *("film", "given", "aligned", "absolute", "MediaPipe aligned", "`tracking`, %", _BEYOND),
+    *("placed, %", _BEYOND, "without posture, %", "pitch found / true, degrees"),
+)
+
+
+def _cells(name: str, films: Sequence[Mapping[str, Any]]) -> list[str]:
     runs = [run for film in films for run in film["runs"]]
 
     def mean(key: str, of: Sequence[Mapping[str, Any]] = runs) -> float:
         values = [one.get(key) for one in of]
         return float(np.mean([np.nan if value is None else value for value in values]))
 
-    def share(part: Callable[[Mapping[str, Any]], float], whole: str) -> float:
+    def share(part: str, whole: str, form: str = "{:.0f}") -> str:
         total = sum(run[whole] for run in runs)
-        return 100 * sum(map(part, runs)) / total if total else float("nan")
+        return number(100 * sum(run[part] for run in runs) / total if total else np.nan, form)
 
-    cells = [
-        name,
-        str(films[0]["given"]),
-        f"{mean('aligned'):.1f}",
-        f"{mean('absolute'):.1f}",
-        f"{mean('mediapipe_aligned', films):.1f}",
-        f"{share(lambda run: run['tracking'], 'frames'):.0f}",
-        f"{share(lambda run: run['tracking_beyond_30'], 'tracking'):.1f}",
-        f"{share(lambda run: run['placed'], 'frames'):.0f}",
-        f"{share(lambda run: run['placed_beyond_30'], 'placed'):.1f}",
-        f"{share(lambda run: run['without_estimate'], 'frames'):.0f}",
-        f"{mean('pitch_found_deg'):.1f} / {mean('pitch_deg'):.1f}",
+    return [
+        *(name, str(films[0]["given"]), number(mean("aligned")), number(mean("absolute"))),
+        number(mean("mediapipe_aligned", films)),
+        share("tracking", "frames"),
+        share("tracking_beyond_30", "tracking", "{:.1f}"),
+        share("placed", "frames"),
+        share("placed_beyond_30", "placed", "{:.1f}"),
+        share("without_estimate", "frames"),
+        f"{number(mean('pitch_found_deg'))} / {number(mean('pitch_deg'))}",
     ]
-    return f"| {' | '.join(cells)} |".replace("nan", "")
 
 
 def evaluate_films(
@@ -241,14 +242,13 @@ def evaluate_films(
         load_session(folder)
     report.parent.mkdir(parents=True, exist_ok=True)
     compile_all()
-    words = ["--detector", "mediapipe", "--preset", preset]
     films: list[dict[str, Any]] = []
     with (
         progress_bar("evaluate") as show,
         ProcessPoolExecutor(jobs, mp_context=get_context("spawn")) as pool,
     ):
         work = [
-            pool.submit(_film, folder, shape, words, seeds)
+            pool.submit(_film, folder, shape, preset, seeds)
             for folder in folders
             for shape in SHAPES
         ]
@@ -266,25 +266,22 @@ def evaluate_films(
     write_file(report, films_report(results))
 
 
-def _film(folder: Path, shape: str, words: list[str], seeds: range) -> list[dict[str, Any]]:
+def _film(folder: Path, shape: str, preset: str, seeds: range) -> list[dict[str, Any]]:
     """Return the entries of one session in ``films.json``, one for all that is given."""
     from lab.evaluation.films import film_figures, make_film
 
-    parser, found = argparse.ArgumentParser(), list[dict[str, Any]]()
-    add_tracking(parser)
+    found = list[dict[str, Any]]()
     with TemporaryDirectory() as made:
         film = make_film(folder, shape, Path(made) / f"{folder.name}.mp4")
-        known = ["--fov", f"{film.fov_deg:.1f}", "--stature", str(film.session.truth.stature_m)]
-        for given, more in {"field of view, stature": known, "nothing": []}.items():
+        stature_m = film.session.truth.stature_m
+        known: dict[str, Any] = {"fov_deg": round(film.fov_deg, 1), "stature_m": stature_m}
+        for given, more in {"field of view, stature": known, "nothing": {}}.items():
             runs = []
             for seed in seeds:
-                typed = parser.parse_args([str(film.path), *words, *more, "--seed", str(seed)])
+                fixed: dict[str, Any] = {"detector": "mediapipe", "preset": preset, "seed": seed}
+                asked = tracking_request(TrackingOptions(film.path, **fixed, **more))
                 estimates: list[Estimate] = []
-                summary = track(
-                    tracking_request(typed),
-                    (partial(_keep, estimates),),
-                    lambda _: None,
-                )
+                summary = track(asked, (partial(_keep, estimates),), lambda _: None)
                 runs.append(film_figures(film, estimates, summary.body))
             found.append(
                 {

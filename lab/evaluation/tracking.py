@@ -13,16 +13,15 @@ from cardbox_tracker.common.errors import CardboxError
 from cardbox_tracker.detectors.detector import Detector
 from cardbox_tracker.detectors.point_table import PointTable
 from cardbox_tracker.measuring.config import InitializationConfig
-from cardbox_tracker.person.model import BodyModel
+from cardbox_tracker.person.model import BodyModel, body_from_proportions
 from cardbox_tracker.person.posture import N_JOINTS, POSTURE
-from cardbox_tracker.person.proportions import STATURE_LIMITS_M, body_from_proportions
+from cardbox_tracker.person.proportions import STATURE_LIMITS_M
 from cardbox_tracker.recordings.initialize import initialize_from_recording
 from cardbox_tracker.recordings.recording import STEREO, FrameSet, RecordingRequest
 from cardbox_tracker.recordings.silhouettes import SilhouetteSource, TimeSpan
 from cardbox_tracker.recordings.truth import GroundTruth
 from cardbox_tracker.search.config import TrackerConfig
 from cardbox_tracker.tracking.estimate import Estimate
-from cardbox_tracker.tracking.observation import Observation
 from cardbox_tracker.tracking.session import Session
 from cardbox_tracker.tracking.tracker import Tracker
 from lab.evaluation.recovery import Recovery, measure_recovery
@@ -47,17 +46,12 @@ class InputSelection:
     Attributes:
         only: name of the one camera that tracks; None for all cameras; ``WITH_DEPTH`` for all
             cameras with the session's depth images, or else the depth of its rectified pair.
-        has_images: False to give the tracker silhouettes without their images.
-        covered: returns the index of the camera that sees nothing, or None, for a time in seconds
-            since tracking began.
         silhouettes: ``BACKGROUND`` or ``DETECTOR``; None for the empty scene if the session has
             one, and otherwise the detector.
         points: source of the person's points in the images; None for no points.
     """
 
     only: str | None = None
-    has_images: bool = True
-    covered: Callable[[float], int | None] | None = None
     silhouettes: str | None = None
     points: Detector | PointTable | None = None
 
@@ -175,17 +169,12 @@ def track_session(
         found: list[dict[int, Estimate]] = [{} for _ in seeds]
         times: list[list[float]] = [[] for _ in seeds]
         inputs_ms: list[float] = []
-        started_ns: int | None = None
         for taken in _timed(source.frames(session.start_s + offset_s), inputs_ms):
             stamp_ns = taken.stamp_ns
-            started_ns = stamp_ns if started_ns is None else started_ns
-            elapsed_s = (stamp_ns - started_ns) / 1e9
-            dark = inputs.covered(elapsed_s) if inputs.covered else None
+            # A camera that does not track gives its image alone.
             seen = [
-                _seen(one, inputs, only in (None, name) and number != dark)
-                for number, (name, one) in enumerate(
-                    zip(source.names, taken.observations, strict=True)
-                )
+                one if only in (None, name) else one.having(silhouette=None, points=None)
+                for name, one in zip(source.names, taken.observations, strict=True)
             ]
             for seed, one, estimates, spent in zip(seeds, followed, found, times, strict=True):
                 if one is None:
@@ -216,15 +205,6 @@ def _timed(frames: Iterable[FrameSet], milliseconds: list[float]) -> Iterator[Fr
         before, start = now, time.thread_time()
         yield taken
         tracked_s = time.thread_time() - start
-
-
-def _seen(observation: Observation, inputs: InputSelection, is_open: bool) -> Observation:
-    """Return the part of an observation that the tracker gets from an open or covered camera."""
-    return observation.having(
-        silhouette=observation.silhouette if is_open else None,
-        points=observation.points if is_open else None,
-        image=observation.image if inputs.has_images else None,
-    )
 
 
 def recovery_of(

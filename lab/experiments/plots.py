@@ -2,27 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-import matplotlib
 import numpy as np
 
-from cardbox_tracker.common.files import atomic_path
 from cardbox_tracker.person.skeleton import JOINT_NAMES, KEYPOINT_NAMES
 from cardbox_tracker.search.config import paper_preset
 from lab.experiments.results import Curves, motions_in
 from lab.experiments.tracking import FloatArray
-
-matplotlib.use("Agg")
+from lab.pages import plot
 
 COLOURS = {"drs": "tab:blue", "srs": "tab:orange"}
 ELBOW = "left_elbow_abduction"
 """The angle of the reproducibility plot, which changes most in the waving motion."""
-
-_DPI = 80
+_FIGURES = (("mpjpe_m", 100.0, "3D error [cm]"), ("mean_cost_px", 1.0, "mean cost [px]"))
 
 
 def plot_all(
@@ -49,33 +45,34 @@ def plot_errors(motion: str, curves: Curves, path: Path) -> None:
     """Plot the error of each of the six joints, per image (the paper's figures GT1 and GT2)."""
     with _figure(path, 2, 3, (12, 5.2), sharex=True, sharey=True) as axes:
         for axis, name in zip(axes.ravel(), KEYPOINT_NAMES, strict=True):
-            for strategy, colour in COLOURS.items():
-                columns = curves[motion, strategy]
-                error_cm = 100 * columns[f"error_{name}_m"]
-                axis.plot(columns["time_s"], error_cm, colour, label=strategy.upper())
+            _curves(axis, motion, curves, f"error_{name}_m", 100.0)
             axis.set_title(name.replace("_", " "), fontsize=10)
         for axis in axes[:, 0]:
             axis.set_ylabel("3D error [cm]")
-        for axis in axes[-1]:
-            axis.set_xlabel("time [s]")
+        for axis in axes[0]:
+            axis.set_xlabel("")
         axes[0, 0].legend()
 
 
-def plot_costs(motions: list[str], curves: Curves, path: Path) -> None:
+def plot_costs(motions: Sequence[str], curves: Curves, path: Path) -> None:
     """Plot the cost of the system's output, per image."""
     with _figure(path, 1, len(motions), (4.2 * len(motions), 3.2), sharey=True) as axes:
         for axis, motion in zip(axes[0], motions, strict=True):
-            for strategy, colour in COLOURS.items():
-                columns = curves[motion, strategy]
-                axis.plot(columns["time_s"], columns["cost_px"], colour, label=strategy.upper())
+            _curves(axis, motion, curves, "cost_px")
             axis.set_title(motion)
-            axis.set_xlabel("time [s]")
         axes[0, 0].set_ylabel("mean cost [px]")
         axes[0, 0].legend()
 
 
+def _curves(axis: Any, motion: str, curves: Curves, column: str, scale: float = 1.0) -> None:
+    for strategy, colour in COLOURS.items():
+        columns = curves[motion, strategy]
+        axis.plot(columns["time_s"], scale * columns[column], colour, label=strategy.upper())
+    axis.set_xlabel("time [s]")
+
+
 def plot_elbow(
-    motions: list[str], curves: Curves, true_postures: Mapping[str, FloatArray], path: Path
+    motions: Sequence[str], curves: Curves, true_postures: Mapping[str, FloatArray], path: Path
 ) -> None:
     """Plot the mean of one elbow angle and one standard deviation to each side."""
     with _figure(path, 1, len(motions), (4.8 * len(motions), 3.6), sharey=True) as axes:
@@ -98,57 +95,51 @@ def plot_elbow(
 
 def plot_survival(results: Mapping[str, Any], path: Path) -> None:
     """Plot error and cost against the survival rate, for each speed."""
-    with _figure(path, 1, 2, (10, 3.6)) as axes:
-        for speed, by_rate in results.items():
-            rates = [float(rate) for rate in by_rate]
-            for axis, name, scale in (
-                (axes[0, 0], "mpjpe_m", 100.0),
-                (axes[0, 1], "mean_cost_px", 1.0),
-            ):
-                axis.plot(rates, [scale * v["mean"][name] for v in by_rate.values()], "o-")
-            axes[0, 0].lines[-1].set_label(f"{speed.replace('_', ' ')} motion")
-        paper = paper_preset()
-        for axis, what in zip(axes[0], ("3D error [cm]", "mean cost [px]"), strict=True):
+    paper = paper_preset()
+    with _error_and_cost(path) as axes:
+        for axis, name, scale in axes:
+            for speed, by_rate in results.items():
+                rates = [float(rate) for rate in by_rate]
+                values = [scale * v["mean"][name] for v in by_rate.values()]
+                axis.plot(rates, values, "o-", label=f"{speed.replace('_', ' ')} motion")
             for rate in (paper.torso.survival_rate, paper.arm.survival_rate):
                 axis.axvline(rate, color="grey", lw=0.8, ls=":")
             axis.set_xlabel("survival rate e of all filters (dotted: Table I)")
-            axis.set_ylabel(what)
-        axes[0, 0].legend()
 
 
 def plot_particles(results: Mapping[str, Any], path: Path) -> None:
     """Plot error and cost against the number of particles."""
-    with _figure(path, 1, 2, (10, 3.6)) as axes:
-        for strategy, by_count in results.items():
-            counts = [int(count) for count in by_count]
-            for axis, name, scale in (
-                (axes[0, 0], "mpjpe_m", 100.0),
-                (axes[0, 1], "mean_cost_px", 1.0),
-            ):
+    with _error_and_cost(path) as axes:
+        for axis, name, scale in axes:
+            for strategy, by_count in results.items():
+                counts = [int(count) for count in by_count]
                 values = [scale * v["mean"][name] for v in by_count.values()]
                 axis.plot(counts, values, "o-", color=COLOURS[strategy], label=strategy.upper())
-        for axis, what in zip(axes[0], ("3D error [cm]", "mean cost [px]"), strict=True):
             axis.set_xscale("log")
             axis.set_xticks(counts, [str(count) for count in counts])
             axis.minorticks_off()
             axis.set_xlabel("particles a filter")
-            axis.set_ylabel(what)
-        axes[0, 0].legend()
 
 
 def plot_schemes(results: Mapping[str, Any], path: Path) -> None:
     """Plot error and cost of each resampling scheme, with and without the elite particle."""
-    with _figure(path, 1, 2, (10, 3.6)) as axes:
-        places = np.arange(len(results))
-        for axis, name, scale, what in (
-            (axes[0, 0], "mpjpe_m", 100.0, "3D error [cm]"),
-            (axes[0, 1], "mean_cost_px", 1.0, "mean cost [px]"),
-        ):
+    places = np.arange(len(results))
+    with _error_and_cost(path) as axes:
+        for axis, name, scale in axes:
             for shift, kind, colour in ((-0.2, "elite", "tab:blue"), (0.2, "no_elite", "silver")):
                 values = [scale * scheme[kind]["mean"][name] for scheme in results.values()]
                 axis.bar(places + shift, values, 0.4, color=colour, label=kind.replace("_", " "))
             axis.set_xticks(places, list(results))
-            axis.set_ylabel(what)
+
+
+@contextmanager
+def _error_and_cost(path: Path) -> Iterator[list[tuple[Any, str, float]]]:
+    """Yield an axis, the key of its figure and a factor for both ``_FIGURES``."""
+    with _figure(path, 1, 2, (10, 3.6)) as axes:
+        both = list(zip(axes[0], _FIGURES, strict=True))
+        yield [(axis, name, scale) for axis, (name, scale, _) in both]
+        for axis, (_, _, label) in both:
+            axis.set_ylabel(label)
         axes[0, 0].legend()
 
 
@@ -187,15 +178,7 @@ def _figure(
     path: Path, rows: int, columns: int, size: tuple[float, float], **options: Any
 ) -> Iterator[Any]:
     """Yield axes (rows, columns), and save the figure in the end."""
-    from matplotlib import pyplot as plt
-
-    figure, axes = plt.subplots(rows, columns, figsize=size, squeeze=False, **options)
-    try:
+    with plot(path, (rows, columns), size, layout="tight", **options) as axes:
         yield axes
         for axis in axes.ravel():
             axis.grid(alpha=0.3)
-        figure.tight_layout()
-        with atomic_path(path) as temporary:
-            figure.savefig(temporary, dpi=_DPI, metadata={"Software": None})
-    finally:
-        plt.close(figure)

@@ -13,6 +13,7 @@ from cardbox_tracker.person.skeleton import JOINT_NAMES, KEYPOINT_NAMES
 from cardbox_tracker.search.config import paper_preset
 from lab.experiments.results import motions_in, recorded_results
 from lab.experiments.tracking import AXES
+from lab.pages import table
 
 Results = Mapping[str, Any]
 
@@ -358,5 +359,4 @@ def _section(*paragraphs: str) -> Iterator[str]:
 
 
 def _table(header: Sequence[object], rows: Iterable[Sequence[object]]) -> Iterator[str]:
-    lines = [f"| {' | '.join(map(str, row))} |" for row in (header, *rows)]
-    yield from (lines[0], "|" + "---|" * len(header), *lines[1:], "")
+    yield from (table(header, rows), "")

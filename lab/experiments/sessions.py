@@ -53,7 +53,6 @@ class Session:
         keypoints_m: true shoulders, elbows and hands, (n, 6, 3), metres in the optical frame; NaN
             in an image without truth.
         postures: true d1..d12, (n, 12); NaN where the truth lacks them.
-        torso_rad: true roll, pitch and yaw of the torso, (n, 3); NaN where the truth lacks them.
         shown: indices of the images kept, at most ``SEQUENCE_LENGTH`` of each motion.
         images: the images kept, (len(shown), H, W), brightness.
         initialization_iou: fit of each reference, by name.
@@ -66,7 +65,6 @@ class Session:
     time_s: FloatArray
     keypoints_m: FloatArray
     postures: FloatArray
-    torso_rad: FloatArray
     shown: NDArray[np.intp]
     images: NDArray[np.uint8]
     initialization_iou: Mapping[str, float]
@@ -158,7 +156,6 @@ def _session(
     segments = ["neutral"] * n
     keypoints_m = np.full((n, 6, 3), np.nan)
     postures = np.full((n, N_JOINTS), np.nan)
-    torso_rad = np.full((n, 3), np.nan)
     for i, frame in enumerate(frames):
         true = truth.frames.get(frame.stamp_ns)
         if true is None:
@@ -167,8 +164,6 @@ def _session(
         keypoints_m[i] = true.keypoints_m
         if true.posture is not None:
             postures[i] = true.posture
-        if true.torso_rad is not None:
-            torso_rad[i] = true.torso_rad
     names = np.array(segments)
     motions = motions_of(names)
     if not motions:
@@ -185,7 +180,6 @@ def _session(
         np.array([frame.time_s for frame in frames]),
         keypoints_m,
         postures,
-        torso_rad,
         shown,
         np.array([brightness_of(frames[i].image) for i in shown]),
         iou,

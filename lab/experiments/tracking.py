@@ -14,19 +14,18 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from cardbox_tracker.person.posture import N_JOINTS, TURNS
+from cardbox_tracker.person.posture import N_JOINTS
 from cardbox_tracker.person.skeleton import JOINT_NAMES, KEYPOINT_NAMES
 from cardbox_tracker.search.config import TrackerConfig
-from cardbox_tracker.search.cycles import Cycles, MakeHierarchy
+from cardbox_tracker.search.hierarchy import Cycles, MakeHierarchy
 from cardbox_tracker.search.resampling import gaussian_weights
+from cardbox_tracker.terms.silhouette import SilhouetteObservation, SilhouetteTerm
+from cardbox_tracker.terms.term import ArmCosts, Frame, TorsoCosts
 from cardbox_tracker.tracking.tracker import Tracker
-from lab.evaluation.metrics import align, angle_errors_deg, distances_m
-from lab.experiments.counting import CountingSilhouette
+from lab.evaluation.metrics import align, distances_m
 from lab.experiments.models import make_silhouette_term
 from lab.experiments.parallel import Call
-from lab.experiments.peers.annealed import Annealed
-from lab.experiments.peers.cma_es import CmaEs
-from lab.experiments.peers.flat import Flat
+from lab.experiments.peers import Annealed, CmaEs, Flat
 from lab.experiments.sessions import Session
 
 FloatArray = NDArray[np.float64]
@@ -40,6 +39,50 @@ PEERS: dict[str, MakeHierarchy] = {"flat": Flat, "annealed": Annealed, "cma_es":
 RUNS_A_CALL = 10
 # More frames than any session has.
 _NEVER = 1_000_000
+
+
+class CountingSilhouette(SilhouetteTerm):
+    """Gives the costs of another term, so that searches are compared at equal numbers of ratings.
+
+    Attributes:
+        ratings: states rated so far: torsos, arms and whole postures.
+    """
+
+    def __init__(self, term: SilhouetteTerm) -> None:
+        """Count the ratings of ``term``."""
+        super().__init__(term.body, term.camera)
+        self._term = term
+        self.ratings = 0
+
+    def observe(self, frame: Frame) -> SilhouetteObservation:
+        """See :class:`SilhouetteTerm`."""
+        return _Counting(frame, self._term.observe(frame), self)
+
+    def count(self, costs: FloatArray) -> FloatArray:
+        """Count and return ``costs`` (N,)."""
+        self.ratings += len(costs)
+        return costs
+
+
+@dataclass(frozen=True)
+class _Counting(SilhouetteObservation):
+    frame: Frame
+    seen: SilhouetteObservation
+    counter: CountingSilhouette
+
+    def torsos_beside(self, arms: FloatArray | None) -> TorsoCosts:
+        rate = self.seen.torsos_beside(arms)
+        return lambda torsos: self.counter.count(rate(torsos))
+
+    def arms_beside(self, torso: FloatArray) -> ArmCosts:
+        rate = self.seen.arms_beside(torso)
+        return lambda side, arms: self.counter.count(rate(side, arms))
+
+    def postures(self, postures: FloatArray) -> FloatArray:
+        return self.counter.count(self.seen.postures(postures))
+
+    def overlap(self, posture: FloatArray) -> tuple[int, float]:
+        return self.seen.overlap(posture)
 
 
 @dataclass(frozen=True)
@@ -152,14 +195,12 @@ class MotionRuns:
         time_s: seconds from the motion's start, (n,).
         keypoints_m: true keypoints, (n, 6, 3).
         postures: true postures, (n, 12), or NaN.
-        torso_rad: true roll, pitch, yaw, (n, 3), or NaN.
     """
 
     runs: Runs
     time_s: FloatArray
     keypoints_m: FloatArray
     postures: FloatArray
-    torso_rad: FloatArray
 
 
 def select_motion(runs: Runs, session: Session, motion: str, every: int = 1) -> MotionRuns:
@@ -172,7 +213,6 @@ def select_motion(runs: Runs, session: Session, motion: str, every: int = 1) -> 
         time_s - time_s[0],
         session.keypoints_m[::every][chosen],
         session.postures[::every][chosen],
-        session.torso_rad[::every][chosen],
     )
 
 
@@ -189,11 +229,9 @@ def summarize(motion: MotionRuns) -> dict[str, Any]:
         "mean_cost_px": float(runs.costs_px.mean()),
         "error_m": _by(KEYPOINT_NAMES, errors_m.mean(axis=(0, 1))),
         "std_dof": _by(JOINT_NAMES, stddev_over_runs(runs.postures).mean(axis=0)),
-        "mean_dof": _by(JOINT_NAMES, runs.postures.mean(axis=(0, 1))),
         "mpjpe_m": float(errors_m.mean()),
         "pa_mpjpe_m": float(aligned.mean()),
         "axis_error_m": errors_along_axes_m(runs.keypoints_m, motion.keypoints_m),
-        "joint_angle_error_deg": _angle_errors(motion),
         "stderr_cost_px": _standard_error(runs.costs_px.mean(axis=1)),
         "stderr_mpjpe_m": _standard_error(errors_m.mean(axis=(1, 2))),
         "runs": len(runs.costs_px),
@@ -219,7 +257,6 @@ def brief(motion: MotionRuns) -> dict[str, float]:
     figures = {
         "mean_cost_px": float(motion.runs.costs_px.mean()),
         "mpjpe_m": float(errors_m.mean()),
-        "elbow_hand_error_m": float(errors_m[..., [1, 2, 4, 5]].mean()),
         "stderr_mpjpe_m": _standard_error(errors_m.mean(axis=(1, 2))),
         "stderr_cost_px": _standard_error(motion.runs.costs_px.mean(axis=1)),
         "mean_std_angles_rad": float(stddev_over_runs(motion.runs.postures)[:, 1:].mean()),
@@ -255,18 +292,6 @@ def per_frame(motion: MotionRuns) -> dict[str, FloatArray]:
         columns[f"mean_{name}"] = mean[:, i]
         columns[f"std_{name}"] = stddev[:, i]
     return columns
-
-
-def _angle_errors(motion: MotionRuns) -> dict[str, float]:
-    """Return the mean error of each angle with known truth: all, the torso's, or none."""
-    if not np.any(np.isnan(motion.postures)):
-        names, truth = JOINT_NAMES[1:], motion.postures[:, 1:]
-    elif not np.any(np.isnan(motion.torso_rad)):
-        names, truth = JOINT_NAMES[TURNS], motion.torso_rad
-    else:
-        return {}
-    estimates = motion.runs.postures[..., 1 : 1 + len(names)]
-    return _by(names, angle_errors_deg(estimates, truth).mean(axis=(0, 1)))
 
 
 def _by(names: Sequence[str], values: FloatArray) -> dict[str, float]:

@@ -14,16 +14,14 @@ from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple
 
-import matplotlib
 import numpy as np
 
-from cardbox_tracker.common.files import atomic_path
 from cardbox_tracker.search.config import PRESETS
 from lab.evaluation.session import RecordedSession, load_session
 from lab.evaluation.tracking import SessionRun, track_session
+from lab.pages import plot, table
 
 EFFORTS = (0.25, 0.5, 1.0, 2.0, 4.0)
-_DPI = 90
 
 
 class Measured(NamedTuple):
@@ -75,50 +73,40 @@ def ratios(rows: Sequence[Measured]) -> list[float]:
     return [row.milliseconds / of_one for row in rows]
 
 
-def table(rows: Sequence[Measured]) -> list[str]:
-    """Return the lines of the table."""
+def effort_table(rows: Sequence[Measured]) -> str:
+    """Return the table."""
     names = [f"{name}, cm" for name in rows[0].errors_cm]
-    columns = ["effort", "ms an image", "times effort 1", *names]
-    lines = [_row(columns), "|---" * len(columns) + "|"]
-    for row, ratio in zip(rows, ratios(rows), strict=True):
-        errors = [f"{error:.1f}" for error in row.errors_cm.values()]
-        cells = [f"{row.effort:g}", f"{row.milliseconds:.1f}", f"{ratio:.2f}", *errors]
-        lines.append(_row(cells))
-    return lines
+    return table(
+        ["effort", "ms an image", "times effort 1", *names],
+        (
+            [f"{row.effort:g}", f"{row.milliseconds:.1f}", f"{ratio:.2f}"]
+            + [f"{error:.1f}" for error in row.errors_cm.values()]
+            for row, ratio in zip(rows, ratios(rows), strict=True)
+        ),
+    )
 
 
-def _row(cells: Sequence[str]) -> str:
-    return f"| {' | '.join(cells)} |"
-
-
-def plot(rows: Sequence[Measured], path: Path) -> None:
+def draw(rows: Sequence[Measured], path: Path) -> None:
     """Write a PNG with the errors, and the times relative to effort 1, against the effort.
 
     Raises:
         CardboxError: the file cannot be written.
     """
-    matplotlib.use("Agg")
-    from matplotlib import pyplot
-
     efforts = [row.effort for row in rows]
-    figure, (errors, times) = pyplot.subplots(
-        1, 2, figsize=(9, 3.6), dpi=_DPI, layout="constrained"
-    )
-    for name in rows[0].errors_cm:
-        errors.plot(efforts, [row.errors_cm[name] for row in rows], "o-", label=name)
-    errors.set(ylabel="mean error of the keypoints [cm]")
-    errors.legend()
-    times.plot(efforts, ratios(rows), "o-", color="black")
-    times.set(ylabel="time of an image / time at effort 1")
-    for axis in (errors, times):
-        axis.set_xscale("log", base=2)
-        axis.set_xticks(efforts, [f"{effort:g}" for effort in efforts])
-        axis.set(xlabel="effort")
-        axis.set_ylim(bottom=0.0)
-        axis.grid(color="0.9")
-    with atomic_path(path) as temporary:
-        figure.savefig(temporary, format="png", metadata={"Software": None})
-    pyplot.close(figure)
+    with plot(path, (1, 2), (9, 3.6), dpi=90) as axes:
+        errors, times = axes[0]
+        for name in rows[0].errors_cm:
+            errors.plot(efforts, [row.errors_cm[name] for row in rows], "o-", label=name)
+        errors.set(ylabel="mean error of the keypoints [cm]")
+        errors.legend()
+        times.plot(efforts, ratios(rows), "o-", color="black")
+        times.set(ylabel="time of an image / time at effort 1")
+        for axis in (errors, times):
+            axis.set_xscale("log", base=2)
+            axis.set_xticks(efforts, [f"{effort:g}" for effort in efforts])
+            axis.set(xlabel="effort")
+            axis.set_ylim(bottom=0.0)
+            axis.grid(color="0.9")
 
 
 def main(args: Sequence[str] | None = None) -> None:
@@ -129,9 +117,9 @@ def main(args: Sequence[str] | None = None) -> None:
     parser.add_argument("--plot", type=Path, default=None, metavar="OUT.png")
     given = parser.parse_args(args)
     rows = measured(given.sessions, range(given.seeds))
-    print(*table(rows), sep="\n")
+    print(effort_table(rows))
     if given.plot is not None:
-        plot(rows, given.plot)
+        draw(rows, given.plot)
 
 
 if __name__ == "__main__":

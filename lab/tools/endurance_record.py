@@ -8,11 +8,11 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, NamedTuple
 
-import matplotlib
 import numpy as np
 
-from cardbox_tracker.common.files import atomic_path
+from cardbox_tracker.common.files import write_file
 from lab.evaluation.results import provenance, read_json, write_json
+from lab.pages import plot, table
 
 PERCENTILES = (50, 95, 99, 100)
 
@@ -117,10 +117,10 @@ _VALUES = {
     "iou": "overlap with the image",
     "error_cm": "error of the keypoints, cm",
 }
-_HEAD = """\
-| process | memory, MB, first and last quarter | files, first and last | threads, first and last |
-|---|---|---|---|
-"""
+_HEAD = (
+    *("process", "memory, MB, first and last quarter"),
+    *("files, first and last", "threads, first and last"),
+)
 
 
 def _quarters(samples: Sequence[Mapping[str, Any]]) -> tuple[Any, Any]:
@@ -142,68 +142,51 @@ def section_of(data: Mapping[str, Any]) -> str:
     end = samples[-1]
     reached = end["images"] if data["unit"] == "images" else end["passed_s"]
     short = f", of {data['wanted']:,.0f} {data['unit']} wanted" if reached < data["wanted"] else ""
-    minutes = end["passed_s"] / 60
-    lines = [
-        f"## {data['run']}",
-        "",
-        f"{data['about']} Reached: {end['images']:,} images in {minutes:.0f} minutes{short}.",
-        "",
-        *(f"- {text}: {number:,}" for text, number in counts.items()),
-        "",
-        "| value | first quarter | last quarter |",
-        "|---|---|---|",
-    ]
-    lines += [
-        f"| {words} | {_mean(first, key):.3g} | {_mean(last, key):.3g} |"
+    values = [
+        (words, f"{_mean(first, key):.3g}", f"{_mean(last, key):.3g}")
         for key, words in _VALUES.items()
         if key in end
     ]
-    lines += ["", _HEAD.rstrip()]
+    processes = []
     for name in end["processes"]:
         early, late = ([s["processes"][name] for s in part] for part in (first, last))
-        lines.append(
-            f"| {name} | {_mean(early, 'memory_mb'):.1f}, {_mean(late, 'memory_mb'):.1f} "
-            f"| {early[0]['files']}, {late[-1]['files']} "
-            f"| {early[0]['threads']}, {late[-1]['threads']} |"
-        )
-    return "\n".join(lines) + "\n"
+        cells = [f"{_mean(early, 'memory_mb'):.1f}, {_mean(late, 'memory_mb'):.1f}"]
+        cells += [f"{early[0][key]}, {late[-1][key]}" for key in ("files", "threads")]
+        processes.append((name, *cells))
+    parts = [
+        f"## {data['run']}",
+        f"{data['about']} Reached: {end['images']:,} images in {end['passed_s'] / 60:.0f} "
+        f"minutes{short}.",
+        "\n".join(f"- {text}: {number:,}" for text, number in counts.items()),
+        table(("value", "first quarter", "last quarter"), values),
+        table(_HEAD, processes),
+    ]
+    return "\n\n".join(parts) + "\n"
 
 
-def plot(runs: Sequence[Mapping[str, Any]], path: Path) -> None:
+def draw(runs: Sequence[Mapping[str, Any]], path: Path) -> None:
     """Write a PNG with memory and latency over time, a row for each run."""
-    matplotlib.use("Agg")
-    from matplotlib import pyplot
-
-    figure, grid = pyplot.subplots(
-        len(runs), 2, figsize=(10, 2.6 * len(runs)), dpi=80, layout="constrained", squeeze=False
-    )
-    for (memory, latency), data in zip(grid, runs, strict=True):
-        samples = data["samples"]
-        minutes = [sample["passed_s"] / 60 for sample in samples]
-        for name in samples[-1]["processes"]:
-            used = [sample["processes"][name]["memory_mb"] for sample in samples]
-            memory.plot(minutes, used, label=name)
-        memory.set(title=f"{data['run']}: memory", ylabel="MB", xlabel="minutes", ylim=(0, None))
-        for share in PERCENTILES[:-1]:
-            latency.plot(
-                minutes, [sample[f"p{share}_ms"] for sample in samples], label=f"{share} %"
-            )
-        latency.set(title=f"{data['run']}: latency", ylabel="ms", xlabel="minutes", ylim=(0, None))
-        for axis in (memory, latency):
-            # A flat line would otherwise lie on the frame.
-            axis.set_ylim(0.0, 1.2 * axis.get_ylim()[1])
-            axis.legend(fontsize="x-small", loc="lower right")
-    with atomic_path(path) as temporary:
-        figure.savefig(temporary, format="png")
-    pyplot.close(figure)
+    with plot(path, (len(runs), 2), (10, 2.6 * len(runs))) as grid:
+        for (memory, latency), data in zip(grid, runs, strict=True):
+            samples = data["samples"]
+            minutes = [sample["passed_s"] / 60 for sample in samples]
+            for name in samples[-1]["processes"]:
+                used = [sample["processes"][name]["memory_mb"] for sample in samples]
+                memory.plot(minutes, used, label=name)
+            for share in PERCENTILES[:-1]:
+                took = [sample[f"p{share}_ms"] for sample in samples]
+                latency.plot(minutes, took, label=f"{share} %")
+            for axis, what, unit in ((memory, "memory", "MB"), (latency, "latency", "ms")):
+                axis.set(title=f"{data['run']}: {what}", ylabel=unit, xlabel="minutes")
+                # A flat line would otherwise lie on the frame.
+                axis.set_ylim(0.0, 1.2 * axis.get_ylim()[1])
+                axis.legend(fontsize="x-small", loc="lower right")
 
 
 def write_page(folder: Path, image: Path) -> None:
     """Write endurance.md in ``folder`` and the picture ``image`` from the runs' files there."""
     runs = [read_json(path) for path in sorted(folder.glob("endurance-*.json"))]
-    plot(runs, image)
+    draw(runs, image)
     page = folder / "endurance.md"
-    with atomic_path(page) as temporary:
-        text = "\n".join([_PAGE, *map(section_of, runs)])
-        temporary.write_text(text, encoding="utf-8")
+    write_file(page, "\n".join([_PAGE, *map(section_of, runs)]))
     print(f"written: {page} and {image}")

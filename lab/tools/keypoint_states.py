@@ -8,17 +8,17 @@ with a reliability diagram for each kind of keypoint.
 from __future__ import annotations
 
 import argparse
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-import matplotlib
 import numpy as np
 
 from cardbox_tracker.common.errors import CardboxError
-from cardbox_tracker.common.files import atomic_path, write_file
+from cardbox_tracker.common.files import write_file
 from lab.evaluation.figures import KINDS, added
 from lab.evaluation.results import read_json
+from lab.pages import plot, table
 
 _TEXT = """\
 # States of the keypoints
@@ -40,18 +40,25 @@ agree. Intervals with fewer than 50 keypoints are left out.*
 `tracking` has no `uncertain` or `lost` hand. The last two columns are shares of all images: those
 that are called `tracking` with a mean error beyond 30 cm, and with a wrong hand.
 
-| recordings | images | `tracking`, % | `tracking` with a mean error beyond 30 cm, % of all \
-| `tracking` with a wrong hand, % of all |
-|---|---|---|---|---|
-"""
-_STATES_HEAD = """
+{whole}
+
 ## The states of keypoints
 
 Share of the keypoints in each state, and in parentheses how many of these are wrong, %.
 
-| recordings | keypoint | `tracked` | `uncertain` | `lost` | `hidden` | wrong in all |
-|---|---|---|---|---|---|---|
+{states}
 """
+_WHOLE_HEAD = (
+    *(
+        "recordings",
+        "images",
+        "`tracking`, %",
+        "`tracking` with a mean error beyond 30 cm, % of all",
+    ),
+    "`tracking` with a wrong hand, % of all",
+)
+_STATES = ("tracked", "uncertain", "lost", "hidden")
+_STATES_HEAD = ("recordings", "keypoint", *(f"`{state}`" for state in _STATES), "wrong in all")
 _LEAST = 50
 
 
@@ -82,7 +89,7 @@ def groups_of(folder: Path) -> dict[str, list[Mapping[str, Any]]]:
     return groups
 
 
-def whole(name: str, runs: Sequence[Mapping[str, Any]]) -> str:
+def whole(name: str, runs: Sequence[Mapping[str, Any]]) -> list[str]:
     """Return the row of a group in the table of whole states."""
 
     def total(key: str) -> int:
@@ -90,51 +97,37 @@ def whole(name: str, runs: Sequence[Mapping[str, Any]]) -> str:
 
     images, far, hand = map(total, ("frames", "far_but_tracking", "hand_far_but_tracking"))
     tracking = sum(int(run["states"].get("tracking", 0)) for run in runs)
-    shares = (100.0 * value / images for value in (tracking, far, hand))
-    return "| {} | {} | {:.0f} | {:.1f} | {:.1f} |".format(name, images, *shares)
+    shares = f"{100 * tracking / images:.0f}", *(f"{100 * n / images:.1f}" for n in (far, hand))
+    return [name, str(images), *shares]
 
 
-def rows(name: str, table: Mapping[str, Any]) -> list[str]:
-    """Return the rows of a group in the table of states: one for each kind of keypoint."""
-    found = []
+def rows(name: str, table: Mapping[str, Any]) -> Iterator[list[str]]:
+    """Yield the rows of a group in the table of states: one for each kind of keypoint."""
     for kind in KINDS:
         states = table[kind]["states"]
-        count = sum(number for number, _ in states.values())
-        wrong = sum(number for _, number in states.values())
+        count, wrong = (sum(numbers) for numbers in zip(*states.values(), strict=True))
         cells = [
             f"{100 * number / count:.0f} ({100 * bad / number:.0f})" if number else "0"
-            for number, bad in (states[one] for one in ("tracked", "uncertain", "lost", "hidden"))
+            for number, bad in (states[state] for state in _STATES)
         ]
-        found.append(f"| {name} | {kind} | {' | '.join(cells)} | {100 * wrong / count:.0f} |")
-    return found
+        yield [name, kind, *cells, f"{100 * wrong / count:.0f}"]
 
 
-def plot(tables: Mapping[str, Mapping[str, Any]], path: Path) -> None:
+def draw(tables: Mapping[str, Mapping[str, Any]], path: Path) -> None:
     """Write a PNG with a reliability diagram for each kind of keypoint."""
-    matplotlib.use("Agg")
-    from matplotlib import pyplot
-
-    figure, axes = pyplot.subplots(
-        1, 3, figsize=(11, 4.6), dpi=90, sharey=True, layout="constrained"
-    )
-    for axis, kind in zip(axes, KINDS, strict=True):
-        axis.plot([0, 1], [0, 1], color="0.7", linewidth=1)
-        for name, table in tables.items():
-            count, said, wrong = np.array(table[kind]["bins"], float).T
-            shown = count >= _LEAST
-            axis.plot(
-                said[shown] / count[shown],
-                wrong[shown] / count[shown],
-                "o-",
-                markersize=4,
-                label=name,
-            )
-        axis.set(title=kind, xlabel="probability", xlim=(0, 1), ylim=(0, 1))
-    axes[0].set_ylabel("share of wrong ones")
-    figure.legend(*axes[0].get_legend_handles_labels(), loc="outside lower center", ncols=4)
-    with atomic_path(path) as temporary:
-        figure.savefig(temporary, format="png")
-    pyplot.close(figure)
+    with plot(path, (1, 3), (11, 4.6), dpi=90, sharey=True) as grid:
+        for axis, kind in zip(grid[0], KINDS, strict=True):
+            axis.plot([0, 1], [0, 1], color="0.7", linewidth=1)
+            for name, one in tables.items():
+                count, said, wrong = np.array(one[kind]["bins"], float).T
+                shown = count >= _LEAST
+                said, wrong = (values[shown] / count[shown] for values in (said, wrong))
+                axis.plot(said, wrong, "o-", markersize=4, label=name)
+            axis.set(title=kind, xlabel="probability", xlim=(0, 1), ylim=(0, 1))
+        first = grid[0, 0]
+        first.set_ylabel("share of wrong ones")
+        labels = first.get_legend_handles_labels()
+        first.figure.legend(*labels, loc="outside lower center", ncols=4)
 
 
 def main(args: list[str] | None = None) -> int:
@@ -147,10 +140,10 @@ def main(args: list[str] | None = None) -> int:
     tables = {
         name: added([run["keypoint_states"] for run in runs]) for name, runs in groups.items()
     }
-    plot(tables, given.image)
-    lines = [whole(name, runs) for name, runs in groups.items() if "states" in runs[0]]
-    text = _TEXT + "\n".join(lines) + "\n" + _STATES_HEAD
-    text += "\n".join(row for name, table in tables.items() for row in rows(name, table)) + "\n"
+    draw(tables, given.image)
+    wholes = [whole(name, runs) for name, runs in groups.items() if "states" in runs[0]]
+    every = (row for name, one in tables.items() for row in rows(name, one))
+    text = _TEXT.format(whole=table(_WHOLE_HEAD, wholes), states=table(_STATES_HEAD, every))
     path = given.folder / "keypoint-states.md"
     write_file(path, text)
     print(f"written: {path} and {given.image}")

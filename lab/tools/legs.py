@@ -8,9 +8,8 @@ not covered, *place* is the mean error, *shape* that after both skeletons are sh
 of their shoulders, and *legs* after a shift to the middle of the hips, without the hips. The
 network is the detector's points in space, which have no metric place. *Knee* is the error of its
 bend: the root of the mean square, and the mean. *Upper* is the mean error of shoulders, elbows and
-hands. *REBA* has the mean scores of the legs as found and by the true joints, and in how many of
-the images with both legs ``tracked`` they are equal. People are numbered from left to right if they
-come together, and statures are given in this order.
+hands. People are numbered from left to right if they come together, and statures are given in this
+order.
 """
 
 from __future__ import annotations
@@ -23,16 +22,13 @@ from typing import Any
 
 import numpy as np
 
-from cardbox_tracker.applications.ergonomics.reba import RebaConfig, Seen, score_table
-from cardbox_tracker.camera.camera import level_to_optical
-from cardbox_tracker.commands.request import points_named
+from cardbox_tracker.commands.tracking_request import points_named
 from cardbox_tracker.detectors.detector import Detector
 from cardbox_tracker.detectors.image_points import LEG_POINT_NAMES, POINT_INDEX, ImagePoints
-from cardbox_tracker.person.legs import LEG_KEYPOINT_NAMES, leg_angles
-from cardbox_tracker.person.posture import PITCH
-from cardbox_tracker.person.proportions import body_from_proportions
+from cardbox_tracker.person.legs import LEG_KEYPOINT_NAMES
+from cardbox_tracker.person.model import body_from_proportions
 from cardbox_tracker.person.sizes import FloatArray
-from cardbox_tracker.person.skeleton import KEYPOINT_NAMES, rotation_z
+from cardbox_tracker.person.skeleton import KEYPOINT_NAMES
 from cardbox_tracker.recordings.recording import RecordingRequest, Segmentation
 from cardbox_tracker.recordings.silhouettes import TimeSpan
 from cardbox_tracker.search.config import default_preset
@@ -53,7 +49,7 @@ def main() -> None:
     given = [float(one) for one in options.stature.split(",")] if options.stature else None
     print(
         "camera, person, images, tracked, cm: place, shape, legs; network: shape, legs; "
-        "upper; knee degrees: rms, too bent by; REBA's legs: found, true, equal, images"
+        "upper; knee degrees: rms, too bent by"
     )
     for folder in options.sessions:
         truth = json.loads((folder / "ground_truth.json").read_text())
@@ -81,72 +77,20 @@ def _lines(folder: Path, truth: Any, camera: Any, given: list[float] | None) -> 
             for number, estimate in enumerate(tracked.track(taken.observations), 1):
                 there.append((estimate, tracked.points_of(number)))
     rows: list[list[FloatArray]] = [[] for _ in people]
-    seen: list[list[tuple[Seen, Seen]]] = [[] for _ in people]
     for i, frame in enumerate(truth["frames"]):
         seen_people = [joints_of(person["frames"][i], name) for person in people]
         both = {id(one[0]): one for one in found.get(frame["stamp_ns"], [])}
         estimates = [one for one, _ in both.values() if one.legs is not None]
         for k, estimate in matched(seen_people, estimates):
-            there_m = people[k]["frames"][i]["cameras"][name]
-            rows[k].append(_errors(*both[id(estimate)], there_m))
-            seen[k].append(_seen(frame["stamp_ns"], estimate, there_m["joints_m"], pitch_rad))
-    for person, row, pairs in zip(people, rows, seen, strict=True):
+            rows[k].append(_errors(*both[id(estimate)], people[k]["frames"][i]["cameras"][name]))
+    for person, row in zip(people, rows, strict=True):
         mean = np.nanmean(np.array(row), axis=0)
         mean[6] = np.sqrt(mean[6])
         cm = 100 * mean
         yield (
             f"{name}, {person['name']}, {len(row)}, {mean[-1]:.0%}, {cm[0]:.1f}, {cm[1]:.1f}, "
-            f"{cm[2]:.1f}; {cm[3]:.1f}, {cm[4]:.1f}; {cm[5]:.1f}; {mean[6]:.1f}, {mean[7]:.1f}; "
-            f"{_rated(pairs)}"
+            f"{cm[2]:.1f}; {cm[3]:.1f}, {cm[4]:.1f}; {cm[5]:.1f}; {mean[6]:.1f}, {mean[7]:.1f}"
         )
-
-
-def _seen(stamp_ns: int, estimate: Estimate, joints_m: Any, pitch_rad: float) -> tuple[Seen, Seen]:
-    """Return what REBA reads of an image: as found, and by the true joints in the optical frame."""
-    legs = estimate.legs
-    assert legs is not None and estimate.posture is not None
-    names = (*LEG_KEYPOINT_NAMES, "left_shoulder", "right_shoulder")
-    true_m = np.array([joints_m.get(name, [np.nan] * 3) for name in names])
-    level_m = true_m @ level_to_optical(pitch_rad)
-    # Hips are level as in the model, so feet keep their heights.
-    level_m[[0, 3], 2] = level_m[[0, 3], 2].mean()
-    aside = level_m[0, :2] - level_m[3, :2]
-    # The left hip is along Y of the hips.
-    hips = rotation_z(np.arctan2(-aside[0], aside[1]))
-    bones = np.diff(level_m[:6].reshape(2, 3, 3), axis=1) @ hips
-    lengths_m = np.linalg.norm(bones, axis=-1)
-    trunk = (level_m[6:].mean(axis=0) - level_m[[0, 3]].mean(axis=0)) @ hips
-    units = bones / lengths_m[..., None]
-    angles = [
-        leg_angles(one[0], one[1], side) for one, side in zip(units, (1.0, -1.0), strict=True)
-    ]
-    posture = np.zeros((2, len(estimate.posture)))
-    posture[0, PITCH] = np.arctan2(trunk[0], trunk[2])
-    true = np.stack([np.concatenate(angles), np.zeros(8)])
-    found_m = np.linalg.norm(np.diff(legs.points_m.reshape(2, 3, 3), axis=1), axis=-1).ravel()
-    shoulders_m = np.asarray(estimate.keypoints_m)[_SHOULDERS].mean(axis=0)
-    trunk_m = float(np.linalg.norm(shoulders_m - legs.points_m[_HIPS].mean(axis=0)))
-    is_seen = all(str(state) == "tracked" for state in legs.states) and np.isfinite(true).all()
-    wrists = np.full((2, 2, 2), np.nan)
-    rest = stamp_ns, stamp_ns / 1e9, estimate.state
-    found = np.stack([legs.angles, legs.angles_stddev])
-    body = np.stack([estimate.posture, np.asarray(estimate.posture_stddev)])
-    lengths = np.array([trunk_m, *found_m]), np.array([np.linalg.norm(trunk), *lengths_m.ravel()])
-    return (
-        Seen(*rest, body, None, wrists, found if is_seen else None, lengths[0]),
-        Seen(*rest, posture, None, wrists, true if is_seen else None, lengths[1]),
-    )
-
-
-def _rated(pairs: list[tuple[Seen, Seen]]) -> str:
-    """Return the mean scores of the legs, found and true, the share that is equal, and images."""
-    scores = [
-        [0 if row.scores is None else row.scores.parts["legs"].argmax() + 1 for row in rows]
-        for rows in (score_table(images, RebaConfig(), 0) for images in zip(*pairs, strict=True))
-    ]
-    are_seen = np.array([found.legs is not None for found, _ in pairs])
-    found, true = np.array(scores)[:, are_seen]
-    return f"{found.mean():.2f}, {true.mean():.2f}, {np.mean(found == true):.0%}, {len(found)}"
 
 
 def _errors(estimate: Estimate, points: ImagePoints | None, there: Any) -> FloatArray:

@@ -23,9 +23,9 @@ from typing import Any
 
 import numpy as np
 
-from cardbox_tracker.commands.request import points_named
+from cardbox_tracker.commands.tracking_request import points_named
 from cardbox_tracker.detectors.detector import Detector
-from cardbox_tracker.person.proportions import body_from_proportions
+from cardbox_tracker.person.model import body_from_proportions
 from cardbox_tracker.person.sizes import FloatArray
 from cardbox_tracker.person.skeleton import KEYPOINT_NAMES
 from cardbox_tracker.recordings.recording import RecordingRequest, Segmentation

@@ -17,8 +17,7 @@ from numpy.typing import NDArray
 from PIL import Image as Pillow
 
 from cardbox_tracker.common.files import atomic_path
-from lab.tools.people_sheet import TrackedFilm
-from lab.tools.real_sheet import REFERENCE_BGR
+from lab.tools.people_sheet import REFERENCE_BGR, TrackedFilm
 
 Image = NDArray[np.uint8]
 FloatArray = NDArray[np.float64]

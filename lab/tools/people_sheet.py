@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import argparse
 import json
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -31,11 +32,14 @@ from cardbox_tracker.tracking.estimate import Estimate
 from cardbox_tracker.tracking.tracker import Tracker
 from lab.evaluation.session import RecordedSession, load_session
 from lab.evaluation.tracking import InputSelection, track_session
-from lab.tools.real_sheet import COLUMNS, REFERENCE_BGR, side_by_side
 
 Image = NDArray[np.uint8]
 FloatArray = NDArray[np.float64]
 
+REFERENCE_BGR = (255, 255, 0)
+"""Colour of the joints to which the model is compared."""
+COLUMNS = 5
+"""Pictures in a row."""
 ATTRIBUTION = (
     "Pictures: github.com/sarkadava/MotionTrackingPipeline_Workshop_ZAS2025 (CC0 1.0); "
     "github.com/perfanalytics/pose2sim (BSD-3-Clause); github.com/mprib/caliscope (BSD-2-Clause)",
@@ -167,6 +171,18 @@ def tiles_of(folder: Path, count: int) -> list[Image]:
     film = TrackedFilm(folder)
     numbers = film.numbers
     return [film.picture(numbers[int((i + 0.5) * len(numbers) / count)]) for i in range(count)]
+
+
+def side_by_side(tiles: Sequence[Image], lines: Sequence[str]) -> Image:
+    """Return pictures (H, W, 3) of one size in rows of ``COLUMNS``, and lines of text."""
+    height, width = tiles[0].shape[:2]
+    strip = np.zeros((24 * len(lines), COLUMNS * width, 3), np.uint8)
+    for number, line in enumerate(lines):
+        place = (6, 24 * number + 17)
+        cv2.putText(strip, line, place, 0, 0.5, (255, 255, 255), 1, cv2.LINE_AA)
+    every = [*tiles, *[np.zeros((height, width, 3), np.uint8)] * (-len(tiles) % COLUMNS)]
+    rows = [np.hstack(every[n : n + COLUMNS]) for n in range(0, len(every), COLUMNS)]
+    return np.asarray(np.vstack([*rows, strip]), np.uint8)
 
 
 def _frames(

@@ -16,9 +16,9 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from cardbox_tracker.common.files import write_file
-from lab.evaluation.people_report import replaced
 from lab.evaluation.report import mean_of
 from lab.evaluation.results import read_json
+from lab.pages import replaced, table
 
 BEGIN, END = "<!-- accuracy:begin -->", "<!-- accuracy:end -->"
 RESULTS = Path("docs/evaluation")
@@ -112,8 +112,7 @@ def section(
         f"calls {_tracking(silhouettes)}. From silhouette to posture an image takes "
         f"{_mean(recordings, 'ms'):.1f} ms on one core, {_mean(points, 'ms'):.1f} ms with points."
     )
-    lines = [f"| {' | '.join(row)} |" for row in (titles, ("---",) * len(titles), *cells)]
-    return "\n".join([*lines, "", *textwrap.wrap(text, 100)])
+    return "\n".join([table(titles, cells), "", *textwrap.wrap(text, 100)])
 
 
 def _tracking(sessions: Sequence[Session]) -> str:

@@ -19,7 +19,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from cardbox_tracker.common.files import write_file
-from lab.evaluation.people_report import replaced
+from lab.pages import replaced
 
 ROOT = Path(__file__).resolve().parents[2]
 PAGE = "docs/reliability.md"

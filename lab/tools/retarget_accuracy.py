@@ -20,12 +20,12 @@ import numpy as np
 from cardbox_tracker.applications.retargeting.arm import ArmFollower, directions_of
 from cardbox_tracker.applications.retargeting.config import RetargetConfig
 from cardbox_tracker.applications.retargeting.robot import Robot, load_robot
-from cardbox_tracker.person.model import BodyModel
-from cardbox_tracker.person.proportions import body_from_proportions
+from cardbox_tracker.common.files import write_file
+from cardbox_tracker.person.model import BodyModel, body_from_proportions
 from cardbox_tracker.person.sizes import FloatArray
 from lab.evaluation.angles import true_postures
-from lab.evaluation.people_report import replaced
 from lab.evaluation.session import load_session
+from lab.pages import replaced, row, table
 
 ROOT = Path(__file__).resolve().parents[2]
 DOCUMENT, ROBOT = ROOT / "docs" / "retargeting.md", ROOT / "config" / "example_arm.urdf"
@@ -33,7 +33,7 @@ BEGIN, END = "<!-- retarget-accuracy:begin -->", "<!-- retarget-accuracy:end -->
 _HEAD = ("robot", "side", "upper arm", "forearm", "shoulder to hand", "at a limit", "time")
 
 
-def row(robot: Robot, name: str, side: str, body: BodyModel, postures: FloatArray) -> str:
+def row_of(robot: Robot, name: str, side: str, body: BodyModel, postures: FloatArray) -> str:
     """Return a row of the table: median and nine in ten of the angles, degrees.
 
     ``postures`` (n, 12) are followed one after the other, as those of a recording.
@@ -52,8 +52,7 @@ def row(robot: Robot, name: str, side: str, body: BodyModel, postures: FloatArra
     took_ms = 1000 * (time.perf_counter() - begun) / len(postures)
     angles = np.degrees(np.arccos(np.clip(cosines, -1.0, 1.0)))
     shares = (f"{half:.1f} / {most:.1f}°" for half, most in np.percentile(angles, (50, 90), 0).T)
-    cells = (name, side, *shares, f"{np.mean(limited):.0%}", f"{took_ms:.0f} ms")
-    return f"| {' | '.join(cells)} |"
+    return row((name, side, *shares, f"{np.mean(limited):.0%}", f"{took_ms:.0f} ms"))
 
 
 def main(args: list[str] | None = None) -> int:
@@ -64,17 +63,16 @@ def main(args: list[str] | None = None) -> int:
     parser.add_argument("--write", action="store_true", help="write the table into the document")
     given = parser.parse_args(args)
     body = body_from_proportions(1.75, 2.0)
-    found = [true_postures(load_session(folder)) for folder in given.sessions]
-    postures = np.concatenate(found)
+    postures = np.concatenate([true_postures(load_session(one)) for one in given.sessions])
     postures = postures[np.isfinite(postures).all(axis=1)]
-    rows = [f"| {' | '.join(_HEAD)} |", "|---" * len(_HEAD) + "|"]
+    rows = [table(_HEAD, ())]
     for path in given.robot or [ROBOT]:
         for side in ("left", "right"):
-            rows.append(row(load_robot(path), path.stem, side, body, postures))
+            rows.append(row_of(load_robot(path), path.stem, side, body, postures))
             print(rows[-1], flush=True)
     if given.write:
-        text, table = DOCUMENT.read_text(encoding="utf-8"), "\n".join(rows)
-        DOCUMENT.write_text(replaced(text, f"\n{table}\n", BEGIN, END), encoding="utf-8")
+        text, found = DOCUMENT.read_text(encoding="utf-8"), "\n".join(rows)
+        write_file(DOCUMENT, replaced(text, f"\n{found}\n", BEGIN, END))
     return 0
 
 

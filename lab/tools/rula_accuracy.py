@@ -13,25 +13,30 @@ from __future__ import annotations
 import argparse
 import sys
 from collections.abc import Mapping
-from dataclasses import dataclass, fields, replace
+from dataclasses import replace
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
 from cardbox_tracker.applications.ergonomics.rula import (
+    PARTS,
     RULA,
     SAMPLES,
     RulaConfig,
     ScoreArray,
     ScoreDistribution,
+    measured_parts,
     neck_samples,
     rula_scores,
     sampled_scores,
     score_distribution,
 )
+from cardbox_tracker.common.files import write_file
 from cardbox_tracker.detectors.detector import Detector
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.sizes import FloatArray
+from cardbox_tracker.person.skeleton import Group, rows_of
 from cardbox_tracker.recordings.truth import SHOULDERS
 from cardbox_tracker.search.config import PRESETS, TrackerConfig
 from cardbox_tracker.search.particles import normal_postures
@@ -39,7 +44,6 @@ from cardbox_tracker.tracking.estimate import Estimate
 from cardbox_tracker.tracking.tracker import Tracker
 from lab.evaluation.angles import comparable, true_postures
 from lab.evaluation.people import torso_angles
-from lab.evaluation.people_report import replaced
 from lab.evaluation.session import RecordedSession, load_session
 from lab.evaluation.tracking import (
     ALL_INPUTS,
@@ -47,6 +51,7 @@ from lab.evaluation.tracking import (
     InputSelection,
     track_session,
 )
+from lab.pages import replaced, row, table
 
 DOCUMENT = Path(__file__).resolve().parents[2] / "docs" / "ergonomics.md"
 BEGIN, END = "<!-- rula-accuracy:begin -->", "<!-- rula-accuracy:end -->"
@@ -54,8 +59,6 @@ TASKS = {
     "no load": RulaConfig(),
     "2 to 10 kg held": RulaConfig(arm_load=2, arm_muscle_use=1, body_load=2, body_muscle_use=1),
 }
-UNKNOWN = np.full((2, 2, 2), np.nan)
-"""Wrists, whose true flexion is not known."""
 LOW = 2
 """Highest score that is acceptable."""
 _HEAD = (
@@ -75,31 +78,17 @@ the command; and for comparison these with the whole deviation, and the most fre
 the session."""
 
 
-@dataclass(frozen=True)
-class ScoreError:
-    """Errors of scores over the images with a true score.
+class ScoreError(NamedTuple):
+    """Errors of scores over the images with a true score."""
 
-    Attributes:
-        frames: number of images.
-        difference: mean absolute difference of the expected score.
-        equal: share of images whose likeliest score is the true one.
-        within_one: share of images where it is at most 1 off.
-        chance_of_truth: mean chance that the distribution gives the true score.
-        low: mean chance of a score up to ``LOW``.
-        true_low: share of images whose true score is up to ``LOW``.
-        above: mean chance of a score above ``RULA.above``.
-        true_above: share of images whose true score is above ``RULA.above``.
-    """
-
-    frames: int
-    difference: float
-    equal: float
-    within_one: float
-    chance_of_truth: float
-    low: float
-    true_low: float
-    above: float
-    true_above: float
+    difference: float  #: mean absolute difference of the expected score
+    equal: float  #: share of images whose likeliest score is the true one
+    within_one: float  #: share of images where it is at most 1 off
+    chance_of_truth: float  #: mean chance that the distribution gives the true score
+    low: float  #: mean chance of a score up to ``LOW``
+    true_low: float  #: share of images whose true score is up to ``LOW``
+    above: float  #: mean chance of a score above ``RULA.above``
+    true_above: float  #: share of images whose true score is above ``RULA.above``
 
 
 def score_errors(
@@ -121,16 +110,18 @@ def score_errors(
         body[:] = [tracker.body]
         normal = normal_postures(estimate.posture, estimate.posture_stddev, SAMPLES, rng)
         particles = tracker.sample(estimate, SAMPLES, rng)
-        angles, deviations = neck = estimate.neck, estimate.neck_stddev
-        known = neck, UNKNOWN
+        joints = estimate.joints.copy()
+        # The true flexion of the wrists is not known.
+        joints[:, rows_of(Group.HAND)] = np.nan
+        angles, deviations = joints[:, PARTS["neck"]]
         for task, rula in tasks.items():
             drawn = [
-                sampled_scores(tracker.body, estimate.posture, postures, *known, rula, rng)[0]
+                sampled_scores(tracker.body, joints, postures, rula, rng)[0]
                 for postures in (normal, particles)
             ]
             mean = np.eye(RULA.highest)[drawn[0].of_mean - 1]
             necks = None
-            if angles is not None and deviations is not None:
+            if "neck" in measured_parts(joints):
                 necks = neck_samples(angles, deviations, SAMPLES, rng)
             whole = score_distribution(tracker.body, particles, rula, necks)
             ways = ScoreDistribution(mean, mean, mean), *drawn, whole
@@ -169,7 +160,6 @@ def score_error(scores: list[ScoreDistribution], truth: ScoreArray) -> ScoreErro
     chances: FloatArray = np.array([one.grand for one in scores])
     off = np.abs(likeliest - truth)
     return ScoreError(
-        frames=len(truth),
         difference=float(np.abs(means - truth).mean()),
         equal=float((off == 0).mean()),
         within_one=float((off <= 1).mean()),
@@ -181,9 +171,9 @@ def score_error(scores: list[ScoreDistribution], truth: ScoreArray) -> ScoreErro
     )
 
 
-def row(name: str, task: str, way: str, error: ScoreError) -> str:
+def row_of(name: str, task: str, way: str, error: ScoreError) -> list[str]:
     """Return one row of the table."""
-    cells = (
+    return [
         name,
         task,
         way,
@@ -191,8 +181,7 @@ def row(name: str, task: str, way: str, error: ScoreError) -> str:
         *(f"{share:.0%}" for share in (error.equal, error.within_one, error.chance_of_truth)),
         f"{error.low:.0%}, {error.true_low:.0%}",
         f"{error.above:.0%}, {error.true_above:.0%}",
-    )
-    return f"| {' | '.join(cells)} |"
+    ]
 
 
 def load(folder: Path) -> RecordedSession:
@@ -213,20 +202,12 @@ def load(folder: Path) -> RecordedSession:
     return replace(session, torso_rad=torso_angles(session))
 
 
-def mean_of(errors: list[ScoreError]) -> ScoreError:
-    """Return the mean over sessions; the frames are added."""
-    names = [field.name for field in fields(ScoreError) if field.name != "frames"]
-    means = {name: float(np.mean([getattr(one, name) for one in errors])) for name in names}
-    return ScoreError(frames=sum(one.frames for one in errors), **means)
-
-
 def main(args: list[str] | None = None) -> int:
     """Measure and write the table."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("sessions", nargs="+", type=Path, metavar="SESSION")
     parser.add_argument("--seed", type=int, default=0)
     given = parser.parse_args(args)
-    rows = [f"| {' | '.join(_HEAD)} |", "|---" * len(_HEAD) + "|"]
     found = {(task, way): list[ScoreError]() for task in TASKS for way in WAYS}
     for folder in given.sessions:
         session = load(folder)
@@ -238,12 +219,16 @@ def main(args: list[str] | None = None) -> int:
         for task, way in found:
             found[task, way].append(errors[task][way])
         for task in TASKS:
-            print(row(session.name, task, "particles", errors[task]["particles"]), flush=True)
-    rows += [row("**mean**", *which, mean_of(errors)) for which, errors in found.items()]
+            cells = row_of(session.name, task, "particles", errors[task]["particles"])
+            print(row(cells), flush=True)
+    every = (
+        row_of("**mean**", *of, ScoreError(*np.mean(errors, axis=0).tolist()))
+        for of, errors in found.items()
+    )
+    means = table(_HEAD, every)
     text = DOCUMENT.read_text(encoding="utf-8")
-    table = "\n".join(rows)
-    DOCUMENT.write_text(replaced(text, f"\n{table}\n", BEGIN, END), encoding="utf-8")
-    print(table)
+    write_file(DOCUMENT, replaced(text, f"\n{means}\n", BEGIN, END))
+    print(means)
     return 0
 
 

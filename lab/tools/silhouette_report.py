@@ -20,9 +20,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cardbox_tracker.camera.camera import WORKING_SIZE
+from cardbox_tracker.common.files import write_file
 from cardbox_tracker.recordings.bag_reader import BagReader
 from cardbox_tracker.segmentation.background_config import BackgroundConfig
 from cardbox_tracker.segmentation.silhouettes import SilhouettePipeline
+from lab.pages import table
 
 Image = NDArray[np.uint8]
 # Takes a time (s) and a shape (H, W[, channels]); returns the factor on an image.
@@ -177,45 +179,38 @@ def soon_after(rows: list[Row]) -> float:
     return mean(chosen, "iou")
 
 
-def report(sessions: list[Path], lit: Path | None) -> Iterator[str]:
-    """Yield the document's lines."""
-    yield from (
+def report(sessions: list[Path], lit: Path | None) -> str:
+    """Return the document."""
+    found = {folder.name: rows_of(folder) for folder in sessions}
+    means = [[mean(rows, figure) for figure in FIGURES.values()] for rows in found.values()]
+    named = [*zip(found, means, strict=True)]
+    named.append((f"**mean of {len(sessions)}**", np.nanmean(means, axis=0).tolist()))
+    parts = [
         "# Silhouettes against the true ones",
-        "",
         "`python -m lab.tools.silhouette_report` made this page. The figures are means over all "
         "images with a person after the empty scene. *Missing* and *extra* are pixels as a share "
         "of the person; *arms found* is the share of the true pixels along forearms and hands. "
         f"The scene is learned from its first {BackgroundConfig().learn_images} images, as in the "
         "node.",
-        "",
-        f"| session | {' | '.join(FIGURES)} |",
-        "|---" * (1 + len(FIGURES)) + "|",
-    )
-    table = []
-    for folder in sessions:
-        rows = rows_of(folder)
-        table.append([mean(rows, figure) for figure in FIGURES.values()])
-        yield _line(folder.name, table[-1])
-    yield _line(f"**mean of {len(sessions)}**", np.nanmean(table, axis=0).tolist())
-    if lit is None:
-        return
-    yield from (
-        "",
-        f"## `{lit.name}` in changing light",
-        "",
-        "The columns have the IoU over all images, and 2 to 2.5 s after each step.",
-        "",
-        "| light | IoU | 2 s after a step |",
-        "|---|---|---|",
-    )
-    for name, light in LIGHTS.items():
-        rows = rows_of(lit, light)
-        yield _line(name, [mean(rows, "iou"), np.nan if light is _drift else soon_after(rows)])
+        table(["session", *FIGURES], map(_cells, named)),
+    ]
+    if lit is not None:
+        lights = []
+        for name, light in LIGHTS.items():
+            rows = rows_of(lit, light)
+            after = np.nan if light is _drift else soon_after(rows)
+            lights.append((name, [mean(rows, "iou"), after]))
+        parts += [
+            f"## `{lit.name}` in changing light",
+            "The columns have the IoU over all images, and 2 to 2.5 s after each step.",
+            table(["light", "IoU", "2 s after a step"], map(_cells, lights)),
+        ]
+    return "\n\n".join(parts) + "\n"
 
 
-def _line(name: str, values: list[float]) -> str:
-    cells = [f"{value:.3f}" if np.isfinite(value) else "-" for value in values]
-    return f"| {name} | {' | '.join(cells)} |"
+def _cells(named: tuple[str, list[float]]) -> list[str]:
+    name, values = named
+    return [name, *(f"{value:.3f}" if np.isfinite(value) else "-" for value in values)]
 
 
 def main(arguments: list[str] | None = None) -> int:
@@ -225,11 +220,7 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("--light", type=Path, metavar="DIR", help="session to change the light of")
     parser.add_argument("--output", type=Path, required=True)
     options = parser.parse_args(arguments)
-    lines = []
-    for line in report(options.sessions, options.light):
-        print(line, flush=True)
-        lines.append(line)
-    options.output.write_text("\n".join(lines) + "\n", encoding="utf-8")
+    write_file(options.output, report(options.sessions, options.light))
     return 0
 
 

@@ -11,11 +11,11 @@ from itertools import groupby
 from pathlib import Path
 
 from cardbox_tracker.ros.runtime.command_line import SERVICE, Entry, entries
-from lab.evaluation.people_report import replaced
+from lab.pages import replaced, table
 
 DOCUMENT = Path(__file__).resolve().parents[2] / "docs" / "topics.md"
-_TOPICS = ("| topic | direction | type | QoS | what |", "|---|---|---|---|---|")
-_SERVICES = ("| service | type | what |", "|---|---|---|")
+_TOPICS = ("topic", "direction", "type", "QoS", "what")
+_SERVICES = ("service", "type", "what")
 
 
 def _label(entry: Entry) -> str:
@@ -24,11 +24,10 @@ def _label(entry: Entry) -> str:
     return f"{entry.node} {kind}{' with cameras' if entry.case else ''}"
 
 
-def _row(entry: Entry) -> str:
-    content = entry.content.replace("|", "\\|")
-    if entry.direction == SERVICE:
-        return f"| `{entry.name}` | {entry.type} | {content} |"
-    return f"| `{entry.name}` | {entry.direction} | {entry.type} | {entry.qos} | {content} |"
+def _cells(entry: Entry) -> tuple[str, ...]:
+    of_topic = () if entry.direction == SERVICE else (entry.direction,)
+    qos = () if entry.direction == SERVICE else (entry.qos,)
+    return f"`{entry.name}`", *of_topic, entry.type, *qos, entry.content.replace("|", "\\|")
 
 
 def document(text: str) -> str:
@@ -40,8 +39,8 @@ def document(text: str) -> str:
     shown = (entry for entry in entries() if entry.name != "/diagnostics")
     for label, found in groupby(shown, _label):
         head = _SERVICES if "services" in label else _TOPICS
-        table = "\n".join([*head, *map(_row, found)])
-        text = replaced(text, table, f"<!-- {label}:begin -->", f"<!-- {label}:end -->")
+        marks = f"<!-- {label}:begin -->", f"<!-- {label}:end -->"
+        text = replaced(text, table(head, map(_cells, found)), *marks)
     return text
 
 

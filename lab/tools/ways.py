@@ -28,8 +28,8 @@ import numpy as np
 
 from cardbox_tracker.common.errors import CardboxError
 from cardbox_tracker.common.files import write_file
-from cardbox_tracker.person.legs import LEG_NAMES
 from cardbox_tracker.person.sizes import FloatArray
+from cardbox_tracker.person.skeleton import LEG_NAMES
 from cardbox_tracker.recordings.bag_reader import BagReader
 from cardbox_tracker.recordings.result_reader import Results, read_results
 from cardbox_tracker.recordings.result_table import POINT_COLUMNS

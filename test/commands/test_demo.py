@@ -37,7 +37,7 @@ def test_the_demo_tracks_its_film_and_says_the_error(
         assert picture.std() > 10.0, f"{name} is empty"
     reader = cv2.VideoCapture(str(output / "overlay.mp4"))
     assert int(reader.get(cv2.CAP_PROP_FRAME_COUNT)) == 171
-    assert (output / "markers.trc").read_text().startswith("PathFileType\t4")
+    assert (output / "angles.trc").read_text().startswith("PathFileType\t4")
     with (output / "angles.csv").open() as file:
         assert sum(row["state"] != "no_person" for row in csv.DictReader(file)) == 171
 

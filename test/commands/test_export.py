@@ -214,7 +214,7 @@ def test_a_body_beside_the_table_that_is_anothers(
     ("words", "expected"),
     [
         (("person.csv", "--to", "bvh"), "BVH needs the bones of the person: give --model"),
-        (("person.csv", "--to", "fbx"), "--to: invalid choice: 'fbx'"),
+        (("person.csv", "--to", "fbx"), "--to: expected one of trc, bvh"),
         (("person.csv",), "the following arguments are required: --to"),
         (("person.csv", "--to", "trc", "--model", "FOLDER/other.yaml"), "not those of the body"),
         (

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from cardbox_tracker.person.skeleton import KeypointState
-from cardbox_tracker.recordings.result_table import columns, row_of
+from cardbox_tracker.recordings.result_table import row_of, units
 from cardbox_tracker.tracking.estimate import Estimate, Legs
 
 
@@ -23,7 +23,7 @@ def results(tmp_path: Path) -> Path:
     path = tmp_path / "film.csv"
     with path.open("w", newline="") as file:
         writer = csv.writer(file)
-        writer.writerow(columns(has_points=True, has_people=True))
+        writer.writerow(units(has_points=True, has_people=True))
         for number in range(10):
             found = Estimate("tracking", *arms, 100, 0.9, person=1, legs=legs)
             row = row_of(10**8 * number, number / 10, found, has_points=True, has_people=True)

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import argparse
-from dataclasses import FrozenInstanceError
+from dataclasses import FrozenInstanceError, replace
 from itertools import chain, combinations
 from pathlib import Path
 
@@ -11,21 +10,17 @@ import cv2
 import numpy as np
 import pytest
 
-from cardbox_tracker.commands import request
+from cardbox_tracker.commands import tracking_request as module
 from cardbox_tracker.commands.main import build_parser
-from cardbox_tracker.commands.request import (
-    TrackingRequest,
-    tracking_request,
-    with_own_options,
-)
+from cardbox_tracker.commands.request import Request, with_own_options
+from cardbox_tracker.commands.tracking_request import TrackingRequest, tracking_request
 from cardbox_tracker.common.errors import CardboxError
 from cardbox_tracker.detectors import detector as detector_module
 from cardbox_tracker.detectors.model_files import ModelFiles
 from cardbox_tracker.detectors.person_choice import PersonChoice
 from cardbox_tracker.detectors.point_table import PointTable
-from cardbox_tracker.person.model import BodyModel
+from cardbox_tracker.person.model import BodyModel, body_from_proportions
 from cardbox_tracker.person.model_file import save_body_model
-from cardbox_tracker.person.proportions import body_from_proportions
 from cardbox_tracker.recordings.given_camera import GivenCamera
 from cardbox_tracker.recordings.other_silhouettes import PersonInView
 from cardbox_tracker.recordings.silhouettes import TimeSpan
@@ -42,8 +37,8 @@ def film(tmp_path: Path) -> Path:
     return tmp_path / "film.mp4"
 
 
-def line(recording: object, *words: object) -> argparse.Namespace:
-    return build_parser(["track"]).parse_args(["track", *map(str, (recording, *words))])
+def line(recording: object, *words: object) -> Request:
+    return Request.of(build_parser(["track"]).parse_args(["track", *map(str, (recording, *words))]))
 
 
 def asked(recording: object, *words: object) -> TrackingRequest:
@@ -73,6 +68,23 @@ def test_a_request_has_what_the_options_ask_for(film: Path) -> None:
     assert set(request.inputs) == {film, folder / "me.yaml", folder / "points.csv"}
     with pytest.raises(FrozenInstanceError):
         request.seed = 8  # type: ignore[misc]
+
+
+def test_python_asks_for_the_same_as_a_command_line(film: Path) -> None:
+    words = ("--background=0:1.5", "--person=120,80.5", "--stature=1.8,1.6", "--people=auto")
+    more = ("--cameras", "a", "b", "--set=lost_frames=9", "--set=relocalize=false", "--hands")
+    asked = Request(
+        film,
+        background=(0, 1.5),
+        person=(120, 80.5),
+        stature_m=(1.8, 1.6),
+        people="auto",
+        cameras=("a", "b"),
+        set={"lost_frames": 9, "relocalize": False},
+        hands=True,
+    )
+    assert asked == line(film, *words, *more) == replace(asked)
+    assert isinstance(asked.background, TimeSpan) and asked.statures_m == (1.8, 1.6)
 
 
 def test_a_stature_leaves_the_rest_to_be_found(film: Path) -> None:
@@ -158,7 +170,7 @@ def test_mistakes_with_several_people(words: tuple[str, ...], fault: str, film: 
 
 def test_hands_need_the_detector_and_its_file(film: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(detector_module, "installed_models", lambda: ModelFiles(film, film))
-    monkeypatch.setattr(request, "installed_hands", lambda: film)
+    monkeypatch.setattr(module, "installed_hands", lambda: film)
     given = ("--fov", 60, "--stature", 1.7)
     assert asked(film, *given, "--detector", "mediapipe", "--hands").hands == film
     assert asked(film, *given, "--detector", "mediapipe").hands is None
@@ -289,7 +301,7 @@ def test_a_file_that_contradicts_itself_is_refused(tmp_path: Path) -> None:
 
 def test_without_a_file_the_command_line_is_left(tmp_path: Path) -> None:
     given = line("in", "--stature", "1.7")
-    assert vars(with_own_options(given, tmp_path, "a/b")) == vars(given)
+    assert with_own_options(given, tmp_path, "a/b") == given
 
 
 def test_files_change_the_command_line_and_inner_ones_the_outer(tmp_path: Path) -> None:
@@ -300,12 +312,12 @@ def test_files_change_the_command_line_and_inner_ones_the_outer(tmp_path: Path) 
     words = ("--stature", "1.7", "--effort", "2", "--silhouettes", "person_in_view")
     given = line("in", *words, "--set", "lost_frames=9", "--set", "average=3")
     wave, bow = (with_own_options(given, tmp_path, f"anna/{name}") for name in ("wave", "bow"))
-    assert (wave.stature, wave.start, wave.effort) == ((1.64,), 5.0, 2.0)
+    assert (wave.stature_m, wave.start_s, wave.effort) == ((1.64,), 5.0, 2.0)
     assert (wave.background, wave.silhouettes) == (TimeSpan(0.0, 2.0), None)
     assert dict(wave.set) == {"lost_frames": 9, "average": 2}
-    assert (bow.stature, bow.start, bow.background) == ((1.64,), 3.0, None)
+    assert (bow.stature_m, bow.start_s, bow.background) == ((1.64,), 3.0, None)
     assert bow.silhouettes == "person_in_view"
-    assert (given.stature, given.start) == ((1.7,), None)
+    assert (given.stature_m, given.start_s) == ((1.7,), None)
     assert dict(given.set) == dict(bow.set) == {"lost_frames": 9, "average": 3}
 
 
@@ -315,7 +327,7 @@ def test_a_measured_person_takes_the_place_of_a_stature(tmp_path: Path) -> None:
     (tmp_path / "b.options").write_text("--detector mediapipe")
     given = line("in", "--stature", "1.7", "--distance", "2", "--camera-pitch-deg", "5")
     found = with_own_options(given, tmp_path, "a")
-    assert (found.stature, found.distance, found.camera_pitch_deg) == (None, None, None)
+    assert (found.stature_m, found.distance_m, found.camera_pitch_deg) == (None, None, None)
     # A path begins at the folder of its file.
     assert found.model == tmp_path / "a.yaml"
     assert found.detector == str(tmp_path / "points.csv")

@@ -36,7 +36,7 @@ GIVEN = ("--background", "0:3.9", "--start", 16, "--stature", 1.72)
             ("--background", "90:99"),
             "0 images lie in the background span 90:99 s of a",
         ),
-        (("--preset", "fast"), "invalid choice: 'fast' (choose from "),
+        (("--preset", "fast"), "--preset: expected one of paper, default, got 'fast'"),
         (("--effort", "5"), "--effort is 5; expected 0.25 to 4"),
         (("--settings", "FOLDER/missing.yaml"), "missing.yaml: No such file or directory; exp"),
         (("--settings", "FOLDER/list.yaml"), "list.yaml: expected names and values"),

@@ -17,13 +17,9 @@ from typing import Any
 import pytest
 
 from cardbox_tracker.commands import track_folder
-from cardbox_tracker.commands.main import build_parser
-from cardbox_tracker.commands.request import (
-    TrackingRequest,
-    tracking_request,
-    with_own_options,
-)
+from cardbox_tracker.commands.request import Request, with_own_options
 from cardbox_tracker.commands.track_folder import digest_of_inputs
+from cardbox_tracker.commands.tracking_request import TrackingRequest, tracking_request
 from cardbox_tracker.common import processes
 from cardbox_tracker.common.errors import CardboxError
 from cardbox_tracker.recordings.open_images import SUMMARY
@@ -408,7 +404,7 @@ def test_options_beside_a_recording_name_no_code(
     (tmp_path / "evil.py").write_text("raise SystemExit('code of the data ran')")
     monkeypatch.chdir(tmp_path)
     monkeypatch.syspath_prepend("")
-    typed = build_parser(["track"]).parse_args(["track", str(tmp_path)])
+    typed = Request(tmp_path)
     words = ("--corrector", "--detector", "--silhouettes", "--set corrector", "--preset")
     for word in words:
         given = word + ("=" if word.startswith("--set") else " ") + "evil:function"
@@ -434,8 +430,7 @@ def test_a_huge_summary_is_not_read(tmp_path: Path) -> None:
 def test_files_of_a_recording_may_have_any_name(tmp_path: Path) -> None:
     folder = tmp_path / "images"
     folder.mkdir()
-    given = ("--stature=1.7", "--background=0:1")
-    request = tracking_request(build_parser(["track"]).parse_args(["track", str(folder), *given]))
+    request = tracking_request(Request(folder, stature_m=1.7, background=(0, 1)))
     before = digest_of_inputs(request, ("csv",), "program")
     try:
         Path(os.fsdecode(os.fsencode(folder) + b"/\xff.png")).touch()

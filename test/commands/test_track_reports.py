@@ -115,7 +115,6 @@ def in_browser(page: Path) -> str:
         (("--plot", "FOLDER/angles.jpg"), "its name must end in .png"),
         (("--report", "FOLDER/page"), "its name must end in .html"),
         (("--report", "FOLDER/a.html", "--video", "FOLDER/a.avi"), "must end in .mp4"),
-        (("--export", "trc", "--csv", "/dev/null"), "--export reads the table"),
         (("--plot", "FOLDER/there.png"), "there.png exists"),
     ],
 )

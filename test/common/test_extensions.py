@@ -11,7 +11,7 @@ import pytest
 
 from cardbox_tracker.applications.exporting.formats import formats, read_result
 from cardbox_tracker.commands.main import main
-from cardbox_tracker.commands.request import points_named
+from cardbox_tracker.commands.tracking_request import points_named
 from cardbox_tracker.common.errors import CardboxError
 from cardbox_tracker.detectors.detector import Detector
 from cardbox_tracker.recordings.result_table import result_table

@@ -19,7 +19,7 @@ from cardbox_tracker.measuring.scene import (
     load_scene,
     save_scene,
 )
-from cardbox_tracker.person.proportions import body_from_proportions
+from cardbox_tracker.person.model import body_from_proportions
 
 CAMERA = SceneCamera(
     Value(math.radians(60.0), 0.02, USUAL),

@@ -16,8 +16,9 @@ from cardbox_tracker.detectors.image_points import (
     ImagePoints,
     LegPoints,
 )
-from cardbox_tracker.measuring.people_camera import FORWARD, HEIGHTS, LEVELS, people_camera
+from cardbox_tracker.measuring.people_camera import FORWARD, LEVELS, people_camera
 from cardbox_tracker.measuring.scene_camera import FoundCamera, scene_camera
+from cardbox_tracker.person.proportions import MARKED_HEIGHTS
 
 CAMERA = Camera(640, 480, 500.0, 500.0, 319.5, 239.5)
 STATURE_M, HEIGHT_M = 1.7, 1.5
@@ -42,7 +43,7 @@ def points(
             (
                 STATURE_M * FORWARD[at] - distance_m,
                 aside_m + across_m,
-                STATURE_M * HEIGHTS[at] - HEIGHT_M + on_m,
+                STATURE_M * MARKED_HEIGHTS[at] - HEIGHT_M + on_m,
             )
         )
         u, v = view.project(view.reference_to_optical(there)) - (CAMERA.cx, CAMERA.cy)
@@ -108,8 +109,8 @@ def test_without_feet_the_hips_are_marked_higher(
     places: Sequence[tuple[float, float]], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """MediaPipe marks them 0.022 of the stature higher; without this, they seem farther away."""
-    marked = HEIGHTS + 0.022 * (np.array(LEVELS) == "hip")
-    monkeypatch.setattr(f"{__name__}.HEIGHTS", marked)
+    marked = MARKED_HEIGHTS + 0.022 * (np.array(LEVELS) == "hip")
+    monkeypatch.setattr(f"{__name__}.MARKED_HEIGHTS", marked)
     cut = [(at_s, replace(one, legs=None)) for at_s, one in film(places, 8.0)]
     shown = people_camera([cut], [STATURE_M], CAMERA, (np.radians(8.0), 0.2), (0.0, 0.01))
     assert shown is not None
@@ -144,8 +145,8 @@ def squatting(pitch_deg: float, bend_deg: float) -> ImagePoints:
     """Return who bends knees and hips, and leans forward, at one place; 0 degrees for upright."""
     view, bend = CAMERA.with_pitch(np.radians(pitch_deg)), np.radians(bend_deg)
     # Ankles, knees, hips, and what is above, forward and up, in statures.
-    shin, thigh = HEIGHTS[4] - HEIGHTS[5], HEIGHTS[3] - HEIGHTS[4]
-    ankle = np.array((0.0, HEIGHTS[5]))
+    shin, thigh = MARKED_HEIGHTS[4] - MARKED_HEIGHTS[5], MARKED_HEIGHTS[3] - MARKED_HEIGHTS[4]
+    ankle = np.array((0.0, MARKED_HEIGHTS[5]))
     knee = ankle + shin * np.array((np.sin(bend / 2), np.cos(bend / 2)))
     hip = knee + thigh * np.array((-np.sin(bend), np.cos(bend)))
     lean = np.array(((np.cos(bend / 2), np.sin(bend / 2)), (-np.sin(bend / 2), np.cos(bend / 2))))
@@ -153,7 +154,7 @@ def squatting(pitch_deg: float, bend_deg: float) -> ImagePoints:
     for name in (*POINT_NAMES, *LEG_POINT_NAMES):
         level = name.split("_")[-1].replace("heel", "ankle").replace("foot", "ankle")
         at = LEVELS.index(level) if level in LEVELS else LEVELS.index("shoulder")
-        above = lean @ (FORWARD[at], HEIGHTS[at] - HEIGHTS[3])
+        above = lean @ (FORWARD[at], MARKED_HEIGHTS[at] - MARKED_HEIGHTS[3])
         forward, up = STATURE_M * {3: hip, 4: knee, 5: ankle}.get(at, hip + above)
         aside_m = 0.0 if name == "nose" else 0.12 * (1 if "left" in name else -1)
         there = np.array((forward - 3.0, aside_m, up - HEIGHT_M))

@@ -10,9 +10,10 @@ import pytest
 from cardbox_tracker.camera.camera import Camera
 from cardbox_tracker.detectors.image_points import ImagePoints
 from cardbox_tracker.detectors.pose_network import LANDMARKS
-from cardbox_tracker.measuring.people_camera import FORWARD, HEIGHTS, LEVELS
+from cardbox_tracker.measuring.people_camera import FORWARD, LEVELS
 from cardbox_tracker.measuring.scene_watch import SceneWatch
-from cardbox_tracker.person.proportions import body_from_proportions
+from cardbox_tracker.person.model import body_from_proportions
+from cardbox_tracker.person.proportions import MARKED_HEIGHTS
 from cardbox_tracker.terms.term import Image
 from cardbox_tracker.tracking.observation import Observation
 from cardbox_tracker.tracking.session import Session
@@ -30,7 +31,7 @@ def standing(score: float = 0.9) -> ImagePoints:
         level = "ankle" if level in ("heel", "foot") else level
         if level in LEVELS:
             at = LEVELS.index(level)
-            there = -AWAY_M + 1.8 * FORWARD[at], 0.0, 1.8 * HEIGHTS[at] - HEIGHT_M
+            there = -AWAY_M + 1.8 * FORWARD[at], 0.0, 1.8 * MARKED_HEIGHTS[at] - HEIGHT_M
             column, row = camera.project(camera.reference_to_optical(np.array(there)))
             found[name] = float(column), float(row), score
     return ImagePoints.of(found)

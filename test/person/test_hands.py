@@ -8,12 +8,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from cardbox_tracker.person.hands import HAND_NAMES, HANDS, limited, turn_of
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.posture import TURNING_LIMITS
 from cardbox_tracker.person.sizes import FloatArray
-from cardbox_tracker.person.skeleton import JOINT_NAMES
+from cardbox_tracker.person.skeleton import HAND_NAMES, JOINT_NAMES, turn_of
 from cardbox_tracker.person.urdf import LinkTransforms, urdf_from_body
+from cardbox_tracker.tracking.estimate import Hand
 
 BODY = BodyModel.of(distance_m=2.0)
 LINKS = LinkTransforms(urdf_from_body(BODY, torso_place=False, hands=True))
@@ -92,9 +92,10 @@ def test_a_hanging_hand_by_hand(side: str) -> None:
 
 
 def test_joints_are_kept_within_their_limits() -> None:
-    found = np.degrees(limited(np.array([4.0, -3.0, 3.0])))
+    wrist = np.array([-3.0, 3.0, 0.0])
+    found = np.degrees(Hand(None, np.zeros(3), wrist, np.zeros(3), turn=4.0).joints)
     np.testing.assert_allclose(found, [180.0, -90.0, 50.0])
-    assert len(HANDS) == len(HAND_NAMES) == 6
+    assert len(HAND_NAMES) == 6
     assert HAND_NAMES[3] == "right_forearm_turn"
 
 

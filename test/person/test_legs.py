@@ -8,19 +8,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from cardbox_tracker.person.kinematics import pose
-from cardbox_tracker.person.legs import (
-    HIP_SHARE,
-    LEG_NAMES,
-    SHANK_SHARE,
-    THIGH_SHARE,
-    leg_angles,
-    leg_directions,
-    stature_of,
-)
+from cardbox_tracker.person.legs import leg_angles, leg_directions
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.parts import body_parts
+from cardbox_tracker.person.proportions import HIP_SHARE, SHANK_SHARE, THIGH_SHARE, stature_of
 from cardbox_tracker.person.skeleton import (
-    JOINT_STATE_NAMES,
+    LEG_NAMES,
+    Group,
+    names_of,
 )
 from cardbox_tracker.person.urdf import LinkTransforms, urdf_from_body
 
@@ -53,7 +48,7 @@ def test_directions_by_hand(side: float) -> None:
 def test_the_description_with_legs_moves_as_they_do() -> None:
     angles = np.radians([70.0, 20.0, 10.0, 60.0, 15.0, -5.0, -20.0, 30.0])
     links = LinkTransforms(urdf_from_body(BODY))
-    positions = dict.fromkeys(JOINT_STATE_NAMES, 0.0) | {"torso_yaw": 0.4}
+    positions = dict.fromkeys(names_of(*{*Group} - {Group.HAND}), 0.0) | {"torso_yaw": 0.4}
     positions |= dict(zip(LEG_NAMES, angles.tolist(), strict=True))
     assert set(links.joint_names) == set(positions)
     found = {one.child: one for one in links.at(positions)}

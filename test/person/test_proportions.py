@@ -5,9 +5,9 @@ from __future__ import annotations
 import pytest
 
 from cardbox_tracker.common.errors import BodyModelError
-from cardbox_tracker.person.model import MEASURED, PROPORTIONS, BodyModel
+from cardbox_tracker.person.model import MEASURED, PROPORTIONS, BodyModel, body_from_proportions
 from cardbox_tracker.person.model_file import dumps_body_model, loads_body_model
-from cardbox_tracker.person.proportions import BREADTHS, body_from_proportions
+from cardbox_tracker.person.proportions import BREADTHS
 
 
 @pytest.mark.parametrize("stature_m", [1.1, 1.6, 1.9, 2.2])

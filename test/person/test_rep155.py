@@ -23,10 +23,9 @@ from cardbox_tracker.person.posture import (
 )
 from cardbox_tracker.person.rep155 import (
     Rep155Joints,
-    head_joints,
     joint_names,
 )
-from cardbox_tracker.person.skeleton import Group, joints_of, neck_rotation
+from cardbox_tracker.person.skeleton import POSTURE_GROUPS, joints_of, neck_rotation
 from cardbox_tracker.person.urdf import rep155_urdf
 from cardbox_tracker.tracking.estimate import TRACKING, Estimate
 
@@ -98,7 +97,7 @@ def test_the_head_turns_as_the_neck_does(neck: tuple[float, float]) -> None:
     """``p_head`` is positive upwards in the reference model."""
     posture, camera = np.zeros(12), Camera(320, 240, 300.0, 300.0, 159.5, 119.5, pitch_rad=0.15)
     posture[1:4] = (0.1, 0.3, -0.4)
-    values = [*Rep155Joints()(posture), 0.0, 0.0, *head_joints(np.array(neck)), 0.0, 0.0]
+    values = Rep155Joints()(np.array([*posture, 0.0, 0.0, *neck, 0.0, 0.0]))
     ROBOT.update_cfg(dict(zip(joint_names("p1"), values, strict=True)))
     frames = pose(BODY.rigid, posture)
     turned = frames.torso_rotation @ neck_rotation(np.array(neck))
@@ -125,7 +124,7 @@ def test_values_stay_within_the_limits_of_the_urdf(postures: list[np.ndarray]) -
 )
 def test_plain_movements_have_plain_angles(arm: slice, prefix: str) -> None:
     """Raised aside is p alone; forwards has y at 90 degrees; a forearm forwards is the elbow."""
-    index = {joint.rep155: number for number, joint in enumerate(joints_of(Group.POSTURE))}
+    index = {joint.rep155: number for number, joint in enumerate(joints_of(*POSTURE_GROUPS))}
     posture = reference_posture("front")
     posture[arm] = (0.8, 0.0, 0.0, 0.5)
     values = Rep155Joints()(posture)

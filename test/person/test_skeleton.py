@@ -9,9 +9,9 @@ from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.parts import body_parts
 from cardbox_tracker.person.skeleton import (
     FIXED,
-    JOINT_STATE_NAMES,
     PRISMATIC,
     SKELETON,
+    STATE_NAMES,
     UNITS,
     Group,
     joints_of,
@@ -22,7 +22,7 @@ PARTS = body_parts(BodyModel().sizes)
 
 
 def test_names_that_others_read_keep_their_order_and_new_ones_follow() -> None:
-    assert JOINT_STATE_NAMES[:16] == (
+    assert STATE_NAMES[:16] == (
         *("torso_y", "torso_roll", "torso_pitch", "torso_yaw"),
         *("left_shoulder_abduction", "left_shoulder_flexion"),
         *("left_elbow_abduction", "left_elbow_flexion"),
@@ -30,9 +30,15 @@ def test_names_that_others_read_keep_their_order_and_new_ones_follow() -> None:
         *("right_elbow_abduction", "right_elbow_flexion"),
         *("torso_x", "torso_z", "neck_yaw", "neck_pitch"),
     )
-    assert JOINT_STATE_NAMES[16:] == ("left_clavicle_elevation", "right_clavicle_elevation")
+    assert STATE_NAMES[16:18] == ("left_clavicle_elevation", "right_clavicle_elevation")
+    assert STATE_NAMES[18:] == (
+        *("left_forearm_turn", "left_wrist_flexion", "left_wrist_deviation"),
+        *("right_forearm_turn", "right_wrist_flexion", "right_wrist_deviation"),
+        *("left_hip_flexion", "left_hip_abduction", "left_hip_rotation", "left_knee_flexion"),
+        *("right_hip_flexion", "right_hip_abduction", "right_hip_rotation", "right_knee_flexion"),
+    )
     movable = tuple(joint.name for joint in SKELETON if joint.kind != FIXED)
-    assert movable == JOINT_STATE_NAMES
+    assert movable == STATE_NAMES
 
 
 def test_the_joints_form_one_tree_from_the_hips() -> None:

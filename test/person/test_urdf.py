@@ -19,7 +19,6 @@ from cardbox_tracker.camera.camera import Camera, roll_turn
 from cardbox_tracker.commands.main import main
 from cardbox_tracker.common.compiling import kernel
 from cardbox_tracker.person.kinematics import clavicles, gaze_m, keypoints, pose
-from cardbox_tracker.person.legs import LEG_LIMITS, LEG_NAMES, LEGS
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.model_file import load_body_model
 from cardbox_tracker.person.parts import body_parts
@@ -30,18 +29,19 @@ from cardbox_tracker.person.posture import (
     place_limits,
     state_limits,
 )
-from cardbox_tracker.person.rep155 import Rep155Joints, head_joints, joint_names
+from cardbox_tracker.person.rep155 import Rep155Joints, joint_names
 from cardbox_tracker.person.sizes import SIZE_LIMITS
 from cardbox_tracker.person.skeleton import (
-    CLAVICLE_NAMES,
     JOINT_NAMES,
+    LEG_LIMITS,
     NECK_LIMITS,
-    NECK_NAMES,
-    PLACE_NAMES,
+    SKELETON,
+    Group,
+    names_of,
     neck_rotation,
 )
 from cardbox_tracker.person.urdf import ROOT_LINK, rep155_urdf, urdf_from_body
-from cardbox_tracker.recordings.outputs import joint_values, positions_of
+from cardbox_tracker.recordings.outputs import joint_values
 from cardbox_tracker.search.config import PRESETS
 from cardbox_tracker.terms.kernel_arguments import BodyTuple, body_of, body_tuple
 from cardbox_tracker.tracking.estimate import TRACKING, Estimate
@@ -57,7 +57,7 @@ KEYPOINT_LINKS = (
 )
 # From the reference frame (X to the camera, Y right) to the URDF's root (X away, Y left).
 TO_ROOT = np.diag([-1.0, -1.0, 1.0])
-ALL_NAMES = (*JOINT_NAMES, *PLACE_NAMES, *NECK_NAMES, *CLAVICLE_NAMES, *LEG_NAMES)
+ALL_NAMES = names_of(*{*Group} - {Group.HAND})
 REP155_LINKS = ("l_shoulder", "l_elbow", "l_wrist", "r_shoulder", "r_elbow", "r_wrist")
 PLACE_LIMITS = place_limits(2.0)
 ALL_LIMITS = np.vstack([TURNING_LIMITS, PLACE_LIMITS, NECK_LIMITS, [[0.0, 0.15]] * 2, LEG_LIMITS])
@@ -157,8 +157,7 @@ def test_urdf_and_joint_states_have_the_joints_where_keypoints_are(
     keypoints_m = np.empty((6, 3))
     published(state, body_tuple(body, camera), keypoints_m)
     if is_rep155:
-        convert = Rep155Joints()
-        values = [*convert(posture), *place, *head_joints(neck), *raised_m]
+        values = Rep155Joints()(np.array([*posture, *place, *neck, *raised_m]))
         joints = dict(zip(joint_names("a"), values, strict=True))
         poses = link_poses(rep155_urdf(body, "a", "eye"), joints, "eye")
         links = [f"{link}_a" for link in REP155_LINKS]
@@ -166,7 +165,7 @@ def test_urdf_and_joint_states_have_the_joints_where_keypoints_are(
         said = joint_values(found)
         assert said is not None
         assert said.names == ALL_NAMES
-        poses = link_poses(urdf_from_body(body, "eye"), positions_of(said))
+        poses = link_poses(urdf_from_body(body, "eye"), said.by_name)
         links = list(KEYPOINT_LINKS)
     to_eye = np.linalg.inv(poses["eye"])
     for point, link in zip(keypoints_m @ roll_turn(roll_rad), links, strict=True):
@@ -200,7 +199,8 @@ def test_torso_x_is_nearer_to_the_camera_and_torso_z_is_higher() -> None:
 def test_without_the_place_it_and_neck_and_clavicles_are_missing() -> None:
     full = Xml.fromstring(urdf_from_body(BodyModel(), "eye"))
     short = Xml.fromstring(urdf_from_body(BodyModel(), "eye", torso_place=False))
-    of_legs = [name for joint in LEGS for name in (joint.name, joint.link)]
+    legs = [joint for joint in SKELETON if joint.group == Group.LEG]
+    of_legs = [name for joint in legs for name in (joint.name, joint.link)]
     missing = {*ALL_NAMES[12:], *CLAVICLE_LINKS, *of_legs}
     for element in [*full.findall("link"), *full.findall("joint")]:
         if element.attrib["name"].removesuffix("_link") in missing:

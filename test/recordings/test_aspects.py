@@ -15,9 +15,8 @@ from cardbox_tracker.camera.camera import Camera
 from cardbox_tracker.camera.extrinsics import Extrinsics
 from cardbox_tracker.camera.view import OtherCamera, View
 from cardbox_tracker.person.kinematics import pose
-from cardbox_tracker.person.model import BodyModel
+from cardbox_tracker.person.model import BodyModel, body_from_proportions
 from cardbox_tracker.person.posture import POSTURE, reference_posture
-from cardbox_tracker.person.proportions import body_from_proportions
 from cardbox_tracker.person.sizes import FloatArray
 from cardbox_tracker.recordings.bag_writer import BagWriter
 from cardbox_tracker.recordings.given_camera import GivenCamera

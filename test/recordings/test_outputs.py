@@ -12,13 +12,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from cardbox_tracker.camera.camera import Camera
-from cardbox_tracker.person.hands import HAND_NAMES
 from cardbox_tracker.person.kinematics import pose
-from cardbox_tracker.person.legs import LEG_NAMES
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.posture import reference_posture
 from cardbox_tracker.person.skeleton import (
+    HAND_NAMES,
+    HAND_OPEN_NAMES,
     JOINT_NAMES,
+    LEG_NAMES,
     NECK_NAMES,
     PLACE_NAMES,
     KeypointState,
@@ -31,9 +32,6 @@ from cardbox_tracker.recordings.outputs import (
     joint_deviations,
     joint_values,
     open_hands,
-    open_hands_from,
-    posture_from,
-    values_from,
 )
 from cardbox_tracker.tracking.estimate import (
     LOST,
@@ -141,8 +139,8 @@ def test_the_neck_follows_and_has_deviations_if_it_was_seen() -> None:
     place = 0.25, -0.05, 0.4, -0.1, 0.02, 0.03
     np.testing.assert_array_equal(joints.values, [*POSTURE, *place, *NO_LEGS])
     np.testing.assert_array_equal(deviations.values[-12:-8], (0.1, 0.2, 0.002, 0.003))
-    np.testing.assert_array_equal(cast(Any, values_from(joints, NECK_NAMES)), (0.4, -0.1))
-    assert values_from(JointValues(BODY_NAMES, np.zeros(14)), NECK_NAMES) is None
+    np.testing.assert_array_equal(joints.of(NECK_NAMES), (0.4, -0.1))
+    assert np.isnan(JointValues(BODY_NAMES, np.zeros(14)).of(NECK_NAMES)).all()
 
 
 def test_without_the_place_there_are_the_twelve_joints() -> None:
@@ -240,19 +238,19 @@ def test_without_the_place_velocities_are_those_of_the_twelve_joints() -> None:
 def test_a_posture_is_found_by_names_in_any_order(order: list[int]) -> None:
     names = ("torso_x", *(JOINT_NAMES[i] for i in order))
     values = np.concatenate([[9.0], POSTURE[order]])
-    np.testing.assert_array_equal(posture_from(JointValues(names, values)), POSTURE)
+    np.testing.assert_array_equal(JointValues(names, values).posture, POSTURE)
 
 
 def test_some_joints_are_found_by_their_names() -> None:
     names = ("torso_z", *JOINT_NAMES, "torso_x")
-    place = values_from(JointValues(names, np.array([-0.1, *POSTURE, 0.3])), PLACE_NAMES)
+    place = JointValues(names, np.array([-0.1, *POSTURE, 0.3])).of(PLACE_NAMES)
     np.testing.assert_array_equal(cast(Any, place), [0.3, -0.1])
-    assert values_from(JointValues(JOINT_NAMES, POSTURE), PLACE_NAMES) is None
+    assert np.isnan(JointValues(JOINT_NAMES, POSTURE).of(PLACE_NAMES)).all()
 
 
 def test_a_missing_joint_is_named() -> None:
     with pytest.raises(ValueError, match="torso_y"):
-        posture_from(JointValues(JOINT_NAMES[1:], POSTURE[1:]))
+        _ = JointValues(JOINT_NAMES[1:], POSTURE[1:]).posture
 
 
 def test_joints_of_the_legs_are_always_the_last_ones() -> None:
@@ -288,6 +286,6 @@ def test_joints_of_the_hands_are_0_without_deviation_while_one_is_not_known() ->
     assert [name in stddevs.names for name in HAND_NAMES] == [False] * 3 + [True] * 3
     opened = open_hands(found)
     assert opened is not None and opened.names == ("right_hand_open",)
-    np.testing.assert_array_equal(open_hands_from(opened), [np.nan, 0.9])
+    np.testing.assert_array_equal(opened.of(HAND_OPEN_NAMES), [np.nan, 0.9])
     unknown = hand._replace(open=None)
     assert open_hands(replace(SEEN, hands=(unknown, None))) is open_hands(SEEN) is None

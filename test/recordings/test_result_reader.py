@@ -16,13 +16,13 @@ from cardbox_tracker.camera.camera import Camera
 from cardbox_tracker.common.errors import BagError, CardboxError
 from cardbox_tracker.person.kinematics import pose
 from cardbox_tracker.person.model import BodyModel
-from cardbox_tracker.person.skeleton import KeypointState
+from cardbox_tracker.person.skeleton import Group, KeypointState
 from cardbox_tracker.recordings import result_reader
 from cardbox_tracker.recordings.bag_reader import BagReader
 from cardbox_tracker.recordings.bag_writer import BagWriter
 from cardbox_tracker.recordings.result_bag import result_bag
 from cardbox_tracker.recordings.result_reader import read_results
-from cardbox_tracker.recordings.result_table import columns, result_table
+from cardbox_tracker.recordings.result_table import result_table, units
 from cardbox_tracker.recordings.silhouettes import RecordedFrame
 from cardbox_tracker.tracking.estimate import Estimate
 from cardbox_tracker.tracking.tracker import Tracker
@@ -85,8 +85,8 @@ def assert_is_what_was_written(motion: Motion) -> None:
         assert motion.states[number, :12] == pytest.approx(one.posture, abs=1e-6)
         assert motion.keypoints_m[number] == pytest.approx(one.keypoints_m, abs=1e-6)
     assert motion.states[2, 12:] == pytest.approx([0.0, -0.05])
-    assert motion.neck[2] == pytest.approx([0.0, 0.2])
-    assert np.isnan(motion.neck[[0, 4]]).all()
+    assert motion.values_of(Group.NECK)[2] == pytest.approx([0.0, 0.2])
+    assert np.isnan(motion.values_of(Group.NECK)[[0, 4]]).all()
     assert motion.rate_hz == 10.0
 
 
@@ -143,7 +143,7 @@ def test_a_live_recording_of_people_beside_the_body_that_was_given(tmp_path: Pat
     assert read_results(tmp_path / "live", 2).state == read_results(tmp_path / "one").state
 
 
-STAMP_NS = columns().index("stamp_ns")
+STAMP_NS = tuple(units()).index("stamp_ns")
 
 
 def without_column(rows: list[list[str]]) -> None:

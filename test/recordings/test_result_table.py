@@ -17,7 +17,6 @@ from cardbox_tracker.common.errors import CardboxError
 from cardbox_tracker.person.skeleton import KeypointState
 from cardbox_tracker.recordings.result_table import (
     check_table,
-    columns,
     result_table,
     row_of,
     units,
@@ -92,8 +91,8 @@ STAMP_NS, STAMP = 1_700_000_000_000_000_005, Decimal("1700000000.000000005")
 
 
 def test_scripts_find_the_columns_that_they_know() -> None:
-    assert columns() == HEADER + CLAVICLES + PLACE + ANATOMICAL
-    assert columns(has_points=True) == WHOLE
+    assert tuple(units()) == HEADER + CLAVICLES + PLACE + ANATOMICAL
+    assert tuple(units(has_points=True)) == WHOLE
 
 
 def test_legs_follow_all_others() -> None:
@@ -101,7 +100,7 @@ def test_legs_follow_all_others() -> None:
     values = np.arange(8) / 10, np.arange(8) / 100, np.arange(18).reshape(6, 3) / 10
     found = replace(FOUND, legs=Legs(*values, np.arange(6) / 10, states))
     row = row_of(STAMP_NS, 1.0, found, has_points=True)
-    named = dict(zip(columns(has_points=True), row, strict=True))
+    named = dict(zip(units(has_points=True), row, strict=True))
     assert named["right_knee_flexion"] == 0.7
     assert named["right_knee_flexion_stddev_rad"] == 0.07
     assert (named["left_knee_x"], named["right_ankle_z"]) == pytest.approx((0.3, 1.7))
@@ -129,7 +128,7 @@ def test_a_row_without_an_estimate_by_hand(state: str) -> None:
 
 @pytest.mark.parametrize("state", ["tracking", "uncertain"])
 def test_a_row_by_hand(state: str) -> None:
-    row = dict(zip(columns(), row_of(42, 1.5, replace(PLACED, state=state)), strict=True))
+    row = dict(zip(units(), row_of(42, 1.5, replace(PLACED, state=state)), strict=True))
     assert [row[name] for name in HEADER[:4]] == [Decimal("0.000000042"), state, 0.0, 0.1]
     assert (row["stamp_ns"], row["time_s"]) == (42, 1.5)
     assert (row["right_elbow_flexion"], row["right_elbow_flexion_stddev_rad"]) == (1.1, 0.11)
@@ -137,7 +136,7 @@ def test_a_row_by_hand(state: str) -> None:
     assert (row["cost"], row["iou"]) == (812, 0.87654)
     assert (row["torso_x"], row["torso_z"]) == (0.25, -0.05)
     assert (row["torso_x_stddev_m"], row["torso_z_stddev_m"]) == (0.03, 0.01)
-    still = dict(zip(columns(), row_of(42, 1.5, FOUND), strict=True))
+    still = dict(zip(units(), row_of(42, 1.5, FOUND), strict=True))
     assert (still["torso_x"], still["torso_x_stddev_m"]) == (0.0, 0.0)
     unsure = row_of(42, 1.5, replace(FOUND, posture_stddev=None))
     first = HEADER.index("torso_y_stddev_m")
@@ -147,7 +146,7 @@ def test_a_row_by_hand(state: str) -> None:
 def test_keypoints_have_states_and_chances() -> None:
     states = tuple(KeypointState(one) for one in ("tracked", "uncertain", "hidden") * 2)
     known = replace(PLACED, keypoint_states=states, keypoint_chances=np.arange(6) / 10)
-    row = dict(zip(columns(), row_of(42, 1.5, known), strict=True))
+    row = dict(zip(units(), row_of(42, 1.5, known), strict=True))
     assert (row["left_elbow_state"], row["right_hand_state"]) == ("uncertain", "hidden")
     assert (row["left_shoulder_chance"], row["right_hand_chance"]) == (0.0, 0.5)
     unknown = row_of(42, 1.5, PLACED)
@@ -165,7 +164,13 @@ def test_the_clavicles_follow_the_neck() -> None:
         SEEN, clavicles_m=np.array([0.02, 0.0]), clavicles_stddev_m=np.array([0.003, 0.001])
     )
     for has_points in (False, True):
-        row = dict(zip(columns(has_points), row_of(42, 1.5, raised, has_points), strict=True))
+        row = dict(
+            zip(
+                tuple(units(has_points)),
+                row_of(42, 1.5, raised, has_points=has_points),
+                strict=True,
+            )
+        )
         assert [row[name] for name in CLAVICLES] == [0.02, 0.0, 0.003, 0.001]
 
 
@@ -189,7 +194,7 @@ def test_hands_follow_all_other_columns_and_are_empty_where_unknown() -> None:
     wrist = np.array([0.1, -0.2, np.nan])
     seen = Hand(0.9, np.array([0.0, 0.6, -0.8]), wrist, np.array([0.3, 0.4, np.nan]))
     small = seen._replace(open=None, wrist=np.array([0.5, 0.6, 0.7]))
-    names = columns(has_points=True, has_people=True, has_hands=True)
+    names = tuple(units(has_points=True, has_people=True, has_hands=True))
     assert names == (*UPPER, "person", "person_chance", *HANDS, *LEGS)
     cells = row_of(42, 1.5, replace(SEEN, hands=(seen, None)), has_hands=True)[-20:]
     first = [0.9, 0.0, 0.6, -0.8, 0.1, -0.2, None]
@@ -248,7 +253,7 @@ def test_the_page_lists_all_columns_in_their_order() -> None:
 
 
 def test_of_several_people_the_number_comes_last() -> None:
-    assert columns(has_people=True) == (*columns(), "person", "person_chance")
+    assert tuple(units(has_people=True)) == (*units(), "person", "person_chance")
     found = replace(FOUND, person=2, person_chance=0.9)
     assert row_of(42, 1.5, found, has_people=True)[-2:] == [2, 0.9]
     nobody = Estimate("no_person", person=1)

@@ -16,20 +16,20 @@ from cardbox_tracker.applications.drawing.video import overlay_video
 from cardbox_tracker.common.errors import BagError, CardboxError
 from cardbox_tracker.measuring.config import InitializationConfig
 from cardbox_tracker.person.kinematics import pose
-from cardbox_tracker.person.legs import LEG_NAMES
 from cardbox_tracker.person.model_file import loads_body_model
 from cardbox_tracker.person.skeleton import (
     JOINT_NAMES,
-    JOINT_STATE_NAMES,
     KEYPOINT_NAMES,
     PLACE_NAMES,
+    Group,
+    names_of,
 )
 from cardbox_tracker.person.urdf import LinkTransforms
 from cardbox_tracker.recordings.bag_reader import BagReader
 from cardbox_tracker.recordings.initialize import describe, initialize_from_recording
 from cardbox_tracker.recordings.recording import Recording
 from cardbox_tracker.recordings.result_bag import result_bag
-from cardbox_tracker.recordings.result_table import columns
+from cardbox_tracker.recordings.result_table import units
 from cardbox_tracker.recordings.silhouettes import SilhouetteSource, TimeSpan
 from cardbox_tracker.recordings.track import TrackSummary, track_recording
 from cardbox_tracker.search.config import default_preset
@@ -122,7 +122,7 @@ def test_there_is_one_row_an_image_with_its_stamp(
 ) -> None:
     summary = track(recording, source, tmp_path / "person.csv")
     text = (tmp_path / "person.csv").read_text()
-    assert text.splitlines()[0] == ",".join(columns())
+    assert text.splitlines()[0] == ",".join(units())
     assert text.endswith("\n")
     assert "\r" not in text
     rows = rows_of(tmp_path / "person.csv")
@@ -172,7 +172,7 @@ def test_what_is_not_known_is_left_empty(
     assert len(empty) >= 20
     assert summary.frames_tracked <= len(rows) - len(empty)
     for row in rows:
-        names = [name for name in columns() if name not in KNOWN]
+        names = [name for name in units() if name not in KNOWN]
         # The plane of a hanging arm is not determined.
         values = {row[name] for name in names if not name.endswith("_plane_deg")}
         assert ("" in values) == (row["state"] in ("lost", "no_person"))
@@ -274,7 +274,7 @@ def test_the_bag_of_results_holds_what_the_tracker_would_publish(
     ):
         for header in (state.header, points.header):
             assert header.stamp.sec * 10**9 + header.stamp.nanosec == int(row["stamp_ns"])
-        assert tuple(state.name) == (*JOINT_STATE_NAMES, *LEG_NAMES)
+        assert tuple(state.name) == names_of(*{*Group} - {Group.HAND})
         # Without a detector the table has no neck, which does not turn.
         expected = [float(row.get(name, 0.0)) for name in state.name]
         np.testing.assert_allclose(state.position, expected, atol=5.1e-7)

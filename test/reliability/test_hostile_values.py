@@ -207,7 +207,7 @@ def tables(tmp_path: Path) -> dict[str, tuple[Callable[[Path], Any], list[list[s
         offset_stddev_m=np.zeros(2),
     )
     blank = np.zeros(SIZE[::-1], np.uint8)
-    with result_table(tmp_path / "results.csv", False) as add:
+    with result_table(tmp_path / "results.csv") as add:
         for number in range(2):
             add(RecordedFrame(number * 10**8, number / 10, blank, blank), estimate)
     with (tmp_path / "results.csv").open(newline="") as file:

@@ -6,8 +6,9 @@ from typing import Any
 
 import pytest
 
-from cardbox_tracker.segmentation.scene_motion import STILL, SceneMotion
+from cardbox_tracker.segmentation.scene_motion import SceneMotion
 
+STILL = 0.006
 IMAGES = 30
 
 

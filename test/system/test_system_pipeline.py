@@ -23,16 +23,15 @@ from std_msgs.msg import Header, String
 from visualization_msgs.msg import Marker, MarkerArray
 
 from cardbox_tracker.person.kinematics import pose
-from cardbox_tracker.person.legs import LEG_NAMES
 from cardbox_tracker.person.model_file import loads_body_model
 from cardbox_tracker.person.posture import N_STATE, reference_posture
-from cardbox_tracker.person.skeleton import JOINT_NAMES, JOINT_STATE_NAMES
+from cardbox_tracker.person.skeleton import JOINT_NAMES, Group, names_of
 from cardbox_tracker.ros.messages.conversions import camera_info_message, image_message
 from cardbox_tracker.ros.runtime import qos
 from cardbox_tracker.tracking.estimate import Estimate
 
 LEARN_IMAGES = 10
-ALL_NAMES = (*JOINT_STATE_NAMES, *LEG_NAMES)
+ALL_NAMES = names_of(*{*Group} - {Group.HAND})
 
 
 class Session:

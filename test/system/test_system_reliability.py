@@ -27,12 +27,11 @@ from std_srvs.srv import Trigger
 
 from cardbox_tracker.person.model_file import dumps_body_model, save_body_model
 from cardbox_tracker.person.skeleton import PLACE_NAMES
-from cardbox_tracker.recordings.outputs import posture_from, values_from
+from cardbox_tracker.recordings.outputs import joints_of
 from cardbox_tracker.ros.messages.conversions import (
     camera_info_message,
     image_message,
 )
-from cardbox_tracker.ros.messages.results import joint_values_of
 from cardbox_tracker.ros.runtime import qos
 from cardbox_tracker.search.config import default_preset
 from cardbox_tracker.tracking.tracker import Tracker
@@ -143,10 +142,10 @@ class Live:
     def found(self) -> list[Found]:
         made = []
         for message in self.joint_states:
-            joints = joint_values_of(message)
+            joints = joints_of(message)
             stamp = message.header.stamp
             stamp_ns = stamp.sec * S + stamp.nanosec
-            made.append(Found(stamp_ns, posture_from(joints), values_from(joints, PLACE_NAMES)))
+            made.append(Found(stamp_ns, joints.posture, joints.of(PLACE_NAMES)))
         return made
 
     def next_run(self) -> float:

@@ -23,10 +23,10 @@ from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.parts import BodyParts, Part, body_parts, shape_of
 from cardbox_tracker.person.posture import JOINT_LIMITS, LEFT_ARM, RIGHT_ARM, TORSO
 from cardbox_tracker.person.sizes import DEFAULT_SIZES, SIZE_INDEX, SIZE_LIMITS
+from cardbox_tracker.terms.bit_planes import fill_planes, new_planes
 from cardbox_tracker.terms.cardbox_kernels import trunk_costs
 from cardbox_tracker.terms.compiled import CompiledSilhouette
 from cardbox_tracker.terms.kernel_arguments import intrinsics_of, place_of
-from cardbox_tracker.terms.row_sums import fill_row_sums
 from cardbox_tracker.terms.silhouette import SilhouetteTerm, rows_above_hips
 from lab.experiments.reference import ReferenceSilhouette
 
@@ -179,11 +179,12 @@ def test_a_trunk_with_a_neck_is_equal(case: Case) -> None:
     parts, shoulder = shape_of(case.body.sizes, 0.6)
     cardbox = parts, shoulder, place_of(case.body), intrinsics_of(case.camera)
     torsos = np.ascontiguousarray(case.postures[:, TORSO])
-    row_sums = np.zeros((compiled.rows, case.camera.width + 1), np.int32)
+    planes = new_planes(case.camera.width, compiled.rows)
     silhouette = case.silhouette[: compiled.rows]
-    silhouette_px = fill_row_sums(silhouette, np.zeros((1, 0), np.uint64), row_sums)
+    silhouette_px = fill_planes(silhouette, np.zeros((1, 0), np.uint64), planes)
     got = np.zeros(len(torsos), np.int64)
-    trunk_costs(torsos, cardbox, row_sums, silhouette_px, got)
+    size = compiled.rows, case.camera.width
+    trunk_costs(torsos, cardbox, size, planes, silhouette_px, got)
     for cost, posture in zip(got, case.postures, strict=True):
         patches = cardbox_patches(case.body, posture, 0.6)
         trunk = np.concatenate([patches[TORSO_PATCHES], patches[NECK_PATCHES]])

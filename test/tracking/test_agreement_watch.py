@@ -3,46 +3,44 @@
 from __future__ import annotations
 
 import threading
+from concurrent.futures import ThreadPoolExecutor
 
-from cardbox_tracker.tracking.camera_agreement import AgreementWatch
+import pytest
+
+from cardbox_tracker.camera.camera import Camera
+from cardbox_tracker.person.model import BodyModel
+from cardbox_tracker.tracking.camera_agreement import CameraAgreement
+from cardbox_tracker.tracking.session import Session
+
+CAMERA = Camera(64, 48, 60.0, 60.0, 31.5, 23.5)
 
 
-class Agreement:
-    """Stands for a CameraAgreement whose check lasts until it is let go."""
+class Agreement(CameraAgreement):
+    """A check that lasts until it is let go."""
+
+    is_due = True
 
     def __init__(self) -> None:
-        self.is_due = True
-        self.turned_deg: list[float | None] = [None]
-        self.rolled_deg: list[float | None] = [None]
-        self.checks = 0
-        self.go_on = threading.Event()
+        super().__init__(BodyModel(), CAMERA, [])
+        self.checks, self.go_on = 0, threading.Event()
 
-    def check(self) -> None:
+    def check(self, is_last: bool = False) -> None:
         self.checks += 1
         assert self.go_on.wait(60)
-        self.turned_deg = [2.0]
+        raise OverflowError
 
 
-def test_a_check_runs_beside_the_tracking_and_is_said() -> None:
-    watch, agreement = AgreementWatch(["left", "right"]), Agreement()
-    assert watch.values() == {}
-    for _ in range(3):
-        watch.see(agreement)  # type: ignore[arg-type]
-    unknown = {"right turned (deg)": "not yet known", "right rolled (deg)": "not yet known"}
-    assert watch.values() == unknown
-    # Python waits for those that are no daemons; others in compiled code abort it at its end.
-    assert [one.daemon for one in threading.enumerate() if one.name == "agreement"] == [False]
-    agreement.go_on.set()
-    watch.wait()
+def test_a_check_runs_beside_the_tracking_and_its_error_is_raised() -> None:
+    agreement = Agreement()
+    with ThreadPoolExecutor(1) as beside:
+        session = Session([BodyModel()], CAMERA, beside=beside)
+        session.trackers[0].agreement = agreement
+        for _ in range(3):
+            session.check_cameras()
+        agreement.go_on.set()
     assert agreement.checks == 1
-    assert watch.values() == unknown | {"right turned (deg)": "2.0"}
-
-
-def test_nothing_is_checked_before_it_is_due() -> None:
-    watch, agreement = AgreementWatch(["left", "right"]), Agreement()
+    with pytest.raises(OverflowError):
+        session.check_cameras()
     agreement.is_due = False
-    watch.see(agreement)  # type: ignore[arg-type]
-    watch.see(None)
-    watch.wait()
-    assert agreement.checks == 0
-    assert watch.values() == {}
+    session.check_cameras()
+    assert agreement.checks == 1

@@ -15,9 +15,9 @@ from cardbox_tracker.measuring import first_sight, seen_body
 from cardbox_tracker.measuring.first_sight import FirstSight
 from cardbox_tracker.measuring.people_camera import Distances
 from cardbox_tracker.measuring.seen_body import MOST_SIGHTS, SeenBody
-from cardbox_tracker.person.model import BodyModel
+from cardbox_tracker.person.model import BodyModel, body_from_proportions
 from cardbox_tracker.person.posture import reference_posture
-from cardbox_tracker.person.proportions import body_from_proportions, sizes_of_stature
+from cardbox_tracker.person.proportions import sizes_of_stature
 from cardbox_tracker.person.sizes import SIZE_INDEX
 from cardbox_tracker.search.config import default_preset
 from cardbox_tracker.tracking.estimate import LOST, TRACKING, UNCERTAIN, Estimate

@@ -13,9 +13,8 @@ from cardbox_tracker.camera.camera import Camera
 from cardbox_tracker.camera.rasterisation import render
 from cardbox_tracker.detectors.image_points import POINT_INDEX, POINT_NAMES, ImagePoints
 from cardbox_tracker.person.cardbox import cardbox_patches
-from cardbox_tracker.person.model import BodyModel
+from cardbox_tracker.person.model import BodyModel, body_from_proportions
 from cardbox_tracker.person.posture import reference_posture
-from cardbox_tracker.person.proportions import body_from_proportions
 from cardbox_tracker.person.skeleton import KeypointState
 from cardbox_tracker.search.config import default_preset
 from cardbox_tracker.terms.term import Frame
@@ -149,17 +148,6 @@ def test_a_stature_that_contradicts_the_given_distance_is_told(
         assert shown_m in watch.contradiction and "2.0 m" in watch.contradiction
         # The place is off by what the two sources differ by.
         assert place.stddev_m[0] >= abs(2.0 * stature_m / 1.80 - 2.0)
-
-
-@pytest.mark.parametrize(("first", "is_told"), [(1.10, False), (1.25, True)])
-def test_a_contradiction_lasts_until_the_sources_agree(first: float, is_told: bool) -> None:
-    """A tenth is too little to be told, and too much for an end."""
-    watch = PlaceWatch(TALL, CAMERA)
-    shown = [first] * 5 + [1.10] * 9
-    for number, factor in enumerate(shown):
-        frame = replace(frames(points_at(2.0 * factor))[0], stamp_ns=number * 10**8)
-        watch.see(estimate_at(2.0, TALL), TALL, frame)
-    assert bool(watch.contradiction) is is_told
 
 
 def test_a_body_that_is_too_large_makes_the_shape_uncertain() -> None:

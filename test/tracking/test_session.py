@@ -19,9 +19,8 @@ from cardbox_tracker.camera.view import OtherCamera, View
 from cardbox_tracker.detectors.identity import OTHER, cheapest
 from cardbox_tracker.detectors.image_points import ImagePoints
 from cardbox_tracker.person.cardbox import cardbox_patches
-from cardbox_tracker.person.model import BodyModel
+from cardbox_tracker.person.model import BodyModel, body_from_proportions
 from cardbox_tracker.person.posture import N_STATE, TORSO_Y, reference_posture
-from cardbox_tracker.person.proportions import body_from_proportions
 from cardbox_tracker.person.skeleton import KeypointState
 from cardbox_tracker.search.config import default_preset
 from cardbox_tracker.terms.outline import Outline

@@ -32,8 +32,8 @@ from cardbox_tracker.search.config import (
     default_preset,
     paper_preset,
 )
-from cardbox_tracker.search.cycles import Cycles
 from cardbox_tracker.search.doubt import HANDS, Source, models
+from cardbox_tracker.search.hierarchy import Cycles
 from cardbox_tracker.terms.compiled import CompiledObservation, CompiledSilhouette
 from cardbox_tracker.terms.term import Frame, Posed, TermObservation, TorsoCosts
 from cardbox_tracker.terms.whole_body import WholeBodyCost

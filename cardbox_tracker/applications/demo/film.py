@@ -1,9 +1,9 @@
 """The film of ``cardbox demo``, what a detector found in it, and where the joints really were.
 
-``film.mp4`` is from github.com/sarkadava/MotionTrackingPipeline_Workshop_ZAS2025 (CC0 1.0), as
-``lab/tools/demo_film.py`` made it: turned until the camera looks at its middle, with a blurred
-face. ``film.npz`` has the reference from three cameras, and what MediaPipe Pose found in the sharp
-images: points in the image and in space, and masks of one bit a pixel.
+``film.mp4`` is from github.com/sarkadava/MotionTrackingPipeline_Workshop_ZAS2025 (CC0 1.0), turned
+until the camera looks at its middle, with a blurred face. ``film.npz`` has the reference from three
+cameras, and what MediaPipe Pose found in the sharp images: points in the image and in space, and
+masks of one bit a pixel.
 """
 
 from __future__ import annotations

@@ -30,6 +30,8 @@ from cardbox_tracker.applications.ergonomics.recording import RulaRow
 from cardbox_tracker.applications.ergonomics.rula import (
     INDEPENDENT,
     NOT_MEASURED,
+    PARTS,
+    POSTURE_ROWS,
     SAMPLES,
     WRISTS,
     ErgonomicConfig,
@@ -39,7 +41,7 @@ from cardbox_tracker.applications.ergonomics.rula import (
     Scores,
     distribution_of,
     elbow_scores,
-    measured_wrists,
+    measured_parts,
     neck_samples,
     neck_scores,
     of_both_arms,
@@ -50,14 +52,14 @@ from cardbox_tracker.applications.ergonomics.rula import (
     with_arms,
     wrist_samples,
     wrist_scores,
+    wrists_of,
 )
 from cardbox_tracker.common.errors import CardboxError
 from cardbox_tracker.common.settings import setting
-from cardbox_tracker.person.hands import WRIST_NAMES
-from cardbox_tracker.person.legs import LEG_KEYPOINT_NAMES, LEG_NAMES, leg_directions
+from cardbox_tracker.person.legs import LEG_KEYPOINT_NAMES, leg_directions
 from cardbox_tracker.person.posture import PITCH
 from cardbox_tracker.person.sizes import FloatArray
-from cardbox_tracker.person.skeleton import JOINT_NAMES, NECK_NAMES, KeypointState
+from cardbox_tracker.person.skeleton import LEG_NAMES, STATE_NAMES, KeypointState
 from cardbox_tracker.recordings.result_reader import Results
 from cardbox_tracker.recordings.result_table import LEG_POINT_COLUMNS, POINT_COLUMNS
 from cardbox_tracker.search.particles import normal_postures
@@ -191,15 +193,21 @@ class Seen(NamedTuple):
     stamp_ns: int  #: its stamp
     time_s: float  #: seconds from the recording's start
     state: str  #: of the tracker
-    #: d1..d12 and their standard deviations, (2, 12); None without a posture
-    posture: FloatArray | None
-    #: ``neck_yaw`` and ``neck_pitch`` and their deviations, (2, 2); None if unknown
-    neck: FloatArray | None
-    wrists: FloatArray  #: see :func:`.rula.wrist_samples`
-    #: ``LEG_NAMES`` and their deviations, (2, 8); None unless both legs are ``tracked``
-    legs: FloatArray | None
+    #: values and deviations of ``STATE_NAMES``, (2, n), rad and m; nan where they are unknown, and
+    #: for legs unless both are ``tracked``
+    joints: FloatArray
     #: hips to shoulders, then thigh and shank of the left and the right leg, (5,)
     lengths_m: FloatArray
+
+    @property
+    def has_posture(self) -> bool:
+        """Whether the posture is known."""
+        return bool(np.isfinite(self.joints[:, POSTURE_ROWS]).all())
+
+    @property
+    def measured(self) -> frozenset[str]:
+        """Names of the known ones among neck, legs and wrists."""
+        return measured_parts(self.joints)
 
 
 def images_of(results: Results) -> list[Seen]:
@@ -217,27 +225,11 @@ def images_of(results: Results) -> list[Seen]:
     bones_m = np.linalg.norm(np.diff(legs_m, axis=2), axis=-1).reshape(len(legs_m), 4)
     states = [results.texts_of(f"{name}_state") for name in LEG_KEYPOINT_NAMES]
     are_tracked = np.all(np.array(states) == KeypointState.TRACKED, axis=0)
-    posture, neck, legs, *wrists = (
-        _pairs(results, names) for names in (JOINT_NAMES, NECK_NAMES, LEG_NAMES, *WRIST_NAMES)
-    )
-
-    def known(pair: FloatArray) -> FloatArray | None:
-        return pair if np.isfinite(pair).all() else None
-
-    return [
-        Seen(
-            *(stamp_ns, float(results.time_s[i]), results.state[i]),
-            *(known(posture[i]), known(neck[i]), np.stack([one[i] for one in wrists], axis=1)),
-            *(known(legs[i]) if are_tracked[i] else None, np.hstack([trunk_m[i], bones_m[i]])),
-        )
-        for i, stamp_ns in enumerate(results.stamp_ns.tolist())
-    ]
-
-
-def _pairs(results: Results, names: Sequence[str]) -> FloatArray:
-    """Return values and deviations (n, 2, k) of joints; nan unless all of them are known."""
-    both = np.stack([results.of(names), results.deviations_of(names)], axis=1)
-    return np.where(np.isfinite(both).all(axis=(1, 2), keepdims=True), both, np.nan)
+    joints = np.stack([results.of(STATE_NAMES), results.deviations_of(STATE_NAMES)], axis=1)
+    joints[np.ix_(~are_tracked, [0, 1], PARTS["legs"])] = np.nan
+    lengths_m = np.column_stack([trunk_m, bones_m])
+    times = zip(results.stamp_ns.tolist(), results.time_s.tolist(), results.state, strict=True)
+    return [Seen(*at, *of) for at, *of in zip(times, joints, lengths_m, strict=True)]
 
 
 def score_table(images: Sequence[Seen], config: RebaConfig, seed: int) -> list[RulaRow]:
@@ -248,10 +240,9 @@ def score_table(images: Sequence[Seen], config: RebaConfig, seed: int) -> list[R
         RulaRow(
             seen.stamp_ns,
             seen.state,
-            None if seen.posture is None else _distribution(seen, config, rng, is_sitting),
+            _distribution(seen, config, rng, is_sitting) if seen.has_posture else None,
             seen.time_s,
-            frozenset(name for name in ("neck", "legs") if getattr(seen, name) is not None)
-            | measured_wrists(seen.wrists),
+            seen.measured,
         )
         for seen, is_sitting in zip(images, is_seated, strict=True)
     ]
@@ -261,10 +252,10 @@ def _seated(images: Sequence[Seen]) -> list[bool]:
     """Return for each image whether the person is seen to sit; hidden legs change nothing."""
     found, run, began_ns, last_ns = [False] * len(images), list[int](), 0, 0
     for number, seen in enumerate(images):
-        if seen.legs is None or seen.posture is None:
+        if not seen.has_posture or "legs" not in seen.measured:
             continue
-        pitch = np.asarray(seen.posture[0, PITCH])
-        if not sits(seen.legs[0], pitch, seen.lengths_m):
+        values = seen.joints[0]
+        if not sits(values[PARTS["legs"]], values[PITCH], seen.lengths_m):
             run.clear()
             continue
         if not run or seen.stamp_ns - last_ns > _SITS_NS:
@@ -280,20 +271,20 @@ def _seated(images: Sequence[Seen]) -> list[bool]:
 def _distribution(
     seen: Seen, config: RebaConfig, rng: np.random.Generator, is_seated: bool
 ) -> ScoreDistribution:
-    assert seen.posture is not None
-    mean, stddev = seen.posture
+    mean, stddev = seen.joints[:, POSTURE_ROWS]
     postures = normal_postures(mean, INDEPENDENT * stddev, SAMPLES, rng)
-    necks = legs = None
-    if seen.neck is not None:
-        necks = neck_samples(seen.neck[0], INDEPENDENT * seen.neck[1], SAMPLES, rng)
-    if seen.legs is not None:
-        angles, deviations = seen.legs
-        legs = angles + INDEPENDENT * deviations * rng.standard_normal((SAMPLES, len(angles)))
-    wrists = wrist_samples(seen.wrists, SAMPLES, rng)
+    neck = necks = leg = legs = None
+    if "neck" in seen.measured:
+        neck, spread = seen.joints[:, PARTS["neck"]]
+        necks = neck_samples(neck, INDEPENDENT * spread, SAMPLES, rng)
+    if "legs" in seen.measured:
+        leg, spread = seen.joints[:, PARTS["legs"]]
+        legs = leg + INDEPENDENT * spread * rng.standard_normal((SAMPLES, len(leg)))
+    wrists = wrists_of(seen.joints)
     rest = seen.lengths_m, is_seated
-    scores = reba_scores(postures, config, necks, legs, wrists, *rest)
-    neck, leg = (None if one is None else one[0] for one in (seen.neck, seen.legs))
-    of_mean = reba_scores(mean, config, neck, leg, seen.wrists[0], *rest)
+    drawn = wrist_samples(wrists, SAMPLES, rng)
+    scores = reba_scores(postures, config, necks, legs, drawn, *rest)
+    of_mean = reba_scores(mean, config, neck, leg, wrists[0], *rest)
     return distribution_of(scores, REBA, int(of_mean["grand"]))
 
 

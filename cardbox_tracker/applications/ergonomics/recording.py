@@ -122,13 +122,8 @@ class RulaObserver:
         scores, measured = None, frozenset[str]()
         if estimate.posture is not None:
             postures = tracker.sample(estimate, SAMPLES, self._rng)
-            neck = estimate.neck, estimate.neck_stddev
-            wrists = np.full((2, 2, 2), np.nan)
-            for number, hand in enumerate(estimate.hands or ()):
-                if hand is not None:
-                    wrists[:, number] = hand.wrist[:2], hand.wrist_stddev[:2]
             scores, measured = sampled_scores(
-                tracker.body, estimate.posture, postures, neck, wrists, self._config, self._rng
+                tracker.body, estimate.joints, postures, self._config, self._rng
             )
         row = RulaRow(frame.stamp_ns, estimate.state, scores, frame.time_s, measured)
         self.rows.append(row)

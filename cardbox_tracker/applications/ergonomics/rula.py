@@ -33,18 +33,31 @@ from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.parts import body_parts
 from cardbox_tracker.person.posture import LEFT_ARM, PITCH, RIGHT_ARM, ROLL
 from cardbox_tracker.person.sizes import FloatArray
-from cardbox_tracker.person.skeleton import NECK_LIMITS, arm_directions
+from cardbox_tracker.person.skeleton import (
+    NECK_LIMITS,
+    POSTURE_GROUPS,
+    Group,
+    arm_directions,
+    rows_of,
+)
 
 MEASURED, DECLARED, MIXED = "measured", "declared", "mixed"
 """Origins of a part score; tables and the grand score are mixed."""
 NOT_SEEN = "declared, not seen"
 WRISTS = "left_wrist", "right_wrist"
+POSTURE_ROWS = rows_of(*POSTURE_GROUPS)
+PARTS = {
+    "neck": rows_of(Group.NECK),
+    "legs": rows_of(Group.LEG),
+    **{f"{side}_wrist": rows_of(Group.HAND, side=side)[1:] for side in ("left", "right")},
+}
+"""Rows of the state of neck, legs, and flexion and deviation of the wrists."""
 """Parts that share the declared input ``wrist``."""
 
 NOT_MEASURED = "declared, since it is not measured"
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class ErgonomicConfig(Settings):
     """What no image shows, of both methods.
 
@@ -63,7 +76,7 @@ class ErgonomicConfig(Settings):
     )
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class RulaConfig(ErgonomicConfig):
     """Settings of RULA."""
 
@@ -308,6 +321,15 @@ def neck_samples(
     return np.asarray(np.clip(drawn, NECK_LIMITS[:, 0], NECK_LIMITS[:, 1]))
 
 
+def wrists_of(joints: FloatArray) -> FloatArray:
+    """Return flexion and deviation of both wrists, and standard deviations, (2, 2, 2), of a state.
+
+    The state is (2, n), see below; a wrist whose deviations are unknown is nan.
+    """
+    wrists = joints[:, [PARTS[name] for name in WRISTS]]
+    return np.where(np.isfinite(wrists[1]), wrists, np.nan)
+
+
 def wrist_samples(wrists: FloatArray, count: int, rng: np.random.Generator) -> FloatArray | None:
     """Return normal samples (count, 2, 2) of the wrists, rad; None if both are unknown.
 
@@ -321,39 +343,32 @@ def wrist_samples(wrists: FloatArray, count: int, rng: np.random.Generator) -> F
     return np.asarray(mean + stddev * rng.standard_normal((count, 2, 2)))
 
 
-def measured_wrists(wrists: FloatArray) -> frozenset[str]:
-    """Return the names of those ``wrists``, see :func:`wrist_samples`, that are known."""
-    known = np.isfinite(wrists[1, :, 0]).tolist()
-    return frozenset(name for name, is_known in zip(WRISTS, known, strict=True) if is_known)
+def measured_parts(joints: FloatArray) -> frozenset[str]:
+    """Return the names of neck, legs and wrists that are known in a state, see below."""
+    return frozenset(name for name, rows in PARTS.items() if np.isfinite(joints[:, rows]).all())
 
 
 def sampled_scores(
     body: BodyModel,
-    posture: FloatArray,
+    joints: FloatArray,
     drawn: FloatArray,
-    neck: tuple[FloatArray | None, FloatArray | None],
-    wrists: FloatArray,
     config: RulaConfig,
     rng: np.random.Generator,
 ) -> tuple[ScoreDistribution, frozenset[str]]:
     """Return the scores of an uncertain posture, and which of the measurable parts are measured.
 
-    ``posture`` (12,) is the mean, ``drawn`` (n, 12) are samples with its whole deviation, rad and
-    m; ``neck`` are its angles and their standard deviations, (2,) each, rad, or None. ``wrists``
-    are as in :func:`wrist_samples`.
+    ``joints`` (2, n) are values and deviations of ``STATE_NAMES``, nan where they are unknown,
+    ``drawn`` (m, 12) are samples of the posture with its whole deviation, rad and metres.
     """
-    angles, stddev = neck
-    necks, measured = None, measured_wrists(wrists)
-    if angles is None or stddev is None:
-        angles = None
-    else:
-        necks = neck_samples(angles, INDEPENDENT * stddev, len(drawn), rng)
-        measured |= {"neck"}
+    measured, neck, necks = measured_parts(joints), None, None
+    posture, wrists = joints[0, POSTURE_ROWS], wrists_of(joints)
+    if "neck" in measured:
+        neck, stddev = joints[:, PARTS["neck"]]
+        necks = neck_samples(neck, INDEPENDENT * stddev, len(drawn), rng)
     bent = wrist_samples(wrists, len(drawn), rng)
     found = score_distribution(body, posture + INDEPENDENT * (drawn - posture), config, necks, bent)
-    known = np.where(np.isfinite(wrists[1]), wrists[0], np.nan)
-    of_mean = rula_scores(body, posture, config, angles, known)["grand"]
-    return found._replace(of_mean=int(of_mean)), measured
+    of_mean = rula_scores(body, posture, config, neck, wrists[0])["grand"]
+    return found._replace(of_mean=int(of_mean)), measured & {*RULA.measurable}
 
 
 def score_distribution(

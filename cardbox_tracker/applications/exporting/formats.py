@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -21,7 +21,7 @@ from cardbox_tracker.measuring.scene import Scene, load_scene
 from cardbox_tracker.person.isb_angles import ISB_NAMES, isb_angles
 from cardbox_tracker.person.legs import floor_m
 from cardbox_tracker.person.model import BodyModel
-from cardbox_tracker.person.skeleton import JOINT_NAMES, NECK_NAMES, PLACE_NAMES, UNITS
+from cardbox_tracker.person.skeleton import POSTURE_GROUPS, Group, joints_of
 from cardbox_tracker.recordings import result_reader
 from cardbox_tracker.recordings.result_reader import Results
 from cardbox_tracker.recordings.result_table import units
@@ -30,15 +30,15 @@ from cardbox_tracker.tracking.estimate import UNCERTAIN
 
 def write_isb(path: Path, motion: Motion, body: BodyModel | None = None) -> None:
     """Write CSV with angles of the ISB in degrees, then our joints, or raise CardboxError."""
-    names = (*JOINT_NAMES, *PLACE_NAMES, *NECK_NAMES)
-    values = np.hstack([np.degrees(isb_angles(motion.states)), motion.states, motion.neck])
+    groups = *POSTURE_GROUPS, Group.PLACE, Group.NECK
+    values = np.hstack([np.degrees(isb_angles(motion.states)), motion.values_of(*groups)])
     rows = (
         (str(stamp_ns), f"{time_s:.6f}", state, *("" if v != v else f"{v:.6f}" for v in row))
         for stamp_ns, time_s, state, row in zip(
             motion.stamp_ns.tolist(), motion.time_s, motion.state, values.tolist(), strict=True
         )
     )
-    units = (f"{name}_{UNITS[name]}" for name in names)
+    units = (f"{joint.name}_{joint.unit}" for joint in joints_of(*groups))
     header = ("stamp_ns", "time_s", "state", *(f"{name}_deg" for name in ISB_NAMES), *units)
     write_table(path, header, rows)
 
@@ -101,9 +101,11 @@ def export(results: Results, path: Path, to: Format, model: BodyModel | None = N
 
 @dataclass(frozen=True)
 class Result(Results):
-    """Results of one person, with camera and people as of ``OUT.scene.yaml`` if they are known."""
+    """Results of one person."""
 
-    scene: Scene | None = None
+    scene: Scene | None = None  #: camera and people as of ``OUT.scene.yaml``, if they are known
+    #: those of ``track(..., people=...)`` by the numbers of the people; empty for one alone
+    people: Mapping[int, Result] = field(default_factory=dict)
 
     def to_pandas(self) -> Any:
         """Return a ``pandas.DataFrame`` with a row for each image and the columns of the table.

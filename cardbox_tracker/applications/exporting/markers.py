@@ -20,12 +20,13 @@ from cardbox_tracker.applications.exporting.motion import (
 )
 from cardbox_tracker.common.extensions import optional
 from cardbox_tracker.common.files import atomic_path
-from cardbox_tracker.person.hands import WRIST_SHARE
 from cardbox_tracker.person.isb_angles import LABORATORY
 from cardbox_tracker.person.legs import legs_m
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.posture import YAW
+from cardbox_tracker.person.proportions import WRIST_SHARE
 from cardbox_tracker.person.sizes import FloatArray
+from cardbox_tracker.person.skeleton import Group
 
 KEYPOINT_MARKERS = ("LShoulder", "LElbow", "LHand", "RShoulder", "RElbow", "RHand")
 """Markers in the order of the keypoints."""
@@ -82,7 +83,9 @@ def _legs_m(motion: Motion, body: BodyModel | None) -> FloatArray:
     points_m = in_reference(motion.leg_points_m, body)
     if body is None or np.isfinite(motion.leg_stddev_m).any():
         return points_m
-    return legs_m(body, frames_of(motion, body).hip, motion.states[:, YAW], motion.legs)
+    return legs_m(
+        body, frames_of(motion, body).hip, motion.states[:, YAW], motion.values_of(Group.LEG)
+    )
 
 
 def write_trc(path: Path, motion: Motion, body: BodyModel | None) -> None:

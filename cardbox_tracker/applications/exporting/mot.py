@@ -18,7 +18,7 @@ from cardbox_tracker.person.isb_angles import LABORATORY, LEAST_BENT_RAD, thorax
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.posture import LEFT_ARM, RIGHT_ARM, YAW
 from cardbox_tracker.person.sizes import FloatArray
-from cardbox_tracker.person.skeleton import arm_directions, rotation_x, rotation_z
+from cardbox_tracker.person.skeleton import Group, arm_directions, rotation_x, rotation_z
 
 LUMBAR = ("lumbar_extension", "lumbar_bending", "lumbar_rotation")
 """Rotations about Z, X' and Y''."""
@@ -51,9 +51,10 @@ def _limbs(motion: Motion) -> dict[str, FloatArray]:
     """Return rotations (n,), rad, of legs and hands; unknown ones stay, or rest at first."""
     found: dict[str, FloatArray] = {}
     rest = 0.0, 0.0, np.pi / 2
-    for number, suffix in enumerate("lr"):
+    for number, side in enumerate(("left", "right")):
+        suffix = side[0]
         if motion.has_legs:
-            angles = held(motion.legs[:, 4 * number : 4 * number + 4]) * (1.0, -1.0, 1.0, 1.0)
+            angles = held(motion.values_of(Group.LEG, side=side)) * (1.0, -1.0, 1.0, 1.0)
             found |= {f"{name}_{suffix}": angles[:, i] for i, name in enumerate(LEG)}
         if motion.has_hands:
             angles = np.hstack([held(motion.wrists[:, number, i, None]) for i in range(3)]) + rest

@@ -11,17 +11,17 @@ from numpy.typing import NDArray
 from cardbox_tracker.camera.camera import level_to_optical
 from cardbox_tracker.common.errors import CardboxError
 from cardbox_tracker.person.kinematics import PosedBodies, pose
-from cardbox_tracker.person.legs import LEG_KEYPOINT_NAMES, LEG_NAMES, floor_m
+from cardbox_tracker.person.legs import LEG_KEYPOINT_NAMES, floor_m
 from cardbox_tracker.person.model import BodyModel, CameraPose
 from cardbox_tracker.person.sizes import FloatArray
 from cardbox_tracker.person.skeleton import (
-    JOINT_NAMES,
     KEYPOINT_NAMES,
-    NECK_NAMES,
-    PLACE_NAMES,
+    POSTURE_GROUPS,
+    STATE_NAMES,
     Group,
     KeypointState,
     joints_of,
+    rows_of,
 )
 from cardbox_tracker.recordings.result_reader import Results
 from cardbox_tracker.recordings.result_table import (
@@ -42,10 +42,7 @@ class Motion:
     stamp_ns: NDArray[np.int64]  #: stamps of the images, (n,), rising
     time_s: FloatArray  #: seconds from the start of the recording, (n,)
     state: tuple[str, ...]  #: tracking state of each image, n texts
-    #: d1..d12, ``torso_x`` and ``torso_z``, (n, 14), rad and metres; nan in gaps
-    states: FloatArray
-    #: ``neck_yaw`` and ``neck_pitch``, (n, 2), rad; nan while the face is not seen
-    neck: FloatArray
+    joints: FloatArray  #: ``STATE_NAMES``, (n, number), rad and metres; nan where they are unknown
     #: (n, 6, 3), ordered as ``KEYPOINT_NAMES``, metres in the optical frame of the first camera;
     #: nan in gaps
     keypoints_m: FloatArray
@@ -53,7 +50,6 @@ class Motion:
     #: are unknown, as all that follows
     wrists: FloatArray
     palms: FloatArray  #: normals out of the palms, (n, 2, 3), unit vectors in the optical frame
-    legs: FloatArray  #: ``LEG_NAMES``, (n, 8), rad
     #: (n, 6, 3), ordered as ``LEG_KEYPOINT_NAMES``, in the optical frame; nan where they are hidden
     leg_points_m: FloatArray
     leg_stddev_m: FloatArray  #: their standard deviations, (n, 6)
@@ -73,12 +69,10 @@ class Motion:
             results.stamp_ns,
             results.time_s,
             results.state,
-            results.of((*JOINT_NAMES, *PLACE_NAMES)),
-            results.of(NECK_NAMES),
+            results.of(STATE_NAMES),
             results.of(POINT_COLUMNS).reshape(n, len(KEYPOINT_NAMES), 3),
             results.of(WRIST_COLUMNS).reshape(n, 2, 3),
             results.of(PALM_COLUMNS).reshape(n, 2, 3),
-            results.of(LEG_NAMES),
             np.where(hidden[..., None], np.nan, points_m),
             results.of([f"{name}_stddev_m" for name in LEG_KEYPOINT_NAMES]),
         )
@@ -87,6 +81,15 @@ class Motion:
                 f"{results.path} has no image with a posture; track a recording of a person"
             )
         return motion
+
+    def values_of(self, *groups: Group, side: str = "") -> FloatArray:
+        """Return the joints of groups of the skeleton, or of one side of them, (n, k)."""
+        return self.joints[:, rows_of(*groups, side=side)]
+
+    @property
+    def states(self) -> FloatArray:
+        """d1..d12, ``torso_x`` and ``torso_z``, (n, 14), rad and metres; nan in gaps."""
+        return self.values_of(*POSTURE_GROUPS, Group.PLACE)
 
     @property
     def is_seen(self) -> NDArray[np.bool_]:
@@ -98,7 +101,7 @@ class Motion:
     @property
     def has_legs(self) -> bool:
         """Whether an image has legs."""
-        return bool(np.isfinite(self.legs).any())
+        return bool(np.isfinite(self.values_of(Group.LEG)).any())
 
     @property
     def has_hands(self) -> bool:
@@ -190,7 +193,7 @@ def frames_of(motion: Motion, body: BodyModel) -> PosedBodies:
     rigid = pose(body.rigid, motion.states)
     shoulders_m = in_reference(motion.keypoints_m, body)[:, SHOULDERS]
     moved_m = shoulders_m - rigid.keypoints_m[:, SHOULDERS]
-    axes = np.array([joint.axis for joint in joints_of(Group.CLAVICLES)])
+    axes = np.array([joint.axis for joint in joints_of(Group.CLAVICLE)])
     rise_m = np.einsum("nkj,nji,ki->nk", moved_m, rigid.torso_rotation, axes)
     return pose(body, motion.states, clavicles_m=rise_m)
 

@@ -13,17 +13,23 @@ from cardbox_tracker.applications.drawing.page import png_of, render_page
 from cardbox_tracker.applications.exporting.markers import markers_of
 from cardbox_tracker.applications.exporting.motion import Motion, floor_below, in_reference
 from cardbox_tracker.person.isb_angles import LABORATORY
-from cardbox_tracker.person.legs import LEG_NAMES
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.sizes import FloatArray
-from cardbox_tracker.person.skeleton import JOINT_NAMES, NECK_NAMES, UNITS
+from cardbox_tracker.person.skeleton import Group, names_of
 from cardbox_tracker.recordings.result_reader import Results
 from cardbox_tracker.tracking.estimate import TRACKING, UNCERTAIN
 
 STATE_COLOURS = {UNCERTAIN: "#e69f00", "": "#9a9a9a"}
 """Colours of times whose posture may be wrong, and of those without one."""
-_ANGLES = [name for name in (*JOINT_NAMES, *NECK_NAMES) if UNITS[name] == "rad"] + [*LEG_NAMES]
-_GROUPS = ("torso", "neck", "left arm", "right arm", "left leg", "right leg")
+_JOINTS = {
+    "torso": names_of(Group.TORSO)[1:],
+    "neck": names_of(Group.NECK),
+    **{
+        f"{side} {group}": names_of(group, side=side)
+        for group in (Group.ARM, Group.LEG)
+        for side in ("left", "right")
+    },
+}
 _DPI = 100
 
 _TRUNK, _LEFT, _RIGHT, _TRUE = "#4073bf", "#33b366", "#d97333", "#00b4d8"
@@ -37,7 +43,10 @@ def angles_plot(results: Results) -> bytes:
     """Return the joint angles over time as PNG, each with a band of one standard deviation."""
     from matplotlib.figure import Figure
 
-    groups = {name: _joints_of(name, results) for name in _GROUPS}
+    groups = {
+        name: [joint for joint in joints if np.isfinite(results.of([joint])).any()]
+        for name, joints in _JOINTS.items()
+    }
     shown = {name: joints for name, joints in groups.items() if joints} or {"torso": []}
     figure = Figure(figsize=(10.0, 2.2 * len(shown)), dpi=_DPI, layout="constrained")
     time_s = results.time_s
@@ -65,17 +74,6 @@ def angles_plot(results: Results) -> bytes:
         "time [s]; bands: one standard deviation; orange: may be wrong, grey: no posture"
     )
     return png_of(figure)
-
-
-def _joints_of(group: str, results: Results) -> list[str]:
-    """Return the joints of a group, such as ``left arm``, that have a value in the results."""
-    side, _, limb = group.partition(" ")
-    found = []
-    for name in _ANGLES:
-        is_of_group = name.startswith(side) and (not limb or (name in LEG_NAMES) == (limb == "leg"))
-        if is_of_group and np.isfinite(results.of([name])).any():
-            found.append(name)
-    return found
 
 
 def doubtful_spans(results: Results) -> list[tuple[float, float, str]]:

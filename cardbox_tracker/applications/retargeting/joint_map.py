@@ -27,7 +27,6 @@ from cardbox_tracker.applications.retargeting.robot import Robot
 from cardbox_tracker.common.errors import CardboxError, quoted
 from cardbox_tracker.common.files import foreign
 from cardbox_tracker.common.small_yaml import parse_small_yaml, read_small_text
-from cardbox_tracker.person.hands import HAND_OPEN_NAMES
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.posture import (
     ELBOW_ABDUCTION,
@@ -37,7 +36,13 @@ from cardbox_tracker.person.posture import (
     RIGHT_ARM,
 )
 from cardbox_tracker.person.sizes import FloatArray
-from cardbox_tracker.person.skeleton import JOINT_NAMES, NECK_NAMES
+from cardbox_tracker.person.skeleton import (
+    HAND_OPEN_NAMES,
+    JOINT_NAMES,
+    NECK_NAMES,
+    Group,
+    joints_of,
+)
 
 WITH_HEAD_AND_HANDS: tuple[str, ...] = (*JOINT_NAMES, *NECK_NAMES, *HAND_OPEN_NAMES)
 """Order of a posture with head and hands, (16,)."""
@@ -131,9 +136,10 @@ def head_map(robot: Robot) -> JointMap | None:
     for one in robot.joints.values():
         if one.kind == "prismatic" or not _HEAD.search(f"{one.name} {one.child}"):
             continue
-        for name, along in zip(NECK_NAMES, robot.axis_of(one)[[2, 1]].tolist(), strict=True):
+        for joint in joints_of(Group.NECK):
+            along = float(robot.axis_of(one) @ joint.axis)
             if abs(along) > _ALONG:
-                found.setdefault(name, (one.name, math.copysign(1.0, along)))
+                found.setdefault(joint.name, (one.name, math.copysign(1.0, along)))
     if not found:
         return None
     joints, signs = zip(*found.values(), strict=True)

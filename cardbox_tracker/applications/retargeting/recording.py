@@ -11,8 +11,7 @@ import numpy as np
 
 from cardbox_tracker.applications.retargeting.retargeter import Command, Moment, Retargeter
 from cardbox_tracker.common.files import write_table
-from cardbox_tracker.person.hands import HAND_OPEN_NAMES
-from cardbox_tracker.person.skeleton import JOINT_NAMES, NECK_NAMES
+from cardbox_tracker.person.skeleton import HAND_OPEN_NAMES, JOINT_NAMES, NECK_NAMES
 from cardbox_tracker.recordings.bag_reader import BagReader
 from cardbox_tracker.recordings.bag_writer import BagWriter
 from cardbox_tracker.recordings.result_reader import Results
@@ -56,11 +55,9 @@ def retarget_results(results: Results, retargeter: Retargeter, rate_hz: float) -
     for stamp_ns, state, body, values, deviations, hands, keypoints in images:
         posture = stddev = None
         if state in (TRACKING, UNCERTAIN):
-            # The joints of the neck are there if the face is seen.
-            known = np.isfinite(deviations)
-            if not known[: len(JOINT_NAMES)].all():
+            if not np.isfinite(deviations[: len(JOINT_NAMES)]).all():
                 continue
-            posture, stddev = values[known], deviations[known]
+            posture, stddev = values, deviations
         if motion.commands:
             motion.way.extend(_until(stamp_ns, motion.commands, retargeter, rate_hz))
         command = retargeter.update(

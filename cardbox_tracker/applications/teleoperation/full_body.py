@@ -14,30 +14,28 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from cardbox_tracker.person.hands import HAND_NAMES, WRIST_SHARE, turn_of
 from cardbox_tracker.person.kinematics import pose
-from cardbox_tracker.person.legs import (
-    ANKLE_SHARE,
-    LEG_KEYPOINT_NAMES,
-    LEG_NAMES,
-    leg_rotations,
-    legs_m,
-    stature_of,
-)
+from cardbox_tracker.person.legs import LEG_KEYPOINT_NAMES, leg_rotations, legs_m
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.parts import body_parts
-from cardbox_tracker.person.posture import LEFT_ARM, RIGHT_ARM
+from cardbox_tracker.person.proportions import ANKLE_SHARE, WRIST_SHARE, stature_of
 from cardbox_tracker.person.sizes import FloatArray
 from cardbox_tracker.person.skeleton import (
+    HAND_NAMES,
     JOINT_NAMES,
+    LEG_NAMES,
     NECK_NAMES,
     POINT_NAMES,
+    STATE_NAMES,
+    Group,
     KeypointState,
+    names_of,
     neck_pivot_m,
     neck_rotation,
     rotation_x,
     rotation_y,
     rotation_z,
+    turn_of,
 )
 from cardbox_tracker.tracking.estimate import TRACKING, UNCERTAIN
 
@@ -53,7 +51,6 @@ NAMES: tuple[str, ...] = (
 """The joints in their order."""
 _SIDES = {"left": 1.0, "right": -1.0}
 _TRUNK = JOINT_NAMES[1:4]
-_ARMS = {"left": JOINT_NAMES[LEFT_ARM], "right": JOINT_NAMES[RIGHT_ARM]}
 # Places in SMPL's mean body: the pelvis above the hips, and the foot ahead of the ankle, as shares
 # of the stature; the spine from pelvis to neck, and the collar from neck to shoulder.
 _PELVIS, _FOOT, _COLLAR = 0.054, 0.07, 0.46
@@ -107,7 +104,7 @@ class FullBodies:
     """Makes the full body of image after image; what is not measured keeps its last angles."""
 
     def __init__(self) -> None:
-        self._angles = dict.fromkeys((*JOINT_NAMES, *NECK_NAMES, *LEG_NAMES, *HAND_NAMES), 0.0)
+        self._angles = dict.fromkeys(STATE_NAMES, 0.0)
         self._before: FullBody | None = None
 
     def update(
@@ -145,13 +142,13 @@ class FullBodies:
         head = trunk and self._take(known, NECK_NAMES)
         sure = dict.fromkeys(NAMES, trunk) | {"head": head}
         passed_s = 0.0 if before is None else max(stamp_ns - before.stamp_ns, 0) / 1e9
-        for number, side in enumerate(_SIDES):
-            upper, fore = _ARMS[side][:2], _ARMS[side][2:]
-            elbow = trunk and tracked(f"{side}_elbow") and self._take(known, upper)
-            hand = elbow and tracked(f"{side}_hand") and self._take(known, fore)
+        for side in _SIDES:
+            arm = names_of(Group.ARM, side=side)
+            elbow = trunk and tracked(f"{side}_elbow") and self._take(known, arm[:2])
+            hand = elbow and tracked(f"{side}_hand") and self._take(known, arm[2:])
             if hand:
-                self._take(known, HAND_NAMES[3 * number : 3 * number + 3])
-            legs = LEG_NAMES[4 * number : 4 * number + 4]
+                self._take(known, names_of(Group.HAND, side=side))
+            legs = names_of(Group.LEG, side=side)
             # A straight leg hides its rotation, which then matters little.
             is_sure = all(stddev.get(legs[i], np.inf) < _SURE_RAD for i in (0, 1, 3))
             leg = trunk and is_sure and self._take(known, legs)
@@ -199,7 +196,7 @@ class FullBodies:
         for number, (side, sign) in enumerate(_SIDES.items()):
             arm = posed.left if side == "left" else posed.right
             shoulder, elbow, hand = (points[f"{side}_{at}"] for at in ("shoulder", "elbow", "hand"))
-            turn, flexion, deviation = self._of(HAND_NAMES[3 * number : 3 * number + 3])
+            turn, flexion, deviation = self._of(names_of(Group.HAND, side=side))
             palm = arm.forearm_rotation @ rotation_z(-sign * turn)
             if turn or flexion or deviation:
                 limbs = -arm.upper_arm_rotation[:, 2], -arm.forearm_rotation[:, 2]
@@ -230,7 +227,6 @@ def _roll(palm: FloatArray, upper: FloatArray, fore: FloatArray, sign: float) ->
     return float(np.arctan2(np.cross(inwards, palm) @ fore, inwards @ palm))
 
 
-_NAMES = (*JOINT_NAMES, *NECK_NAMES, *LEG_NAMES, *HAND_NAMES)
 # Between images farther apart nothing is known; a longer gap is shortened.
 _LONGEST_S, _LONGEST_GAP_S = 0.5, 1.0
 
@@ -242,12 +238,12 @@ def bodies_of(results: Results) -> Iterator[FullBody]:
     from cardbox_tracker.recordings.result_table import PALM_COLUMNS
 
     make = FullBodies()
-    values, deviations = results.of(_NAMES), results.deviations_of(_NAMES)
+    values, deviations = results.of(STATE_NAMES), results.deviations_of(STATE_NAMES)
     palms, turns = results.of(PALM_COLUMNS).reshape(-1, 2, 3), [HAND_NAMES[0], HAND_NAMES[3]]
     images = zip(results.state, results.bodies, values, deviations, palms, strict=True)
     rows = zip(results.stamp_ns.tolist(), images, results.keypoints(), strict=True)
     for stamp_ns, (state, body, row, stddev, palm), keypoints in rows:
-        found, known = (dict(zip(_NAMES, one.tolist(), strict=True)) for one in (row, stddev))
+        found, known = (dict(zip(STATE_NAMES, one.tolist(), strict=True)) for one in (row, stddev))
         posture = row[: len(JOINT_NAMES)]
         if body is not None and np.isfinite(palm).any() and np.isfinite(posture).all():
             # A table has the palms in place of their turns about the forearms.

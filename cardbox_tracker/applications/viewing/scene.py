@@ -14,23 +14,14 @@ from cardbox_tracker.applications.viewing.viewer import rerun
 from cardbox_tracker.camera.camera import level_to_optical
 from cardbox_tracker.camera.encodings import SentImage, decode_bgr
 from cardbox_tracker.common.errors import BagError, CardboxError, cut
-from cardbox_tracker.person.hands import HAND_NAMES
-from cardbox_tracker.person.legs import LEG_NAMES
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.model_file import loads_body_model
 from cardbox_tracker.person.sizes import FloatArray
-from cardbox_tracker.person.skeleton import (
-    CLAVICLE_NAMES,
-    JOINT_NAMES,
-    NECK_NAMES,
-    PLACE_NAMES,
-    UNITS,
-    KeypointState,
-)
+from cardbox_tracker.person.skeleton import HAND_NAMES, UNITS, Group, KeypointState, names_of
 from cardbox_tracker.person.urdf import ROOT_LINK, urdf_from_body
 from cardbox_tracker.recordings.bag_reader import BagReader, stamp_ns_of
-from cardbox_tracker.recordings.outputs import JointValues
-from cardbox_tracker.recordings.result_reader import MODEL, joints_of, namespace_of, points_of
+from cardbox_tracker.recordings.outputs import JointValues, joints_of
+from cardbox_tracker.recordings.result_reader import MODEL, namespace_of, points_of
 from cardbox_tracker.recordings.truth import TrueFrame, beside_shoulders
 
 Rgb = tuple[int, int, int]
@@ -40,18 +31,17 @@ _ROOT_FRAME = f"person/{ROOT_LINK}"
 # Entity below a plot that contains the uncertainty of its joints.
 _SPREAD = "within_two_deviations"
 _GROUPS: dict[str, tuple[str, ...]] = {
-    "left_arm": tuple(name for name in JOINT_NAMES if name.startswith("left")),
-    "right_arm": tuple(name for name in JOINT_NAMES if name.startswith("right")),
-    "torso": tuple(name for name in JOINT_NAMES[1:] if name.startswith("torso")),
-    "head": NECK_NAMES,
-    "place": ("torso_y", *PLACE_NAMES),
-    "shoulders": CLAVICLE_NAMES,
-    "left_leg": LEG_NAMES[:4],
-    "right_leg": LEG_NAMES[4:],
+    "left_arm": names_of(Group.ARM, side="left"),
+    "right_arm": names_of(Group.ARM, side="right"),
+    "torso": names_of(Group.TORSO)[1:],
+    "head": names_of(Group.NECK),
+    "place": ("torso_y", *names_of(Group.PLACE)),
+    "shoulders": names_of(Group.CLAVICLE),
+    "left_leg": names_of(Group.LEG, side="left"),
+    "right_leg": names_of(Group.LEG, side="right"),
     "hands": HAND_NAMES,
 }
 """Joints by plot: angles in degrees, place and rise of the shoulders in metres."""
-_METRES = ("place", "shoulders")
 # Interval, degrees and metres, at which that of a joint ends: a wider one tells nothing, and would
 # leave no room for the curve.
 _WIDEST = {"deg": 60.0, "m": 0.5}
@@ -308,7 +298,7 @@ def level_points(points_m: FloatArray, pitch_rad: float, roll_rad: float = 0.0) 
 
 
 def _unit_of(group: str) -> str:
-    return "m" if group in _METRES else "deg"
+    return "m" if group in ("place", "shoulders") else "deg"
 
 
 def _plot_of(joint: str) -> tuple[str, int]:

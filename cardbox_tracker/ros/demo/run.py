@@ -29,12 +29,11 @@ from cardbox_tracker.common.progress import progress_bar
 from cardbox_tracker.person.posture import REFERENCE_NAMES
 from cardbox_tracker.recordings.bag_reader import BagReader, stamp_ns_of
 from cardbox_tracker.recordings.bag_writer import BagWriter
-from cardbox_tracker.recordings.outputs import TOPICS, positions_of
+from cardbox_tracker.recordings.outputs import TOPICS, joints_of
 from cardbox_tracker.recordings.result_bag import BagTransforms, result_writer
 from cardbox_tracker.recordings.result_reader import Results, read_results
 from cardbox_tracker.recordings.result_table import POINT_COLUMNS
 from cardbox_tracker.recordings.truth import GroundTruth, load_ground_truth, tracking_error
-from cardbox_tracker.ros.messages import results
 from cardbox_tracker.ros.messages.results import mean_iou_of
 from cardbox_tracker.ros.messages.types import class_of
 from cardbox_tracker.ros.nodes.camera_poses import silhouettes_of
@@ -122,7 +121,7 @@ class Client:
         elif topic == "robot_description":
             self._transforms.describe(message.data)
         elif topic == "joint_states":
-            self._transforms.write(self._stamp_ns, positions_of(results.joint_values_of(message)))
+            self._transforms.write(self._stamp_ns, joints_of(message).by_name)
             self.latest_ns = self._stamp_ns
             self.arrivals_s.append(time.monotonic())
 

@@ -12,10 +12,10 @@ from std_msgs.msg import Header
 from cardbox_tracker.common.errors import CardboxError
 from cardbox_tracker.measuring.config import InitializationResult, fit_text
 from cardbox_tracker.person.sizes import SIZE_NAMES, FloatArray
-from cardbox_tracker.person.skeleton import NECK_NAMES
+from cardbox_tracker.person.skeleton import STATE_NAMES
 from cardbox_tracker.recordings import messages
 from cardbox_tracker.recordings.messages import finite
-from cardbox_tracker.recordings.outputs import JointValues, Value, posture_from, values_from
+from cardbox_tracker.recordings.outputs import Value, joints_of
 from cardbox_tracker.ros.messages.types import new_message
 
 
@@ -24,41 +24,20 @@ def message_of(header: Header, value: Value) -> Any:
     return messages.message_of(new_message, header, value)
 
 
-def joint_values_of(message: JointState) -> JointValues:
-    """Return the names and positions of a message."""
-    return JointValues(tuple(message.name), np.array(message.position))
+def state_of(values: JointState, stddev: JointState) -> FloatArray:
+    """Return values and deviations of ``STATE_NAMES``, (2, n), nan for those that are missing.
 
-
-def posture_of(message: JointState) -> FloatArray:
-    """Return the posture (12,), or its deviations, of a message of the tracker.
-
-    Raises NotFiniteError if a value is not a finite number, and CardboxError if a joint is missing,
-    or the numbers of names and values differ.
+    Raises NotFiniteError if a value is not a finite number, and CardboxError if a joint of the
+    posture is missing, or the numbers of names and values differ.
     """
     try:
-        found = posture_from(joint_values_of(message))
+        both = joints_of(values), joints_of(stddev)
+        for joints in both:
+            finite(joints.posture, "joint states")
+            finite(joints.values, "joint states")
     except ValueError as error:
         raise CardboxError(f"joint states are not the tracker's: {error}") from None
-    return finite(found, "joint states")
-
-
-def neck_of(message: JointState) -> FloatArray | None:
-    """Return ``neck_yaw`` and ``neck_pitch`` (2,), rad, or deviations; None if missing.
-
-    Raises NotFiniteError if a value is not a finite number.
-    """
-    found = values_from(joint_values_of(message), NECK_NAMES)
-    return None if found is None else finite(found, "joint states")
-
-
-def posture_and_neck_of(message: JointState) -> FloatArray:
-    """Return the posture, and the neck if it is there, or their deviations; (12,) or (14,).
-
-    Raises NotFiniteError if a value is not a finite number, and CardboxError if a joint is missing,
-    or the numbers of names and values differ.
-    """
-    posture, neck = posture_of(message), neck_of(message)
-    return posture if neck is None else np.concatenate([posture, neck])
+    return np.array([joints.of(STATE_NAMES) for joints in both])
 
 
 _MEAN_IOU = "mean iou"

@@ -12,6 +12,7 @@ from std_msgs.msg import Header
 from cardbox_tracker.camera.camera import Calibration, Camera
 from cardbox_tracker.camera.stamps import StampOrder
 from cardbox_tracker.common.errors import BackgroundFileError, CameraError
+from cardbox_tracker.common.health import WATCHES
 from cardbox_tracker.common.progress import told
 from cardbox_tracker.ros.messages import conversions
 from cardbox_tracker.ros.nodes.camera_images import CameraImages, SilhouetteOutputs
@@ -37,12 +38,6 @@ from cardbox_tracker.segmentation.silhouettes import WITHIN_LIMITS_M, Silhouette
 
 # The default shared-memory segment of Fast DDS holds half a megabyte, less its own data.
 _LARGE_IMAGE_BYTES = 400_000
-_LOSS_TO_WARN = 0.1
-# Well above the noise of a median over the image.
-_DRIFT_TO_WARN_GREY_LEVELS = 12.0
-# A person who is wholly in view covers less of the image.
-_COVERAGE_TO_WARN = 0.6
-
 
 _NEXT_LEARNING = "next learning"
 
@@ -225,31 +220,18 @@ class BackgroundNode(CardboxNode):
         is_left_out = self.diagnostics.is_slow or self.diagnostics.arrivals.has_burst
         loss = 0.0 if is_left_out else self.diagnostics.input.loss
         image_bytes, covered = self.camera_images.image_bytes, self._outputs.covered
-        if loss > _LOSS_TO_WARN and image_bytes > _LARGE_IMAGE_BYTES:
-            texts["loss"] = (
-                f"{100 * loss:.0f} % of the images on {self.camera_images.topic} "
-                f"({image_bytes // 1000} kB each) are lost on the way: start all nodes "
-                "with FASTRTPS_DEFAULT_PROFILES_FILE set to this package's "
-                "config/fastdds_large_images.xml, or use smaller, grey or compressed images"
-            )
+        if image_bytes > _LARGE_IMAGE_BYTES:
+            given = {"topic": self.camera_images.topic, "kilobytes": image_bytes // 1000}
+            texts["loss"] = WATCHES["loss"].remark(100.0 * loss, **given)
         follows = settings.follow and settings.clean_up
-        drifted = not follows and abs(self._drift()) > _DRIFT_TO_WARN_GREY_LEVELS
-        if settings.within_m > 0.0 and covered > _COVERAGE_TO_WARN:
-            texts["depth"] = (
-                f"most of the image is nearer than within_m, {settings.within_m:g} m: choose it "
-                "between the person and the wall, and let nothing else stand before it"
-            )
-        elif (
-            settings.within_m == 0.0
-            and "exposure" not in texts
-            and (drifted or covered > _COVERAGE_TO_WARN)
+        drift = 0.0 if follows else abs(self._drift())
+        if settings.within_m > 0.0:
+            texts["depth"] = WATCHES["near"].remark(covered, within_m=settings.within_m)
+        elif "exposure" not in texts and (
+            WATCHES["drift"].is_beyond(drift) or WATCHES["near"].is_beyond(covered)
         ):
-            texts["brightness"] = (
-                "the whole scene changed its brightness: switch the camera's automatic exposure "
-                "and white balance off (v4l2-ctl -c auto_exposure=1,white_balance_automatic=0), "
-                "then call background/learn with nobody in view"
-            )
-        return texts
+            texts["brightness"] = WATCHES["drift"].words
+        return {kind: text for kind, text in texts.items() if text}
 
 
 main = node_main("background", BackgroundNode, BackgroundParameters)

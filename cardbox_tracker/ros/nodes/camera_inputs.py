@@ -16,11 +16,12 @@ from cardbox_tracker.camera.depth_image import DepthImage
 from cardbox_tracker.camera.pairing import TOLERANCE_NS, Arrivals
 from cardbox_tracker.camera.view import OtherCamera
 from cardbox_tracker.common.errors import CameraError, CardboxError
+from cardbox_tracker.common.health import WATCHES, Verdict
 from cardbox_tracker.ros.messages import conversions
 from cardbox_tracker.ros.messages.conversions import ImageArray
 from cardbox_tracker.ros.nodes.camera_poses import CameraPoses, silhouettes_of
 from cardbox_tracker.ros.nodes.depth_input import DepthInput
-from cardbox_tracker.ros.nodes.input_stream import ClockDifference, InputStream, RecentImages
+from cardbox_tracker.ros.nodes.input_stream import InputStream, RecentImages
 from cardbox_tracker.ros.nodes.keypoint_inputs import KeypointInputs
 from cardbox_tracker.ros.nodes.tracker_parameters import TrackerParameters
 from cardbox_tracker.ros.runtime import qos
@@ -82,10 +83,8 @@ class ImagePairing:
             self._deliver(silhouette, image, sent_ns)
 
 
-_SILENT_S = 2.0
-_STUCK = 10
-# Of one clock, images from different computers or of depth may arrive this much later.
-_OTHER_CLOCK_S = 0.1
+# A paused camera falls behind, so stamps are compared only while both cameras send.
+_RECENT_S = 0.5
 
 
 class Received(NamedTuple):
@@ -148,9 +147,10 @@ class CameraInputs:
         self._count = len(self._streams)
         if settings.depth:
             self._streams.append(InputStream("depth", node.resolve(settings.depth)))
-        # Messages in a row whose stamps did not go on.
-        self._stuck = [0] * len(self._streams)
-        self._clocks = [ClockDifference(self._streams[0], one) for one in self._streams[1:]]
+        self._stuck = [Verdict("stuck") for _ in self._streams]
+        # Differences of stamps that arrive together, and of clocks: images of the same moment
+        # arrive at almost the same time, and late ones do not change the median.
+        self._clocks = [Verdict("clock", lambda stamps_s, _: abs(stamps_s)) for _ in self._streams]
         self._is_named = bool(settings.cameras or settings.depth)
         self._arrivals: Arrivals[Received] = Arrivals(len(self._streams), TOLERANCE_NS)
         self._pairings = [ImagePairing(partial(self._add, number)) for number in range(self._count)]
@@ -197,13 +197,15 @@ class CameraInputs:
     def _add(self, number: int, message: Image, image: Image | None, sent_ns: int) -> None:
         stamp_ns, received = _stamp_ns(message), Received(message, image, sent_ns)
         is_usable = self._streams[number].arrived(stamp_ns, sent_ns).is_usable
-        if number:
-            self._clocks[number - 1].see()
+        first, other = self._streams[0], self._streams[number]
+        if number and first.newest_ns and other.newest_ns and first.age_s < _RECENT_S:
+            transit_s = first.transit_s - other.transit_s
+            self._clocks[number].see(first.delay_s - other.delay_s, transit_s)
         if len(self._streams) == 1:
             # The node itself drops and counts repeated and late messages.
             self._hold([received])
             return
-        self._stuck[number] = 0 if is_usable else self._stuck[number] + 1
+        self._stuck[number].count(not is_usable)
         if not is_usable:
             return
         self._arrivals.tolerance_ns = self._streams[0].statistics.period_ns // 2 or TOLERANCE_NS
@@ -313,35 +315,29 @@ class CameraInputs:
         texts = self._keypoints.warnings()
         if len(self._streams) == 1:
             return texts
-        first, *others = self._streams
         # If nothing comes at all, the node says so itself.
-        is_going_on = any(stream.age_s <= _SILENT_S for stream in self._streams)
-        for stream, stuck in zip(self._streams, self._stuck, strict=True):
-            if stuck > _STUCK:
-                texts[f"stamps of {stream.name}"] = (
-                    f"the stamps of the last {stuck} messages on {stream.topic} stand still or go "
-                    "back, so they are not used; is that camera's driver stuck?"
-                )
-            elif is_going_on and stream.age_s > _SILENT_S:
-                texts[f"silence of {stream.name}"] = (
-                    f"nothing has come on {stream.topic} for {stream.age_s:.0f} s; tracking goes "
-                    "on without it. Are that camera and its background node running?"
-                )
+        silence = WATCHES["silence"]
+        is_going_on = not all(silence.is_beyond(stream.age_s) for stream in self._streams)
+        first = self._streams[0]
+        for stream, stuck, clock in zip(self._streams, self._stuck, self._clocks, strict=True):
+            name, topic = stream.name, stream.topic
+            if stuck.holds:
+                texts[f"stamps of {name}"] = stuck.remark(topic=topic)
+            elif is_going_on and silence.is_beyond(stream.age_s):
+                texts[f"silence of {name}"] = silence.remark(stream.age_s, topic=topic)
             elif stream.problem:
-                texts[f"{stream.name} cannot be read"] = f"{stream.topic}: {stream.problem}"
-        for stream, clock in zip(others, self._clocks, strict=True):
-            apart_s, others_s = map(abs, clock.medians_s)
-            if apart_s > max(_OTHER_CLOCK_S, first.statistics.period_ns / 2e9):
+                texts[f"{name} cannot be read"] = f"{topic}: {stream.problem}"
+            is_paused = stream.age_s >= _RECENT_S
+            if clock.holds and not is_paused and clock.value > first.statistics.period_ns / 2e9:
+                others_s = abs(clock.medians[1])
                 remedy = (
                     f"the clocks of the computers that send them are {others_s:.2f} s apart: "
                     "synchronize them, for example with chrony"
-                    if others_s > _OTHER_CLOCK_S
+                    if clock.watch.is_beyond(others_s)
                     else "one of them takes so much longer to be made: send smaller or fewer images"
                 )
-                texts[f"clock of {stream.name}"] = (
-                    f"the stamps on {stream.topic} and {first.topic} are {apart_s:.2f} s "
-                    "apart in images that arrive together, so images of different moments are "
-                    f"paired, or none; {remedy}"
+                texts[f"clock of {name}"] = clock.remark(
+                    topic=topic, first=first.topic, remedy=remedy
                 )
         return texts
 

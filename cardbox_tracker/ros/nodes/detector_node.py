@@ -16,7 +16,7 @@ from std_msgs.msg import Header
 from cardbox_tracker.camera.camera import Calibration, unrectified
 from cardbox_tracker.camera.stamps import WINDOW, StampOrder
 from cardbox_tracker.detectors.detector import Detector, PersonDetector
-from cardbox_tracker.detectors.pose_network import NOBODY, Detection
+from cardbox_tracker.detectors.pose_network import NOBODY, Detection, silhouette_of
 from cardbox_tracker.ros.messages.conversions import ImageArray, stamp_ns
 from cardbox_tracker.ros.messages.keypoints import (
     people_message,
@@ -81,7 +81,7 @@ class DetectorNode(CardboxNode):
         if person is None and not settings.publish_silhouette:
             # The tracker goes first; the threads of the networks inherit this.
             os.nice(_NICE)
-        self._person = person or Detector.installed()._replace(people=settings.people).start()
+        self._person = person or Detector.installed(settings.people).start()
         self._pipeline: SilhouettePipeline | None = None
         self._looked_ns = 0
         self._took_ms: deque[float] = deque(maxlen=WINDOW)
@@ -125,9 +125,7 @@ class DetectorNode(CardboxNode):
         self._send_points(header, found, pipeline)
         if self._silhouettes is not None:
             self._silhouettes.send_image(header, image)
-            silhouette = np.zeros(image.shape[:2], np.uint8)
-            for one in found:
-                silhouette |= one.silhouette()
+            silhouette = silhouette_of(found, image.shape)
             self._silhouettes.send(header, silhouette, pipeline.camera, self._images.info)
         self.diagnostics.working(sent_ns)
 

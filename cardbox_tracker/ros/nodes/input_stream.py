@@ -6,15 +6,10 @@ import time
 from collections import deque
 from collections.abc import Iterator
 
-import numpy as np
 from sensor_msgs.msg import Image
 
 from cardbox_tracker.camera.stamps import StampOrder, StreamStatistics
 from cardbox_tracker.ros.messages.conversions import stamp_ns
-
-# A paused camera falls behind, so stamps are compared only while both cameras send.
-_RECENT_S = 0.5
-_COMPARED, _LEAST = 60, 10
 
 
 class InputStream:
@@ -63,35 +58,6 @@ class InputStream:
             f"{self.name} rate (Hz)": f"{rate:.1f}",
             f"{self.name} age (s)": f"{self.age_s:.1f}" if count else "never",
         }
-
-
-class ClockDifference:
-    """How far the clocks of two streams are apart, by when their images arrive.
-
-    Images of the same moment arrive at almost the same time, so a steady difference of their stamps
-    is one of the clocks, or of the time on the way. Late images do not change the median.
-    """
-
-    def __init__(self, first: InputStream, other: InputStream) -> None:
-        self._first, self._other = first, other
-        self._found: deque[tuple[float, float]] = deque(maxlen=_COMPARED)
-
-    def see(self) -> None:
-        """Compare the newest messages, after each message of the other stream."""
-        first, other = self._first, self._other
-        if first.newest_ns and other.newest_ns and first.age_s < _RECENT_S:
-            transit_s = first.transit_s - other.transit_s
-            self._found.append((first.delay_s - other.delay_s, transit_s))
-
-    @property
-    def medians_s(self) -> tuple[float, float]:
-        """Differences of stamps that arrive together, and of clocks, s; 0 while unknown.
-
-        Both are positive if the clock of the other stream is ahead.
-        """
-        is_known = len(self._found) >= _LEAST and self._other.age_s < _RECENT_S
-        stamps_s, computers_s = np.median(self._found, axis=0) if is_known else (0.0, 0.0)
-        return float(stamps_s), float(computers_s)
 
 
 MOST_BYTES = 64_000_000

@@ -13,12 +13,13 @@ from rclpy.subscription import Subscription
 from sensor_msgs.msg import CameraInfo, PointCloud2
 from std_msgs.msg import Header
 
-from cardbox_tracker.camera.calibration_watch import CalibrationWatch
-from cardbox_tracker.camera.camera import Camera
+from cardbox_tracker.camera.camera import Calibration, Camera
+from cardbox_tracker.camera.camera_info import calibration_from_info
 from cardbox_tracker.camera.pairing import TOLERANCE_NS
 from cardbox_tracker.camera.stamps import StampOrder
-from cardbox_tracker.common.errors import CardboxError, cut, quoted
+from cardbox_tracker.common.errors import CameraError, CardboxError, cut, quoted
 from cardbox_tracker.common.files import user_path
+from cardbox_tracker.common.health import WATCHES, Verdict
 from cardbox_tracker.detectors.figure import figure_of_points
 from cardbox_tracker.detectors.image_points import ImagePoints
 from cardbox_tracker.detectors.person_choice import person_in
@@ -43,9 +44,6 @@ SAME_TIME_NS = 50_000_000
 # one person are at most so far apart, lengths of the trunk.
 _MOVED_NS, _MOTION_NS, _MOST_SPANS, _SAME_PERSON = 150_000_000, 250_000_000, 2, 0.5
 _KEPT = 8
-_SILENT_S = 3.0
-# After so many consecutive messages of another time the clocks are in doubt.
-_IN_DOUBT = 5
 # Weight of an image in the share of images whose points come before the next image, and the share
 # from which on images wait for theirs.
 _LEARN_RATE, _KEEPS_UP = 0.1, 0.8
@@ -113,7 +111,8 @@ class KeypointTopic:
         self._node, self._topic = node, topic
         self._kept: deque[Taken] = deque()
         self._asked_ns = self._apart_ns = 0
-        self._used = self._unused = self._in_doubt = 0
+        self._used = self._unused = 0
+        self._other_time = Verdict("other time")
         self._wrong_type = ""
         self._type = ""
         self._subscription: Subscription | None = None
@@ -153,7 +152,8 @@ class KeypointTopic:
                 f"{quoted(frame_id)}: give each camera's detector the images of that camera"
             )
             return None
-        self._used, self._in_doubt = self._used + 1, 0
+        self._used += 1
+        self._other_time.count(False)
         self._apart_ns = at_ns - newest.stamp_ns
         self._motion = _Motion.of(before, newest)
         moved = self._motion.at(at_ns) if self._motion is not None else None
@@ -174,19 +174,15 @@ class KeypointTopic:
         stream, name = self.stream, self.stream.name
         if self._wrong_type:
             return {f"type of {name}": self._wrong_type}
-        if stream.age_s > _SILENT_S and stream.statistics.received:
-            return {
-                f"silence of {name}": f"nothing has come on {stream.topic} for {stream.age_s:.0f} "
-                "s; tracking goes on without points. Is the detector running?"
-            }
-        if self._in_doubt >= _IN_DOUBT:
-            return {
-                f"clock of {name}": f"the points on {stream.topic} are "
-                f"{abs(self._apart_ns) / 1e9:.1f} s {'older' if self._apart_ns > 0 else 'newer'} "
-                "than the silhouettes, so they are not used; expected at most "
-                f"{MOST_AGE_NS / 1e9:g} s: the stamp must be that of the image, and clocks of "
-                "several computers synchronized"
-            }
+        silence = WATCHES["no points"].remark(stream.age_s, topic=stream.topic)
+        if silence and stream.statistics.received:
+            return {f"silence of {name}": silence}
+        if self._other_time.holds:
+            apart_s, than = abs(self._apart_ns) / 1e9, "older" if self._apart_ns > 0 else "newer"
+            text = self._other_time.remark(
+                topic=stream.topic, apart_s=apart_s, than=than, most_s=MOST_AGE_NS / 1e9
+            )
+            return {f"clock of {name}": text}
         return {f"{name} cannot be used": stream.problem} if stream.problem else {}
 
     def _look(self) -> None:
@@ -253,7 +249,7 @@ class KeypointTopic:
 
     def _leave_out(self, taken: Taken) -> None:
         self._unused += 1
-        self._in_doubt += 1
+        self._other_time.count(True)
         self._apart_ns = self._asked_ns - taken.stamp_ns
 
     def _report(self, problem: str) -> None:
@@ -263,11 +259,10 @@ class KeypointTopic:
         self._node.diagnostics.say(kind, self.stream.problem, warning=True)
 
 
-_PATIENCE_S = 3.0
+# Relative difference of focal length and principal point up to which cameras are the same.
+_SAME_CAMERA = 1e-3
 # Images at the start, in which a detector may not have looked at any yet.
 _STARTING = 30
-# Images in a row whose points lie beside the silhouette, after which a warning follows.
-_BESIDE = 10
 
 
 class KeypointInputs:
@@ -306,8 +301,8 @@ class KeypointInputs:
         texts = {kind: text for one in self.cameras for kind, text in one.warnings().items()}
         waits = [one.stream for one in self._topics if not one.stream.statistics.received]
         # One camera of several may be without a detector.
-        is_silent = waits and len(waits) == len(self._topics) and waits[0].age_s > _PATIENCE_S
-        if is_silent and not texts:
+        is_silent = waits and len(waits) == len(self._topics)
+        if is_silent and not texts and WATCHES["no points"].is_beyond(waits[0].age_s):
             names = ", ".join(stream.topic for stream in waits)
             texts["no keypoints"] = (
                 f"no points have come on {names}; tracking goes on without. Is the detector "
@@ -329,7 +324,8 @@ class CameraKeypoints:
         source, below = settings.keypoints, f"{camera.rstrip('/')}/" if camera else ""
         self.topic: KeypointTopic | None = None
         self._name = f"{camera.strip('/')} keypoints".lstrip()
-        self._images = self._used = self._beside = 0
+        self._images = self._used = 0
+        self._beside = Verdict("beside")
         self._fault = self._reason = ""
         if settings.has_point_table:
             table = PointTable(user_path(source))
@@ -342,17 +338,37 @@ class CameraKeypoints:
             topic = source if source.startswith("/") else f"{below}{source}"
             self.topic = KeypointTopic(node, self._name, topic, arrived)
         self._info_topic = node.resolve(f"{below}camera_info")
-        self._watch = CalibrationWatch(
-            self._info_topic,
-            node.resolve(f"{below}image_raw"),
-            np.radians(settings.camera_roll_deg),
-        )
+        self._image_topic = node.resolve(f"{below}image_raw")
+        self._roll_rad = np.radians(settings.camera_roll_deg)
+        self._calibration: Calibration | None = None
+        self._camera: Camera | None = None
         self._began_s = time.monotonic()
         node.subscribe_info(f"{below}camera_info", self._on_info)
 
     def _on_info(self, message: CameraInfo, _: int) -> None:
-        if self._watch.see(message) and self.topic is not None and self._watch.current is not None:
-            self.topic.size = self._watch.current.width, self._watch.current.height
+        """Follow another calibration unless the silhouettes, whose node sees the images, do not."""
+        before = self._calibration
+        try:
+            found = calibration_from_info(message, self._image_topic, self._info_topic)
+            found = replace(found, roll_rad=self._roll_rad)
+            is_seen = self._is_seen(found)
+        except CameraError:
+            if before is None:
+                raise
+            return
+        if before is None or is_seen or not self._is_seen(before):
+            self._calibration = found
+            if self.topic is not None:
+                self.topic.size = found.width, found.height
+
+    def _is_seen(self, calibration: Calibration) -> bool:
+        """Return whether the last silhouette is of a calibration, or raise CameraError."""
+        size = self._camera or calibration
+        there, here = calibration.camera(size.width, size.height), self._camera
+        if here is None:
+            return False
+        k, own = ((one.fx, one.fy, one.cx, one.cy) for one in (there, here))
+        return np.allclose(k, own, rtol=_SAME_CAMERA)
 
     def points(
         self,
@@ -371,10 +387,10 @@ class CameraKeypoints:
         if person is None:
             return None
         self._reason = why_not(silhouette, person)
+        self._beside.count(bool(self._reason))
         if self._reason:
-            self._beside += 1
             return None
-        self._used, self._beside = self._used + 1, 0
+        self._used += 1
         return person
 
     def people(self, header: Header, camera: Camera) -> list[ImagePoints] | None:
@@ -390,7 +406,8 @@ class CameraKeypoints:
         self, header: Header, camera: Camera, tolerance_ns: int
     ) -> list[ImagePoints] | None:
         """Return the points of all persons in px of the silhouette; None if there are none yet."""
-        calibration, at_ns = self._watch.current, stamp_ns(header.stamp)
+        calibration, at_ns = self._calibration, stamp_ns(header.stamp)
+        self._camera = camera
         taken = self._taken(at_ns, header.frame_id, tolerance_ns)
         self._images += 1
         if taken is None or calibration is None:
@@ -402,12 +419,13 @@ class CameraKeypoints:
     def _taken(self, at_ns: int, frame_id: str, tolerance_ns: int) -> Taken | None:
         if self.topic is not None:
             return self.topic.take(at_ns, frame_id)
-        if self._watch.current is None:
+        calibration = self._calibration
+        if calibration is None:
             return None
         found = self._given.persons(Image(at_ns), tolerance_ns)
         try:
             for person in found:
-                check_places(person, (self._watch.current.width, self._watch.current.height))
+                check_places(person, (calibration.width, calibration.height))
         except CardboxError as error:
             self._fault = str(error)
             return None
@@ -424,11 +442,10 @@ class CameraKeypoints:
         texts = {} if self.topic is None else self.topic.warnings()
         if self._fault:
             texts[f"{self._name} cannot be used"] = self._fault
-        if self._beside > _BESIDE:
-            texts[f"place of {self._name}"] = (
-                f"the points of the last {self._beside} images are not used: {self._reason}"
-            )
-        if self._watch.current is None and time.monotonic() - self._began_s > _PATIENCE_S:
+        if self._beside.holds:
+            texts[f"place of {self._name}"] = self._beside.remark(reason=self._reason)
+        is_late = WATCHES["no points"].is_beyond(time.monotonic() - self._began_s)
+        if self._calibration is None and is_late:
             texts[f"calibration on {self._info_topic}"] = (
                 f"no CameraInfo has come on {self._info_topic}, so keypoints cannot be placed in "
                 "the silhouette; remap camera_info of the tracker to that of the camera"

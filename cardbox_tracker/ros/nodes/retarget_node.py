@@ -23,8 +23,9 @@ from cardbox_tracker.applications.teleoperation.sending import ZmqSender, joints
 from cardbox_tracker.common.errors import CardboxError
 from cardbox_tracker.common.files import user_path
 from cardbox_tracker.common.settings import settings_of
-from cardbox_tracker.recordings.outputs import open_hands_from
-from cardbox_tracker.ros.messages.results import joint_values_of, posture_and_neck_of
+from cardbox_tracker.person.skeleton import HAND_OPEN_NAMES, POSTURE_GROUPS, Group, rows_of
+from cardbox_tracker.recordings.outputs import joints_of
+from cardbox_tracker.ros.messages.results import state_of
 from cardbox_tracker.ros.nodes.posture_input import PostureInput, Tracked
 from cardbox_tracker.ros.runtime import qos
 from cardbox_tracker.ros.runtime.command_line import node_main
@@ -114,9 +115,10 @@ class RetargetNode(CardboxNode):
         posture = stddev = hands = None
         if image.joints is not None:
             self._arrived_ns, self._stamp_ns = now_ns, image.stamp_ns
-            posture, stddev = posture_and_neck_of(image.joints), posture_and_neck_of(image.stddev)
+            rows = rows_of(*POSTURE_GROUPS, Group.NECK)
+            posture, stddev = state_of(image.joints, image.stddev)[:, rows]
         if image.hands is not None:
-            hands = open_hands_from(joint_values_of(image.hands))
+            hands = joints_of(image.hands).of(HAND_OPEN_NAMES)
         update = partial(
             self._retargeter.update,
             *(image.stamp_ns, image.state, image.body, posture, stddev, now_ns, hands),

@@ -12,6 +12,7 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import Float32, Float32MultiArray, MultiArrayDimension, MultiArrayLayout
 
 from cardbox_tracker.applications.ergonomics.rula import (
+    POSTURE_ROWS,
     RULA,
     SAMPLES,
     RulaConfig,
@@ -20,8 +21,7 @@ from cardbox_tracker.applications.ergonomics.rula import (
     part_values,
     sampled_scores,
 )
-from cardbox_tracker.recordings.outputs import wrists_from
-from cardbox_tracker.ros.messages.results import joint_values_of, neck_of, posture_of
+from cardbox_tracker.ros.messages.results import state_of
 from cardbox_tracker.ros.nodes.posture_input import PostureInput, Tracked
 from cardbox_tracker.ros.runtime import qos
 from cardbox_tracker.ros.runtime.command_line import node_main
@@ -54,14 +54,11 @@ class RulaNode(CardboxNode):
         joints, message = image.joints, image.stddev
         if joints is None or message is None or image.body is None:
             return
-        posture, stddev = posture_of(joints), posture_of(message)
+        known, config = state_of(joints, message), self.parameters.value
+        posture, stddev = known[:, POSTURE_ROWS]
         postures = normal_postures(posture, stddev, SAMPLES, self._rng)
         # The tracker leaves out the deviations of a neck, or a hand, that it does not know.
-        neck, config = (neck_of(joints), neck_of(message)), self.parameters.value
-        wrists = np.array([wrists_from(joint_values_of(one)) for one in (joints, message)])
-        scores, measured = sampled_scores(
-            image.body, posture, postures, neck, wrists, config, self._rng
-        )
+        scores, measured = sampled_scores(image.body, known, postures, config, self._rng)
         self._score.publish(Float32(data=scores.mean))
         self._chances.publish(_chances_message(scores))
         parts = part_values(scores, config, measured)

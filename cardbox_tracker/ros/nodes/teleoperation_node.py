@@ -11,8 +11,7 @@ from std_msgs.msg import ByteMultiArray, String
 from cardbox_tracker.applications.teleoperation.full_body import FullBodies, FullBody
 from cardbox_tracker.applications.teleoperation.sending import PACKETS, ZmqSender, packet
 from cardbox_tracker.common.errors import CardboxError
-from cardbox_tracker.recordings.outputs import positions_of
-from cardbox_tracker.ros.messages.results import joint_values_of
+from cardbox_tracker.recordings.outputs import joints_of
 from cardbox_tracker.ros.nodes.posture_input import PostureInput, Tracked
 from cardbox_tracker.ros.runtime import qos
 from cardbox_tracker.ros.runtime.command_line import node_main
@@ -62,8 +61,7 @@ class TeleoperationNode(CardboxNode):
 
     def _take(self, image: Tracked) -> None:
         values, stddev = (
-            {} if one is None else positions_of(joint_values_of(one))
-            for one in (image.joints, image.stddev)
+            {} if one is None else joints_of(one).by_name for one in (image.joints, image.stddev)
         )
         body = self._bodies.update(
             *(image.stamp_ns, image.state, image.body, values, stddev, image.keypoints or {})

@@ -24,9 +24,8 @@ from cardbox_tracker.detectors.model_files import installed_hands
 from cardbox_tracker.measuring.scene_watch import SceneWatch
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.model_file import dumps_body_model, load_body_model, loads_body_model
-from cardbox_tracker.person.skeleton import PLACE_NAMES
+from cardbox_tracker.person.skeleton import PLACE_NAMES, STATE_NAMES
 from cardbox_tracker.person.urdf import urdf_from_body
-from cardbox_tracker.recordings.outputs import place_of
 from cardbox_tracker.ros.messages import conversions
 from cardbox_tracker.ros.nodes.camera_inputs import CameraInputs, Received
 from cardbox_tracker.ros.nodes.tracker_outputs import TrackedBodies, TrackerOutputs
@@ -35,7 +34,6 @@ from cardbox_tracker.ros.runtime import qos
 from cardbox_tracker.ros.runtime.command_line import node_main
 from cardbox_tracker.ros.runtime.node import CardboxNode
 from cardbox_tracker.ros.runtime.parameters import LiveParameters
-from cardbox_tracker.tracking.camera_agreement import AgreementWatch
 from cardbox_tracker.tracking.estimate import LOST, NO_PERSON, UNCERTAIN, Estimate
 from cardbox_tracker.tracking.precompile import compile_all
 from cardbox_tracker.tracking.session import Session
@@ -118,8 +116,8 @@ class TrackingReport:
         if estimate.posture_stddev is not None:
             angles = estimate.posture_stddev[1:]
             values["largest deviation (deg)"] = f"{math.degrees(float(angles.max())):.1f}"
-        places = zip(PLACE_NAMES, place_of(estimate), strict=True)
-        return values | {f"{name} (m)": f"{value:.3f}" for name, value in places}
+        joints = dict(zip(STATE_NAMES, estimate.joints[0].tolist(), strict=True))
+        return values | {f"{name} (m)": f"{joints[name]:.3f}" for name in PLACE_NAMES}
 
 
 class OwnBody:
@@ -200,7 +198,6 @@ class TrackerNode(CardboxNode):
         self.subscribe(String, "body_model", self._on_model, qos.LATCHED)
         self._inputs = CameraInputs(self, settings, self._on_cameras, self._on_input)
         self._names = [name.strip("/") for name in settings.cameras or [""]]
-        self._agreement = AgreementWatch(self._names)
         self.diagnostics.source = f"silhouettes on {self._inputs.source}"
         self.diagnostics.extra = self._values
         self.diagnostics.remedy = (
@@ -353,7 +350,7 @@ class TrackerNode(CardboxNode):
             outputs.publish(seen, estimate, tracker)
         if self._scene is not None and self._scene.news:
             self.diagnostics.say("scene", self._scene.news)
-        self._agreement.see(self._session.agreement)
+        self._session.check_cameras()
         self.diagnostics.advice = self._warnings
         self.diagnostics.working(seen.sent_ns)
         self.diagnostics.made("joint states", conversions.stamp_ns(seen.header.stamp))
@@ -372,7 +369,9 @@ class TrackerNode(CardboxNode):
         first = None if self._session is None else self._session.trackers[0]
         ious = [] if first is None else first.camera_ious()
         used = {} if first is None else first.used_texts()
-        common = self._inputs.values(ious) | self._agreement.values() | used
+        agreement = None if self._session is None else self._session.agreement
+        turned = {} if agreement is None else agreement.values(self._names[1:])
+        common = self._inputs.values(ious) | turned | used
         values: dict[str, str] = {}
         if self.parameters.value.people:
             absent = [str(k) for k, report in enumerate(self._reports, 1) if report.is_absent]

@@ -12,16 +12,13 @@ from cardbox_tracker.applications.drawing.overlay import draw_camera_overlay, dr
 from cardbox_tracker.camera.camera import OPTICAL_FRAME
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.model_file import dumps_body_model
-from cardbox_tracker.person.rep155 import Rep155Joints, head_joints, joint_names
+from cardbox_tracker.person.rep155 import Rep155Joints, joint_names
 from cardbox_tracker.person.urdf import rep155_urdf
 from cardbox_tracker.recordings.outputs import (
     TOPICS,
     JointValues,
     OutputStream,
-    clavicles_of,
-    neck_of,
     person_space,
-    place_of,
 )
 from cardbox_tracker.ros.messages import conversions, results
 from cardbox_tracker.ros.messages.types import class_of, optional_class
@@ -87,11 +84,8 @@ class Rep155Outputs:
             urdf = rep155_urdf(tracker.body, self._id, frame_id, self._torso_place)
             for publisher in self._descriptions:
                 publisher.publish(String(data=urdf))
-        values = self._convert(estimate.posture)
-        if self._torso_place:
-            others = place_of(estimate), head_joints(neck_of(estimate)), clavicles_of(estimate)
-            values = np.concatenate([values, *others])
-        joints = JointValues(self._names, values)
+        values = np.nan_to_num(estimate.joints[0, : len(self._names)])
+        joints = JointValues(self._names, self._convert(values))
         self._joints.publish(results.message_of(header, joints))
 
 

@@ -10,13 +10,8 @@ from cardbox_tracker.camera.pairing import camera_names
 from cardbox_tracker.common.settings import NoEffectError, nested
 from cardbox_tracker.measuring.people_camera import PITCH_PRIOR, USUAL_PITCH
 from cardbox_tracker.measuring.scene_camera import GIVEN_STDDEV
-from cardbox_tracker.person.model import BodyModel
-from cardbox_tracker.person.proportions import (
-    STATURE_LIMITS_M,
-    USUAL_STATURE_M,
-    USUAL_STDDEV_M,
-    body_from_proportions,
-)
+from cardbox_tracker.person.model import BodyModel, body_from_proportions
+from cardbox_tracker.person.proportions import STATURE_LIMITS_M, USUAL_STATURE_M, USUAL_STDDEV_M
 from cardbox_tracker.ros.nodes.shared_parameters import (
     camera_roll_parameter,
     cameras_parameter,

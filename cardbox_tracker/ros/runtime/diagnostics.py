@@ -20,6 +20,7 @@ from rclpy.timer import Timer
 
 from cardbox_tracker.camera.stamps import WINDOW, ArrivalWatch, StampOrder, StreamStatistics
 from cardbox_tracker.common.errors import plain
+from cardbox_tracker.common.health import WATCHES, Verdict
 from cardbox_tracker.ros.runtime import qos
 
 _TEXTS = 3
@@ -71,11 +72,8 @@ def every_second(node: Node, call: Callable[[], None]) -> Timer:
     return node.create_timer(1.0, call, clock=Clock(clock_type=ClockType.STEADY_TIME))
 
 
-# The input has ceased after this time and this number of periods without a message.
-_SILENT_S = 2.0
+# The input of a slow camera has ceased after this number of periods without a message.
 _SILENT_PERIODS = 5.0
-# The median latency needs at least this many results.
-_ENOUGH = 30
 # An image that is older has a stamp of another clock, as those of a recording.
 _OLDEST_MS = 10_000.0
 
@@ -126,7 +124,7 @@ class NodeDiagnostics:
         self._arrived = (0, time.monotonic())
         self._warnings: list[str] = []
         self._published = self._late = 0
-        self._latencies_ms: deque[float] = deque(maxlen=WINDOW)
+        self._slow = Verdict("slow", self._periods)
         self._made = ""
         self._ages_ms: deque[float] = deque(maxlen=WINDOW)
         self._before = (time.monotonic(), 0, 0)
@@ -175,7 +173,7 @@ class NodeDiagnostics:
         self._published += 1
         if sent_ns > 0:
             latency_ns = time.time_ns() - sent_ns
-            self._latencies_ms.append(latency_ns / 1e6)
+            self._slow.see(latency_ns)
             # The next image was due before this one was done.
             self._late += 0 < self.input.period_ns < latency_ns
 
@@ -210,9 +208,8 @@ class NodeDiagnostics:
                 self._node.get_logger().info(f"{self.source} arrive again")
             return
         silent_s = now_s - since_s
-        if not (received and self.source) or silent_s < max(
-            _SILENT_S, _SILENT_PERIODS * self.input.period_ns / 1e9
-        ):
+        is_slow = silent_s < _SILENT_PERIODS * self.input.period_ns / 1e9
+        if is_slow or not (received and self.source and WATCHES["ceased"].is_beyond(silent_s)):
             return
         # The player may have been paused, which is not a fault and cannot be detected here.
         topics = self._node.get_topic_names_and_types()
@@ -222,23 +219,22 @@ class NodeDiagnostics:
             self._node.get_logger().info(f"{self.source} have ceased: {why}")
         elif not self._silence:
             self._node.get_logger().warning(f"{self.source} have ceased: {why}")
-        self._silence = f"{self.source}, which have ceased {silent_s:.0f} s ago: {why}"
+        self._silence = WATCHES["ceased"].remark(silent_s, source=self.source, why=why)
 
     @property
     def is_slow(self) -> bool:
         """Whether results take longer than the period of images that come evenly."""
-        if len(self._latencies_ms) < _ENOUGH or self.arrivals.has_burst:
-            return False
-        return 0 < self.input.period_ns / 1e6 < float(np.median(self._latencies_ms))
+        return self._slow.holds and not self.arrivals.has_burst
+
+    def _periods(self, latency_ns: float) -> float:
+        return latency_ns / self.input.period_ns if self.input.period_ns else 0.0
 
     def _slowness(self) -> dict[str, str]:
         if not self.remedy or not self.is_slow:
             return {}
-        return {
-            "slow": f"results come {np.median(self._latencies_ms):.0f} ms after their images, "
-            f"which come every {self.input.period_ns / 1e6:.0f} ms, so images are left out; "
-            f"{self.remedy}"
-        }
+        latency_ms, period_ms = self._slow.medians[0] / 1e6, self.input.period_ns / 1e6
+        given = {"latency_ms": latency_ms, "period_ms": period_ms, "remedy": self.remedy}
+        return {"slow": self._slow.remark(**given)}
 
     def _remarks(self) -> list[str]:
         """Return all current warnings, and log each new kind."""
@@ -290,8 +286,8 @@ class NodeDiagnostics:
             "late": str(self._late),
             "out of order (by stamps)": str(self.input.out_of_order),
         }
-        if self._latencies_ms:
-            values["latency p95 (ms)"] = f"{np.percentile(self._latencies_ms, 95):.2f}"
+        if self._slow.samples:
+            values["latency p95 (ms)"] = f"{np.percentile(self._slow.samples, 95) / 1e6:.2f}"
         values |= self._ages() | self.extra()
         values |= {f"warning {i}": warning for i, warning in enumerate(warnings, 1)}
         name = self._node.get_fully_qualified_name().lstrip("/")

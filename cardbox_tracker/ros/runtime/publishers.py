@@ -7,11 +7,7 @@ from typing import Any
 
 from rclpy.node import Node
 
-PATIENCE = 5
-"""Number of checks, one a second, after which a topic without a publisher is reported."""
-
-STARTING = 150
-"""The same where no other topic fits: the camera may be in a process that compiles first."""
+from cardbox_tracker.common.health import WATCHES
 
 _MOST_NAMED = 5
 # Images that are made of a camera's.
@@ -37,23 +33,20 @@ class SinglePublisher:
             names = self._publishers(topic)
             if names:
                 self._absent.pop(topic, None)
-            if len(names) > 1:
-                found[f"publishers of {topic}"] = (
-                    f"{len(names)} publishers send {topic}: {', '.join(names)}; expected one "
-                    "for each camera. Stop all but one, or give each camera its own namespace "
-                    "(docs/cameras.md); a killed publisher stays listed for some seconds"
-                )
+            several = WATCHES["publishers"]
+            found[f"publishers of {topic}"] = several.remark(
+                len(names), topic=topic, names=", ".join(names)
+            )
             if topic in self._absent:
                 self._absent[topic] += 1
                 others = self._others(topic)
-                if self._absent[topic] > (PATIENCE if others else STARTING):
+                if WATCHES["no publisher" if others else "no camera"].is_beyond(
+                    self._absent[topic]
+                ):
                     there = ", ".join(others[:_MOST_NAMED]) or "none at all"
-                    found[f"no publisher of {topic}"] = (
-                        f"nobody publishes {topic}; topics of the same type are: {there}. Start "
-                        "the camera's driver with the same ROS_DOMAIN_ID, or remap the topic to "
-                        "one of these"
-                    )
-        return found
+                    words = WATCHES["no publisher"].words
+                    found[f"no publisher of {topic}"] = words.format(topic=topic, there=there)
+        return {kind: text for kind, text in found.items() if text}
 
     def _others(self, topic: str) -> list[str]:
         types = dict(self._node.get_topic_names_and_types())

@@ -24,9 +24,8 @@ from cardbox_tracker.camera.camera import Camera
 from cardbox_tracker.detectors.image_points import POINT_NAMES, ImagePoints
 from cardbox_tracker.person.cardbox import PATCH_NAMES, cardbox_patches
 from cardbox_tracker.person.kinematics import pose
-from cardbox_tracker.person.model import BodyModel
+from cardbox_tracker.person.model import BodyModel, body_from_proportions
 from cardbox_tracker.person.posture import reference_posture
-from cardbox_tracker.person.proportions import body_from_proportions
 from cardbox_tracker.person.skeleton import KeypointState
 from cardbox_tracker.recordings.markers import marker_shapes
 from cardbox_tracker.terms.whole_body import WholeBodyCost

@@ -28,7 +28,7 @@ from cardbox_tracker.person.posture import PITCH, ROLL
 from cardbox_tracker.person.sizes import FloatArray
 from cardbox_tracker.person.skeleton import JOINT_NAMES, KeypointState
 from cardbox_tracker.recordings.result_reader import read_results
-from cardbox_tracker.recordings.result_table import columns, row_of
+from cardbox_tracker.recordings.result_table import row_of, units
 from cardbox_tracker.tracking.estimate import Estimate, Hand, Legs
 
 CONFIG = RebaConfig()
@@ -160,7 +160,7 @@ def test_wrists_of_a_table_are_read(tmp_path: Path) -> None:
     hand = Hand(0.5, np.array([0.0, 0.0, 1.0]), np.full(3, 0.4), np.full(3, 0.1))
     with path.open("w", newline="") as file:
         writer = csv.writer(file)
-        writer.writerow(columns(has_points=True, has_hands=True))
+        writer.writerow(units(has_points=True, has_hands=True))
         for i, hands in enumerate((None, (None, hand))):
             found = replace(seen(SEATED), hands=hands)
             cells = row_of(10**9 + i, 0.0, found, has_points=True, has_hands=True)
@@ -200,7 +200,7 @@ def table(
     rows.append(row_of(4 * 10**9, 4.0, Estimate("lost"), has_points=True))
     with path.open("w", newline="") as file:
         writer = csv.writer(file)
-        writer.writerow(columns(has_points=True))
+        writer.writerow(units(has_points=True))
         writer.writerows(["" if cell is None else cell for cell in row] for row in rows)
     return path
 

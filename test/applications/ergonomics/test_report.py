@@ -37,7 +37,7 @@ from cardbox_tracker.applications.ergonomics.rula import (
     declared,
 )
 from cardbox_tracker.camera.camera import Camera
-from cardbox_tracker.person.proportions import body_from_proportions
+from cardbox_tracker.person.model import body_from_proportions
 from cardbox_tracker.recordings.silhouettes import RecordedFrame
 from cardbox_tracker.tracking.estimate import NO_PERSON, TRACKING, UNCERTAIN, Estimate
 

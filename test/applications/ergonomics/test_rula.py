@@ -9,6 +9,8 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from cardbox_tracker.applications.ergonomics.rula import (
+    PARTS,
+    POSTURE_ROWS,
     RULA,
     SAMPLES,
     TABLE_A,
@@ -23,12 +25,21 @@ from cardbox_tracker.applications.ergonomics.rula import (
     sampled_scores,
     score_distribution,
 )
+from cardbox_tracker.person.model import body_from_proportions
 from cardbox_tracker.person.posture import TURNING_LIMITS
-from cardbox_tracker.person.proportions import body_from_proportions
-from cardbox_tracker.person.skeleton import JOINT_NAMES
+from cardbox_tracker.person.sizes import FloatArray
+from cardbox_tracker.person.skeleton import JOINT_NAMES, STATE
 
 BODY = body_from_proportions(1.75, 2.0)
-NO_WRISTS = np.full((2, 2, 2), np.nan)
+
+
+def state(mean: FloatArray, **parts: FloatArray) -> FloatArray:
+    """Values and deviations of all joints, of which some parts are known beside the posture."""
+    joints = np.full((2, len(STATE)), np.nan)
+    joints[0, POSTURE_ROWS] = mean
+    for name, values in parts.items():
+        joints[:, PARTS[name]] = values
+    return joints
 
 
 def posture(**angles_deg: float) -> np.ndarray:
@@ -121,10 +132,9 @@ def test_wrists_by_hand(flexion_deg: float, deviation_deg: float, score: int) ->
 def test_a_wrist_counts_with_all_of_its_deviation() -> None:
     """At 15 degrees, it is beyond the limit in half of the samples."""
     rng, mean = np.random.default_rng(0), posture(left_elbow_flexion=80)
-    wrists, neck = NO_WRISTS.copy(), (None, None)
-    wrists[:, 0] = np.radians([(15.0, 0.0), (5.0, 1.0)])
+    joints = state(mean, left_wrist=np.radians([(15.0, 0.0), (5.0, 1.0)]))
     drawn = np.tile(mean, (SAMPLES, 1))
-    found, measured = sampled_scores(BODY, mean, drawn, neck, wrists, RulaConfig(), rng)
+    found, measured = sampled_scores(BODY, joints, drawn, RulaConfig(), rng)
     assert measured == {"left_wrist"}
     assert found.parts["left_wrist"][2] == pytest.approx(0.5, abs=0.07)
     assert found.parts["right_wrist"].tolist() == [1, 0, 0, 0]
@@ -249,8 +259,8 @@ def test_the_spread_does_not_push_the_score_up(pitch_deg: float) -> None:
     """Deviations as of a film: the neck's is wider than its first limit."""
     rng, mean = np.random.default_rng(0), posture(torso_pitch=pitch_deg, left_elbow_flexion=80)
     drawn = mean + np.radians(9.0) * rng.standard_normal((SAMPLES, 12))
-    neck = np.zeros(2), np.radians([12.0, 12.0])
-    found, measured = sampled_scores(BODY, mean, drawn, neck, NO_WRISTS, RulaConfig(), rng)
+    neck = np.array([np.zeros(2), np.radians([12.0, 12.0])])
+    found, measured = sampled_scores(BODY, state(mean, neck=neck), drawn, RulaConfig(), rng)
     assert measured == {"neck"}
     assert found.of_mean == 2
     assert found.mean == pytest.approx(2.0, abs=0.3)

@@ -13,37 +13,53 @@ from cardbox_tracker.applications.exporting.motion import Motion
 from cardbox_tracker.camera.camera import level_to_optical
 from cardbox_tracker.person.kinematics import pose
 from cardbox_tracker.person.model import BodyModel
-from cardbox_tracker.person.skeleton import rotation_x, rotation_y, rotation_z
+from cardbox_tracker.person.skeleton import (
+    LEG_NAMES,
+    NECK_NAMES,
+    STATE_NAMES,
+    rotation_x,
+    rotation_y,
+    rotation_z,
+)
 
 STEP_NS = 100_000_000
 TURNS: dict[str, Callable[..., np.ndarray]] = {"X": rotation_x, "Y": rotation_y, "Z": rotation_z}
 
 
 def motion_of(
-    states: np.ndarray, body: BodyModel, rises_m: tuple[float, float] = (0, 0), **more: np.ndarray
+    states: np.ndarray,
+    body: BodyModel,
+    rises_m: tuple[float, float] = (0, 0),
+    neck: Any = np.nan,
+    legs: Any = np.nan,
+    **more: np.ndarray,
 ) -> Any:
     """Return the motion of states (n, 14), 10 a second; rows of nan are gaps.
 
-    ``rises_m`` raise the left and right shoulder; ``more`` are other arrays of the motion.
+    ``rises_m`` raise the left and right shoulder; ``neck`` and ``legs`` are joints, and ``more``
+    other arrays of the motion.
     """
     states = np.atleast_2d(np.asarray(states, float))
     points = pose(body, states, clavicles_m=np.tile(rises_m, (len(states), 1))).keypoints_m
     tilt, n = body.camera_pose, len(states)
     shapes = {
-        "neck": (2,),
         "wrists": (2, 3),
         "palms": (2, 3),
-        "legs": (8,),
         "leg_points_m": (6, 3),
         "leg_stddev_m": (6,),
     }
     unknown = {name: np.full((n, *shape), np.nan) for name, shape in shapes.items()}
     stamps = np.arange(len(states)) * STEP_NS
+    joints = np.full((n, len(STATE_NAMES)), np.nan)
+    joints[:, :14] = states
+    for names, values in ((NECK_NAMES, neck), (LEG_NAMES, legs)):
+        first = STATE_NAMES.index(names[0])
+        joints[:, first : first + len(names)] = values
     return Motion(
         stamps,
         stamps / 1e9,
         tuple("lost" if np.isnan(row).any() else "tracking" for row in states),
-        states,
+        joints,
         keypoints_m=points @ level_to_optical(tilt.pitch_rad, tilt.roll_rad).T,
         **(unknown | more),
     )

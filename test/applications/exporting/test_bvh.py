@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -15,9 +14,9 @@ from hypothesis.extra.numpy import arrays
 from cardbox_tracker.applications.exporting.bvh import write_bvh
 from cardbox_tracker.applications.exporting.markers import markers_of
 from cardbox_tracker.common.errors import CardboxError
-from cardbox_tracker.person.legs import LEG_LIMITS
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.posture import state_limits
+from cardbox_tracker.person.skeleton import LEG_LIMITS
 
 LIMBS = ("Arm", "ForeArm", "Hand")
 JOINTS = [f"{side}{limb}" for side in ("Left", "Right") for limb in LIMBS]
@@ -81,7 +80,7 @@ def test_bones_are_those_of_the_body_and_angles_those_of_the_table(
 ) -> None:
     state = np.zeros(14)
     state[[1, 2, 3, 5, 8, 10, 11]] = np.radians([5, 20, 30, 40, 50, 60, 70])
-    motion = replace(motion_of(state, body), neck=np.radians([[25.0, 15.0]]))
+    motion = motion_of(state, body, neck=np.radians([[25.0, 15.0]]))
     write_bvh(tmp_path / "a.bvh", motion, body)
     bvh = pytest.importorskip("bvh", reason="bvh is not installed")
     file = bvh.Bvh((tmp_path / "a.bvh").read_text(encoding="utf-8"))

@@ -9,15 +9,16 @@ import pytest
 
 from cardbox_tracker.applications.exporting.motion import MISSING, Motion
 from cardbox_tracker.common.errors import CardboxError
+from cardbox_tracker.person.skeleton import STATE_NAMES
 
 
 def motion_at(*times_ms: int) -> Motion:
     """A motion whose torso_y is the time in seconds."""
     stamps = np.array(times_ms, np.int64) * 1_000_000
-    states = np.repeat(stamps[:, None] / 1e9, 14, axis=1)
-    shapes = (2,), (6, 3), (2, 3), (2, 3), (8,), (6, 3), (6,)
+    joints = np.repeat(stamps[:, None] / 1e9, len(STATE_NAMES), axis=1)
+    shapes = (6, 3), (2, 3), (2, 3), (6, 3), (6,)
     others = [np.zeros((len(stamps), *shape)) for shape in shapes]
-    return Motion(stamps, stamps / 1e9, ("tracking",) * len(stamps), states, *others)
+    return Motion(stamps, stamps / 1e9, ("tracking",) * len(stamps), joints, *others)
 
 
 def test_images_of_a_constant_rate_stay() -> None:

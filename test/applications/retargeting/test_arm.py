@@ -15,8 +15,8 @@ from cardbox_tracker.applications.retargeting.config import RetargetConfig
 from cardbox_tracker.applications.retargeting.retargeter import Retargeter
 from cardbox_tracker.applications.retargeting.robot import load_robot, parse_robot
 from cardbox_tracker.common.errors import CardboxError
+from cardbox_tracker.person.model import body_from_proportions
 from cardbox_tracker.person.posture import JOINT_LIMITS
-from cardbox_tracker.person.proportions import body_from_proportions
 from cardbox_tracker.person.skeleton import JOINT_NAMES
 
 ROBOT = load_robot(Path(__file__).parents[3] / "config" / "example_arm.urdf")

@@ -19,8 +19,8 @@ from cardbox_tracker.applications.retargeting.joint_map import (
 from cardbox_tracker.applications.retargeting.retargeter import Retargeter
 from cardbox_tracker.applications.retargeting.robot import load_robot, parse_robot
 from cardbox_tracker.common.errors import CardboxError
+from cardbox_tracker.person.model import body_from_proportions
 from cardbox_tracker.person.posture import RIGHT_ARM
-from cardbox_tracker.person.proportions import body_from_proportions
 from cardbox_tracker.person.skeleton import (
     JOINT_NAMES,
     arm_directions,

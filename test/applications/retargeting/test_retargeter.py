@@ -20,8 +20,8 @@ from cardbox_tracker.applications.retargeting.retargeter import (
 )
 from cardbox_tracker.applications.retargeting.robot import load_robot
 from cardbox_tracker.common.errors import CardboxError
+from cardbox_tracker.person.model import body_from_proportions
 from cardbox_tracker.person.posture import reference_posture
-from cardbox_tracker.person.proportions import body_from_proportions
 from cardbox_tracker.person.skeleton import JOINT_NAMES
 
 CONFIG = Path(__file__).parents[3] / "config"

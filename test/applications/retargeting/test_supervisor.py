@@ -14,8 +14,8 @@ from cardbox_tracker.applications.retargeting.joint_map import load_joint_map
 from cardbox_tracker.applications.retargeting.retargeter import Command, Retargeter
 from cardbox_tracker.applications.retargeting.robot import load_robot
 from cardbox_tracker.applications.retargeting.supervisor import DEAD_MAN_NS, Phase, Supervisor
+from cardbox_tracker.person.model import body_from_proportions
 from cardbox_tracker.person.posture import reference_posture
-from cardbox_tracker.person.proportions import body_from_proportions
 
 CONFIG = Path(__file__).parents[3] / "config"
 ROBOT = load_robot(CONFIG / "example_arm.urdf")

@@ -9,17 +9,10 @@ from hypothesis import settings as hypothesis_settings
 from hypothesis import strategies as st
 
 from cardbox_tracker.applications.teleoperation.full_body import NAMES, FullBodies, FullBody
-from cardbox_tracker.person.hands import HAND_NAMES
-from cardbox_tracker.person.legs import (
-    ANKLE_SHARE,
-    LEG_NAMES,
-    SHANK_SHARE,
-    THIGH_SHARE,
-    stature_of,
-)
+from cardbox_tracker.person.model import body_from_proportions
 from cardbox_tracker.person.parts import body_parts
-from cardbox_tracker.person.proportions import body_from_proportions
-from cardbox_tracker.person.skeleton import JOINT_NAMES, NECK_NAMES
+from cardbox_tracker.person.proportions import ANKLE_SHARE, SHANK_SHARE, THIGH_SHARE, stature_of
+from cardbox_tracker.person.skeleton import HAND_NAMES, JOINT_NAMES, LEG_NAMES, NECK_NAMES
 
 BODY = body_from_proportions(1.75, 2.0)
 PARTS = body_parts(BODY.sizes)
@@ -64,7 +57,7 @@ def test_a_hanging_body_stands() -> None:
     assert at(body, "left_shoulder")[1] == pytest.approx(PARTS.shoulder_aside_m)
     assert at(body, "right_shoulder")[1] == pytest.approx(-PARTS.shoulder_aside_m)
     down = at(body, "left_wrist") - at(body, "left_elbow")
-    assert down == pytest.approx([0.0, 0.0, 0.75 * PARTS.forearm.bottom_m])
+    assert down == pytest.approx([0.0, 0.0, 0.73 * PARTS.forearm.bottom_m])
     assert body.yaw_rad == pytest.approx(np.radians(30))
     assert body.turns == pytest.approx(np.tile([1.0, 0.0, 0.0, 0.0], (24, 1)))
     # Nobody has seen the legs or the face.

@@ -18,8 +18,8 @@ from cardbox_tracker.person.kinematics import pose
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.recordings.truth import GroundTruth
 from lab.evaluation.people import people_figures, torso_angles
-from lab.evaluation.people_report import BEGIN, END, people_report
 from lab.evaluation.plan import NO_POINTS, Plan, ways_of
+from lab.evaluation.report import BEGIN, END, people_report
 from lab.evaluation.session import RecordedSession, load_session
 from lab.evaluation.tracking import (
     BACKGROUND,

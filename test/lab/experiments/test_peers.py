@@ -8,10 +8,7 @@ import pytest
 from cardbox_tracker.person.posture import JOINT_LIMITS, reference_posture
 from cardbox_tracker.person.sizes import FloatArray
 from cardbox_tracker.search.config import paper_preset
-from lab.experiments.peers.annealed import Annealed, annealed
-from lab.experiments.peers.cma_es import CmaEs
-from lab.experiments.peers.flat import Flat
-from lab.experiments.peers.whole import WholeSearch
+from lab.experiments.peers import Annealed, CmaEs, Flat, WholeSearch, annealed
 
 
 @pytest.mark.parametrize("share", [0.1, 0.5, 0.9])

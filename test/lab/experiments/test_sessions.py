@@ -44,7 +44,6 @@ def test_the_truth_is_that_of_the_kinematics(session: Session) -> None:
         person_frames(person, session.postures).keypoints_m
     )
     np.testing.assert_allclose(session.keypoints_m, expected, atol=1e-4)
-    np.testing.assert_allclose(session.torso_rad, session.postures[:, 1:4], atol=1e-3)
 
 
 def test_images_for_the_sequence_are_of_the_motion(session: Session) -> None:

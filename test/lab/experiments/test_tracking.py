@@ -42,7 +42,6 @@ def hand_made() -> MotionRuns:
         np.array([0.0, 0.1]),
         truth_m,
         np.zeros((2, 12)),
-        np.zeros((2, 3)),
     )
 
 
@@ -58,18 +57,8 @@ def test_summary_by_hand() -> None:
     assert figures["std_dof"]["torso_y"] == pytest.approx(0.02 / np.sqrt(2))
     assert figures["std_dof"]["torso_pitch"] == pytest.approx(np.radians(30) / np.sqrt(2))
     assert figures["std_dof"]["left_elbow_flexion"] == 0.0
-    assert figures["joint_angle_error_deg"]["torso_pitch"] == pytest.approx(15.0)
-    assert set(figures["joint_angle_error_deg"]) == set(JOINT_NAMES[1:])
     assert figures["stderr_cost_px"] == pytest.approx(100.0)
     assert (figures["runs"], figures["frames"]) == (2, 2)
-
-
-def test_where_only_the_torso_is_known_only_its_angles_are_compared() -> None:
-    motion = replace(hand_made(), postures=np.full((2, 12), np.nan))
-    errors = summarize(motion)["joint_angle_error_deg"]
-    assert errors == pytest.approx({"torso_roll": 0.0, "torso_pitch": 15.0, "torso_yaw": 0.0})
-    nothing = replace(motion, torso_rad=np.full((2, 3), np.nan))
-    assert summarize(nothing)["joint_angle_error_deg"] == {}
 
 
 def test_curves_are_means_over_runs() -> None:

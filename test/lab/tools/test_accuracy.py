@@ -14,8 +14,8 @@ from cardbox_tracker.applications.ergonomics.rula import RulaConfig, ScoreDistri
 from cardbox_tracker.applications.retargeting.robot import load_robot
 from cardbox_tracker.applications.simulation.session import session_camera
 from cardbox_tracker.person.kinematics import pose
+from cardbox_tracker.person.model import body_from_proportions
 from cardbox_tracker.person.posture import reference_posture
-from cardbox_tracker.person.proportions import body_from_proportions
 from cardbox_tracker.search.config import default_preset
 from cardbox_tracker.tracking.estimate import TRACKING, Estimate
 from lab.evaluation.angles import true_postures
@@ -90,7 +90,7 @@ def test_a_robot_that_can_points_as_the_person() -> None:
     postures = np.zeros((3, 12))
     postures[:, 8], postures[:, 11] = 0.4, (0.5, 0.7, 0.9)
     body = body_from_proportions(1.75, 2.0)
-    cells = retarget_accuracy.row(ROBOT, "arm", "right", body, postures).split(" | ")
+    cells = retarget_accuracy.row_of(ROBOT, "arm", "right", body, postures).split(" | ")
     assert cells[:2] == ["| arm", "right"]
     assert all(float(cell.split(" / ")[1].rstrip("°")) < 8.0 for cell in cells[2:5])
 

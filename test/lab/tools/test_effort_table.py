@@ -35,7 +35,7 @@ def rows(monkeypatch: pytest.MonkeyPatch) -> list[Measured]:
 
 
 def test_the_table_by_hand(rows: list[Measured]) -> None:
-    head, _, *lines = effort_table.table(rows)
+    head, _, *lines = effort_table.effort_table(rows).splitlines()
     assert head == "| effort | ms an image | times effort 1 | a, cm | b, cm |"
     assert lines[0] == "| 0.25 | 0.5 | 0.25 | 4.0 | 4.0 |"
     assert lines[-1] == "| 4 | 8.0 | 4.00 | 0.2 | 0.2 |"
@@ -45,7 +45,7 @@ def test_the_plot_shows_errors_and_times(
     rows: list[Measured], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(pyplot, "close", lambda _: None)
-    effort_table.plot(rows, tmp_path / "effort.png")
+    effort_table.draw(rows, tmp_path / "effort.png")
     errors, times = pyplot.gcf().axes
     monkeypatch.undo()
     pyplot.close("all")

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from lab.tools.people_film import from_the_side
-from lab.tools.real_sheet import REFERENCE_BGR
+from lab.tools.people_sheet import REFERENCE_BGR
 
 
 def test_depth_grows_to_the_right_and_height_upwards() -> None:

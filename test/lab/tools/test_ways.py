@@ -9,9 +9,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from cardbox_tracker.person.legs import LEG_NAMES
 from cardbox_tracker.person.sizes import FloatArray
-from cardbox_tracker.person.skeleton import KEYPOINT_NAMES
+from cardbox_tracker.person.skeleton import KEYPOINT_NAMES, LEG_NAMES
 from cardbox_tracker.recordings.result_reader import Results
 from cardbox_tracker.recordings.result_table import POINT_COLUMNS
 from cardbox_tracker.recordings.silhouettes import TimeSpan

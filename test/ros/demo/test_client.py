@@ -10,9 +10,8 @@ import pytest
 import yaml
 from rclpy.serialization import serialize_message
 
-from cardbox_tracker.person.legs import LEG_NAMES
 from cardbox_tracker.person.model import BodyModel
-from cardbox_tracker.person.skeleton import JOINT_STATE_NAMES
+from cardbox_tracker.person.skeleton import Group, names_of
 from cardbox_tracker.person.urdf import urdf_from_body
 from cardbox_tracker.recordings.outputs import TOPICS
 from cardbox_tracker.recordings.result_bag import result_writer
@@ -36,7 +35,7 @@ def recorded(
             for topic, (kind, _) in topics_of().items():
                 message = kind()
                 if topic.startswith("joint_states"):
-                    message.name = [*JOINT_STATE_NAMES, *LEG_NAMES]
+                    message.name = [*names_of(*{*Group} - {Group.HAND})]
                     message.position = [0.0] * len(message.name)
                 if topic == "robot_description":
                     message.data = urdf_from_body(BodyModel())

@@ -25,6 +25,7 @@ from cardbox_tracker.recordings.outputs import (
     TOPICS,
     JointValues,
     KeypointStates,
+    joints_of,
 )
 from cardbox_tracker.ros.messages import conversions, results
 from cardbox_tracker.ros.messages.types import class_of
@@ -219,7 +220,7 @@ def test_joint_state_has_names_positions_and_header() -> None:
     np.testing.assert_array_equal(message.position, posture)
     assert message.header.frame_id == "optical"
     assert len(message.velocity) == len(message.effort) == 0
-    read = results.joint_values_of(message)
+    read = joints_of(message)
     assert read.names == JOINT_NAMES
     np.testing.assert_array_equal(read.values, posture)
 

@@ -20,9 +20,8 @@ from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 
 from cardbox_tracker.applications.simulation.session import session_camera
 from cardbox_tracker.detectors.detector import PersonDetector
-from cardbox_tracker.person.legs import LEG_NAMES
 from cardbox_tracker.person.model import BodyModel
-from cardbox_tracker.person.skeleton import JOINT_NAMES, JOINT_STATE_NAMES
+from cardbox_tracker.person.skeleton import JOINT_NAMES, Group, names_of
 from cardbox_tracker.person.urdf import (
     ROOT_LINK,
     LinkTransforms,
@@ -61,7 +60,7 @@ ARM = {
 }
 # rclpy adds these to every node.
 OF_EVERY_NODE = ("/rosout", "/parameter_events")
-ALL_NAMES = (*JOINT_STATE_NAMES, *LEG_NAMES)
+ALL_NAMES = names_of(*{*Group} - {Group.HAND})
 BAG_TOPIC = "/of_the_bag/camera_info"
 
 

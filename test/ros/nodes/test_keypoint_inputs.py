@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -314,6 +315,22 @@ def table(folder: Path, *rows: str, camera: bool = False) -> Path:
     names = "stamp_ns,joint,u,v,score" + (",camera" if camera else "")
     path.write_text("\n".join([names, *rows]), encoding="utf-8")
     return path
+
+
+@pytest.mark.parametrize("is_zoomed", [False, True])
+def test_a_calibration_that_the_silhouettes_contradict_is_not_followed(
+    tracker: Tracker, is_zoomed: bool
+) -> None:
+    """The node that sees the images goes on with the calibration before, or follows, too."""
+    other, silhouette = replace(FULL, fx=2 * FULL.fx, fy=2 * FULL.fy), CAMERA
+    if is_zoomed:
+        silhouette = replace(CAMERA, fx=2 * CAMERA.fx, fy=2 * CAMERA.fy)
+    (source,) = tracker.inputs.cameras
+    for number in range(65):
+        source.points(header(T + number * 33 * MS), silhouette, SILHOUETTE)
+        tracker.bus.send("/camera_info", camera_info_message(header(T), other))
+    assert source._calibration is not None
+    assert source._calibration.k[0, 0] == (other if is_zoomed else FULL).fx
 
 
 def test_a_table_is_looked_up_by_the_stamp(bus: Any, tmp_path: Path) -> None:

@@ -17,8 +17,8 @@ from std_msgs.msg import Bool, String
 
 from cardbox_tracker.applications.retargeting.robot import load_robot
 from cardbox_tracker.common.errors import CardboxError
+from cardbox_tracker.person.model import body_from_proportions
 from cardbox_tracker.person.model_file import dumps_body_model
-from cardbox_tracker.person.proportions import body_from_proportions
 from cardbox_tracker.ros.nodes import retarget_node
 from cardbox_tracker.ros.nodes.retarget_node import RetargetNode
 

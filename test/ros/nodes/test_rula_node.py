@@ -10,8 +10,8 @@ from diagnostic_msgs.msg import DiagnosticStatus
 from sensor_msgs.msg import JointState
 from std_msgs.msg import String
 
+from cardbox_tracker.person.model import body_from_proportions
 from cardbox_tracker.person.model_file import dumps_body_model
-from cardbox_tracker.person.proportions import body_from_proportions
 from cardbox_tracker.ros.nodes.rula_node import RulaNode
 
 MODEL = String(data=dumps_body_model(body_from_proportions(1.75, 2.0, 0.4, 0.0)))

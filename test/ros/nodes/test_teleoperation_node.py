@@ -12,8 +12,8 @@ import pytest
 from std_msgs.msg import String
 
 from cardbox_tracker.common.errors import CardboxError
+from cardbox_tracker.person.model import body_from_proportions
 from cardbox_tracker.person.model_file import dumps_body_model
-from cardbox_tracker.person.proportions import body_from_proportions
 from cardbox_tracker.ros.nodes.teleoperation_node import TeleoperationNode
 
 MODEL = String(data=dumps_body_model(body_from_proportions(1.75, 2.0, 0.4, 0.0)))

@@ -20,11 +20,10 @@ from cardbox_tracker.detectors.hand_network import HandPoints
 from cardbox_tracker.detectors.image_points import POINT_INDEX
 from cardbox_tracker.detectors.pose_network import LANDMARKS, NOBODY, Square
 from cardbox_tracker.person.cardbox import cardbox_patches
-from cardbox_tracker.person.hands import HAND_NAMES
-from cardbox_tracker.person.legs import LEG_NAMES
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.model_file import dumps_body_model
 from cardbox_tracker.person.posture import reference_posture
+from cardbox_tracker.person.skeleton import HAND_NAMES, LEG_NAMES
 from cardbox_tracker.ros.messages.conversions import camera_info_message, image_message
 from cardbox_tracker.ros.messages.keypoints import people_message
 from cardbox_tracker.ros.nodes import tracker_node

@@ -22,11 +22,10 @@ from std_msgs.msg import Header, String  # noqa: E402
 
 from cardbox_tracker.camera.camera import Camera  # noqa: E402
 from cardbox_tracker.person.kinematics import pose  # noqa: E402
-from cardbox_tracker.person.legs import LEG_NAMES  # noqa: E402
 from cardbox_tracker.person.model import BodyModel  # noqa: E402
 from cardbox_tracker.person.model_file import save_body_model  # noqa: E402
 from cardbox_tracker.person.posture import reference_posture  # noqa: E402
-from cardbox_tracker.person.skeleton import JOINT_NAMES  # noqa: E402
+from cardbox_tracker.person.skeleton import JOINT_NAMES, LEG_NAMES  # noqa: E402
 from cardbox_tracker.ros.messages.conversions import (  # noqa: E402
     camera_info_message,
     image_message,

@@ -16,9 +16,10 @@ from cardbox_tracker.camera.rasterisation import render
 from cardbox_tracker.camera.view import OtherCamera
 from cardbox_tracker.measuring.people_camera import FOUND_STDDEV, PITCH_PRIOR, USUAL_PITCH
 from cardbox_tracker.person.cardbox import cardbox_patches
+from cardbox_tracker.person.model import body_from_proportions
 from cardbox_tracker.person.model_file import dumps_body_model, loads_body_model
 from cardbox_tracker.person.posture import reference_posture
-from cardbox_tracker.person.proportions import USUAL_STATURE_M, body_from_proportions
+from cardbox_tracker.person.proportions import USUAL_STATURE_M
 from cardbox_tracker.ros.messages.conversions import camera_info_message, image_message
 from cardbox_tracker.ros.nodes.tracker_node import TrackerNode
 from cardbox_tracker.ros.nodes.tracker_parameters import TrackerParameters

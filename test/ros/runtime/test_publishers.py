@@ -8,9 +8,10 @@ from typing import Any
 
 from std_msgs.msg import String
 
-from cardbox_tracker.ros.runtime.publishers import PATIENCE, STARTING, SinglePublisher
+from cardbox_tracker.ros.runtime.publishers import SinglePublisher
 
 WAIT_S = 30.0
+PATIENCE, STARTING = 5, 150
 
 
 def wait_for(condition: Callable[[], Any]) -> Any:

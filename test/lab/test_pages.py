@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from cardbox_tracker.common.errors import CardboxError
-from lab.evaluation.people_report import replaced
+from lab.pages import replaced
 
 BEGIN, END = "<!-- begin -->", "<!-- end -->"
 

@@ -1,1 +1,0 @@
-"""Searches that take the place of the paper's hierarchy of filters, with as many ratings."""
