@@ -1,0 +1,67 @@
+"""Share of a film's images in which a standing or squatting person would fall.
+
+    python -m lab.tools.falls TABLE...
+
+A table is one of ``cardbox track`` with legs. The middle of the mass has to be between 6 cm behind
+and 21 cm ahead of the ankles, where heels and toes are (masses of D. Winter, see
+:mod:`cardbox_tracker.tracking.leg_fit`). Images with the hips below 70 % of their usual height are
+squats; of these, shoulders and hips are given as cm ahead of the ankles.
+"""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+import numpy as np
+
+from cardbox_tracker import Result, read_result
+from cardbox_tracker.camera.camera import level_to_optical
+from cardbox_tracker.person.sizes import FloatArray
+
+_BEHIND_M, _AHEAD_M, _SQUAT = -0.06, 0.21, 0.7
+
+
+def ahead_of_ankles(result: Result) -> tuple[FloatArray, FloatArray]:
+    """Return the middle of the mass, shoulders and hips ahead of the ankles, and the hips' height.
+
+    They are (n, 3) and (n,), m; nan without legs.
+    """
+    assert result.body is not None, "a table has its body beside it"
+    to_level = level_to_optical(result.body.camera_pose.pitch_rad)
+
+    def middle(name: str) -> FloatArray:
+        sides = [
+            np.stack([result.numbers[f"{side}_{name}_{axis}"] for axis in "xyz"], axis=1)
+            for side in ("left", "right")
+        ]
+        return np.asarray(np.mean(sides, axis=0) @ to_level)
+
+    shoulders, hips, knees, ankles = map(middle, ("shoulder", "hip", "knee", "ankle"))
+    upper, thighs = hips + 0.626 * (shoulders - hips), hips + 0.433 * (knees - hips)
+    shanks = knees + 0.433 * (ankles - knees)
+    mass = 0.678 * upper + 0.2 * thighs + 0.093 * shanks + 0.029 * ankles
+    yaw = result.numbers["torso_yaw"]
+    facing = np.stack([np.cos(yaw), np.sin(yaw), np.zeros(len(yaw))], axis=1)
+    ahead = [((point - ankles) * facing).sum(axis=1) for point in (mass, shoulders, hips)]
+    return np.stack(ahead, axis=1), hips[:, 2] - ankles[:, 2]
+
+
+def main() -> None:
+    """Print a line for each table."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("tables", type=Path, nargs="+", metavar="TABLE")
+    print("table: images, would fall; squats: shoulders, hips ahead of the ankles, cm")
+    for path in parser.parse_args().tables:
+        ahead_m, height_m = ahead_of_ankles(read_result(path))
+        known = np.isfinite(height_m)
+        mass_m = ahead_m[known, 0]
+        falls = np.mean((mass_m < _BEHIND_M) | (mass_m > _AHEAD_M))
+        squats = known & (height_m < _SQUAT * np.nanpercentile(height_m, 90))
+        _, shoulders, hips = 100 * np.median(ahead_m[squats], axis=0)
+        where = f"{shoulders:.0f}, {hips:.0f}"
+        print(f"{path.stem}: {known.sum()}, {falls:.0%}; {squats.sum()}: {where}")
+
+
+if __name__ == "__main__":
+    main()
