@@ -1,6 +1,6 @@
 """Share of a film's images in which a standing or squatting person would fall.
 
-    python -m lab.tools.falls TABLE...
+    python -m lab.tools.falls TABLE... [--person K]
 
 A table is one of ``cardbox track`` with legs. The middle of the mass has to be between 6 cm behind
 and 21 cm ahead of the ankles, where heels and toes are (masses of D. Winter, see
@@ -51,16 +51,18 @@ def main() -> None:
     """Print a line for each table."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("tables", type=Path, nargs="+", metavar="TABLE")
+    parser.add_argument("--person", type=int, metavar="K", help="one of several people")
+    given = parser.parse_args()
     print("table: images, would fall; squats: shoulders, hips ahead of the ankles, cm")
-    for path in parser.parse_args().tables:
-        ahead_m, height_m = ahead_of_ankles(read_result(path))
+    for path in given.tables:
+        ahead_m, height_m = ahead_of_ankles(read_result(path, given.person))
         known = np.isfinite(height_m)
         mass_m = ahead_m[known, 0]
         falls = np.mean((mass_m < _BEHIND_M) | (mass_m > _AHEAD_M))
-        squats = known & (height_m < _SQUAT * np.nanpercentile(height_m, 90))
-        _, shoulders, hips = 100 * np.median(ahead_m[squats], axis=0)
-        where = f"{shoulders:.0f}, {hips:.0f}"
-        print(f"{path.stem}: {known.sum()}, {falls:.0%}; {squats.sum()}: {where}")
+        squats = ahead_m[known & (height_m < _SQUAT * np.nanpercentile(height_m, 90)), 1:]
+        middle = 100 * np.median(squats, axis=0) if len(squats) else ()
+        where = ", ".join(f"{one:.0f}" for one in middle)
+        print(f"{path.stem}: {known.sum()}, {falls:.0%}; {len(squats)}: {where}")
 
 
 if __name__ == "__main__":
