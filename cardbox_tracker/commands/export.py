@@ -14,6 +14,7 @@ from cardbox_tracker.commands.arguments import (
     option,
     time,
 )
+from cardbox_tracker.common.errors import CardboxError
 from cardbox_tracker.common.files import body_beside, body_of_person
 from cardbox_tracker.person.model_file import load_body_model
 from cardbox_tracker.recordings.smoothing import LONGEST_GAP_S
@@ -54,6 +55,10 @@ def run(given: Arguments) -> None:
     chosen.check()
     model = None if given.model is None else load_body_model(given.model)
     results = given.read()
+    if given.cutoff is None and given.fill != LONGEST_GAP_S:
+        raise CardboxError(
+            "--fill needs a low-pass; give --cutoff, as docs/export.md recommends it"
+        )
     if given.cutoff is not None:
         results = filtered(results, given.cutoff, given.fill, model)
     remarks = export(results, output, chosen, model)

@@ -4,13 +4,15 @@
 
 Each session is tracked as a film with field of view, stature and detector. Shape and place are
 errors of the keypoints; the acceleration is that of the hands, by second differences, in images
-that the reference and the unfiltered results have. The table goes between the marks of the page.
+that the reference and the unfiltered results have. The reference after the same low-pass shows what
+is lost of the motion. The table goes between the marks of the page.
 """
 
 from __future__ import annotations
 
 import argparse
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
+from dataclasses import replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -20,8 +22,10 @@ from numpy.typing import NDArray
 from cardbox_tracker import track
 from cardbox_tracker.common.files import write_file
 from cardbox_tracker.person.sizes import FloatArray
+from cardbox_tracker.person.skeleton import KEYPOINT_NAMES
 from cardbox_tracker.recordings.result_reader import Results
 from cardbox_tracker.recordings.result_table import POINT_COLUMNS
+from cardbox_tracker.recordings.smoothing import low_passed
 from cardbox_tracker.search.doubt import HANDS
 from lab.evaluation.films import make_film
 from lab.pages import replaced, table
@@ -31,52 +35,54 @@ MARKS = "<!-- low-pass -->", "<!-- /low-pass -->"
 CUTOFFS_HZ = 3.0, 4.0, 6.0
 
 
-def figures(
-    results: Mapping[str, Results], stamps_ns: FloatArray, true_m: FloatArray
-) -> FloatArray:
-    """Return shape and place, cm, and acceleration, m/s², of each results, then the reference's.
+def figures(found_m: FloatArray, true_m: FloatArray, stamps_ns: FloatArray) -> FloatArray:
+    """Return shape and place, cm, and acceleration of the hands, m/s², (3,).
 
     Args:
-        results: unfiltered ones first, of the same images.
-        stamps_ns: of these images, (n,), by the session's clock.
-        true_m: reference (n, 6, 3) in them, nan where there is none.
+        found_m: keypoints (n, 6, 3).
+        true_m: the reference in the same images, (n, 6, 3), nan where they do not count.
+        stamps_ns: of the images, (n,).
     """
-    found_m = [one.of(POINT_COLUMNS).reshape(-1, 6, 3) for one in results.values()]
-    true_m = np.where(np.isfinite(found_m[0]), true_m, np.nan)
     steps_s = np.diff(stamps_ns) / 1e9
     is_even: NDArray[np.bool_] = np.asarray(np.abs(steps_s / np.median(steps_s) - 1.0) < 0.2)
-
-    def shaking(points_m: FloatArray) -> float:
-        second = np.diff(points_m[:, HANDS], 2, axis=0) / np.median(steps_s) ** 2
-        second[~(is_even[1:] & is_even[:-1])] = np.nan
-        return float(np.sqrt(np.nanmean(np.sum(second**2, axis=2))))
-
-    rows = [(*shape_and_place_cm(m - true_m), shaking(m + 0 * true_m)) for m in found_m]
-    return np.array([*rows, (0.0, 0.0, shaking(true_m))])
+    counted_m = np.where(np.isfinite(true_m), found_m, np.nan)[:, HANDS]
+    second = np.diff(counted_m, 2, axis=0) / np.median(steps_s) ** 2
+    second[~(is_even[1:] & is_even[:-1])] = np.nan
+    hands = np.sqrt(np.nanmean(np.sum(second**2, axis=2)))
+    return np.array([*shape_and_place_cm(found_m - true_m), hands])
 
 
-def measure(folder: Path) -> FloatArray:
-    """Return :func:`figures` of one session as a film."""
+def measure(folder: Path) -> tuple[FloatArray, FloatArray]:
+    """Return :func:`figures` of one session, (cut-offs, 3), and of its reference likewise."""
     with TemporaryDirectory() as made:
         film = make_film(folder, "across", Path(made) / "film.mp4")
         given = {"fov_deg": round(film.fov_deg, 1), "stature_m": film.session.truth.stature_m}
         result = track(film.path, detector="mediapipe", seed=0, **given)
-    stamps_ns, true_m = film.session.stamps_ns, film.session.keypoints_m
-    by_stamp = dict(zip(stamps_ns.tolist(), true_m, strict=True))
-    nothing = np.full((6, 3), np.nan)
-    truth_m = np.array([by_stamp.get(stamp_ns, nothing) for stamp_ns in film.stamps_ns])
-    every = {"no": result} | {f"{hz:g} Hz": result.filtered(hz) for hz in CUTOFFS_HZ}
-    return figures(every, np.array(film.stamps_ns), truth_m)
+    pairs = zip(film.session.stamps_ns.tolist(), film.session.keypoints_m, strict=True)
+    by_stamp, unknown = dict(pairs), np.full((6, 3), np.nan)
+    true_m = np.array([by_stamp.get(stamp_ns, unknown) for stamp_ns in film.stamps_ns])
+    true_m = np.where(np.isfinite(_keypoints_m(result)), true_m, np.nan)
+    columns = dict(zip(POINT_COLUMNS, true_m.reshape(len(true_m), -1).T, strict=True))
+    found = []
+    for kind in (result, replace(result, numbers=columns)):
+        every = [kind, *(low_passed(kind, hz) for hz in CUTOFFS_HZ)]
+        stamps_ns = np.array(film.stamps_ns)
+        found.append(np.array([figures(_keypoints_m(one), true_m, stamps_ns) for one in every]))
+    return found[0], found[1]
 
 
-def report(found: Mapping[str, FloatArray]) -> str:
+def _keypoints_m(results: Results) -> FloatArray:
+    return results.of(POINT_COLUMNS).reshape(-1, len(KEYPOINT_NAMES), 3)
+
+
+def report(found: Mapping[str, Iterable[FloatArray]]) -> str:
     """Return the table of :func:`measure` by the names of recordings."""
-    head = "recording", "unfiltered", *(f"{hz:g} Hz" for hz in CUTOFFS_HZ), "reference"
     rows = []
-    for name, values in found.items():
-        cells = [f"{shape:.2f} / {place:.2f} / {hands:.1f}" for shape, place, hands in values[:-1]]
-        rows.append((name, *cells, f"{values[-1, 2]:.1f}"))
-    return table(head, rows)
+    for name, both in found.items():
+        for what, values in zip((name, "its reference"), both, strict=True):
+            cells = (f"{shape:.2f} / {place:.2f} / {hands:.1f}" for shape, place, hands in values)
+            rows.append((what, *cells))
+    return table(("recording", "unfiltered", *(f"{hz:g} Hz" for hz in CUTOFFS_HZ)), rows)
 
 
 def main() -> None:

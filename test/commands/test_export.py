@@ -240,6 +240,7 @@ def test_a_body_beside_the_table_that_is_anothers(
             ("person.csv", "--to", "trc", "--model", "FOLDER/none.yaml"),
             "expected the body model",
         ),
+        (("person.csv", "--to", "trc", "--fill", "1"), "--fill needs a low-pass; give --cutoff"),
         (("person.yaml", "--to", "trc"), "has no column"),
         (("nothing.csv", "--to", "trc"), "there are no results"),
     ],
