@@ -10,7 +10,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from itertools import pairwise
 from typing import TypeVar
 
 import numpy as np
@@ -114,13 +113,12 @@ def low_passed(
         known = np.flatnonzero(np.isfinite(values))
         for run in np.split(known, 1 + np.flatnonzero(np.diff(time_s[known]) > longest_s)):
             if len(run) > 1:
+                inside = slice(run[0], run[-1] + 1)
                 begin_s, end_s = time_s[run[[0, -1]]]
                 even_s = np.linspace(begin_s, end_s, round((end_s - begin_s) / step_s) + 1)
-                even = butterworth(
-                    np.interp(even_s, time_s[run], values[run]), cutoff_hz, 1 / step_s
-                )
-                inside = slice(run[0], run[-1] + 1)
-                values[inside] = np.interp(time_s[inside], even_s, even)
+                even = np.interp(even_s, time_s[run], values[run])
+                smooth = butterworth(even, cutoff_hz, 1.0 / step_s)
+                values[inside] = np.interp(time_s[inside], even_s, smooth)
     for palm in (PALM_COLUMNS[:3], PALM_COLUMNS[3:]):
         if numbers.keys() >= set(palm):
             length = np.linalg.norm([numbers[name] for name in palm], axis=0)
@@ -204,8 +202,9 @@ def _grown(
     acceleration = np.linalg.norm(np.diff(speed, axis=1) / steps_s, axis=0)
     acceleration = acceleration[np.isfinite(acceleration)]
     a = np.sqrt(np.mean(acceleration**2)) if len(acceleration) else 0.0
-    for first, last in pairwise(known):
-        if last - first > 1 and time_s[last] - time_s[first] <= longest_s:
+    before = np.flatnonzero(np.diff(known) > 1)
+    for first, last in zip(known[before], known[before + 1], strict=True):
+        if time_s[last] - time_s[first] <= longest_s:
             t = time_s[first + 1 : last]
             line = np.interp(t, time_s[[first, last]], deviations[[first, last]])
             error = a * (t - time_s[first]) * (time_s[last] - t) / 2.0

@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from cardbox_tracker.applications.exporting.formats import filtered
+from cardbox_tracker.applications.exporting.formats import Result, filtered
 from cardbox_tracker.camera.camera import level_to_optical
 from cardbox_tracker.common.errors import CardboxError
 from cardbox_tracker.person.isb_angles import ANATOMICAL_NAMES
@@ -181,3 +181,12 @@ def test_images_of_another_body_are_gaps_before_the_low_pass() -> None:
     found = filtered(Results(**{**vars(results), "numbers": numbers}), 6.0, model=body)
     assert found.state[20] == FILLED
     assert found.state.count("tracking") == 29
+
+
+def test_results_for_programs_are_filtered_and_have_velocities() -> None:
+    result = Result(**vars(results_of(np.r_[0.0, np.nan, 0.2:2.0:0.1])))
+    found = result.filtered(6.0)
+    assert isinstance(found, Result)
+    assert (found.cutoff_hz, found.state[1]) == (6.0, FILLED)
+    np.testing.assert_allclose(found.velocities()[f"{YAW}_velocity_rad_s"][1:-1], 3.0, atol=1e-4)
+    assert result.filtered(6.0, 0.0).state[1] == "lost"
