@@ -101,7 +101,7 @@ def low_passed(
     if not _LEAST_HZ <= cutoff_hz <= _MOST / step_s:
         raise CardboxError(
             f"the cut-off is {cutoff_hz:g} Hz, expected {_LEAST_HZ} to {_MOST / step_s:.3g} Hz, "
-            f"{_MOST} of the rate of the images; docs/export.md recommends one"
+            f"{_MOST} of the rate of the images; give one of this range"
         )
     if not longest_gap_s >= 0.0:
         raise CardboxError(f"the longest gap is {longest_gap_s:g} s; give 0 s or more")
