@@ -5,16 +5,19 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
-from cardbox_tracker.applications.exporting.formats import export, formats
+from cardbox_tracker.applications.exporting.formats import export, filtered, formats
 from cardbox_tracker.commands.arguments import (
     TrackedResults,
     Written,
     check_outputs,
     one_of,
     option,
+    time,
 )
+from cardbox_tracker.common.errors import CardboxError
 from cardbox_tracker.common.files import body_beside, body_of_person
 from cardbox_tracker.person.model_file import load_body_model
+from cardbox_tracker.recordings.smoothing import LONGEST_GAP_S
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -24,17 +27,23 @@ class Arguments(TrackedResults, Written):
     Attributes:
         to: trc: markers for OpenSim and Pose2Sim; mot: coordinates for OpenSim; bvh: skeleton for
             Blender; c3d: markers, with ezc3d; isb: CSV with joint angles by the recommendations of
-            the ISB (docs/export.md); or a format that another package adds
+            the ISB (docs/export.md); velocities: CSV with velocities and accelerations; or a format
+            that another package adds
         output: file to write; by default it has the name of the results and is in the current
             folder
         model: the person with whom the results were tracked, which bvh needs; trc, mot and c3d take
             the pitch of the camera and the floor from it, and the places of hips and neck. A bag
             contains it, and OUT.body.yaml beside the table OUT.csv is found
+        cutoff: fill short gaps and pass the motion through a low-pass without delay (Butterworth,
+            4th order) with this cut-off frequency; docs/export.md recommends one
+        fill: longest time between two images whose gap is filled, with --cutoff
     """
 
     to: str = option("FORMAT", lambda given: one_of(formats())(given), required=True)
     output: Path | None = option("FILE")
     model: Path | None = option("MODEL.yaml")
+    cutoff: float | None = option("HZ")
+    fill: float = option("S", time, LONGEST_GAP_S)
 
 
 def run(given: Arguments) -> None:
@@ -46,6 +55,12 @@ def run(given: Arguments) -> None:
     chosen.check()
     model = None if given.model is None else load_body_model(given.model)
     results = given.read()
+    if given.cutoff is None and given.fill != LONGEST_GAP_S:
+        raise CardboxError(
+            "--fill needs a low-pass; give --cutoff, as docs/export.md recommends it"
+        )
+    if given.cutoff is not None:
+        results = filtered(results, given.cutoff, given.fill, model)
     remarks = export(results, output, chosen, model)
     if model is None and chosen.has_places and beside.is_file():
         print(f"took the body of {beside}; --model gives another")

@@ -56,17 +56,17 @@ def isb_angles(states: FloatArray) -> FloatArray:
     return np.hstack([thorax_angles(d), left, right])
 
 
-def anatomical_angles(posture: FloatArray) -> FloatArray:
-    """Return the angles of ``ANATOMICAL_NAMES``, (8,), degrees; nan where they are not determined.
+def anatomical_angles(postures: FloatArray) -> FloatArray:
+    """Return the angles of ``ANATOMICAL_NAMES``, (n, 8), degrees; nan where undetermined.
 
     The bend of an elbow is 0 for a straight arm. Elevation is the angle between the upper arm and
     the hanging one, and its plane is 0 to the side and 90 to the front; both are against the trunk.
     The trunk leans to the front and to the right of the direction in which the person faces. The
-    posture is (12,), rad and metres.
+    postures are (n, 12), rad and metres.
     """
-    found = dict(zip(ISB_NAMES, np.degrees(isb_angles(posture[None]))[0], strict=True))
+    found = dict(zip(ISB_NAMES, np.degrees(isb_angles(postures)).T, strict=True))
     arms = [sign * found[f"{side}_{name}"] for side in SIDES for name, sign in _OF_ARM]
-    return np.array([*arms, *np.degrees(posture[[PITCH, ROLL]])])
+    return np.stack([*arms, *np.degrees(postures[:, [PITCH, ROLL]]).T], axis=1)
 
 
 def thorax_angles(postures: FloatArray) -> FloatArray:

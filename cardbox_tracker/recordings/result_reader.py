@@ -93,6 +93,7 @@ class Results:
     texts: Mapping[str, tuple[str, ...]]
     bodies: tuple[BodyModel | None, ...]  #: the person as of each image; None where it is not known
     has_others: bool = False  #: whether the file has results of other people, too
+    cutoff_hz: float | None = None  #: that of the low-pass that they have passed, if any
 
     @property
     def body(self) -> BodyModel | None:

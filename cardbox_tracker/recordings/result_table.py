@@ -149,7 +149,7 @@ def row_of(stamp_ns: int, time_s: float, estimate: Estimate, **has: bool) -> lis
         return [known.get(name) for name in names]
     for columns_of, values in zip((_units, _deviation_units), estimate.joints, strict=True):
         known |= zip(columns_of(STATE_NAMES), map(_known, values), strict=True)
-    angles = anatomical_angles(np.asarray(estimate.posture, float)).tolist()
+    angles = anatomical_angles(np.asarray(estimate.posture, float)[None])[0].tolist()
     known |= {name: x for name, x in zip(ANATOMICAL_NAMES, angles, strict=True) if x == x}
     points_m = np.asarray(estimate.keypoints_m, float).ravel()
     known |= zip(POINT_COLUMNS, points_m.tolist(), strict=True)

@@ -87,6 +87,25 @@ def test_a_table_and_a_bag_give_the_same_file(
     assert sorted(path.name for path in tmp_path.iterdir()) == ["bag", made.name]
 
 
+@pytest.mark.filterwarnings("ignore:builtin type:DeprecationWarning")
+@pytest.mark.parametrize("name", FORMATS)
+def test_each_format_takes_a_low_pass_and_a_filled_gap(
+    name: str, results: Path, tmp_path: Path, cardbox: Callable
+) -> None:
+    if name == "c3d":
+        pytest.importorskip("ezc3d", reason="ezc3d is not installed")
+    words = ("export", results / "person.csv", "--to", name, "--cutoff", "4")
+    words += ("--model", results / "person.yaml", "--output")
+    done = cardbox(*words, tmp_path / "a")
+    assert done.code == 0, done.err
+    assert done.out.startswith("exported 4 of 4 images, 1 of them uncertain; 0 without")
+    assert "1 of them were gaps that are filled" in done.out
+    done = cardbox(*words, tmp_path / "b", "--fill", "0.19")
+    assert done.out.startswith("exported 3 of 4 images") and "filled" not in done.out
+    done = cardbox(*words[:4], "--cutoff", "5", "--output", tmp_path / "c")
+    done.assert_refused("export", "the cut-off is 5 Hz, expected 0.01 to 4.5 Hz")
+
+
 @pytest.fixture(scope="module")
 def whole_body(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Tables and a bag as ``track`` writes them of two people with legs and hands."""
@@ -221,6 +240,7 @@ def test_a_body_beside_the_table_that_is_anothers(
             ("person.csv", "--to", "trc", "--model", "FOLDER/none.yaml"),
             "expected the body model",
         ),
+        (("person.csv", "--to", "trc", "--fill", "1"), "--fill needs a low-pass; give --cutoff"),
         (("person.yaml", "--to", "trc"), "has no column"),
         (("nothing.csv", "--to", "trc"), "there are no results"),
     ],

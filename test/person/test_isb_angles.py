@@ -123,7 +123,7 @@ def test_arms_in_plain_words(
     posture = np.zeros(12)
     for name, value in joints_deg.items():
         posture[JOINT_NAMES.index(f"{side}_{name}")] = np.radians(value)
-    found = dict(zip(ANATOMICAL_NAMES, anatomical_angles(posture), strict=True))
+    found = dict(zip(ANATOMICAL_NAMES, anatomical_angles(posture[None])[0], strict=True))
     of_arm = [found[f"{side}_{name}_deg"] for name in ("elbow_bend", "arm_elevation", "arm_plane")]
     assert of_arm == pytest.approx(expected_deg, abs=1e-6, nan_ok=True)
 
@@ -131,7 +131,7 @@ def test_arms_in_plain_words(
 def test_the_trunk_leans_where_the_person_faces() -> None:
     posture = np.zeros(12)
     posture[[1, 2, 3]] = np.radians([5.0, 20.0, 70.0])
-    found = dict(zip(ANATOMICAL_NAMES, anatomical_angles(posture), strict=True))
+    found = dict(zip(ANATOMICAL_NAMES, anatomical_angles(posture[None])[0], strict=True))
     assert found["trunk_lean_deg"] == pytest.approx(20.0)
     assert found["trunk_side_lean_deg"] == pytest.approx(5.0)
     assert found["left_arm_elevation_deg"] == pytest.approx(0.0, abs=1e-6)

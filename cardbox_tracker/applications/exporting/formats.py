@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -21,26 +21,44 @@ from cardbox_tracker.measuring.scene import Scene, load_scene
 from cardbox_tracker.person.isb_angles import ISB_NAMES, isb_angles
 from cardbox_tracker.person.legs import floor_m
 from cardbox_tracker.person.model import BodyModel
+from cardbox_tracker.person.sizes import FloatArray
 from cardbox_tracker.person.skeleton import POSTURE_GROUPS, Group, joints_of
 from cardbox_tracker.recordings import result_reader
 from cardbox_tracker.recordings.result_reader import Results
 from cardbox_tracker.recordings.result_table import units
+from cardbox_tracker.recordings.smoothing import (
+    FILLED,
+    LONGEST_GAP_S,
+    RATE_COLUMNS,
+    AnyResults,
+    low_passed,
+    rates_of,
+)
 from cardbox_tracker.tracking.estimate import UNCERTAIN
 
 
-def write_isb(path: Path, motion: Motion, body: BodyModel | None = None) -> None:
-    """Write CSV with angles of the ISB in degrees, then our joints, or raise CardboxError."""
-    groups = *POSTURE_GROUPS, Group.PLACE, Group.NECK
-    values = np.hstack([np.degrees(isb_angles(motion.states)), motion.values_of(*groups)])
+def _write_csv(path: Path, motion: Motion, names: Iterable[str], values: FloatArray) -> None:
     rows = (
         (str(stamp_ns), f"{time_s:.6f}", state, *("" if v != v else f"{v:.6f}" for v in row))
         for stamp_ns, time_s, state, row in zip(
             motion.stamp_ns.tolist(), motion.time_s, motion.state, values.tolist(), strict=True
         )
     )
+    write_table(path, ("stamp_ns", "time_s", "state", *names), rows)
+
+
+def write_isb(path: Path, motion: Motion, body: BodyModel | None = None) -> None:
+    """Write CSV with angles of the ISB in degrees, then our joints, or raise CardboxError."""
+    groups = *POSTURE_GROUPS, Group.PLACE, Group.NECK
+    values = np.hstack([np.degrees(isb_angles(motion.states)), motion.values_of(*groups)])
     units = (f"{joint.name}_{joint.unit}" for joint in joints_of(*groups))
-    header = ("stamp_ns", "time_s", "state", *(f"{name}_deg" for name in ISB_NAMES), *units)
-    write_table(path, header, rows)
+    _write_csv(path, motion, (*(f"{name}_deg" for name in ISB_NAMES), *units), values)
+
+
+def write_velocities(path: Path, motion: Motion, body: BodyModel | None = None) -> None:
+    """Write CSV with the known ones of ``RATE_COLUMNS``, or raise CardboxError."""
+    known = np.flatnonzero(np.isfinite(motion.rates).any(axis=0))
+    _write_csv(path, motion, (RATE_COLUMNS[i] for i in known), motion.rates[:, known])
 
 
 class Format(NamedTuple):
@@ -59,6 +77,7 @@ FORMATS: dict[str, Format] = {
     "c3d": Format(".c3d", write_c3d, ezc3d_or_error),
     "mot": Format(".mot", write_mot),
     "isb": Format(".isb.csv", write_isb, has_places=False),
+    "velocities": Format(".velocities.csv", write_velocities, has_places=False),
 }
 
 
@@ -72,6 +91,22 @@ def formats() -> dict[str, Format]:
     return found
 
 
+def filtered(
+    results: AnyResults,
+    cutoff_hz: float,
+    longest_gap_s: float = LONGEST_GAP_S,
+    model: BodyModel | None = None,
+) -> AnyResults:
+    """Return results after :func:`low_passed`; those of another body, if it is known, are gaps.
+
+    Raises CardboxError as it does, if no image has a posture, or most are of another body.
+    """
+    motion, body = Motion.of(results), model or results.body
+    is_gap = ~(motion if body is None else images_of_body(motion, body)).is_seen
+    numbers = {name: np.where(is_gap, np.nan, of) for name, of in results.numbers.items()}
+    return low_passed(replace(results, numbers=numbers), cutoff_hz, longest_gap_s)
+
+
 def export(results: Results, path: Path, to: Format, model: BodyModel | None = None) -> list[str]:
     """Write results of one person, by default of the body that they have; return lines about it.
 
@@ -81,13 +116,16 @@ def export(results: Results, path: Path, to: Format, model: BodyModel | None = N
     to.check()
     motion, body = Motion.of(results), model or results.body
     images, seen = len(motion.state), int(motion.is_seen.sum())
-    if body is not None and to.has_places:
+    # The low-pass moves points from where the joints have them.
+    if body is not None and to.has_places and results.cutoff_hz is None:
         motion = images_of_body(motion, body)
     to.write(path, motion, body)
     lines = [
         f"exported {seen} of {images} images, {motion.state.count(UNCERTAIN)} of them uncertain; "
         f"{images - seen} without a posture are gaps"
     ]
+    if filled := motion.state.count(FILLED):
+        lines.append(f"{filled} of them were gaps that are filled")
     if images == 1:
         lines.append("a single image has no rate: 1 Hz is written")
     if others := seen - int(motion.is_seen.sum()):
@@ -106,6 +144,18 @@ class Result(Results):
     scene: Scene | None = None  #: camera and people as of ``OUT.scene.yaml``, if they are known
     #: those of ``track(..., people=...)`` by the numbers of the people; empty for one alone
     people: Mapping[int, Result] = field(default_factory=dict)
+
+    def filtered(self, cutoff_hz: float, longest_gap_s: float = LONGEST_GAP_S) -> Result:
+        """Return this person's results after a low-pass without delay, with short gaps filled.
+
+        See ``docs/export.md``. Raises CardboxError unless the cut-off, Hz, is from 0.01 to 0.45
+        of the rate of the images, or if no image has a posture.
+        """
+        return filtered(self, cutoff_hz, longest_gap_s)
+
+    def velocities(self) -> dict[str, FloatArray]:
+        """Return velocities and accelerations, (n,), by columns as ``--to velocities`` has them."""
+        return dict(zip(RATE_COLUMNS, rates_of(self).T, strict=True))
 
     def to_pandas(self) -> Any:
         """Return a ``pandas.DataFrame`` with a row for each image and the columns of the table.

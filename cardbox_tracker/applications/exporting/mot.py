@@ -77,11 +77,13 @@ def _arm_angles(upper: FloatArray, lower: FloatArray) -> FloatArray:
     rotation = np.where(
         last < 0, turned[np.argmax(is_known)] if is_known.any() else 0, turned[last]
     )
-    return np.stack([flexion, adduction, np.unwrap(rotation), bend], axis=1)
+    return np.stack([flexion, adduction, rotation, bend], axis=1)
 
 
 def write_mot(path: Path, motion: Motion, body: BodyModel | None) -> None:
     """Write time (s), rotations (deg) and, with the body, place (m) of each image with a posture.
+
+    Rotations go on beyond half a turn, so they do not jump by a whole one.
 
     Raises CardboxError if the file cannot be written.
     """
@@ -94,7 +96,8 @@ def write_mot(path: Path, motion: Motion, body: BodyModel | None) -> None:
         states[:, YAW] = 0.0
     limbs = {name: of[seen] for name, of in _limbs(motion).items()}
     columns = {
-        name: np.degrees(of) for name, of in (coordinates_of(states) | limbs | turned).items()
+        name: np.degrees(np.unwrap(of))
+        for name, of in (coordinates_of(states) | limbs | turned).items()
     }
     if body is not None:
         hips_m = ((frames_of(motion, body).hip - floor_below(body)) @ LABORATORY.T)[seen]

@@ -30,6 +30,7 @@ from cardbox_tracker.recordings.result_table import (
     POINT_COLUMNS,
     WRIST_COLUMNS,
 )
+from cardbox_tracker.recordings.smoothing import rates_of
 
 MISSING = "missing"
 """State of a moment at which there is no image."""
@@ -53,6 +54,7 @@ class Motion:
     #: (n, 6, 3), ordered as ``LEG_KEYPOINT_NAMES``, in the optical frame; nan where they are hidden
     leg_points_m: FloatArray
     leg_stddev_m: FloatArray  #: their standard deviations, (n, 6)
+    rates: FloatArray  #: velocities and accelerations, (n, number), by ``RATE_COLUMNS``
 
     @classmethod
     def of(cls, results: Results) -> Motion:
@@ -75,6 +77,7 @@ class Motion:
             results.of(PALM_COLUMNS).reshape(n, 2, 3),
             np.where(hidden[..., None], np.nan, points_m),
             results.of([f"{name}_stddev_m" for name in LEG_KEYPOINT_NAMES]),
+            rates_of(results),
         )
         if not motion.is_seen.any():
             raise CardboxError(

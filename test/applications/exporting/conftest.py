@@ -21,6 +21,7 @@ from cardbox_tracker.person.skeleton import (
     rotation_y,
     rotation_z,
 )
+from cardbox_tracker.recordings.smoothing import RATE_COLUMNS
 
 STEP_NS = 100_000_000
 TURNS: dict[str, Callable[..., np.ndarray]] = {"X": rotation_x, "Y": rotation_y, "Z": rotation_z}
@@ -47,6 +48,7 @@ def motion_of(
         "palms": (2, 3),
         "leg_points_m": (6, 3),
         "leg_stddev_m": (6,),
+        "rates": (len(RATE_COLUMNS),),
     }
     unknown = {name: np.full((n, *shape), np.nan) for name, shape in shapes.items()}
     stamps = np.arange(len(states)) * STEP_NS

@@ -13,7 +13,7 @@ from cardbox_tracker.person.isb_angles import LABORATORY
 from cardbox_tracker.person.kinematics import pose
 from cardbox_tracker.person.legs import floor_m, leg_directions
 from cardbox_tracker.person.model import BodyModel
-from cardbox_tracker.person.posture import LEFT_ARM, RIGHT_ARM
+from cardbox_tracker.person.posture import LEFT_ARM, RIGHT_ARM, YAW
 from cardbox_tracker.person.skeleton import arm_directions, rotation_x, rotation_y, rotation_z
 
 
@@ -119,3 +119,16 @@ def test_legs_and_hands_turn_as_opensim_s_joints(
     left = [found[f"{name}_l"] for name in ("wrist_flex", "wrist_dev", "pro_sup")]
     right = [found[f"{name}_r"] for name in ("wrist_flex", "wrist_dev", "pro_sup")]
     assert left == pytest.approx([20.0, 10.0, 60.0]) and right == pytest.approx([0.0, 0.0, 90.0])
+
+
+def test_angles_do_not_jump_by_a_whole_turn(
+    motion_of: Callable, body: BodyModel, tmp_path: Path
+) -> None:
+    states = np.zeros((8, 14))
+    # The person turns around.
+    states[:, YAW] = np.linspace(2.5, 4.0, 8)
+    write_mot(tmp_path / "a.mot", motion_of(states, body), body)
+    lines = (tmp_path / "a.mot").read_text(encoding="utf-8").splitlines()
+    rows = np.array([line.split() for line in lines[7:]], float)
+    turned = rows[:, lines[6].split().index("lumbar_rotation")]
+    np.testing.assert_allclose(np.abs(np.diff(turned)), np.degrees(1.5 / 7), atol=1e-3)

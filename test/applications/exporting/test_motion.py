@@ -16,7 +16,7 @@ def motion_at(*times_ms: int) -> Motion:
     """A motion whose torso_y is the time in seconds."""
     stamps = np.array(times_ms, np.int64) * 1_000_000
     joints = np.repeat(stamps[:, None] / 1e9, len(STATE_NAMES), axis=1)
-    shapes = (6, 3), (2, 3), (2, 3), (6, 3), (6,)
+    shapes = (6, 3), (2, 3), (2, 3), (6, 3), (6,), (0,)
     others = [np.zeros((len(stamps), *shape)) for shape in shapes]
     return Motion(stamps, stamps / 1e9, ("tracking",) * len(stamps), joints, *others)
 
