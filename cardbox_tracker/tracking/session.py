@@ -50,7 +50,7 @@ from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.posture import PLACE, POSTURE
 from cardbox_tracker.person.sizes import FloatArray
 from cardbox_tracker.person.skeleton import KeypointState
-from cardbox_tracker.search.config import TrackerConfig
+from cardbox_tracker.search.config import TrackerConfig, default_preset
 from cardbox_tracker.search.doubt import doubted
 from cardbox_tracker.terms.term import Image, Silhouette
 from cardbox_tracker.tracking.camera_agreement import CameraAgreement
@@ -190,7 +190,7 @@ class _Person:
 
 
 class Session:
-    """Tracks up to six people before up to four cameras, with the settings ``config``."""
+    """Tracks up to six people before up to four cameras, by default with the preset ``default``."""
 
     def __init__(
         self,
@@ -217,7 +217,7 @@ class Session:
         """
         self._bodies = tuple(_before_all(body, others) for body in bodies)
         self._camera = camera
-        self.config = config or TrackerConfig()
+        self.config = config or default_preset()
         self._rng, self._others = rng or np.random.default_rng(0), tuple(others)
         self._look, self._is_alone, self._beside = look, people is None, beside
         self._only_measures, self._most = only_measures, people or MOST_PEOPLE
