@@ -10,7 +10,7 @@ from dataclasses import replace
 from typing import Any
 
 from cardbox_tracker.camera.camera import Calibration
-from cardbox_tracker.camera.camera_info import calibration_from_info, info_remark
+from cardbox_tracker.camera.camera_info import calibration_from_info, info_content, info_remark
 from cardbox_tracker.camera.zoom import ZoomWitness
 from cardbox_tracker.common.errors import CameraError
 from cardbox_tracker.common.health import WATCHES
@@ -45,6 +45,7 @@ class CalibrationWatch:
         self._topic = topic
         self._image_topic = image_topic
         self._other: Calibration | None = None
+        self._content: tuple[Any, ...] = ()
         self._count = 0
         self._is_contradicted = False
         self._good = 0
@@ -54,7 +55,10 @@ class CalibrationWatch:
 
         Raises CameraError if the message is invalid and no valid one has arrived yet.
         """
-        self.seen = True
+        self.seen, content = True, info_content(message)
+        if self.current is not None and content == self._content:
+            self._back_to_good()
+            return False
         try:
             calibration = calibration_from_info(message, self._image_topic, self._topic)
             calibration = replace(calibration, roll_rad=self._roll_rad)
@@ -69,6 +73,7 @@ class CalibrationWatch:
             )
             return False
         if self.current is not None and self.current.is_same(calibration):
+            self._content = content
             self._back_to_good()
             return False
         if self.current is not None and not self._lasts(calibration):
@@ -78,6 +83,7 @@ class CalibrationWatch:
             self._ignore(WATCHES[name].words.format(**given))
             return False
         self.current, self._other, self._count = calibration, None, 0
+        self._content = content
         self.remark, self.doubt = "", info_remark(message, self._topic)
         return True
 

@@ -75,6 +75,17 @@ def info_array(message: Any, name: str) -> NDArray[np.float64]:
     return np.array(getattr(message, field), dtype=np.float64)
 
 
+def info_content(message: Any) -> tuple[Any, ...]:
+    """Return what the calibration follows from: a driver sends the same with each image."""
+    roi = message.roi
+    return (
+        *(info_array(message, name).tobytes() for name in ("k", "d", "p")),
+        *(message.header.frame_id, message.distortion_model, message.width, message.height),
+        *(message.binning_x, message.binning_y),
+        *(roi.x_offset, roi.y_offset, roi.width, roi.height),
+    )
+
+
 def calibration_from_info(message: Any, image_topic: str, info_topic: str) -> Calibration:
     """Return the calibration of the images that go with a sensor_msgs/CameraInfo.
 

@@ -7,8 +7,6 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from cardbox_tracker.commands.arguments import Written, check_outputs, option
-from cardbox_tracker.person.model import body_from_proportions
-from cardbox_tracker.person.model_file import save_body_model
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -37,6 +35,9 @@ class Arguments(Written):
 
 def run(given: Arguments) -> None:
     """Write the body model and print its sizes."""
+    from cardbox_tracker.person.model import body_from_proportions
+    from cardbox_tracker.person.model_file import save_body_model
+
     check_outputs((given.output,), given.force)
     body = body_from_proportions(
         given.stature_m,

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from cardbox_tracker.commands.arguments import Options, at_least, camera_count, choice, option
-from cardbox_tracker.commands.request import Request
 from cardbox_tracker.common.errors import CardboxError, RosMissingError
 from cardbox_tracker.common.files import make_folder, write_file
 from cardbox_tracker.search.config import PRESETS
@@ -54,6 +53,7 @@ def _track_film(output: Path, seed: int) -> None:
     from cardbox_tracker.applications.demo.film import SOURCE, DemoFilm
     from cardbox_tracker.applications.exporting.motion import Motion
     from cardbox_tracker.applications.reporting.page import space_view
+    from cardbox_tracker.commands.request import Request
     from cardbox_tracker.commands.track import track_one
 
     make_folder(output)

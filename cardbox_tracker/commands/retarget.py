@@ -8,17 +8,6 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from cardbox_tracker.applications.retargeting.config import RetargetConfig
-from cardbox_tracker.applications.retargeting.recording import (
-    retarget_results,
-    write_bag,
-    write_csv,
-)
-from cardbox_tracker.applications.retargeting.retargeter import make_retargeter
-from cardbox_tracker.applications.teleoperation.sending import (
-    ZmqSender,
-    in_real_time,
-    joints_packet,
-)
 from cardbox_tracker.commands.arguments import (
     TrackedResults,
     Written,
@@ -26,8 +15,6 @@ from cardbox_tracker.commands.arguments import (
     option,
 )
 from cardbox_tracker.common.errors import CardboxError
-from cardbox_tracker.recordings.bag_reader import BagReader
-from cardbox_tracker.recordings.open_images import is_bag
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -53,6 +40,20 @@ class Arguments(TrackedResults, Written, RetargetConfig):
 
 def run(given: Arguments) -> None:
     """Retarget a recording to the robot and write the results."""
+    from cardbox_tracker.applications.retargeting.recording import (
+        retarget_results,
+        write_bag,
+        write_csv,
+    )
+    from cardbox_tracker.applications.retargeting.retargeter import make_retargeter
+    from cardbox_tracker.applications.teleoperation.sending import (
+        ZmqSender,
+        in_real_time,
+        joints_packet,
+    )
+    from cardbox_tracker.recordings.bag_reader import BagReader
+    from cardbox_tracker.recordings.open_images import is_bag
+
     check_outputs(
         (given.csv,),
         given.force,

@@ -48,10 +48,11 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator
 from enum import StrEnum
-from functools import reduce
+from functools import cache, reduce
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from cardbox_tracker.person.parts import BodyParts
 from cardbox_tracker.person.proportions import (
@@ -262,6 +263,7 @@ SKELETON: tuple[Joint, ...] = (
 """All joints; the movable ones in the order of joint states, to which new ones are appended."""
 
 
+@cache
 def joints_of(*groups: Group, side: str = "") -> tuple[Joint, ...]:
     """Return the movable joints of some groups, or of one side of them, in the table's order."""
     return tuple(
@@ -271,6 +273,7 @@ def joints_of(*groups: Group, side: str = "") -> tuple[Joint, ...]:
     )
 
 
+@cache
 def names_of(*groups: Group, side: str = "") -> tuple[str, ...]:
     """Return the names of :func:`joints_of`."""
     return tuple(joint.name for joint in joints_of(*groups, side=side))
@@ -281,9 +284,12 @@ STATE = joints_of(*Group)
 STATE_NAMES = names_of(*Group)
 
 
-def rows_of(*groups: Group, side: str = "") -> list[int]:
-    """Return the indices of :func:`joints_of` in ``STATE``."""
-    return [STATE.index(joint) for joint in joints_of(*groups, side=side)]
+@cache
+def rows_of(*groups: Group, side: str = "") -> NDArray[np.intp]:
+    """Return the indices (n,) of :func:`joints_of` in ``STATE``; not writable."""
+    rows = np.array([STATE.index(joint) for joint in joints_of(*groups, side=side)], np.intp)
+    rows.setflags(write=False)
+    return rows
 
 
 JOINT_NAMES = names_of(*POSTURE_GROUPS)
@@ -301,6 +307,7 @@ UNITS = {joint.name: joint.unit for joint in SKELETON}
 """Unit of each joint by its name, ``m`` or ``rad``."""
 
 
+@cache
 def limits_of(*groups: Group, side: str = "") -> FloatArray:
     """Return lowest and highest value, (n, 2), rad or m, of :func:`joints_of`; not writable."""
     limits: FloatArray = np.array([joint.limits for joint in joints_of(*groups, side=side)])

@@ -8,6 +8,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from functools import cache
 from itertools import compress
 from types import MappingProxyType
 from typing import Any, NamedTuple
@@ -26,6 +27,7 @@ from cardbox_tracker.person.skeleton import (
     STATE_NAMES,
     Group,
     KeypointState,
+    rows_of,
 )
 from cardbox_tracker.recordings.markers import MarkerShape, marker_shapes
 from cardbox_tracker.tracking.estimate import Estimate
@@ -133,7 +135,7 @@ def joint_values(estimate: Estimate, torso_place: bool = True) -> JointValues | 
     """
     if estimate.posture is None:
         return None
-    rows, values = _rows(estimate, torso_place), estimate.joints[0]
+    rows, values = _rows(estimate.hands is not None, torso_place), estimate.joints[0]
     return JointValues(_names(rows), np.where(_MAY_BE_HIDDEN & np.isnan(values), 0.0, values)[rows])
 
 
@@ -146,13 +148,14 @@ def joint_deviations(estimate: Estimate, torso_place: bool = True) -> JointValue
     if estimate.posture_stddev is None:
         return None
     stddev = np.where(np.isnan(estimate.joints[1]), _ANYWHERE, estimate.joints[1])
-    rows = _rows(estimate, torso_place) & np.isfinite(stddev)
+    rows = _rows(estimate.hands is not None, torso_place) & np.isfinite(stddev)
     return JointValues(_names(rows), stddev[rows])
 
 
-def _rows(estimate: Estimate, torso_place: bool) -> NDArray[np.bool_]:
+@cache
+def _rows(has_hands: bool, torso_place: bool) -> NDArray[np.bool_]:
     """Return which joints of ``STATE`` are published, (n,)."""
-    without = set() if estimate.hands is not None else {Group.HAND}
+    without = set() if has_hands else {Group.HAND}
     groups = {*Group} - without if torso_place else {*POSTURE_GROUPS}
     return np.array([joint.group in groups for joint in STATE])
 
@@ -230,7 +233,7 @@ class OutputStream:
         for topic in filter(wanted, TOPICS):
             value = self._value(topic, estimate, tracker, is_new)
             if topic == "joint_states" and isinstance(value, JointValues):
-                rows = _rows(estimate, self._torso_place)
+                rows = _rows(estimate.hands is not None, self._torso_place)
                 value = value._replace(velocities=None if velocities is None else velocities[rows])
             if value is not None:
                 yield topic, value
@@ -276,6 +279,6 @@ class OutputStream:
             return None
         found: FloatArray = (estimate.joints[0] - before[1]) / (step_ns / 1e9)
         # A hand is looked at every other image at most, and may not be known in one.
-        found[[joint.group == Group.HAND for joint in STATE]] = 0.0
+        found[rows_of(Group.HAND)] = 0.0
         # A face that appears does not turn, and legs that appear do not move.
         return np.nan_to_num(found)

@@ -13,6 +13,7 @@ from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from cardbox_tracker.camera.camera import roll_turn
 from cardbox_tracker.person.model import BodyModel
@@ -164,7 +165,7 @@ class Estimate:
         """
         found, still = np.full((2, len(STATE)), np.nan), rows_of(Group.PLACE, Group.CLAVICLE)
 
-        def put(rows: list[int], *pair: FloatArray | float | None) -> None:
+        def put(rows: NDArray[np.intp], *pair: FloatArray | float | None) -> None:
             for row, values in zip(found, pair, strict=True):
                 if values is not None:
                     row[rows] = values

@@ -88,7 +88,7 @@ def points_of(values: Floats, of: Person) -> Floats:
 
 @borrowing_kernel
 def _write_residuals(values: Floats, given: Given, points_m: Floats, residuals: Floats) -> float:
-    """Write the residuals (34,) of values (12,), and return the sum of their squares."""
+    """Write the residuals (35,) of values (12,), and return the sum of their squares."""
     of, (axes, (fx, fy, cx, cy)), (before, change, expected, root), shown = given
     px, sigma_px, slopes, sigma_slopes, (upper_m, sigma_m) = shown
     _place(values, of, points_m)

@@ -54,6 +54,7 @@ _ENDS = [
     [LEG_POINT_NAMES.index(f"{side}_{name}") for name in ("knee", "ankle")]
     for side in ("left", "right")
 ]
+# The bends of both knees among the angles.
 _KNEES = [3, 7]
 _HIPS = [POINT_INDEX[f"{side}_hip"] for side in ("left", "right")]
 _SHOULDERS = [POINT_INDEX[f"{side}_shoulder"] for side in ("left", "right")]
@@ -80,8 +81,9 @@ _FIXED = 1e-6
 # Deviation of the middle of the mass of somebody who stands, m, and where that of trunk, head and
 # arms is on the way from the hips to the shoulders (see :mod:`.leg_fit`).
 _BALANCE_M, _UPPER_SHARE = 0.03, 0.626
-# Knees of somebody who stands are bent less, rad; who bends them for longer without moving the hips
-# as far sits, s and m.
+# Somebody stands who bends the knees by less, rad. Who bends them more, and has not moved the hips
+# by this distance, m, for this time, s, sits. A foot that is higher than the other one by this
+# distance is not on the floor.
 _STRAIGHT_RAD, _SITS_S, _STILL_M = np.radians(60.0), 2.0, 0.08
 # Images whose information counts for what they share, because their errors are alike, and time over
 # which it is averaged, s.

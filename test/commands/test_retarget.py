@@ -80,7 +80,9 @@ def test_a_table_is_read_and_its_joints_are_streamed(
 ) -> None:
     sent: list[dict] = []
     sender = SimpleNamespace(send=lambda one: sent.append(json.loads(one)), close=lambda: None)
-    monkeypatch.setattr("cardbox_tracker.commands.retarget.ZmqSender", lambda _: sender)
+    monkeypatch.setattr(
+        "cardbox_tracker.applications.teleoperation.sending.ZmqSender", lambda _: sender
+    )
     table, arm = tmp_path / "person.csv", tmp_path / "arm.csv"
     posture = reference_posture("arms")
     seen = Estimate(TRACKING, posture, np.full(12, 0.1), np.zeros((6, 3)), 10, 0.9)

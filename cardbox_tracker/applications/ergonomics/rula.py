@@ -45,6 +45,7 @@ MEASURED, DECLARED, MIXED = "measured", "declared", "mixed"
 """Origins of a part score; tables and the grand score are mixed."""
 NOT_SEEN = "declared, not seen"
 WRISTS = "left_wrist", "right_wrist"
+"""Parts that share the declared input ``wrist``."""
 POSTURE_ROWS = rows_of(*POSTURE_GROUPS)
 PARTS = {
     "neck": rows_of(Group.NECK),
@@ -52,7 +53,6 @@ PARTS = {
     **{f"{side}_wrist": rows_of(Group.HAND, side=side)[1:] for side in ("left", "right")},
 }
 """Rows of the state of neck, legs, and flexion and deviation of the wrists."""
-"""Parts that share the declared input ``wrist``."""
 
 NOT_MEASURED = "declared, since it is not measured"
 

@@ -57,8 +57,9 @@ def write_isb(path: Path, motion: Motion, body: BodyModel | None = None) -> None
 
 def write_velocities(path: Path, motion: Motion, body: BodyModel | None = None) -> None:
     """Write CSV with the known ones of ``RATE_COLUMNS``, or raise CardboxError."""
-    known = np.flatnonzero(np.isfinite(motion.rates).any(axis=0))
-    _write_csv(path, motion, (RATE_COLUMNS[i] for i in known), motion.rates[:, known])
+    rates = motion.rates()
+    known = np.flatnonzero(np.isfinite(rates).any(axis=0))
+    _write_csv(path, motion, (RATE_COLUMNS[i] for i in known), rates[:, known])
 
 
 class Format(NamedTuple):

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, fields, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -54,7 +56,8 @@ class Motion:
     #: (n, 6, 3), ordered as ``LEG_KEYPOINT_NAMES``, in the optical frame; nan where they are hidden
     leg_points_m: FloatArray
     leg_stddev_m: FloatArray  #: their standard deviations, (n, 6)
-    rates: FloatArray  #: velocities and accelerations, (n, number), by ``RATE_COLUMNS``
+    #: returns velocities and accelerations, (n, number), by ``RATE_COLUMNS``
+    rates: Callable[[], FloatArray]
 
     @classmethod
     def of(cls, results: Results) -> Motion:
@@ -77,7 +80,7 @@ class Motion:
             results.of(PALM_COLUMNS).reshape(n, 2, 3),
             np.where(hidden[..., None], np.nan, points_m),
             results.of([f"{name}_stddev_m" for name in LEG_KEYPOINT_NAMES]),
-            rates_of(results),
+            partial(rates_of, results),
         )
         if not motion.is_seen.any():
             raise CardboxError(
@@ -166,7 +169,7 @@ def held(values: FloatArray) -> FloatArray:
     return found
 
 
-_VALUES = [entry.name for entry in fields(Motion)][3:]
+_VALUES = [entry.name for entry in fields(Motion)][3:-1]
 
 
 SHOULDERS = [KEYPOINT_NAMES.index(f"{side}_shoulder") for side in ("left", "right")]

@@ -14,7 +14,7 @@ from sensor_msgs.msg import CameraInfo, PointCloud2
 from std_msgs.msg import Header
 
 from cardbox_tracker.camera.camera import Calibration, Camera
-from cardbox_tracker.camera.camera_info import calibration_from_info
+from cardbox_tracker.camera.camera_info import calibration_from_info, info_content
 from cardbox_tracker.camera.pairing import TOLERANCE_NS
 from cardbox_tracker.camera.stamps import StampOrder
 from cardbox_tracker.common.errors import CameraError, CardboxError, cut, quoted
@@ -341,13 +341,16 @@ class CameraKeypoints:
         self._image_topic = node.resolve(f"{below}image_raw")
         self._roll_rad = np.radians(settings.camera_roll_deg)
         self._calibration: Calibration | None = None
+        self._content: tuple[Any, ...] = ()
         self._camera: Camera | None = None
         self._began_s = time.monotonic()
         node.subscribe_info(f"{below}camera_info", self._on_info)
 
     def _on_info(self, message: CameraInfo, _: int) -> None:
         """Follow another calibration unless the silhouettes, whose node sees the images, do not."""
-        before = self._calibration
+        before, content = self._calibration, info_content(message)
+        if before is not None and content == self._content:
+            return
         try:
             found = calibration_from_info(message, self._image_topic, self._info_topic)
             found = replace(found, roll_rad=self._roll_rad)
@@ -357,14 +360,14 @@ class CameraKeypoints:
                 raise
             return
         if before is None or is_seen or not self._is_seen(before):
-            self._calibration = found
+            self._calibration, self._content = found, content
             if self.topic is not None:
                 self.topic.size = found.width, found.height
 
     def _is_seen(self, calibration: Calibration) -> bool:
         """Return whether the last silhouette is of a calibration, or raise CameraError."""
-        size = self._camera or calibration
-        there, here = calibration.camera(size.width, size.height), self._camera
+        here, size = self._camera, self._camera or calibration
+        there = calibration.camera(size.width, size.height)
         if here is None:
             return False
         k, own = ((one.fx, one.fy, one.cx, one.cy) for one in (there, here))
