@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 import cardbox_tracker
+from cardbox_tracker.person.skeleton import POSTURE_GROUPS, joints_of
 from cardbox_tracker.search.config import paper_preset
 
 SOURCES = (
@@ -26,7 +27,6 @@ SOURCES = (
     "terms/silhouette.py",
     "person/cardbox.py",
     "person/parts.py",
-    "person/skeleton.py",
     # The simulation.
     "applications/simulation/motions.py",
     "applications/simulation/person.py",
@@ -40,12 +40,14 @@ SOURCES = (
 
 
 def paper_digest() -> str:
-    """Return the digest of ``SOURCES`` and of Table I."""
+    """Return the digest of ``SOURCES``, of the posture's joints and of Table I."""
     root = Path(cardbox_tracker.__file__).parent
     codes = [_code(ast.parse((root / name).read_bytes())) for name in SOURCES]
     paper = paper_preset()
     table = paper.torso, paper.arm, paper.strategy, paper.cycles, paper.average
-    codes.append([repr(table), paper.torso_beside_arms])
+    # Joints that the paper lacks are rows of the skeleton, too, so its posture counts alone.
+    posture = [(joint.name, joint.limits) for joint in joints_of(*POSTURE_GROUPS)]
+    codes.append([repr(table), repr(posture), paper.torso_beside_arms])
     return hashlib.sha256(repr(codes).encode()).hexdigest()[:16]
 
 
