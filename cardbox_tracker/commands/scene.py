@@ -111,8 +111,7 @@ def found_camera(
         if given is None:
             level = (
                 "nothing tells the camera's pitch without a detector: a level camera is assumed, "
-                "so every posture is at best uncertain; give --camera-pitch-deg (0 for a level "
-                "camera)"
+                "so leans are uncertain; give --camera-pitch-deg (0 for a level camera)"
             )
             print_remarks([level])
         else:

@@ -167,7 +167,10 @@ def _derived(
             write_file(path, angles_plot(results))
             yield f"wrote {path}"
     if asked.report is not None and video is not None:
-        named = {f"Person {k}" if summary.people else "Person": one for k, one in people.items()}
+        named = {
+            f"Person {k}" if summary.people else "Person": (one, summary.people.get(k, summary))
+            for k, one in people.items()
+        }
         lines = (*summary.assumptions, *summary.remarks, *summary.accounts)
         write_page(asked.report, video, f"Posture in {asked.recording.name}", named, lines)
         yield f"wrote {asked.report}"

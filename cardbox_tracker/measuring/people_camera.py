@@ -42,8 +42,6 @@ USUAL_PITCH, PITCH_PRIOR = np.radians(10.0), np.radians(13.0)
 """Mean and standard deviation of the pitch of cameras before anything is seen, rad."""
 ROLL_PRIOR = np.radians(15.0)
 """Standard deviation of the roll of cameras that do not stand level, rad."""
-FOUND_STDDEV = float(np.radians(9.5))
-"""Standard deviation from which on a pitch is mostly that of most cameras, and not found, rad."""
 LEVELS = ("nose", "ear", "shoulder", "hip", "knee", "ankle")
 # Distance before the ankles of each level where MediaPipe marks the joints of people who stand
 # upright, and the standard deviations among people of heights and distances.

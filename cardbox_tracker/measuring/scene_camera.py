@@ -20,7 +20,6 @@ from numpy.typing import NDArray
 from cardbox_tracker.camera.camera import Camera
 from cardbox_tracker.detectors.image_points import ImagePoints
 from cardbox_tracker.measuring.people_camera import (
-    FOUND_STDDEV,
     PITCH_PRIOR,
     ROLL_PRIOR,
     USUAL_PITCH,
@@ -30,7 +29,7 @@ from cardbox_tracker.measuring.people_camera import (
 )
 from cardbox_tracker.measuring.room_edges import PITCHES_RAD, ROLLS_RAD, edge_likelihoods
 from cardbox_tracker.measuring.scene import FOUND, GIVEN, USUAL, SceneCamera, Value
-from cardbox_tracker.person.model import PLACEMENT, BodyModel
+from cardbox_tracker.person.model import FOUND_STDDEV, PLACEMENT, BodyModel
 from cardbox_tracker.person.proportions import USUAL_STATURE_M
 from cardbox_tracker.person.sizes import FloatArray
 
@@ -159,8 +158,8 @@ def scene_camera(
     if moves:
         pitch_stddev = float(np.hypot(pitch_stddev, _MOVING))
         remarks.append(
-            "the background moves, so the camera does not stand still; postures are those of one "
-            "mean camera and places are unsure: use a tripod"
+            "the background moves, so the camera does not stand still; leans and places are those "
+            "of one mean camera, and unsure: use a tripod"
         )
     found = Value(pitch, pitch_stddev, FOUND if sources else USUAL)
     if given is not None:

@@ -123,6 +123,10 @@ class Placement:
             check_range(entry.name, getattr(self, entry.name), lowest, highest, unit)
 
 
+FOUND_STDDEV = math.radians(9.5)
+"""Standard deviation from which on a pitch is mostly that of most cameras, and not found, rad."""
+
+
 @dataclass(frozen=True)
 class CameraPose:
     """Pose of the camera in the reference frame, whose origin is the camera's centre.

@@ -10,7 +10,6 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import cache
 from itertools import compress
-from types import MappingProxyType
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -35,6 +34,8 @@ from cardbox_tracker.tracking.tracker import Tracker
 
 CHANCE_KEY = "chance of an error beyond 0.3 m"
 """Key of the probability in the messages."""
+PITCH_KEY = "standard deviation of the camera's pitch (degrees)"
+"""Key of what the vertical rests on in the messages."""
 LEVELS = {
     KeypointState.TRACKED: 0,
     KeypointState.UNCERTAIN: 1,
@@ -48,18 +49,21 @@ class KeypointStates(NamedTuple):
     """States of the keypoints ``names``, and their probabilities of being wrong.
 
     A keypoint is wrong if it is off by over 30 cm relative to the middle of the shoulders. The
-    place has a state, too, and is wrong if its distance is. ``more`` are further texts by name.
+    place has a state, too, and is wrong if its distance is; the vertical has no probability (nan).
+    ``more`` are further texts of each by name.
     """
 
     names: tuple[str, ...]
     states: tuple[KeypointState, ...]
     chances: FloatArray
-    more: Mapping[str, str] = MappingProxyType({})
+    more: tuple[Mapping[str, str], ...] = ()
 
     def rows(self) -> Iterator[tuple[str, KeypointState, dict[str, str]]]:
         """Yield name, state and texts by name."""
-        for name, state, chance in zip(self.names, self.states, self.chances, strict=True):
-            yield name, state, {CHANCE_KEY: f"{chance:.3f}", **self.more}
+        more = self.more or ({},) * len(self.names)
+        for name, state, chance, texts in zip(*self[:3], more, strict=True):
+            chances = {CHANCE_KEY: f"{chance:.3f}"} if np.isfinite(chance) else {}
+            yield name, state, {**chances, **texts}
 
 
 def keypoint_states(estimate: Estimate) -> KeypointStates | None:
@@ -70,9 +74,9 @@ def keypoint_states(estimate: Estimate) -> KeypointStates | None:
 
 
 def place_state(estimate: Estimate) -> KeypointStates | None:
-    """Return the state of the place of an estimate; None if the filter has none."""
-    place = estimate.place
-    if place is None:
+    """Return the states of place and vertical of an estimate; None if the filter has no place."""
+    place, vertical = estimate.place, estimate.vertical_state
+    if place is None or vertical is None or estimate.pitch_stddev_rad is None:
         return None
     more = {
         "rests on": place.rests_on,
@@ -80,7 +84,9 @@ def place_state(estimate: Estimate) -> KeypointStates | None:
     }
     if place.contradiction:
         more["contradiction"] = place.contradiction
-    return KeypointStates(("place",), (place.state,), np.array([place.chance]), more)
+    pitch = {PITCH_KEY: f"{np.degrees(estimate.pitch_stddev_rad):.1f}"}
+    states, chances = (place.state, vertical), np.array([place.chance, np.nan])
+    return KeypointStates(("place", "vertical"), states, chances, (more, pitch))
 
 
 class JointValues(NamedTuple):

@@ -61,7 +61,7 @@ from cardbox_tracker.tracking.tracker import Tracker
 
 MODEL = "/body_model"
 _STATE, _JOINTS, _STDDEV = "/tracking_state", "/joint_states", "/joint_states_stddev"
-_KEYPOINTS, _HANDS, _STATES = "/keypoints", "/hands", "/keypoint_states"
+_KEYPOINTS, _HANDS, _STATES = "/keypoints", "/hands", ("/keypoint_states", "/place_state")
 
 _SEEN, _GAPS = (TRACKING, UNCERTAIN), (LOST, NO_PERSON)
 _KEYPOINT_STATES = frozenset(map(str, KeypointState))
@@ -124,6 +124,15 @@ class Results:
     def texts_of(self, name: str) -> tuple[str, ...]:
         """Return the texts (n) of a column; empty ones if it is missing."""
         return self.texts.get(name, ("",) * len(self.state))
+
+    @property
+    def upright_state(self) -> tuple[str, ...]:
+        """State of each image, ``uncertain`` where the vertical is: that of leans."""
+        pairs = zip(self.state, self.texts_of("vertical_state"), strict=True)
+        return tuple(
+            UNCERTAIN if (state, vertical) == (TRACKING, KeypointState.UNCERTAIN) else state
+            for state, vertical in pairs
+        )
 
     def keypoints(self) -> Iterator[dict[str, tuple[str, float]]]:
         """Yield state and chance to be wrong of each image's keypoints, where they are known."""
@@ -374,7 +383,7 @@ def points_of(message: Any) -> FloatArray:
 def results_in(bag: BagReader, person: int | None = None) -> Results:
     """Return the results in an open bag, the last one of each stamp; see :func:`read_results`."""
     space = namespace_of(bag, person)
-    of_images = _STATE, _JOINTS, _STDDEV, _KEYPOINTS, _HANDS, _STATES
+    of_images = _STATE, _JOINTS, _STDDEV, _KEYPOINTS, _HANDS, *_STATES
     topics = [space + name for name in (MODEL, *of_images)]
     found = _Messages()
     for message in bag.messages([topic for topic in topics if topic in bag.topics]):
@@ -437,12 +446,13 @@ class _Messages:
             self.repeated += stamp_ns in self.by_stamp
             row |= self._keypoints.get(stamp_ns, {})
             self.by_stamp[stamp_ns] = row
-        elif name == _STATES:
+        elif name in _STATES:
             # They come before the joints of their image.
-            states: dict[str, Any] = {}
+            stamp_ns = stamp_ns_of(message)
+            states = self._keypoints.get(stamp_ns, {})
             for keypoint, (state, chance) in chances_of(message).items():
                 states |= {f"{keypoint}_state": state, f"{keypoint}_chance": chance}
-            self._keypoints = {stamp_ns_of(message): states}
+            self._keypoints = {stamp_ns: states}
         elif (found := self.by_stamp.get(stamp_ns_of(message))) is not None:
             if name == _KEYPOINTS:
                 points_m = points_of(message).ravel().tolist()

@@ -92,6 +92,8 @@ def units(
         "place_state": "",
         "place_chance": "",
         "place_rests_on": "",
+        "vertical_state": "",
+        "state_reason": "",
         **dict.fromkeys(ANATOMICAL_NAMES, "deg"),
         **(dict.fromkeys((PERSON, PERSON_CHANCE), "") if has_people else {}),
         **(_HAND_UNITS if has_hands else {}),
@@ -132,7 +134,7 @@ def deviation_columns(joints: Iterable[str]) -> list[str]:
 
 
 TEXT_COLUMNS = (
-    *("state", "place_state", "place_rests_on"),
+    *("state", "place_state", "place_rests_on", "vertical_state", "state_reason"),
     *(f"{name}_state" for name in (*KEYPOINT_NAMES, *LEG_KEYPOINT_NAMES)),
 )
 """Columns of texts."""
@@ -162,6 +164,7 @@ def row_of(stamp_ns: int, time_s: float, estimate: Estimate, **has: bool) -> lis
         place = estimate.place
         known |= {"place_state": str(place.state), "place_chance": place.chance}
         known["place_rests_on"] = place.rests_on
+    known |= {"vertical_state": estimate.vertical_state, "state_reason": estimate.reason}
     known |= {f"{name}_state": str(KeypointState.HIDDEN) for name in LEG_KEYPOINT_NAMES}
     for side, hand in zip(_SIDES, estimate.hands or (None, None), strict=True):
         if hand is not None:

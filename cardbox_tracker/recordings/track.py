@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import nullcontext
 from dataclasses import dataclass, field, replace
@@ -133,6 +134,7 @@ def track_recording(
     return replace(summary, used=used, people=each)
 
 
+_MOST_REASONS = 3
 MOST_MOMENTS, GAP_S = 5, 3.0
 """Number of worst moments that are named, and the least time between two of them, s."""
 
@@ -159,7 +161,9 @@ class Quality:
     """
 
     def __init__(self) -> None:
-        self.images = self.uncertain = self._sure = self._sure_hands = self._sure_places = 0
+        self.images = self.uncertain = self._sure_hands = self._sure_places = 0
+        self._sure = self._vertical = 0
+        self._reasons, self._pitch = Counter[str](), (0.0, 0.0)
         self.fits: list[tuple[int, float]] = []
         self._moments: list[_Moment] = []
         self._angles_rad: list[float] = []
@@ -178,7 +182,11 @@ class Quality:
         self._sure_hands += sum(sure)
         place = estimate.place
         self._sure_places += place is not None and place.state == KeypointState.TRACKED
+        self._vertical += estimate.vertical_state == KeypointState.TRACKED
+        if estimate.pitch_stddev_rad is not None:
+            self._pitch = tracker.body.camera_pose.pitch_rad, estimate.pitch_stddev_rad
         if estimate.state in (UNCERTAIN, LOST):
+            self._reasons[estimate.reason or estimate.state] += 1
             self._moments.append(_moment(frame.time_s, estimate))
         if estimate.posture is None or estimate.posture_stddev is None:
             return
@@ -191,18 +199,28 @@ class Quality:
             self._distances_m.append(float(place.stddev_m[0]))
 
     def lines(self) -> Iterator[str]:
-        """Yield shares of sure images and hands, typical deviations, and the worst moments.
+        """Yield shares of what is sure, why the rest is not, deviations, and the worst moments.
 
-        Hands and distances are sure in the state ``tracked``. Typical is the median over images
-        with a posture; a hand moves beside the shoulders with the deviations of all joints.
+        Hands, leans and distances are sure in the state ``tracked``. Typical is the median over
+        images with a posture; a hand moves beside the shoulders with the deviations of all joints.
         """
         if not self.images:
             return
         yield (
-            f"sure: {self._sure / self.images:.0%} of {self.images} images, "
-            f"{self._sure_hands / (2 * self.images):.0%} of the hands in them, "
-            f"{self._sure_places / self.images:.0%} of the distances (to 0.3 m)"
+            f"sure: the posture in {self._sure / self.images:.0%} of {self.images} images (hands "
+            f"{self._sure_hands / (2 * self.images):.0%}), leans in "
+            f"{self._vertical / self.images:.0%}, the distance (to 0.3 m) in "
+            f"{self._sure_places / self.images:.0%}"
         )
+        if self._reasons:
+            counts = (f"{why} ({count})" for why, count in self._reasons.most_common(_MOST_REASONS))
+            yield f"postures are unsure where {', '.join(counts)}"
+        if self.fits and not self._vertical:
+            pitch, stddev = np.degrees(self._pitch)
+            yield (
+                f"leans are unsure: the camera's pitch is {pitch:.0f} +- {stddev:.0f} degrees; "
+                "give --camera-pitch-deg (0 for a level camera)"
+            )
         if self._angles_rad:
             typical = [
                 f"{np.degrees(np.median(self._angles_rad)):.0f} degrees of an angle",

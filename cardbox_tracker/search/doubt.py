@@ -19,6 +19,7 @@ import json
 from collections.abc import Mapping, Sequence
 from enum import StrEnum
 from functools import cache
+from itertools import compress
 from math import exp, log, sqrt
 from pathlib import Path
 from types import MappingProxyType
@@ -57,6 +58,8 @@ HANDS = [2, 5]
 """Indices of the hands among the keypoints."""
 KINDS = ("shoulder", "elbow", "hand") * 2
 """Kind of each keypoint; the models have these names, and ``whole``."""
+BACK, WHOLE = "the person is seen from behind", "the whole posture may be another one"
+"""Reasons why a whole result is uncertain."""
 
 _FILE = Path(__file__).with_name("doubt.json")
 # Weight of the previous probability of loss in the smoothed one.
@@ -123,9 +126,14 @@ class Judgement(NamedTuple):
 
     chances: FloatArray  #: probability of each keypoint to be wrong, (6,)
     states: tuple[KeypointState, ...]  #: state of each keypoint
-    is_uncertain: bool  #: whether the posture may be wrong
+    reason: str  #: why the posture may be wrong; empty if it is sure
     is_poor: bool  #: whether it does not fit; several such results in a row mean a lost person
     evidence: Values  #: what the probabilities follow from, by name
+
+    @property
+    def is_uncertain(self) -> bool:
+        """Whether the posture may be wrong."""
+        return bool(self.reason)
 
 
 class Doubt:
@@ -144,12 +152,12 @@ class Doubt:
         self._is_sure = False
 
     def judge(
-        self, evidence: Values, source: Source, hidden: BoolArray, vetoes: Sequence[bool] = ()
+        self, evidence: Values, source: Source, hidden: BoolArray, veto: str = ""
     ) -> Judgement:
         """Return the doubt about a result that rests on ``source``, by its evidence.
 
-        ``hidden`` (6,) says whether no camera sees a keypoint; each of ``vetoes``, such as a
-        person's back, makes the whole result uncertain.
+        ``hidden`` (6,) says whether no camera sees a keypoint; a ``veto``, such as ``BACK``, is a
+        reason why the whole result is uncertain.
         """
         if source is not self._source:
             # What an outline left open, points show.
@@ -160,25 +168,28 @@ class Doubt:
         chances = np.array([_chance(of[kind], values, i) for i, kind in enumerate(KINDS)])
         whole = _chance(of["whole"], values, 0)
         self._whole = whole if self._whole is None else _MEMORY * (self._whole + whole)
-        is_doubted = any(vetoes) or self._whole > WHOLE_UNCERTAIN_FROM
+        reason = veto or (WHOLE if self._whole > WHOLE_UNCERTAIN_FROM else "")
+        is_doubted = bool(reason)
         is_unsure = chances > uncertain_from
         self._hands = remembered(self._hands, chances[HANDS])
-        is_uncertain = is_doubted
         # The paper's filter finds hands so badly that its state only says whether it is lost.
         if source is not Source.PAPER:
             limit = doubtful_from
             if self._is_sure:
                 limit = min(_STAYS_SURE * doubtful_from, uncertain_from)
-            is_uncertain |= bool(self._hands.max() > limit)
+            if self._hands.max() > limit:
+                sides = ("left hand", "right hand")
+                doubtful = " and ".join(compress(sides, self._hands > limit))
+                reason = reason or f"the {doubtful} may be elsewhere"
             # An outline shows hands so badly that they make the images uncertain.
             if source is not Source.POINTS:
                 is_unsure[HANDS] = self._hands > limit
-        self._is_sure = not is_uncertain
+        self._is_sure = not reason
         given = zip(
             chances.tolist(), hidden.tolist(), (is_unsure | is_doubted).tolist(), strict=True
         )
         states = tuple(_state_of(*one) for one in given)
-        return Judgement(chances, states, is_uncertain, self._whole > WHOLE_LOST_FROM, evidence)
+        return Judgement(chances, states, reason, self._whole > WHOLE_LOST_FROM, evidence)
 
 
 def remembered(before: FloatArray, chances: FloatArray) -> FloatArray:

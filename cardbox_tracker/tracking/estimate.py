@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cardbox_tracker.camera.camera import roll_turn
-from cardbox_tracker.person.model import BodyModel
+from cardbox_tracker.person.model import FOUND_STDDEV, BodyModel
 from cardbox_tracker.person.sizes import FloatArray
 from cardbox_tracker.person.skeleton import (
     POSTURE_GROUPS,
@@ -102,7 +102,8 @@ class Estimate:
     """State of tracking and posture of the person at one time."""
 
     #: ``tracking``, ``uncertain``, ``lost`` or ``no_person``; with the last two, all other
-    #: attributes are None
+    #: attributes are None. It is about the shape: the posture in the camera's frame beside the
+    #: place.
     state: str
     posture: FloatArray | None = None  #: d1..d12, (12,), rad and metres
     #: standard deviation of each joint, (12,), rad and metres: the weighted spread of the particles
@@ -136,6 +137,9 @@ class Estimate:
     #: how surely distance, scale and height are known, and by what; None if the filter keeps them
     #: constant. All states above are about the shape alone.
     place: Place | None = None
+    #: standard deviation of the camera's pitch, rad, on which leans and angles with the floor rest
+    pitch_stddev_rad: float | None = None
+    reason: str = ""  #: why the state is ``uncertain``
     person: int | None = None  #: number of the person, 1, 2, ...; None if only one is tracked
     #: probability that it is the person who had this number before: 1 unless they were away; None
     #: if only one is tracked
@@ -143,6 +147,20 @@ class Estimate:
     #: the left and the right hand, None for one that is not known; None unless hands are looked at
     hands: tuple[Hand | None, Hand | None] | None = None
     legs: Legs | None = None  #: None without a posture, and as long as no points have shown them
+
+    @property
+    def vertical_state(self) -> KeypointState | None:
+        """``tracked`` or ``uncertain``: how surely leans are known; None without a posture."""
+        if self.pitch_stddev_rad is None:
+            return None
+        is_found = self.pitch_stddev_rad <= FOUND_STDDEV
+        return KeypointState.TRACKED if is_found else KeypointState.UNCERTAIN
+
+    @property
+    def upright_state(self) -> str:
+        """``state``, which is ``uncertain`` where the vertical is: that of leans."""
+        is_sure = self.vertical_state in (None, KeypointState.TRACKED)
+        return self.state if is_sure or self.state != TRACKING else UNCERTAIN
 
     def as_camera_stands(self, roll_rad: float) -> Estimate:
         """Return the estimate in the frame of the rolled camera, not of images turned upright."""

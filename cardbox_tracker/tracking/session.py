@@ -640,7 +640,9 @@ def _held(last: Estimate, hidden: bool = False) -> Estimate:
     if not hidden and last.keypoint_states is not None:
         states = doubted(last.keypoint_states)
     legs = None if last.legs is None else last.legs.hidden()
-    return replace(last, state=UNCERTAIN, keypoint_states=states, legs=legs, hands=hands)
+    reason = "others hide the person" if hidden else "the person is not seen for a moment"
+    last = replace(last, state=UNCERTAIN, reason=reason)
+    return replace(last, keypoint_states=states, legs=legs, hands=hands)
 
 
 def _figures(points: Sequence[ImagePoints], shape: tuple[int, ...]) -> list[Shown]:

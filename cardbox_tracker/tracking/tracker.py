@@ -14,13 +14,12 @@ from cardbox_tracker.camera.camera import Camera
 from cardbox_tracker.camera.tilt import tilted_states
 from cardbox_tracker.camera.view import OtherCamera, View
 from cardbox_tracker.common.settings import restarts
-from cardbox_tracker.measuring.people_camera import FOUND_STDDEV
 from cardbox_tracker.person.kinematics import clavicles
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.posture import LEFT_ARM, RIGHT_ARM, TURNING_LIMITS, TURNS
 from cardbox_tracker.person.sizes import FloatArray
 from cardbox_tracker.search.config import TrackerConfig
-from cardbox_tracker.search.doubt import doubted
+from cardbox_tracker.search.doubt import BACK, doubted
 from cardbox_tracker.search.hierarchy import Cycles
 from cardbox_tracker.search.particles import Particles, likely_postures
 from cardbox_tracker.search.pose_filter import MakeFilter, PoseFilter, Presence
@@ -81,8 +80,7 @@ class Tracker:
         Settings are the paper's by default, and noise is seeded with 0. ``silhouette`` and
         ``make_filter`` replace the compiled term and the filter of the settings. ``look`` finds
         the points of hands in images of the first camera. ``others``, the further cameras, need
-        the filter ``whole_body``. If the body or the camera's pitch is not known, the latter to 10
-        degrees, estimates are at best ``uncertain``.
+        the filter ``whole_body``. If the body is not known, estimates are at best ``uncertain``.
 
         Raises CameraError if the person was not measured in front of one of ``others``, and
         ValueError if there are others, but the filter takes one camera.
@@ -259,7 +257,7 @@ class Tracker:
         """Return the estimate of the posture in :meth:`frames`."""
         estimate, first = self._found(frames), self.cameras[0]
         is_found = estimate.posture is not None
-        is_doubtful = is_found and self._is_doubtful(frames[0])
+        reason = self._doubt_about(frames[0]) if is_found else ""
         found = self._before if is_found else None
         if self._is_alone and first.shows_other(frames[0], found, self._now_ns):
             estimate = Estimate(LOST)
@@ -267,7 +265,7 @@ class Tracker:
                 self._before = None
                 self._filter.forget()
         estimate = self.place.placed(estimate, self.body, frames)
-        estimate = self._doubted(estimate, is_doubtful)
+        estimate = self._doubted(estimate, reason)
         self._count(frames, estimate)
         estimate = self._legs.see(frames[0], self._head.see(frames[0], estimate))
         if self._hands is None:
@@ -277,19 +275,27 @@ class Tracker:
         self.used["hands"] = self.used.get("hands", 0) + any(estimate.hands or ())
         return estimate
 
-    def _doubted(self, estimate: Estimate, is_doubtful: bool) -> Estimate:
-        """Return an estimate that is no surer than body, pitch, distance, person and limits."""
-        state, states, posture = estimate.state, estimate.keypoint_states, estimate.posture
-        is_doubtful = is_doubtful or self.place.is_too_large
-        is_doubtful |= self._is_alone and self.cameras[0].identity.is_doubtful
-        if self.config.has_several_views and posture is not None:
-            is_doubtful |= is_at_two_limits(posture)
-        is_tilt_unknown = self.body.camera_pose.pitch_stddev_rad > FOUND_STDDEV
-        if state == TRACKING and (is_doubtful or is_tilt_unknown or self.body.unknown):
-            state = UNCERTAIN
-        if is_doubtful and states is not None:
+    def _doubted(self, estimate: Estimate, reason: str) -> Estimate:
+        """Return an estimate that is no surer than body, distance, person and limits."""
+        if estimate.posture is None:
+            return estimate
+        if self.place.is_too_large:
+            reason = "the body is too large for the distance"
+        if self._is_alone and self.cameras[0].identity.is_doubtful:
+            reason = "it may be somebody else"
+        if self.config.has_several_views and is_at_two_limits(estimate.posture):
+            reason = "joints are at their limits"
+        state, states = estimate.state, estimate.keypoint_states
+        if reason and states is not None:
             states = doubted(states)
-        return replace(estimate, state=state, keypoint_states=states)
+        if not reason and self.body.unknown:
+            reason = "the sizes are not known yet"
+        if state == TRACKING and reason:
+            state = UNCERTAIN
+        pitch_stddev_rad = self.body.camera_pose.pitch_stddev_rad
+        reason = (reason or estimate.reason) if state == UNCERTAIN else ""
+        estimate = replace(estimate, state=state, reason=reason, keypoint_states=states)
+        return replace(estimate, pitch_stddev_rad=pitch_stddev_rad)
 
     def _count(self, frames: Sequence[Frame], estimate: Estimate) -> None:
         """Count which of the optional inputs that were given told of a posture."""
@@ -367,16 +373,17 @@ class Tracker:
             keypoint_states=None if judged is None else judged.states,
             keypoint_chances=None if judged is None else judged.chances,
             evidence=None if judged is None else judged.evidence,
+            reason="" if judged is None else judged.reason,
             clavicles_m=clavicles_m,
             clavicles_stddev_m=clavicles_stddev_m,
         )
 
-    def _is_doubtful(self, frame: Frame) -> bool:
-        """Return whether poses of cameras, or a person's back, make the whole result doubtful."""
+    def _doubt_about(self, frame: Frame) -> str:
+        """Return whether a person's back or the poses of cameras make the whole result doubtful."""
         if self._facing is not None and self._before is not None:
             self._facing.see(frame, Posed(self.cameras[0].posable, self._before[None]))
-            return self._facing.shows_back
-        return self.faults.is_contradicted
+            return BACK if self._facing.shows_back else ""
+        return "the cameras contradict each other" if self.faults.is_contradicted else ""
 
 
 def is_at_two_limits(posture: FloatArray) -> bool:

@@ -51,15 +51,18 @@ def lines(*images: tuple[float, Estimate]) -> list[str]:
 
 
 def test_sure_images_and_hands_are_counted() -> None:
-    share, deviation, moments = lines(
+    unsure = replace(estimate(UNCERTAIN, UNSURE, 0.3), reason="a hand hides")
+    share, why, deviation, moments = lines(
         (0.0, replace(estimate(TRACKING), place=Place(np.zeros(3), 0.01, "given"))),
-        (1.0, replace(estimate(UNCERTAIN, UNSURE, 0.3), place=Place(np.zeros(3), 0.9, "given"))),
+        (1.0, replace(unsure, place=Place(np.zeros(3), 0.9, "given"), pitch_stddev_rad=0.1)),
         (5.0, Estimate(LOST)),
         (9.0, Estimate(NO_PERSON)),
     )
     assert share == (
-        "sure: 25% of 4 images, 38% of the hands in them, 25% of the distances (to 0.3 m)"
+        "sure: the posture in 25% of 4 images (hands 38%), leans in 25%, the distance (to 0.3 m) "
+        "in 25%"
     )
+    assert why == "postures are unsure where a hand hides (1), lost (1)"
     assert deviation.startswith("typical standard deviation: 8 degrees of an angle, ")
     assert moments == "least sure, look at them: 1.0 s (right hand), 5.0 s (lost)"
 
@@ -83,12 +86,22 @@ def test_a_hand_deviates_with_its_joints_and_the_distance_with_the_place() -> No
 
 def test_the_worst_moments_are_apart_and_in_order() -> None:
     images = [(time_s, estimate(UNCERTAIN, UNSURE, chance)) for time_s, chance in SOME]
-    assert lines(*images)[2] == (
+    assert lines(*images)[3] == (
         "least sure, look at them: 1.0 s (right hand), 5.0 s (right hand), 9.0 s (right hand)"
     )
 
 
 SOME = [(1.0, 0.5), (3.0, 0.4), (5.0, 0.9), (7.0, 0.8), (9.0, 0.3)]
+
+
+def test_an_unknown_pitch_is_told_with_what_to_give() -> None:
+    shown = replace(estimate(TRACKING), pitch_stddev_rad=np.radians(15.0), cost_px=1, iou=0.9)
+    assert lines((0.0, shown))[:2] == [
+        "sure: the posture in 100% of 1 images (hands 100%), leans in 0%, the distance (to 0.3 m) "
+        "in 0%",
+        "leans are unsure: the camera's pitch is 0 +- 15 degrees; give --camera-pitch-deg (0 for a "
+        "level camera)",
+    ]
 
 
 def test_without_images_there_is_nothing_to_say() -> None:
@@ -98,4 +111,4 @@ def test_without_images_there_is_nothing_to_say() -> None:
 @pytest.mark.parametrize("count", [1, 30])
 def test_few_moments_are_named(count: int) -> None:
     images = [(4.0 * n, estimate(UNCERTAIN, UNSURE, 0.5)) for n in range(count)]
-    assert lines(*images)[2].count("right hand") == min(count, 5)
+    assert lines(*images)[3].count("right hand") == min(count, 5)

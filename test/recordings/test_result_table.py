@@ -57,7 +57,10 @@ CLAVICLES = (
     *("left_clavicle_elevation", "right_clavicle_elevation"),
     *("left_clavicle_elevation_stddev_m", "right_clavicle_elevation_stddev_m"),
 )
-PLACE = ("place_state", "place_chance", "place_rests_on")
+PLACE = (
+    *("place_state", "place_chance", "place_rests_on"),
+    *("vertical_state", "state_reason"),
+)
 ANATOMICAL = (
     *("left_elbow_bend_deg", "left_arm_elevation_deg", "left_arm_plane_deg"),
     *("right_elbow_bend_deg", "right_arm_elevation_deg", "right_arm_plane_deg"),

@@ -176,13 +176,15 @@ def test_doubt_about_each_keypoint_comes_with_its_evidence(make_config: Any) -> 
     assert tracker.track(NOBODY).evidence is None
 
 
-def test_an_unknown_pitch_makes_every_image_uncertain() -> None:
+def test_an_unknown_pitch_makes_the_vertical_uncertain_and_not_the_shape() -> None:
     states = []
     for stddev_deg in (9.0, 11.0):
         body = BODY.with_values(pitch_stddev_rad=np.radians(stddev_deg))
         tracker = Tracker(body, CAMERA, paper_preset(), np.random.default_rng(0))
-        states.append({tracker.track(silhouette).state for silhouette in waving(5)})
-    assert states == [{TRACKING}, {UNCERTAIN}]
+        estimates = [tracker.track(silhouette) for silhouette in waving(5)]
+        assert {estimate.state for estimate in estimates} == {TRACKING}
+        states.append({(one.vertical_state, one.upright_state) for one in estimates})
+    assert states == [{("tracked", TRACKING)}, {("uncertain", UNCERTAIN)}]
 
 
 def test_the_lean_of_the_trunk_is_no_surer_than_the_pitch() -> None:

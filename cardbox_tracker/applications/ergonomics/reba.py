@@ -227,8 +227,8 @@ def images_of(results: Results) -> list[Seen]:
     are_tracked = np.all(np.array(states) == KeypointState.TRACKED, axis=0)
     joints = np.stack([results.of(STATE_NAMES), results.deviations_of(STATE_NAMES)], axis=1)
     joints[np.ix_(~are_tracked, np.arange(2), PARTS["legs"])] = np.nan
-    lengths_m = np.column_stack([trunk_m, bones_m])
-    times = zip(results.stamp_ns.tolist(), results.time_s.tolist(), results.state, strict=True)
+    lengths_m, upright = np.column_stack([trunk_m, bones_m]), results.upright_state
+    times = zip(results.stamp_ns.tolist(), results.time_s.tolist(), upright, strict=True)
     return [Seen(*at, *of) for at, *of in zip(times, joints, lengths_m, strict=True)]
 
 

@@ -125,7 +125,7 @@ class RulaObserver:
             scores, measured = sampled_scores(
                 tracker.body, estimate.joints, postures, self._config, self._rng
             )
-        row = RulaRow(frame.stamp_ns, estimate.state, scores, frame.time_s, measured)
+        row = RulaRow(frame.stamp_ns, estimate.upright_state, scores, frame.time_s, measured)
         self.rows.append(row)
         if self._images is not None:
             self._images.add(row, frame, estimate, tracker)

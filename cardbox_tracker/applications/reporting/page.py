@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import os
+from collections import Counter
 from collections.abc import Mapping, Sequence
+from itertools import compress
 from pathlib import Path
 from urllib.parse import quote
 
@@ -17,6 +19,7 @@ from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.sizes import FloatArray
 from cardbox_tracker.person.skeleton import Group, names_of
 from cardbox_tracker.recordings.result_reader import Results
+from cardbox_tracker.recordings.track import TrackSummary
 from cardbox_tracker.tracking.estimate import TRACKING, UNCERTAIN
 
 STATE_COLOURS = {UNCERTAIN: "#e69f00", "": "#9a9a9a"}
@@ -90,6 +93,13 @@ def doubtful_spans(results: Results) -> list[tuple[float, float, str]]:
     return spans
 
 
+def _why(results: Results, begin_s: float, end_s: float) -> str:
+    """Return the commonest reason why the posture may be wrong in a time."""
+    is_in = (results.time_s >= begin_s) & (results.time_s < end_s)
+    reasons = Counter(compress(results.texts_of("state_reason"), is_in))
+    return reasons.most_common(1)[0][0] or UNCERTAIN
+
+
 def space_view(motion: Motion, body: BodyModel | None, true_m: FloatArray | None = None) -> bytes:
     """Return the skeleton from aside at some moments of a motion of n images as PNG.
 
@@ -151,12 +161,16 @@ _MOST_SPANS = 20
 
 
 def write_page(
-    path: Path, film: Path, title: str, people: Mapping[str, Results], lines: Sequence[str]
+    path: Path,
+    film: Path,
+    title: str,
+    people: Mapping[str, tuple[Results, TrackSummary]],
+    lines: Sequence[str],
 ) -> None:
     """Write the page, which needs no other file than the ``film``, named relative to it.
 
-    It has the results of ``people`` by a heading, and ``lines`` on what they rest on. Raises
-    CardboxError if the file cannot be written.
+    It has the results of ``people`` with their summaries by a heading, and ``lines`` on what they
+    rest on. Raises CardboxError if the file cannot be written.
     """
     render_page(
         path,
@@ -164,14 +178,13 @@ def write_page(
         title=title,
         film=quote(os.path.relpath(film, path.parent)),
         film_name=film.name,
-        start_s=min(float(results.time_s[0]) for results in people.values()),
-        people=[_person(name, results) for name, results in people.items()],
+        start_s=min(float(results.time_s[0]) for results, _ in people.values()),
+        people=[_person(name, *of) for name, of in people.items()],
         lines=lines,
     )
 
 
-def _person(name: str, results: Results) -> dict[str, object]:
-    images, sure = len(results.state), results.state.count(TRACKING)
+def _person(name: str, results: Results, summary: TrackSummary) -> dict[str, object]:
     seen = Motion.of(results) if np.isfinite(results.of(["torso_y"])).any() else None
     spans = sorted(doubtful_spans(results), key=lambda span: span[0] - span[1])
     pictures = {"angles over time, with a standard deviation": angles_plot(results)}
@@ -179,9 +192,9 @@ def _person(name: str, results: Results) -> dict[str, object]:
         pictures = {"skeleton from aside": space_view(seen, results.body)} | pictures
     return {
         "name": name,
-        "words": f"{images} images, {sure} of them sure ({sure / images:.0%})",
+        "words": summary.quality,
         "moments": [
-            (begin_s, end_s, what or "no posture")
+            (begin_s, end_s, _why(results, begin_s, end_s) if what else "no posture")
             for begin_s, end_s, what in sorted(spans[:_MOST_SPANS])
         ],
         "more": max(0, len(spans) - _MOST_SPANS),

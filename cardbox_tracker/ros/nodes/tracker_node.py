@@ -45,8 +45,8 @@ _REASONS = {
         "stand in the front reference posture, or initialize again if it is another person"
     ),
     UNCERTAIN: (
-        "the posture may be wrong (several postures fit the silhouette, or none fits it well); "
-        "look at the overlay, and let a robot wait until tracking_state is tracking again"
+        "the posture may be wrong ({why}); look at the overlay, and let a robot wait until "
+        "tracking_state is tracking again"
     ),
 }
 
@@ -78,7 +78,9 @@ class TrackingReport:
         self._estimate = estimate
         self._counts[estimate.state] = self._counts.get(estimate.state, 0) + 1
         before, self._state = self._state, estimate.state
-        reason = self._reason = exposure or _REASONS.get(estimate.state, "")
+        reason = self._reason = exposure or _REASONS.get(estimate.state, "").format(
+            why=estimate.reason or "several postures fit the silhouette, or none fits it well"
+        )
         if estimate.state == before:
             return news
         if estimate.state == UNCERTAIN:
