@@ -76,7 +76,7 @@ def keypoint_states(estimate: Estimate) -> KeypointStates | None:
 def place_state(estimate: Estimate) -> KeypointStates | None:
     """Return the states of place and vertical of an estimate; None if the filter has no place."""
     place, vertical = estimate.place, estimate.vertical_state
-    if place is None or vertical is None or estimate.pitch_stddev_rad is None:
+    if place is None:
         return None
     more = {
         "rests on": place.rests_on,
@@ -84,6 +84,8 @@ def place_state(estimate: Estimate) -> KeypointStates | None:
     }
     if place.contradiction:
         more["contradiction"] = place.contradiction
+    if vertical is None or estimate.pitch_stddev_rad is None:
+        return KeypointStates(("place",), (place.state,), np.array([place.chance]), (more,))
     pitch = {PITCH_KEY: f"{np.degrees(estimate.pitch_stddev_rad):.1f}"}
     states, chances = (place.state, vertical), np.array([place.chance, np.nan])
     return KeypointStates(("place", "vertical"), states, chances, (more, pitch))

@@ -164,7 +164,9 @@ def row_of(stamp_ns: int, time_s: float, estimate: Estimate, **has: bool) -> lis
         place = estimate.place
         known |= {"place_state": str(place.state), "place_chance": place.chance}
         known["place_rests_on"] = place.rests_on
-    known |= {"vertical_state": estimate.vertical_state, "state_reason": estimate.reason}
+    if estimate.vertical_state is not None:
+        known["vertical_state"] = str(estimate.vertical_state)
+    known["state_reason"] = estimate.reason or None
     known |= {f"{name}_state": str(KeypointState.HIDDEN) for name in LEG_KEYPOINT_NAMES}
     for side, hand in zip(_SIDES, estimate.hands or (None, None), strict=True):
         if hand is not None:

@@ -158,8 +158,8 @@ def test_keypoints_have_states_and_chances() -> None:
 
 
 def test_the_neck_is_empty_while_the_face_is_not_seen() -> None:
-    assert row_of(42, 1.5, SEEN, has_points=True)[-65:-61] == [0.4, -0.1, 0.2, 0.3]
-    assert row_of(42, 1.5, PLACED, has_points=True)[-65:-61] == [None] * 4
+    assert row_of(42, 1.5, SEEN, has_points=True)[-67:-63] == [0.4, -0.1, 0.2, 0.3]
+    assert row_of(42, 1.5, PLACED, has_points=True)[-67:-63] == [None] * 4
 
 
 def test_the_clavicles_follow_the_neck() -> None:
@@ -180,8 +180,15 @@ def test_the_clavicles_follow_the_neck() -> None:
 def test_the_place_has_its_own_state() -> None:
     place = Place(np.array([0.2, 0.0, 0.1]), 0.13, "given stature")
     row = row_of(42, 1.5, replace(PLACED, place=place))
-    assert row[-11:-8] == ["uncertain", 0.13, "given stature"]
-    assert row_of(42, 1.5, PLACED)[-11:-8] == [None] * 3
+    assert row[-13:-8] == ["uncertain", 0.13, "given stature", None, None]
+    assert row_of(42, 1.5, PLACED)[-13:-8] == [None] * 5
+
+
+def test_the_vertical_has_its_own_state_and_an_uncertain_one_its_reason() -> None:
+    sure = replace(PLACED, pitch_stddev_rad=0.1)
+    assert row_of(42, 1.5, sure)[-10:-8] == ["tracked", None]
+    unsure = replace(PLACED, state="uncertain", reason="a hand hides", pitch_stddev_rad=0.2)
+    assert row_of(42, 1.5, unsure)[-10:-8] == ["uncertain", "a hand hides"]
 
 
 def test_anatomical_angles_are_in_degrees_and_empty_where_they_are_not_determined() -> None:
@@ -228,7 +235,7 @@ def test_both_formats_have_the_same_content(tmp_path: Path) -> None:
     assert table.schema.field("left_hand_x").metadata == {b"unit": b"m"}
     for row, other in zip(rows, table.to_pylist(), strict=True):
         assert (row["stamp_ns"], row["state"]) == (str(other["stamp_ns"]), other["state"])
-        texts = {name for name in row if name.endswith("state")}
+        texts = {name for name in row if name.endswith(("state", "reason"))}
         assert all((row[name] or None) == other[name] for name in texts)
         for name in set(row) - texts - {"stamp_ns"}:
             known = None if row[name] == "" else float(row[name])
