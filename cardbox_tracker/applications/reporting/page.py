@@ -14,24 +14,22 @@ import numpy as np
 from cardbox_tracker.applications.drawing.page import png_of, render_page
 from cardbox_tracker.applications.exporting.markers import markers_of
 from cardbox_tracker.applications.exporting.motion import Motion, floor_below, in_reference
-from cardbox_tracker.person.isb_angles import LABORATORY
+from cardbox_tracker.person.isb_angles import ANATOMICAL_NAMES, LABORATORY, anatomical_angles
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.sizes import FloatArray
-from cardbox_tracker.person.skeleton import Group, names_of
+from cardbox_tracker.person.skeleton import JOINT_NAMES
 from cardbox_tracker.recordings.result_reader import Results
 from cardbox_tracker.recordings.track import TrackSummary
 from cardbox_tracker.tracking.estimate import TRACKING, UNCERTAIN
 
 STATE_COLOURS = {UNCERTAIN: "#e69f00", "": "#9a9a9a"}
 """Colours of times whose posture may be wrong, and of those without one."""
-_JOINTS = {
-    "torso": names_of(Group.TORSO)[1:],
-    "neck": names_of(Group.NECK),
-    **{
-        f"{side} {group}": names_of(group, side=side)
-        for group in (Group.ARM, Group.LEG)
-        for side in ("left", "right")
-    },
+_KNEES = "left_knee_flexion", "right_knee_flexion"
+_ANGLES = {
+    "elbow": {"left": "left_elbow_bend_deg", "right": "right_elbow_bend_deg"},
+    "raised arm": {"left": "left_arm_elevation_deg", "right": "right_arm_elevation_deg"},
+    "lean of the trunk": {"forward": "trunk_lean_deg", "right": "trunk_side_lean_deg"},
+    "knee": dict(zip(("left", "right"), _KNEES, strict=True)),
 }
 _DPI = 100
 
@@ -43,30 +41,28 @@ _MOMENTS = 4
 
 
 def angles_plot(results: Results) -> bytes:
-    """Return the joint angles over time as PNG, each with a band of one standard deviation."""
+    """Return elbows, arms, trunk and knees over time as PNG, with bands of a standard deviation."""
     from matplotlib.figure import Figure
 
-    groups = {
-        name: [joint for joint in joints if np.isfinite(results.of([joint])).any()]
-        for name, joints in _JOINTS.items()
+    angles = angles_of(results)
+    shown = {
+        name: {label: angles[column] for label, column in columns.items()}
+        for name, columns in _ANGLES.items()
+        if name != "knee" or np.isfinite(results.of(_KNEES)).any()
     }
-    shown = {name: joints for name, joints in groups.items() if joints} or {"torso": []}
     figure = Figure(figsize=(10.0, 2.2 * len(shown)), dpi=_DPI, layout="constrained")
     time_s = results.time_s
-    for row, (name, joints) in zip(
+    for row, (name, lines) in zip(
         figure.subplots(len(shown), sharex=True, squeeze=False)[:, 0], shown.items(), strict=True
     ):
-        angles, deviations = (
-            np.degrees(values) for values in (results.of(joints), results.deviations_of(joints))
-        )
-        for joint, angle, deviation in zip(joints, angles.T, deviations.T, strict=True):
-            label = joint.removeprefix(f"{name.split()[0]}_").replace("_", " ")
+        for label, (angle, deviation) in lines.items():
             line = row.plot(time_s, angle, linewidth=1.2, label=label)[0]
             low, high = angle - deviation, angle + deviation
             row.fill_between(time_s, low, high, color=line.get_color(), alpha=0.15, linewidth=0)
         # Deviations of what is hardly seen would leave no room for the curves.
-        if np.isfinite(angles).any():
-            row.set_ylim(np.nanmin(angles) - 30.0, np.nanmax(angles) + 30.0)
+        known = np.concatenate([angle[np.isfinite(angle)] for angle, _ in lines.values()])
+        if len(known):
+            row.set_ylim(known.min() - 30.0, known.max() + 30.0)
         for begin_s, end_s, state in doubtful_spans(results):
             row.axvspan(begin_s, end_s, 0.0, 0.04, color=STATE_COLOURS[state], linewidth=0)
         row.set(ylabel=f"{name} [deg]")
@@ -77,6 +73,23 @@ def angles_plot(results: Results) -> bytes:
         "time [s]; bands: one standard deviation; orange: may be wrong, grey: no posture"
     )
     return png_of(figure)
+
+
+def angles_of(results: Results) -> dict[str, tuple[FloatArray, FloatArray]]:
+    """Return angles and standard deviations, (n,), degrees, by the columns' names; nan in gaps.
+
+    Deviations are carried to the first order from those of the joints, taken as independent.
+    """
+    posture, stddev = results.of(JOINT_NAMES), results.deviations_of(JOINT_NAMES)
+    is_seen = np.isfinite(posture).all(axis=1)
+    found = np.full((2, len(posture), len(ANATOMICAL_NAMES)), np.nan)
+    seen, spread = posture[is_seen], stddev[is_seen]
+    found[0, is_seen] = values = anatomical_angles(seen)
+    changes = [anatomical_angles(seen + spread * one) - values for one in np.eye(len(JOINT_NAMES))]
+    found[1, is_seen] = np.linalg.norm(changes, axis=0)
+    knees = np.degrees([results.of(_KNEES), results.deviations_of(_KNEES)])
+    columns = np.concatenate([found, knees], axis=2).transpose(2, 0, 1)
+    return dict(zip((*ANATOMICAL_NAMES, *_KNEES), map(tuple, columns), strict=True))
 
 
 def doubtful_spans(results: Results) -> list[tuple[float, float, str]]:
