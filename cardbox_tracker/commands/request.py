@@ -261,6 +261,7 @@ class Request(TrackingOptions):
             used
         bag: also write the topics of the tracker
         video: also write an overlay video
+        blur: hide the heads of people in the pictures of --video, --report and --bag
         json: also write what is printed at the end: what was tracked, used, left out and assumed
         export: also write the table in formats of 'cardbox export' beside it, such as trc,bvh
         plot: also plot the angles, with bands of one standard deviation
@@ -272,6 +273,7 @@ class Request(TrackingOptions):
     csv: Path | None = option("OUT.csv|OUT.parquet")
     bag: Path | None = option("OUT")
     video: Path | None = option("OUT.mp4")
+    blur: bool = option(default=False)
     json: Path | None = option("OUT.json")
     export: str | tuple[str, ...] | None = option("FORMAT[,...]", _formats)
     plot: Path | None = option("OUT.png")

@@ -136,7 +136,7 @@ def _files(asked: Request, is_new_body: bool) -> tuple[TrackFiles, dict[Format, 
     if asked.report is not None and video is None:
         video = asked.report.with_suffix(".overlay.mp4")
     if table is None:
-        return TrackFiles(None, video, asked.bag), {}
+        return TrackFiles(None, video, asked.bag, hides_heads=asked.blur), {}
     check_table(table)
     # There is no place for a further file beside a pipe.
     is_piped = is_written_in_place(table)
@@ -146,7 +146,8 @@ def _files(asked: Request, is_new_body: bool) -> tuple[TrackFiles, dict[Format, 
     for form in chosen:
         form.check()
     exports = {form: beside.with_name(beside.stem + form.suffix) for form in chosen}
-    return TrackFiles(table, video, asked.bag, body, scene_beside(beside)), exports
+    scene = scene_beside(beside)
+    return TrackFiles(table, video, asked.bag, body, scene, asked.blur), exports
 
 
 def _derived(
@@ -172,7 +173,9 @@ def _derived(
             for k, one in people.items()
         }
         lines = (*summary.assumptions, *summary.remarks, *summary.accounts)
-        write_page(asked.report, video, f"Posture in {asked.recording.name}", named, lines)
+        write_page(
+            asked.report, video, f"Posture in {asked.recording.name}", named, lines, asked.blur
+        )
         yield f"wrote {asked.report}"
     for form, path in exports.items():
         for number, results in people.items():

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack
 from dataclasses import replace
+from functools import partial
 
 from cardbox_tracker.applications.drawing.overlay import draw_sharp_overlay
 from cardbox_tracker.applications.drawing.video import overlay_video
@@ -143,7 +144,8 @@ def _writers(request: TrackingRequest, source: Recording, stack: ExitStack) -> I
     """Yield what writes bag and video; they appear when ``stack`` is closed without an error."""
     bag, video = request.files.bag, request.files.video
     if video is not None:
-        yield stack.enter_context(overlay_video(video, source))
+        yield stack.enter_context(overlay_video(video, source, request.files.hides_heads))
     if bag is not None:
         frame_id = source.first.frame_id
-        yield stack.enter_context(result_bag(bag, frame_id, request.force, draw_sharp_overlay))
+        draw = partial(draw_sharp_overlay, hides_heads=request.files.hides_heads)
+        yield stack.enter_context(result_bag(bag, frame_id, request.force, draw))

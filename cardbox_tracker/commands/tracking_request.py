@@ -81,6 +81,7 @@ class TrackFiles(NamedTuple):
     bag: Path | None = None  #: folder of a bag with the topics of the tracker
     body: Path | None = None  #: the body that was tracked
     scene: Path | None = None  #: camera, floor and people (:mod:`~cardbox_tracker.measuring.scene`)
+    hides_heads: bool = False  #: whether heads are hidden in pictures of people
 
 
 @dataclass(frozen=True)

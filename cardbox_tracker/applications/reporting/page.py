@@ -179,11 +179,13 @@ def write_page(
     title: str,
     people: Mapping[str, tuple[Results, TrackSummary]],
     lines: Sequence[str],
+    hides_heads: bool = False,
 ) -> None:
     """Write the page, which needs no other file than the ``film``, named relative to it.
 
     It has the results of ``people`` with their summaries by a heading, and ``lines`` on what they
-    rest on. Raises CardboxError if the file cannot be written.
+    rest on; ``hides_heads`` says that no face is in the film. Raises CardboxError if the file
+    cannot be written.
     """
     render_page(
         path,
@@ -194,6 +196,7 @@ def write_page(
         start_s=min(float(results.time_s[0]) for results, _ in people.values()),
         people=[_person(name, *of) for name, of in people.items()],
         lines=lines,
+        hides_heads=hides_heads,
     )
 
 
