@@ -245,7 +245,7 @@ class ArmFollower:
         arm: what was found in the robot.
         kinematics: where its joints are.
         joints: the arm's joints and the gripper, if there is one.
-        sources: for each joint, the joints of the person's arm; none for the gripper.
+        sources: for each joint, the joints of the person's arm; the hand for the gripper.
     """
 
     def __init__(self, robot: Robot, config: RetargetConfig, side: str = "") -> None:
@@ -256,13 +256,14 @@ class ArmFollower:
         gripper = (self.arm.gripper,) if self.arm.gripper else ()
         self.joints = (*self.arm.joints, *gripper)
         behind = tuple(f"{self._side}_{name}" for name in ARM_JOINTS)
-        self.sources = (*(behind for _ in self.arm.joints), *(() for _ in gripper))
+        hand = (f"{self._side}_hand_open",)
+        self.sources = (*(behind for _ in self.arm.joints), *(hand for _ in gripper))
         self._lower, self._upper, _ = robot.limits_of(self.joints)
         if config.gripper_open == "lower":
             self._closed, self._open = self._upper[-1], self._lower[-1]
         else:
             self._closed, self._open = self._lower[-1], self._upper[-1]
-        self._hand = WITH_HEAD_AND_HANDS.index(f"{self._side}_hand_open")
+        self._hand = WITH_HEAD_AND_HANDS.index(*hand)
         angles = np.radians([config.mount_roll_deg, config.mount_pitch_deg, config.mount_yaw_deg])
         self._mount = rotation_z(angles[2]) @ rotation_y(angles[1]) @ rotation_x(angles[0])
         self._solution: FloatArray | None = None

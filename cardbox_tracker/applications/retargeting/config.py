@@ -50,7 +50,16 @@ class RetargetConfig(Settings):
         False, "the robot begins where it is and follows movements from there, not postures"
     )
     enable_after_lost: bool = setting(
-        False, "after lost or no_person the robot has to be enabled again"
+        True,
+        "after a loss, of the person, of postures or of the robot's joint states for timeout_s, "
+        "the robot has to be enabled again",
+    )
+    max_following_error: float = setting(
+        0.2,
+        "all joints of the robot hold while one is farther from where it was sent than this, or a "
+        "quarter of its range",
+        unit="rad or m",
+        limits=(0.01, 10.0),
     )
     start: str = setting(
         "",

@@ -112,9 +112,10 @@ class JointMap:
 
     @property
     def sources(self) -> tuple[tuple[str, ...], ...]:
-        """For each joint, those of the posture behind its angle; none for the neck and hands."""
+        """For each joint, those of the posture behind its angle, or the hand; none for the neck."""
         behind = (_ELBOW.get(angle, (angle,)) if angle else () for angle in self.angles)
-        return tuple(tuple(one for one in names if one in JOINT_NAMES) for names in behind)
+        known = (*JOINT_NAMES, *HAND_OPEN_NAMES)
+        return tuple(tuple(one for one in names if one in known) for names in behind)
 
     def target(self, _: BodyModel, posture: FloatArray, now: FloatArray) -> FloatArray:
         """See :class:`~.retargeter.Method`; a joint stays while its angle is unknown."""

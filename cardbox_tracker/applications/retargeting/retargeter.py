@@ -22,10 +22,10 @@ from cardbox_tracker.common.errors import CardboxError, quoted
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.posture import N_JOINTS
 from cardbox_tracker.person.sizes import FloatArray
-from cardbox_tracker.person.skeleton import JOINT_NAMES
+from cardbox_tracker.person.skeleton import HAND_OPEN_NAMES, JOINT_NAMES
 from cardbox_tracker.tracking.estimate import TRACKING, UNCERTAIN
 
-MOVING = "moving"
+FOLLOWING = "following"
 # Settings that a joint map does not need.
 _OF_AN_ARM = (
     *("base", "hand", "gripper", "gripper_open", "trunk_radius_m", "lowest_m"),
@@ -40,7 +40,7 @@ class Method(Protocol):
 
     @property
     def sources(self) -> tuple[tuple[str, ...], ...]:
-        """For each joint of the robot, the person's joints on which its target depends."""
+        """For each joint of the robot, what its target depends on: joints of the person, hands."""
 
     @property
     def joints(self) -> tuple[str, ...]:
@@ -182,13 +182,18 @@ class Command(NamedTuple):
     """Command for the robot at one image."""
 
     positions: FloatArray  #: positions (n,) of ``Retargeter.joints``, rad or m
-    status: str  #: ``moving``, or ``frozen:`` with the reason
+    status: str  #: ``following``, or ``holding:`` with the reason
     duration_s: float  #: time in which the robot reaches the positions, s
 
     @property
     def is_moving(self) -> bool:
         """True unless the robot must stand still."""
-        return self.status == MOVING
+        return self.status == FOLLOWING
+
+    @property
+    def reason(self) -> str:
+        """Why the robot stands still; empty if it does not."""
+        return self.status.partition(": ")[2]
 
 
 class Retargeter:
@@ -199,6 +204,8 @@ class Retargeter:
     Attributes:
         joints: names of the robot's joints.
         limits: those of the joints' motion.
+        tolerance: the largest following errors (n,), rad or m; inf for a gripper, which what it
+            holds may stop.
         settles_ns: time in which the robot stops, ns.
     """
 
@@ -218,8 +225,11 @@ class Retargeter:
         )
         self.settles_ns = self._motion.settles_ns
         self._method, self._config = method, config
-        self._sources = method.sources
-        self._follows = np.array([bool(names) for names in method.sources])
+        self._sources = sources = [frozenset(names) for names in method.sources]
+        self._follows = np.array([not names.isdisjoint(JOINT_NAMES) for names in sources])
+        grips = [not names.isdisjoint(HAND_OPEN_NAMES) for names in sources]
+        most = np.minimum(config.max_following_error, (limits.upper - limits.lower) / 4)
+        self.tolerance = np.where(grips, np.inf, most)
         self._before_ns: int | None = None
         self._commanded_ns: int | None = None
         self._followed_ns: int | None = None
@@ -238,6 +248,15 @@ class Retargeter:
         """Return the command to stop from now on; the next image counts as the first."""
         self._before_ns = self._followed_ns = None
         return self._stop(reason, now_ns)
+
+    def hold_near(self, positions: FloatArray, reason: str, now_ns: int) -> Command:
+        """Return the command to stop within the ``tolerance`` of where the robot is, (n,)."""
+        held = self.hold(reason, now_ns)
+        point = self._motion.set_point(now_ns)
+        goal = np.clip(point, positions - self.tolerance, positions + self.tolerance)
+        duration_ns = math.ceil(float((np.abs(goal - point) / self.limits.speed).max()) * 1e9)
+        self._motion.move(goal, now_ns, duration_ns)
+        return held._replace(positions=goal, duration_s=held.duration_s + duration_ns / 1e9)
 
     def update(
         self,
@@ -294,12 +313,12 @@ class Retargeter:
         goal = point + np.clip(np.where(held, 0.0, target + self._offset - point), -most, most)
         goal = np.where(held, point, self._method.clear(goal))
         self._motion.move(goal, now_ns, duration_ns, share)
-        return Command(self.at(now_ns + duration_ns).positions, MOVING, duration_ns / 1e9)
+        return Command(self.at(now_ns + duration_ns).positions, FOLLOWING, duration_ns / 1e9)
 
     def _stop(self, reason: str, now_ns: int) -> Command:
         self._motion.stop(now_ns)
         end = self.at(now_ns + self.settles_ns).positions
-        return Command(end, f"frozen: {reason.replace('_', ' ')}", self.settles_ns / 1e9)
+        return Command(end, f"holding: {reason.replace('_', ' ')}", self.settles_ns / 1e9)
 
     def _held(
         self, posture: FloatArray, stddev: FloatArray, keypoints: Mapping[str, tuple[str, float]]
@@ -314,7 +333,7 @@ class Retargeter:
             if state != "tracked" or chance > self._config.max_chance:
                 sure[number] = False
         unsure = {name for name, is_sure in zip(JOINT_NAMES, sure, strict=True) if not is_sure}
-        return np.array([not unsure.isdisjoint(names) for names in self._sources])
+        return np.array([not names.isdisjoint(unsure) for names in self._sources])
 
 
 def _start(text: str, joints: tuple[str, ...], limits: Limits) -> FloatArray:

@@ -168,13 +168,13 @@ def test_a_joint_holds_while_its_own_keypoints_are_not_tracked() -> None:
 @pytest.mark.parametrize(
     ("state", "deviation", "status"),
     [
-        ("lost", 0.1, "frozen: lost"),
-        ("no_person", 0.1, "frozen: no person"),
-        ("uncertain", 0.1, "frozen: uncertain"),
-        ("", 0.1, "frozen: no state yet"),
-        ("tracking", 0.8, "frozen: too uncertain"),
-        ("tracking", math.nan, "frozen: too uncertain"),
-        ("tracking", 0.1, "moving"),
+        ("lost", 0.1, "holding: lost"),
+        ("no_person", 0.1, "holding: no person"),
+        ("uncertain", 0.1, "holding: uncertain"),
+        ("", 0.1, "holding: no state yet"),
+        ("tracking", 0.8, "holding: too uncertain"),
+        ("tracking", math.nan, "holding: too uncertain"),
+        ("tracking", 0.1, "following"),
     ],
 )
 def test_the_dead_man(state: str, deviation: float, status: str) -> None:
@@ -184,13 +184,13 @@ def test_the_dead_man(state: str, deviation: float, status: str) -> None:
     assert robot.update(5 * 10**8, state, BODY, posture, np.full(12, deviation)).status == status
     assert robot.at(5 * 10**8).velocities.any()  # it decelerates
     assert not robot.at(10**9).velocities.any()
-    assert robot.update(10**9, "tracking", None, posture, SURE).status == "frozen: no body model"
+    assert robot.update(10**9, "tracking", None, posture, SURE).status == "holding: no body model"
 
 
 def test_after_holding_nothing_is_made_up_for() -> None:
     robot = Retargeter(ROBOT, MAP, RetargetConfig())
     robot.update(0, "tracking", BODY, reference_posture("arms"), SURE)
-    assert robot.hold("no posture", 10**8).status == "frozen: no posture"
+    assert robot.hold("no posture", 10**8).status == "holding: no posture"
     robot.update(10**9, "tracking", BODY, reference_posture("arms"), SURE)
     assert not robot.at(2 * 10**9).positions.any()
 
