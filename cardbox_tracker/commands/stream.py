@@ -9,9 +9,9 @@ from dataclasses import dataclass
 from cardbox_tracker.applications.teleoperation.full_body import at_rate, bodies_of
 from cardbox_tracker.applications.teleoperation.sending import (
     PACKETS,
+    Packets,
     ZmqSender,
     in_real_time,
-    packet,
 )
 from cardbox_tracker.commands.arguments import TrackedResults, between, choice, option
 
@@ -39,10 +39,11 @@ def run(given: Arguments) -> None:
     results = given.read()
     results.check_body()
     bodies = at_rate(bodies_of(results), given.rate)
+    packets = Packets(given.to, given.rate)
     sent = number = 0
     with closing(ZmqSender(given.address)) if given.address else nullcontext() as sender:
         for body in bodies if given.fast else in_real_time(bodies, given.rate):
-            made = packet(given.to, body, number)
+            made = packets.of(body)
             number += 1
             if made is None:
                 continue

@@ -123,7 +123,7 @@ def isaac_packet(body: FullBody, _: int) -> bytes:
     x, y, z, w = turned.as_quat().T
     content = {
         "timestamp": body.stamp_ns,
-        "joint_names": NAMES,
+        "joint_names": [name.upper() for name in NAMES],
         "joint_positions": points_m.tolist(),
         "joint_orientations": np.stack([-y, z, -x, w], axis=1).tolist(),
         "joint_valid": body.valid.tolist(),
@@ -140,8 +140,42 @@ PACKETS: dict[str, Callable[[FullBody, int], bytes]] = {
 """Makers of packets by the name of the peer."""
 
 
-def packet(to: str, body: FullBody | None, number: int) -> bytes | None:
-    """Return the packet of a body; None where the peer has to stay, as it cannot read validity."""
-    if body is None or (to != "json" and not body.valid.any()):
-        return None
-    return PACKETS[to](body, number)
+# A hand that gestures is slower; what is faster is mostly an arm that is seen again.
+_FASTEST_M_S, _FASTEST_RAD_S = 4.0, 8.0
+
+
+class Packets:
+    """Makes the packets of one stream, at one rate.
+
+    SONIC cannot read validity. From one of its packets to the next, no joint moves faster than
+    4 m/s, and yaw and wrists turn no faster than 8 rad/s, also after a time without packets.
+    """
+
+    def __init__(self, to: str, rate_hz: float) -> None:
+        """Begin a stream to a peer, one of ``PACKETS``."""
+        self._to, self._rate_hz = to, rate_hz
+        self._number, self._before = -1, None
+
+    def of(self, body: FullBody | None) -> bytes | None:
+        """Return the packet of a body; None where the peer has to stay as nothing is valid."""
+        self._number += 1
+        if body is None or (self._to != "json" and not body.valid.any()):
+            return None
+        if self._to == "sonic":
+            self._before = body = self._slowed(body)
+        return PACKETS[self._to](body, self._number)
+
+    def _slowed(self, body: FullBody) -> FullBody:
+        if self._before is None:
+            return body
+        most_m, most_rad = _FASTEST_M_S / self._rate_hz, _FASTEST_RAD_S / self._rate_hz
+        before = self._before
+        moved_m = body.points_m - before.points_m
+        away_m = np.linalg.norm(moved_m, axis=1, keepdims=True)
+        turned = (body.yaw_rad - before.yaw_rad + np.pi) % (2 * np.pi) - np.pi
+        wrists = np.clip(body.wrists_rad - before.wrists_rad, -most_rad, most_rad)
+        return body._replace(
+            points_m=before.points_m + moved_m * (most_m / np.maximum(away_m, most_m)),
+            yaw_rad=before.yaw_rad + float(np.clip(turned, -most_rad, most_rad)),
+            wrists_rad=before.wrists_rad + wrists,
+        )

@@ -9,7 +9,7 @@ from typing import Any
 from std_msgs.msg import ByteMultiArray, String
 
 from cardbox_tracker.applications.teleoperation.full_body import FullBodies, FullBody
-from cardbox_tracker.applications.teleoperation.sending import PACKETS, ZmqSender, packet
+from cardbox_tracker.applications.teleoperation.sending import PACKETS, Packets, ZmqSender
 from cardbox_tracker.common.errors import CardboxError
 from cardbox_tracker.recordings.outputs import joints_of
 from cardbox_tracker.ros.nodes.posture_input import PostureInput, Tracked
@@ -55,7 +55,7 @@ class TeleoperationNode(CardboxNode):
             self._publisher = self.advertise(*_TOPICS[to], qos.RESULT)
         self._bodies = FullBodies()
         self._pair: tuple[FullBody, FullBody] | None = None
-        self._arrived_s, self._number = 0.0, 0
+        self._arrived_s, self._packets = 0.0, Packets(to, self._settings.rate_hz)
         self._input = PostureInput(self, self._take)
         self.create_timer(1.0 / self._settings.rate_hz, self._stream)
 
@@ -82,10 +82,9 @@ class TeleoperationNode(CardboxNode):
         body = before.until(after, now_ns)
         if passed_s > self._settings.timeout_s:
             body = after.invalid(now_ns)
-        made = packet(self._settings.to, body, self._number)
+        made = self._packets.of(body)
         if made is None:
             return
-        self._number += 1
         if self._sender is not None:
             self._sender.send(made)
         elif self._settings.to == "json":

@@ -75,6 +75,15 @@ def test_a_decoder_of_the_page_reads_a_frame_of_sonic() -> None:
     }
 
 
+# The table of its document on full-body tracking: upper case, in this order.
+ISAAC_NAMES = [
+    *("PELVIS", "LEFT_HIP", "RIGHT_HIP", "SPINE1", "LEFT_KNEE", "RIGHT_KNEE", "SPINE2"),
+    *("LEFT_ANKLE", "RIGHT_ANKLE", "SPINE3", "LEFT_FOOT", "RIGHT_FOOT", "NECK", "LEFT_COLLAR"),
+    *("RIGHT_COLLAR", "HEAD", "LEFT_SHOULDER", "RIGHT_SHOULDER", "LEFT_ELBOW", "RIGHT_ELBOW"),
+    *("LEFT_WRIST", "RIGHT_WRIST", "LEFT_HAND", "RIGHT_HAND"),
+]
+
+
 def test_isaac_gets_the_axes_of_openxr() -> None:
     msgpack = pytest.importorskip("msgpack")
     points = np.zeros((24, 3))
@@ -84,7 +93,7 @@ def test_isaac_gets_the_axes_of_openxr() -> None:
     turns = REST.copy()
     turns[NAMES.index("neck")] = half, half, 0.0, 0.0
     found = msgpack.unpackb(sending.isaac_packet(body()._replace(points_m=points, turns=turns), 0))
-    assert found["timestamp"] == 7 and found["joint_names"] == list(NAMES)
+    assert found["timestamp"] == 7 and found["joint_names"] == ISAAC_NAMES
     # X to the right, Y up, Z backwards; the lower foot stands on the floor.
     assert found["joint_positions"][NAMES.index("head")] == [-0.5, 2.0, -0.25]
     assert found["joint_positions"][0] == [0.0, 1.0, 0.0]
@@ -101,6 +110,7 @@ def test_isaac_gets_the_axes_of_openxr() -> None:
 def test_the_message_fills_isaac_teleops_full_body() -> None:
     pytest.importorskip("isaacteleop", reason="isaacteleop is not installed")
     types = import_module("isaacteleop.retargeting_engine.tensor_types")
+    assert [one.name for one in types.BodyJointIndex] == ISAAC_NAMES
     group_of = import_module("isaacteleop.retargeting_engine.interface").TensorGroup
     found = import_module("msgpack").unpackb(sending.isaac_packet(body(), 0))
     group = group_of(types.FullBodyInput())
@@ -122,10 +132,32 @@ def test_a_line_of_json_has_the_validity_of_each_joint() -> None:
 
 def test_readers_without_validity_get_nothing_while_nothing_is_valid() -> None:
     nothing = body().invalid(8)
-    assert sending.packet("sonic", nothing, 1) is None
-    assert sending.packet("isaac", nothing, 1) is None
-    assert b'"valid":[false' in (sending.packet("json", nothing, 1) or b"")
-    assert sending.packet("json", None, 1) is None
+    assert sending.Packets("sonic", 50.0).of(nothing) is None
+    assert sending.Packets("isaac", 50.0).of(nothing) is None
+    assert b'"valid":[false' in (sending.Packets("json", 50.0).of(nothing) or b"")
+    assert sending.Packets("json", 50.0).of(None) is None
+
+
+def test_sonic_gets_no_joint_that_jumps() -> None:
+    """An arm that is seen again, after a silence, is reached at 4 m/s; a robot holds meanwhile."""
+    packets = sending.Packets("sonic", 50.0)
+    away = body(np.pi)
+    points = away.points_m + np.array([0.3, 0.0, 0.4])
+    away = away._replace(points_m=points, wrists_rad=np.ones((2, 3)))
+    sent = [packets.of(one) for one in (body(), body().invalid(8), *[away] * 40)]
+    assert sent[1] is None
+    found = [decoded(one) for one in sent if one]
+    assert [one["frame_index"][0] for one in found] == [0, *range(2, 42)]
+    moved = np.diff([one["smpl_joints"][0] for one in found], axis=0)
+    assert np.linalg.norm(moved, axis=2).max() == pytest.approx(0.08, abs=1e-6)
+    assert found[-1]["smpl_joints"][0] == pytest.approx(away.points_m)
+    yaws = np.array(
+        [2 * np.arctan2(one["body_quat"][0, 3], one["body_quat"][0, 0]) for one in found]
+    )
+    assert np.abs(np.diff(yaws)).max() <= 0.16 + 1e-6
+    assert np.abs(yaws[-1]) == pytest.approx(np.pi, abs=1e-6)
+    turned = np.diff([one["joint_pos"][0] for one in found], axis=0)
+    assert np.abs(turned).max() <= 0.16 + 1e-6
 
 
 @pytest.fixture
