@@ -238,6 +238,17 @@ def _steps(arm: Arm) -> tuple[list[_Step], FloatArray]:
     return found, place
 
 
+def _turned_deg(robot: Robot) -> float:
+    """Return how a root is turned about its Z axis if the left shoulder is not at its left."""
+    try:
+        left, right = (find_arm(robot, side) for side in ("left", "right"))
+        places = [Kinematics(one).at(np.zeros(len(one.joints))) for one in (left, right)]
+    except CardboxError:
+        return 0.0
+    x, y, z = places[0].origins_m[1] - places[1].origins_m[1]
+    return 90.0 * round(math.atan2(x, y) / (np.pi / 2)) if math.hypot(x, y) > abs(z) else 0.0
+
+
 class ArmFollower:
     """A :class:`~.retargeter.Method` by which the robot's arm points as the person's arm.
 
@@ -245,6 +256,8 @@ class ArmFollower:
         arm: what was found in the robot.
         kinematics: where its joints are.
         joints: the arm's joints and the gripper, if there is one.
+        mount: rotation matrix (3, 3) from the robot's root to the person's torso.
+        turned_deg: the part of its yaw that no setting has, as the robot's shoulders tell it.
         sources: for each joint, the joints of the person's arm; the hand for the gripper.
     """
 
@@ -264,8 +277,10 @@ class ArmFollower:
         else:
             self._closed, self._open = self._lower[-1], self._upper[-1]
         self._hand = WITH_HEAD_AND_HANDS.index(*hand)
-        angles = np.radians([config.mount_roll_deg, config.mount_pitch_deg, config.mount_yaw_deg])
-        self._mount = rotation_z(angles[2]) @ rotation_y(angles[1]) @ rotation_x(angles[0])
+        mount_deg = np.array([config.mount_roll_deg, config.mount_pitch_deg, config.mount_yaw_deg])
+        self.turned_deg = 0.0 if mount_deg.any() else _turned_deg(robot)
+        angles = np.radians(mount_deg + np.array([0.0, 0.0, self.turned_deg]))
+        self.mount = rotation_z(angles[2]) @ rotation_y(angles[1]) @ rotation_x(angles[0])
         self._solution: FloatArray | None = None
         self._turn = 0
         random = np.random.default_rng(0)
@@ -282,7 +297,7 @@ class ArmFollower:
 
     def target(self, body: BodyModel, posture: FloatArray, now: FloatArray) -> FloatArray:
         """See :class:`~.retargeter.Method`."""
-        wanted = directions_of(body, posture, self._side) @ self._mount
+        wanted = directions_of(body, posture, self._side) @ self.mount
         before = now[: len(self.arm.joints)] if self._solution is None else self._solution
         best, error = self._solved(before, wanted)
         if error > _BAD:

@@ -128,17 +128,18 @@ class JointMap:
         return positions
 
 
-def head_map(robot: Robot) -> JointMap | None:
+def head_map(robot: Robot, mount: FloatArray) -> JointMap | None:
     """Return a map of the robot's head: its first joints about Z and Y; None without any.
 
-    They have ``head`` or ``neck`` in their names or those of their links.
+    They have ``head`` or ``neck`` in their names or those of their links. ``mount`` is the rotation
+    matrix (3, 3) from the robot's root to the torso.
     """
     found: dict[str, tuple[str, float]] = {}
     for one in robot.joints.values():
         if one.kind == "prismatic" or not _HEAD.search(f"{one.name} {one.child}"):
             continue
         for joint in joints_of(Group.NECK):
-            along = float(robot.axis_of(one) @ joint.axis)
+            along = float(mount @ robot.axis_of(one) @ joint.axis)
             if abs(along) > _ALONG:
                 found.setdefault(joint.name, (one.name, math.copysign(1.0, along)))
     if not found:

@@ -403,11 +403,15 @@ def make_retargeter(
         return robot, Retargeter(robot, method, config), ""
     sides = ("left", "right") if config.side == "both" else (config.side,)
     arms = [ArmFollower(robot, config, side) for side in sides]
-    head = head_map(robot) if config.side == "both" else None
+    head = head_map(robot, arms[0].mount) if config.side == "both" else None
     tables = [
         f"{side} arm\n{one.arm.table(robot, config.max_speed)}"
         for side, one in zip(sides, arms, strict=True)
     ]
+    if arms[0].turned_deg:
+        tables.append(
+            f"the shoulders tell how the root is turned: mount_yaw_deg is {arms[0].turned_deg:g}"
+        )
     if head is not None:
         tables.append(f"head\n{robot.table(head.roles, config.max_speed)}")
     method = _Together([*arms, head] if head is not None else arms)
