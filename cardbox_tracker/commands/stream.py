@@ -13,7 +13,13 @@ from cardbox_tracker.applications.teleoperation.sending import (
     ZmqSender,
     in_real_time,
 )
-from cardbox_tracker.commands.arguments import TrackedResults, between, choice, option
+from cardbox_tracker.commands.arguments import (
+    TrackedResults,
+    between,
+    choice,
+    option,
+    print_remarks,
+)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -42,6 +48,7 @@ def run(given: Arguments) -> None:
     packets = Packets(given.to, given.rate)
     sent = number = 0
     with closing(ZmqSender(given.address)) if given.address else nullcontext() as sender:
+        print_remarks(sender.remarks if sender else ())
         for body in bodies if given.fast else in_real_time(bodies, given.rate):
             made = packets.of(body)
             number += 1

@@ -79,7 +79,9 @@ def test_a_table_is_read_and_its_joints_are_streamed(
     results: Path, tmp_path: Path, cardbox: Callable, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     sent: list[dict] = []
-    sender = SimpleNamespace(send=lambda one: sent.append(json.loads(one)), close=lambda: None)
+    sender = SimpleNamespace(
+        send=lambda one: sent.append(json.loads(one)), close=lambda: None, remarks=()
+    )
     monkeypatch.setattr(
         "cardbox_tracker.applications.teleoperation.sending.ZmqSender", lambda _: sender
     )

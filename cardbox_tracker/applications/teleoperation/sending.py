@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import os
+import re
 import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from typing import Any, TypeVar
@@ -42,11 +44,34 @@ def in_real_time(items: Iterable[T], rate_hz: float) -> Iterator[T]:
         yield item
 
 
+_ADDRESS = re.compile(r"tcp://(?P<host>[^/;]+):(?P<port>\d{1,5})|ipc://(?P<file>[^*].*)")
+_LOOPBACK = re.compile(r"localhost|lo|127(\.\d+){3}|\[::1\]")
+_EXPECTED = "give an address as tcp://127.0.0.1:5556, whose port is free, or ipc:///tmp/NEW"
+
+
 class ZmqSender:
-    """Publishes packets by ZMQ; who subscribes later misses the first ones."""
+    """Publishes packets by ZMQ; who subscribes later misses the first ones.
+
+    Attributes:
+        remarks: what the user should know of the address, such as who can read it.
+    """
 
     def __init__(self, address: str) -> None:
         """Listen on ``address``, such as ``tcp://127.0.0.1:5556``, or raise CardboxError."""
+        found = _ADDRESS.fullmatch(address)
+        if not found or not (found["file"] or 0 < int(found["port"]) < 65536):
+            raise CardboxError(f"cannot listen on {quoted(address)}; {_EXPECTED}")
+        if found["file"] and os.path.lexists(found["file"]):
+            raise CardboxError(
+                f"cannot listen on {quoted(address)}: that file exists, and would be deleted; "
+                "give another, or remove it"
+            )
+        self.remarks: list[str] = []
+        if found["host"] and not _LOOPBACK.fullmatch(found["host"]):
+            self.remarks.append(
+                f"whoever reaches {quoted(address)} can read what is sent; tcp://127.0.0.1:"
+                f"{found['port']} is for this computer alone"
+            )
         zmq = optional("zmq", *_EXTRA)
         self._context = zmq.Context()
         self._socket = self._context.socket(zmq.PUB)
@@ -56,8 +81,7 @@ class ZmqSender:
         except zmq.ZMQError as error:
             self.close()
             raise CardboxError(
-                f"cannot listen on {quoted(address)}: {error}; give an address as "
-                "tcp://127.0.0.1:5556, whose port is free"
+                f"cannot listen on {quoted(address)}: {error}; {_EXPECTED}"
             ) from None
 
     def send(self, packet: bytes) -> None:
@@ -154,7 +178,8 @@ class Packets:
     def __init__(self, to: str, rate_hz: float) -> None:
         """Begin a stream to a peer, one of ``PACKETS``."""
         self._to, self._rate_hz = to, rate_hz
-        self._number, self._before = -1, None
+        self._number = -1
+        self._before: FullBody | None = None
 
     def of(self, body: FullBody | None) -> bytes | None:
         """Return the packet of a body; None where the peer has to stay as nothing is valid."""

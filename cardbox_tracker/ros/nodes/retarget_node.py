@@ -80,6 +80,8 @@ class RetargetNode(CardboxNode):
         self._streamed_ns = self._sent_stamp_ns = 0
         address = settings.stream_address
         self._sender = ZmqSender(address) if address else None
+        for remark in self._sender.remarks if self._sender else ():
+            self.get_logger().warning(remark)
         self._trajectory = self.advertise(JointTrajectory, "retarget/joint_trajectory", qos.RESULT)
         self._commands = self.advertise(Float64MultiArray, "retarget/commands", qos.RESULT)
         self._robot_joints = self.advertise(JointState, "retarget/joint_states", qos.RESULT)

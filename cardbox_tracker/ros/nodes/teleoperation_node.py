@@ -51,6 +51,8 @@ class TeleoperationNode(CardboxNode):
         if to not in _TOPICS and not address:
             raise CardboxError(f"{to} reads ZMQ: give the parameter address, tcp://127.0.0.1:5556")
         self._sender = ZmqSender(address) if address else None
+        for remark in self._sender.remarks if self._sender else ():
+            self.get_logger().warning(remark)
         if not address:
             self._publisher = self.advertise(*_TOPICS[to], qos.RESULT)
         self._bodies = FullBodies()

@@ -7,6 +7,7 @@ import struct
 from collections.abc import Iterator
 from contextlib import closing
 from importlib import import_module
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -186,8 +187,33 @@ def test_packets_arrive_by_zmq(subscriber: Any) -> None:
             pytest.fail("nothing arrived")
         with pytest.raises(CardboxError, match="cannot listen on 'tcp:"):
             sending.ZmqSender(address)
+
+
+@pytest.mark.parametrize(
+    "address",
+    [
+        *("nonsense", "tcp://127.0.0.1:0", "tcp://127.0.0.1:70000", "tcp://127.0.0.1:*"),
+        *("tcp://127.0.0.1", "tcp://127.0.0.1:5595/x", "inproc://x", "ipc://*", "ipc://", ""),
+    ],
+)
+def test_an_address_that_nobody_can_read_is_refused(address: str) -> None:
     with pytest.raises(CardboxError, match="give an address as"):
-        sending.ZmqSender("nonsense")
+        sending.ZmqSender(address)
+
+
+def test_no_file_is_deleted_and_an_open_address_is_told(tmp_path: Path) -> None:
+    pytest.importorskip("zmq", reason="pyzmq is not installed")
+    file = tmp_path / "notes"
+    file.write_text("mine")
+    with pytest.raises(CardboxError, match="that file exists"):
+        sending.ZmqSender(f"ipc://{file}")
+    assert file.read_text() == "mine"
+    for address, words in (
+        (f"ipc://{tmp_path}/new", ""),
+        ("tcp://0.0.0.0:51875", "computer alone"),
+    ):
+        with closing(sending.ZmqSender(address)) as sender:
+            assert bool(sender.remarks) == bool(words) and words in "".join(sender.remarks)
 
 
 def test_a_missing_package_is_told(monkeypatch: pytest.MonkeyPatch) -> None:

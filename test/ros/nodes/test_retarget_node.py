@@ -159,7 +159,8 @@ def test_only_what_may_be_sent_is_streamed(
     bus: Any, start: Any, send: Any, clock: Clock, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     sent: list[dict[str, Any]] = []
-    sender = SimpleNamespace(send=lambda one: sent.append(json.loads(one)), close=lambda: None)
+    keep = lambda one: sent.append(json.loads(one))  # noqa: E731
+    sender = SimpleNamespace(send=keep, close=lambda: None, remarks=())
     monkeypatch.setattr(retarget_node, "ZmqSender", lambda _: sender)
     node = start(start=START, stream_address="tcp://127.0.0.1:5557")
     node._supervisor.enable(False, int(clock.now_s * 1e9))
