@@ -29,16 +29,17 @@ class RetargetConfig(Settings):
         limits=(0.01, 20.0),
     )
     max_acceleration: float = setting(
-        20.0,
-        "no joint of the robot changes its speed faster",
+        0.0,
+        "no joint of the robot changes its speed faster; 0: 20 times max_speed, which is then "
+        "reached as soon whatever it is",
         unit="rad/s² or m/s²",
-        limits=(0.1, 1000.0),
+        limits=(0.0, 1000.0),
     )
     max_jerk: float = setting(
-        400.0,
-        "no joint of the robot changes its acceleration faster",
+        0.0,
+        "no joint of the robot changes its acceleration faster; 0: 20 times max_acceleration",
         unit="rad/s³ or m/s³",
-        limits=(1.0, 1e6),
+        limits=(0.0, 1e6),
     )
     soft_start_s: float = setting(
         1.0,

@@ -33,6 +33,9 @@ _OF_AN_ARM = (
 )
 # The first of the speeds with which a robot begins to follow, of its highest.
 _SLOWEST = 0.1
+# Speed, acceleration and jerk that belong together: each is reached in twice this time, so the
+# robot is late by it twice, 0.1 s, at any speed.
+_PER_SECOND = 20.0
 
 
 class Method(Protocol):
@@ -217,11 +220,12 @@ class Retargeter:
         self.joints = method.joints
         limits = Limits(*robot.limits_of(method.joints))
         self.limits = limits = limits._replace(speed=np.minimum(limits.speed, config.max_speed))
+        acceleration = config.max_acceleration or _PER_SECOND * config.max_speed
         self._motion = SafeMotion(
             limits,
             _start(config.start, method.joints, limits),
-            config.max_acceleration,
-            config.max_jerk,
+            acceleration,
+            config.max_jerk or _PER_SECOND * acceleration,
         )
         self.settles_ns = self._motion.settles_ns
         self._method, self._config = method, config

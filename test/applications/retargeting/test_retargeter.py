@@ -123,6 +123,15 @@ def test_an_arm_gets_where_it_is_wanted_at_its_speed() -> None:
     assert robot.at(3 * 10**9).positions == pytest.approx([-math.radians(80), *[0.0] * 6])
 
 
+def test_a_faster_robot_is_no_later() -> None:
+    """Acceleration and jerk follow the speed, so that stopping takes 0.2 s at each."""
+    for speed in (0.25, 0.5, 1.0, 2.0):
+        robot = Retargeter(ROBOT, MAP, RetargetConfig(max_speed=speed))
+        assert robot.settles_ns == pytest.approx(2e8, rel=1e-6)
+    own = RetargetConfig(max_acceleration=10.0, max_jerk=100.0)
+    assert Retargeter(ROBOT, MAP, own).settles_ns == pytest.approx(4e8, rel=1e-6)
+
+
 def test_the_start_is_soft_and_where_the_robot_is() -> None:
     robot = Retargeter(ROBOT, MAP, RetargetConfig(soft_start_s=1.0, start="shoulder_roll=0.4"))
     assert robot.at(0).positions[0] == 0.4
