@@ -38,6 +38,8 @@ _WEIGHTS = (1.0, 1.0, 2.0)
 # A point that is too near counts so much for each metre that it comes nearer by millimetres only.
 _KEEPS_OUT = 100.0
 _IDENTITY = np.eye(3)
+# Points along a part of an arm, whose distances are those of its axis to some millimetres.
+_POINTS = 9
 _SHORTEST_M, _LONGEST_M = 0.01, 100.0
 _LEAST_PART, _LEAST_SINE = 0.2, 0.5
 
@@ -311,7 +313,16 @@ class ArmFollower:
             found[-1] = self._closed + float(posture[self._hand]) * (self._open - self._closed)
         return found
 
-    def clear(self, positions: FloatArray) -> FloatArray:
+    def axes(self, positions: FloatArray) -> FloatArray:
+        """Return points (m, 3) along forearm and hand, m in the frame of the root."""
+        places = self.kinematics.at(positions[: len(self.arm.joints)])
+        corners = np.vstack([places.origins_m[self.kinematics.elbow :], places.tip_m])
+        if len(corners) == 1:
+            corners = np.vstack([places.origins_m[self.kinematics.shoulder], places.tip_m])
+        shares = np.linspace(0.0, 1.0, _POINTS)[:, None, None]
+        return np.reshape(corners[:-1] + shares * (corners[1:] - corners[:-1]), (-1, 3))
+
+    def clear(self, positions: FloatArray, _: FloatArray) -> FloatArray:
         """See :class:`~.retargeter.Method`."""
         found = positions.copy()
         arm = found[None, : len(self.arm.joints)]

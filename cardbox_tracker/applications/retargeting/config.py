@@ -99,6 +99,13 @@ class RetargetConfig(Settings):
         unit="m",
         limits=(0.0, 2.0),
     )
+    arms_apart_m: float = setting(
+        0.1,
+        "with both sides, the axes of one arm's forearm and hand come no nearer to those of the "
+        "other than this; the arms hold meanwhile",
+        unit="m",
+        limits=(0.0, 2.0),
+    )
     lowest_m: float = setting(
         -10.0,
         "forearm and hand stay above this height in the robot's root, as above a table",

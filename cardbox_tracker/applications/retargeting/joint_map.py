@@ -123,7 +123,7 @@ class JointMap:
         chosen = np.array([known[angle] if angle else 0.0 for angle in self.angles])
         return np.where(np.isnan(chosen), now, self.scale * chosen + self.offset_rad)
 
-    def clear(self, positions: FloatArray) -> FloatArray:
+    def clear(self, positions: FloatArray, _: FloatArray) -> FloatArray:
         """See :class:`~.retargeter.Method`; nothing is known of the robot's shape."""
         return positions
 

@@ -28,7 +28,7 @@ from cardbox_tracker.tracking.estimate import TRACKING, UNCERTAIN
 FOLLOWING = "following"
 # Settings that a joint map does not need.
 _OF_AN_ARM = (
-    *("base", "hand", "gripper", "gripper_open", "trunk_radius_m", "lowest_m"),
+    *("base", "hand", "gripper", "gripper_open", "trunk_radius_m", "arms_apart_m", "lowest_m"),
     *("mount_roll_deg", "mount_pitch_deg", "mount_yaw_deg"),
 )
 # The first of the speeds with which a robot begins to follow, of its highest.
@@ -56,8 +56,11 @@ class Method(Protocol):
         target may be beyond the joint limits; it is nan if there is no solution.
         """
 
-    def clear(self, positions: FloatArray) -> FloatArray:
-        """Return the positions (n,) near to these at which the hand is not in the way."""
+    def clear(self, positions: FloatArray, now: FloatArray) -> FloatArray:
+        """Return the positions (n,) near to these at which the hand is not in the way.
+
+        Where there are none, they are the current ones, ``now`` (n,).
+        """
 
 
 class Limits(NamedTuple):
@@ -315,7 +318,7 @@ class Retargeter:
         # On the way, too, the hand is not in the trunk.
         most = share * self.limits.speed * duration_ns / 1e9
         goal = point + np.clip(np.where(held, 0.0, target + self._offset - point), -most, most)
-        goal = np.where(held, point, self._method.clear(goal))
+        goal = np.where(held, point, self._method.clear(goal, point))
         self._motion.move(goal, now_ns, duration_ns, share)
         return Command(self.at(now_ns + duration_ns).positions, FOLLOWING, duration_ns / 1e9)
 
@@ -364,8 +367,8 @@ def _start(text: str, joints: tuple[str, ...], limits: Limits) -> FloatArray:
 class _Together:
     """A :class:`Method` of several parts of one robot."""
 
-    def __init__(self, parts: Sequence[Method]) -> None:
-        self._parts = parts
+    def __init__(self, parts: Sequence[Method], apart_m: float) -> None:
+        self._parts, self._apart_m = parts, apart_m
         self.joints = tuple(name for one in parts for name in one.joints)
         self.sources = tuple(names for one in parts for names in one.sources)
         if len(set(self.joints)) < len(self.joints):
@@ -379,9 +382,21 @@ class _Together:
         parts = zip(self._parts, np.split(now, self._ends), strict=True)
         return np.concatenate([one.target(body, posture, part) for one, part in parts])
 
-    def clear(self, positions: FloatArray) -> FloatArray:
+    def clear(self, positions: FloatArray, now: FloatArray) -> FloatArray:
+        split = (np.split(one, self._ends) for one in (positions, now))
+        parts = zip(self._parts, *split, strict=True)
+        found = np.concatenate([one.clear(part, before) for one, part, before in parts])
+        # Arms that are too near may part.
+        least_m = min(self._apart_m, self._between_m(now))
+        return found if self._between_m(found) >= least_m else now
+
+    def _between_m(self, positions: FloatArray) -> float:
+        """Return the distance of the axes of both arms, m; infinite for a single one."""
         parts = zip(self._parts, np.split(positions, self._ends), strict=True)
-        return np.concatenate([one.clear(part) for one, part in parts])
+        arms = [one.axes(part) for one, part in parts if isinstance(one, ArmFollower)]
+        if len(arms) < 2:
+            return math.inf
+        return float(np.linalg.norm(arms[0][:, None] - arms[1][None], axis=-1).min())
 
 
 def make_retargeter(
@@ -418,5 +433,5 @@ def make_retargeter(
         )
     if head is not None:
         tables.append(f"head\n{robot.table(head.roles, config.max_speed)}")
-    method = _Together([*arms, head] if head is not None else arms)
+    method = _Together([*arms, head] if head is not None else arms, config.arms_apart_m)
     return robot, Retargeter(robot, method, config), "\n".join(tables)

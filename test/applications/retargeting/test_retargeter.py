@@ -204,8 +204,8 @@ def test_after_holding_nothing_is_made_up_for() -> None:
     assert not robot.at(2 * 10**9).positions.any()
 
 
-def test_two_arms_of_one_robot_follow_at_once(tmp_path: Path) -> None:
-    """Each arm is the example arm, by its names."""
+def two_arms(path: Path, head: str = "", left: str = "") -> Path:
+    """Write a robot with the example arm twice; ``left`` is the origin of the left one."""
     text = ROBOT.urdf
     names = [*(f'"{link}"' for link in ROBOT.links if link != "base_link")]
     names += [f'"{name}"' for name in ROBOT.joints]
@@ -215,8 +215,37 @@ def test_two_arms_of_one_robot_follow_at_once(tmp_path: Path) -> None:
         part = body
         for name in names:
             part = part.replace(name, f'"{side}_{name[1:]}')
+        if side == "left" and left:
+            limits = 'lower="-2.8" upper="0.5"'
+            part = part.replace("0 -0.16 0", left, 1).replace(limits, 'lower="-0.5" upper="2.8"')
         arms.append(part)
-    path = tmp_path / "two.urdf"
+    path.write_text(f'<robot name="two"><link name="base_link"/>{"".join(arms)}{head}</robot>')
+    return path
+
+
+@pytest.mark.parametrize("apart_m", [0.0, 0.15])
+def test_two_arms_do_not_touch_and_part_again(tmp_path: Path, apart_m: float) -> None:
+    """Forearms that cross before the chest come as near as they may, and leave each other."""
+    path = two_arms(tmp_path / "two.urdf", left="0 0.16 0")
+    config = RetargetConfig(side="both", arms_apart_m=apart_m, soft_start_s=0.0)
+    _, robot, _ = make_retargeter(path, None, config)
+    crossed = np.zeros(12)
+    for side in ("left", "right"):
+        crossed[JOINT_NAMES.index(f"{side}_elbow_flexion")] = 0.7
+        crossed[JOINT_NAMES.index(f"{side}_elbow_abduction")] = -1.3
+    seen = []
+    for tenth, posture in enumerate([*[crossed] * 30, *[np.zeros(12)] * 30]):
+        robot.update(tenth * 10**8, "tracking", BODY, posture, SURE)
+        for count in range(10):
+            positions = robot.at(tenth * 10**8 + count * 10**7).positions
+            seen.append(robot._method._between_m(positions))  # type: ignore[attr-defined]
+    assert (min(seen) < 0.1) == (apart_m == 0.0)
+    assert min(seen) >= apart_m - 0.01
+    assert seen[-1] > 0.25
+
+
+def test_two_arms_of_one_robot_follow_at_once(tmp_path: Path) -> None:
+    """Each arm is the example arm, by its names."""
     joint = (
         '<link name="{link}"/><joint name="{name}" type="revolute"><parent link="{parent}"/>'
         '<child link="{link}"/><origin rpy="0 0 {yaw}"/><axis xyz="{axis}"/>'
@@ -225,7 +254,7 @@ def test_two_arms_of_one_robot_follow_at_once(tmp_path: Path) -> None:
     # Turned by half a turn, the second joint lifts the face by positive angles.
     head = joint.format(link="neck", name="pan", parent="base_link", yaw=0, axis="0 0 1")
     head += joint.format(link="head", name="tilt", parent="neck", yaw=np.pi, axis="0 1 0")
-    path.write_text(f'<robot name="two"><link name="base_link"/>{"".join(arms)}{head}</robot>')
+    path = two_arms(tmp_path / "two.urdf", head)
     _, robot, table = make_retargeter(path, None, RetargetConfig(side="both"))
     arm_joints = (f"{side}_{name}" for side in ("left", "right") for name in ROBOT.joints)
     assert robot.joints == (*arm_joints, "pan", "tilt")
