@@ -11,8 +11,8 @@ from cardbox_tracker.applications.teleoperation.full_body import at_rate, bodies
 from cardbox_tracker.applications.teleoperation.sending import (
     PACKETS,
     Packets,
-    ZmqSender,
     in_real_time,
+    sender_of,
 )
 from cardbox_tracker.applications.teleoperation.smpl import write_npz
 from cardbox_tracker.commands.arguments import (
@@ -35,10 +35,12 @@ class Arguments(TrackedResults, Written):
 
     Attributes:
         to: sonic: frames of its protocol v3; isaac: msgpack of Isaac Teleop's full body; json: a
-            line for each time; npz: a file of SMPL's joints, for GMR (docs/retargeting.md)
+            line for each time; vmc: bones of avatars, by UDP; npz: a file of SMPL's joints, for GMR
+            (docs/retargeting.md)
         output: the file to write with --to npz
         rate: packets a second
-        address: publish by ZMQ, as tcp://127.0.0.1:5556 (default: the standard output)
+        address: publish by ZMQ, as tcp://127.0.0.1:5556, or send vmc to udp://127.0.0.1:39539
+            (default: the standard output)
         fast: do not wait for the time of a packet
     """
 
@@ -66,7 +68,7 @@ def run(given: Arguments) -> None:
         return
     packets = Packets(given.to, given.rate)
     sent = number = 0
-    with closing(ZmqSender(given.address)) if given.address else nullcontext() as sender:
+    with closing(sender_of(given.to, given.address)) if given.address else nullcontext() as sender:
         print_remarks(sender.remarks if sender else ())
         for body in bodies if given.fast else in_real_time(bodies, given.rate):
             made = packets.of(body)

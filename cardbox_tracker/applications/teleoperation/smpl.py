@@ -24,11 +24,12 @@ _BODY_JOINTS, _BETAS = 21, 16
 _FEET = [NAMES.index(f"{side}_foot") for side in ("left", "right")]
 
 
-def local_turns(body: FullBody) -> FloatArray:
-    """Return the rotation of each joint against the one before it, (24, 3, 3).
+def local_frames(body: FullBody) -> tuple[FloatArray, FloatArray]:
+    """Return rotation (24, 3, 3) and place (24, 3), m, of each joint against the one before it.
 
-    In the T-pose, in which hanging arms are raised sideways by a quarter, all are the identity.
-    Axes are those of the person, and the pelvis does not turn.
+    In the T-pose, in which hanging arms are raised sideways by a quarter, all rotations are the
+    identity. Axes are those of the person. The pelvis does not turn, and is above the floor, on
+    which the lower foot is.
     """
     turns = Rotation.from_quat(body.turns[:, [1, 2, 3, 0]]).as_matrix()
     for number, name in enumerate(NAMES):
@@ -36,10 +37,11 @@ def local_turns(body: FullBody) -> FloatArray:
         if part in ("shoulder", "elbow", "wrist", "hand"):
             quarter = np.array(-np.pi / 2 if side == "left" else np.pi / 2)
             turns[number] = turns[number] @ rotation_x(quarter)
-    before = turns[list(PARENTS)]
-    before[0] = np.eye(3)
-    found: FloatArray = before.transpose(0, 2, 1) @ turns
-    return found
+    backwards = turns[list(PARENTS)].transpose(0, 2, 1)
+    backwards[0] = np.eye(3)
+    places = np.einsum("nij,nj->ni", backwards, body.points_m - body.points_m[list(PARENTS)])
+    places[0] = 0.0, 0.0, -body.points_m[_FEET, 2].min()
+    return backwards @ turns, places
 
 
 def write_npz(bodies: Sequence[FullBody], rate_hz: float, path: Path) -> None:
@@ -53,10 +55,9 @@ def write_npz(bodies: Sequence[FullBody], rate_hz: float, path: Path) -> None:
     """
     if not bodies:
         raise CardboxError("the results have no posture; track a recording of a person")
-    turns = np.array([TO_SMPL @ local_turns(body) @ TO_SMPL.T for body in bodies])
+    frames = [local_frames(body) for body in bodies]
+    turns = np.array([TO_SMPL @ one @ TO_SMPL.T for one, _ in frames])
     roots = np.array([rotation_z(np.array(body.yaw_rad)) @ TO_SMPL.T for body in bodies])
-    places = np.zeros((len(bodies), 3))
-    places[:, 2] = [-body.points_m[_FEET, 2].min() for body in bodies]
     vectors = Rotation.from_matrix(turns.reshape(-1, 3, 3)).as_rotvec().reshape(len(bodies), -1)
     arrays = {
         "gender": np.array("neutral"),
@@ -64,7 +65,7 @@ def write_npz(bodies: Sequence[FullBody], rate_hz: float, path: Path) -> None:
         "betas": np.zeros(_BETAS),
         "root_orient": Rotation.from_matrix(roots).as_rotvec(),
         "pose_body": vectors[:, 3 : 3 * (1 + _BODY_JOINTS)],
-        "trans": places - _SMPLX_PELVIS_M,
+        "trans": np.array([places[0] for _, places in frames]) - _SMPLX_PELVIS_M,
         "smpl_joints": np.array([body.points_m for body in bodies]),
         "joint_names": np.array(NAMES),
         "joint_valid": np.array([body.valid for body in bodies]),

@@ -9,7 +9,7 @@ from typing import Any
 from std_msgs.msg import ByteMultiArray, String
 
 from cardbox_tracker.applications.teleoperation.full_body import FullBodies, FullBody
-from cardbox_tracker.applications.teleoperation.sending import PACKETS, Packets, ZmqSender
+from cardbox_tracker.applications.teleoperation.sending import PACKETS, Packets, sender_of
 from cardbox_tracker.common.errors import CardboxError
 from cardbox_tracker.recordings.outputs import joints_of
 from cardbox_tracker.ros.nodes.posture_input import PostureInput, Tracked
@@ -32,8 +32,8 @@ class TeleoperationParameters(NodeParameters):
     to: str = at_start("isaac", "who reads the stream", choices=tuple(PACKETS))
     address: str = at_start(
         "",
-        "ZMQ address on which the stream is published, as tcp://127.0.0.1:5556; empty: the topic "
-        "of the reader",
+        "ZMQ address on which the stream is published, as tcp://127.0.0.1:5556, or for vmc where "
+        "it is sent, udp://127.0.0.1:39539; empty: the topic of the reader",
     )
     rate_hz: float = at_start(50.0, "packets a second", unit="Hz", limits=(1.0, 1000.0))
     timeout_s: float = at_start(
@@ -49,8 +49,9 @@ class TeleoperationNode(CardboxNode):
         self._settings = LiveParameters(self, TeleoperationParameters).value
         to, address = self._settings.to, self._settings.address
         if to not in _TOPICS and not address:
-            raise CardboxError(f"{to} reads ZMQ: give the parameter address, tcp://127.0.0.1:5556")
-        self._sender = ZmqSender(address) if address else None
+            example = "udp://127.0.0.1:39539" if to == "vmc" else "tcp://127.0.0.1:5556"
+            raise CardboxError(f"{to} has no topic: give the parameter address, {example}")
+        self._sender = sender_of(to, address) if address else None
         for remark in self._sender.remarks if self._sender else ():
             self.get_logger().warning(remark)
         if not address:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import socket
 import struct
 from collections.abc import Iterator
 from contextlib import closing
@@ -159,6 +160,67 @@ def test_sonic_gets_no_joint_that_jumps() -> None:
     assert np.abs(yaws[-1]) == pytest.approx(np.pi, abs=1e-6)
     turned = np.diff([one["joint_pos"][0] for one in found], axis=0)
     assert np.abs(turned).max() <= 0.16 + 1e-6
+
+
+def osc_strings(packet: bytes, offset: int) -> tuple[str, int]:
+    """Return a text of OSC, which ends with zeros to a multiple of four bytes, and its end."""
+    end = packet.index(b"\0", offset)
+    return packet[offset:end].decode(), (end + 4) & ~3
+
+
+def osc_messages(packet: bytes) -> dict[str, list[float]]:
+    """Decode a bundle as the specification of OSC 1.0 has it: values by address and name."""
+    assert packet[:8] == b"#bundle\0"
+    found, offset = {}, 16
+    while offset < len(packet):
+        size = struct.unpack_from(">i", packet, offset)[0]
+        message, offset = packet[offset + 4 : offset + 4 + size], offset + 4 + size
+        address, at = osc_strings(message, 0)
+        types, at = osc_strings(message, at)
+        name = ""
+        if types[1:2] == "s":
+            name, at = osc_strings(message, at)
+        kinds = types[2 if name else 1 :]
+        found[f"{address} {name}".strip()] = list(struct.unpack_from(f">{kinds}", message, at))
+    return found
+
+
+def test_an_avatar_gets_the_bones_of_vmc() -> None:
+    """Hanging arms are turned down from the T-pose; in Unity, about Z, which points ahead."""
+    pytest.importorskip("pythonosc", reason="python-osc is not installed")
+    points = np.zeros((24, 3))
+    points[NAMES.index("left_shoulder")] = 0.0, 0.2, 0.5
+    points[NAMES.index("left_elbow")] = 0.0, 0.2, 0.2
+    points[[NAMES.index("left_foot"), NAMES.index("right_foot")], 2] = -0.75, -1.0
+    half = np.sqrt(0.5)
+    found = osc_messages(sending.vmc_packet(body(np.pi / 2)._replace(points_m=points), 0))
+    assert found["/VMC/Ext/OK"] == [1]
+    # To the left is a negative turn about Y of left-handed axes.
+    assert found["/VMC/Ext/Root/Pos root"] == pytest.approx([0, 0, 0, 0, -half, 0, half])
+    bones = {name.split()[1]: of for name, of in found.items() if "Bone" in name}
+    assert len(bones) == 20 and bones["Hips"] == pytest.approx([0, 1.0, 0, 0, 0, 0, 1])
+    # The left is -X; the arm goes out from the shoulder before it is turned by a quarter.
+    assert bones["LeftLowerArm"] == pytest.approx([-0.3, 0, 0, 0, 0, 0, 1], abs=1e-6)
+    assert bones["LeftUpperArm"][:3] == pytest.approx([-0.2, 0.5, 0.0])
+    for side, sign in (("Left", 1.0), ("Right", -1.0)):
+        turn = np.array(bones[f"{side}UpperArm"][3:])
+        assert turn * np.sign(turn[3]) == pytest.approx([0, 0, sign * half, half])
+
+
+def test_packets_arrive_by_udp() -> None:
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as reader:
+        reader.bind(("127.0.0.1", 0))
+        reader.settimeout(5.0)
+        address = f"udp://127.0.0.1:{reader.getsockname()[1]}"
+        with closing(sending.sender_of("vmc", address)) as sender:
+            sender.send(b"one")
+            assert reader.recv(10) == b"one"
+            reader.close()
+            sender.send(b"nobody listens")
+            sender.send(b"nobody listens")
+    for wrong in ("tcp://127.0.0.1:39539", "udp://127.0.0.1", "udp://127.0.0.1:99999", "udp://:1"):
+        with pytest.raises(CardboxError, match="give the address of the program"):
+            sending.sender_of("vmc", wrong)
 
 
 @pytest.fixture
