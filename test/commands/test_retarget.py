@@ -46,7 +46,7 @@ def test_the_robot_follows_and_stands_still(
     table, bag = tmp_path / "arm.csv", tmp_path / "with_arm"
     done = cardbox(
         *("retarget", results, "--robot", ROBOT, "--map", MAP, "--max-speed", "0.5"),
-        *("--soft-start-s", "0"),
+        *("--soft-start-s", "0", "--max-acceleration", "20", "--max-jerk", "400"),
         *("--csv", table, "--bag", bag),
     )
     assert done.code == 0, done.err

@@ -20,12 +20,27 @@ from cardbox_tracker.applications.retargeting.joint_map import (
 from cardbox_tracker.applications.retargeting.robot import Robot, load_robot
 from cardbox_tracker.common.errors import CardboxError, quoted
 from cardbox_tracker.person.model import BodyModel
-from cardbox_tracker.person.posture import N_JOINTS
+from cardbox_tracker.person.posture import (
+    ELBOW_ABDUCTION,
+    ELBOW_FLEXION,
+    FIRST_ANGLES,
+    N_JOINTS,
+    SHOULDER_ABDUCTION,
+    SHOULDER_FLEXION,
+)
 from cardbox_tracker.person.sizes import FloatArray
 from cardbox_tracker.person.skeleton import HAND_OPEN_NAMES, JOINT_NAMES
 from cardbox_tracker.tracking.estimate import TRACKING, UNCERTAIN
 
 FOLLOWING = "following"
+# Places in an arm's angles, and the flexion of the same limb by the abduction.
+_ABDUCTIONS = np.array([SHOULDER_ABDUCTION, ELBOW_ABDUCTION])
+_FLEXIONS = np.array([SHOULDER_FLEXION, ELBOW_FLEXION])
+_FLEXION_OF = {
+    JOINT_NAMES[first + abduction]: JOINT_NAMES[first + flexion]
+    for first in FIRST_ANGLES
+    for abduction, flexion in zip(_ABDUCTIONS, _FLEXIONS, strict=True)
+}
 # Settings that a joint map does not need.
 _OF_AN_ARM = (
     *("base", "hand", "gripper", "gripper_open", "trunk_radius_m", "arms_apart_m", "lowest_m"),
@@ -330,8 +345,33 @@ class Retargeter:
     def _held(
         self, posture: FloatArray, stddev: FloatArray, keypoints: Mapping[str, tuple[str, float]]
     ) -> NDArray[np.bool_]:
-        """Return which joints (n,) of the robot stay because theirs are not sure."""
-        sure = (stddev[:N_JOINTS] <= self._config.max_stddev_rad) & np.isfinite(posture[:N_JOINTS])
+        """Return which joints (n,) of the robot stay because theirs are not sure.
+
+        A limb that points along the axis of its abduction has a sure direction, but no sure
+        abduction: what follows both angles of a limb needs the direction alone.
+        """
+        angles, directions = stddev[:N_JOINTS], stddev[:N_JOINTS].copy()
+        for first in FIRST_ANGLES:
+            abductions, flexions = first + _ABDUCTIONS, first + _FLEXIONS
+            # The root of the mean square of the cosine, in which the abduction turns the limb.
+            bent, spread = posture[flexions], angles[flexions]
+            turned = np.hypot(np.cos(bent), spread * np.sin(bent))
+            directions[abductions] *= np.minimum(turned, 1.0)
+        most = self._config.max_stddev_rad
+        unsure = self._unsure(np.isfinite(posture[:N_JOINTS]) & (directions <= most), keypoints)
+        alone = self._unsure(angles <= most, {})
+        return np.array(
+            [
+                not names.isdisjoint(unsure)
+                or any(name in alone and _FLEXION_OF.get(name) not in names for name in names)
+                for names in self._sources
+            ]
+        )
+
+    def _unsure(
+        self, sure: NDArray[np.bool_], keypoints: Mapping[str, tuple[str, float]]
+    ) -> set[str]:
+        """Return joints that are not ``sure`` (12,), or whose keypoints are not."""
         for number, name in enumerate(JOINT_NAMES):
             side, _, joint = name.partition("_")
             # The angles at the shoulder are those of the elbow's place, these of the hand's.
@@ -339,8 +379,7 @@ class Retargeter:
             state, chance = keypoints.get(f"{side}_{end}", ("tracked", 0.0))
             if state != "tracked" or chance > self._config.max_chance:
                 sure[number] = False
-        unsure = {name for name, is_sure in zip(JOINT_NAMES, sure, strict=True) if not is_sure}
-        return np.array([not names.isdisjoint(unsure) for names in self._sources])
+        return {name for name, is_sure in zip(JOINT_NAMES, sure, strict=True) if not is_sure}
 
 
 def _start(text: str, joints: tuple[str, ...], limits: Limits) -> FloatArray:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -194,6 +195,24 @@ def test_the_dead_man(state: str, deviation: float, status: str) -> None:
     assert robot.at(5 * 10**8).velocities.any()  # it decelerates
     assert not robot.at(10**9).velocities.any()
     assert robot.update(10**9, "tracking", None, posture, SURE).status == "holding: no body model"
+
+
+@pytest.mark.parametrize(
+    ("flexion_deg", "moves"), [(88.0, True), (30.0, False)], ids=["along the axis", "across"]
+)
+def test_a_limb_along_the_axis_of_its_abduction_has_a_sure_direction(
+    flexion_deg: float, moves: bool
+) -> None:
+    """A forearm straight ahead is known, and its abduction is not."""
+    posture, stddev = np.zeros(12), SURE.copy()
+    posture[JOINT_NAMES.index("right_elbow_flexion")] = np.radians(flexion_deg)
+    stddev[JOINT_NAMES.index("right_elbow_abduction")] = 1.8
+    _, robot, _ = make_retargeter(CONFIG / "example_arm.urdf", None, RetargetConfig())
+    assert robot.update(0, "tracking", BODY, posture, stddev).is_moving == moves
+    # What follows the abduction alone needs it.
+    only = replace(MAP, angles=tuple("right_elbow_abduction" for _ in MAP.angles))
+    single = Retargeter(ROBOT, only, RetargetConfig())
+    assert not single.update(0, "tracking", BODY, posture, stddev).is_moving
 
 
 def test_after_holding_nothing_is_made_up_for() -> None:
