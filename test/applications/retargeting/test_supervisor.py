@@ -67,7 +67,12 @@ class Bench:
             self.posture(state)
 
 
-EVENTS = ("step", "tracking", "uncertain", "lost", "jump", "silent", "on", "off", "grip", "moved")
+EVENTS = (
+    *("step", "tracking", "uncertain", "lost", "jump", "silent", "on", "off", "grip", "moved"),
+    *("blocked", "free"),
+)
+# The limit of the following error, and a tenth of a second at full speed to stop.
+FARTHEST_RAD = 0.2 + 0.1 + 2 * STEP_NS / 1e9
 
 
 @given(st.lists(st.tuples(st.sampled_from(EVENTS), st.integers(1, 30)), max_size=40))
@@ -86,6 +91,8 @@ def test_no_sequence_makes_it_jump_or_send_what_was_not_enabled(
                 bench.supervisor.enable(True, bench.now_ns, is_grip=True)
             elif event == "moved" and not bench.supervisor.moment(bench.now_ns):
                 bench.robot = np.clip(bench.robot + 0.1, *limits[:2])
+            elif event in ("blocked", "free"):
+                bench.is_blocked = event == "blocked"
             elif event == "jump":
                 bench.posture("tracking", 3600 * 10**9)
             elif event in ("tracking", "uncertain", "lost"):
@@ -94,8 +101,12 @@ def test_no_sequence_makes_it_jump_or_send_what_was_not_enabled(
             if bench.supervisor._is_wanted:
                 enabled_ns = bench.now_ns
             if len(bench.sent) > before[0]:
-                moved = np.abs(bench.sent[-1][1] - before[1])
-                assert (moved <= 1.0 * STEP_NS / 1e9 + 1e-9).all()
+                # From the command before, or where it begins, from the robot.
+                origins = [before[1], *(positions for _, positions in bench.sent[-2:-1])]
+                moved = [np.abs(bench.sent[-1][1] - origin).max() for origin in origins]
+                assert min(moved) <= 1.0 * STEP_NS / 1e9 + 1e-9
+                # One that cannot move is not left far behind.
+                assert np.abs(bench.sent[-1][1] - bench.robot).max() <= FARTHEST_RAD
                 assert bench.now_ns - enabled_ns <= bench.retargeter.settles_ns + STEP_NS
     times = np.array([time for time, _ in bench.sent])
     way = np.array([positions for _, positions in bench.sent]).reshape(-1, 7)
