@@ -14,7 +14,7 @@ ROS = ["ros-jazzy-rclpy[fastrtps]", "ros-jazzy-common-interfaces"]
 # 'cardbox track FOLDER --scheduler' on a cluster.
 CLUSTER = ["dask>=2024.5", "distributed>=2024.5"]
 # Streams to programs that teleoperate robots.
-TELEOPERATION = ["msgpack>=1,<2", "pyzmq>=25,<28"]
+TELEOPERATION = ["msgpack>=1,<2", "python-osc>=1.8,<2", "pyzmq>=25,<28"]
 # Gives results in memory as a table.
 PANDAS = ["pandas>=2,<4"]
 TEST = [
