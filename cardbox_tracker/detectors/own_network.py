@@ -116,7 +116,7 @@ def _detection(person: Mapping[str, Any], shape: tuple[int, int]) -> Detection:
         if score > 0.0:
             number = LANDMARKS.index(name)
             known[name] = column, row, score
-            points_px[number], scores[number] = (column, row), score
+            points_px[number], scores[number] = (column, row), min(score, 1.0)
             spatial_m[number, : len(space)] = space
     check_person(known)
     found = Detection(points_px, scores, np.zeros(shape, np.uint8))

@@ -69,7 +69,7 @@ def test_a_mask_is_the_silhouette() -> None:
     [
         (7, r"Scripted.detect returns 7; expected a list of people"),
         ([{}, {"left_hand": (1, 2, 1)}], "person 1: 'left_hand' is no point; those are nose"),
-        ([{"nose": (1, 2, 3)}], "person 0: nose has the score 3; expected a chance from 0 to 1"),
+        ([{"nose": (1, 2, 87)}], "person 0: nose has the score 87; expected a chance from 0 to 1"),
         ([{"nose": (1, 2)}], "person 0: .*expected column, row and score"),
         ([{"nose": (float("nan"), 2, 1)}], r"nose is at \(nan, 2.0\) px; expected a place"),
         ([dict.fromkeys(LANDMARKS[:4], (0.2, 0.4, 1))], "shares of the image"),

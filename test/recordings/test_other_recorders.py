@@ -140,10 +140,17 @@ def test_the_frame_is_that_of_the_images_if_the_camera_info_has_none(tmp_path: P
 
 def test_a_zoom_within_the_recording_is_told(tmp_path: Path) -> None:
     store = get_typestore(Stores.ROS2_JAZZY)
-    for focal_px, is_told in ((166.0, False), (200.0, True)):
-        zoomed = info(store, k=(focal_px, 0.0, 79.5, 0.0, focal_px, 59.5, 0.0, 0.0, 1.0))
+    twice = (330.0, 0.0, 159.5, 0.0, 330.0, 119.5, 0.0, 0.0, 1.0)
+    for focal_px, size, is_told in (
+        (166.0, (160, 120), False),
+        (200.0, (160, 120), True),
+        (330.0, (320, 240), False),
+        (330.0, (160, 120), True),
+    ):
+        once = (focal_px, 0.0, 79.5, 0.0, focal_px, 59.5, 0.0, 0.0, 1.0)
+        zoomed = info(store, *size, twice if size[0] == 320 else once)
         infos = [info(store)] * 6 + [zoomed] * 6
-        with open_images(recorded(tmp_path / str(focal_px), infos=infos)) as bag:
+        with open_images(recorded(tmp_path / f"{focal_px}_{size[0]}", infos=infos)) as bag:
             assert bag.calibration().k[0, 0] == 165.0
             assert any("changes at 0.4 s" in text for text in bag.remarks) == is_told
 

@@ -80,14 +80,14 @@ class CameraImages:
 
     def on_info(self, message: CameraInfo, _: int) -> None:
         """Use a CameraInfo if it is the first valid one, or lasts."""
-        before = self.watch.remark
+        before, old = self.watch.remark, self.watch.current
         changed = self.watch.see(message)
         if self.watch.remark not in ("", before):
             self._node.diagnostics.say("CameraInfo", self.watch.remark, warning=True)
         calibration = self.watch.current
         if not changed or calibration is None:
             return
-        if self.info is not None:
+        if old is not None and not old.is_resized(calibration):
             self._node.get_logger().warning(
                 f"the CameraInfo on {self.info_topic} has changed for good, to {calibration}"
             )
