@@ -95,9 +95,9 @@ def dumps_scene(scene: Scene) -> str:
 
 def _written(value: float, factor: float) -> str:
     """Return a number with few digits, or all, that gives the same value when it is read."""
-    number = factor * value
-    near = (round(number, digits) for digits in range(6, 18))
-    tried = *near, math.nextafter(number, -math.inf), math.nextafter(number, math.inf)
+    number = float(factor * value)
+    near = (round(number, digits) for digits in range(6, 17))
+    tried = *near, number, math.nextafter(number, -math.inf), math.nextafter(number, math.inf)
     # Some radians are between those of any degrees; then what is read is written so again.
     read = value if any(one / factor == value for one in tried) else number / factor
     return yaml_number(next(one for one in tried if one / factor == read))
