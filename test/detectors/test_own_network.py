@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from itertools import repeat
 from typing import Any
 
 import numpy as np
@@ -80,6 +81,38 @@ def test_a_mask_is_the_silhouette() -> None:
 def test_what_are_no_people_is_told(people: Any, expected: str) -> None:
     with pytest.raises(CardboxError, match=expected):
         detector(people).start()(IMAGE, 0)
+
+
+def raising(error: BaseException) -> Iterator[Any]:
+    """Yield a person, and raise an error after it."""
+    yield person(40)
+    raise error
+
+
+@pytest.mark.parametrize(
+    ("people", "expected"),
+    [
+        (raising(SystemExit(3)), "Scripted.detect fails: SystemExit: 3"),
+        (raising(OSError("no model")), "Scripted.detect fails: OSError: no model"),
+        ([{"nose": (10**400, 2, 1)}], "Scripted.detect, person 0: .*too large"),
+        ([person(40)] * 5000, "Scripted.detect returns more than 200 people"),
+        (repeat(person(40)), "Scripted.detect returns more than 200 people"),
+    ],
+)
+def test_a_detector_that_fails_is_named(people: Any, expected: str) -> None:
+    with pytest.raises(CardboxError, match=expected):
+        detector(people).start()(IMAGE, 0)
+
+
+def test_a_detector_that_stops_is_named() -> None:
+    """StopIteration would end the images without a word."""
+
+    class Stops(Scripted):
+        def detect(self, image: np.ndarray) -> Sequence[Mapping[str, Any]]:
+            raise StopIteration
+
+    with pytest.raises(CardboxError, match=r"Stops.detect fails: StopIteration"):
+        Detector(OwnModel.of(Stops(), "it")).start()(IMAGE, 0)
 
 
 def test_one_person_is_followed_whatever_the_order() -> None:
