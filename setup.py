@@ -132,7 +132,7 @@ setup(
     # The upper bound is the next version that may break the interface: a major one, but a minor
     # one of rosbags, whose interface still changes.
     install_requires=[
-        "av>=12,<19",
+        "av>=13,<19",
         "jinja2>=3.1,<4",
         "joblib>=1.3,<2",
         "lz4>=4.3,<5",

@@ -6,11 +6,12 @@ import math
 from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import replace
+from itertools import zip_longest
 
 from cardbox_tracker.camera.camera import Camera
 from cardbox_tracker.commands.arguments import print_remarks
 from cardbox_tracker.commands.tracking_request import PersonRequest
-from cardbox_tracker.measuring.people_camera import PITCH_PRIOR, USUAL_PITCH
+from cardbox_tracker.measuring.people_camera import FOUND_STDDEV, PITCH_PRIOR, USUAL_PITCH
 from cardbox_tracker.measuring.scene import FOUND, GIVEN, USUAL, Scene, SceneCamera, Value
 from cardbox_tracker.measuring.scene_camera import (
     FoundCamera,
@@ -19,12 +20,17 @@ from cardbox_tracker.measuring.scene_camera import (
     lens_of,
     scene_camera,
 )
-from cardbox_tracker.person.model import BodyModel
-from cardbox_tracker.person.proportions import USUAL_STATURE_M, USUAL_STDDEV_M
+from cardbox_tracker.person.model import PLACE, BodyModel
+from cardbox_tracker.person.parts import body_parts
+from cardbox_tracker.person.proportions import USUAL_STATURE_M, USUAL_STDDEV_M, stature_of
 from cardbox_tracker.recordings.measured_scene import Watched, seen_people, seen_person, watch
 from cardbox_tracker.recordings.recording import Recording, RecordingRequest
 from cardbox_tracker.recordings.silhouettes import TimeSpan
 from cardbox_tracker.search.config import TrackerConfig
+
+# Relative difference of the distances of a person who stands where the scene has them, and
+# deviations beyond which people contradict a scene.
+_SAME_PLACE, _CONTRADICTS = 0.15, 3.0
 
 
 @contextmanager
@@ -36,7 +42,7 @@ def measured_scene(
     A roll that is found turns the images back, unless one is given. Raises CardboxError if the
     recording cannot be read, or the detector cannot be loaded.
     """
-    if person.model is not None and not person.body.unknown:
+    if person.model is not None and not person.body.unknown and person.scene is None:
         roll_rad = person.body.camera_pose.roll_rad
         recording = replace(recording, camera=recording.camera.standing(roll_rad))
     with ExitStack() as stack:
@@ -44,6 +50,9 @@ def measured_scene(
         span = person.start_s, person.end_s
         bodies, first = [person.body, *person.others], source.first
         tilt = person.body.camera_pose
+        if person.scene is not None:
+            yield source, _again(source, recording, person, person.scene, config, seed)
+            return
         if person.model is not None and not person.body.unknown:
             pitch = Value(tilt.pitch_rad, tilt.pitch_stddev_rad, GIVEN)
             roll_rad = recording.camera.stands_rad
@@ -70,6 +79,79 @@ def measured_scene(
         else:
             bodies = seen_people(source, bodies, config, person.people, seed, *span)
         yield source, Scene(found.camera, tuple(bodies))
+
+
+def _again(
+    source: Recording,
+    recording: RecordingRequest,
+    person: PersonRequest,
+    scene: Scene,
+    config: TrackerConfig,
+    seed: int,
+) -> Scene:
+    """Return a given scene, with people who stand elsewhere at their place, and say what is wrong.
+
+    Nobody is sure in a scene that people contradict.
+    """
+    span, camera = (person.start_s, person.end_s), source.first.camera
+    watched = watch(source, *span)
+    stands = {"camera_roll_rad": recording.camera.stands_rad}
+    bodies = [body.with_values(**stands) for body in (person.body, *person.others)]
+    wrong = _contradiction(watched, bodies, scene.camera, camera)
+    if wrong:
+        print_remarks([f"{person.model}: {wrong}"])
+        unsure = math.hypot(scene.camera.pitch_rad.stddev, FOUND_STDDEV)
+        bodies = [body.with_values(pitch_stddev_rad=unsure) for body in bodies]
+    guesses = [body.with_values(unknown=tuple({*PLACE, *body.unknown})) for body in bodies]
+    if person.people is None:
+        placed = [seen_person(watched, guesses[0], camera, config, seed)]
+    else:
+        placed = seen_people(source, guesses, config, person.people, seed, *span)
+    # The tracker begins at the place of the scene, and goes on from there.
+    kept = [
+        body if body is not None and _is_near(body, there) else there
+        for body, there in zip_longest(bodies[: len(placed)], placed)
+    ]
+    return Scene(scene.camera, tuple(kept))
+
+
+def _is_near(body: BodyModel, there: BodyModel) -> bool:
+    """Return whether a body that is wholly known is where it is seen, or is not seen."""
+    if body.unknown:
+        return False
+    if "distance_m" in there.unknown:
+        return True
+    return abs(math.log(body.placement.distance_m / there.placement.distance_m)) < _SAME_PLACE
+
+
+def _contradiction(
+    watched: Watched, bodies: Sequence[BodyModel], given: SceneCamera, camera: Camera
+) -> str:
+    """Return what people and edges of the room show of the camera if it is not the given one."""
+    if not watched.people:
+        return ""
+    people = len(watched.people)
+    statures_m = [stature_of(body_parts(body.sizes)) for body in bodies]
+    statures_m = [*statures_m, *statures_m[-1:] * people][:people]
+    found = scene_camera(watched.people, watched.pictures, camera, statures_m, None, 0.0).camera
+    shown = [(given.pitch_rad, found.pitch_rad)]
+    of_height = ""
+    if given.height_m is not None and found.height_m is not None:
+        shown.append((given.height_m, found.height_m))
+        of_height = f" and a height of {found.height_m.mean:.2f} m, not {given.height_m.mean:.2f}"
+    # Independent sources; what nothing shows contradicts nothing.
+    apart = [
+        (one.mean - other.mean) / math.hypot(one.stddev, other.stddev)
+        for one, other in shown
+        if other.origin != USUAL
+    ]
+    if math.hypot(*apart) <= _CONTRADICTS:
+        return ""
+    return (
+        f"the scene has a camera pitch of {degrees_of(given.pitch_rad)}, and people and the room "
+        f"show {degrees_of(found.pitch_rad)}{of_height}: it is of another camera, lens or person, "
+        "so every posture is at best uncertain; leave --scene out"
+    )
 
 
 def _bodies(

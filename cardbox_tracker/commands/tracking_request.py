@@ -27,7 +27,8 @@ from cardbox_tracker.detectors.own_network import OwnModel
 from cardbox_tracker.detectors.person_choice import PersonChoice
 from cardbox_tracker.detectors.point_table import PointTable
 from cardbox_tracker.measuring.scene import Scene, load_scene
-from cardbox_tracker.person.model import MEASURED, BodyModel, body_from_proportions
+from cardbox_tracker.measuring.scene_camera import in_scene
+from cardbox_tracker.person.model import MEASURED, PLACE, BodyModel, body_from_proportions
 from cardbox_tracker.person.model_file import load_body_model
 from cardbox_tracker.person.proportions import USUAL_STATURE_M
 from cardbox_tracker.recordings.given_camera import FOV_HINT, GivenCamera
@@ -63,6 +64,7 @@ class PersonRequest:
     #: number of people to track, 0 for all who come; None for one without a number
     people: int | None = None
     others: tuple[BodyModel, ...] = ()  #: the bodies of the second and further people
+    scene: Scene | None = None  #: a scene with these people, whose camera nothing else tells
     number: int = 1  #: whose results commands use that use those of one
     statures_m: tuple[float, ...] = ()  #: the statures that are given, by number
 
@@ -211,11 +213,17 @@ def tracking_request(asked: TrackingOptions, faults: Iterable[str] = ()) -> Trac
     scene = None
     if asked.scene is not None:
         scene = problems.caught(partial(load_scene, asked.scene), None)
+    focal_stddev: float | None = None
     if scene is not None:
-        asked = _with_camera(asked, scene)
+        given, asked = asked, _with_camera(asked, scene)
+        if asked.fov_deg != given.fov_deg:
+            fov = scene.camera.fov_rad
+            focal_stddev = fov.stddev / math.sin(fov.mean)
     people = 0 if asked.people == AUTO else asked.people
     assert not isinstance(people, str)
     recording = recording_request(asked, problems, people)
+    camera = replace(recording.camera, focal_stddev=focal_stddev)
+    recording = replace(recording, camera=camera)
     person = _person(asked, people, problems, scene)
     problems.add(*_tracking_faults(asked, people, isinstance(recording.points, Detector)))
     preset = PRESETS[asked.preset]()
@@ -365,15 +373,22 @@ def _person(
     statures_m, pitch_deg = asked.statures_m, asked.camera_pitch_deg
     is_of_scene = scene is not None and bool(scene.people) and not statures_m
     if scene is not None and is_of_scene:
-        # They may stand elsewhere now.
-        unknown = "distance_m", "hip_height_m"
-        bodies = [one.with_values(unknown=unknown) for one in scene.people]
+        bodies = [replace(one, is_distance_found=one.source != MEASURED) for one in scene.people]
     else:
         bodies = _bodies(asked, problems)
     if scene is not None and pitch_deg is None:
-        pitch = scene.camera.pitch_rad
-        tilt = {"camera_pitch_rad": pitch.mean, "pitch_stddev_rad": pitch.stddev}
-        bodies = [one.with_values(**tilt) for one in bodies]
+        # Degrees have not the same digits as the radians of the people of the scene.
+        known_rad = [one.camera_pose.pitch_rad for one in bodies]
+        bodies = [in_scene(one, scene.camera) for one in bodies]
+        bodies = [
+            one.with_values(camera_pitch_rad=before_rad)
+            if math.isclose(before_rad, one.camera_pose.pitch_rad, rel_tol=1e-12)
+            else one
+            for one, before_rad in zip(bodies, known_rad, strict=True)
+        ]
+    elif is_of_scene and pitch_deg is not None:
+        moved = {"camera_pitch_rad": math.radians(pitch_deg), "unknown": PLACE}
+        bodies = [one.with_values(**moved) for one in bodies]
     start_s, end_s = asked.start_s or 0.0, math.inf if asked.end_s is None else asked.end_s
     if end_s <= start_s:
         problems.add(f"--end {end_s:g} is not after --start {start_s:g}: give a later second")
@@ -387,6 +402,7 @@ def _person(
         others=tuple(bodies[1:]),
         number=asked.number,
         statures_m=statures_m,
+        scene=scene if is_of_scene and pitch_deg is None else None,
     )
 
 

@@ -17,7 +17,7 @@ from cardbox_tracker.common.errors import CardboxError, quoted
 from cardbox_tracker.common.files import foreign, write_file
 from cardbox_tracker.common.small_yaml import parse_small_yaml, read_small_text
 from cardbox_tracker.person.model import BodyModel
-from cardbox_tracker.person.model_file import dumps_body_model, loads_body_model
+from cardbox_tracker.person.model_file import dumps_body_model, loads_body_model, yaml_number
 
 FORMAT = "cardbox_scene/1"
 ORIGINS = GIVEN, FOUND, USUAL = "given", "found", "usual"
@@ -82,13 +82,25 @@ def dumps_scene(scene: Scene) -> str:
         "camera:",
     ]
     for name, value in scene.numbers().items():
-        mean, stddev, origin = value.values()
-        entries = f"{{mean: {mean:.6f}, stddev: {stddev:.6f}, origin: {origin}}}"
+        attribute, factor, *_ = _NUMBERS[name]
+        mean, stddev, _ = getattr(scene.camera, attribute)
+        numbers = f"mean: {_written(mean, factor)}, stddev: {_written(stddev, factor)}"
+        entries = f"{{{numbers}, origin: {value['origin']}}}"
         lines.append(f"  {name}: {entries}  # {_NUMBERS[name][3]}")
     lines.append("people:" if scene.people else "people: []")
     for body in scene.people:
         lines += ["  - |", textwrap.indent(dumps_body_model(body), "    ").rstrip()]
     return "\n".join(lines) + "\n"
+
+
+def _written(value: float, factor: float) -> str:
+    """Return a number with few digits, or all, that gives the same value when it is read."""
+    number = float(factor * value)
+    near = (round(number, digits) for digits in range(6, 17))
+    tried = *near, number, math.nextafter(number, -math.inf), math.nextafter(number, math.inf)
+    # Some radians are between those of any degrees; then what is read is written so again.
+    read = value if any(one / factor == value for one in tried) else number / factor
+    return yaml_number(next(one for one in tried if one / factor == read))
 
 
 def save_scene(scene: Scene, path: str | os.PathLike[str]) -> None:
@@ -131,10 +143,10 @@ def _value_of(name: str, given: Any) -> Value:
     ):
         raise ValueError(f"camera.{name} is no mapping of the numbers mean and stddev and origin")
     mean, stddev = map(float, numbers)
-    if not lowest <= mean <= highest or not 0.0 <= stddev < math.inf:
+    if not lowest <= mean <= highest or not 0.0 <= stddev <= highest - lowest:
         raise ValueError(
             f"camera.{name} is {mean:g} +- {stddev:g}; expected {lowest:g} to {highest:g}, and a "
-            "deviation from 0 on"
+            f"deviation from 0 on, up to {highest - lowest:g}"
         )
     if given["origin"] not in ORIGINS:
         raise ValueError(f"camera.{name}.origin is none of {', '.join(ORIGINS)}")
