@@ -189,7 +189,7 @@ class TrackingOptions(RecordingOptions):
         people: track N people, or all who come (up to 6); they are numbered as they come, and from
             left to right if they come together
         distance_m: with --stature: from the camera to the person, metres along the floor; without
-            it, it is found from the first images
+            it, it is found from the first images. With --detector it takes the place of --fov
         camera_pitch_deg: positive when the camera looks down (default: with --stature, found from
             the person who stands upright at --start)
         start_s: second at which the person stands as for --front; tracking starts there. With

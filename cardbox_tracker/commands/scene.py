@@ -120,7 +120,10 @@ def found_camera(
         return FoundCamera(SceneCamera(lens_of(camera), pitch, Value(0.0, 0.0, USUAL)))
     # Images are turned back by a roll that is given.
     roll_rad = None if recording.camera.roll_rad is None else 0.0
-    found = scene_camera(people, watched.pictures, camera, statures_m, given, roll_rad)
+    distance_m = None
+    if "distance_m" not in person.body.unknown and person.model is None:
+        distance_m = person.body.placement.distance_m
+    found = scene_camera(people, watched.pictures, camera, statures_m, given, roll_rad, distance_m)
     number, shown_by = degrees_of(found.camera.pitch_rad), " and ".join(found.sources)
     remarks = list(found.remarks)
     if given is None and found.sources:
@@ -133,6 +136,7 @@ def found_camera(
             f"that of most cameras, {number}; give --camera-pitch-deg (0 for a level camera)"
         )
     better = _corrected(recording, found.camera)
+    better.camera.check()
     if better.camera.roll_rad != recording.camera.roll_rad:
         remarks.append(
             f"camera roll {math.degrees(found.camera.roll_rad.mean):.1f} degrees, found in the "
@@ -142,7 +146,7 @@ def found_camera(
     if better.camera.fov_deg != recording.camera.fov_deg:
         remarks.append(
             f"field of view {better.camera.fov_deg:.0f} degrees across the image, found from "
-            "people who walk; give --fov if it is known"
+            f"{found.camera.fov_rad.by}; give --fov if it is known"
         )
     print_remarks(remarks)
     return found
