@@ -59,8 +59,9 @@ _REPLACED = MappingProxyType(
         "within_m": ("background", "silhouettes"),
         "silhouettes": ("background", "within_m"),
         "detector": ("detector_class",),
-        "fov_deg": ("calibration",),
-        "calibration": ("fov_deg",),
+        "fov_deg": ("calibration", "webcam"),
+        "calibration": ("fov_deg", "webcam"),
+        "webcam": ("fov_deg", "calibration"),
     }
 )
 
@@ -144,6 +145,7 @@ class RecordingOptions(Options):
             phones 60 to 75 held sideways and 36 to 46 upright. Without it, what a phone wrote into
             the file, or else, with --detector, 65 degrees along the longer side
         calibration: in place of --fov: file of camera_calibration, OpenCV's FileStorage or Kalibr
+        webcam: in place of --fov: name of a usual webcam, such as C920, with its field of view
         camera_roll_deg: how far the camera is turned clockwise, seen from behind it, 180 if its top
             is below; images are turned back
         mirrored: the images are mirrored, as some programs do with those of a front camera; they
@@ -170,6 +172,7 @@ class RecordingOptions(Options):
     )
     fov_deg: float | None = option("DEG", flag="--fov")
     calibration: Path | None = option("FILE")
+    webcam: str | None = option("NAME")
     camera_roll_deg: float | None = option("R", between(-_MOST_ROLL_DEG, _MOST_ROLL_DEG))
     mirrored: bool = option(default=False)
     fps: float | None = option("HZ", between(0.0, _MOST_FPS))

@@ -23,7 +23,7 @@ from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.proportions import USUAL_STATURE_M, USUAL_STDDEV_M
 from cardbox_tracker.recordings.measured_scene import Watched, seen_people, seen_person, watch
 from cardbox_tracker.recordings.recording import Recording, RecordingRequest
-from cardbox_tracker.recordings.silhouettes import TimeSpan
+from cardbox_tracker.recordings.silhouettes import SilhouetteSource, TimeSpan
 from cardbox_tracker.search.config import TrackerConfig
 
 
@@ -49,7 +49,7 @@ def measured_scene(
             roll_rad = recording.camera.stands_rad
             camera = SceneCamera(lens_of(first.camera), pitch, Value(roll_rad, 0.0, GIVEN))
             bodies = [body.with_values(camera_roll_rad=roll_rad) for body in bodies]
-            yield source, Scene(camera, tuple(bodies))
+            yield source, Scene(_told(camera, first), tuple(bodies))
             return
         watched = watch(source, *span)
         found = found_camera(recording, person, watched, first.camera)
@@ -69,7 +69,13 @@ def measured_scene(
             bodies = [seen_person(watched, bodies[0], first.camera, config, seed, far)]
         else:
             bodies = seen_people(source, bodies, config, person.people, seed, *span)
-        yield source, Scene(found.camera, tuple(bodies))
+        yield source, Scene(_told(found.camera, first), tuple(bodies))
+
+
+def _told(camera: SceneCamera, source: SilhouetteSource) -> SceneCamera:
+    """Return the camera with what tells its field of view."""
+    lens = camera.fov_rad
+    return camera._replace(fov_rad=lens._replace(by=lens.by or source.lens_by))
 
 
 def _bodies(
