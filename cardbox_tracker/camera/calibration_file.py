@@ -1,4 +1,4 @@
-"""Reads calibrations of camera_calibration, OpenCV, Kalibr, aniposelib, and of a CameraInfo."""
+"""Files of calibrations: camera_calibration, OpenCV, Kalibr, aniposelib, and a CameraInfo."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ from xml.etree import ElementTree
 
 import numpy as np
 
-from cardbox_tracker.camera.camera import Calibration
+from cardbox_tracker.camera.camera import CALIBRATED, Calibration
 from cardbox_tracker.common.errors import CameraError, cut, quoted
-from cardbox_tracker.common.files import foreign
+from cardbox_tracker.common.files import foreign, write_file
 from cardbox_tracker.common.small_yaml import SmallYamlError, parse_small_yaml, read_small_text
 
 _EXPECTED = "a file of camera_calibration, OpenCV's FileStorage, Kalibr or aniposelib"
@@ -22,6 +22,8 @@ _EXPECTED = "a file of camera_calibration, OpenCV's FileStorage, Kalibr or anipo
 _NO_YAML = re.compile(r"\A%YAML.*\n|!!opencv-matrix|\A---\s*$|^---\s*\Z", re.MULTILINE)
 # FileStorage names no model; OpenCV's sample has a switch for its fisheye.
 _FILE_STORAGE = {"distortion_model": "plumb_bob"}
+# Key that 'cardbox calibrate-camera' adds to the format of camera_calibration.
+_STDDEV = "focal_length_stddev"
 _ALIASES = MappingProxyType(
     {
         "image_width": ("imagewidth", "width"),
@@ -64,6 +66,33 @@ def _of_aniposelib(data: Mapping[str, Any]) -> Mapping[str, Any]:
     return {"distortion_model": "plumb_bob", "fisheye_model": camera.get("fisheye", 0)} | camera
 
 
+def save_calibration(path: str | os.PathLike[str], calibration: Calibration) -> None:
+    """Write a calibration atomically as camera_calibration does, with its relative deviation.
+
+    Raises CardboxError if the file cannot be written.
+    """
+    lens, k = calibration, calibration.k
+    projection = np.pad(k, ((0, 0), (0, 1)))
+    matrices = {
+        "camera_matrix": k,
+        "distortion_coefficients": lens.distortion[None],
+        "rectification_matrix": np.eye(3),
+        "projection_matrix": projection,
+    }
+    lines = [
+        f"image_width: {lens.width}",
+        f"image_height: {lens.height}",
+        "camera_name: camera",
+        f"distortion_model: {lens.distortion_model}",
+        f"{_STDDEV}: {lens.focal_stddev:.5f}",
+    ]
+    for name, matrix in matrices.items():
+        data = ", ".join(f"{value:.9g}" for value in matrix.ravel().tolist())
+        rows, columns = matrix.shape
+        lines += [f"{name}:", f"  rows: {rows}", f"  cols: {columns}", f"  data: [{data}]"]
+    write_file(path, "\n".join(lines) + "\n")
+
+
 def _parsed(text: str) -> Any:
     if not text.lstrip().startswith("<"):
         data = parse_small_yaml(_NO_YAML.sub("", text))
@@ -99,6 +128,9 @@ def _of_matrix(data: Mapping[Any, Any]) -> Calibration:
     size = (
         plain.get("imagesize") or plain.get("size") or (value("image_width"), value("image_height"))
     )
+    stddev = float(plain.get(_STDDEV.replace("_", ""), CALIBRATED))
+    if not 0.0 < stddev < 1.0:
+        raise ValueError(f"{_STDDEV} is {stddev:g}; expected a share between 0 and 1")
     is_fisheye = str(plain.get("fisheyemodel", 0)) not in ("0", "False")
     return Calibration(
         int(size[0]),
@@ -106,6 +138,7 @@ def _of_matrix(data: Mapping[Any, Any]) -> Calibration:
         np.array(value("camera_matrix"), dtype=np.float64).reshape(3, 3),
         np.array(value("distortion_coefficients"), dtype=np.float64).ravel(),
         "fisheye" if is_fisheye else str(value("distortion_model")),
+        focal_stddev=stddev,
     )
 
 

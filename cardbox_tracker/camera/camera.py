@@ -165,6 +165,7 @@ class Calibration:
     roll_rad: float = 0.0
     focal_stddev: float = CALIBRATED  #: relative standard deviation of the focal lengths
     is_mirrored: bool = False  #: whether the images are mirrored; working images are turned back
+    told_by: str = ""  #: what tells the focal lengths, in words; empty if that is not known
 
     def __post_init__(self) -> None:
         """Bring the lens and the name of the frame into their usual form."""

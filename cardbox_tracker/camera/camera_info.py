@@ -128,4 +128,5 @@ def calibration_from_info(message: Any, image_topic: str, info_topic: str) -> Ca
         distortion,
         message.distortion_model,
         message.header.frame_id,
+        told_by="CameraInfo",
     )

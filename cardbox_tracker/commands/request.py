@@ -59,8 +59,9 @@ _REPLACED = MappingProxyType(
         "within_m": ("background", "silhouettes"),
         "silhouettes": ("background", "within_m"),
         "detector": ("detector_class",),
-        "fov_deg": ("calibration",),
-        "calibration": ("fov_deg",),
+        "fov_deg": ("calibration", "webcam"),
+        "calibration": ("fov_deg", "webcam"),
+        "webcam": ("fov_deg", "calibration"),
     }
 )
 
@@ -144,6 +145,7 @@ class RecordingOptions(Options):
             phones 60 to 75 held sideways and 36 to 46 upright. Without it, what a phone wrote into
             the file, or else, with --detector, 65 degrees along the longer side
         calibration: in place of --fov: file of camera_calibration, OpenCV's FileStorage or Kalibr
+        webcam: in place of --fov: name of a usual webcam, such as C920, with its field of view
         camera_roll_deg: how far the camera is turned clockwise, seen from behind it, 180 if its top
             is below; images are turned back
         mirrored: the images are mirrored, as some programs do with those of a front camera; they
@@ -170,6 +172,7 @@ class RecordingOptions(Options):
     )
     fov_deg: float | None = option("DEG", flag="--fov")
     calibration: Path | None = option("FILE")
+    webcam: str | None = option("NAME")
     camera_roll_deg: float | None = option("R", between(-_MOST_ROLL_DEG, _MOST_ROLL_DEG))
     mirrored: bool = option(default=False)
     fps: float | None = option("HZ", between(0.0, _MOST_FPS))
@@ -189,7 +192,7 @@ class TrackingOptions(RecordingOptions):
         people: track N people, or all who come (up to 6); they are numbered as they come, and from
             left to right if they come together
         distance_m: with --stature: from the camera to the person, metres along the floor; without
-            it, it is found from the first images
+            it, it is found from the first images. With --detector it takes the place of --fov
         camera_pitch_deg: positive when the camera looks down (default: with --stature, found from
             the person who stands upright at --start)
         start_s: second at which the person stands as for --front; tracking starts there. With

@@ -11,7 +11,7 @@ from itertools import zip_longest
 from cardbox_tracker.camera.camera import Camera
 from cardbox_tracker.commands.arguments import print_remarks
 from cardbox_tracker.commands.tracking_request import PersonRequest
-from cardbox_tracker.measuring.people_camera import FOUND_STDDEV, PITCH_PRIOR, USUAL_PITCH
+from cardbox_tracker.measuring.people_camera import PITCH_PRIOR, USUAL_PITCH
 from cardbox_tracker.measuring.scene import FOUND, GIVEN, USUAL, Scene, SceneCamera, Value
 from cardbox_tracker.measuring.scene_camera import (
     FoundCamera,
@@ -20,12 +20,12 @@ from cardbox_tracker.measuring.scene_camera import (
     lens_of,
     scene_camera,
 )
-from cardbox_tracker.person.model import PLACE, BodyModel
+from cardbox_tracker.person.model import FOUND_STDDEV, PLACE, BodyModel
 from cardbox_tracker.person.parts import body_parts
 from cardbox_tracker.person.proportions import USUAL_STATURE_M, USUAL_STDDEV_M, stature_of
 from cardbox_tracker.recordings.measured_scene import Watched, seen_people, seen_person, watch
 from cardbox_tracker.recordings.recording import Recording, RecordingRequest
-from cardbox_tracker.recordings.silhouettes import TimeSpan
+from cardbox_tracker.recordings.silhouettes import SilhouetteSource, TimeSpan
 from cardbox_tracker.search.config import TrackerConfig
 
 # Relative difference of the distances of a person who stands where the scene has them, and
@@ -58,7 +58,7 @@ def measured_scene(
             roll_rad = recording.camera.stands_rad
             camera = SceneCamera(lens_of(first.camera), pitch, Value(roll_rad, 0.0, GIVEN))
             bodies = [body.with_values(camera_roll_rad=roll_rad) for body in bodies]
-            yield source, Scene(camera, tuple(bodies))
+            yield source, Scene(_told(camera, first), tuple(bodies))
             return
         watched = watch(source, *span)
         found = found_camera(recording, person, watched, first.camera)
@@ -78,7 +78,13 @@ def measured_scene(
             bodies = [seen_person(watched, bodies[0], first.camera, config, seed, far)]
         else:
             bodies = seen_people(source, bodies, config, person.people, seed, *span)
-        yield source, Scene(found.camera, tuple(bodies))
+        yield source, Scene(_told(found.camera, first), tuple(bodies))
+
+
+def _told(camera: SceneCamera, source: SilhouetteSource) -> SceneCamera:
+    """Return the camera with what tells its field of view."""
+    lens = camera.fov_rad
+    return camera._replace(fov_rad=lens._replace(by=lens.by or source.lens_by))
 
 
 def _again(
@@ -201,7 +207,10 @@ def found_camera(
         return FoundCamera(SceneCamera(lens_of(camera), pitch, Value(0.0, 0.0, USUAL)))
     # Images are turned back by a roll that is given.
     roll_rad = None if recording.camera.roll_rad is None else 0.0
-    found = scene_camera(people, watched.pictures, camera, statures_m, given, roll_rad)
+    distance_m = None
+    if "distance_m" not in person.body.unknown and person.model is None:
+        distance_m = person.body.placement.distance_m
+    found = scene_camera(people, watched.pictures, camera, statures_m, given, roll_rad, distance_m)
     number, shown_by = degrees_of(found.camera.pitch_rad), " and ".join(found.sources)
     remarks = list(found.remarks)
     if given is None and found.sources:
@@ -214,6 +223,7 @@ def found_camera(
             f"that of most cameras, {number}; give --camera-pitch-deg (0 for a level camera)"
         )
     better = _corrected(recording, found.camera)
+    better.camera.check()
     if better.camera.roll_rad != recording.camera.roll_rad:
         remarks.append(
             f"camera roll {math.degrees(found.camera.roll_rad.mean):.1f} degrees, found in the "
@@ -223,7 +233,7 @@ def found_camera(
     if better.camera.fov_deg != recording.camera.fov_deg:
         remarks.append(
             f"field of view {better.camera.fov_deg:.0f} degrees across the image, found from "
-            "people who walk; give --fov if it is known"
+            f"{found.camera.fov_rad.by}; give --fov if it is known"
         )
     print_remarks(remarks)
     return found

@@ -47,6 +47,8 @@ _EFFORT = "whole_body.effort"
 _EXCLUDE = (
     ("--scene", "--model", "have the camera's pitch"),
     ("--fov", "--calibration", "describe the lens"),
+    ("--fov", "--webcam", "describe the lens"),
+    ("--webcam", "--calibration", "describe the lens"),
     ("--detector", "--detector-class", "name a detector"),
     ("--stature", "--model", "say who is tracked"),
 )
@@ -266,7 +268,8 @@ def _tracking_faults(
 def _camera(asked: RecordingOptions, problems: Problems) -> GivenCamera:
     roll_deg = asked.camera_roll_deg
     roll_rad = None if roll_deg is None else math.radians(roll_deg)
-    camera = GivenCamera(asked.fov_deg, asked.calibration, roll_rad, asked.fps, asked.mirrored)
+    given = asked.fov_deg, asked.calibration, roll_rad, asked.fps, asked.mirrored, asked.webcam
+    camera = GivenCamera(*given)
     if not (camera.is_calibrated or _is_guessed(asked) or tells_lens(asked.recording)):
         hint = f"--fov is across the width of the image: {FOV_HINT}"
         problems.miss("--fov DEG or --calibration FILE", hint)
@@ -360,7 +363,7 @@ def points_named(given: object, class_name: str | None = None) -> Detector | Poi
 def _with_camera(asked: TrackingOptions, scene: Scene) -> TrackingOptions:
     """Return the options with what the scene says of a film's camera where they say nothing."""
     found, camera = dict[str, float](), scene.camera
-    if is_film(asked.recording) and asked.fov_deg is None and asked.calibration is None:
+    if is_film(asked.recording) and not {"--fov", "--calibration", "--webcam"} & {*asked.given()}:
         found["fov_deg"] = math.degrees(camera.fov_rad.mean)
     if asked.camera_roll_deg is None and camera.roll_rad.mean:
         found["camera_roll_deg"] = math.degrees(camera.roll_rad.mean)

@@ -6,6 +6,7 @@ film can be given to the next film of the same camera.
 
 from __future__ import annotations
 
+import json
 import math
 import os
 import textwrap
@@ -30,6 +31,7 @@ class Value(NamedTuple):
     mean: float  #: its value
     stddev: float  #: its standard deviation
     origin: str = FOUND  #: one of ``ORIGINS``
+    by: str = ""  #: what tells it, in words; empty if that is not known
 
 
 class SceneCamera(NamedTuple):
@@ -60,18 +62,22 @@ class Scene:
         """Yield each number of the camera with its deviation and origin."""
         for name, value in self._numbers():
             unit = name.rpartition("_")[2].replace("deg", "degrees")
-            number = f"{value.mean:.3g} +- {value.stddev:.2g} {unit} ({value.origin})"
+            source = f"{value.origin}: {value.by}" if value.by else value.origin
+            number = f"{value.mean:.3g} +- {value.stddev:.2g} {unit} ({source})"
             yield f"{_NUMBERS[name][3]} {number}"
 
     def numbers(self) -> dict[str, dict[str, float | str]]:
-        """Return mean, stddev and origin by the names of the file."""
-        return {name: value._asdict() for name, value in self._numbers()}
+        """Return mean, stddev, origin and what tells it by the names of the file."""
+        return {
+            name: {key: entry for key, entry in value._asdict().items() if entry != ""}
+            for name, value in self._numbers()
+        }
 
     def _numbers(self) -> Iterator[tuple[str, Value]]:
         for name, (attribute, factor, *_) in _NUMBERS.items():
             value: Value | None = getattr(self.camera, attribute)
             if value is not None:
-                yield name, Value(factor * value.mean, factor * value.stddev, value.origin)
+                yield name, value._replace(mean=factor * value.mean, stddev=factor * value.stddev)
 
 
 def dumps_scene(scene: Scene) -> str:
@@ -81,12 +87,14 @@ def dumps_scene(scene: Scene) -> str:
         f"format: {FORMAT}",
         "camera:",
     ]
-    for name, value in scene.numbers().items():
+    for name in scene.numbers():
         attribute, factor, *_ = _NUMBERS[name]
-        mean, stddev, _ = getattr(scene.camera, attribute)
-        numbers = f"mean: {_written(mean, factor)}, stddev: {_written(stddev, factor)}"
-        entries = f"{{{numbers}, origin: {value['origin']}}}"
-        lines.append(f"  {name}: {entries}  # {_NUMBERS[name][3]}")
+        value: Value = getattr(scene.camera, attribute)
+        mean, stddev = (_written(number, factor) for number in value[:2])
+        entries = f"mean: {mean}, stddev: {stddev}, origin: {value.origin}"
+        if value.by:
+            entries += f", by: {json.dumps(value.by)}"
+        lines.append(f"  {name}: {{{entries}}}  # {_NUMBERS[name][3]}")
     lines.append("people:" if scene.people else "people: []")
     for body in scene.people:
         lines += ["  - |", textwrap.indent(dumps_body_model(body), "    ").rstrip()]
@@ -136,7 +144,7 @@ def loads_scene(text: str) -> Scene:
 
 def _value_of(name: str, given: Any) -> Value:
     _, factor, (lowest, highest), _ = _NUMBERS[name]
-    is_value = isinstance(given, dict) and set(given) == set(Value._fields)
+    is_value = isinstance(given, dict) and set(given) | {"by"} == set(Value._fields)
     numbers = (given["mean"], given["stddev"]) if is_value else ()
     if not is_value or not all(
         isinstance(one, int | float) and not isinstance(one, bool) for one in numbers
@@ -150,4 +158,7 @@ def _value_of(name: str, given: Any) -> Value:
         )
     if given["origin"] not in ORIGINS:
         raise ValueError(f"camera.{name}.origin is none of {', '.join(ORIGINS)}")
-    return Value(mean / factor, stddev / factor, given["origin"])
+    by = given.get("by", "")
+    if not isinstance(by, str):
+        raise ValueError(f"camera.{name}.by is no text")
+    return Value(mean / factor, stddev / factor, given["origin"], by)
