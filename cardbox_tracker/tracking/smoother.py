@@ -47,10 +47,10 @@ T = TypeVar("T")
 LAG_S = 0.5
 """Seconds on either side of an image that count; others change it by less than 1 mm."""
 
-# The motion of people ends at about 3 Hz.
-_CUTOFF_HZ = 3.0
+# Lower ones take from the fast motion of arms (docs/research.md).
+_CUTOFF_HZ = 4.0
 # Deviation of the part that changes, m or rad, in images of this rate.
-_NOISE, _RATE_HZ = 0.04, 30.0
+_NOISE, _RATE_HZ = 0.05, 30.0
 _FREEDOM, _ROUNDS = 4.0, 8
 # Nobody turns as far between two images: the tracker has found that it was wrong.
 _TURN_RAD = 0.5 * np.pi

@@ -72,7 +72,7 @@ def test_a_straight_motion_stays_and_its_keypoints_are_those_of_the_joints(rate_
 @pytest.mark.parametrize("frequency_hz", [1.0, 2.0, 4.0])
 def test_a_sine_keeps_the_share_of_the_low_pass_of_fourth_order(frequency_hz: float) -> None:
     # Three values that fit have 1 + 3 / 4 of the usual weight.
-    kept = 1.0 / (1.0 + (frequency_hz / 3.0) ** 4 / 1.75)
+    kept = 1.0 / (1.0 + (frequency_hz / 4.0) ** 4 / 1.75)
     sine = 1e-3 * np.sin(2.0 * np.pi * frequency_hz * np.arange(200) / RATE_HZ)
     found = states_of(smooth([estimate_of(state) for state in moved(sine, YAW)]))[:, YAW]
     np.testing.assert_allclose(found[50:-50], kept * sine[50:-50], atol=3e-5)
