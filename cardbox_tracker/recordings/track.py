@@ -100,7 +100,7 @@ def track_recording(
     given = recording.others, people, look
     session, found = Session(bodies, first.camera, config, rng, *given), list[Quality]()
     has = {"has_points": first.has_points, "has_people": people is not None}
-    has["has_hands"] = look is not None
+    has |= {"has_hands": look is not None, "is_smoothed": lag_s > 0.0}
     smoother = Smoother[tuple[RecordedFrame, list[Tracker]]](lag_s)
     as_seen: list[Tracker] = []
     with nullcontext() if table is None else result_table(table, **has) as add_row:

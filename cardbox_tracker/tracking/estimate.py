@@ -143,6 +143,8 @@ class Estimate:
     #: the left and the right hand, None for one that is not known; None unless hands are looked at
     hands: tuple[Hand | None, Hand | None] | None = None
     legs: Legs | None = None  #: None without a posture, and as long as no points have shown them
+    #: frequency of which smoothing over time has left half; None if it is not smoothed
+    smoothed_hz: float | None = None
 
     def as_camera_stands(self, roll_rad: float) -> Estimate:
         """Return the estimate in the frame of the rolled camera, not of images turned upright."""

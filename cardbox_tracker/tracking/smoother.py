@@ -238,4 +238,5 @@ def _estimate(result: _Result, values: FloatArray, stddev: FloatArray) -> Estima
         clavicles_stddev_m=rises[1],
         neck=None if estimate.neck is None else values[_NECK],
         legs=legs,
+        smoothed_hz=_CUTOFF_HZ,
     )

@@ -85,7 +85,7 @@ def measure(folder: Path, seeds: Iterable[int]) -> tuple[FloatArray, FloatArray]
 
 def _runs(film: Film, seed: int) -> tuple[Results, Results]:
     """Return the results of a film as live tracking gives them, and smoothed."""
-    kept = [KeptResults(film.path, has_points=True) for _ in range(2)]
+    kept = [KeptResults(film.path, has_points=True, is_smoothed=True) for _ in range(2)]
     smoother = Smoother[tuple[RecordedFrame, Tracker]]()
 
     def tell(seen: Iterable[tuple[tuple[RecordedFrame, Tracker], Sequence[Estimate]]]) -> None:
