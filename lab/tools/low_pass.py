@@ -72,12 +72,14 @@ def measure(folder: Path, seeds: Iterable[int]) -> tuple[FloatArray, FloatArray]
     by_stamp, unknown = dict(pairs), np.full((6, 3), np.nan)
     every_m = np.array([by_stamp.get(stamp_ns, unknown) for stamp_ns in film.stamps_ns])
     stamps_ns, found = np.array(film.stamps_ns), []
+    # The low-pass needs more than two images of a period.
+    cutoff_hz = min(CUTOFF_HZ, 0.4e9 / float(np.median(np.diff(stamps_ns))))
     for as_live, smoothed in runs:
         true_m = np.where(np.isfinite(_keypoints_m(as_live)), every_m, np.nan)
         columns = dict(zip(POINT_COLUMNS, true_m.reshape(len(true_m), -1).T, strict=True))
         reference = replace(as_live, numbers=columns)
         for pair in ((as_live, smoothed), (reference, reference)):
-            every = [*pair, *(low_passed(one, CUTOFF_HZ) for one in pair)]
+            every = [*pair, *(low_passed(one, cutoff_hz) for one in pair)]
             found.append([_figures(one, true_m, stamps_ns) for one in every])
     ours, of_reference = np.array(found).reshape(len(runs), 2, 4, 4).mean(axis=0)
     return ours, of_reference
