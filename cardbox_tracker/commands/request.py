@@ -205,6 +205,8 @@ class TrackingOptions(RecordingOptions):
         seed: random seed of the filters
         hands: with --detector mediapipe: also tell open from closed hands, and measure palms and
             wrists, in further columns and in the video (docs/results.md)
+        causal: take for each image only those before it, as live; without it, also those after it,
+            which takes out the shaking
     """
 
     model: Path | None = option("MODEL.yaml")
@@ -229,6 +231,7 @@ class TrackingOptions(RecordingOptions):
     settings: Path | None = option("FILE.yaml")
     seed: int = option(read=at_least(0), default=0)
     hands: bool = option(default=False)
+    causal: bool = option(default=False)
 
     @property
     def statures_m(self) -> tuple[float, ...]:

@@ -114,6 +114,7 @@ def track_one(
         "has_points": has_points,
         "has_people": has_people,
         "has_hands": request.hands is not None,
+        "is_smoothed": request.lag_s > 0.0,
     }
     kept = KeptResults(asked.recording, **has)
     observers = (kept,) if show is not None or any(derived) else ()

@@ -38,6 +38,7 @@ from cardbox_tracker.recordings.recording import STEREO, RecordingRequest, Segme
 from cardbox_tracker.recordings.silhouettes import TimeSpan
 from cardbox_tracker.search.config import PRESETS, TrackerConfig, read_settings
 from cardbox_tracker.tracking.session import MOST_PEOPLE
+from cardbox_tracker.tracking.smoother import LAG_S
 
 S = TypeVar("S")
 T = TypeVar("T")
@@ -100,6 +101,7 @@ class TrackingRequest:
     inputs: tuple[Path, ...]  #: files and folders that are read, which no result may replace
     #: network file that finds the points of hands; None if they are not measured
     hands: Path | None = None
+    lag_s: float = LAG_S  #: seconds of later images that count for an image
     files: TrackFiles = TrackFiles()  #: results to write
     force: bool = False  #: whether an existing bag is replaced
 
@@ -232,9 +234,10 @@ def tracking_request(asked: TrackingOptions, faults: Iterable[str] = ()) -> Trac
     config = problems.caught(lambda: _config(asked, preset), preset)
     hands = problems.caught(installed_hands, None) if asked.hands else None
     problems.check()
-    return TrackingRequest(
-        recording, person, asked.preset, config, asked.seed, inputs_of(asked), hands
-    )
+    given = recording, person, asked.preset, config, asked.seed, inputs_of(asked), hands
+    # The paper's filter is what the paper says.
+    lag_s = 0.0 if asked.causal or asked.preset == "paper" else LAG_S
+    return TrackingRequest(*given, lag_s)
 
 
 def _tracking_faults(

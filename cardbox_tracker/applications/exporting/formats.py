@@ -199,7 +199,7 @@ class Result(Results):
         pandas = optional("pandas", "to_pandas needs the library pandas", "pandas")
         times = {"stamp_ns": self.stamp_ns, "time_s": self.time_s, "state": self.state}
         found = {**times, **self.numbers, **self.texts}
-        return pandas.DataFrame({name: found[name] for name in units(*[True] * 3) if name in found})
+        return pandas.DataFrame({name: found[name] for name in units(*[True] * 4) if name in found})
 
     def save(self, path: str | os.PathLike[str]) -> list[str]:
         """Write, or replace, a file in the format of its ending; return lines about it.
