@@ -63,10 +63,11 @@ _PRIORS = np.array([*_LIMBS.values(), *_BREADTHS.values()])
 _LEAST_SCORE = 0.5
 # Speeds are of points smoothed over this time, s, and count to this many deviations.
 _SMOOTH_S, _MOST_SPEED = 0.07, 3.0
-# Share of the longest overlap from which on an offset is tried, and how many are.
-_LEAST_SHARE, _MOST_PEAKS = 0.2, 4
+# Time in which a movement ends, s, and independent movements of a body; offsets that are tried, and
+# how surely speeds agree there, in what chance gives.
+_MOVE_S, _MOVING, _MOST_OFFSETS, _SURE = 0.2, 4.0, 2, 1.1
 # Images of each person that count, and the time in which people keep posture and errors, s.
-_MOST_IMAGES, _SAME_S = 60, 0.5
+_MOST_IMAGES, _COARSE_IMAGES, _SAME_S = 60, 15, 0.5
 # Deviations of points in the first and the second fit, and of bones in an image, statures. Joints
 # on the far side of the body, which it hides, are this many times less sure.
 _COARSE, _POINT, _BONE, _HIDDEN = 0.03, 0.008, 0.01, 10.0
@@ -207,7 +208,9 @@ def film_cameras(films: Sequence[Film], statures_m: Sequence[float]) -> list[Fil
     alone = [_alone(first, film, tall_m) for film in films[1:]]
     fixed = np.array([_is_given(film) for film in films[1:]])
     rows = np.array([one.unknowns for one in alone])
-    moments = _moments(films, [one.who for one in alone], [0.0, *rows[:, _OFFSET]], tall_m)
+    moments = _moments(
+        films, [one.who for one in alone], [0.0, *rows[:, _OFFSET]], tall_m, _MOST_IMAGES
+    )
     fit = _Fit(moments, fixed, np.array([one.offsets_s for one in alone]).T)
     whole, solution = fit.run(rows.ravel(), _POINT)
     covariance = np.linalg.inv(solution.information[0])
@@ -259,7 +262,7 @@ class _Alone(NamedTuple):
 def _alone(first: Film, film: Film, tall_m: Sequence[float]) -> _Alone:
     best, least = None, math.inf
     for offset_s, within_s, who in _offsets(first, film):
-        moments = _moments((first, film), (who,), (0.0, offset_s), tall_m)
+        moments = _moments((first, film), (who,), (0.0, offset_s), tall_m, _COARSE_IMAGES)
         limits = offset_s - within_s, offset_s + within_s
         fit = _Fit(moments, _is_given(film)[None], np.array(limits)[:, None])
         for start in _starts(first, film, who, offset_s, tall_m):
@@ -277,7 +280,10 @@ def _alone(first: Film, film: Film, tall_m: Sequence[float]) -> _Alone:
 
 
 def _lags(one: Seen, other: Seen, step_s: float) -> tuple[FloatArray, FloatArray]:
-    """Return offsets of the other film, s, and how surely the speeds agree with each."""
+    """Return offsets of the other film, s, and how surely speeds agree there, in what chance gives.
+
+    The largest of n independent correlations of chance is sqrt(2 ln n) deviations.
+    """
     (ours, ours_known), (theirs, theirs_known) = one.speeds(step_s), other.speeds(step_s)
 
     def summed(a: FloatArray, b: FloatArray) -> FloatArray:
@@ -288,20 +294,19 @@ def _lags(one: Seen, other: Seen, step_s: float) -> tuple[FloatArray, FloatArray
     count = summed(ours_known, theirs_known)
     norm = summed(ours**2, theirs_known) * summed(ours_known, theirs**2)
     alike = summed(ours, theirs) / np.sqrt(np.maximum(norm, 1e-9))
-    shared = correlate(*(known.any(axis=1).astype(float) for known in (ours_known, theirs_known)))
-    least = max(LEAST_IMAGES * max(one.period_s, other.period_s) / step_s, 2.0)
-    is_long = (shared >= least) & (count >= _LEAST_SHARE * count.max())
+    joints = max(1.0, float((ours_known.mean(axis=0) * theirs_known.mean(axis=0)).sum()))
+    shared_s = np.maximum(count, 0.0) / joints * step_s
+    is_long = shared_s >= LEAST_IMAGES * max(one.period_s, other.period_s)
+    chance = math.sqrt(2.0 * math.log(max(2.0, is_long.sum() * step_s / _MOVE_S)))
+    sure = np.where(is_long, alike * np.sqrt(_MOVING * shared_s / _MOVE_S) / chance, 0.0)
     lags = (np.arange(len(count)) - (len(theirs) - 1)) * step_s
-    sure = np.where(is_long, alike * np.sqrt(np.maximum(count, 0.0)), 0.0)
     return lags + one.times_s[0] - other.times_s[0], sure
 
 
 def _offsets(first: Film, film: Film) -> Iterator[tuple[float, float, Who]]:
-    """Yield likely offsets of a film, s, to half an image, s, with who is who."""
-    everybody = [one for one in (*first.people, *film.people) if len(one.times_s) > 1]
-    if not everybody:
-        return
-    step_s = max(one.period_s for one in everybody) / 2.0
+    """Yield likely offsets of a film, s, to half an image, s, and who is who."""
+    everybody = [one for one in (*first.people, *film.people) if len(one.times_s) > 2]
+    step_s = max((one.period_s for one in everybody), default=1.0) / 2.0
     curves = {
         (a, b): _lags(one, other, step_s)
         for a, one in enumerate(first.people)
@@ -311,7 +316,7 @@ def _offsets(first: Film, film: Film) -> Iterator[tuple[float, float, Who]]:
     tried = [] if film.offset_s is None else [film.offset_s]
     for lags, sure in curves.values() if film.offset_s is None else ():
         peaks = 1 + np.flatnonzero((sure[1:-1] > sure[:-2]) & (sure[1:-1] >= sure[2:]))
-        tried += lags[peaks[np.argsort(-sure[peaks])[:_MOST_PEAKS]]].tolist()
+        tried += lags[peaks[sure[peaks] > _SURE]].tolist()
     found = list[tuple[float, float, Who]]()
     for offset_s in tried:
         gains = np.zeros((len(first.people), len(film.people)))
@@ -324,7 +329,7 @@ def _offsets(first: Film, film: Film) -> Iterator[tuple[float, float, Who]]:
             found.append((sum(gains[pair] for pair in pairs), offset_s, who))
     taken = list[float]()
     for _, offset_s, who in sorted(found, key=lambda one: -one[0]):
-        if len(taken) < _MOST_PEAKS and all(abs(offset_s - one) > step_s for one in taken):
+        if len(taken) < _MOST_OFFSETS and all(abs(offset_s - one) > _MOVE_S for one in taken):
             taken.append(offset_s)
             yield offset_s, 0.0 if film.offset_s is not None else step_s, who
 
@@ -394,7 +399,11 @@ class _Moments(NamedTuple):
 
 
 def _moments(
-    films: Sequence[Film], who: Sequence[Who], offsets_s: Sequence[float], tall_m: Sequence[float]
+    films: Sequence[Film],
+    who: Sequence[Who],
+    offsets_s: Sequence[float],
+    tall_m: Sequence[float],
+    most: int,
 ) -> list[_Moments]:
     """Return images of the people who are in at least two films."""
     found = []
@@ -413,7 +422,7 @@ def _moments(
             is_shared |= (one.times_s >= begin_s) & (one.times_s <= end_s)
         times_s = one.times_s[is_shared]
         if len(times_s) > 1:
-            chosen = np.unique(np.linspace(0, len(times_s) - 1, _MOST_IMAGES).astype(int))
+            chosen = np.unique(np.linspace(0, len(times_s) - 1, most).astype(int))
             independent = 1.0 + float(np.ptp(times_s)) / _SAME_S
             weight = min(1.0, independent / len(chosen))
             found.append(_Moments(times_s[chosen], seen, weight, tall_m[number]))
@@ -555,7 +564,7 @@ class _Fit:
             ends_m = points.places_m[:, _ENDS]
             length_m = np.linalg.norm(ends_m[:, :, 0] - ends_m[:, :, 1], axis=-1)
             off_m = length_m - np.exp(unknowns[first + _LENGTHS])
-            is_seen = (points.sure > 0.0).any(axis=0)[:, _ENDS].all(axis=-1)
+            is_seen = (points.sure.max(axis=0)[:, _ENDS] > 0.0).all(axis=-1)
             rows += [away.ravel(), (off_m / deviation_m * is_seen).ravel()]
             weights.append(np.full(away.size + off_m.size, one.weight))
             lengths += [np.full(away.size, -1), np.tile(first + _LENGTHS, len(off_m))]
