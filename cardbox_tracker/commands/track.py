@@ -176,7 +176,8 @@ def _derived(
     if asked.report is not None and video is not None:
         named = {f"Person {k}" if summary.people else "Person": one for k, one in people.items()}
         lines = (*summary.assumptions, *summary.remarks, *summary.accounts)
-        write_page(asked.report, video, f"Posture in {asked.recording.name}", named, lines)
+        title = f"Posture in {asked.recording.name}"
+        write_page(asked.report, video, title, named, lines, summary.cameras)
         yield f"wrote {asked.report}"
     for form, path in exports.items():
         for number, results in people.items():
@@ -195,6 +196,14 @@ def _account(summary: TrackSummary) -> dict[str, Any]:
         "remarks": summary.remarks,
         "cameras": summary.accounts,
     }
+    if summary.cameras:
+        found["extrinsics"] = {
+            name: {
+                "rotation": one.rotation.tolist(),
+                "translation_m": one.translation_m.tolist(),
+            }
+            for name, one in summary.cameras.items()
+        }
     if summary.people:
         found["people"] = {number: _account(one) for number, one in summary.people.items()}
     return found

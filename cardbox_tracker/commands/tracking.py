@@ -49,7 +49,10 @@ def track(
         print_remarks(one for one in source.first.remarks if one not in early)
         accounts = tuple(one.account for one in source.sources)
         assumptions = tuple(_assumptions(request, scene, source))
-    summary = replace(summary, accounts=accounts, assumptions=assumptions, scene=scene)
+        poses = [other.extrinsics for other in source.others]
+        cameras = dict(zip(source.names[1:], poses, strict=True))
+    more = {"assumptions": assumptions, "scene": scene, "cameras": cameras}
+    summary = replace(summary, accounts=accounts, **more)
     print_remarks(summary.remarks)
     if show is None:
         print(*_lines(summary), sep="\n")
@@ -59,7 +62,7 @@ def track(
     if files.scene is not None:
         save_scene(scene, files.scene)
     one = summary.people.get(person.number, summary)
-    names = "remarks", "accounts", "assumptions", "scene", "people"
+    names = "remarks", "accounts", "people", *more
     return replace(one, **{name: getattr(summary, name) for name in names})
 
 

@@ -63,9 +63,11 @@ _PRIORS = np.array([*_LIMBS.values(), *_BREADTHS.values()])
 _LEAST_SCORE = 0.5
 # Speeds are of points smoothed over this time, s, and count to this many deviations.
 _SMOOTH_S, _MOST_SPEED = 0.07, 3.0
-# Time in which a movement ends, s, and independent movements of a body; offsets that are tried, and
-# how surely speeds agree there, in what chance gives.
-_MOVE_S, _MOVING, _MOST_OFFSETS, _SURE = 0.2, 4.0, 2, 1.1
+# Movements of arms, legs and trunk that are independent.
+_MOVING = 4.0
+# Offsets that are tried, and the time between them, s; how surely speeds agree there, in what
+# chance gives, and from where on nobody needs to look.
+_MOST_OFFSETS, _APART_S, _SURE, _CLEAR = 2, 0.2, 1.2, 1.6
 # Images of each person that count, and the time in which people keep posture and errors, s.
 _MOST_IMAGES, _COARSE_IMAGES, _SAME_S = 60, 15, 0.5
 # Deviations of points in the first and the second fit, and of bones in an image, statures. Joints
@@ -170,6 +172,7 @@ class FilmCamera:
         place_stddev_m: standard deviation of the place, along the axis where it is largest.
         halves: angle, rad, and distance, m, between the poses by the two halves of the time.
         is_doubtful: whether these differ by more than the deviations tell.
+        is_clear: whether the offset is given, or surely none of chance.
     """
 
     extrinsics: Extrinsics
@@ -179,6 +182,7 @@ class FilmCamera:
     place_stddev_m: float
     halves: tuple[float, float]
     is_doubtful: bool
+    is_clear: bool
 
     def __str__(self) -> str:
         turn_deg, place_m = math.degrees(self.turn_stddev_rad), self.place_stddev_m
@@ -216,8 +220,13 @@ def film_cameras(films: Sequence[Film], statures_m: Sequence[float]) -> list[Fil
     covariance = np.linalg.inv(solution.information[0])
     halves = [fit.half(k).run(whole, _POINT)[0] for k in range(2)]
     return [
-        _camera(film.name, [one[_of(k)] for one in (whole, *halves)], covariance[_of(k), _of(k)])
-        for k, film in enumerate(films[1:])
+        _camera(
+            film.name,
+            [values[_of(k)] for values in (whole, *halves)],
+            covariance[_of(k), _of(k)],
+            one.is_clear,
+        )
+        for k, (film, one) in enumerate(zip(films[1:], alone, strict=True))
     ]
 
 
@@ -231,7 +240,9 @@ def _is_given(film: Film) -> BoolArray:
     return given
 
 
-def _camera(name: str, rows: Sequence[FloatArray], covariance: FloatArray) -> FilmCamera:
+def _camera(
+    name: str, rows: Sequence[FloatArray], covariance: FloatArray, is_clear: bool
+) -> FilmCamera:
     """Return a film's camera by its unknowns (7,) of the whole time and of both halves."""
     poses = [Extrinsics.of_vectors(row[_TURN], row[_MOVE], name) for row in rows]
     halves = poses[1].difference(poses[2])
@@ -248,20 +259,29 @@ def _camera(name: str, rows: Sequence[FloatArray], covariance: FloatArray) -> Fi
         place,
         halves,
         is_doubtful,
+        is_clear,
     )
 
 
 class _Alone(NamedTuple):
-    """One film beside the first one: unknowns (7,), limits of its offset, s, and who is who."""
+    """One film beside the first one.
+
+    Attributes:
+        unknowns: (7,).
+        offsets_s: limits of its offset, s.
+        who: who is who.
+        is_clear: whether the offset is surely none of chance.
+    """
 
     unknowns: FloatArray
     offsets_s: tuple[float, float]
     who: Who
+    is_clear: bool
 
 
 def _alone(first: Film, film: Film, tall_m: Sequence[float]) -> _Alone:
     best, least = None, math.inf
-    for offset_s, within_s, who in _offsets(first, film):
+    for offset_s, within_s, who, is_clear in _offsets(first, film):
         moments = _moments((first, film), (who,), (0.0, offset_s), tall_m, _COARSE_IMAGES)
         limits = offset_s - within_s, offset_s + within_s
         fit = _Fit(moments, _is_given(film)[None], np.array(limits)[:, None])
@@ -269,7 +289,7 @@ def _alone(first: Film, film: Film, tall_m: Sequence[float]) -> _Alone:
             values, found = fit.run(start, _COARSE)
             cost = float(found.total[0]) / fit.count(values)
             if cost < least:
-                best, least = _Alone(values[:_OF_CAMERA], limits, who), cost
+                best, least = _Alone(values[:_OF_CAMERA], limits, who, is_clear), cost
     if best is None:
         raise CameraError(
             f"{film.name} and {first.name} do not show the same people at one time, or not for "
@@ -282,7 +302,9 @@ def _alone(first: Film, film: Film, tall_m: Sequence[float]) -> _Alone:
 def _lags(one: Seen, other: Seen, step_s: float) -> tuple[FloatArray, FloatArray]:
     """Return offsets of the other film, s, and how surely speeds agree there, in what chance gives.
 
-    The largest of n independent correlations of chance is sqrt(2 ln n) deviations.
+    The largest of n independent correlations of chance is sqrt(2 ln n) deviations. What is
+    independent follows from the autocorrelations of both (Bartlett, "On the theoretical
+    specification and sampling properties of autocorrelated time-series", 1946).
     """
     (ours, ours_known), (theirs, theirs_known) = one.speeds(step_s), other.speeds(step_s)
 
@@ -297,13 +319,17 @@ def _lags(one: Seen, other: Seen, step_s: float) -> tuple[FloatArray, FloatArray
     joints = max(1.0, float((ours_known.mean(axis=0) * theirs_known.mean(axis=0)).sum()))
     shared_s = np.maximum(count, 0.0) / joints * step_s
     is_long = shared_s >= LEAST_IMAGES * max(one.period_s, other.period_s)
-    chance = math.sqrt(2.0 * math.log(max(2.0, is_long.sum() * step_s / _MOVE_S)))
-    sure = np.where(is_long, alike * np.sqrt(_MOVING * shared_s / _MOVE_S) / chance, 0.0)
+    both = [summed(x, x) for x in (ours, theirs)]
+    reach = min(len(ours), len(theirs)) - 1
+    own = [one[len(one) // 2 :][: reach + 1] / max(one.max(), 1e-9) for one in both]
+    same_s = step_s * max(1.0, 2.0 * float((own[0] * own[1]).sum()) - 1.0)
+    chance = math.sqrt(2.0 * math.log(max(2.0, is_long.sum() * step_s / same_s)))
+    sure = np.where(is_long, alike * np.sqrt(_MOVING * shared_s / same_s) / chance, 0.0)
     lags = (np.arange(len(count)) - (len(theirs) - 1)) * step_s
     return lags + one.times_s[0] - other.times_s[0], sure
 
 
-def _offsets(first: Film, film: Film) -> Iterator[tuple[float, float, Who]]:
+def _offsets(first: Film, film: Film) -> Iterator[tuple[float, float, Who, bool]]:
     """Yield likely offsets of a film, s, to half an image, s, and who is who."""
     everybody = [one for one in (*first.people, *film.people) if len(one.times_s) > 2]
     step_s = max((one.period_s for one in everybody), default=1.0) / 2.0
@@ -328,10 +354,11 @@ def _offsets(first: Film, film: Film) -> Iterator[tuple[float, float, Who]]:
             who = tuple(same.get(a) for a in range(len(first.people)))
             found.append((sum(gains[pair] for pair in pairs), offset_s, who))
     taken = list[float]()
-    for _, offset_s, who in sorted(found, key=lambda one: -one[0]):
-        if len(taken) < _MOST_OFFSETS and all(abs(offset_s - one) > _MOVE_S for one in taken):
+    is_given = film.offset_s is not None
+    for sure, offset_s, who in sorted(found, key=lambda one: -one[0]):
+        if len(taken) < _MOST_OFFSETS and all(abs(offset_s - one) > _APART_S for one in taken):
             taken.append(offset_s)
-            yield offset_s, 0.0 if film.offset_s is not None else step_s, who
+            yield offset_s, 0.0 if is_given else step_s, who, is_given or sure > _CLEAR
 
 
 def _starts(

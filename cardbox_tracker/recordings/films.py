@@ -5,6 +5,7 @@ Each film is read once. What the detector finds, and small images, are kept for 
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import NamedTuple
@@ -25,6 +26,9 @@ from cardbox_tracker.measuring.film_cameras import (
 from cardbox_tracker.person.proportions import USUAL_STATURE_M
 from cardbox_tracker.person.sizes import FloatArray
 from cardbox_tracker.recordings.silhouettes import RecordedFrame, SilhouetteSource
+
+# Deviation of a rotation from which on it is doubtful, degrees.
+_SURE_DEG = 3.0
 
 
 @dataclass
@@ -87,10 +91,18 @@ class PlacedFilm(NamedTuple):
                 f"{self.name} overlaps with {first} from {begin_s:.2f} to {end_s:.2f} of "
                 f"{lasts_s:.2f} s; the rest is tracked without it"
             )
-        if self.camera.is_doubtful:
+        if not self.camera.is_clear:
             yield (
-                f"where the camera of {self.name} stands is doubtful: {self.camera}; film people "
-                "who walk about in view of both cameras, or give --extrinsics"
+                f"people in {self.name} and {first} move alike hardly more than by chance if it "
+                f"begins at {self.camera.offset_s:.2f} s: check that both show the same people at "
+                "one time, and give --offset if it is known"
+            )
+        turn_deg = math.degrees(self.camera.turn_stddev_rad)
+        if self.camera.is_doubtful or turn_deg > _SURE_DEG:
+            yield (
+                f"where the camera of {self.name} stands is doubtful, to {turn_deg:.0f} degrees "
+                f"and {self.camera.place_stddev_m:.2f} m: film people who walk about, near to the "
+                "cameras, or give --extrinsics"
             )
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Mapping, Sequence
 from pathlib import Path
+from types import MappingProxyType
 from urllib.parse import quote
 
 import numpy as np
@@ -12,6 +13,7 @@ import numpy as np
 from cardbox_tracker.applications.drawing.page import png_of, render_page
 from cardbox_tracker.applications.exporting.markers import markers_of
 from cardbox_tracker.applications.exporting.motion import Motion, floor_below, in_reference
+from cardbox_tracker.camera.extrinsics import Extrinsics
 from cardbox_tracker.person.isb_angles import LABORATORY
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.sizes import FloatArray
@@ -133,6 +135,31 @@ def space_view(motion: Motion, body: BodyModel | None, true_m: FloatArray | None
     return png_of(figure)
 
 
+def cameras_view(
+    motion: Motion, body: BodyModel | None, cameras: Mapping[str, Extrinsics]
+) -> bytes:
+    """Return the cameras and the way of the hips from above as PNG, the first camera below."""
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(5.0, 5.0), dpi=_DPI, layout="constrained")
+    axes = figure.subplots()
+    markers = markers_of(motion, body)
+    hips_m = _upright(markers.points_m[motion.is_seen, markers.names.index("Hip")])
+    axes.plot(hips_m[:, 0], hips_m[:, 1], color=_TRUNK, linewidth=1.5)
+    first = Extrinsics(np.eye(3), np.zeros(3))
+    for name, pose in {"first camera": first, **cameras}.items():
+        ends_m = np.array([pose.centre_m, pose.centre_m + 0.5 * pose.rotation[2]])
+        ends_m = _upright((in_reference(ends_m, body) - floor_below(body)) @ LABORATORY.T)
+        axes.plot(*ends_m[:, :2].T, color="black", linewidth=2)
+        axes.plot(*ends_m[0, :2], color="black", marker="o")
+        axes.annotate(name, ends_m[0, :2], (6, 6), textcoords="offset points", fontsize=9)
+    axes.set(xlabel="to the right [m]", ylabel="away from the first camera [m]")
+    axes.set_aspect("equal", "datalim")
+    axes.margins(0.2)
+    axes.grid(alpha=0.3)
+    return png_of(figure)
+
+
 def _bones() -> list[tuple[str, str, str]]:
     bones = [("Hip", "Neck", _TRUNK)]
     for side, colour in (("L", _LEFT), ("R", _RIGHT)):
@@ -151,11 +178,17 @@ _MOST_SPANS = 20
 
 
 def write_page(
-    path: Path, film: Path, title: str, people: Mapping[str, Results], lines: Sequence[str]
+    path: Path,
+    film: Path,
+    title: str,
+    people: Mapping[str, Results],
+    lines: Sequence[str],
+    cameras: Mapping[str, Extrinsics] = MappingProxyType({}),
 ) -> None:
     """Write the page, which needs no other file than the ``film``, named relative to it.
 
-    It has the results of ``people`` by a heading, and ``lines`` on what they rest on. Raises
+    It has the results of ``people`` by a heading, ``lines`` on what they rest on, and shows the
+    further ``cameras`` from above. Raises
     CardboxError if the file cannot be written.
     """
     render_page(
@@ -165,18 +198,20 @@ def write_page(
         film=quote(os.path.relpath(film, path.parent)),
         film_name=film.name,
         start_s=min(float(results.time_s[0]) for results in people.values()),
-        people=[_person(name, results) for name, results in people.items()],
+        people=[_person(name, results, cameras) for name, results in people.items()],
         lines=lines,
     )
 
 
-def _person(name: str, results: Results) -> dict[str, object]:
+def _person(name: str, results: Results, cameras: Mapping[str, Extrinsics]) -> dict[str, object]:
     images, sure = len(results.state), results.state.count(TRACKING)
     seen = Motion.of(results) if np.isfinite(results.of(["torso_y"])).any() else None
     spans = sorted(doubtful_spans(results), key=lambda span: span[0] - span[1])
     pictures = {"angles over time, with a standard deviation": angles_plot(results)}
     if seen is not None:
         pictures = {"skeleton from aside": space_view(seen, results.body)} | pictures
+    if seen is not None and cameras:
+        pictures["cameras and hips from above"] = cameras_view(seen, results.body, cameras)
     return {
         "name": name,
         "words": f"{images} images, {sure} of them sure ({sure / images:.0%})",
