@@ -51,8 +51,9 @@ def track(
         assumptions = tuple(_assumptions(request, scene, source))
         poses = [other.extrinsics for other in source.others]
         cameras = dict(zip(source.names[1:], poses, strict=True))
-    more = {"assumptions": assumptions, "scene": scene, "cameras": cameras}
-    summary = replace(summary, accounts=accounts, **more)
+    summary = replace(
+        summary, accounts=accounts, assumptions=assumptions, scene=scene, cameras=cameras
+    )
     print_remarks(summary.remarks)
     if show is None:
         print(*_lines(summary), sep="\n")
@@ -62,7 +63,7 @@ def track(
     if files.scene is not None:
         save_scene(scene, files.scene)
     one = summary.people.get(person.number, summary)
-    names = "remarks", "accounts", "people", *more
+    names = "remarks", "accounts", "assumptions", "scene", "cameras", "people"
     return replace(one, **{name: getattr(summary, name) for name in names})
 
 

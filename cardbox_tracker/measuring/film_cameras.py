@@ -358,7 +358,7 @@ def _offsets(first: Film, film: Film) -> Iterator[tuple[float, float, Who, bool]
     for sure, offset_s, who in sorted(found, key=lambda one: -one[0]):
         if len(taken) < _MOST_OFFSETS and all(abs(offset_s - one) > _APART_S for one in taken):
             taken.append(offset_s)
-            yield offset_s, 0.0 if is_given else step_s, who, is_given or sure > _CLEAR
+            yield offset_s, 0.0 if is_given else step_s, who, is_given or bool(sure > _CLEAR)
 
 
 def _starts(

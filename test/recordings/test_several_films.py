@@ -2,15 +2,22 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import cv2
 import numpy as np
 import pytest
 
 from cardbox_tracker.camera.camera import Camera
 from cardbox_tracker.camera.extrinsics import Extrinsics
-from cardbox_tracker.common.errors import CameraError
+from cardbox_tracker.commands.main import build_parser
+from cardbox_tracker.commands.request import Request, TrackArguments
+from cardbox_tracker.commands.tracking_request import points_named, tracking_request
+from cardbox_tracker.common.errors import CameraError, CardboxError
 from cardbox_tracker.detectors.image_points import LEG_POINT_NAMES, POINT_NAMES, ImagePoints
 from cardbox_tracker.measuring.film_cameras import Film, FilmCamera, Seen, film_cameras
+from cardbox_tracker.recordings.given_camera import GivenCamera
+from cardbox_tracker.recordings.recording import FurtherFilm, RecordingRequest
 
 CAMERA = Camera(320, 240, 280.0, 280.0, 159.5, 119.5)
 STATURE_M, OFFSET_S = 1.7, 0.37
@@ -28,7 +35,10 @@ def skeleton(times_s: np.ndarray, seed: int) -> np.ndarray:
     """Return 25 points (n, 25, 3), m, of a person who walks and waves, right, down, away."""
     rng, shares = np.random.default_rng(seed), {}
     # Sums of waves that do not repeat.
-    phase = 2 * np.pi * np.multiply.outer(times_s, rng.uniform(0.2, 1.5, (12, 6)))
+    hz = rng.uniform(0.2, 1.5, (12, 6))
+    # People turn and walk slower than they wave.
+    hz[:3] *= 0.2
+    phase = 2 * np.pi * np.multiply.outer(times_s, hz)
     angle = np.sin(phase + rng.uniform(0.0, 6.0, (12, 6))).sum(axis=-1) / 3.0
     yaw = 0.6 * angle[:, 0]
     across, none = np.stack([np.cos(yaw), 0 * yaw, np.sin(yaw)], -1), np.zeros(len(yaw))
@@ -68,7 +78,7 @@ def film(
     pose: Extrinsics,
     begins_s: float,
     hz: float,
-    seed: int = 0,
+    seed: int = 1,
     noise_px: float = 0.3,
     seconds: float = 8.0,
     **given: object,
@@ -143,8 +153,8 @@ def test_three_films_stand_in_one_frame() -> None:
 
 def test_people_of_two_films_are_found_in_each_other() -> None:
     true = other_camera(60.0)
-    one = [film("a", FIRST, 0.0, 15.0, seed).people[0] for seed in (0, 1)]
-    two = [film("b", true, OFFSET_S, 15.0, seed).people[0] for seed in (1, 0)]
+    one = [film("a", FIRST, 0.0, 15.0, seed).people[0] for seed in (1, 2)]
+    two = [film("b", true, OFFSET_S, 15.0, seed).people[0] for seed in (2, 1)]
     (found,) = film_cameras([Film("a", one), Film("b", two)], (STATURE_M,))
     check_pose(found, true, degrees=2.0, share=0.05)
 
@@ -152,7 +162,7 @@ def test_people_of_two_films_are_found_in_each_other() -> None:
 @pytest.mark.parametrize(
     "other",
     [
-        film("b.mp4", other_camera(60.0), 0.0, 30.0, seed=7),
+        film("b.mp4", other_camera(60.0), 0.0, 30.0, seed=8),
         film("b.mp4", other_camera(60.0), 0.0, 30.0, seconds=0.6),
         Film("b.mp4", []),
     ],
@@ -161,3 +171,94 @@ def test_people_of_two_films_are_found_in_each_other() -> None:
 def test_films_of_something_else_are_refused(other: Film) -> None:
     with pytest.raises(CameraError, match=r"b\.mp4 and a\.mp4.*--offset"):
         film_cameras([film("a.mp4", FIRST, 0.0, 30.0), other], (STATURE_M,))
+
+
+class Numbered:
+    """Finds the person of a film whose images have nothing but a number; counts the images."""
+
+    def __init__(self, films: list[tuple[Extrinsics, float, float]]) -> None:
+        self.found, self.calls = list[list[dict[str, list[float]]]](), 0
+        for pose, begins_s, hz in films:
+            there_m = skeleton(begins_s + np.arange(0.0, 8.0, 1.0 / hz), 1) @ pose.rotation.T
+            there_m += pose.translation_m
+            values = np.concatenate(
+                [CAMERA.project(there_m), np.ones((*there_m.shape[:2], 1)), there_m], axis=-1
+            )
+            self.found.append([dict(zip(NAMES, one.tolist(), strict=True)) for one in values])
+
+    def detect(self, image: np.ndarray) -> list[dict[str, list[float]]]:
+        self.calls += 1
+        which, number = divmod(int(image[0, 0, 0]), 128)
+        return [self.found[which][number]]
+
+
+@pytest.fixture(scope="module")
+def folders(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path]:
+    """Return two folders of images of one scene, at 15 and 12 Hz."""
+    paths = []
+    for which, count in enumerate((120, 96)):
+        path = tmp_path_factory.mktemp("ab"[which])
+        for number in range(count):
+            image = np.full((CAMERA.height, CAMERA.width), 128 * which + number, np.uint8)
+            cv2.imwrite(str(path / f"{number:03}.png"), image)
+        paths.append(path)
+    return paths[0], paths[1]
+
+
+def test_films_are_one_recording_whose_images_are_detected_once(
+    folders: tuple[Path, Path],
+) -> None:
+    true, fov_deg = other_camera(60.0), float(np.degrees(2 * np.arctan(160.0 / 280.0)))
+    own = Numbered([(FIRST, 0.0, 15.0), (true, OFFSET_S, 12.0)])
+    detector = points_named(own)
+    cameras = [GivenCamera(fov_deg=fov_deg, fps=hz) for hz in (15.0, 12.0)]
+    request = RecordingRequest(
+        folders[0],
+        detector,
+        points=detector,
+        camera=cameras[0],
+        films=(FurtherFilm(folders[1], cameras[1]),),
+        statures_m=(STATURE_M,),
+    )
+    with request.open() as recording:
+        check_pose(recording.films[0].camera, true, degrees=2.0, share=0.05)
+        sets = list(recording.frames())
+        again = [one.stamp_ns for one in recording.frames(2.0, 4.0)]
+        remarks = " ".join(recording.films[0].remarks("a", recording.first.duration_s))
+    assert own.calls == 120 + 96
+    assert [one.stamp_ns for one in sets] == [round(1e9 * k / 15.0) for k in range(120)]
+    assert all(2e9 <= stamp_ns <= 4e9 for stamp_ns in again)
+    assert len(again) == 31
+    pairs = [one.frames for one in sets if one.frames[1] is not None]
+    # The other film begins 0.37 s later and has fewer images, each of which is used once.
+    assert len({two.recorded.name for _, two in pairs if two and two.recorded}) == len(pairs) > 85
+    apart_ns = [abs(one.stamp_ns - two.stamp_ns) for one, two in pairs if one and two]
+    assert max(apart_ns) <= 0.5e9 / 15.0
+    assert "overlaps with a from 0.3" in remarks
+
+
+@pytest.mark.parametrize(
+    ("options", "fault"),
+    [
+        ({"fov_deg": (60.0, 43.0, 40.0)}, r"--fov has 3 values.*one for each film"),
+        ({"offset_s": (0.1, 0.2)}, r"--offset has 2 values"),
+        ({"cameras": ("cam0", "cam1")}, r"--cameras.*several films"),
+        ({"camera_roll_deg": 90.0}, r"--camera-roll-deg.*several films"),
+        ({"films": ("missing.mp4",)}, r"no recording missing\.mp4"),
+        ({"detector": None}, r"--detector mediapipe"),
+    ],
+)
+def test_options_that_do_not_fit_several_films_are_told(
+    folders: tuple[Path, Path], options: dict[str, object], fault: str
+) -> None:
+    given = {"films": (folders[1],), "fov_deg": 60.0, "stature_m": 1.7, "detector": Numbered([])}
+    with pytest.raises(CardboxError, match=fault):
+        tracking_request(Request(folders[0], **(given | options)))  # type: ignore[arg-type]
+
+
+def test_the_command_takes_further_films() -> None:
+    words = ["track", "a.mp4", "b.mp4", "c.mp4", "--fov", "60,43,43", "--offset", "0.4,-1.2"]
+    asked = TrackArguments.of(build_parser(words).parse_args(words))
+    assert (str(asked.recording), *map(str, asked.films)) == ("a.mp4", "b.mp4", "c.mp4")
+    assert asked.fovs_deg == (60.0, 43.0, 43.0)
+    assert asked.offset_s == (0.4, -1.2)
