@@ -91,6 +91,15 @@ def _statures(given: Any) -> tuple[float, ...]:
     return tuple(map(float, parts if isinstance(parts, Iterable) else (parts,)))
 
 
+def _fovs(given: Any) -> float | tuple[float, ...]:
+    found = _statures(given)
+    return found[0] if len(found) == 1 else found
+
+
+def _films(given: Any) -> tuple[Path, ...]:
+    return tuple(map(Path, (given,) if isinstance(given, str | os.PathLike) else given))
+
+
 def _people(given: Any) -> int | str:
     if given == AUTO:
         return AUTO
@@ -143,7 +152,8 @@ class RecordingOptions(Options):
             of the one whose results are used, if not all are
         fov_deg: field of view across the width of the image as it is shown: webcams 60 to 78,
             phones 60 to 75 held sideways and 36 to 46 upright. Without it, what a phone wrote into
-            the file, or else, with --detector, 65 degrees along the longer side
+            the file, or else, with --detector, 65 degrees along the longer side. Of several films,
+            one value for all, or one each
         calibration: in place of --fov: file of camera_calibration, OpenCV's FileStorage or Kalibr
         webcam: in place of --fov: name of a usual webcam, such as C920, with its field of view
         camera_roll_deg: how far the camera is turned clockwise, seen from behind it, 180 if its top
@@ -170,12 +180,21 @@ class RecordingOptions(Options):
     person: str | tuple[float, float] | int | PersonChoice | None = option(
         "left|right|largest|X,Y|K", _person_choice
     )
-    fov_deg: float | None = option("DEG", flag="--fov")
+    fov_deg: float | tuple[float, ...] | None = option(
+        "DEG[,DEG...]",
+        parsed(_fovs, "degrees, or those of each film as in 60,43"),
+        flag="--fov",
+    )
     calibration: Path | None = option("FILE")
     webcam: str | None = option("NAME")
     camera_roll_deg: float | None = option("R", between(-_MOST_ROLL_DEG, _MOST_ROLL_DEG))
     mirrored: bool = option(default=False)
     fps: float | None = option("HZ", between(0.0, _MOST_FPS))
+
+    @property
+    def fovs_deg(self) -> tuple[float, ...]:
+        """The fields of view that are given, in the order of the films."""
+        return () if self.fov_deg is None else _statures(self.fov_deg)
 
 
 @dataclass(frozen=True)
@@ -262,6 +281,10 @@ class Request(TrackingOptions):
     The fields are the options of ``cardbox track``. Raises CardboxError if a value is wrong.
 
     Attributes:
+        films: further films of the same people, one of each camera, with --detector: when they
+            begin, and where the cameras stand, is found from the people (docs/two-cameras.md)
+        offset_s: when each further film begins, seconds from the beginning of the first one;
+            negative if it begins before (default: found)
         csv: table to write, one row per image (docs/results.md); by default it has the name of the
             recording and is in the current folder. OUT.body.yaml beside it is the body that was
             used
@@ -276,6 +299,14 @@ class Request(TrackingOptions):
         force: replace results that exist; without it, refuse
     """
 
+    films: tuple[Path, ...] = option(
+        "FILM", parsed(_films, "paths of films"), default=(), flag="films", type=str, nargs="*"
+    )
+    offset_s: tuple[float, ...] | None = option(
+        "S[,S...]",
+        flag="--offset",
+        read=parsed(_statures, "seconds, or those of each further film as in 0.4,-1.2"),
+    )
     csv: Path | None = option("OUT.csv|OUT.parquet")
     bag: Path | None = option("OUT")
     video: Path | None = option("OUT.mp4")

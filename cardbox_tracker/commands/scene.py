@@ -175,7 +175,7 @@ def _bodies(
 def _corrected(recording: RecordingRequest, found: SceneCamera) -> RecordingRequest:
     """Return the recording with roll and field of view that were found and are not given."""
     given = recording.camera
-    if len(recording.cameras) > 1:
+    if len(recording.cameras) > 1 or recording.films:
         return recording
     if given.roll_rad is None and found.roll_rad.mean:
         given = replace(given, roll_rad=found.roll_rad.mean)

@@ -41,13 +41,20 @@ def track(
     with measured_scene(recording, person, request.config, request.seed) as (source, scene):
         # Hands and the overlay are seen at the resolution of the recording.
         source.first.has_pictures = request.hands is not None or files.video is not None
+        lasts_s = source.first.duration_s
+        early = [one for film in source.films for one in film.remarks(source.names[0], lasts_s)]
+        print_remarks(early)
         early = source.first.remarks
         print_remarks(_with_unknown(early, person))
         summary = _tracked(request, source, scene, observers, show)
         print_remarks(one for one in source.first.remarks if one not in early)
         accounts = tuple(one.account for one in source.sources)
-        assumptions = tuple(_assumptions(request, scene))
-    summary = replace(summary, accounts=accounts, assumptions=assumptions, scene=scene)
+        assumptions = tuple(_assumptions(request, scene, source))
+        poses = [other.extrinsics for other in source.others]
+        cameras = dict(zip(source.names[1:], poses, strict=True))
+    summary = replace(
+        summary, accounts=accounts, assumptions=assumptions, scene=scene, cameras=cameras
+    )
     print_remarks(summary.remarks)
     if show is None:
         print(*_lines(summary), sep="\n")
@@ -57,7 +64,7 @@ def track(
     if files.scene is not None:
         save_scene(scene, files.scene)
     one = summary.people.get(person.number, summary)
-    names = "remarks", "accounts", "assumptions", "scene", "people"
+    names = "remarks", "accounts", "assumptions", "scene", "cameras", "people"
     return replace(one, **{name: getattr(summary, name) for name in names})
 
 
@@ -123,12 +130,13 @@ def _with_unknown(remarks: Sequence[str], person: PersonRequest) -> list[str]:
     return [unknown, *others]
 
 
-def _assumptions(request: TrackingRequest, scene: Scene) -> Iterator[str]:
+def _assumptions(request: TrackingRequest, scene: Scene, source: Recording) -> Iterator[str]:
     """Yield camera, place and stature with where they are from."""
     person = request.person
     yield from scene.words()
-    source = "given" if person.model is None else f"from {person.model.name}"
-    distance = "found" if "distance_m" in person.body.unknown else source
+    yield from (f"{film.name} {film.camera}" for film in source.films)
+    origin = "given" if person.model is None else f"from {person.model.name}"
+    distance = "found" if "distance_m" in person.body.unknown else origin
     for number, body in enumerate(scene.people, 1):
         whose = "" if person.people is None else f" of person {number}"
         yield f"distance{whose} {body.placement.distance_m:.2f} m ({distance})"
@@ -138,7 +146,7 @@ def _assumptions(request: TrackingRequest, scene: Scene) -> Iterator[str]:
     elif person.model is None:
         yield f"stature {USUAL_STATURE_M:.2f} m (the mean of adults), sizes from proportions"
     else:
-        yield f"sizes {source}"
+        yield f"sizes {origin}"
 
 
 def _writers(request: TrackingRequest, source: Recording, stack: ExitStack) -> Iterator[Observer]:

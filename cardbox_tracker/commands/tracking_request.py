@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import Any, NamedTuple, TypeVar
 
 from cardbox_tracker.camera.pairing import camera_names
-from cardbox_tracker.commands.request import AUTO, RecordingOptions, TrackingOptions
+from cardbox_tracker.commands.request import AUTO, RecordingOptions, Request, TrackingOptions
 from cardbox_tracker.common.errors import CardboxError
 from cardbox_tracker.common.extensions import DETECTORS, extensions, loaded
 from cardbox_tracker.common.settings import NoEffectError, nested
@@ -34,7 +34,7 @@ from cardbox_tracker.person.proportions import USUAL_STATURE_M
 from cardbox_tracker.recordings.given_camera import FOV_HINT, GivenCamera
 from cardbox_tracker.recordings.open_images import check_exists, is_bag, is_film, tells_lens
 from cardbox_tracker.recordings.other_silhouettes import PersonInView, Within
-from cardbox_tracker.recordings.recording import STEREO, RecordingRequest, Segmentation
+from cardbox_tracker.recordings.recording import STEREO, FurtherFilm, RecordingRequest, Segmentation
 from cardbox_tracker.recordings.silhouettes import TimeSpan
 from cardbox_tracker.search.config import PRESETS, TrackerConfig, read_settings
 from cardbox_tracker.tracking.session import MOST_PEOPLE
@@ -175,11 +175,39 @@ def recording_request(
         asked.depth,
         _following(points, asked.person, people),
         camera,
+        _further(asked, camera, problems),
+        asked.statures_m if isinstance(asked, TrackingOptions) else (),
     )
     problems.add(*request.faults())
-    if asked.extrinsics is not None and len(names) < 2:
+    if asked.extrinsics is not None and len(names) < 2 and not request.films:
         problems.add("--extrinsics has no effect with one camera: name several with --cameras")
     return request
+
+
+def _films(asked: RecordingOptions) -> tuple[Path, ...]:
+    """Return the further films, which only a Request has."""
+    return asked.films if isinstance(asked, Request) else ()
+
+
+def _further(
+    asked: RecordingOptions, camera: GivenCamera, problems: Problems
+) -> tuple[FurtherFilm, ...]:
+    """Return the further films that are asked for, each with its camera and offset."""
+    if not isinstance(asked, Request):
+        return ()
+    count = len(asked.films)
+    fovs_deg = asked.fovs_deg[1:] if len(asked.fovs_deg) > 1 else (camera.fov_deg,) * count
+    offsets_s: tuple[float | None, ...] = asked.offset_s or (None,) * count
+    if len(fovs_deg) != count:
+        problems.add(f"--fov has {len(asked.fovs_deg)} values: give one, or one for each film")
+    if len(offsets_s) != count:
+        problems.add(f"--offset has {len(offsets_s)} values: give one for each further film")
+    for path in asked.films:
+        problems.caught(partial(check_exists, path), None)
+    return tuple(
+        FurtherFilm(path, replace(camera, fov_deg=fov_deg), offset_s)
+        for path, fov_deg, offset_s in zip(asked.films, fovs_deg, offsets_s, strict=False)
+    )
 
 
 def _person_faults(person: object, people: int | None, has_detector: bool) -> Iterator[str]:
@@ -206,7 +234,7 @@ def _following(source: Any, person: object, people: int | None) -> Any:
 def inputs_of(asked: RecordingOptions) -> tuple[Path, ...]:
     """Return the files and folders that the options of a recording or of tracking name."""
     names = "recording", "extrinsics", "calibration", "detector", "model", "scene", "settings"
-    given = (getattr(asked, name, None) for name in names)
+    given = (*(getattr(asked, name, None) for name in names), *_films(asked))
     # A detector may also be a word, which names no file, or an object.
     return tuple(Path(path) for path in given if path and isinstance(path, str | Path))
 
@@ -234,16 +262,16 @@ def tracking_request(asked: TrackingOptions, faults: Iterable[str] = ()) -> Trac
     config = problems.caught(lambda: _config(asked, preset), preset)
     hands = problems.caught(installed_hands, None) if asked.hands else None
     problems.check()
-    given = recording, person, asked.preset, config, asked.seed, inputs_of(asked), hands
+    of = recording, person, asked.preset, config, asked.seed, inputs_of(asked), hands
     # The paper's filter is what the paper says.
     lag_s = 0.0 if asked.causal or asked.preset == "paper" else LAG_S
-    return TrackingRequest(*given, lag_s)
+    return TrackingRequest(*of, lag_s)
 
 
 def _tracking_faults(
     asked: TrackingOptions, people: int | None, has_detector: bool
 ) -> Iterator[str]:
-    is_more = len(asked.cameras) > 1 or asked.depth is not None
+    is_more = len(asked.cameras) > 1 or asked.depth is not None or bool(_films(asked))
     if is_more and not PRESETS[asked.preset]().has_several_views:
         yield (
             f"--preset {asked.preset} uses the silhouette of one camera; give --preset default "
@@ -271,7 +299,10 @@ def _tracking_faults(
 def _camera(asked: RecordingOptions, problems: Problems) -> GivenCamera:
     roll_deg = asked.camera_roll_deg
     roll_rad = None if roll_deg is None else math.radians(roll_deg)
-    given = asked.fov_deg, asked.calibration, roll_rad, asked.fps, asked.mirrored, asked.webcam
+    if len(asked.fovs_deg) > 1 and not _films(asked):
+        problems.add("--fov has several values: give one, or several films")
+    fov_deg = asked.fovs_deg[0] if asked.fovs_deg else None
+    given = fov_deg, asked.calibration, roll_rad, asked.fps, asked.mirrored, asked.webcam
     camera = GivenCamera(*given)
     if not (camera.is_calibrated or _is_guessed(asked) or tells_lens(asked.recording)):
         hint = f"--fov is across the width of the image: {FOV_HINT}"

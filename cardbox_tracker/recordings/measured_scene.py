@@ -4,21 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from functools import partial
 from typing import NamedTuple
 
 import numpy as np
 
 from cardbox_tracker.camera.camera import Camera
-from cardbox_tracker.detectors.figure import Figure, figure_of_points
-from cardbox_tracker.detectors.identity import (
-    GONE_NS,
-    cheapest,
-    colours_in,
-    learned,
-    unlike,
-)
 from cardbox_tracker.detectors.image_points import ImagePoints
 from cardbox_tracker.measuring.first_sight import upper_body
 from cardbox_tracker.measuring.people_camera import Distances
@@ -26,7 +18,7 @@ from cardbox_tracker.measuring.scene_camera import Picture
 from cardbox_tracker.measuring.scene_watch import MOST_PICTURES, Spread
 from cardbox_tracker.measuring.seen_body import MOST_SIGHTS, SeenBody
 from cardbox_tracker.person.model import BodyModel
-from cardbox_tracker.person.sizes import FloatArray
+from cardbox_tracker.recordings.films import Person, assign
 from cardbox_tracker.recordings.recording import FrameSet, Recording
 from cardbox_tracker.recordings.silhouettes import RecordedFrame
 from cardbox_tracker.search.config import TrackerConfig
@@ -50,12 +42,12 @@ def watch(recording: Recording, start_s: float = 0.0, end_s: float = math.inf) -
     for source in recording.sources:
         source.keep_images()
     frames, pictures = Spread[RecordedFrame](MOST_SIGHTS), Spread[Picture](MOST_PICTURES)
-    people: list[_Person] = []
+    people: list[Person] = []
     for taken in recording.frames(start_s, end_s):
         frame = taken.first
         frames.add(partial(_whole, frame))
         pictures.add(partial(_picture, taken))
-        _assign(people, frame, taken.time_s)
+        assign(people, frame, taken.time_s)
     for source in recording.sources:
         source.has_pictures = False
     return Watched(frames.items, pictures.items, [one.seen for one in people])
@@ -69,41 +61,6 @@ def _whole(frame: RecordedFrame) -> RecordedFrame | None:
 def _picture(taken: FrameSet) -> Picture:
     assert taken.picture is not None
     return taken.time_s, taken.picture()
-
-
-@dataclass
-class _Person:
-    """Somebody whom a detector sees in a recording: points so far, last figure, colours."""
-
-    figure: Figure | None = None
-    colours: FloatArray | None = None
-    seen: list[tuple[float, ImagePoints]] = field(default_factory=list)
-
-
-def _assign(people: list[_Person], frame: RecordedFrame, time_s: float) -> None:
-    """Add the points in a frame to the people who they are by place and colours, or to new ones."""
-    shown = list[tuple[ImagePoints, Figure, FloatArray | None]]()
-    for points in frame.people if frame.people is not None else (frame.points,):
-        if points is not None:
-            figure = figure_of_points(points)
-            trunk = figure.trunk(frame.silhouette.shape) & frame.silhouette
-            shown.append((points, figure, colours_in(frame.image, trunk)))
-    # Who was away for longer may be somebody else with the same clothes.
-    known = [(one, round(1e9 * (time_s - one.seen[-1][0]))) for one in people]
-    known = [(one, away_ns) for one, away_ns in known if 0 < away_ns <= GONE_NS]
-    costs = [
-        [unlike(one.figure, one.colours, figure, their, ns) for _, figure, their in shown]
-        for one, ns in known
-    ]
-    found = {column: known[row][0] for row, column in cheapest(costs).items()}
-    for column, (points, figure, colours) in enumerate(shown):
-        if column not in found:
-            people.append(_Person())
-        person = found.get(column, people[-1])
-        person.seen.append((time_s, points))
-        person.figure = figure
-        if colours is not None:
-            person.colours = learned(person.colours, colours)
 
 
 def seen_person(

@@ -367,6 +367,8 @@ class SilhouetteSource:
 
     def keep_images(self) -> None:
         """Keep small images of the next pass in a file for passes without pictures."""
+        if self._file is not None:
+            return
         self._file = TemporaryFile()  # noqa: SIM115
         weakref.finalize(self, self._file.close)
 

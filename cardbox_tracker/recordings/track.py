@@ -14,6 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from cardbox_tracker.camera.extrinsics import Extrinsics
 from cardbox_tracker.common.errors import CardboxError
 from cardbox_tracker.measuring.scene import Scene
 from cardbox_tracker.person.kinematics import pose
@@ -48,6 +49,8 @@ class TrackSummary:
     #: what the results rest on, with its numbers and where they are from.
     assumptions: tuple[str, ...] = ()
     scene: Scene | None = None  #: camera, floor and people
+    #: poses of further cameras relative to the first one, by name
+    cameras: Mapping[str, Extrinsics] = field(default_factory=dict)
     #: in how many images each optional input was used, by its name.
     used: Mapping[str, int] = field(default_factory=dict)
     quality: tuple[str, ...] = ()  #: see :meth:`Quality.lines`; empty for several people

@@ -7,6 +7,7 @@ from collections import Counter
 from collections.abc import Mapping, Sequence
 from itertools import compress
 from pathlib import Path
+from types import MappingProxyType
 from urllib.parse import quote
 
 import numpy as np
@@ -14,6 +15,7 @@ import numpy as np
 from cardbox_tracker.applications.drawing.page import png_of, render_page
 from cardbox_tracker.applications.exporting.markers import markers_of
 from cardbox_tracker.applications.exporting.motion import Motion, floor_below, in_reference
+from cardbox_tracker.camera.extrinsics import Extrinsics
 from cardbox_tracker.person.isb_angles import ANATOMICAL_NAMES, LABORATORY, anatomical_angles
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.sizes import FloatArray
@@ -156,6 +158,31 @@ def space_view(motion: Motion, body: BodyModel | None, true_m: FloatArray | None
     return png_of(figure)
 
 
+def cameras_view(
+    motion: Motion, body: BodyModel | None, cameras: Mapping[str, Extrinsics]
+) -> bytes:
+    """Return the cameras and the way of the hips from above as PNG, the first camera below."""
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(5.0, 5.0), dpi=_DPI, layout="constrained")
+    axes = figure.subplots()
+    markers = markers_of(motion, body)
+    hips_m = _upright(markers.points_m[motion.is_seen, markers.names.index("Hip")])
+    axes.plot(hips_m[:, 0], hips_m[:, 1], color=_TRUNK, linewidth=1.5)
+    first = Extrinsics(np.eye(3), np.zeros(3))
+    for name, pose in {"first camera": first, **cameras}.items():
+        ends_m = np.array([pose.centre_m, pose.centre_m + 0.5 * pose.rotation[2]])
+        ends_m = _upright((in_reference(ends_m, body) - floor_below(body)) @ LABORATORY.T)
+        axes.plot(*ends_m[:, :2].T, color="black", linewidth=2)
+        axes.plot(*ends_m[0, :2], color="black", marker="o")
+        axes.annotate(name, ends_m[0, :2], (6, 6), textcoords="offset points", fontsize=9)
+    axes.set(xlabel="to the right [m]", ylabel="away from the first camera [m]")
+    axes.set_aspect("equal", "datalim")
+    axes.margins(0.2)
+    axes.grid(alpha=0.3)
+    return png_of(figure)
+
+
 def _bones() -> list[tuple[str, str, str]]:
     bones = [("Hip", "Neck", _TRUNK)]
     for side, colour in (("L", _LEFT), ("R", _RIGHT)):
@@ -179,13 +206,14 @@ def write_page(
     title: str,
     people: Mapping[str, tuple[Results, TrackSummary]],
     lines: Sequence[str],
+    cameras: Mapping[str, Extrinsics] = MappingProxyType({}),
     hides_heads: bool = False,
 ) -> None:
     """Write the page, which needs no other file than the ``film``, named relative to it.
 
     It has the results of ``people`` with their summaries by a heading, and ``lines`` on what they
-    rest on; ``hides_heads`` says that no face is in the film. Raises CardboxError if the file
-    cannot be written.
+    rest on, and shows the further ``cameras`` from above; ``hides_heads`` says that no face is in
+    the film. Raises CardboxError if the file cannot be written.
     """
     render_page(
         path,
@@ -194,18 +222,22 @@ def write_page(
         film=quote(os.path.relpath(film, path.parent)),
         film_name=film.name,
         start_s=min(float(results.time_s[0]) for results, _ in people.values()),
-        people=[_person(name, *of) for name, of in people.items()],
+        people=[_person(name, *of, cameras) for name, of in people.items()],
         lines=lines,
         hides_heads=hides_heads,
     )
 
 
-def _person(name: str, results: Results, summary: TrackSummary) -> dict[str, object]:
+def _person(
+    name: str, results: Results, summary: TrackSummary, cameras: Mapping[str, Extrinsics]
+) -> dict[str, object]:
     seen = Motion.of(results) if np.isfinite(results.of(["torso_y"])).any() else None
     spans = sorted(doubtful_spans(results), key=lambda span: span[0] - span[1])
     pictures = {"angles over time, with a standard deviation": angles_plot(results)}
     if seen is not None:
         pictures = {"skeleton from aside": space_view(seen, results.body)} | pictures
+    if seen is not None and cameras:
+        pictures["cameras and hips from above"] = cameras_view(seen, results.body, cameras)
     return {
         "name": name,
         "words": summary.quality,
