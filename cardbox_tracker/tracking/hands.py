@@ -31,7 +31,7 @@ from typing import Protocol
 import cv2
 import numpy as np
 
-from cardbox_tracker.camera.camera import Camera
+from cardbox_tracker.camera.camera import NEAREST_M, Camera
 from cardbox_tracker.detectors.detector import color
 from cardbox_tracker.detectors.hand_network import FINGERS, WRIST, HandPoints
 from cardbox_tracker.detectors.image_points import POINT_INDEX, ImagePoints
@@ -41,7 +41,7 @@ from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.proportions import WRIST_SHARE
 from cardbox_tracker.person.sizes import FloatArray
 from cardbox_tracker.person.skeleton import FRAME_NAMES, KeypointState, turn_of
-from cardbox_tracker.tracking.estimate import HAND_KEYPOINTS, Estimate, Hand
+from cardbox_tracker.tracking.estimate import HAND_KEYPOINTS, KEPT_S, Estimate, Hand
 
 # A finger is open if its end is bent by less than the first angle from the direction of its base,
 # and closed if by more than the second, with their spread, rad.
@@ -68,8 +68,6 @@ _ELBOWS = {"left": slice(6, 8), "right": slice(10, 12)}
 _SQUARE, _PALM_M = 2.4, 0.09
 # Least score of the points that place the square.
 _LEAST_SCORE = 0.3
-# Time for which a hand that is not found keeps its result, s.
-_KEPT_S = 0.5
 # Bases of index, middle, ring and little finger from the wrist, in lengths of the palm: aside to
 # the little finger, and ahead. They are means of the network's own points.
 _BASES = [*range(_INDEX, _LITTLE + 1, 4)]
@@ -144,7 +142,7 @@ class HandReader:
 
     def _kept(self, side: str, estimate: Estimate, time_s: float) -> Hand | None:
         seen_s, hand = self._seen.get(side, (-np.inf, None))
-        is_new = 0.0 <= time_s - seen_s <= _KEPT_S
+        is_new = 0.0 <= time_s - seen_s <= KEPT_S
         return hand if is_new and is_tracked(estimate, side) else None
 
 
@@ -174,7 +172,7 @@ def hand_square(
         return None
     hand = np.mean(knuckles, axis=0) - wrist
     depth_m = float(estimate.keypoints_m[_KEYPOINTS[side], 2])
-    palm_px = max(hypot(*hand), camera.fx * _PALM_M / max(depth_m, 0.1))
+    palm_px = max(hypot(*hand), camera.fx * _PALM_M / max(depth_m, NEAREST_M))
     # A hand that points to the camera has no direction in the image.
     along = hand + 0.2 * (wrist - elbow)
     angle = float(np.arctan2(along[0], -along[1]))
