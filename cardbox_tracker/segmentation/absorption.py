@@ -32,8 +32,6 @@ _SPACING_NS = 50_000_000
 # docs/evaluation/silhouettes.md has the shares of objects and people.
 STILL = 0.08
 _NEAR_PX = 8
-# Smoothing blurs an edge, and colours are compared at half the resolution.
-_EDGE_PX = 5
 
 
 class StillRegions:
@@ -155,7 +153,7 @@ class Absorber:
         if self._things is not None:
             things = self._things & found
             if things.any():
-                around = cv2.dilate(things.astype(np.uint8), _disk(_EDGE_PX)) > 0
+                around = cv2.dilate(things.astype(np.uint8), _disk(_NEAR_PX)) > 0
                 others = (self._others > 0) & ~things
                 absorbed = around & ~others, self._learner.model()
         self._things = found if found.any() else None

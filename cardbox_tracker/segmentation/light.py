@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from cardbox_tracker.common.array_checks import ANY, check_array
 from cardbox_tracker.common.compiling import kernel
-from cardbox_tracker.segmentation.chroma import bgr_of
+from cardbox_tracker.segmentation.chroma import DARKEST, bgr_of
 from cardbox_tracker.segmentation.regions import SQUARE, flooded
 from cardbox_tracker.segmentation.window import Window
 
@@ -34,8 +34,6 @@ _GRID = (slice(1, None, 4), slice(1, None, 4))
 # standard deviation of two cells.
 _CELLS = (20, 15)
 _GAUSSIAN = cv2.getGaussianKernel(17, 2.0, cv2.CV_32F)
-# Darker pixels carry no information about the light, grey levels.
-_DARKEST = 10.0
 # A field within this of 1 is ignored.
 _SAME = 0.004
 # Weights of blue, green and red in the brightness.
@@ -101,7 +99,7 @@ class LightFollower:
         self._size = self._small.shape[1], self._small.shape[0]
         self._mean = mean
         blocks = cv2.resize(mean, self._size, interpolation=cv2.INTER_AREA)
-        self._blocks = np.maximum(blocks, np.float32(_DARKEST))
+        self._blocks = np.maximum(blocks, np.float32(DARKEST))
         self._now, self._scaled = np.empty_like(mean), np.empty_like(mean)
         channels = mean[None]
         if chroma is not None:
@@ -111,7 +109,7 @@ class LightFollower:
         self._brightest = self._channels.max(axis=0)
         brightest = self._brightest.reshape(mean.shape)[_GRID]
         # Ratios of dark pixels are noise, so these are never used.
-        self._small_brightest = np.where(self._small > _DARKEST, brightest, np.inf).astype(
+        self._small_brightest = np.where(self._small > DARKEST, brightest, np.inf).astype(
             np.float32
         )
         self._highest = float(self._brightest.max())

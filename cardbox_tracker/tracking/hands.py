@@ -46,17 +46,11 @@ from cardbox_tracker.tracking.estimate import HAND_KEYPOINTS, KEPT_S, Estimate, 
 # A finger is open if its end is bent by less than the first angle from the direction of its base,
 # and closed if by more than the second, with their spread, rad.
 _OPEN, _CLOSED, _SPREAD = np.radians([80.0, 45.0, 8.0])
-# The thumb is open if its end is straight, and far from the base of the little finger: bend and its
-# spread, rad; distance in lengths of the palm and its spread.
-_THUMB, _THUMB_SPREAD, _THUMB_FAR, _THUMB_FAR_SPREAD = *np.radians([60.0, 5.0]), 0.78, 0.057
-# A thumb that is farther from the base of the middle finger is not part of a fist.
-_THUMB_OUT, _THUMB_OUT_SPREAD = 0.74, 0.03
-# The thumb alone never makes an open hand a closed one.
-_LEAST_BY_THUMB = 0.1
-# Box around a hand relative to that around its points: a closed one, and how much less an open one.
-_BOX, _BOX_LESS = 1.35, 0.21
-LEAST_PX = 17.0
-"""A hand whose box has a smaller longer side is neither open nor closed for the network."""
+# The thumb is open if its end is farther from the base of the little finger, and no part of a fist
+# if it is farther from that of the middle finger; lengths of the palm, and their spread.
+_THUMB_FAR, _THUMB_OUT, _THUMB_SPREAD = 0.78, 0.74, 0.057
+# A hand whose points have a smaller longer side is neither open nor closed for the network, px.
+_LEAST_PX = 12.6
 
 # Points at the bases of index, middle and little finger.
 _INDEX, _MIDDLE, _LITTLE = 5, 9, 17
@@ -292,19 +286,15 @@ def _length(at: FloatArray) -> float:
 def opened(found: HandPoints) -> float | None:
     """Return how open a hand is, see :class:`~.estimate.Hand`; None if it is too small."""
     at = found.spatial_m
-    bends = [_finger_bend(at, 1 + 4 * number) for number in range(len(FINGERS))]
+    bends = [_finger_bend(at, 1 + 4 * number) for number in range(1, len(FINGERS))]
     far, out = (
         float(np.linalg.norm(at[4] - at[base])) / _length(at) for base in (_LITTLE, _MIDDLE)
     )
-    fingers = np.array(bends[1:])
-    thumb = (_THUMB - bends[0]) / _THUMB_SPREAD + (far - _THUMB_FAR) / _THUMB_FAR_SPREAD
-    is_open = min(_chance((_OPEN - fingers.max()) / _SPREAD), max(_chance(thumb), _LEAST_BY_THUMB))
-    is_out = _chance((out - _THUMB_OUT) / _THUMB_OUT_SPREAD)
-    is_closed = min(
-        _chance((fingers.min() - _CLOSED) / _SPREAD), max(1.0 - is_out, _LEAST_BY_THUMB)
-    )
+    far, out = (far - _THUMB_FAR) / _THUMB_SPREAD, (out - _THUMB_OUT) / _THUMB_SPREAD
+    is_open = _chance(min((_OPEN - max(bends)) / _SPREAD, far))
+    is_closed = _chance(min((min(bends) - _CLOSED) / _SPREAD, -out))
     value = (1.0 + is_open - is_closed) / 2
-    return value if found.size_px * (_BOX - _BOX_LESS * value) >= LEAST_PX else None
+    return value if found.size_px >= _LEAST_PX else None
 
 
 def _finger_bend(at: FloatArray, base: int) -> float:

@@ -24,6 +24,7 @@ import numpy as np
 from cardbox_tracker.camera.camera import NEAREST_M, Camera
 from cardbox_tracker.common.compiling import borrowing_kernel, inlined_kernel, kernel
 from cardbox_tracker.common.least_squares import (
+    DIFFERENCE,
     ENDS,
     Equations,
     Solution,
@@ -112,9 +113,7 @@ _POINT_M, _POINT_PX = 0.010, 1.0
 _STDDEVS = np.array([*np.radians([60.0, 40.0, 15.0]), 0.15, 0.15, 0.10])
 _STARTS = np.zeros((5, 6))
 _STARTS[1:, :2] = np.radians([(45.0, 0.0), (-45.0, 0.0), (0.0, 35.0), (0.0, -35.0)])
-_LARGEST_STEP = np.array([0.5, 0.5, 0.5, 0.2, 0.2, 0.2])
-_RULES = rules_of(6, inverse=_STDDEVS**-2.0, largest=_LARGEST_STEP)
-_DIFFERENCE = 1e-6
+_RULES = rules_of(6, inverse=_STDDEVS**-2.0)
 
 _SMOOTHING_S = 0.15
 _DRIFT_RAD_S = 1.0
@@ -208,7 +207,7 @@ def _write_residuals(values: Floats, given: _Given, residuals: Floats) -> None:
 @kernel
 def _solve(given: _Given) -> Equations:
     """Return the equations of the best values from each start."""
-    rows = given, 2 * given[3].shape[0], _DIFFERENCE
+    rows = given, 2 * given[3].shape[0], DIFFERENCE
     return minimize_compiled(_write_residuals, rows, _STARTS, _RULES, ENDS)
 
 
