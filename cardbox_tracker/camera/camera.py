@@ -31,6 +31,8 @@ WORKING_SIZE = (320, 240)
 """Working size (width, height), px, of images of 4:3; others have as many pixels."""
 # The kernels draw rows of pixels fastest if their number is a multiple of this.
 _MULTIPLE_PX = 8
+NEAREST_M = 0.1
+"""Depth of points that are nearer to a camera, or behind it, when they are projected, m."""
 OPTICAL_FRAME = "camera_optical_frame"
 """Name of the optical frame of a camera that has none."""
 CALIBRATED, GIVEN_FIELD_OF_VIEW = 0.005, 0.03

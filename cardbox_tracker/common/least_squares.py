@@ -32,6 +32,11 @@ Rules = tuple[Floats, Floats, Floats, Floats, Floats, Floats]
 
 PRIOR = "prior"
 """Name of the prior among the costs."""
+ENDS = 8, 1e-3
+"""Steps of small fits, and the share of its cost from which on a step that gains less is the last
+one."""
+DIFFERENCE = 1e-5
+"""Change of an unknown for the derivatives by it."""
 # Change of the diagonal's factor after a step, and its largest value.
 _FACTOR, _LARGEST_FACTOR = 4.0, 4.0**8
 # Least square of a pivot: what no residual depends on stays.

@@ -39,8 +39,10 @@ COCO_NAMES = (*POINT_NAMES[:13], "left_knee", "right_knee", "left_ankle", "right
 """The 17 points of COCO in its order."""
 
 _FARTHEST = 1e6
-# Score of a certain point, and share of certain points that shows a person.
-_CERTAIN, _SHARE = 0.5, 0.5
+CERTAIN = 0.5
+"""Score from which a point is certain."""
+# Share of certain points that shows a person.
+_SHARE = 0.5
 
 POINT_INDEX = {name: index for index, name in enumerate(POINT_NAMES)}
 
@@ -68,7 +70,7 @@ class LegPoints(NamedTuple):
     @property
     def are_certain(self) -> bool:
         """Whether a knee and an ankle are."""
-        return bool((self.scores[:4].reshape(2, 2).max(axis=1) >= _CERTAIN).all())
+        return bool((self.scores[:4].reshape(2, 2).max(axis=1) >= CERTAIN).all())
 
     def exchanged(self) -> LegPoints:
         """Return the points with left and right exchanged."""
@@ -162,7 +164,7 @@ class ImagePoints:
 
     def apart_px(self, other: ImagePoints) -> float:
         """Return the mean distance of points that are certain in both; infinite without any."""
-        is_certain = np.minimum(self.scores, other.scores) >= _CERTAIN
+        is_certain = np.minimum(self.scores, other.scores) >= CERTAIN
         away_px = np.linalg.norm(self.px - other.px, axis=1)[is_certain]
         return float(away_px.mean()) if len(away_px) else float("inf")
 
@@ -173,7 +175,7 @@ class ImagePoints:
         """
 
         def moved(points: Any, others: Any) -> FloatArray:
-            is_certain = np.minimum(points.scores, others.scores) >= _CERTAIN
+            is_certain = np.minimum(points.scores, others.scores) >= CERTAIN
             step = np.where(is_certain[:, None], points.px - others.px, 0.0)
             return np.asarray(points.px + share * step)
 
@@ -185,7 +187,7 @@ class ImagePoints:
     @property
     def are_certain(self) -> bool:
         """Whether at least half of the points are certain."""
-        return float(np.mean(self.scores >= _CERTAIN)) >= _SHARE
+        return float(np.mean(self.scores >= CERTAIN)) >= _SHARE
 
     @property
     def is_empty(self) -> bool:

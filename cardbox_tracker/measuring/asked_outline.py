@@ -18,7 +18,13 @@ from cardbox_tracker.camera.rasterisation import render
 from cardbox_tracker.common.errors import InitializationError
 from cardbox_tracker.measuring.config import InitializationConfig
 from cardbox_tracker.measuring.outline import filled
-from cardbox_tracker.measuring.references import POSTURE_TEXT, Silhouette, lateral_m, rounded_down
+from cardbox_tracker.measuring.references import (
+    COARSE_PX,
+    POSTURE_TEXT,
+    Silhouette,
+    lateral_m,
+    rounded_down,
+)
 from cardbox_tracker.person.cardbox import cardbox_patches
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.posture import REFERENCE_NAMES, reference_posture
@@ -34,9 +40,7 @@ STATURES_M = (1.3, 1.45, 1.6, 1.75, 1.9)
 FITS, NEARLY, FAR = "fits", "nearly", "far"
 """A capture would be accepted without a warning, or almost; or another posture is shown."""
 
-_WIDTH_PX = 80
 _SOME_IOU = 0.40
-_LEAST_PX = 20
 
 
 class _Outline(NamedTuple):
@@ -53,7 +57,7 @@ class LiveFit:
     def __init__(self, camera: Camera, config: InitializationConfig) -> None:
         """Draw the outlines of people at the distance of ``config``."""
         self.camera, self.config = camera, config
-        self._cell = max(1, camera.width // _WIDTH_PX)
+        self._cell = max(1, camera.width // COARSE_PX)
         grid = camera.scaled(camera.width // self._cell, camera.height // self._cell)
         # The canvas is larger than the image, so that no outline is cut off.
         wide = replace(
@@ -82,7 +86,7 @@ class LiveFit:
         # Holes are filled at full resolution, because narrow parts break on the grid.
         seen = filled(silhouette)[half :: self._cell, half :: self._cell] > 0
         ious = dict.fromkeys(REFERENCE_NAMES, 0.0)
-        if np.count_nonzero(seen) < _LEAST_PX:
+        if not seen.any():
             return ious
         crown = int(np.argmax(seen.any(axis=1)))
         column = _middle_column(seen)

@@ -19,7 +19,8 @@ from cardbox_tracker.camera.camera import Camera
 from cardbox_tracker.camera.extrinsics import Extrinsics
 from cardbox_tracker.camera.view import OtherCamera, View
 from cardbox_tracker.common.errors import CameraError, InitializationError
-from cardbox_tracker.measuring.camera_pose import PoseProblem, Sighting
+from cardbox_tracker.measuring.camera_pose import STEPS, PoseProblem, Sighting
+from cardbox_tracker.measuring.references import COARSE_PX
 from cardbox_tracker.person.kinematics import pose
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.parts import body_parts
@@ -35,13 +36,11 @@ from cardbox_tracker.terms.term import Silhouette
 from cardbox_tracker.terms.whole_body import WholeBodyCost
 from cardbox_tracker.terms.whole_body_config import WholeBodyCostConfig
 
-_WIDTH = 80
 _YAWS_RAD = np.radians(np.arange(-180.0, 180.0, 7.5))
 _PITCHES_RAD = np.radians([-20.0, -10.0, 0.0, 10.0, 20.0, 30.0])
 _DISTANCES_M = np.geomspace(1.0, 5.0, 12)
 # Number of refined guesses, and their least difference in rad and metres.
 _BEST, _APART_RAD, _APART_M = 4, 0.3, 0.5
-_STEPS = 8
 # A silhouette with less intersection over union shows another posture or no person.
 _LEAST_IOU = 0.5
 
@@ -74,7 +73,7 @@ def guessed_extrinsics(
         try:
             problem = PoseProblem(body, first, other, guess, sightings)
             found = guess
-            for _ in range(_STEPS):
+            for _ in range(STEPS):
                 found, cost = problem.step(found)
             improved.append((cost, found))
         except (CameraError, np.linalg.LinAlgError):
@@ -96,7 +95,7 @@ def _best_guesses(
     seen: Mapping[str, Silhouette],
 ) -> list[Extrinsics]:
     """Return the best guesses that differ from each other."""
-    camera = other.with_pitch(0.0).scaled(_WIDTH, round(_WIDTH * other.height / other.width))
+    camera = other.with_pitch(0.0).scaled(COARSE_PX, round(COARSE_PX * other.height / other.width))
     size = camera.width, camera.height
     small = {
         name: np.asarray(cv2.resize(mask, size, interpolation=cv2.INTER_AREA)) > 127

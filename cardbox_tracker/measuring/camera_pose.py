@@ -37,6 +37,8 @@ from cardbox_tracker.terms.whole_body import WholeBodyCost
 from cardbox_tracker.terms.whole_body_config import WholeBodyCostConfig
 
 N_POSE = 6
+STEPS = 6
+"""Steps (:meth:`PoseProblem.step`) to a pose."""
 ROTATION = (0, 1, 2)
 """Indices of a change that rotate the camera."""
 

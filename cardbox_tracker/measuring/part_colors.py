@@ -23,7 +23,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from cardbox_tracker.camera.camera import Camera
+from cardbox_tracker.camera.camera import NEAREST_M, Camera
 from cardbox_tracker.person.appearance import (
     COLOR_STEPS,
     FOREARM,
@@ -59,8 +59,6 @@ LEARNED_FROM = ("front", "arms")
 # Additional label for the skin of the face, and its share in the histogram of the hand.
 _FACE = len(PARTS)
 _FACE_SHARE = 0.5
-# Least depth of drawn points.
-_NEAREST_M = 0.1
 # Least number of pixels from which a part is learned.
 _MIN_PX = 40
 # Factors on the light in which one image of a part is counted, because limbs that move are lit
@@ -208,7 +206,7 @@ def part_labels(
     def pixels(points_m: FloatArray) -> FloatArray:
         optical = camera.reference_to_optical(np.asarray(points_m, dtype=np.float64))
         # An estimated hand can be at the lens or behind it.
-        optical[..., 2] = np.maximum(optical[..., 2], _NEAREST_M)
+        optical[..., 2] = np.maximum(optical[..., 2], NEAREST_M)
         return np.asarray(camera.project(optical))
 
     def upright(

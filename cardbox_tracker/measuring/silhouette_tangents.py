@@ -189,8 +189,10 @@ def _highest(hull: _Hull, axes: FloatArray) -> tuple[FloatArray, bool]:
     return rays[number], bool(inside[number])
 
 
-# Frames between samples, and between those of the first frames, so that a verdict comes early.
-_EVERY, _EVERY_AT_FIRST, _FIRST = 6, 2, 60
+EVERY = 6
+"""Frames between samples."""
+# The same for the first frames, whose number follows, so that a verdict comes early.
+_EVERY_AT_FIRST, _FIRST = 2, 60
 # An inverted pose's height is more than that of its inverse divided by this.
 _BETTER = 0.25
 
@@ -230,7 +232,7 @@ class PoseDirection:
         self._frames += 1
         # An error that is over is forgotten as soon as it was found.
         is_often = self._frames <= _FIRST or self.fault is not None
-        if self._frames % (_EVERY_AT_FIRST if is_often else _EVERY):
+        if self._frames % (_EVERY_AT_FIRST if is_often else EVERY):
             return
         if not self._tangents.add(first, other):
             return

@@ -17,6 +17,7 @@ from cardbox_tracker.person.kinematics import pose
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.parts import body_parts
 from cardbox_tracker.person.posture import N_JOINTS
+from cardbox_tracker.person.proportions import STATURE_LIMITS_M
 
 SHOULDER_TO_HIP = 0.275
 """Height of the shoulder joints above the hip joints in statures, chosen on rendered bodies with
@@ -33,8 +34,6 @@ CROWN_TO_SHOULDER = 0.218
 """Height of the crown with hair above the shoulder joints in statures (rendered bodies of two
 families); 0.182 above the acromion, without hair, in the source."""
 
-_RANGE_M = (1.1, 2.2)
-"""Range of statures, from a child of six years to a very tall adult."""
 _MEAN_M = 1.68
 _GUESSES_SD = np.array([0.06, 0.09, 0.12])
 """Relative standard deviations of the stature estimated from the span, from the height of the head
@@ -57,11 +56,11 @@ def stature_m(
     crown_m = height_of_row_m(camera, rows[0] - 0.5, distance_m)
     above_m = crown_m - skeleton.shoulder_height_m
     guesses = np.array([skeleton.span_m / SPAN, above_m / CROWN_TO_SHOULDER, _MEAN_M])
-    guess_m = float(np.clip(combined(guesses, _GUESSES_SD), *_RANGE_M))
+    guess_m = float(np.clip(combined(guesses, _GUESSES_SD), *STATURE_LIMITS_M))
     if rows[-1] < front.shape[0] - 1:
         # The lower edge can be the feet, or the edge of a desk.
         whole_m = crown_m - height_of_row_m(camera, rows[-1] + 0.5, distance_m)
-        if whole_m > _FEET * guess_m and _RANGE_M[0] <= whole_m <= _RANGE_M[1]:
+        if whole_m > _FEET * guess_m and STATURE_LIMITS_M[0] <= whole_m <= STATURE_LIMITS_M[1]:
             return whole_m
     return guess_m
 

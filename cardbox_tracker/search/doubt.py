@@ -60,6 +60,8 @@ KINDS = ("shoulder", "elbow", "hand") * 2
 """Kind of each keypoint; the models have these names, and ``whole``."""
 BACK, WHOLE = "the person is seen from behind", "the whole posture may be another one"
 """Reasons why a whole result is uncertain."""
+SETTLED_FRAMES = 15
+"""Images after which a search has settled, and what was seen in all of them is no accident."""
 
 _FILE = Path(__file__).with_name("doubt.json")
 # Weight of the previous probability of loss in the smoothed one.
@@ -70,7 +72,6 @@ _DOUBT_STAYS = 0.85
 # Share of the limit of this doubt below which a sure posture stays so: a robot that follows would
 # stop and go on where the doubt is about the limit.
 _STAYS_SURE = 1.25
-_FRESH_FRAMES = 15.0
 _AREAS, _PRIORS = (0.1, 3.0), (-0.2, 0.3)
 # Step of the numerical derivatives, rad and m.
 _STEP = 1e-3
@@ -81,15 +82,11 @@ _BETTER, _MIRROR_RATING, _LEAST_MOVE_M = (1e-3, 0.03, 0.5), 0.05, 0.02
 _BESIDE_M = 0.2
 
 # Deviations of the states do not include errors of model and silhouette. These factors and floors,
-# chosen on motion capture, make two deviations cover about 95 % of the errors.
-_PLACE_GAIN, _PLACE_FLOOR_M = 2.0, 0.02
-_TORSO_GAIN, _ROLL_FLOOR_RAD, _PITCH_YAW_FLOOR_RAD = 2.0, 0.06, 0.15
-_ARM_GAIN, _ARM_FLOOR_RAD = 3.0, 0.20
-_GAINS, _FLOORS = np.full(N_STATE, _PLACE_GAIN), np.full(N_STATE, _PLACE_FLOOR_M)
-_GAINS[TURNS], _FLOORS[TURNS] = _TORSO_GAIN, _PITCH_YAW_FLOOR_RAD
-_FLOORS[ROLL] = _ROLL_FLOOR_RAD
+# chosen on motion capture, make two deviations cover about 95 % of the errors; rad and m.
+_GAINS, _FLOORS = np.full(N_STATE, 2.0), np.full(N_STATE, 0.02)
+_FLOORS[TURNS], _FLOORS[ROLL] = 0.15, 0.06
 for _arm in (LEFT_ARM, RIGHT_ARM):
-    _GAINS[_arm], _FLOORS[_arm] = _ARM_GAIN, _ARM_FLOOR_RAD
+    _GAINS[_arm], _FLOORS[_arm] = 3.0, 0.20
 
 
 class Source(StrEnum):
@@ -271,7 +268,7 @@ def evidence_of_search(
         "distance spread": float(deviations[TORSO_X]),
         "yaw": abs(float(state[YAW])),
         "pitch": abs(float(state[PITCH])),
-        "freshness": exp(-age / _FRESH_FRAMES),
+        "freshness": exp(-age / SETTLED_FRAMES),
     }
     found = _of_all_keypoints(whole)
     found["spread"] = np.log(np.maximum(spread_m, 1e-3) / 0.1)

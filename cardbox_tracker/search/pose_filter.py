@@ -13,7 +13,7 @@ import numpy as np
 from cardbox_tracker.camera.view import View
 from cardbox_tracker.person.sizes import FloatArray
 from cardbox_tracker.search.config import TrackerConfig
-from cardbox_tracker.search.doubt import Judgement
+from cardbox_tracker.search.doubt import SETTLED_FRAMES, Judgement
 from cardbox_tracker.search.particles import Particles
 from cardbox_tracker.search.whole_body_config import WholeBodyConfig
 from cardbox_tracker.terms.multi_view import MultiViewCost
@@ -88,8 +88,6 @@ MakeFilter = Callable[
 and the views of the further cameras; returns a new filter."""
 
 
-# Frames with too much foreground after which it is assumed to be a near person.
-_TOO_MUCH_FRAMES = 15
 # Share of the image above the hips that no person fills, however near.
 _FULL = 0.8
 # Factor on the foreground by which it decreases only if the person is elsewhere.
@@ -122,7 +120,7 @@ class PersonPresence:
     @property
     def _is_too_long_too_much(self) -> bool:
         # The background model would have learned another light by then.
-        return self._too_much > _TOO_MUCH_FRAMES
+        return self._too_much > SETTLED_FRAMES
 
     def see(self, frames: Sequence[Frame], near: FloatArray) -> tuple[Presence, list[int]]:
         """Return the presence, and the indices of the cameras that show the person.

@@ -11,6 +11,7 @@ from math import sqrt
 import numpy as np
 from numpy.typing import NDArray
 
+from cardbox_tracker.camera.camera import NEAREST_M
 from cardbox_tracker.common.compiling import inlined_kernel, kernel
 from cardbox_tracker.person.kinematics import keypoints
 from cardbox_tracker.person.sizes import FloatArray
@@ -36,7 +37,6 @@ BEHIND_M = 0.08
 """Distance behind the middle plane of the trunk from which the trunk hides a keypoint, m."""
 
 _SHOULDERS = (0, 3)
-_NEAREST_M = 1e-3
 
 
 def is_trackable(cost: MultiViewCost, state: FloatArray) -> bool:
@@ -140,7 +140,7 @@ def _is_in_image(point_m: FloatArray, lens: Lens, size: tuple[int, int]) -> bool
 
 @inlined_kernel
 def _projected(point_m: FloatArray, lens: Lens) -> tuple[float, float]:
-    """Return the pixel of a point (3,); its depth counts as at least ``_NEAREST_M``."""
-    depth_m = max(point_m[2], _NEAREST_M)
+    """Return the pixel of a point (3,); its depth counts as at least ``NEAREST_M``."""
+    depth_m = max(point_m[2], NEAREST_M)
     fx, fy, cx, cy = lens
     return fx * point_m[0] / depth_m + cx, fy * point_m[1] / depth_m + cy

@@ -16,16 +16,12 @@ from numpy.typing import NDArray
 
 from cardbox_tracker.common.array_checks import ANY, check_array
 from cardbox_tracker.segmentation.empty_scene import BackgroundLearner, BackgroundModel
-from cardbox_tracker.segmentation.scene_motion import changed_pixels
+from cardbox_tracker.segmentation.scene_motion import SCALE, SMOOTHING_PX, changed_pixels
 
 FloatImage = NDArray[np.float32]
 ImageArray = NDArray[np.uint8]
 Mask = NDArray[np.bool_]
 
-# Motion is detected at half the resolution, where averaging halves the noise.
-_SCALE = 2
-_SMOOTHING_PX = 0.8
-_LEAST_LEVEL = 1e-3
 # A pixel has changed if it differs by more than this multiple of the noise.
 _TIMES_NOISE = 4.0
 # Images a mean is computed from; this many reduce the noise to a quarter.
@@ -36,8 +32,6 @@ _SPACING_NS = 50_000_000
 # docs/evaluation/silhouettes.md has the shares of objects and people.
 STILL = 0.08
 _NEAR_PX = 8
-# Smoothing blurs an edge, and colours are compared at half the resolution.
-_EDGE_PX = 5
 
 
 class StillRegions:
@@ -64,7 +58,7 @@ class StillRegions:
         if not brightness.size:
             raise ValueError(f"brightness has the shape {brightness.shape}; expected pixels")
         height, width = brightness.shape
-        size = max(width // _SCALE, 1), max(height // _SCALE, 1)
+        size = max(width // SCALE, 1), max(height // SCALE, 1)
         if self._count == 0:
             self._sum = np.zeros(size[::-1], np.uint16)
             self._seen = np.zeros(size[::-1], np.uint8)
@@ -77,8 +71,8 @@ class StillRegions:
         if self._count < _BLOCK:
             return None
         self._count = 0
-        now = self._sum.astype(np.float32) / np.float32(_BLOCK * max(level, _LEAST_LEVEL))
-        now = np.asarray(cv2.GaussianBlur(now, (0, 0), _SMOOTHING_PX), np.float32)
+        now = self._sum.astype(np.float32) / np.float32(_BLOCK * level)
+        now = np.asarray(cv2.GaussianBlur(now, (0, 0), SMOOTHING_PX), np.float32)
         if self._before is None:
             self._before, self._still = now, np.ones(now.shape, np.int32)
         else:
@@ -108,12 +102,12 @@ class StillRegions:
         part of it, so that a head is not separated where the neck has the colour of the wall.
         """
         moves = (self._still < self._blocks).astype(np.uint8)
-        joined = cv2.dilate(self._seen, _disk(_NEAR_PX // _SCALE))
+        joined = cv2.dilate(self._seen, _disk(_NEAR_PX // SCALE))
         count, labels = cv2.connectedComponents(joined, connectivity=8)
         for number in range(1, count):
             region = ((labels == number) & (self._seen > 0)).astype(np.uint8)
-            near = cv2.dilate(region, _disk(_NEAR_PX // _SCALE))
-            outline = near - cv2.erode(region, _disk(_NEAR_PX // 2 // _SCALE))
+            near = cv2.dilate(region, _disk(_NEAR_PX // SCALE))
+            outline = near - cv2.erode(region, _disk(_NEAR_PX // 2 // SCALE))
             yield region > 0, max(cv2.mean(moves, part)[0] for part in (near, outline))
 
 
@@ -159,7 +153,7 @@ class Absorber:
         if self._things is not None:
             things = self._things & found
             if things.any():
-                around = cv2.dilate(things.astype(np.uint8), _disk(_EDGE_PX)) > 0
+                around = cv2.dilate(things.astype(np.uint8), _disk(_NEAR_PX)) > 0
                 others = (self._others > 0) & ~things
                 absorbed = around & ~others, self._learner.model()
         self._things = found if found.any() else None

@@ -25,11 +25,11 @@ from cardbox_tracker.camera.given_arrays import image_from
 from cardbox_tracker.common.array_checks import ANY, check_array
 from cardbox_tracker.segmentation.absorption import Absorber
 from cardbox_tracker.segmentation.background_config import BackgroundConfig
-from cardbox_tracker.segmentation.chroma import ChromaScore, colors_of
+from cardbox_tracker.segmentation.chroma import DARKEST, ChromaScore, colors_of
 from cardbox_tracker.segmentation.empty_scene import BackgroundLearner, BackgroundModel
-from cardbox_tracker.segmentation.light import LightFollower
+from cardbox_tracker.segmentation.light import LEAST_LEVEL, LightFollower
 from cardbox_tracker.segmentation.partial_scene import merged
-from cardbox_tracker.segmentation.regions import LEAST_AREA, MOST_HOLE, clean_in_window
+from cardbox_tracker.segmentation.regions import LEAST_AREA, MOST_HOLE, SQUARE, clean_in_window
 from cardbox_tracker.segmentation.shadows import decide_shadows
 from cardbox_tracker.segmentation.window import Window, window_of
 
@@ -59,13 +59,12 @@ def segment_foreground(
     check_array("brighter", brighter, shape, np.float32)
     check_array("darker", darker, shape, np.float32)
     score = np.maximum(difference * brighter, difference * darker)
-    highest = np.asarray(cv2.dilate(score, _NEIGHBOURS), np.float32).reshape(shape)
+    highest = np.asarray(cv2.dilate(score, SQUARE), np.float32).reshape(shape)
     is_seen = (score >= np.float32(edge) * highest) & (score >= np.float32(1))
     foreground: ImageArray = np.uint8(255) * is_seen
     return foreground, window_of(foreground)
 
 
-_NEIGHBOURS = np.ones((3, 3), np.uint8)
 # Least standard deviation of a pixel, grey levels.
 _LEAST_STDDEV = 1.5
 # Standard deviation of the Gaussian that smooths differences against noise, px. The kernel covers
@@ -83,13 +82,10 @@ _DARKEST_SHADOW = 0.4
 _FLICKER = 0.1
 # Number of pixels whose median estimates the brightness of the scene.
 _BRIGHTNESS_SAMPLES = 1000
-# Margins around the foreground, and around the part that is compared by colour.
-_MARGIN_PX, _COLOR_MARGIN_PX = 2, 8
+# Margin around the foreground, and around the part that is compared by colour.
+_MARGIN_PX = 8
 # One image in this many is compared by colour everywhere, not only near the foreground.
 _WHOLE_EVERY = 8
-# Relative differences are noise where the background is darker than this, grey levels.
-_DARKEST = 8.0
-_LEAST_LIGHT = np.float32(1e-3)
 
 
 class SilhouetteExtractor:
@@ -125,7 +121,7 @@ class SilhouetteExtractor:
         self._brighter = np.asarray(1.0 / brighter, dtype=np.float32)
         self._darker = np.asarray(-1.0 / darker, dtype=np.float32)
         self._grid_mean = np.maximum(model.mean[self._grid], 1.0)
-        self._per_level = np.asarray(1.0 / np.maximum(model.mean, _DARKEST), np.float32)
+        self._per_level = np.asarray(1.0 / np.maximum(model.mean, DARKEST), np.float32)
         before, self._chroma = self._chroma, None
         if model.chroma is not None and config.color:
             self._chroma = ChromaScore(
@@ -153,7 +149,7 @@ class SilhouetteExtractor:
             factors = np.full(pixels.shape, self.gain, np.float32)
             if self._light is not None:
                 factors = self._light.factors()
-            light = np.asarray(1.0 / np.maximum(factors, _LEAST_LIGHT), np.float32)
+            light = np.asarray(1.0 / np.maximum(factors, np.float32(LEAST_LEVEL)), np.float32)
             self._use(merged(self.model, now, pixels, light))
 
     def __call__(self, image: ImageArray, stamp_ns: int = 0) -> ImageArray:
@@ -205,7 +201,7 @@ class SilhouetteExtractor:
         is_settling = self._light is not None and self._light.is_settling
         if number % _WHOLE_EVERY == 0 or is_settling or not self._is_even:
             return None
-        near = window.joined(self._last).grown(_COLOR_MARGIN_PX, shape)
+        near = window.joined(self._last).grown(_MARGIN_PX, shape)
         return None if near.is_empty else near
 
     def _decide(

@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cardbox_tracker.common.array_checks import ANY, check_array
+from cardbox_tracker.segmentation.regions import SQUARE
 from cardbox_tracker.segmentation.window import Window
 
 FloatImage = NDArray[np.float32]
@@ -23,13 +24,11 @@ ImageArray = NDArray[np.uint8]
 
 # Cr and Cb of grey.
 _NEUTRAL = 128.0
-# Dark pixels have hardly any colour, so ratios of the brightness are limited below this.
-_DARKEST = 8.0
+DARKEST = 8.0
+"""Relative differences are noise where the scene is darker than this, grey levels."""
 _RATIOS = (0.2, 1.6)
 # A channel above this may be saturated, which changes the colour.
 _CUT_OFF = 245.0
-# The highest difference is searched within half of a JPEG chroma block.
-_NEAR = np.ones((7, 7), np.uint8)
 # Kernel of the mean filter, px at half the resolution.
 _SMOOTHING = (3, 3)
 # Number of pixels whose medians estimate the white balance, and its largest change.
@@ -107,7 +106,7 @@ class ChromaScore:
         # Averaging mixes a bright place into its neighbours.
         highest = cv2.dilate(bgr_of(mean).max(axis=0), np.ones(_SMOOTHING, np.uint8))
         planes = (
-            1.0 / np.maximum(mean[:1], _DARKEST),
+            1.0 / np.maximum(mean[:1], DARKEST),
             mean[1:] - _NEUTRAL,
             1.0 / limits,
             np.reshape(highest, (1, *mean.shape[1:])),
@@ -170,7 +169,9 @@ class ChromaScore:
         blue = (blue - np.float32(_NEUTRAL) - ratio * mean_blue - cast_blue * level) * weight_blue
         distance = np.sqrt(red * red + blue * blue)
         score = np.where(ratio * brightest < np.float32(_CUT_OFF), distance, np.float32(0))
-        highest = np.asarray(cv2.dilate(score, _NEAR), np.float32).reshape(score.shape)
+        # Within half of a JPEG chroma block.
+        highest = np.asarray(cv2.dilate(score, SQUARE, iterations=3), np.float32)
+        highest = highest.reshape(score.shape)
         margin: FloatImage = np.minimum(score - 1, score - np.float32(self._edge) * highest)
         return margin
 
@@ -186,7 +187,7 @@ class ChromaScore:
         """
         level, red, blue = _smooth(colors)[self._grid].astype(np.float32)
         background = self._background[self._grid]
-        ratio, least = level * background[0], np.maximum(level, np.float32(_DARKEST))
+        ratio, least = level * background[0], np.maximum(level, np.float32(DARKEST))
         parts = (red, background[1]), (blue, background[2])
         shares = [(one - np.float32(_NEUTRAL) - ratio * mean) / least for one, mean in parts]
         middle = shares[0].size // 2

@@ -16,6 +16,7 @@ from cardbox_tracker.segmentation.background_file import (
     load_background,
     save_background,
 )
+from cardbox_tracker.segmentation.chroma import DARKEST
 from cardbox_tracker.segmentation.empty_scene import BackgroundModel
 from cardbox_tracker.segmentation.silhouettes import SilhouettePipeline
 
@@ -37,7 +38,6 @@ _ENOUGH, _FEWEST = 0.3, 4
 # grey levels and relative to the expected brightness.
 _MOST_CHANGED = 0.4
 _LEAST_CHANGE, _CHANGE = 6.0, 0.12
-_DARKEST = 8.0
 
 
 @dataclass(frozen=True)
@@ -95,7 +95,7 @@ def compare_scene(model: BackgroundModel, brightness: ImageArray) -> SceneFit:
             else:
                 shifts.append(shift)
     middle = np.median(shifts, axis=0) if shifts else np.zeros(2)
-    level = np.float32(np.median(image / np.maximum(model.mean, _DARKEST)))
+    level = np.float32(np.median(image / np.maximum(model.mean, DARKEST)))
     expected = level * model.mean
     limit = np.maximum(_LEAST_CHANGE, _CHANGE * expected)
     changed = float(np.mean(np.abs(cv2.blur(image, (3, 3)) - expected) > limit))

@@ -17,8 +17,8 @@ from numpy.typing import NDArray
 
 from cardbox_tracker.common.array_checks import ANY, check_array
 from cardbox_tracker.common.compiling import kernel
-from cardbox_tracker.segmentation.chroma import bgr_of
-from cardbox_tracker.segmentation.regions import flooded
+from cardbox_tracker.segmentation.chroma import DARKEST, bgr_of
+from cardbox_tracker.segmentation.regions import SQUARE, flooded
 from cardbox_tracker.segmentation.window import Window
 
 FloatImage = NDArray[np.float32]
@@ -29,23 +29,17 @@ _DOUBT = 0.02
 # A channel above this may be saturated, so the pixel may be brighter than it seems.
 _CUT_OFF = 250.0
 # The light is estimated from every fourth pixel of every fourth row.
-_STEP_PX = 4
-_GRID = (slice(1, None, _STEP_PX), slice(1, None, _STEP_PX))
+_GRID = (slice(1, None, 4), slice(1, None, 4))
 # Columns and rows of the cells of the coarse field, and the Gaussian that smooths them, with a
 # standard deviation of two cells.
 _CELLS = (20, 15)
 _GAUSSIAN = cv2.getGaussianKernel(17, 2.0, cv2.CV_32F)
-# Darker pixels carry no information about the light, grey levels.
-_DARKEST = 10.0
 # A field within this of 1 is ignored.
 _SAME = 0.004
 # Weights of blue, green and red in the brightness.
 _WEIGHTS = np.array([0.114, 0.587, 0.299], np.float32)
-_GREY = np.ones(1, np.float32)
 # The field is estimated in every third image, and in every one after a step; the level always.
 _EVERY = 3
-# Share of the new estimate in the field, an exponential moving average.
-_RATE = 1.0 - 0.9**_EVERY
 # Pixels whose brightness differs from the expected one by more are not background.
 _TOLERANCE, _TOLERANCE_AFTER_STEP = 0.1, 0.4
 # A larger change of the level between two images is a step of the light: a lamp, a gain.
@@ -54,10 +48,10 @@ _STEP = 0.04
 _SETTLING = 8
 # Smallest share of pixels that must be background.
 _ENOUGH = 0.15
-_LEAST = 1e-3
-_KERNEL = np.ones((5, 5), np.uint8)
+LEAST_LEVEL = 1e-3
+"""Least brightness of the scene relative to the learned background."""
 # Light varies by less than this fraction within the square of 12 px; an outline does not.
-_SOFT, _SQUARE = 0.06, np.ones((3, 3), np.uint8)
+_SOFT = 0.06
 # More foreground than a person covers: the light has changed, not the scene.
 _COVERAGE = 0.5
 # With more foreground than this caused by light, the field is estimated as after a step.
@@ -105,7 +99,7 @@ class LightFollower:
         self._size = self._small.shape[1], self._small.shape[0]
         self._mean = mean
         blocks = cv2.resize(mean, self._size, interpolation=cv2.INTER_AREA)
-        self._blocks = np.maximum(blocks, np.float32(_DARKEST))
+        self._blocks = np.maximum(blocks, np.float32(DARKEST))
         self._now, self._scaled = np.empty_like(mean), np.empty_like(mean)
         channels = mean[None]
         if chroma is not None:
@@ -115,7 +109,7 @@ class LightFollower:
         self._brightest = self._channels.max(axis=0)
         brightest = self._brightest.reshape(mean.shape)[_GRID]
         # Ratios of dark pixels are noise, so these are never used.
-        self._small_brightest = np.where(self._small > _DARKEST, brightest, np.inf).astype(
+        self._small_brightest = np.where(self._small > DARKEST, brightest, np.inf).astype(
             np.float32
         )
         self._highest = float(self._brightest.max())
@@ -162,7 +156,7 @@ class LightFollower:
     def _cut_off(self) -> None:
         """Compute the expected brightness, limited to the range of the camera's channels."""
         limit = np.float32(_CUT_OFF / (self.level * self._highest_field))
-        weights = _WEIGHTS if len(self._channels) == 3 else _GREY
+        weights = _WEIGHTS if len(self._channels) == 3 else (1.0,)
         np.multiply(self._relative, np.float32(self.level), out=self._now)
         now, mean = self._now.reshape(-1), self._mean.reshape(-1)
         bright = np.flatnonzero(self._brightest > limit)
@@ -176,7 +170,7 @@ class LightFollower:
         measured = self._measured_level()
         if not measured >= 0.0:
             return
-        level = max(measured, _LEAST)
+        level = max(measured, LEAST_LEVEL)
         if self._started and abs(level / self.level - 1.0) > _STEP:
             if self._settling == 0:
                 self._base = np.ones_like(self._field)
@@ -187,11 +181,11 @@ class LightFollower:
         number, self._images = self._images, self._images + 1
         if number % _EVERY and self._settling == 0 and not self._is_lit:
             return
-        person, rate, tolerance, around = self._person, _RATE, _TOLERANCE, self._fine
+        person, rate, tolerance, around = self._person, 1.0 - 0.9**_EVERY, _TOLERANCE, self._fine
         if self._settling > 0:
             # The person may have moved since.
             known = person if self._passing is None else person | self._passing
-            person = cv2.dilate(known, _KERNEL).reshape(person.shape)
+            person = cv2.dilate(known, SQUARE, iterations=2).reshape(person.shape)
         if self._settling > 0 or self._is_lit:
             rate, tolerance = 1.0, _TOLERANCE_AFTER_STEP
         self._sum_cells(around, person, tolerance)
@@ -283,7 +277,9 @@ class LightFollower:
             self._passing = np.where(smooth, np.uint8(0), silhouette[_GRID])
             return
         person = np.where(self._lit, np.uint8(0), silhouette[_GRID])
-        self._person = np.asarray(cv2.dilate(person, _KERNEL), np.uint8).reshape(person.shape)
+        self._person = np.asarray(cv2.dilate(person, SQUARE, iterations=2), np.uint8).reshape(
+            person.shape
+        )
         self._passing = None
 
     def _find_smooth(self, silhouette: ImageArray) -> NDArray[np.bool_]:
@@ -295,7 +291,7 @@ class LightFollower:
         means = cv2.resize(self._brightness, self._size, interpolation=cv2.INTER_AREA)
         now = np.asarray(means, np.float32).reshape(shape)
         relative = now / (self._blocks * self._fine * np.float32(self.level))
-        varies = cv2.dilate(relative, _SQUARE) - cv2.erode(relative, _SQUARE)
+        varies = cv2.dilate(relative, SQUARE) - cv2.erode(relative, SQUARE)
         is_even = varies.reshape(shape) < np.float32(_SOFT)
         is_hidden = silhouette[_GRID] > 0
         smooth = is_hidden & flooded(~is_hidden, is_even)

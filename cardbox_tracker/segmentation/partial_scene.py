@@ -18,9 +18,9 @@ from cardbox_tracker.segmentation.scene_motion import changed_pixels
 Mask = NDArray[np.bool_]
 FloatImage = NDArray[np.float32]
 
-# Largest gap between parts of one outline, and margin of the body around moving pixels, as shares
-# of the image's width.
-_GAP, _MARGIN = 0.06, 0.03
+# Margin of the body around moving pixels, as a share of the image's width; parts of one outline
+# whose margins touch are one body.
+_MARGIN = 0.03
 # Moving regions below this share of the image are noise.
 _LEAST = 0.0005
 # Hidden rests below this share of the image are filled from their surroundings.
@@ -90,7 +90,7 @@ def bodies(moved: Mask) -> Mask:
     image = moved.astype(np.uint8)
     _, regions, statistics, _ = cv2.connectedComponentsWithStats(image, connectivity=8)
     image[(statistics[:, cv2.CC_STAT_AREA] < _LEAST * moved.size)[regions]] = 0
-    near = cv2.dilate(image, _disk(_GAP / 2 * width))
+    near = cv2.dilate(image, _disk(_MARGIN * width))
     labels, regions = cv2.connectedComponents(near, connectivity=8)
     result = np.zeros(moved.shape, np.uint8)
     for label in range(1, labels):

@@ -20,10 +20,11 @@ from cardbox_tracker.segmentation.window import Window, window_of
 
 ImageArray = NDArray[np.uint8]
 
-_NO_WORDS = np.zeros((1, 0), np.uint64)
+NO_WORDS = np.zeros((1, 0), np.uint64)
+"""Stands for the words of eight pixels of an image whose width is no multiple of eight."""
 _EIGHT = np.uint64(0x0101010101010101)
-# Smallest kernel that closes a gap of one pixel in all eight directions.
-_CLOSING_KERNEL = np.ones((3, 3), np.uint8)
+SQUARE = np.ones((3, 3), np.uint8)
+"""A pixel and its eight neighbours, for morphology."""
 
 LEAST_AREA, MOST_HOLE = 0.004, 0.0008
 """Least area of a region of the foreground, and area below which a hole is filled, as shares of the
@@ -70,7 +71,7 @@ def clean_in_window(
         window = Window(0, foreground.shape[0], 0, foreground.shape[1])
     # Closing joins parts that noise separated; opening would remove thin fingers.
     part = foreground[window.slices]
-    closed = np.asarray(cv2.morphologyEx(part, cv2.MORPH_CLOSE, _CLOSING_KERNEL), np.uint8)
+    closed = np.asarray(cv2.morphologyEx(part, cv2.MORPH_CLOSE, SQUARE), np.uint8)
     check_array("part of the foreground", closed, part.shape, is_written=True)
     _recolour(closed, 255, min_area * foreground.size)
     _recolour(closed, 0, max_hole * foreground.size)
@@ -105,7 +106,7 @@ def find_regions(image: ImageArray) -> Regions:
     image = np.require(image, requirements=("C", "W", "A"))
     check_array("image", image, (ANY, ANY))
     height, width = image.shape
-    words = image.view(np.uint64) if width % 8 == 0 else _NO_WORDS
+    words = image.view(np.uint64) if width % 8 == 0 else NO_WORDS
     runs = np.empty((4, height * (width // 2 + 1)), np.int32)
     firsts = np.empty(height + 1, np.int32)
     count = _list_runs(image, words, np.uint8(255), runs, firsts)

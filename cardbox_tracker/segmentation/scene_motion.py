@@ -13,20 +13,21 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from cardbox_tracker.segmentation.chroma import DARKEST
+
 FloatImage = NDArray[np.float32]
 ImageArray = NDArray[np.uint8]
 Mask = NDArray[np.bool_]
 
 # Motion is detected at half the resolution, where averaging halves the noise.
-_SCALE = 2
-_SMOOTHING_PX = 0.8
+SCALE, SMOOTHING_PX = 2, 0.8
+"""How much smaller the images are, and the deviation of the Gaussian that smooths them, px."""
 # Images per mean, whose noise is less than half of an image's.
 _MEAN_OF = 5
 # A changed pixel differs by at least this many grey levels and this multiple of the noise. The
 # estimated noise is limited, since a running person smears over half of the image.
 _LEAST, _MOST = 2.0, 8.0
 _TIMES_NOISE = 6.0
-_DARKEST = 8.0
 # Standard deviation of a normal distribution from the median of its absolute values.
 _FROM_MEDIAN = 1.4826
 
@@ -64,9 +65,9 @@ class SceneMotion:
 
 def _small(brightness: ImageArray) -> FloatImage:
     height, width = brightness.shape
-    size = (max(width // _SCALE, 1), max(height // _SCALE, 1))
+    size = (max(width // SCALE, 1), max(height // SCALE, 1))
     small = cv2.resize(brightness, size, interpolation=cv2.INTER_AREA).astype(np.float32)
-    return np.asarray(cv2.GaussianBlur(small, (0, 0), _SMOOTHING_PX), np.float32)
+    return np.asarray(cv2.GaussianBlur(small, (0, 0), SMOOTHING_PX), np.float32)
 
 
 def changed_pixels(
@@ -76,7 +77,7 @@ def changed_pixels(
 
     The level of the light and the noise are medians, since moving pixels are less than half.
     """
-    ratios = np.asarray(after / np.maximum(before, _DARKEST), np.float32)
+    ratios = np.asarray(after / np.maximum(before, DARKEST), np.float32)
     level = max(float(np.median(ratios)), 1e-3)
     # Differences grow with the light.
     difference = np.asarray(np.abs(after - level * before) / max(level, 1.0), np.float32)

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cardbox_tracker.common.array_checks import ANY, check_array
-from cardbox_tracker.segmentation.regions import flooded
+from cardbox_tracker.segmentation.regions import SQUARE, flooded
 from cardbox_tracker.segmentation.window import Window
 
 FloatImage = NDArray[np.float32]
@@ -20,7 +20,6 @@ ImageArray = NDArray[np.uint8]
 
 # Half the width of the square in which the brightness is compared, px.
 _REACH_PX = 2
-_SQUARE = np.ones((2 * _REACH_PX + 1, 2 * _REACH_PX + 1), np.uint8)
 _CROSS = np.asarray(cv2.getStructuringElement(cv2.MORPH_CROSS, (3, 3)), np.uint8)
 
 
@@ -66,7 +65,10 @@ def decide_shadows(
     begin = max(top - _REACH_PX, 0), max(left - _REACH_PX, 0)
     part = np.s_[begin[0] : top + height + _REACH_PX, begin[1] : left + width + _REACH_PX]
     seen, is_dark, darkness = foreground[part], is_dark[part], difference[part] * per_level[part]
-    varies = cv2.dilate(darkness, _SQUARE) - cv2.erode(darkness, _SQUARE)
+    highest, lowest = (
+        change(darkness, SQUARE, iterations=_REACH_PX) for change in (cv2.dilate, cv2.erode)
+    )
+    varies = highest - lowest
     is_soft = is_dark & (varies.reshape(seen.shape) < np.float32(softest))
     is_background = seen == 0
     shadow = is_soft & flooded(is_background, is_soft | is_background)

@@ -137,14 +137,11 @@ WITHIN_LIMITS_M = 0.3, 20.0
 # and where only one of its eyes sees.
 _GAP = 1 / 64
 
-# A share of the pixels below which they are specks.
-_NEAREST = 0.01
-
 
 def nearest_m(depth_m: DepthImage) -> float:
     """Return the distance of the nearest hundredth of a depth image, metres; infinite without."""
     known = depth_m[np.isfinite(depth_m) & (depth_m > 0)]
-    return float(np.quantile(known, _NEAREST)) if known.size else np.inf
+    return float(np.quantile(known, 0.01)) if known.size else np.inf
 
 
 def silhouette_within(depth_m: DepthImage, within_m: float) -> NDArray[np.uint8]:

@@ -15,6 +15,7 @@ from math import sqrt
 
 import numpy as np
 
+from cardbox_tracker.camera.camera import NEAREST_M
 from cardbox_tracker.common.compiling import kernel
 from cardbox_tracker.person.kinematics import pose_arm, state_pose
 from cardbox_tracker.person.parts import HEIGHT, TOP_WIDTH, UPPER_ARM
@@ -23,8 +24,6 @@ from cardbox_tracker.terms.kernel_arguments import BodyTuple, Floats, body_of
 
 # Points of the upper arm, including the elbow, and of the forearm, up to the fingertips.
 _POINTS = (3, 4)
-# Least depth of drawn points, m.
-_NEAREST_M = 0.05
 
 
 @kernel
@@ -74,7 +73,7 @@ def add_costs_of_arms(
             long_m, wide_m = drawn[part, HEIGHT], drawn[part, TOP_WIDTH]
             for j in range(3):
                 axis[j] = (seen_m[limb + 1, j] - start[j]) / parts[part, HEIGHT]
-            far_m = max(start[2] + 0.5 * long_m * axis[2], _NEAREST_M)
+            far_m = max(start[2] + 0.5 * long_m * axis[2], NEAREST_M)
             # Length of the limb in the image: the part of its axis across the line of sight.
             across = axis[0] - axis[2] * start[0] / far_m
             down = axis[1] - axis[2] * start[1] / far_m
@@ -83,7 +82,7 @@ def add_costs_of_arms(
             for k in range(_POINTS[limb]):
                 along_m = long_m * (k + 1.0) / _POINTS[limb]
                 ahead_m = start[2] + along_m * axis[2]
-                if ahead_m < _NEAREST_M:
+                if ahead_m < NEAREST_M:
                     continue
                 column = lens.fx * (start[0] + along_m * axis[0]) / ahead_m + lens.cx + 0.5
                 row = lens.fy * (start[1] + along_m * axis[1]) / ahead_m + lens.cy + 0.5

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from cardbox_tracker.camera.camera import NEAREST_M
 from cardbox_tracker.common.compiling import inlined_kernel, kernel
 from cardbox_tracker.person.kinematics import (
     angles_in,
@@ -31,7 +32,7 @@ _CLAIM = 0.5
 # Distance from the axis of the other forearm, or its hand, up to which it covers pixels.
 _CLAIM_REACH_M = 0.09
 # A hand this far behind the torso's middle, and within its width, is hidden.
-_BEHIND_M, _NEAREST_M = 0.03, 0.1
+_BEHIND_M = 0.03
 
 _TORSO_ZONE, _HEAD_ZONE, _LOWER_ZONE = 0, 1, 2
 
@@ -63,7 +64,7 @@ def torso_zones(state: Any, body: BodyTuple, zones: Any) -> None:
         forward = head[FORWARD] if i == 0 else 0.0
         x = hip[0] + forward * rotation[0, 0] + heights[i] * rotation[0, 2]
         y = hip[1] + forward * rotation[1, 0] + heights[i] * rotation[1, 2]
-        z = max(hip[2] + forward * rotation[2, 0] + heights[i] * rotation[2, 2], _NEAREST_M)
+        z = max(hip[2] + forward * rotation[2, 0] + heights[i] * rotation[2, 2], NEAREST_M)
         row = camera.fy * y / z + camera.cy
         if i == 0:
             per_m = camera.fx / z
@@ -120,7 +121,7 @@ def project_arms(states: Any, arm: int, body: BodyTuple, points: Any, hidden: An
         turn_arm(posed, rotation, hip)
         for j in range(2):
             joint = posed.joints[1 + j]
-            z = max(joint[2], _NEAREST_M)
+            z = max(joint[2], NEAREST_M)
             points[i, j, 0] = camera.fx * joint[0] / z + camera.cx
             points[i, j, 1] = camera.fy * joint[1] / z + camera.cy
             points[i, j, 2] = camera.fx / z

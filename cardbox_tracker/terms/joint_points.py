@@ -25,7 +25,7 @@ import numpy as np
 from cardbox_tracker.camera.camera import Camera
 from cardbox_tracker.common.least_squares import Residuals
 from cardbox_tracker.common.settings import Settings, setting
-from cardbox_tracker.detectors.image_points import POINT_INDEX, ImagePoints
+from cardbox_tracker.detectors.image_points import CERTAIN, POINT_INDEX, ImagePoints
 from cardbox_tracker.person.model import MEASURED, BodyModel
 from cardbox_tracker.person.posture import N_STATE
 from cardbox_tracker.person.sizes import FloatArray
@@ -56,7 +56,7 @@ from cardbox_tracker.terms.term import (
 _JOINT_M = {SHOULDER: 0.025, ELBOW: 0.02, WRIST: 0.02, KNUCKLES: 0.04}
 _JOINT_M_PER_S = {SHOULDER: 0.2, ELBOW: 0.5, WRIST: 0.8, KNUCKLES: 0.9}
 _TRUNK_M, _TRUNK_M_PER_S = 0.05, 0.25
-_POINT_PX = 1.5
+POINT_PX = 1.5
 # Bones (upper arm, forearm, shoulders, trunk): deviation of the component along the line of sight,
 # and mean difference of the detector's from the true one (docs/research.md). That of the shoulders
 # also covers the errors of their curve, see _turned.
@@ -178,8 +178,8 @@ class JointPointsTerm:
         for arm in range(2):
             for joint, metres in _JOINT_M.items():
                 moved_m = age_s * _JOINT_M_PER_S[joint]
-                deviations[POINTS_OF_ARM * arm + joint] = hypot(metres, moved_m), _POINT_PX
-        deviations[[HIPS, EARS]] = hypot(_TRUNK_M, age_s * _TRUNK_M_PER_S), _POINT_PX
+                deviations[POINTS_OF_ARM * arm + joint] = hypot(metres, moved_m), POINT_PX
+        deviations[[HIPS, EARS]] = hypot(_TRUNK_M, age_s * _TRUNK_M_PER_S), POINT_PX
         bones = np.zeros((N_BONES, 3))
         bones[:, 2] = _BONE_DEVIATIONS * (1.0 + age_s / 0.1)
         away = np.tile([0.0, 0.0, 1.0], (N_BONES, 1))
@@ -226,7 +226,7 @@ class JointPointsObservation(TermObservation):
         """Return how the joints of one state differ from the points, see :data:`EVIDENCE`."""
         pixels, points, bones, away = projected(posed), *self.seen[:1], *self.seen[2:]
         focal_px, keypoints_m = posed.body[4][0], posed.keypoints_m[0]
-        known = points[:, 2] >= _CERTAIN
+        known = points[:, 2] >= CERTAIN
         away_m = np.linalg.norm(points[:, :2] - pixels[:, :2], axis=1) * pixels[:, 2] / focal_px
         away_m = np.where(known, away_m, 0.0)
         found = {name: np.zeros(6) for name in EVIDENCE}
@@ -266,8 +266,6 @@ of its depth from that of the detector, m; component of the bone that ends there
 arm, along the line of sight, as a fraction; distance of the person, m."""
 # Left and right arms of the points that are compared, exchanged.
 _OTHER_SIDE = [*range(POINTS_OF_ARM, 2 * POINTS_OF_ARM), *range(POINTS_OF_ARM), HIPS, EARS]
-# Score of a certain point.
-_CERTAIN = 0.5
 
 
 def projected(posed: Posed) -> FloatArray:

@@ -15,6 +15,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from cardbox_tracker.camera.camera import NEAREST_M
 from cardbox_tracker.common.compiling import inlined_kernel, kernel
 from cardbox_tracker.person.kinematics import (
     TWIST,
@@ -57,7 +58,6 @@ MOST = 16.0
 """Limit of a squared residual in a rating."""
 PULL = 4.0 * MOST
 """The same in a fit: a point that is too far away to count in the cost still pulls."""
-_NEAREST_M = 0.1
 
 
 class Evidence(NamedTuple):
@@ -130,7 +130,7 @@ def _place_body(
 @inlined_kernel
 def residual(i: int, points: Floats, camera: Intrinsics, seen: Evidence) -> tuple[float, float]:
     """Return the residuals of point ``i`` across and down, in units of its deviation."""
-    z = max(points[i, 2], _NEAREST_M)
+    z = max(points[i, 2], NEAREST_M)
     u = camera.fx * points[i, 0] / z + camera.cx
     v = camera.fy * points[i, 1] / z + camera.cy
     metric = seen.deviations[i, 0] * camera.fx / z
@@ -268,7 +268,7 @@ def residuals(states: Floats, body: BodyTuple, evidence: EvidenceTuple, found: F
             root = sqrt(seen.points[i, 2] * exp(-(u * u + v * v) / PULL))
             costs[n] += _pulled(seen.points[i, 2], u * u + v * v)
             values[n, 2 * i], values[n, 2 * i + 1] = root * u, root * v
-            z = max(points[i, 2], _NEAREST_M)
+            z = max(points[i, 2], NEAREST_M)
             metric = seen.deviations[i, 0] * of.camera.fx / z
             variance = metric * metric + seen.deviations[i, 1] ** 2
             scale = root / sqrt(variance)
@@ -310,7 +310,7 @@ def project(state: Floats, body: BodyTuple, pixels: Floats) -> None:
     scratch, posed, points = (np.empty((3, 3)), np.empty(3)), new_arm(), np.empty((NECK + 1, 3))
     _place_body(state, state, of, scratch, posed, points)
     for i in range(N_POINTS):
-        z = max(points[i, 2], _NEAREST_M)
+        z = max(points[i, 2], NEAREST_M)
         pixels[i, 0] = of.camera.fx * points[i, 0] / z + of.camera.cx
         pixels[i, 1] = of.camera.fy * points[i, 1] / z + of.camera.cy
         pixels[i, 2] = points[i, 2]

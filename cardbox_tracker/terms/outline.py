@@ -22,6 +22,7 @@ from cardbox_tracker.common.least_squares import Residuals
 from cardbox_tracker.person.kinematics import TWIST, moves, state_twists
 from cardbox_tracker.person.posture import N_STATE
 from cardbox_tracker.person.sizes import FloatArray
+from cardbox_tracker.segmentation.regions import SQUARE
 from cardbox_tracker.terms.body_outline import (
     BODY_PATCHES,
     LIMB_PATCHES,
@@ -49,13 +50,10 @@ INFORMATION = 0.01
 """Weight of a pixel of outline, 1 / px^2; it is low because errors of neighbours are correlated."""
 _PER_HALF = 1.0 / HALF_PX**2
 # Half of the stretch over which the distance's gradient is taken; shorter ones suffer from pixels.
-_APART_PX = 3.0
+# So near to the border of window or image, or to another person, no point of the outline counts.
+_APART_PX = 3
 # Margin around the silhouette, larger than the limit of the distances.
-_MARGIN_PX = 12
-# Border of the window, or of the image, where no point of the outline counts.
-_BORDER_PX = 3
-# Window around a pixel of another person in which no outline counts.
-_NEAR_PX = 7
+_MARGIN_PX = FAR + 2
 
 SeenTuple = tuple[Floats, NDArray[np.float32], Floats]
 """fx, fy, cx, cy of the image of the distances, (4,); signed distances, (H, W), px, negative
@@ -115,7 +113,7 @@ def _forget(
 ) -> None:
     """Set the distances at and near ``covered`` pixels to 0, so that no outline pulls there."""
     pixels = cv2.resize(covered, (small.width, small.height), interpolation=cv2.INTER_NEAREST)
-    near = np.asarray(cv2.dilate(pixels, np.ones((_NEAR_PX, _NEAR_PX), np.uint8)))
+    near = np.asarray(cv2.dilate(pixels, SQUARE, iterations=_APART_PX))
     first = max(left, 0)
     window = near[top : top + len(field), first : left + field.shape[1]] > 0
     field[: window.shape[0], first - left : first - left + window.shape[1]][window] = 0.0
@@ -137,8 +135,8 @@ def signed_distances(
     left, top, width, height = box
     if not width:
         return 0, 0, np.zeros((0, 0), np.float32), np.zeros(4)
-    first = max(left - _MARGIN_PX, 0) + _BORDER_PX
-    last = min(left + width + _MARGIN_PX, rows.shape[1]) - 1 - _BORDER_PX
+    first = max(left - _MARGIN_PX, 0) + _APART_PX
+    last = min(left + width + _MARGIN_PX, rows.shape[1]) - 1 - _APART_PX
     top, bottom = max(top - _MARGIN_PX, 0), top + height + _MARGIN_PX
     # The kernel continues the mask beside its border, which is background where there is some.
     beside = _MARGIN_PX - FAR
@@ -147,8 +145,8 @@ def signed_distances(
     distances = np.empty((len(inside), padded_width(inside.shape[1])), np.float32)
     signed_distances_of(np.asarray(inside, np.uint8), distances)
     left -= FAR
-    end = min(end_row - top, len(inside) - _BORDER_PX)
-    within = np.array([first - left, last - left, _BORDER_PX, end], np.float64)
+    end = min(end_row - top, len(inside) - _APART_PX)
+    within = np.array([first - left, last - left, _APART_PX, end], np.float64)
     return left, top, distances, within
 
 

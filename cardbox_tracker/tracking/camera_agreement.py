@@ -24,20 +24,19 @@ from cardbox_tracker.camera.extrinsics import Extrinsics
 from cardbox_tracker.camera.view import View
 from cardbox_tracker.common.errors import CameraError
 from cardbox_tracker.common.health import WATCHES, Verdict
-from cardbox_tracker.measuring.camera_pose import ROTATION, PoseProblem, Sighting, turned_by
-from cardbox_tracker.measuring.silhouette_tangents import PoseDirection, TopTangents, roll_of
+from cardbox_tracker.measuring.camera_pose import ROTATION, STEPS, PoseProblem, Sighting, turned_by
+from cardbox_tracker.measuring.silhouette_tangents import EVERY, PoseDirection, TopTangents, roll_of
 from cardbox_tracker.person.model import MEASURED, BodyModel
 from cardbox_tracker.person.posture import TORSO_X, TORSO_Y
 from cardbox_tracker.person.sizes import FloatArray
 from cardbox_tracker.terms.term import Frame
 
-# Frames between samples, samples in a window (12 s at 15 Hz), and samples between two checks.
-_EVERY, _WINDOW, _AGAIN = 12, 15, 60
-# Least number of samples at the end of a recording.
-_LEAST = 8
-_STEPS = 4
-# Roll: frames between samples, samples, and the largest accepted standard deviation in degrees.
-_TOPS_EVERY, _TOPS, _SURE_DEG = 6, 70, 0.5
+# Samples in a window (12 s at 15 Hz), and between two checks.
+_WINDOW, _AGAIN = 15, 60
+LEAST_SIGHTINGS = 8
+"""Least number of samples of a recording."""
+# Roll: samples, and the largest accepted standard deviation in degrees.
+_TOPS, _SURE_DEG = 70, 0.5
 # Least sine of the angle between lines of sight that show a distance.
 _LEAST_ANGLE = 0.2
 
@@ -148,13 +147,13 @@ class CameraAgreement:
                 one.place(state, column)
         first, *others = (frame.silhouette for frame in frames)
         self._frames += 1
-        if self._frames % _TOPS_EVERY or not np.any(first):
+        if self._frames % EVERY or not np.any(first):
             return
         for one, other in zip(self._others, others, strict=True):
             if not np.any(other):
                 continue
             one.tops.add(first, other)
-            if self._frames % _EVERY == 0:
+            if self._frames % (2 * EVERY) == 0:
                 one.kept.append(Sighting(state.copy(), first.copy(), other.copy()))
                 one.missing -= 1
 
@@ -166,7 +165,7 @@ class CameraAgreement:
     def check(self, is_last: bool = False) -> None:
         """Estimate rotations of cameras with a full window, of others too if no frames follow."""
         for one in self._others:
-            is_enough = is_last and not one.turned.samples and len(one.kept) >= _LEAST
+            is_enough = is_last and not one.turned.samples and len(one.kept) >= LEAST_SIGHTINGS
             if one.missing > 0 and not is_enough:
                 continue
             one.missing = _AGAIN
@@ -208,7 +207,7 @@ class CameraAgreement:
         try:
             given = self._body, self._first, other.view.camera, found, sightings
             problem = PoseProblem(*given)
-            for _ in range(_STEPS):
+            for _ in range(STEPS):
                 found, _ = problem.step(found, ROTATION)
         except (CameraError, np.linalg.LinAlgError):
             return float("inf")

@@ -17,22 +17,20 @@ from cardbox_tracker.camera.extrinsics import Extrinsics
 from cardbox_tracker.camera.view import OtherCamera
 from cardbox_tracker.common.errors import CameraError, InitializationError
 from cardbox_tracker.measuring.camera_guess import guessed_extrinsics, reference_states
-from cardbox_tracker.measuring.camera_pose import PoseProblem, Sighting
+from cardbox_tracker.measuring.camera_pose import STEPS, PoseProblem, Sighting
 from cardbox_tracker.measuring.silhouette_tangents import TopTangents
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.search.config import default_preset
 from cardbox_tracker.terms.term import Image, Silhouette
+from cardbox_tracker.tracking.camera_agreement import LEAST_SIGHTINGS
 from cardbox_tracker.tracking.observation import Observation
 from cardbox_tracker.tracking.tracker import Tracker
 
-_PASSES, _SIGHTINGS, _STEPS, _HALF_STEPS = 2, 30, 6, 4
-_LEAST_SIGHTINGS = 8
+_PASSES, _SIGHTINGS = 2, 30
 # Weight of a reference posture in frames, and its standard deviations. The small ones use that
 # the person faces the first camera, which an outline shows less precisely.
 _STILL = 5
 _REFERENCE_STDDEV = np.array([0.1, 0.05, 0.08, 0.05, *[0.3] * 8, 0.1, 0.05])
-# Frames whose tangent planes are used.
-_TANGENTS = 200
 
 Pair = tuple[Silhouette, Silhouette]
 
@@ -86,24 +84,24 @@ def calibrated_camera(
     pose = guessed_extrinsics(body, first, other, references, side_turn)
     pairs = [*references.values(), *(frame.silhouettes for frame in moving)]
     level = first.with_pitch(body.camera_pose.pitch_rad)
-    tangents = TopTangents(level, other, pairs[:: max(1, len(pairs) // _TANGENTS)])
+    tangents = TopTangents(level, other, pairs)
     iou = float("nan")
     try:
         for number in range(_PASSES):
             tracked, iou = _tracked(body, first, OtherCamera(other, pose), moving, seed)
             if progress is not None:
                 progress((number + 0.8) / _PASSES)
-            if len(tracked) < _LEAST_SIGHTINGS:
+            if len(tracked) < LEAST_SIGHTINGS:
                 raise InitializationError(
                     f"both cameras track the person in {len(tracked)} of {len(moving)} frames; "
-                    f"expected {_LEAST_SIGHTINGS} or more: let the person move for ten seconds or "
+                    f"expected {LEAST_SIGHTINGS} or more: let the person move for ten seconds or "
                     "longer after the reference postures, visible to both cameras"
                 )
             sightings = [*still * _STILL, *tracked]
-            pose = _improved(body, first, other, pose, sightings, _STEPS, tangents)
+            pose = _improved(body, first, other, pose, sightings, tangents)
         halves = [
             _improved(
-                *(body, first, other, pose, sightings[start::2], _HALF_STEPS),
+                *(body, first, other, pose, sightings[start::2]),
                 TopTangents(level, other, pairs[start::2]),
             )
             for start in (0, 1)
@@ -141,10 +139,9 @@ def _improved(
     other: Camera,
     pose: Extrinsics,
     sightings: Sequence[Sighting],
-    steps: int,
     tangents: TopTangents,
 ) -> Extrinsics:
     problem = PoseProblem(body, first, other, pose, sightings, tangents)
-    for _ in range(steps):
+    for _ in range(STEPS):
         pose, _ = problem.step(pose)
     return pose

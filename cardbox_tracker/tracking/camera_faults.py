@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from cardbox_tracker.camera.camera import Camera
 from cardbox_tracker.common.health import WATCHES, Verdict
 from cardbox_tracker.detectors.image_points import POINT_INDEX, ImagePoints
-from cardbox_tracker.terms.term import Frame
+from cardbox_tracker.terms.term import USUAL_INTERVAL_S, Frame
 from cardbox_tracker.tracking.camera_agreement import CameraAgreement
 from cardbox_tracker.tracking.observation import Observation
 
@@ -29,8 +29,8 @@ _POSE = (
 )
 # Fewest repetitions in a row that count: every second image may be one.
 _LEAST = 2
-# Time for which a fault that is over is told, ns, and the usual time between images.
-_TOLD_NS, _USUAL_NS = 1_000_000_000, 66_666_667
+# Time for which a fault that is over is told, ns.
+_TOLD_NS = 1_000_000_000
 _SHOULDERS = [POINT_INDEX["left_shoulder"], POINT_INDEX["right_shoulder"]]
 
 
@@ -57,7 +57,9 @@ class CameraFaults:
         self, observations: Sequence[Observation | None], stamp_ns: int | None = None
     ) -> list[Observation | None]:
         """Return the observations of one time, None for cameras that are frozen or useless."""
-        self._now_ns = self._now_ns + _USUAL_NS if stamp_ns is None else stamp_ns
+        self._now_ns = (
+            self._now_ns + round(1e9 * USUAL_INTERVAL_S) if stamp_ns is None else stamp_ns
+        )
         count = len(self._last)
         seen = [*observations, *[None] * (count - len(observations))]
         now = [None if one is None else one.silhouette for one in seen]

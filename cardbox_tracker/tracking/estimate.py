@@ -34,6 +34,8 @@ HAND_KEYPOINTS = 2, 5
 TRACKING, UNCERTAIN, LOST, NO_PERSON = "tracking", "uncertain", "lost", "no_person"
 
 
+KEPT_S = 0.5
+"""Time for which a head or a hand that is not found keeps its result, s."""
 PLACE_UNCERTAIN_FROM = 0.1
 """Probability of a place that is wrong above which it is uncertain."""
 

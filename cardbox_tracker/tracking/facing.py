@@ -31,7 +31,8 @@ _HAIR_NATS = -0.7
 _LEAST_USUAL = 0.07
 # Time between samples, and time constants of the present share and of the usual one, s.
 _EVERY_S, _NOW_S, _USUAL_S = 0.2, 0.5, 4.0
-# Time with the face after which the usual share is known, s; its largest change by a sample.
+# Time with the face after which the usual share is known, and the longest that a sample
+# stands for, s; largest change of the usual share by a sample.
 _KNOWN_S, _USUAL_CHANGE = 1.0, 0.1
 # Yaw of a person who faces the camera, and lean that shows the top of the head, rad.
 _FACING_RAD, _LEAN_RAD = np.radians(30.0), np.radians(6.0)
@@ -39,8 +40,6 @@ _FACING_RAD, _LEAN_RAD = np.radians(30.0), np.radians(6.0)
 _TOP = 0.65
 # Weight of a sample in the low-pass filter of the torso's brightness.
 _LIGHT = 0.5
-# Longest time that a sample stands for, s.
-_LONGEST_S = 1.0
 
 
 class Facing:
@@ -88,7 +87,7 @@ class Facing:
 
     def _add(self, hair: float, is_frontal: bool) -> None:
         """Judge by another share of hair; ``is_frontal`` is whether the tracked yaw is small."""
-        passed_s = min(self._elapsed_s, _LONGEST_S)
+        passed_s = min(self._elapsed_s, _KNOWN_S)
         before = hair if self._now is None else self._now
         self._now = now = before + (1.0 - float(np.exp(-passed_s / _NOW_S))) * (hair - before)
         is_known = self._known_s >= _KNOWN_S

@@ -31,7 +31,7 @@ from typing import Protocol
 import cv2
 import numpy as np
 
-from cardbox_tracker.camera.camera import Camera
+from cardbox_tracker.camera.camera import NEAREST_M, Camera
 from cardbox_tracker.detectors.detector import color
 from cardbox_tracker.detectors.hand_network import FINGERS, WRIST, HandPoints
 from cardbox_tracker.detectors.image_points import POINT_INDEX, ImagePoints
@@ -41,22 +41,16 @@ from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.proportions import WRIST_SHARE
 from cardbox_tracker.person.sizes import FloatArray
 from cardbox_tracker.person.skeleton import FRAME_NAMES, KeypointState, turn_of
-from cardbox_tracker.tracking.estimate import HAND_KEYPOINTS, Estimate, Hand
+from cardbox_tracker.tracking.estimate import HAND_KEYPOINTS, KEPT_S, Estimate, Hand
 
 # A finger is open if its end is bent by less than the first angle from the direction of its base,
 # and closed if by more than the second, with their spread, rad.
 _OPEN, _CLOSED, _SPREAD = np.radians([80.0, 45.0, 8.0])
-# The thumb is open if its end is straight, and far from the base of the little finger: bend and its
-# spread, rad; distance in lengths of the palm and its spread.
-_THUMB, _THUMB_SPREAD, _THUMB_FAR, _THUMB_FAR_SPREAD = *np.radians([60.0, 5.0]), 0.78, 0.057
-# A thumb that is farther from the base of the middle finger is not part of a fist.
-_THUMB_OUT, _THUMB_OUT_SPREAD = 0.74, 0.03
-# The thumb alone never makes an open hand a closed one.
-_LEAST_BY_THUMB = 0.1
-# Box around a hand relative to that around its points: a closed one, and how much less an open one.
-_BOX, _BOX_LESS = 1.35, 0.21
-LEAST_PX = 17.0
-"""A hand whose box has a smaller longer side is neither open nor closed for the network."""
+# The thumb is open if its end is farther from the base of the little finger, and no part of a fist
+# if it is farther from that of the middle finger; lengths of the palm, and their spread.
+_THUMB_FAR, _THUMB_OUT, _THUMB_SPREAD = 0.78, 0.74, 0.057
+# A hand whose points have a smaller longer side is neither open nor closed for the network, px.
+_LEAST_PX = 12.6
 
 # Points at the bases of index, middle and little finger.
 _INDEX, _MIDDLE, _LITTLE = 5, 9, 17
@@ -68,8 +62,6 @@ _ELBOWS = {"left": slice(6, 8), "right": slice(10, 12)}
 _SQUARE, _PALM_M = 2.4, 0.09
 # Least score of the points that place the square.
 _LEAST_SCORE = 0.3
-# Time for which a hand that is not found keeps its result, s.
-_KEPT_S = 0.5
 # Bases of index, middle, ring and little finger from the wrist, in lengths of the palm: aside to
 # the little finger, and ahead. They are means of the network's own points.
 _BASES = [*range(_INDEX, _LITTLE + 1, 4)]
@@ -144,7 +136,7 @@ class HandReader:
 
     def _kept(self, side: str, estimate: Estimate, time_s: float) -> Hand | None:
         seen_s, hand = self._seen.get(side, (-np.inf, None))
-        is_new = 0.0 <= time_s - seen_s <= _KEPT_S
+        is_new = 0.0 <= time_s - seen_s <= KEPT_S
         return hand if is_new and is_tracked(estimate, side) else None
 
 
@@ -174,7 +166,7 @@ def hand_square(
         return None
     hand = np.mean(knuckles, axis=0) - wrist
     depth_m = float(estimate.keypoints_m[_KEYPOINTS[side], 2])
-    palm_px = max(hypot(*hand), camera.fx * _PALM_M / max(depth_m, 0.1))
+    palm_px = max(hypot(*hand), camera.fx * _PALM_M / max(depth_m, NEAREST_M))
     # A hand that points to the camera has no direction in the image.
     along = hand + 0.2 * (wrist - elbow)
     angle = float(np.arctan2(along[0], -along[1]))
@@ -294,19 +286,15 @@ def _length(at: FloatArray) -> float:
 def opened(found: HandPoints) -> float | None:
     """Return how open a hand is, see :class:`~.estimate.Hand`; None if it is too small."""
     at = found.spatial_m
-    bends = [_finger_bend(at, 1 + 4 * number) for number in range(len(FINGERS))]
+    bends = [_finger_bend(at, 1 + 4 * number) for number in range(1, len(FINGERS))]
     far, out = (
         float(np.linalg.norm(at[4] - at[base])) / _length(at) for base in (_LITTLE, _MIDDLE)
     )
-    fingers = np.array(bends[1:])
-    thumb = (_THUMB - bends[0]) / _THUMB_SPREAD + (far - _THUMB_FAR) / _THUMB_FAR_SPREAD
-    is_open = min(_chance((_OPEN - fingers.max()) / _SPREAD), max(_chance(thumb), _LEAST_BY_THUMB))
-    is_out = _chance((out - _THUMB_OUT) / _THUMB_OUT_SPREAD)
-    is_closed = min(
-        _chance((fingers.min() - _CLOSED) / _SPREAD), max(1.0 - is_out, _LEAST_BY_THUMB)
-    )
+    far, out = (far - _THUMB_FAR) / _THUMB_SPREAD, (out - _THUMB_OUT) / _THUMB_SPREAD
+    is_open = _chance(min((_OPEN - max(bends)) / _SPREAD, far))
+    is_closed = _chance(min((min(bends) - _CLOSED) / _SPREAD, -out))
     value = (1.0 + is_open - is_closed) / 2
-    return value if found.size_px * (_BOX - _BOX_LESS * value) >= LEAST_PX else None
+    return value if found.size_px >= _LEAST_PX else None
 
 
 def _finger_bend(at: FloatArray, base: int) -> float:

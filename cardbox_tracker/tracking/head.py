@@ -21,10 +21,17 @@ from typing import NamedTuple
 
 import numpy as np
 
-from cardbox_tracker.camera.camera import Camera
+from cardbox_tracker.camera.camera import NEAREST_M, Camera
 from cardbox_tracker.common.compiling import borrowing_kernel, inlined_kernel, kernel
-from cardbox_tracker.common.least_squares import Equations, Solution, minimize_compiled, rules_of
-from cardbox_tracker.detectors.image_points import POINT_INDEX, ImagePoints
+from cardbox_tracker.common.least_squares import (
+    DIFFERENCE,
+    ENDS,
+    Equations,
+    Solution,
+    minimize_compiled,
+    rules_of,
+)
+from cardbox_tracker.detectors.image_points import CERTAIN, POINT_INDEX, ImagePoints
 from cardbox_tracker.person.kinematics import pose
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.parts import body_parts
@@ -33,7 +40,7 @@ from cardbox_tracker.person.sizes import FloatArray
 from cardbox_tracker.person.skeleton import NECK_LIMITS
 from cardbox_tracker.terms.kernel_arguments import Floats
 from cardbox_tracker.terms.term import Frame
-from cardbox_tracker.tracking.estimate import Estimate
+from cardbox_tracker.tracking.estimate import KEPT_S, Estimate
 
 _MOST_KEPT = 0.5
 """Share of the last output that delays a ramp by one interval."""
@@ -87,8 +94,6 @@ FACE_M.setflags(write=False)
 HEAD_HEIGHT_M = 0.23
 """Chin to crown of the head of ``FACE_M``, metres."""
 
-LEAST_SCORE = 0.5
-"""Points with lower scores are not used."""
 _CHOSEN = np.array([POINT_INDEX[name] for name in FACE_POINTS])
 LEAST_POINTS = 3
 """Two points do not tell turning, nodding and tilting apart."""
@@ -108,14 +113,9 @@ _POINT_M, _POINT_PX = 0.010, 1.0
 _STDDEVS = np.array([*np.radians([60.0, 40.0, 15.0]), 0.15, 0.15, 0.10])
 _STARTS = np.zeros((5, 6))
 _STARTS[1:, :2] = np.radians([(45.0, 0.0), (-45.0, 0.0), (0.0, 35.0), (0.0, -35.0)])
-_LARGEST_STEP = np.array([0.5, 0.5, 0.5, 0.2, 0.2, 0.2])
-_RULES = rules_of(6, inverse=_STDDEVS**-2.0, largest=_LARGEST_STEP)
-# Steps, and the share of its cost from which on a step that gains less is the last one.
-_ENDS = 8, 1e-3
-_DIFFERENCE = 1e-6
+_RULES = rules_of(6, inverse=_STDDEVS**-2.0)
 
 _SMOOTHING_S = 0.15
-_KEPT_S = 0.5
 _DRIFT_RAD_S = 1.0
 
 
@@ -140,7 +140,7 @@ def fit_neck(
     The ``camera`` has the pitch of the body model, and the torso of ``state``, (12,) or (14,), rad
     and metres, is taken as exact. None if points are too few or uncertain, or form no face.
     """
-    known = points.scores[_CHOSEN] >= LEAST_SCORE
+    known = points.scores[_CHOSEN] >= CERTAIN
     if np.count_nonzero(known) < LEAST_POINTS:
         return None
     frames, axes = pose(body, state), camera.reference_to_optical_rotation()
@@ -197,7 +197,7 @@ def _write_residuals(values: Floats, given: _Given, residuals: Floats) -> None:
         y, z = cr * y - sr * z, sr * y + cr * z
         x, z = cp * x + sp * z, cp * z - sp * x
         x, y = cy * x - sy * y, sy * x + cy * y
-        depth = max(_component(2, x, y, z, values, given), 0.05)
+        depth = max(_component(2, x, y, z, values, given), NEAREST_M)
         across = fx * _component(0, x, y, z, values, given) / depth + cx
         down = fy * _component(1, x, y, z, values, given) / depth + cy_px
         residuals[2 * i] = (across - px[i, 0]) / sigma_px
@@ -207,8 +207,8 @@ def _write_residuals(values: Floats, given: _Given, residuals: Floats) -> None:
 @kernel
 def _solve(given: _Given) -> Equations:
     """Return the equations of the best values from each start."""
-    rows = given, 2 * given[3].shape[0], _DIFFERENCE
-    return minimize_compiled(_write_residuals, rows, _STARTS, _RULES, _ENDS)
+    rows = given, 2 * given[3].shape[0], DIFFERENCE
+    return minimize_compiled(_write_residuals, rows, _STARTS, _RULES, ENDS)
 
 
 class HeadTracker:
@@ -227,7 +227,7 @@ class HeadTracker:
     def see(self, frame: Frame, found: Estimate) -> Estimate:
         """Return ``found``, the estimate of a frame, with the angles of the neck if known."""
         self._age_s += frame.interval_s
-        if self._age_s > _KEPT_S:
+        if self._age_s > KEPT_S:
             self._smooth.forget()
             self._last = None
         neck = self._fit(frame.points, found)

@@ -10,20 +10,25 @@ from math import cos, exp, inf, isnan, sin, sqrt
 
 import numpy as np
 
+from cardbox_tracker.camera.camera import NEAREST_M
 from cardbox_tracker.common.compiling import borrowing_kernel, inlined_kernel, kernel
-from cardbox_tracker.common.least_squares import Equations, Solution, minimize_compiled, rules_of
+from cardbox_tracker.common.least_squares import (
+    DIFFERENCE,
+    ENDS,
+    Equations,
+    Solution,
+    minimize_compiled,
+    rules_of,
+)
 from cardbox_tracker.person.skeleton import LEG_LIMITS
 from cardbox_tracker.terms.kernel_arguments import Floats
 
 N_ANGLES, N_VALUES = 8, 12
 LENGTHS, FLOOR, DISTANCE = 8, 10, 11
-DIFFERENCE = 1e-5
-"""Change of a value for its derivatives."""
 REST = np.tile(np.radians([60.0, 15.0, 15.0, 60.0]), 2)
 """Deviations of the angles from those of hanging legs, (8,), rad."""
 # Of each leg: two points in the image, two slopes, and the foot; then the priors and the balance.
 _OF_LEG, _N_RESIDUALS = 7, 2 * 7 + 2 * N_ANGLES + 4 + 1
-_NEAREST_M = 0.1
 # Deviation of a foot on the floor, m, and height above it from which a foot is lifted rather.
 _CONTACT_M, _LIFTED_M = 0.02, 0.06
 # Shares of the mass: trunk, head and arms; thighs; shanks; feet; and how far along thigh and shank
@@ -34,8 +39,6 @@ _UPPER, _THIGHS, _SHANKS, _FEET, _ALONG, _AHEAD_M = 0.678, 0.2, 0.093, 0.029, 0.
 _LOWEST = np.array([*LEG_LIMITS[:, 0], -0.12, -0.12, -inf, -inf])
 _HIGHEST = np.array([*LEG_LIMITS[:, 1], 0.12, 0.12, inf, inf])
 _RULES = rules_of(N_VALUES, low=_LOWEST, high=_HIGHEST, largest=0.6)
-# Steps, and the share of its cost from which on a step that gains less is the last one.
-_ENDS = 8, 1e-3
 
 Person = tuple[Floats, Floats, Floats, Floats, float]
 """The hips (3,) and the left one from their middle (3,), metres in the reference frame; the
@@ -103,7 +106,7 @@ def _write_residuals(values: Floats, given: Given, points_m: Floats, residuals: 
                 z += axes[2, c] * end[c]
                 along += axes[2, c] * (end[c] - start[c])
                 length2 += (end[c] - start[c]) ** 2
-            z, sigma = max(z, _NEAREST_M), sigma_px[leg, part]
+            z, sigma = max(z, NEAREST_M), sigma_px[leg, part]
             residuals[at + 3 * part] = (fx * x / z + cx - px[leg, part, 0]) / sigma
             residuals[at + 3 * part + 1] = (fy * y / z + cy - px[leg, part, 1]) / sigma
             slope = (along / sqrt(length2) - slopes[leg, part]) / sigma_slopes[leg, part]
@@ -151,7 +154,7 @@ def _solve(first: Floats, others: Floats, given: Given) -> Equations:
             least = cost
             start[1] = others[row]
     rows = (given, points_m), _N_RESIDUALS, DIFFERENCE
-    return minimize_compiled(_write, rows, start, _RULES, _ENDS)
+    return minimize_compiled(_write, rows, start, _RULES, ENDS)
 
 
 def fit(first: Floats, others: Floats, given: Given) -> tuple[Floats, Floats, float]:

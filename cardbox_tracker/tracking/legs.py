@@ -29,7 +29,13 @@ from typing import NamedTuple
 import numpy as np
 
 from cardbox_tracker.camera.camera import Camera
-from cardbox_tracker.detectors.image_points import LEG_POINT_NAMES, POINT_INDEX, ImagePoints
+from cardbox_tracker.common.least_squares import DIFFERENCE
+from cardbox_tracker.detectors.image_points import (
+    CERTAIN,
+    LEG_POINT_NAMES,
+    POINT_INDEX,
+    ImagePoints,
+)
 from cardbox_tracker.measuring.people_camera import is_inside
 from cardbox_tracker.person.kinematics import pose
 from cardbox_tracker.person.legs import leg_angles
@@ -39,10 +45,11 @@ from cardbox_tracker.person.posture import TORSO_Y, YAW
 from cardbox_tracker.person.proportions import HIP_SHARE, MARKED_HEIGHTS, stature_of
 from cardbox_tracker.person.sizes import FloatArray
 from cardbox_tracker.person.skeleton import LEG_LIMITS, KeypointState, rotation_z
+from cardbox_tracker.terms.joint_points import POINT_PX
 from cardbox_tracker.terms.term import Frame
 from cardbox_tracker.tracking import leg_fit
 from cardbox_tracker.tracking.estimate import Estimate, Legs
-from cardbox_tracker.tracking.leg_fit import DIFFERENCE, DISTANCE, N_VALUES, REST, Prior
+from cardbox_tracker.tracking.leg_fit import DISTANCE, N_VALUES, REST, Prior
 from cardbox_tracker.tracking.place import DEPTH, SECOND_CAMERA
 
 _SIDES = np.array([1.0, -1.0])
@@ -61,12 +68,10 @@ _SHOULDERS = [POINT_INDEX[f"{side}_shoulder"] for side in ("left", "right")]
 
 # Lengths of thigh and shank, and height of the ankle, by where detectors mark them.
 _MARKED, _ANKLE_SHARE = -np.diff(MARKED_HEIGHTS[3:]), float(MARKED_HEIGHTS[5])
-# A point with a lower score is not seen.
-LEAST_SCORE = 0.5
 # Width of the image's border, as a share of its longer side, where the detector guesses points.
 _BORDER = 0.005
-# Deviations of the points of knee and ankle, m and px; how much larger that of an unseen one is.
-_POINT_M, _POINT_PX, _UNSEEN = np.array([0.025, 0.025]), 1.5, 6.0
+# Deviation of the points of knee and ankle, m; how much larger that of an unseen one is.
+_POINT_M, _UNSEEN = 0.025, 6.0
 # Deviations of the slopes of thigh and shank, and how much larger those of unseen ones are.
 _SLOPES, _UNSEEN_SLOPE = np.array([0.22, 0.12]), 1.5
 # The true slopes as linear functions of the detector's: factors and offsets.
@@ -164,7 +169,7 @@ class LegReader:
         information = np.linalg.inv(np.linalg.inv(information) + changes)
         if fit.is_distance_fixed:
             shared[3] = 0.0
-        if fit.is_distance_fixed or seen is None or seen.scores[:, 2].min() < LEAST_SCORE:
+        if fit.is_distance_fixed or seen is None or seen.scores[:, 2].min() < CERTAIN:
             # Without both feet, nothing new shows the distance.
             information[3, 3] += _FIXED**-2.0
         vector = information @ shared
@@ -179,7 +184,7 @@ class LegReader:
         covariance = inverse * max(1.0, rms) ** 2
         self._last_stddev = np.minimum(np.sqrt(np.diag(covariance)[:_N]), REST)
         estimate = _moved(estimate, fit.hip_m * (np.exp(values[DISTANCE]) - 1.0), camera)
-        if seen is not None and (seen.scores >= LEAST_SCORE).all() and rms < _WRONG_RMS:
+        if seen is not None and (seen.scores >= CERTAIN).all() and rms < _WRONG_RMS:
             after = np.linalg.inv(inverse[_SHARED, _SHARED])
             step_s = min(max(elapsed_s, 0.01), 0.2)
             self._seen_s = min(self._seen_s + step_s, _AVERAGED_S)
@@ -191,7 +196,7 @@ class LegReader:
 
     def _stands(self, seen: _Seen | None, px_per_m: float) -> bool:
         """Return whether the person stands or squats, on both feet, rather than sits."""
-        if seen is None or seen.scores.min() < LEAST_SCORE:
+        if seen is None or seen.scores.min() < CERTAIN:
             return False
         is_up = self._time_s - self._up_s < _SITS_S
         if is_up and not (np.abs(seen.hips_px - self._hips_px) < _STILL_M * px_per_m).all():
@@ -257,8 +262,8 @@ class _Fit:
         scores[:, 0] *= inside[:2]
         scores[:, 1] *= inside[2:].reshape(3, 2).all(axis=0)
         px, scores = np.where(known[..., None], px, 0.0), np.where(known, scores, 0.0)
-        is_seen = scores >= LEAST_SCORE
-        sigma_px = np.hypot(_POINT_PX, self.px_per_m * _POINT_M)
+        is_seen = scores >= CERTAIN
+        sigma_px = np.hypot(POINT_PX, self.px_per_m * _POINT_M)
         sigma_px = np.where(is_seen, sigma_px, _UNSEEN * sigma_px)
         sigma_px = np.where(known, sigma_px, np.inf)
         slopes = _UNKNOWN
@@ -333,7 +338,7 @@ class _Fit:
         variance = ((covariance[:DISTANCE, :DISTANCE] @ slopes) * slopes).sum(axis=0)
         variance = variance.reshape(6, 3).sum(axis=1)
         stddev_m = np.sqrt(np.maximum(variance, 0.0) + _LEAST_M**2)
-        is_seen = np.zeros(6) if seen is None else seen.scores.ravel() >= LEAST_SCORE
+        is_seen = np.zeros(6) if seen is None else seen.scores.ravel() >= CERTAIN
         is_wrong = rms > _WRONG_RMS or (seen is not None and seen.shows_back)
         states = tuple(
             KeypointState.HIDDEN

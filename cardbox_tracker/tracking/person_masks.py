@@ -12,7 +12,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from cardbox_tracker.camera.camera import Camera
+from cardbox_tracker.camera.camera import NEAREST_M, Camera
 from cardbox_tracker.common.compiling import kernel
 from cardbox_tracker.person.kinematics import pose
 from cardbox_tracker.person.model import BodyModel
@@ -26,7 +26,6 @@ HIP, NECK, HEAD_CENTRE, LEFT, RIGHT = (
 """Rows of :meth:`PersonPoints.of`; an arm has three: shoulder, elbow, fingertips."""
 # Length of the fingers in forearm lengths.
 _FINGERS = 0.15
-_NEAREST_M = 0.2
 
 
 class PersonPoints:
@@ -40,16 +39,16 @@ class PersonPoints:
         """Return column and row, px, and pixels per metre of hip, neck, head and arms, (9, 3).
 
         The posture is (12,) or (14,), rad and metres. Rows are as :data:`HIP` and the names beside
-        it. Points nearer than 0.2 m are treated as if they were 0.2 m away.
+        it. Points nearer than :data:`NEAREST_M` are treated as if they were so far away.
         """
         camera, state = self._camera, np.zeros(N_STATE)
         state[: len(posture)] = posture
-        state[TORSO_X] = min(state[TORSO_X], self._body.placement.distance_m - _NEAREST_M)
+        state[TORSO_X] = min(state[TORSO_X], self._body.placement.distance_m - NEAREST_M)
         points_m = pose(self._body, state, camera.pitch_rad).points_m
         for arm in (LEFT, RIGHT):
             points_m[arm + 2] += _FINGERS * (points_m[arm + 2] - points_m[arm + 1])
         x, y, z = points_m.T
-        scale = camera.fx / np.maximum(z, _NEAREST_M)
+        scale = camera.fx / np.maximum(z, NEAREST_M)
         column, row = scale * x + camera.cx, camera.fy / camera.fx * scale * y + camera.cy
         return np.stack([column, row, scale], axis=1)
 

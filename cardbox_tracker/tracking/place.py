@@ -25,7 +25,7 @@ import numpy as np
 
 from cardbox_tracker.camera.camera import Camera
 from cardbox_tracker.common.health import Verdict
-from cardbox_tracker.detectors.image_points import POINT_INDEX, ImagePoints
+from cardbox_tracker.detectors.image_points import CERTAIN, POINT_INDEX, ImagePoints
 from cardbox_tracker.measuring.people_camera import DISTANCE_STDDEV
 from cardbox_tracker.person.kinematics import pose
 from cardbox_tracker.person.model import MEASURED, BodyModel
@@ -49,7 +49,6 @@ _TRUNK, _ARM = ("shoulder", "hip"), ("shoulder", "elbow", "wrist")
 # Lengths between a detector's points as shares of the length of an arm up to the knuckles, whose
 # parts are 0.160 and 0.2005 of the stature.
 _SHARES = {"trunk": 0.818, "upper": 0.452, "fore": 0.388}
-_LEAST_SCORE = 0.5
 
 
 def distance_of_points(points: ImagePoints, body: BodyModel, camera: Camera) -> float | None:
@@ -65,7 +64,7 @@ def distance_of_points(points: ImagePoints, body: BodyModel, camera: Camera) -> 
     at = {
         name: POINT_INDEX[name]
         for name in names
-        if points.scores[POINT_INDEX[name]] >= _LEAST_SCORE
+        if points.scores[POINT_INDEX[name]] >= CERTAIN
         and np.isfinite(points.spatial_m[POINT_INDEX[name]]).all()
     }
     if "left_shoulder" not in at or "right_shoulder" not in at:

@@ -52,7 +52,7 @@ from cardbox_tracker.person.sizes import FloatArray
 from cardbox_tracker.person.skeleton import KeypointState
 from cardbox_tracker.search.config import TrackerConfig, default_preset
 from cardbox_tracker.search.doubt import doubted
-from cardbox_tracker.terms.term import Image, Silhouette
+from cardbox_tracker.terms.term import USUAL_INTERVAL_S, Image, Silhouette
 from cardbox_tracker.tracking.camera_agreement import CameraAgreement
 from cardbox_tracker.tracking.estimate import LOST, NO_PERSON, UNCERTAIN, Estimate
 from cardbox_tracker.tracking.hands import Look
@@ -80,7 +80,6 @@ _SAME_STATURE = 0.08
 _PROVED = 3
 # Least area and height of the region of a new person, as shares of the image.
 _LEAST_AREA, _LEAST_HEIGHT = 0.01, 0.25
-_USUAL_NS = 66_666_667
 # Deviation of the gap between lines of sight to the middle of a trunk, m; length of a trunk, m, and
 # relative deviation of that which the place where they meet gives.
 _GAP_M, _TRUNK_M, _TRUNK = 0.15, 0.5, 0.4
@@ -327,7 +326,7 @@ class Session:
         observations = listed(observations, 1 + len(self._others))
         stamp_ns = stamp_of(observations)
         if stamp_ns is None:
-            stamp_ns = 0 if self._last_ns is None else self._last_ns + _USUAL_NS
+            stamp_ns = 0 if self._last_ns is None else self._last_ns + round(1e9 * USUAL_INTERVAL_S)
         self._last_ns = stamp_ns
         first = observations[0]
         if self._is_alone:

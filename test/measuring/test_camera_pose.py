@@ -52,7 +52,7 @@ TRUE = aside()
 @pytest.fixture
 def one_step(monkeypatch: pytest.MonkeyPatch) -> None:
     """For tests of what does not depend on how exactly the turn of a camera is estimated."""
-    monkeypatch.setattr(camera_agreement, "_STEPS", 1)
+    monkeypatch.setattr(camera_agreement, "STEPS", 1)
 
 
 def sightings(
@@ -251,10 +251,9 @@ def test_extrinsics_are_found_without_a_board(monkeypatch: pytest.MonkeyPatch) -
     # Less of everything than a recording deserves.
     monkeypatch.setattr(camera_calibration, "_PASSES", 1)
     monkeypatch.setattr(camera_calibration, "_SIGHTINGS", 8)
-    monkeypatch.setattr(camera_calibration, "_STEPS", 2)
-    monkeypatch.setattr(camera_calibration, "_HALF_STEPS", 1)
+    monkeypatch.setattr(camera_calibration, "STEPS", 2)
     monkeypatch.setattr(camera_guess, "_BEST", 2)
-    monkeypatch.setattr(camera_guess, "_STEPS", 4)
+    monkeypatch.setattr(camera_guess, "STEPS", 4)
     states = reference_states(BODY, "left")
     seen = sightings(list(states.values()))
     references = {name: (one.first, one.other) for name, one in zip(states, seen, strict=True)}

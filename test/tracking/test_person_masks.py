@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from cardbox_tracker.camera.camera import Camera
+from cardbox_tracker.camera.camera import NEAREST_M, Camera
 from cardbox_tracker.person.kinematics import pose
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.posture import JOINT_LIMITS, reference_posture
@@ -56,7 +56,7 @@ def test_a_posture_of_the_paper_is_at_the_measured_place() -> None:
 def test_a_person_who_stands_in_the_camera_stays_in_front_of_it() -> None:
     state = np.append(reference_posture("front"), [BODY.placement.distance_m, 0.0])
     points = PersonPoints(BODY, CAMERA.with_pitch(0.0)).of(state)
-    assert points[HIP, 2] == pytest.approx(100.0 / 0.2)
+    assert points[HIP, 2] == pytest.approx(100.0 / NEAREST_M)
     assert points[NECK, 1] < points[HIP, 1]
     assert points[LEFT, 0] > points[RIGHT, 0]
 
