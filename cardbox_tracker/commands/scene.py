@@ -106,8 +106,9 @@ def _again(
     wrong = _contradiction(watched, bodies, scene.camera, camera)
     if wrong:
         print_remarks([f"{person.model}: {wrong}"])
+        doubt = {"camera_contradiction": "people contradict the given scene"}
         unsure = math.hypot(scene.camera.pitch_rad.stddev, FOUND_STDDEV)
-        bodies = [body.with_values(pitch_stddev_rad=unsure) for body in bodies]
+        bodies = [body.with_values(pitch_stddev_rad=unsure, **doubt) for body in bodies]
     guesses = [body.with_values(unknown=tuple({*PLACE, *body.unknown})) for body in bodies]
     if person.people is None:
         placed = [seen_person(watched, guesses[0], camera, config, seed)]

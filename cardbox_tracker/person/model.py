@@ -144,6 +144,8 @@ class CameraPose:
     roll_rad: float = 0.0
     height_m: float | None = None  #: height above the floor, metres; None if it is not known
     height_stddev_m: float = 0.1  #: its standard deviation, metres; it is no part of a model file
+    #: what contradicts the pose, in words, so that no result is sure; it is no part of a model file
+    contradiction: str = ""
 
     def __post_init__(self) -> None:
         """Check the values."""
@@ -214,8 +216,8 @@ class BodyModel:
     def with_values(self, **values: Any) -> BodyModel:
         """Return the same model with other numbers.
 
-        ``values`` are those of :meth:`of`, ``sizes``, ``CAMERA_HEIGHT`` and ``height_stddev_m``.
-        Raises BodyModelError for one out of range.
+        ``values`` are those of :meth:`of`, ``sizes``, ``CAMERA_HEIGHT``, ``height_stddev_m`` and
+        ``camera_contradiction``. Raises BodyModelError for one out of range.
         """
         changed: dict[str, Any] = {}
         if "sizes" in values:
@@ -226,6 +228,7 @@ class BodyModel:
             CAMERA_ROLL: "roll_rad",
             CAMERA_HEIGHT: "height_m",
             "height_stddev_m": "height_stddev_m",
+            "camera_contradiction": "contradiction",
         }
         tilted = {tilt[name]: values.pop(name) for name in tilt if name in values}
         place = {name: values.pop(name) for name in PLACEMENT if name in values}

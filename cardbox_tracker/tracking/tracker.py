@@ -279,6 +279,7 @@ class Tracker:
         """Return an estimate that is no surer than body, distance, person and limits."""
         if estimate.posture is None:
             return estimate
+        reason = reason or self.body.camera_pose.contradiction
         if self.place.is_too_large:
             reason = "the body is too large for the distance"
         if self._is_alone and self.cameras[0].identity.is_doubtful:
