@@ -375,15 +375,18 @@ class SilhouetteSource:
     def images(self, end_s: float = math.inf) -> Iterator[PreparedImage]:
         """Yield every image that can be decoded; the next ones are, while the caller works.
 
-        Without pictures, kept images serve if there are all to ``end_s``.
+        Kept images serve if there are all to ``end_s``; with pictures, these are decoded once more.
         """
-        if self._file is not None and not self.has_pictures and self._kept_s >= end_s:
+        kept: Iterator[PreparedImage] = iter(())
+        if self._file is not None and self._kept_s >= end_s:
             self._file.seek(0)
-            yield from (pickle.load(self._file) for _ in range(self._kept))
+            kept = (pickle.load(self._file) for _ in range(self._kept))
+        if not self.has_pictures and self._kept_s >= end_s:
+            yield from kept
             return
         used, keeps = 0, self._file is not None and self._kept == 0
         taken = enumerate(self._bag.images(self.topic), 1)
-        for number, image, prepared in results_ahead(self._prepared, taken):
+        for number, image, prepared in results_ahead(partial(self._prepared, kept), taken):
             if number == 1:
                 late_ns = image.time_ns - image.stamp_ns
                 self._clock_ns = late_ns if abs(late_ns) > _OTHER_CLOCK_NS else 0
@@ -411,15 +414,20 @@ class SilhouetteSource:
         return self._file.tell() < _MOST_KEPT
 
     def _prepared(
-        self, taken: tuple[int, RecordedImage]
+        self, kept: Iterator[PreparedImage], taken: tuple[int, RecordedImage]
     ) -> tuple[int, RecordedImage, NDArray[np.uint8] | str]:
-        """Return an image with its number, decoded once, and prepared, or why it cannot be."""
+        """Return an image with its number, decoded once, and prepared, or why it cannot be.
+
+        ``kept`` has those that were prepared in a pass before.
+        """
         number, image = taken
         try:
             sent = image.as_sent
             height, width = sent.shape[:2]
             self._pipeline.calibration.check_shape(width, height, self.topic, "the first image")
-            prepared = self._pipeline.prepare(sent)
+            again = next(kept, None)
+            is_same = again is not None and again.stamp_ns == image.stamp_ns
+            prepared = again.image if again and is_same else self._pipeline.prepare(sent)
         except (CameraError, EncodingError) as error:
             return number, image, str(error)
         return number, replace(image, _decode=lambda: sent), prepared
