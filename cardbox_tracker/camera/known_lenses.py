@@ -23,7 +23,6 @@ _WEBCAMS: Mapping[str, float] = MappingProxyType(
         "c505": 60.0,
         "c525": 69.0,
         "c615": 78.0,
-        "c910": 78.0,
         "c920": 78.0,
         "c922": 78.0,
         "c925e": 78.0,
