@@ -82,8 +82,13 @@ class Camera:
         """Check the values; whole numbers of another type become ``int``."""
         for name in ("width", "height"):
             object.__setattr__(self, name, whole_pixels(name, getattr(self, name)))
-        for name in ("fx", "fy", "cx", "cy", "pitch_rad"):
+        for name in ("fx", "fy", "cx", "cy", "pitch_rad", "focal_stddev"):
             object.__setattr__(self, name, real_number(name, getattr(self, name)))
+        if not 0.0 <= self.focal_stddev < math.inf:
+            raise CameraError(
+                f"the deviation of the camera's focal lengths is {self.focal_stddev:g}; expected a "
+                "finite share of them from 0 on, such as 0.02"
+            )
         if not all(0 < side <= _MOST_SIDE_PX for side in (self.width, self.height)):
             raise CameraError(
                 f"the camera's image has {self.width}x{self.height} px; expected 1 to "

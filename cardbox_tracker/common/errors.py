@@ -74,6 +74,11 @@ def plain(text: str, most: int = _MOST_OF_A_TEXT) -> str:
     return "".join(shown)
 
 
+def in_cell(text: str) -> str:
+    """Return a text as a cell of a table: without tabs and line breaks, see :func:`plain`."""
+    return plain(text).replace("\n", "\\n")
+
+
 def quoted(value: object) -> str:
     """Return the ``repr`` of ``value``, or its beginning if it is long."""
     if isinstance(value, str):

@@ -46,6 +46,8 @@ def foreign(
         if isinstance(error, CardboxError) and name in str(error):
             raise
         reason = " ".join(str(getattr(error, "strerror", None) or error).split())
+        if isinstance(error, UnicodeDecodeError):
+            reason = "it is no text in UTF-8"
         if isinstance(error, KeyError):
             reason = f"missing key {reason}"
         elif not isinstance(error, CardboxError):

@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import asdict, dataclass, field, fields, replace
+from operator import index
 from typing import Any
 
 import numpy as np
@@ -196,6 +197,13 @@ class BodyModel:
         if self.source not in SOURCES:
             raise BodyModelError(f"source is {quoted(self.source)}; expected one of {SOURCES}")
         check_range("stature_stddev", self.stature_stddev, 0.0, 1.0, "statures")
+        for name in ("version", "stamp_ns"):
+            try:
+                object.__setattr__(self, name, index(getattr(self, name)))
+            except TypeError:
+                raise BodyModelError(
+                    f"{name} is {quoted(getattr(self, name))}; expected a whole number"
+                ) from None
         for name in self.unknown:
             if name not in (*PLACEMENT, *SIZE_NAMES):
                 raise BodyModelError(

@@ -7,7 +7,7 @@ from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
 
-from cardbox_tracker.common.errors import BagError, CardboxError, plain
+from cardbox_tracker.common.errors import BagError, CardboxError, in_cell
 from cardbox_tracker.recordings.bag_files import FILE_ENDINGS, files_of_one, is_bag_file
 from cardbox_tracker.recordings.bag_reader import REPAIR_ROS1, BagReader
 from cardbox_tracker.recordings.given_camera import GivenCamera, equivalent_mm
@@ -93,6 +93,8 @@ def open_images(path: str | os.PathLike[str], camera: GivenCamera | None = None)
         raise BagError(f"{path} is a pipe or a device; give a recording: a bag, a video or images")
     if path.suffix.lower() in SUFFIXES:
         raise BagError(f"{path} is a single image; give the folder of all images, or a video")
+    if path.suffix.lower() in (".csv", ".parquet"):
+        raise BagError(f"{path} is a table; give the recording that it is of")
     return VideoReader(path, camera)
 
 
@@ -170,5 +172,5 @@ def _found(folder: Path, left_out: Path | None, depth: int) -> Iterator[Path]:
 
 def _plain(name: str) -> str:
     """Return a name that a table, a terminal and a spreadsheet show as it is."""
-    shown = plain(name).replace("\n", "\\n")
+    shown = in_cell(name)
     return f"./{shown}" if shown.startswith(FORMULA) else shown

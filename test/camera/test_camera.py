@@ -53,6 +53,9 @@ def test_projection_by_hand() -> None:
         ({"fx": None}, r"fx is None; expected a number"),
         ({"fy": 10**400}, r"fy is 1000.*; expected a number"),
         ({"cy": 1j}, r"cy is 1j; expected a number"),
+        ({"focal_stddev": float("nan")}, "deviation of the camera's focal lengths is nan"),
+        ({"focal_stddev": -float("inf")}, "deviation of the camera's focal lengths is -inf"),
+        ({"focal_stddev": "wide"}, "focal_stddev is 'wide'; expected a number"),
     ],
 )
 def test_an_impossible_camera_is_refused(changes: dict[str, Any], words: str) -> None:

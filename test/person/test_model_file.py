@@ -85,6 +85,13 @@ def test_whole_numbers_are_numbers_too() -> None:
     assert loads_body_model(replaced("distance_m", "distance_m: 3")).placement.distance_m == 3.0
 
 
+@pytest.mark.parametrize("name", ["version", "stamp_ns"])
+@pytest.mark.parametrize("value", [float("nan"), "new"])
+def test_a_version_is_a_whole_number(name: str, value: object) -> None:
+    with pytest.raises(BodyModelError, match=f"{name} is .*; expected a whole number"):
+        BodyModel().with_values(**{name: value})
+
+
 FOREARM = "forearm_length:"
 
 

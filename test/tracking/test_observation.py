@@ -63,6 +63,13 @@ def test_a_channel_that_does_not_fit_the_camera_is_named(
     assert frame["marks"].dtype == np.float64 and frame["marks"].shape == (4, 2)
 
 
+@pytest.mark.parametrize("stamp", [float("nan"), 1.5, "now"])
+def test_a_stamp_that_is_no_whole_number_is_refused(stamp: Any) -> None:
+    with pytest.raises(ValueError, match=r"stamp_ns of an observation is .*nanoseconds"):
+        Observation(MASK, stamp_ns=stamp)
+    assert Observation(MASK, stamp_ns=np.int64(7)).stamp_ns == 7
+
+
 def test_without_a_silhouette_there_are_no_channels_either() -> None:
     config = default_preset()
     camera = TrackedCamera(BodyModel(), CAMERA, config)

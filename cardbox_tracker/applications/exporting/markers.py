@@ -18,6 +18,7 @@ from cardbox_tracker.applications.exporting.motion import (
     frames_of,
     in_reference,
 )
+from cardbox_tracker.common.errors import in_cell
 from cardbox_tracker.common.extensions import optional
 from cardbox_tracker.common.files import atomic_path
 from cardbox_tracker.person.isb_angles import LABORATORY
@@ -94,7 +95,7 @@ def write_trc(path: Path, motion: Motion, body: BodyModel | None) -> None:
     rate, count = f"{motion.rate_hz:g}", str(len(points_m))
     numbers = range(1, len(names) + 1)
     header = (
-        ("PathFileType", "4", "(X/Y/Z)", path.name),
+        ("PathFileType", "4", "(X/Y/Z)", in_cell(path.name)),
         (
             *("DataRate", "CameraRate", "NumFrames", "NumMarkers", "Units"),
             *("OrigDataRate", "OrigDataStartFrame", "OrigNumFrames"),

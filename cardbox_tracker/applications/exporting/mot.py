@@ -13,6 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from cardbox_tracker.applications.exporting.motion import Motion, floor_below, frames_of, held
+from cardbox_tracker.common.errors import in_cell
 from cardbox_tracker.common.files import atomic_path
 from cardbox_tracker.person.isb_angles import LABORATORY, LEAST_BENT_RAD, thorax_angles
 from cardbox_tracker.person.model import BodyModel
@@ -104,7 +105,7 @@ def write_mot(path: Path, motion: Motion, body: BodyModel | None) -> None:
         columns |= dict(zip(PELVIS, hips_m.T, strict=True))
     rows = np.column_stack([motion.time_s[seen], *columns.values()])
     header = (
-        path.stem,
+        in_cell(path.stem),
         "version=1",
         f"nRows={len(rows)}",
         f"nColumns={rows.shape[1]}",

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 from cardbox_tracker.applications.exporting.markers import markers_of, write_c3d, write_trc
+from cardbox_tracker.applications.exporting.mot import write_mot
 from cardbox_tracker.applications.exporting.motion import images_of_body
 from cardbox_tracker.common.errors import CardboxError
 from cardbox_tracker.person.model import BodyModel
@@ -113,6 +114,20 @@ def test_a_rolled_camera_gives_the_same_markers(
     assert np.abs(motion.keypoints_m - motion_of(state, body).keypoints_m).max() > 0.1
     expected_m = markers_of(motion_of(state, body), body).points_m
     assert markers_of(motion, rolled).points_m == pytest.approx(expected_m)
+
+
+@pytest.mark.parametrize("write", [write_trc, write_mot])
+def test_a_name_with_tabs_and_line_breaks_stays_in_its_cell(
+    motion_of: Callable, tmp_path: Path, write: Callable
+) -> None:
+    body = BodyModel.of(distance_m=2.0, hip_height_m=-0.5)
+    motion, texts = motion_of([np.zeros(14)], body), []
+    for name in ("a.trc", "a\tb\nc.trc"):
+        write(tmp_path / name, motion, body)
+        texts.append((tmp_path / name).read_text())
+    assert "a\\tb\\nc" in texts[1]
+    for character in "\t\n":
+        assert texts[0].count(character) == texts[1].count(character)
 
 
 def test_trc_by_hand(motion_of: Callable, tmp_path: Path) -> None:

@@ -165,7 +165,7 @@ def with_point(x: float, y: float, score: float) -> PolygonStamped:
         (with_point(1e30, 5.0, 0.5), "640x480"),
         (with_point(5.0, 5.0, math.nan), "score nan"),
         (with_point(5.0, 5.0, 97.0), "a chance from 0 to 1"),
-        (with_point(5.0, 5.0, -0.1), "a chance from 0 to 1"),
+        (with_point(5.0, 5.0, -1.5), "a chance from 0 to 1"),
     ],
 )
 def test_impossible_polygons_are_refused(message: Any, expected: str) -> None:
@@ -173,8 +173,9 @@ def test_impossible_polygons_are_refused(message: Any, expected: str) -> None:
         persons_of_polygon(message, SIZE)
 
 
-def test_a_missing_point_may_be_anywhere() -> None:
-    (person,) = persons_of_polygon(with_point(math.nan, -1e9, 0.0), SIZE)
+@pytest.mark.parametrize("score", [0.0, -0.1])
+def test_a_missing_point_may_be_anywhere(score: float) -> None:
+    (person,) = persons_of_polygon(with_point(math.nan, -1e9, score), SIZE)
     assert person.scores[POINT_INDEX["nose"]] == 0.0
     assert person.scores[POINT_INDEX["left_eye"]] > 0.0
 

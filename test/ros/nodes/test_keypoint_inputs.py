@@ -366,7 +366,7 @@ def test_points_beside_the_silhouette_are_not_used(bus: Any) -> None:
     ("row", "words"),
     [
         (f"{T},nose,nan,100,0.5", "line 2: nose is at"),
-        (f"{T},nose,100,100,1.5", "line 2: nose has the score 1.5"),
+        (f"{T},nose,100,100,15", "line 2: nose has the score 15"),
         ("\n".join(f"{T},{name},0.5,0.5,1" for name in ("nose", "left_eye", "left_ear")), "shares"),
     ],
 )
