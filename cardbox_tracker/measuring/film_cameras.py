@@ -355,10 +355,10 @@ def _offsets(first: Film, film: Film) -> Iterator[tuple[float, float, Who, bool]
             found.append((sum(gains[pair] for pair in pairs), offset_s, who))
     taken = list[float]()
     is_given = film.offset_s is not None
-    for sure, offset_s, who in sorted(found, key=lambda one: -one[0]):
+    for alike, offset_s, who in sorted(found, key=lambda one: -one[0]):
         if len(taken) < _MOST_OFFSETS and all(abs(offset_s - one) > _APART_S for one in taken):
             taken.append(offset_s)
-            yield offset_s, 0.0 if is_given else step_s, who, is_given or bool(sure > _CLEAR)
+            yield offset_s, 0.0 if is_given else step_s, who, is_given or bool(alike > _CLEAR)
 
 
 def _starts(
