@@ -1,4 +1,4 @@
-"""Table of what a change of each constant changes (``docs/evaluation/constants.md``).
+"""Table of what a change of each constant changes.
 
     python -m lab.tools.constants DATA POINTS.csv [--only tracking/legs.py ...] [--output FILE.md]
 
@@ -62,8 +62,8 @@ def constants_of(text: str) -> Iterator[tuple[str, str, bool]]:
         is_function = isinstance(node, ast.FunctionDef | ast.ClassDef)
         marks = " ".join(map(ast.unparse, getattr(node, "decorator_list", ())))
         if not is_function or "kernel" in marks or "inlined" in marks:
-            names = (one for one in ast.walk(node) if isinstance(one, ast.Name))
-            early |= {one.id for one in names if isinstance(one.ctx, ast.Load)}
+            read = (one for one in ast.walk(node) if isinstance(one, ast.Name))
+            early |= {one.id for one in read if isinstance(one.ctx, ast.Load)}
     for node in body:
         if not isinstance(node, ast.Assign | ast.AnnAssign) or node.value is None:
             continue
