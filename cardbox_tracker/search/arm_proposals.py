@@ -27,17 +27,19 @@ from cardbox_tracker.search.state_choice import least_of
 from cardbox_tracker.terms.bit_planes import FOREGROUND, PIXELS, Planes, value_at
 from cardbox_tracker.terms.kernel_arguments import BodyTuple, Floats, body_of
 
-# Margin of the distance from shoulder to hand of an arm that reaches for a pixel, against the
-# difference of the bones' lengths, m.
-_FOLDED_M = 0.05
+# Margins of the distance from shoulder to hand of an arm that reaches for a pixel, against the
+# difference and the sum of the bones' lengths, m.
+_FOLDED_M, _STRETCHED_M = 0.05, 0.001
 # Probability of the nearer one of two points: people gesture to the front.
 _NEARER = 0.8
 # Direction (forwards, outwards, up) of an elbow that hangs down.
 _ELBOW_HANGS = (-0.2, 0.4, -1.0)
 _ELBOW_TURNS_RAD = 1.2 * pi
-# Radius in arm lengths from the shoulder in which the tip of an arm is sought, and distance between
-# the points of the grid that is searched for it, px.
-_REACH = 1.1
+# Search of the tip of an arm: radius in arm lengths from the shoulder; least number of uncovered
+# points.
+_REACH, _FEWEST_TIPS = 1.1, 3
+_INWARDS_PX = 3.0
+# Distance between the points of the grid that is searched for it, px.
 _GRID_PX = 3
 
 ArmPlan = tuple[int, float, int, int, int, Floats, Floats]
@@ -81,7 +83,7 @@ def _reach(
     for j in range(3):
         squares += (along * ray[j] - shoulder[j]) ** 2
     near = sqrt(squares)
-    farthest = a + b
+    farthest = a + b - _STRETCHED_M
     low = min(max(near, abs(a - b) + _FOLDED_M), farthest)
     reach = low + (farthest - low) * stretch
     step = sqrt(max(reach * reach - near * near, 0.0))
@@ -226,10 +228,10 @@ def propose_arms(
     u, v = fx * shoulder[0] / shoulder[2] + cx, fy * shoulder[1] / shoulder[2] + cy
     length_px = (parts[UPPER_ARM, HEIGHT] + parts[FOREARM, HEIGHT]) * fx / shoulder[2]
     count, tip_u, tip_v = farthest_uncovered(uncovered, size, u, v, _REACH * length_px)
-    if count > 0:
+    if count >= _FEWEST_TIPS:
         # The keypoint of the hand lies before the end of the outline.
         far = sqrt((u - tip_u) ** 2 + (v - tip_v) ** 2) + 1e-9
-        inwards = min(_GRID_PX / far, 1.0)
+        inwards = min(_INWARDS_PX / far, 1.0)
         tip_u, tip_v = tip_u + inwards * (u - tip_u), tip_v + inwards * (v - tip_v)
         ray[0], ray[1], ray[2] = (tip_u - cx) / fx, (tip_v - cy) / fy, 1.0
         norm = sqrt(ray[0] ** 2 + ray[1] ** 2 + 1.0)

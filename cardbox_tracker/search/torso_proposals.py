@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from math import pi
+
 import numpy as np
 
-from cardbox_tracker.common.compiling import inlined_kernel, kernel
+from cardbox_tracker.common.compiling import kernel
 from cardbox_tracker.person.kinematics import (
     angles_in,
     angles_of_arm,
@@ -13,6 +15,7 @@ from cardbox_tracker.person.kinematics import (
     state_pose,
 )
 from cardbox_tracker.person.posture import (
+    FIRST_ANGLES,
     N_STATE,
     PITCH,
     TORSO_X,
@@ -28,20 +31,20 @@ from cardbox_tracker.search.joint_moves import (
 from cardbox_tracker.search.state_choice import least_of
 from cardbox_tracker.terms.kernel_arguments import BodyTuple, Floats, body_of
 
-# Deviation of the yaw of the upright torsos that face the camera, rad.
-_FRESH_YAW_RAD = 0.3
+# Explorers: half of them bow within this range, two fifths get any yaw, the others mirror the yaw;
+# the distance of all has this deviation, m.
+_BOW_FROM_RAD, _BOW_RANGE_RAD = -5.0 * pi / 180.0, 60.0 * pi / 180.0
+_BOWING, _BOWING_OR_TURNING = 0.5, 0.9
+_EXPLORERS_X_M = 0.06
+# Fraction of the upright torsos with any yaw, since people walk in sideways; deviation of the yaw
+# of the others, which face the camera, rad.
+_FRESH_TURNED, _FRESH_YAW_RAD = 0.5, 0.3
 
 
 Upright = tuple[int, Floats, float, float, float]
 """Number of upright torsos at the place of the silhouette; state with hanging arms, (14,);
 deviation of ``torso_x``, m; bearing of the silhouette, lateral coordinate over depth; distance of
 the person in the body model, m."""
-
-
-@inlined_kernel
-def _turn_anywhere(state: Floats, angle: int, limits: Floats, value: float) -> None:
-    """Set an angle of a state by a uniform random number."""
-    state[angle] = limits[angle, 0] + (limits[angle, 1] - limits[angle, 0]) * value
 
 
 @kernel
@@ -57,7 +60,7 @@ def propose_torsos(
 
     Every second torso rotates about the shoulders. Half of either kind moves by ``step_m``, the
     lateral step of the silhouette, because a walking person moves further than the noise. The last
-    ``explorers`` bow or turn; the last of these stand upright. ``numbers`` are
+    ``explorers`` bow, turn or mirror their yaw; the last of these stand upright. ``numbers`` are
     (N, 14) and (N, 2).
     """
     sigma, limits, lever_m = noise
@@ -76,15 +79,22 @@ def propose_torsos(
             if i % 2 == 1:
                 pivot(state, source, lever_m)
         elif i < n - fresh:
-            _turn_anywhere(state, PITCH if uniforms[i, 0] < 0.5 else YAW, limits, uniforms[i, 1])
+            kind, value = uniforms[i, 0], uniforms[i, 1]
+            if kind < _BOWING:
+                state[PITCH] = _BOW_FROM_RAD + _BOW_RANGE_RAD * value
+            elif kind < _BOWING_OR_TURNING:
+                state[YAW] = limits[YAW, 0] + (limits[YAW, 1] - limits[YAW, 0]) * value
+            else:
+                state[YAW] = limits[YAW, 0] + limits[YAW, 1] - state[YAW]
+            # The random numbers of the arms are not used otherwise.
+            state[TORSO_X] += _EXPLORERS_X_M * normals[i, FIRST_ANGLES[0]]
         else:
             for d in range(N_STATE):
                 state[d] = fresh_state[d]
             state[TORSO_X] += fresh_x_m * normals[i, TORSO_X]
             clip_state(state, limits)
-            # People walk in sideways.
-            if uniforms[i, 0] < 0.5:
-                _turn_anywhere(state, YAW, limits, uniforms[i, 1])
+            if uniforms[i, 0] < _FRESH_TURNED:
+                state[YAW] = limits[YAW, 0] + (limits[YAW, 1] - limits[YAW, 0]) * uniforms[i, 1]
             else:
                 state[YAW] = fresh_state[YAW] + _FRESH_YAW_RAD * normals[i, YAW]
             state[TORSO_Y] = sight * (distance_m - state[TORSO_X])

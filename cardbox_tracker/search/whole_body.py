@@ -46,8 +46,8 @@ from cardbox_tracker.terms.silhouette import SilhouetteTerm
 from cardbox_tracker.terms.term import Frame, Posed, Term
 from cardbox_tracker.terms.whole_body import iou_of
 
-# Deviation of ``torso_x`` of upright torsos.
-_FRESH_X_M = 0.25
+# Deviation of ``torso_x`` of upright torsos, which is larger in the first frames of a search.
+_SETTLED_X_M, _YOUNG_X_M = 0.25, 0.5
 # Lateral step, m, after which the legs have left their last columns.
 _STEP_M = 0.05
 # Factor on the numbers of states in a frame whose cues tell where joints are.
@@ -218,7 +218,7 @@ class WholeBodyFilter:
         is_settled = not self._is_new and self._age > doubt.SETTLED_FRAMES
         fresh = self._reference.copy()
         fresh[TORSO_X] = before[TORSO_X] if location.x_m is None else location.x_m
-        fresh_x_m = location.x_stddev_m or _FRESH_X_M
+        fresh_x_m = location.x_stddev_m or (_SETTLED_X_M if is_settled else _YOUNG_X_M)
         upright = profile.fresh_torsos if is_settled else profile.torso_explorers
         torsos = torso_proposals.propose_torsos(
             self._survivors,

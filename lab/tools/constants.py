@@ -30,6 +30,7 @@ from cardbox_tracker.commands.track import track
 from cardbox_tracker.common.files import write_file
 from cardbox_tracker.person.skeleton import KEYPOINT_NAMES
 from cardbox_tracker.tracking.estimate import TRACKING
+from cardbox_tracker.tracking.precompile import compile_for_films
 
 PACKAGE = Path(cardbox_tracker.__file__).parent
 FOLDERS = "search", "terms", "tracking", "measuring", "segmentation"
@@ -68,8 +69,7 @@ def constants_of(text: str) -> Iterator[tuple[str, str, bool]]:
         if not isinstance(node, ast.Assign | ast.AnnAssign) or node.value is None:
             continue
         target = node.targets[0] if isinstance(node, ast.Assign) else node.target
-        named = target.elts if isinstance(target, ast.Tuple) else [target]
-        names = [one.id for one in named if isinstance(one, ast.Name)]
+        names = [one.id for one in ast.walk(target) if isinstance(one, ast.Name)]
         parts = node.value.elts if isinstance(node.value, ast.Tuple) else []
         values = parts if len(names) == len(parts) > 1 else [node.value] * len(names)
         if [getattr(one, "value", None) for one in values] != list(range(len(names))):
@@ -166,6 +166,7 @@ def main() -> None:
     found = {file: list(constants_of(text)) for file, text in files.items()}
     count, lines = sum(map(len, found.values())), sum(map(code_lines, files.values()))
     print(f"{count} constants in {lines} lines of code, {1000 * count / lines:.0f} in 1000")
+    compile_for_films()
     for file in files:
         import_module(f"cardbox_tracker.{file.parent.name}.{file.stem}")
     cases = {case: _apart(case, options) for case in CASES}
