@@ -10,6 +10,8 @@ from dataclasses import replace
 from cardbox_tracker.camera.camera import Camera
 from cardbox_tracker.commands.arguments import print_remarks
 from cardbox_tracker.commands.tracking_request import PersonRequest
+from cardbox_tracker.common.errors import CardboxError
+from cardbox_tracker.detectors.person_choice import Chosen, PersonChoice
 from cardbox_tracker.measuring.people_camera import PITCH_PRIOR, USUAL_PITCH
 from cardbox_tracker.measuring.scene import FOUND, GIVEN, USUAL, Scene, SceneCamera, Value
 from cardbox_tracker.measuring.scene_camera import (
@@ -30,11 +32,12 @@ from cardbox_tracker.search.config import TrackerConfig
 @contextmanager
 def measured_scene(
     recording: RecordingRequest, person: PersonRequest, config: TrackerConfig, seed: int
-) -> Iterator[tuple[Recording, Scene]]:
+) -> Iterator[tuple[Recording, Scene, Chosen | None]]:
     """Open a recording whose scene is measured, in all of it, before it is tracked.
 
-    A roll that is found turns the images back, unless one is given. Raises CardboxError if the
-    recording cannot be read, or the detector cannot be loaded.
+    A roll that is found turns the images back, unless one is given. The third is who is chosen of
+    several people, if there is a choice. Raises CardboxError if the recording cannot be read, the
+    detector cannot be loaded, or nobody can be chosen.
     """
     if person.model is not None and not person.body.unknown:
         roll_rad = person.body.camera_pose.roll_rad
@@ -49,18 +52,25 @@ def measured_scene(
             roll_rad = recording.camera.stands_rad
             camera = SceneCamera(lens_of(first.camera), pitch, Value(roll_rad, 0.0, GIVEN))
             bodies = [body.with_values(camera_roll_rad=roll_rad) for body in bodies]
-            yield source, Scene(camera, tuple(bodies))
+            chosen = None
+            if person.choice is not None:
+                chosen = _checked(watch(source, *span, person.choice).chosen)
+            yield source, Scene(camera, tuple(bodies)), chosen
             return
-        watched = watch(source, *span)
+        watched = watch(source, *span, person.choice)
         found = found_camera(recording, person, watched, first.camera)
         better = _corrected(recording, found.camera)
         if better is not recording:
             stack.close()
             source = stack.enter_context(better.open())
-            watched, first = watch(source, *span), source.first
+            watched, first = watch(source, *span, person.choice), source.first
+        chosen = _checked(watched.chosen)
         stands = {"camera_roll_rad": better.camera.stands_rad}
         bodies = [body.with_values(**stands) for body in _bodies(bodies, person, found)]
-        if person.people is None:
+        if chosen is not None:
+            given = config, 0, seed, *span
+            bodies = seen_people(source, bodies, *given, only=chosen.number)
+        elif person.people is None:
             shown = [one for one in found.distances if one is not None]
             # One person whom the detector lost is several; the longest is surely who is tracked.
             longest = max(shown, key=lambda one: len(one.times_s), default=None)
@@ -69,7 +79,17 @@ def measured_scene(
             bodies = [seen_person(watched, bodies[0], first.camera, config, seed, far)]
         else:
             bodies = seen_people(source, bodies, config, person.people, seed, *span)
-        yield source, Scene(found.camera, tuple(bodies))
+        yield source, Scene(found.camera, tuple(bodies)), chosen
+
+
+def _checked(chosen: Chosen | None) -> Chosen | None:
+    """Return who is chosen; raise CardboxError if nobody is seen."""
+    if chosen is not None and chosen.number is None:
+        raise CardboxError(
+            "the detector finds nobody to choose with --person; give @T a second at which the "
+            "person is in view, or leave --person out"
+        )
+    return chosen
 
 
 def _bodies(
@@ -147,10 +167,12 @@ def found_camera(
     return found
 
 
-def tilt_in(recording: RecordingRequest, span: TimeSpan) -> tuple[float, RecordingRequest]:
+def tilt_in(
+    recording: RecordingRequest, span: TimeSpan, choice: PersonChoice | None = None
+) -> tuple[float, RecordingRequest]:
     """Return the pitch, rad, by the images of a span, and the recording with the roll by them."""
     with recording.open() as source:
         person = PersonRequest(BodyModel(), None, span.start_s, is_pitch_given=False)
         camera = source.first.camera
-        found = found_camera(recording, person, watch(source, *span), camera).camera
+        found = found_camera(recording, person, watch(source, *span, choice), camera).camera
     return found.pitch_rad.mean, _corrected(recording, found)

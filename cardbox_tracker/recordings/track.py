@@ -82,6 +82,7 @@ def track_recording(
     end_s: float = math.inf,
     people: int | None = None,
     look: Look | None = None,
+    only: int | None = None,
 ) -> TrackSummary:
     """Track every image from ``start_s`` to ``end_s``.
 
@@ -89,19 +90,25 @@ def track_recording(
     reference posture. The same recording and ``seed`` give the same bytes. ``table`` is a file of
     :func:`~.result_table.result_table`. ``observers``, such as a progress bar or a bag writer, are
     called after each image, and for each of several people. The other arguments are those of
-    :class:`~cardbox_tracker.tracking.session.Session`. Raises CardboxError if no image lies after
-    ``start_s``, or a file cannot be written.
+    :class:`~cardbox_tracker.tracking.session.Session`; with ``only``, the results are those of one
+    person without a number. Raises CardboxError if no image lies after ``start_s``, or a file
+    cannot be written.
     """
     first, rng = recording.first, np.random.default_rng(seed)
-    given = recording.others, people, look
-    session, found = Session(bodies, first.camera, config, rng, *given), list[Quality]()
+    given = recording.others, people if only is None else 0, look
+    session = Session(bodies, first.camera, config, rng, *given, only=only)
+    found, cuts_s = list[Quality](), list[float]()
     has = {"has_points": first.has_points, "has_people": people is not None}
     has["has_hands"] = look is not None
     with nullcontext() if table is None else result_table(table, **has) as add_row:
         frames = 0
         for taken in recording.frames(start_s, end_s):
             frames += 1
+            if taken.first.is_cut:
+                cuts_s.append(taken.time_s)
             estimates = session.track(taken.observations)
+            if only is not None:
+                estimates = [replace(one, person=None) for one in estimates]
             found += [Quality() for _ in estimates[len(found) :]]
             for estimate, tracker, quality in zip(estimates, session.trackers, found, strict=True):
                 quality(taken.first, estimate, tracker)
@@ -130,8 +137,20 @@ def track_recording(
         each = {n: _summary([quality], body) for n, (quality, body) in enumerate(pairs, 1)}
     # Of several people, there may be nobody.
     body = bodies[0] if bodies else None
-    summary = _summary(found, body, session.remarks(recording.names, is_all=True))
+    remarks = [*_cut_remarks(cuts_s), *session.remarks(recording.names, is_all=True)]
+    summary = _summary(found, body, remarks)
     return replace(summary, used=used, people=each)
+
+
+def _cut_remarks(cuts_s: Sequence[float]) -> Iterator[str]:
+    """Yield what follows from the cuts of a film at these times, s, if it has any."""
+    if cuts_s:
+        yield (
+            f"the film is cut at {', '.join(f'{one:.1f}' for one in cuts_s)} s: each time tracking "
+            "starts anew, and people are known by the colours of the trunk alone, if several are "
+            "told apart; pitch and height of the camera are those of the longest shot, so leans "
+            "and places are right in that one: give --start and --end to track another"
+        )
 
 
 _MOST_REASONS = 3

@@ -81,9 +81,10 @@ class Observation:
         stamp_ns: time of the data, ns; None if it is unknown.
         picture: returns the image at its full resolution, which hands need; that of the channel
             ``image`` without another one.
+        is_cut: whether a film is cut here, so that nothing is where it was before.
     """
 
-    __slots__ = ("channels", "picture", "stamp_ns")
+    __slots__ = ("channels", "is_cut", "picture", "stamp_ns")
 
     def __init__(
         self,
@@ -93,6 +94,7 @@ class Observation:
         stamp_ns: int | None = None,
         points: ImagePoints | None = None,
         picture: Callable[[], Image] | None = None,
+        is_cut: bool = False,
         **more: Any,
     ) -> None:
         """Take the data of one time; what there is not is None.
@@ -119,12 +121,12 @@ class Observation:
                 "or add it to CHANNELS"
             )
         self.channels = {name: data for name, data in given.items() if data is not None}
-        self.stamp_ns = stamp_ns
+        self.stamp_ns, self.is_cut = stamp_ns, is_cut
         self.picture = (lambda: image) if picture is None and image is not None else picture
 
     def having(self, **given: Any) -> Observation:
         """Return the observation with other channels, or another ``stamp_ns``."""
-        kept = {"stamp_ns": self.stamp_ns, "picture": self.picture}
+        kept = {"stamp_ns": self.stamp_ns, "picture": self.picture, "is_cut": self.is_cut}
         return Observation(**{**kept, **self.channels, **given})
 
     @property
