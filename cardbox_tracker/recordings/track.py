@@ -188,10 +188,16 @@ class Quality:
         self._angles_rad: list[float] = []
         self._hands_m: list[float] = []
         self._distances_m: list[float] = []
+        # Chance that it is the same one of several people, and times, s, of each new one.
+        self._chance, self._returns = 1.0, list[tuple[float, float]]()
 
     def __call__(self, frame: RecordedFrame, estimate: Estimate, tracker: Tracker) -> None:
         """Count one image."""
         self.images += 1
+        chance = estimate.person_chance
+        if chance is not None and chance != self._chance:
+            self._chance = chance
+            self._returns.append((frame.time_s, chance))
         self.uncertain += estimate.state == UNCERTAIN
         if estimate.cost_px is not None and estimate.iou is not None:
             self.fits.append((estimate.cost_px, estimate.iou))
@@ -231,6 +237,12 @@ class Quality:
             f"{self._vertical / self.images:.0%}, the distance (to 0.3 m) in "
             f"{self._sure_places / self.images:.0%}"
         )
+        if self._returns:
+            returns = (f"{time_s:.1f} s ({chance:.0%})" for time_s, chance in self._returns)
+            yield (
+                "away or hidden, then known by the colours of the trunk alone, with the chance of "
+                f"being the same person: {', '.join(returns)}"
+            )
         if self._reasons:
             counts = (f"{why} ({count})" for why, count in self._reasons.most_common(_MOST_REASONS))
             yield f"postures are unsure where {', '.join(counts)}"
