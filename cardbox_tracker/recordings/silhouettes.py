@@ -381,14 +381,17 @@ class SilhouetteSource:
             yield from (pickle.load(self._file) for _ in range(self._kept))
             return
         keeps = self._file is not None and self._kept == 0
-        for found, is_cut in with_cuts(self._read(), lambda one: one.image):
+        shown = with_cuts(self._read(), lambda one: one.image)
+        for used, (found, is_cut) in enumerate(shown, 1):
+            # Of several passes, the longest counts.
+            self._used = max(self._used, used)
             found = found._replace(is_cut=is_cut)
             keeps = keeps and self._keep(found)
             yield found
         self._kept_s = math.inf if keeps else self._kept_s
 
     def _read(self) -> Iterator[PreparedImage]:
-        used, taken = 0, enumerate(self._bag.images(self.topic), 1)
+        taken = enumerate(self._bag.images(self.topic), 1)
         for number, image, prepared in results_ahead(self._prepared, taken):
             if number == 1:
                 late_ns = image.time_ns - image.stamp_ns
@@ -396,9 +399,6 @@ class SilhouetteSource:
             if isinstance(prepared, str):
                 self._broken[number] = prepared
                 continue
-            # Of several passes, the longest counts.
-            used += 1
-            self._used = max(self._used, used)
             time_ns = image.stamp_ns + self._clock_ns - self.start_ns
             yield PreparedImage(image.stamp_ns, time_ns / 1e9, prepared, image, number - 1)
 
