@@ -2,7 +2,7 @@
 
 Of neighbouring images, reduced to a few pixels, most of the grey values differ, and the middle of
 one is found nowhere in the other (normalized cross-correlation, which does not depend on the
-light). The image after the next one agrees with the one before a flash or a damaged image.
+light). After a flash or a damaged image, the next one agrees with the one before it.
 """
 
 from __future__ import annotations
@@ -22,8 +22,8 @@ T = TypeVar("T")
 _SIZE, _MARGIN = (64, 48), (8, 11)
 # Difference of grey values that noise and light rarely reach, and what is most of the image.
 _DIFFERS, _MOST = 12, 0.5
-# Neighbours in a film have correlations above 0.8 where that much changes; 88 % of pairs from
-# different films have less than this.
+# Correlation of images of the same place where most grey values differ, by light or motion; those
+# of different places rarely have it.
 _ALIKE = 0.6
 
 
