@@ -14,7 +14,7 @@ ROS = ["ros-jazzy-rclpy[fastrtps]", "ros-jazzy-common-interfaces"]
 # 'cardbox track FOLDER --scheduler' on a cluster.
 CLUSTER = ["dask>=2024.5", "distributed>=2024.5"]
 # Streams to programs that teleoperate robots.
-TELEOPERATION = ["msgpack>=1,<2", "pyzmq>=25,<28"]
+TELEOPERATION = ["msgpack>=1,<2", "python-osc>=1.8,<2", "pyzmq>=25,<28"]
 # Gives results in memory as a table.
 PANDAS = ["pandas>=2,<4"]
 TEST = [
@@ -132,7 +132,7 @@ setup(
     # The upper bound is the next version that may break the interface: a major one, but a minor
     # one of rosbags, whose interface still changes.
     install_requires=[
-        "av>=12,<19",
+        "av>=13,<19",
         "jinja2>=3.1,<4",
         "joblib>=1.3,<2",
         "lz4>=4.3,<5",

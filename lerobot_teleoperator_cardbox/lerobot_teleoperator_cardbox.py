@@ -48,7 +48,10 @@ class CardboxTeleoperatorConfig(TeleoperatorConfig):
 
 
 class CardboxTeleoperator(Teleoperator):
-    """Returns the newest command at once; without new ones the robot holds the last."""
+    """Returns the newest command at once; without new ones the robot holds the last.
+
+    What is no command, is not finite or is beyond the joint's limits is refused, with a warning.
+    """
 
     config_class = CardboxTeleoperatorConfig
     name = "cardbox"
@@ -60,7 +63,7 @@ class CardboxTeleoperator(Teleoperator):
         self._context: zmq.Context | None = None
         self._socket: zmq.Socket | None = None
         self._action: dict[str, float] = {}
-        self._heard_s, self._is_stale = 0.0, False
+        self._heard_s, self._is_stale, self._has_refused = 0.0, False, False
 
     @property
     def action_features(self) -> dict[str, type]:
@@ -99,12 +102,15 @@ class CardboxTeleoperator(Teleoperator):
         self._socket.subscribe(b"")
         try:
             self._socket.connect(self.config.address)
-            if not self._socket.poll(round(1000 * self.config.wait_s)):
-                raise ConnectionError(
-                    f"no command came on {self.config.address} within {self.config.wait_s:g} s; "
-                    "start 'cardbox retarget ... --stream' or the node, and enable the robot"
-                )
-            self._read()
+            until_s = time.monotonic() + self.config.wait_s
+            while not self._action:
+                left_ms = round(1000 * (until_s - time.monotonic()))
+                if left_ms < 0 or not self._socket.poll(left_ms):
+                    raise ConnectionError(
+                        f"no command came on {self.config.address} within {self.config.wait_s:g} "
+                        "s; start 'cardbox retarget ... --stream' or the node, and enable the robot"
+                    )
+                self._read(is_first=True)
         except Exception:
             self.disconnect()
             raise
@@ -140,24 +146,41 @@ class CardboxTeleoperator(Teleoperator):
             self._socket.close()
             self._context.term()
         self._socket = self._context = None
+        self._action = {}
 
-    def _read(self) -> None:
+    def _read(self, is_first: bool = False) -> None:
+        """Take a packet if it is a command; the first one may lack a joint, and then tells it."""
         assert self._socket is not None
-        content = json.loads(self._socket.recv(zmq.NOBLOCK))
-        columns = (content[name] for name in ("positions", "lower", "upper"))
-        found = dict(zip(content["names"], zip(*columns, strict=True), strict=True))
-        missing = [joint for joint in self.config.joints if joint not in found]
-        if missing:
-            raise ValueError(
+        packet = self._socket.recv(zmq.NOBLOCK)
+        try:
+            content = json.loads(packet)
+            columns = (content[name] for name in ("positions", "lower", "upper"))
+            found = dict(zip(content["names"], zip(*columns, strict=True), strict=True))
+            missing = [joint for joint in self.config.joints if joint not in found]
+            if not missing:
+                self._action = {
+                    f"{joint}.pos": self._converted(joint, *found[joint])
+                    for joint in self.config.joints
+                }
+                self._heard_s = time.monotonic()
+                return
+            why = (
                 f"the commands have no joint {', '.join(missing)}, only {', '.join(found)}; give "
                 "--teleop.joints in the names of the robot's URDF"
             )
-        self._action = {
-            f"{joint}.pos": self._converted(joint, *found[joint]) for joint in self.config.joints
-        }
-        self._heard_s = time.monotonic()
+        except (ArithmeticError, LookupError, RecursionError, TypeError, ValueError) as error:
+            why, is_first = f"not a command of cardbox retarget: {error}", False
+        if is_first:
+            raise ValueError(why)
+        if not self._has_refused:
+            _LOG.warning("%s: a packet on %s is refused: %s", self, self.config.address, why)
+        self._has_refused = True
 
     def _converted(self, joint: str, position: float, lower: float, upper: float) -> float:
+        # Numbers of a packet are rounded.
+        if not (math.isfinite(upper - lower) and lower - 1e-5 <= position <= upper + 1e-5):
+            raise ValueError(f"{joint} is at {position}, beyond {lower} to {upper}")
+        position = min(max(position, lower), upper)
         share = 100.0 * (position - lower) / (upper - lower)
         if joint in self.config.percent:
             return share

@@ -1,9 +1,10 @@
-"""Reads calibrations of camera_calibration, OpenCV's FileStorage, Kalibr, and of a CameraInfo."""
+"""Files of calibrations: camera_calibration, OpenCV, Kalibr, aniposelib, and a CameraInfo."""
 
 from __future__ import annotations
 
 import os
 import re
+import tomllib
 from collections.abc import Iterator, Mapping
 from types import MappingProxyType
 from typing import Any
@@ -11,22 +12,24 @@ from xml.etree import ElementTree
 
 import numpy as np
 
-from cardbox_tracker.camera.camera import Calibration
+from cardbox_tracker.camera.camera import CALIBRATED, Calibration
 from cardbox_tracker.common.errors import CameraError, cut, quoted
-from cardbox_tracker.common.files import foreign
+from cardbox_tracker.common.files import foreign, write_file
 from cardbox_tracker.common.small_yaml import SmallYamlError, parse_small_yaml, read_small_text
 
-_EXPECTED = "a file of camera_calibration, OpenCV's FileStorage or Kalibr"
+_EXPECTED = "a file of camera_calibration, OpenCV's FileStorage, Kalibr or aniposelib"
 # What FileStorage adds to YAML: the directive "%YAML:1.0" and the tags of its matrices.
 _NO_YAML = re.compile(r"\A%YAML.*\n|!!opencv-matrix|\A---\s*$|^---\s*\Z", re.MULTILINE)
 # FileStorage names no model; OpenCV's sample has a switch for its fisheye.
 _FILE_STORAGE = {"distortion_model": "plumb_bob"}
+# Key that 'cardbox calibrate-camera' adds to the format of camera_calibration.
+_STDDEV = "focal_length_stddev"
 _ALIASES = MappingProxyType(
     {
         "image_width": ("imagewidth", "width"),
         "image_height": ("imageheight", "height"),
-        "camera_matrix": ("cameramatrix", "k"),
-        "distortion_coefficients": ("distortioncoefficients", "distcoeffs", "d"),
+        "camera_matrix": ("cameramatrix", "k", "matrix"),
+        "distortion_coefficients": ("distortioncoefficients", "distcoeffs", "d", "distortions"),
         "distortion_model": ("distortionmodel",),
     }
 )
@@ -36,16 +39,58 @@ def load_calibration(path: str | os.PathLike[str]) -> Calibration:
     """Read a calibration of one camera; raise CameraError if it cannot be read or lacks a key.
 
     The file is YAML of camera_calibration, YAML, JSON or XML of OpenCV's FileStorage, a camchain of
-    Kalibr with one pinhole camera, or YAML of a CameraInfo, as 'ros2 topic echo' prints it.
+    Kalibr or TOML of aniposelib with one camera, or YAML of a CameraInfo, as 'ros2 topic echo'
+    prints it.
     """
     with foreign(path, CameraError, _EXPECTED):
-        data = _parsed(read_small_text(path))
+        text = read_small_text(path)
+        is_toml = os.fspath(path).lower().endswith(".toml")
+        data = _of_aniposelib(tomllib.loads(text)) if is_toml else _parsed(text)
         if not isinstance(data, Mapping):
             raise CameraError("it is no mapping")
         is_camchain = all(isinstance(one, Mapping) and "intrinsics" in one for one in data.values())
         calibration = _of_kalibr(data) if is_camchain else _of_matrix(data)
         calibration.camera(calibration.width, calibration.height)
     return calibration
+
+
+def _of_aniposelib(data: Mapping[str, Any]) -> Mapping[str, Any]:
+    """Return the entries of the only camera of a camera group."""
+    cameras = {key: one for key, one in data.items() if isinstance(one, dict) and "matrix" in one}
+    if len(cameras) != 1:
+        raise CameraError(
+            f"it is TOML with the cameras {cut(', '.join(cameras)) or 'none'}; expected one: keep "
+            "the camera in question, and give the poses of several as --extrinsics"
+        )
+    (camera,) = cameras.values()
+    return {"distortion_model": "plumb_bob", "fisheye_model": camera.get("fisheye", 0)} | camera
+
+
+def save_calibration(path: str | os.PathLike[str], calibration: Calibration) -> None:
+    """Write a calibration atomically as camera_calibration does, with its relative deviation.
+
+    Raises CardboxError if the file cannot be written.
+    """
+    lens, k = calibration, calibration.k
+    projection = np.pad(k, ((0, 0), (0, 1)))
+    matrices = {
+        "camera_matrix": k,
+        "distortion_coefficients": lens.distortion[None],
+        "rectification_matrix": np.eye(3),
+        "projection_matrix": projection,
+    }
+    lines = [
+        f"image_width: {lens.width}",
+        f"image_height: {lens.height}",
+        "camera_name: camera",
+        f"distortion_model: {lens.distortion_model}",
+        f"{_STDDEV}: {lens.focal_stddev:.5f}",
+    ]
+    for name, matrix in matrices.items():
+        data = ", ".join(f"{value:.9g}" for value in matrix.ravel().tolist())
+        rows, columns = matrix.shape
+        lines += [f"{name}:", f"  rows: {rows}", f"  cols: {columns}", f"  data: [{data}]"]
+    write_file(path, "\n".join(lines) + "\n")
 
 
 def _parsed(text: str) -> Any:
@@ -80,7 +125,12 @@ def _of_matrix(data: Mapping[Any, Any]) -> Calibration:
             raise KeyError(name)
         return found["data"] if isinstance(found, Mapping) else found
 
-    size = plain.get("imagesize") or (value("image_width"), value("image_height"))
+    size = (
+        plain.get("imagesize") or plain.get("size") or (value("image_width"), value("image_height"))
+    )
+    stddev = float(plain.get(_STDDEV.replace("_", ""), CALIBRATED))
+    if not 0.0 < stddev < 1.0:
+        raise ValueError(f"{_STDDEV} is {stddev:g}; expected a share between 0 and 1")
     is_fisheye = str(plain.get("fisheyemodel", 0)) not in ("0", "False")
     return Calibration(
         int(size[0]),
@@ -88,6 +138,7 @@ def _of_matrix(data: Mapping[Any, Any]) -> Calibration:
         np.array(value("camera_matrix"), dtype=np.float64).reshape(3, 3),
         np.array(value("distortion_coefficients"), dtype=np.float64).ravel(),
         "fisheye" if is_fisheye else str(value("distortion_model")),
+        focal_stddev=stddev,
     )
 
 

@@ -76,7 +76,8 @@ class CalibrationWatch:
             self._content = content
             self._back_to_good()
             return False
-        if self.current is not None and not self._lasts(calibration):
+        is_resized = self.current is not None and self.current.is_resized(calibration)
+        if self.current is not None and not is_resized and not self._lasts(calibration):
             name = "wrong calibration" if self._is_contradicted else "other calibration"
             given = {"topic": self._topic, "image_topic": self._image_topic, "lasting": LASTING}
             given |= {"other": calibration, "current": self.current}

@@ -25,6 +25,8 @@ FloatArray = NDArray[np.float64]
 
 # Largest difference of the aspect ratios of a calibration and of the images.
 _ASPECT = 0.02
+# Programs that resize a calibration count pixels from their corners or from their centres.
+_SAME_PX = 1.0
 WORKING_SIZE = (320, 240)
 """Working size (width, height), px, of images of 4:3; others have as many pixels."""
 # The kernels draw rows of pixels fastest if their number is a multiple of this.
@@ -163,6 +165,7 @@ class Calibration:
     roll_rad: float = 0.0
     focal_stddev: float = CALIBRATED  #: relative standard deviation of the focal lengths
     is_mirrored: bool = False  #: whether the images are mirrored; working images are turned back
+    told_by: str = ""  #: what tells the focal lengths, in words; empty if that is not known
 
     def __post_init__(self) -> None:
         """Bring the lens and the name of the frame into their usual form."""
@@ -196,6 +199,16 @@ class Calibration:
             and self._lens() == other._lens()
             and self.roll_rad == other.roll_rad
             and self.is_mirrored == other.is_mirrored
+        )
+
+    def is_resized(self, other: Calibration) -> bool:
+        """Return whether ``other`` is the same camera, whose images have another size."""
+        scale = np.diag([other.width / self.width, other.height / self.height, 1.0])
+        return (
+            self.width != other.width
+            and self.has_shape(other.width, other.height)
+            and np.allclose(scale @ self.k, other.k, rtol=0.0, atol=_SAME_PX)
+            and self.is_same(replace(other, width=self.width, height=self.height, k=self.k))
         )
 
     def _lens(self) -> tuple[Any, ...]:

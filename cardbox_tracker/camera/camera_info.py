@@ -52,9 +52,14 @@ def is_rectified_only(message: Any) -> bool:
 
 
 def is_other_lens(message: Any, first: Any) -> bool:
-    """Return whether the focal length or the principal point of two CameraInfo differs."""
-    k = info_array(first, "k")
-    return not np.allclose(info_array(message, "k"), k, rtol=_STEADY, atol=_STEADY * k[0])
+    """Return whether focal length or principal point of two CameraInfo differ, as image shares."""
+
+    def shares(info: Any) -> NDArray[np.float64]:
+        size = np.array([[info.width or 1.0], [info.height or 1.0]])
+        return np.asarray(info_array(info, "k").reshape(3, 3)[:2] / size)
+
+    k = shares(first)
+    return not np.allclose(shares(message), k, rtol=_STEADY, atol=_STEADY * k[0, 0])
 
 
 def info_remark(message: Any, info_topic: str) -> str:
@@ -123,4 +128,5 @@ def calibration_from_info(message: Any, image_topic: str, info_topic: str) -> Ca
         distortion,
         message.distortion_model,
         message.header.frame_id,
+        told_by="CameraInfo",
     )

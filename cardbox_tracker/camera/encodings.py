@@ -145,11 +145,14 @@ def decode_as_sent(
 
 
 def decode_compressed(
-    data: Any, most_pixels: float = MOST_PIXELS, levels: Levels | None = None
+    data: Any, most_pixels: float = MOST_PIXELS, levels: Levels | None = None, kind: str = ""
 ) -> ImageArray:
-    """Return JPEG or PNG as (H, W) or (H, W, 3) bgr, uint8, or raise EncodingError."""
+    """Return JPEG or PNG as (H, W) or (H, W, 3) bgr, uint8, or raise EncodingError.
+
+    ``kind`` is the format that the message states.
+    """
     raw = np.frombuffer(data, np.uint8)
-    check_pixels(*compressed_size(raw.tobytes()), most_pixels)
+    check_pixels(*compressed_size(raw.tobytes(), kind), most_pixels)
     try:
         image = None if _is_cut_off(raw) else cv2.imdecode(raw, _AS_STORED)
     except cv2.error:

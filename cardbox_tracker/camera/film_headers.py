@@ -21,6 +21,8 @@ from cardbox_tracker.common.errors import CameraError
 _MOST_HEADER_BYTES = 128
 _MOST_START_BYTES = 4096
 _TO_CODEC = b"moov", b"trak", b"mdia", b"minf", b"stbl"
+# Where the headers of a film and a track have their matrix; those of version 1 have it 12 later.
+_MATRICES = {b"mvhd": 36, b"tkhd": 40}
 # Boxes of a film that are read; its header is among the first or last ones of a few.
 _MOST_BOXES = 10_000
 MOST_DAMAGED = 100
@@ -75,6 +77,34 @@ def with_square_pixels(image: NDArray[Any], shape: float) -> NDArray[np.uint8]:
         size = round(width * max(shape, 1.0)), round(height * max(1 / shape, 1.0))
         image = cv2.resize(image, size, interpolation=cv2.INTER_LINEAR)
     return np.asarray(image, np.uint8)
+
+
+def display_matrix(path: Path, number: int) -> NDArray[np.float64]:
+    """Return how an MP4 or MOV places a video track, counted from 0, on the screen, as a (2, 2).
+
+    Pixels (column, row), as a row before the matrix, become those that are shown, but for a shift;
+    other films have the identity. The matrices of track and film are multiplied, as players do.
+    """
+    film, track, tracks = np.eye(2), np.eye(2), []
+    with suppress(OSError, struct.error, IndexError, RecursionError), path.open("rb") as file:
+        for kind, at, _ in boxes(file, (b"moov", b"trak", b"mdia")):
+            file.seek(at)
+            header = file.read(_MOST_HEADER_BYTES)
+            if kind == b"hdlr" and header[8:12] == b"vide":
+                tracks.append(track)
+            if kind in _MATRICES:
+                place = _MATRICES[kind] + (12 if header[0] else 0)
+                found = np.reshape(struct.unpack_from(">2i4x2i", header, place), (2, 2)) / 65536
+                film, track = (found, track) if kind == b"mvhd" else (film, found)
+    return tracks[number] @ film if number < len(tracks) else np.eye(2)
+
+
+def placed_by(matrix: NDArray[np.float64], image: NDArray[Any]) -> NDArray[Any]:
+    """Return an image (H, W) or (H, W, 3) turned and mirrored by a :func:`display_matrix`."""
+    is_turned = abs(matrix[0, 1]) > abs(matrix[0, 0])
+    across, down = (matrix[1, 0], matrix[0, 1]) if is_turned else matrix.diagonal()
+    image = image.swapaxes(0, 1) if is_turned else image
+    return np.ascontiguousarray(image[:: -1 if down < 0 else 1, :: -1 if across < 0 else 1])
 
 
 def shown_s(path: Path) -> float | None:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import struct
 
-from cardbox_tracker.common.errors import EncodingError
+from cardbox_tracker.common.errors import EncodingError, quoted
 
 _PNG = b"\x89PNG\r\n\x1a\n"
 _JPEG = b"\xff\xd8"
@@ -18,17 +18,22 @@ _WITHOUT_LENGTH = frozenset((0x01, *range(0xD0, 0xD9)))
 _ENDS = (0xD9, 0xDA)
 
 
-def compressed_size(data: bytes) -> tuple[int, int]:
-    """Return width and height, px, of a JPEG or PNG image by its header, or raise EncodingError."""
+def compressed_size(data: bytes, kind: str = "") -> tuple[int, int]:
+    """Return width and height, px, of a JPEG or PNG image by its header, or raise EncodingError.
+
+    ``kind`` is the format that its message states.
+    """
     size = None
     if data.startswith(_PNG):
         size = _png_size(data)
     elif data.startswith(_JPEG):
         size = _jpeg_size(data)
     if size is None or min(size) < 1:
+        form = f", of the format {quoted(kind)}" if kind else ""
         raise EncodingError(
-            f"the compressed image ({len(data)} bytes) cannot be decoded; expected whole JPEG or "
-            "PNG data: check the camera's transport"
+            f"the compressed image ({len(data)} bytes{form}) cannot be decoded; expected whole "
+            "JPEG or PNG data: check the camera's transport; 'ros2 run image_transport republish' "
+            "makes such images of others"
         )
     return size
 

@@ -23,6 +23,7 @@ COMMANDS = {
     "synthesize": "record a synthetic person, with ground truth",
     "initialize": "measure the person in a recording",
     "body": "make a body model from a person's stature, without a recording",
+    "calibrate-camera": "find the lens of a camera from a film of a board or a sheet of A4",
     "calibrate-extrinsics": "find where several cameras stand, from the person in a recording, "
     "without a board",
     "detector": "install the network files of the person detector, or check them",

@@ -59,8 +59,9 @@ _REPLACED = MappingProxyType(
         "within_m": ("background", "silhouettes"),
         "silhouettes": ("background", "within_m"),
         "detector": ("detector_class",),
-        "fov_deg": ("calibration",),
-        "calibration": ("fov_deg",),
+        "fov_deg": ("calibration", "webcam"),
+        "calibration": ("fov_deg", "webcam"),
+        "webcam": ("fov_deg", "calibration"),
     }
 )
 
@@ -88,6 +89,15 @@ def _person_choice(given: Any) -> PersonChoice | int:
 def _statures(given: Any) -> tuple[float, ...]:
     parts = given.split(",") if isinstance(given, str) else given
     return tuple(map(float, parts if isinstance(parts, Iterable) else (parts,)))
+
+
+def _fovs(given: Any) -> float | tuple[float, ...]:
+    found = _statures(given)
+    return found[0] if len(found) == 1 else found
+
+
+def _films(given: Any) -> tuple[Path, ...]:
+    return tuple(map(Path, (given,) if isinstance(given, str | os.PathLike) else given))
 
 
 def _people(given: Any) -> int | str:
@@ -143,8 +153,10 @@ class RecordingOptions(Options):
             one whose results are used, if not all are
         fov_deg: field of view across the width of the image as it is shown: webcams 60 to 78,
             phones 60 to 75 held sideways and 36 to 46 upright. Without it, what a phone wrote into
-            the file, or else, with --detector, 65 degrees along the longer side
+            the file, or else, with --detector, 65 degrees along the longer side. Of several films,
+            one value for all, or one each
         calibration: in place of --fov: file of camera_calibration, OpenCV's FileStorage or Kalibr
+        webcam: in place of --fov: name of a usual webcam, such as C920, with its field of view
         camera_roll_deg: how far the camera is turned clockwise, seen from behind it, 180 if its top
             is below; images are turned back
         mirrored: the images are mirrored, as some programs do with those of a front camera; they
@@ -169,11 +181,21 @@ class RecordingOptions(Options):
     person: str | tuple[float, float] | int | PersonChoice | None = option(
         "left|right|largest|X,Y[@T]|K", _person_choice
     )
-    fov_deg: float | None = option("DEG", flag="--fov")
+    fov_deg: float | tuple[float, ...] | None = option(
+        "DEG[,DEG...]",
+        parsed(_fovs, "degrees, or those of each film as in 60,43"),
+        flag="--fov",
+    )
     calibration: Path | None = option("FILE")
+    webcam: str | None = option("NAME")
     camera_roll_deg: float | None = option("R", between(-_MOST_ROLL_DEG, _MOST_ROLL_DEG))
     mirrored: bool = option(default=False)
     fps: float | None = option("HZ", between(0.0, _MOST_FPS))
+
+    @property
+    def fovs_deg(self) -> tuple[float, ...]:
+        """The fields of view that are given, in the order of the films."""
+        return () if self.fov_deg is None else _statures(self.fov_deg)
 
 
 @dataclass(frozen=True)
@@ -190,7 +212,7 @@ class TrackingOptions(RecordingOptions):
         people: track N people, or all who come (up to 6); they are numbered as they come, and from
             left to right if they come together
         distance_m: with --stature: from the camera to the person, metres along the floor; without
-            it, it is found from the first images
+            it, it is found from the first images. With --detector it takes the place of --fov
         camera_pitch_deg: positive when the camera looks down (default: with --stature, found from
             the person who stands upright at --start)
         start_s: second at which the person stands as for --front; tracking starts there. With
@@ -203,6 +225,8 @@ class TrackingOptions(RecordingOptions):
         seed: random seed of the filters
         hands: with --detector mediapipe: also tell open from closed hands, and measure palms and
             wrists, in further columns and in the video (docs/results.md)
+        causal: take for each image only those before it, as live; without it, also those after it,
+            which takes out the shaking
     """
 
     model: Path | None = option("MODEL.yaml")
@@ -227,6 +251,7 @@ class TrackingOptions(RecordingOptions):
     settings: Path | None = option("FILE.yaml")
     seed: int = option(read=at_least(0), default=0)
     hands: bool = option(default=False)
+    causal: bool = option(default=False)
 
     @property
     def statures_m(self) -> tuple[float, ...]:
@@ -257,11 +282,16 @@ class Request(TrackingOptions):
     The fields are the options of ``cardbox track``. Raises CardboxError if a value is wrong.
 
     Attributes:
+        films: further films of the same people, one of each camera, with --detector: when they
+            begin, and where the cameras stand, is found from the people (docs/two-cameras.md)
+        offset_s: when each further film begins, seconds from the beginning of the first one;
+            negative if it begins before (default: found)
         csv: table to write, one row per image (docs/results.md); by default it has the name of the
             recording and is in the current folder. OUT.body.yaml beside it is the body that was
             used
         bag: also write the topics of the tracker
         video: also write an overlay video
+        blur: hide the heads of people in the pictures of --video, --report and --bag
         json: also write what is printed at the end: what was tracked, used, left out and assumed
         export: also write the table in formats of 'cardbox export' beside it, such as trc,bvh
         plot: also plot the angles, with bands of one standard deviation
@@ -270,9 +300,18 @@ class Request(TrackingOptions):
         force: replace results that exist; without it, refuse
     """
 
+    films: tuple[Path, ...] = option(
+        "FILM", parsed(_films, "paths of films"), default=(), flag="films", type=str, nargs="*"
+    )
+    offset_s: tuple[float, ...] | None = option(
+        "S[,S...]",
+        flag="--offset",
+        read=parsed(_statures, "seconds, or those of each further film as in 0.4,-1.2"),
+    )
     csv: Path | None = option("OUT.csv|OUT.parquet")
     bag: Path | None = option("OUT")
     video: Path | None = option("OUT.mp4")
+    blur: bool = option(default=False)
     json: Path | None = option("OUT.json")
     export: str | tuple[str, ...] | None = option("FORMAT[,...]", _formats)
     plot: Path | None = option("OUT.png")

@@ -13,6 +13,7 @@ from cardbox_tracker.commands.arguments import (
     Written,
     check_outputs,
     option,
+    print_remarks,
 )
 from cardbox_tracker.common.errors import CardboxError
 
@@ -82,5 +83,6 @@ def run(given: Arguments) -> None:
     if given.stream is not None:
         lower, upper, _ = retargeter.limits
         with closing(ZmqSender(given.stream)) as sender:
+            print_remarks(sender.remarks)
             for stamp_ns, _, moment in in_real_time(motion.way, given.rate_hz):
                 sender.send(joints_packet(stamp_ns, joints, moment.positions, lower, upper))

@@ -6,6 +6,7 @@ import math
 from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import replace
+from itertools import zip_longest
 
 from cardbox_tracker.camera.camera import Camera
 from cardbox_tracker.commands.arguments import print_remarks
@@ -21,12 +22,17 @@ from cardbox_tracker.measuring.scene_camera import (
     lens_of,
     scene_camera,
 )
-from cardbox_tracker.person.model import BodyModel
-from cardbox_tracker.person.proportions import USUAL_STATURE_M, USUAL_STDDEV_M
+from cardbox_tracker.person.model import FOUND_STDDEV, PLACE, BodyModel
+from cardbox_tracker.person.parts import body_parts
+from cardbox_tracker.person.proportions import USUAL_STATURE_M, USUAL_STDDEV_M, stature_of
 from cardbox_tracker.recordings.measured_scene import Watched, seen_people, seen_person, watch
 from cardbox_tracker.recordings.recording import Recording, RecordingRequest
-from cardbox_tracker.recordings.silhouettes import TimeSpan
+from cardbox_tracker.recordings.silhouettes import SilhouetteSource, TimeSpan
 from cardbox_tracker.search.config import TrackerConfig
+
+# Relative difference of the distances of a person who stands where the scene has them, and
+# deviations beyond which people contradict a scene.
+_SAME_PLACE, _CONTRADICTS = 0.15, 3.0
 
 
 @contextmanager
@@ -39,7 +45,7 @@ def measured_scene(
     several people, if there is a choice. Raises CardboxError if the recording cannot be read, the
     detector cannot be loaded, or nobody can be chosen.
     """
-    if person.model is not None and not person.body.unknown:
+    if person.model is not None and not person.body.unknown and person.scene is None:
         roll_rad = person.body.camera_pose.roll_rad
         recording = replace(recording, camera=recording.camera.standing(roll_rad))
     with ExitStack() as stack:
@@ -47,6 +53,9 @@ def measured_scene(
         span = person.start_s, person.end_s
         bodies, first = [person.body, *person.others], source.first
         tilt = person.body.camera_pose
+        if person.scene is not None:
+            yield source, *_again(source, recording, person, person.scene, config, seed)
+            return
         if person.model is not None and not person.body.unknown:
             pitch = Value(tilt.pitch_rad, tilt.pitch_stddev_rad, GIVEN)
             roll_rad = recording.camera.stands_rad
@@ -55,7 +64,7 @@ def measured_scene(
             chosen = None
             if person.choice is not None:
                 chosen = _checked(watch(source, *span, person.choice).chosen)
-            yield source, Scene(camera, tuple(bodies)), chosen
+            yield source, Scene(_told(camera, first), tuple(bodies)), chosen
             return
         watched = watch(source, *span, person.choice)
         found = found_camera(recording, person, watched, first.camera)
@@ -79,7 +88,7 @@ def measured_scene(
             bodies = [seen_person(watched, bodies[0], first.camera, config, seed, far)]
         else:
             bodies = seen_people(source, bodies, config, person.people, seed, *span)
-        yield source, Scene(found.camera, tuple(bodies)), chosen
+        yield source, Scene(_told(found.camera, first), tuple(bodies)), chosen
 
 
 def _checked(chosen: Chosen | None) -> Chosen | None:
@@ -90,6 +99,89 @@ def _checked(chosen: Chosen | None) -> Chosen | None:
             "person is in view, or leave --person out"
         )
     return chosen
+
+
+def _told(camera: SceneCamera, source: SilhouetteSource) -> SceneCamera:
+    """Return the camera with what tells its field of view."""
+    lens = camera.fov_rad
+    return camera._replace(fov_rad=lens._replace(by=lens.by or source.lens_by))
+
+
+def _again(
+    source: Recording,
+    recording: RecordingRequest,
+    person: PersonRequest,
+    scene: Scene,
+    config: TrackerConfig,
+    seed: int,
+) -> tuple[Scene, Chosen | None]:
+    """Return a given scene, with people who stand elsewhere at their place, and who is chosen.
+
+    What is wrong is said. Nobody is sure in a scene that people contradict.
+    """
+    span, camera = (person.start_s, person.end_s), source.first.camera
+    watched = watch(source, *span, person.choice)
+    chosen = _checked(watched.chosen)
+    stands = {"camera_roll_rad": recording.camera.stands_rad}
+    bodies = [body.with_values(**stands) for body in (person.body, *person.others)]
+    wrong = _contradiction(watched, bodies, scene.camera, camera)
+    if wrong:
+        print_remarks([f"{person.model}: {wrong}"])
+        unsure = math.hypot(scene.camera.pitch_rad.stddev, FOUND_STDDEV)
+        bodies = [body.with_values(pitch_stddev_rad=unsure) for body in bodies]
+    guesses = [body.with_values(unknown=tuple({*PLACE, *body.unknown})) for body in bodies]
+    if chosen is not None and chosen.number is not None:
+        placed = seen_people(source, guesses, config, 0, seed, *span, only=chosen.number)
+        bodies = [bodies[min(chosen.number, len(bodies)) - 1]]
+    elif person.people is None:
+        placed = [seen_person(watched, guesses[0], camera, config, seed)]
+    else:
+        placed = seen_people(source, guesses, config, person.people, seed, *span)
+    # The tracker begins at the place of the scene, and goes on from there.
+    kept = [
+        body if body is not None and _is_near(body, there) else there
+        for body, there in zip_longest(bodies[: len(placed)], placed)
+    ]
+    return Scene(scene.camera, tuple(kept)), chosen
+
+
+def _is_near(body: BodyModel, there: BodyModel) -> bool:
+    """Return whether a body that is wholly known is where it is seen, or is not seen."""
+    if body.unknown:
+        return False
+    if "distance_m" in there.unknown:
+        return True
+    return abs(math.log(body.placement.distance_m / there.placement.distance_m)) < _SAME_PLACE
+
+
+def _contradiction(
+    watched: Watched, bodies: Sequence[BodyModel], given: SceneCamera, camera: Camera
+) -> str:
+    """Return what people and edges of the room show of the camera if it is not the given one."""
+    if not watched.people:
+        return ""
+    people = len(watched.people)
+    statures_m = [stature_of(body_parts(body.sizes)) for body in bodies]
+    statures_m = [*statures_m, *statures_m[-1:] * people][:people]
+    found = scene_camera(watched.people, watched.pictures, camera, statures_m, None, 0.0).camera
+    shown = [(given.pitch_rad, found.pitch_rad)]
+    of_height = ""
+    if given.height_m is not None and found.height_m is not None:
+        shown.append((given.height_m, found.height_m))
+        of_height = f" and a height of {found.height_m.mean:.2f} m, not {given.height_m.mean:.2f}"
+    # Independent sources; what nothing shows contradicts nothing.
+    apart = [
+        (one.mean - other.mean) / math.hypot(one.stddev, other.stddev)
+        for one, other in shown
+        if other.origin != USUAL
+    ]
+    if math.hypot(*apart) <= _CONTRADICTS:
+        return ""
+    return (
+        f"the scene has a camera pitch of {degrees_of(given.pitch_rad)}, and people and the room "
+        f"show {degrees_of(found.pitch_rad)}{of_height}: it is of another camera, lens or person, "
+        "so every posture is at best uncertain; leave --scene out"
+    )
 
 
 def _bodies(
@@ -107,7 +199,7 @@ def _bodies(
 def _corrected(recording: RecordingRequest, found: SceneCamera) -> RecordingRequest:
     """Return the recording with roll and field of view that were found and are not given."""
     given = recording.camera
-    if len(recording.cameras) > 1:
+    if len(recording.cameras) > 1 or recording.films:
         return recording
     if given.roll_rad is None and found.roll_rad.mean:
         given = replace(given, roll_rad=found.roll_rad.mean)
@@ -139,7 +231,10 @@ def found_camera(
         return FoundCamera(SceneCamera(lens_of(camera), pitch, Value(0.0, 0.0, USUAL)))
     # Images are turned back by a roll that is given.
     roll_rad = None if recording.camera.roll_rad is None else 0.0
-    found = scene_camera(people, watched.pictures, camera, statures_m, given, roll_rad)
+    distance_m = None
+    if "distance_m" not in person.body.unknown and person.model is None:
+        distance_m = person.body.placement.distance_m
+    found = scene_camera(people, watched.pictures, camera, statures_m, given, roll_rad, distance_m)
     number, shown_by = degrees_of(found.camera.pitch_rad), " and ".join(found.sources)
     remarks = list(found.remarks)
     if given is None and found.sources:
@@ -152,6 +247,7 @@ def found_camera(
             f"that of most cameras, {number}; give --camera-pitch-deg (0 for a level camera)"
         )
     better = _corrected(recording, found.camera)
+    better.camera.check()
     if better.camera.roll_rad != recording.camera.roll_rad:
         remarks.append(
             f"camera roll {math.degrees(found.camera.roll_rad.mean):.1f} degrees, found in the "
@@ -161,7 +257,7 @@ def found_camera(
     if better.camera.fov_deg != recording.camera.fov_deg:
         remarks.append(
             f"field of view {better.camera.fov_deg:.0f} degrees across the image, found from "
-            "people who walk; give --fov if it is known"
+            f"{found.camera.fov_rad.by}; give --fov if it is known"
         )
     print_remarks(remarks)
     return found

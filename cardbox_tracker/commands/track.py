@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import fields, replace
 from itertools import chain
 from pathlib import Path
@@ -41,7 +41,7 @@ Arguments = TrackArguments
 def run(asked: Arguments) -> None:
     """Track the person and write the requested files."""
     path = asked.recording
-    if not is_one_recording(path) and recordings_in(path, asked.output):
+    if not asked.films and not is_one_recording(path) and recordings_in(path, asked.output):
         from cardbox_tracker.commands.track_folder import track_folder
 
         for fault in _without_effect(asked, Request, "a folder of recordings: give --formats"):
@@ -54,18 +54,25 @@ def run(asked: Arguments) -> None:
     track_one(replace(asked, csv=asked.csv or Path(f"{_name(path)}.csv")), faults)
 
 
-def track(recording: Request | str | os.PathLike[str], **options: Any) -> Result:
+def track(
+    recording: Request | str | os.PathLike[str] | Sequence[str | os.PathLike[str]], **options: Any
+) -> Result:
     """Track a recording as ``cardbox track`` does; return the results, of ``person`` or the first.
 
-    Either a :class:`Request` or a recording and the fields of one as keywords. ``Result.people``
-    has each of several people. Without ``csv`` no table is kept. Raises CardboxError if the request
-    is wrong, or a file cannot be read or written.
+    Either a :class:`Request` or a recording, or several films of the same people, and the fields of
+    one as keywords. ``Result.people`` has each of several people. Without ``csv`` no table is kept.
+    Raises CardboxError if the request is wrong, or a file cannot be read or written.
     """
     known = [entry.name for entry in fields(Request)][1:]
     for name in options.keys() - {*known}:
         near = suggestion(name, known)
         raise CardboxError(f"track has no keyword {name}; {near}expected any of {', '.join(known)}")
-    asked = recording if isinstance(recording, Request) else Request(Path(recording))
+    if not isinstance(recording, Request):
+        paths = [recording] if isinstance(recording, str | os.PathLike) else list(recording)
+        if not paths:
+            raise CardboxError("track has no recording; give a path, or several films")
+        recording = Request(Path(paths[0]), films=tuple(map(Path, paths[1:])))
+    asked = recording
     asked = replace(asked, **options)
     path = asked.recording
     if asked.export and asked.csv is None:
@@ -114,6 +121,7 @@ def track_one(
         "has_points": has_points,
         "has_people": has_people,
         "has_hands": request.hands is not None,
+        "is_smoothed": request.lag_s > 0.0,
     }
     kept = KeptResults(asked.recording, **has)
     observers = (kept,) if show is not None or any(derived) else ()
@@ -136,7 +144,7 @@ def _files(asked: Request, is_new_body: bool) -> tuple[TrackFiles, dict[Format, 
     if asked.report is not None and video is None:
         video = asked.report.with_suffix(".overlay.mp4")
     if table is None:
-        return TrackFiles(None, video, asked.bag), {}
+        return TrackFiles(None, video, asked.bag, hides_heads=asked.blur), {}
     check_table(table)
     # There is no place for a further file beside a pipe.
     is_piped = is_written_in_place(table)
@@ -146,7 +154,8 @@ def _files(asked: Request, is_new_body: bool) -> tuple[TrackFiles, dict[Format, 
     for form in chosen:
         form.check()
     exports = {form: beside.with_name(beside.stem + form.suffix) for form in chosen}
-    return TrackFiles(table, video, asked.bag, body, scene_beside(beside)), exports
+    scene = scene_beside(beside)
+    return TrackFiles(table, video, asked.bag, body, scene, asked.blur), exports
 
 
 def _derived(
@@ -172,7 +181,8 @@ def _derived(
             for k, one in people.items()
         }
         lines = (*summary.assumptions, *summary.remarks, *summary.accounts)
-        write_page(asked.report, video, f"Posture in {asked.recording.name}", named, lines)
+        title = f"Posture in {asked.recording.name}"
+        write_page(asked.report, video, title, named, lines, summary.cameras, asked.blur)
         yield f"wrote {asked.report}"
     for form, path in exports.items():
         for number, results in people.items():
@@ -191,6 +201,14 @@ def _account(summary: TrackSummary) -> dict[str, Any]:
         "remarks": summary.remarks,
         "cameras": summary.accounts,
     }
+    if summary.cameras:
+        found["extrinsics"] = {
+            name: {
+                "rotation": one.rotation.tolist(),
+                "translation_m": one.translation_m.tolist(),
+            }
+            for name, one in summary.cameras.items()
+        }
     if summary.people:
         found["people"] = {number: _account(one) for number, one in summary.people.items()}
     return found

@@ -187,7 +187,9 @@ def _jobs(
     for name, path in recordings.items():
         try:
             own = with_own_options(asked, asked.recording, name)
-            request = replace(tracking_request(replace(own, recording=path)), force=True)
+            files = TrackFiles(hides_heads=own.blur)
+            request = tracking_request(replace(own, recording=path))
+            request = replace(request, force=True, files=files)
             jobs.append(Job(name, request, digest_of_inputs(request, formats, program)))
         except (CardboxError, OSError) as error:
             rows[name] = Row.failed(name, error)
@@ -246,7 +248,8 @@ def _prepared(job: Job, number: int, work: Path, formats: Sequence[str]) -> Job:
     paths = {ending: place.with_name(f"{place.name}.{ending}") for ending in formats}
     table = next(paths[ending] for ending in TABLES if ending in paths)
     beside = body_beside(table), scene_beside(table)
-    files = TrackFiles(table, paths.get("mp4"), paths.get("bag"), *beside)
+    given = table, paths.get("mp4"), paths.get("bag"), *beside
+    files = TrackFiles(*given, job.request.files.hides_heads)
     return job._replace(request=replace(job.request, files=files))
 
 
@@ -345,7 +348,7 @@ def digest_of_inputs(request: TrackingRequest, formats: Sequence[str], program: 
     path = request.recording.path
     asked = replace(request, recording=replace(request.recording, path=Path()), inputs=())
     digest = hashlib.sha256(f"{program} {formats}".encode())
-    for value in _values(replace(asked, files=TrackFiles())):
+    for value in _values(asked):
         if isinstance(value, Path) and value.is_file():
             with value.open("rb") as file:
                 digest.update(b"\0" + hashlib.file_digest(file, "sha256").digest())

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack
 from dataclasses import replace
+from functools import partial
 
 from cardbox_tracker.applications.drawing.overlay import draw_sharp_overlay
 from cardbox_tracker.applications.drawing.video import overlay_video
@@ -44,6 +45,9 @@ def track(
     ):
         # Hands and the overlay are seen at the resolution of the recording.
         source.first.has_pictures = request.hands is not None or files.video is not None
+        lasts_s = source.first.duration_s
+        early = [one for film in source.films for one in film.remarks(source.names[0], lasts_s)]
+        print_remarks(early)
         early = source.first.remarks
         print_remarks(_with_unknown(early, person))
         number = None if chosen is None else chosen.number
@@ -51,8 +55,12 @@ def track(
         print_remarks(one for one in source.first.remarks if one not in early)
         accounts = tuple(one.account for one in source.sources)
         who = () if chosen is None else (str(chosen),)
-        assumptions = (*who, *_assumptions(request, scene))
-    summary = replace(summary, accounts=accounts, assumptions=assumptions, scene=scene)
+        assumptions = (*who, *_assumptions(request, scene, source))
+        poses = [other.extrinsics for other in source.others]
+        cameras = dict(zip(source.names[1:], poses, strict=True))
+    summary = replace(
+        summary, accounts=accounts, assumptions=assumptions, scene=scene, cameras=cameras
+    )
     print_remarks(summary.remarks)
     if show is None:
         print(*_lines(summary), sep="\n")
@@ -62,7 +70,7 @@ def track(
     if files.scene is not None:
         save_scene(scene, files.scene)
     one = summary.people.get(person.number, summary)
-    names = "remarks", "accounts", "assumptions", "scene", "people"
+    names = "remarks", "accounts", "assumptions", "scene", "cameras", "people"
     return replace(one, **{name: getattr(summary, name) for name in names})
 
 
@@ -90,6 +98,7 @@ def _tracked(
             person.end_s,
             person.people,
             None if request.hands is None else HandNetwork(request.hands),
+            request.lag_s,
             only,
         )
 
@@ -129,12 +138,13 @@ def _with_unknown(remarks: Sequence[str], person: PersonRequest) -> list[str]:
     return [unknown, *others]
 
 
-def _assumptions(request: TrackingRequest, scene: Scene) -> Iterator[str]:
+def _assumptions(request: TrackingRequest, scene: Scene, source: Recording) -> Iterator[str]:
     """Yield camera, place and stature with where they are from."""
     person = request.person
     yield from scene.words()
-    source = "given" if person.model is None else f"from {person.model.name}"
-    distance = "found" if "distance_m" in person.body.unknown else source
+    yield from (f"{film.name} {film.camera}" for film in source.films)
+    origin = "given" if person.model is None else f"from {person.model.name}"
+    distance = "found" if "distance_m" in person.body.unknown else origin
     for number, body in enumerate(scene.people, 1):
         whose = "" if person.people is None else f" of person {number}"
         yield f"distance{whose} {body.placement.distance_m:.2f} m ({distance})"
@@ -144,14 +154,15 @@ def _assumptions(request: TrackingRequest, scene: Scene) -> Iterator[str]:
     elif person.model is None:
         yield f"stature {USUAL_STATURE_M:.2f} m (the mean of adults), sizes from proportions"
     else:
-        yield f"sizes {source}"
+        yield f"sizes {origin}"
 
 
 def _writers(request: TrackingRequest, source: Recording, stack: ExitStack) -> Iterator[Observer]:
     """Yield what writes bag and video; they appear when ``stack`` is closed without an error."""
     bag, video = request.files.bag, request.files.video
     if video is not None:
-        yield stack.enter_context(overlay_video(video, source))
+        yield stack.enter_context(overlay_video(video, source, request.files.hides_heads))
     if bag is not None:
         frame_id = source.first.frame_id
-        yield stack.enter_context(result_bag(bag, frame_id, request.force, draw_sharp_overlay))
+        draw = partial(draw_sharp_overlay, hides_heads=request.files.hides_heads)
+        yield stack.enter_context(result_bag(bag, frame_id, request.force, draw))

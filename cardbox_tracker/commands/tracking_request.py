@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import Any, NamedTuple, TypeVar
 
 from cardbox_tracker.camera.pairing import camera_names
-from cardbox_tracker.commands.request import AUTO, RecordingOptions, TrackingOptions
+from cardbox_tracker.commands.request import AUTO, RecordingOptions, Request, TrackingOptions
 from cardbox_tracker.common.errors import CardboxError
 from cardbox_tracker.common.extensions import DETECTORS, extensions, loaded
 from cardbox_tracker.common.settings import NoEffectError, nested
@@ -27,16 +27,18 @@ from cardbox_tracker.detectors.own_network import OwnModel
 from cardbox_tracker.detectors.person_choice import PersonChoice
 from cardbox_tracker.detectors.point_table import PointTable
 from cardbox_tracker.measuring.scene import Scene, load_scene
-from cardbox_tracker.person.model import MEASURED, BodyModel, body_from_proportions
+from cardbox_tracker.measuring.scene_camera import in_scene
+from cardbox_tracker.person.model import MEASURED, PLACE, BodyModel, body_from_proportions
 from cardbox_tracker.person.model_file import load_body_model
 from cardbox_tracker.person.proportions import USUAL_STATURE_M
 from cardbox_tracker.recordings.given_camera import FOV_HINT, GivenCamera
 from cardbox_tracker.recordings.open_images import check_exists, is_bag, is_film, tells_lens
 from cardbox_tracker.recordings.other_silhouettes import PersonInView, Within
-from cardbox_tracker.recordings.recording import STEREO, RecordingRequest, Segmentation
+from cardbox_tracker.recordings.recording import STEREO, FurtherFilm, RecordingRequest, Segmentation
 from cardbox_tracker.recordings.silhouettes import TimeSpan
 from cardbox_tracker.search.config import PRESETS, TrackerConfig, read_settings
 from cardbox_tracker.tracking.session import MOST_PEOPLE
+from cardbox_tracker.tracking.smoother import LAG_S
 
 S = TypeVar("S")
 T = TypeVar("T")
@@ -46,6 +48,8 @@ _EFFORT = "whole_body.effort"
 _EXCLUDE = (
     ("--scene", "--model", "have the camera's pitch"),
     ("--fov", "--calibration", "describe the lens"),
+    ("--fov", "--webcam", "describe the lens"),
+    ("--webcam", "--calibration", "describe the lens"),
     ("--detector", "--detector-class", "name a detector"),
     ("--stature", "--model", "say who is tracked"),
 )
@@ -63,6 +67,7 @@ class PersonRequest:
     #: number of people to track, 0 for all who come; None for one without a number
     people: int | None = None
     others: tuple[BodyModel, ...] = ()  #: the bodies of the second and further people
+    scene: Scene | None = None  #: a scene with these people, whose camera nothing else tells
     number: int = 1  #: whose results commands use that use those of one
     choice: PersonChoice | None = None  #: who alone is tracked of all who come
     statures_m: tuple[float, ...] = ()  #: the statures that are given, by number
@@ -82,6 +87,7 @@ class TrackFiles(NamedTuple):
     bag: Path | None = None  #: folder of a bag with the topics of the tracker
     body: Path | None = None  #: the body that was tracked
     scene: Path | None = None  #: camera, floor and people (:mod:`~cardbox_tracker.measuring.scene`)
+    hides_heads: bool = False  #: whether heads are hidden in pictures of people
 
 
 @dataclass(frozen=True)
@@ -96,6 +102,7 @@ class TrackingRequest:
     inputs: tuple[Path, ...]  #: files and folders that are read, which no result may replace
     #: network file that finds the points of hands; None if they are not measured
     hands: Path | None = None
+    lag_s: float = LAG_S  #: seconds of later images that count for an image
     files: TrackFiles = TrackFiles()  #: results to write
     force: bool = False  #: whether an existing bag is replaced
 
@@ -171,11 +178,39 @@ def recording_request(
         asked.depth,
         _seeing(points, people),
         camera,
+        _further(asked, camera, problems),
+        asked.statures_m if isinstance(asked, TrackingOptions) else (),
     )
     problems.add(*request.faults())
-    if asked.extrinsics is not None and len(names) < 2:
+    if asked.extrinsics is not None and len(names) < 2 and not request.films:
         problems.add("--extrinsics has no effect with one camera: name several with --cameras")
     return request
+
+
+def _films(asked: RecordingOptions) -> tuple[Path, ...]:
+    """Return the further films, which only a Request has."""
+    return asked.films if isinstance(asked, Request) else ()
+
+
+def _further(
+    asked: RecordingOptions, camera: GivenCamera, problems: Problems
+) -> tuple[FurtherFilm, ...]:
+    """Return the further films that are asked for, each with its camera and offset."""
+    if not isinstance(asked, Request):
+        return ()
+    count = len(asked.films)
+    fovs_deg = asked.fovs_deg[1:] if len(asked.fovs_deg) > 1 else (camera.fov_deg,) * count
+    offsets_s: tuple[float | None, ...] = asked.offset_s or (None,) * count
+    if len(fovs_deg) != count:
+        problems.add(f"--fov has {len(asked.fovs_deg)} values: give one, or one for each film")
+    if len(offsets_s) != count:
+        problems.add(f"--offset has {len(offsets_s)} values: give one for each further film")
+    for path in asked.films:
+        problems.caught(partial(check_exists, path), None)
+    return tuple(
+        FurtherFilm(path, replace(camera, fov_deg=fov_deg), offset_s)
+        for path, fov_deg, offset_s in zip(asked.films, fovs_deg, offsets_s, strict=False)
+    )
 
 
 def _person_faults(person: object, people: int | None, has_detector: bool) -> Iterator[str]:
@@ -200,7 +235,7 @@ def _seeing(source: Any, people: int | None) -> Any:
 def inputs_of(asked: RecordingOptions) -> tuple[Path, ...]:
     """Return the files and folders that the options of a recording or of tracking name."""
     names = "recording", "extrinsics", "calibration", "detector", "model", "scene", "settings"
-    given = (getattr(asked, name, None) for name in names)
+    given = (*(getattr(asked, name, None) for name in names), *_films(asked))
     # A detector may also be a word, which names no file, or an object.
     return tuple(Path(path) for path in given if path and isinstance(path, str | Path))
 
@@ -211,26 +246,33 @@ def tracking_request(asked: TrackingOptions, faults: Iterable[str] = ()) -> Trac
     scene = None
     if asked.scene is not None:
         scene = problems.caught(partial(load_scene, asked.scene), None)
+    focal_stddev: float | None = None
     if scene is not None:
-        asked = _with_camera(asked, scene)
+        given, asked = asked, _with_camera(asked, scene)
+        if asked.fov_deg != given.fov_deg:
+            fov = scene.camera.fov_rad
+            focal_stddev = fov.stddev / math.sin(fov.mean)
     people = 0 if asked.people == AUTO else asked.people
     assert not isinstance(people, str)
     recording = recording_request(asked, problems, people)
+    camera = replace(recording.camera, focal_stddev=focal_stddev)
+    recording = replace(recording, camera=camera)
     person = _person(asked, people, problems, scene)
     problems.add(*_tracking_faults(asked, people, isinstance(recording.points, Detector)))
     preset = PRESETS[asked.preset]()
     config = problems.caught(lambda: _config(asked, preset), preset)
     hands = problems.caught(installed_hands, None) if asked.hands else None
     problems.check()
-    return TrackingRequest(
-        recording, person, asked.preset, config, asked.seed, inputs_of(asked), hands
-    )
+    of = recording, person, asked.preset, config, asked.seed, inputs_of(asked), hands
+    # The paper's filter is what the paper says.
+    lag_s = 0.0 if asked.causal or asked.preset == "paper" else LAG_S
+    return TrackingRequest(*of, lag_s)
 
 
 def _tracking_faults(
     asked: TrackingOptions, people: int | None, has_detector: bool
 ) -> Iterator[str]:
-    is_more = len(asked.cameras) > 1 or asked.depth is not None
+    is_more = len(asked.cameras) > 1 or asked.depth is not None or bool(_films(asked))
     if is_more and not PRESETS[asked.preset]().has_several_views:
         yield (
             f"--preset {asked.preset} uses the silhouette of one camera; give --preset default "
@@ -258,7 +300,11 @@ def _tracking_faults(
 def _camera(asked: RecordingOptions, problems: Problems) -> GivenCamera:
     roll_deg = asked.camera_roll_deg
     roll_rad = None if roll_deg is None else math.radians(roll_deg)
-    camera = GivenCamera(asked.fov_deg, asked.calibration, roll_rad, asked.fps, asked.mirrored)
+    if len(asked.fovs_deg) > 1 and not _films(asked):
+        problems.add("--fov has several values: give one, or several films")
+    fov_deg = asked.fovs_deg[0] if asked.fovs_deg else None
+    given = fov_deg, asked.calibration, roll_rad, asked.fps, asked.mirrored, asked.webcam
+    camera = GivenCamera(*given)
     if not (camera.is_calibrated or _is_guessed(asked) or tells_lens(asked.recording)):
         hint = f"--fov is across the width of the image: {FOV_HINT}"
         problems.miss("--fov DEG or --calibration FILE", hint)
@@ -352,7 +398,7 @@ def points_named(given: object, class_name: str | None = None) -> Detector | Poi
 def _with_camera(asked: TrackingOptions, scene: Scene) -> TrackingOptions:
     """Return the options with what the scene says of a film's camera where they say nothing."""
     found, camera = dict[str, float](), scene.camera
-    if is_film(asked.recording) and asked.fov_deg is None and asked.calibration is None:
+    if is_film(asked.recording) and not {"--fov", "--calibration", "--webcam"} & {*asked.given()}:
         found["fov_deg"] = math.degrees(camera.fov_rad.mean)
     if asked.camera_roll_deg is None and camera.roll_rad.mean:
         found["camera_roll_deg"] = math.degrees(camera.roll_rad.mean)
@@ -365,15 +411,22 @@ def _person(
     statures_m, pitch_deg = asked.statures_m, asked.camera_pitch_deg
     is_of_scene = scene is not None and bool(scene.people) and not statures_m
     if scene is not None and is_of_scene:
-        # They may stand elsewhere now.
-        unknown = "distance_m", "hip_height_m"
-        bodies = [one.with_values(unknown=unknown) for one in scene.people]
+        bodies = [replace(one, is_distance_found=one.source != MEASURED) for one in scene.people]
     else:
         bodies = _bodies(asked, problems)
     if scene is not None and pitch_deg is None:
-        pitch = scene.camera.pitch_rad
-        tilt = {"camera_pitch_rad": pitch.mean, "pitch_stddev_rad": pitch.stddev}
-        bodies = [one.with_values(**tilt) for one in bodies]
+        # Degrees have not the same digits as the radians of the people of the scene.
+        known_rad = [one.camera_pose.pitch_rad for one in bodies]
+        bodies = [in_scene(one, scene.camera) for one in bodies]
+        bodies = [
+            one.with_values(camera_pitch_rad=before_rad)
+            if math.isclose(before_rad, one.camera_pose.pitch_rad, rel_tol=1e-12)
+            else one
+            for one, before_rad in zip(bodies, known_rad, strict=True)
+        ]
+    elif is_of_scene and pitch_deg is not None:
+        moved = {"camera_pitch_rad": math.radians(pitch_deg), "unknown": PLACE}
+        bodies = [one.with_values(**moved) for one in bodies]
     start_s, end_s = asked.start_s or 0.0, math.inf if asked.end_s is None else asked.end_s
     if end_s <= start_s:
         problems.add(f"--end {end_s:g} is not after --start {start_s:g}: give a later second")
@@ -387,6 +440,7 @@ def _person(
         others=tuple(bodies[1:]),
         number=asked.number,
         statures_m=statures_m,
+        scene=scene if is_of_scene and pitch_deg is None else None,
         choice=asked.person if isinstance(asked.person, PersonChoice) else None,
     )
 

@@ -8,6 +8,8 @@ from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import contextmanager
 from typing import TypeVar
 
+from cardbox_tracker.common import interrupts
+
 A = TypeVar("A")
 R = TypeVar("R")
 
@@ -65,8 +67,12 @@ def done_beside(call: Callable[..., object]) -> Iterator[Callable[..., None]]:
 
 @contextmanager
 def _worker() -> Iterator[ThreadPoolExecutor]:
-    pool = ThreadPoolExecutor(1)
+    pool, is_interrupted = ThreadPoolExecutor(1), False
     try:
         yield pool
+    except KeyboardInterrupt:
+        is_interrupted = True
+        raise
     finally:
-        pool.shutdown(cancel_futures=True)
+        # A call of foreign code may never end.
+        pool.shutdown(wait=not (is_interrupted or interrupts.received()), cancel_futures=True)

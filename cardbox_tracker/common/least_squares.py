@@ -23,7 +23,7 @@ from cardbox_tracker.common.array_checks import check_array
 from cardbox_tracker.common.compiling import inlined_allocation, inlined_kernel, kernel
 
 Floats = NDArray[np.float64]
-Bools = NDArray[np.bool_]
+Counts = NDArray[np.int64]
 Equations = tuple[Floats, Floats, Floats, Floats]
 """Values (N, n), upper triangles of the matrices (N, n, n) and right sides (N, n) of the normal
 equations there, and costs (N, K), of which the last one is that of the prior."""
@@ -102,6 +102,7 @@ def minimize(
     rules: Rules,
     steps: int,
     least_gain: float = 0.0,
+    tries: int = 1,
 ) -> Solution:
     """Return unknowns (N, n) with a smaller cost near ``start`` (N, n), with their information.
 
@@ -109,18 +110,20 @@ def minimize(
         residuals: what gives the residuals of unknowns (N, n), by name; None if there are none.
         start: values to begin with; they may be beyond the limits.
         rules: prior, limits and damping.
-        steps: most steps; each computes the residuals once.
+        steps: most steps.
+        tries: mean number of tries for a step; one that makes the cost larger is tried again,
+            shorter. Each computes the residuals once.
         least_gain: share of its cost from which on a step that gains less is a fit's last one.
 
     Raises:
         ValueError: the rules, residuals or their Jacobian have another shape or type.
     """
-    factors, is_done = np.ones(len(start)), np.zeros(len(start), np.bool_)
+    factors, left = np.ones(len(start)), np.full(len(start), steps)
     np.broadcast_to(rules[0], start.shape)  # raises for other shapes
     now = _equations(residuals, np.array(start, np.float64, order="C"), rules)
-    for _ in range(steps):
+    for _ in range(tries * steps):
         after = _equations(residuals, _proposed(now, factors, rules), rules)
-        if _accept(now, after, factors, least_gain, is_done):
+        if _accept(now, after, factors, least_gain, left):
             break
     return Solution(now, residuals)
 
@@ -156,11 +159,11 @@ def minimize_compiled(
     (R,). Then come R and the change of a value for its derivatives. ``ends`` are most steps, and
     least gain.
     """
-    factors, is_done = np.ones(start.shape[0]), np.zeros(start.shape[0], np.bool_)
-    now = _linearized(write, given, start.copy(), rules, is_done)
+    factors, left = np.ones(start.shape[0]), np.full(start.shape[0], ends[0])
+    now = _linearized(write, given, start.copy(), rules, left)
     for _ in range(ends[0]):
-        after = _linearized(write, given, _proposed(now, factors, rules), rules, is_done)
-        if _accept(now, after, factors, ends[1], is_done):
+        after = _linearized(write, given, _proposed(now, factors, rules), rules, left)
+        if _accept(now, after, factors, ends[1], left):
             break
     return now
 
@@ -171,13 +174,13 @@ def _linearized(
     given: tuple[Any, int, float],
     values: Floats,
     rules: Rules,
-    is_done: Bools,
+    left: Counts,
 ) -> Equations:
     arguments, rows, step = given
     (count, size), above = values.shape, np.empty(rows)
     errors, jacobian = np.zeros((count, rows)), np.zeros((count, rows, size))
     for n in range(count):
-        if is_done[n]:
+        if left[n] == 0:
             continue
         write(values[n], arguments, errors[n])
         for j in range(size):
@@ -274,13 +277,13 @@ def _solve(matrix: Floats, right: Floats) -> None:
 
 @kernel
 def _accept(
-    now: Equations, after: Equations, factors: Floats, least_gain: float, is_done: Bools
+    now: Equations, after: Equations, factors: Floats, least_gain: float, left: Counts
 ) -> bool:
-    """Take over the fits whose costs are not larger than before; return whether all are done."""
+    """Take over the fits whose costs are not larger than before; return whether no step is left."""
     values, information, right, costs = now
     are_done = True
     for n in range(values.shape[0]):
-        if is_done[n]:
+        if left[n] == 0:
             continue
         before, gain = 0.0, 0.0
         for k in range(costs.shape[1]):
@@ -288,7 +291,7 @@ def _accept(
             gain += costs[n, k] - after[3][n, k]
         if gain >= 0.0:
             factors[n] = max(factors[n] / _FACTOR, 1.0)
-            is_done[n] = is_done[n] or gain <= least_gain * before
+            left[n] = 0 if gain <= least_gain * before else left[n] - 1
             for k in range(costs.shape[1]):
                 costs[n, k] = after[3][n, k]
             for i in range(values.shape[1]):
@@ -297,8 +300,8 @@ def _accept(
                     information[n, i, j] = after[1][n, i, j]
         else:
             factors[n] *= _FACTOR
-            is_done[n] = is_done[n] or factors[n] > _LARGEST_FACTOR
-        are_done = are_done and is_done[n]
+            left[n] = 0 if factors[n] > _LARGEST_FACTOR else left[n]
+        are_done = are_done and left[n] == 0
     return are_done
 
 

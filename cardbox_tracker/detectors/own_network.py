@@ -5,6 +5,7 @@ from __future__ import annotations
 import inspect
 from collections.abc import Callable, Iterable, Mapping
 from contextlib import suppress
+from itertools import islice
 from pathlib import Path
 from typing import Any, NamedTuple, Protocol
 
@@ -12,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cardbox_tracker.camera.given_arrays import silhouette_from
-from cardbox_tracker.common.errors import CardboxError, quoted
+from cardbox_tracker.common.errors import CardboxError, cut, quoted
 from cardbox_tracker.detectors.point_checks import check_person, check_point
 from cardbox_tracker.detectors.pose_network import (
     LANDMARKS,
@@ -25,6 +26,8 @@ from cardbox_tracker.detectors.pose_network import (
 )
 
 _MASK = "mask"
+# More fill the screen, and take minutes an image.
+_MOST_PEOPLE = 200
 
 
 class FindsPeople(Protocol):
@@ -73,13 +76,23 @@ class OwnNetwork(PoseNetwork):
     def people_in(self, image: ColorImage) -> list[Detection]:
         """Return the people in an image (H, W, 3), bgr; CardboxError if what is found are none."""
         name, found = f"{type(self._own).__name__}.detect", list[Detection]()
-        people: Any = self._own.detect(np.ascontiguousarray(image))
-        if not isinstance(people, Iterable):
+        try:
+            people: Any = self._own.detect(np.ascontiguousarray(image))
+            if isinstance(people, Iterable):
+                people = list(islice(people, _MOST_PEOPLE + 1))
+        except (Exception, SystemExit) as error:
+            raise CardboxError(
+                f"{name} fails: {type(error).__name__}: {cut(str(error))}; expected a list of "
+                "people (docs/extending.md)"
+            ) from error
+        if not isinstance(people, list):
             raise CardboxError(f"{name} returns {quoted(people)}; expected a list of people")
+        if len(people) > _MOST_PEOPLE:
+            raise CardboxError(f"{name} returns more than {_MOST_PEOPLE} people in an image")
         for number, person in enumerate(people):
             try:
                 found.append(_detection(person, image.shape[:2]))
-            except (CardboxError, ValueError, TypeError, AttributeError) as error:
+            except (CardboxError, ValueError, TypeError, AttributeError, ArithmeticError) as error:
                 raise CardboxError(
                     f"{name}, person {number}: {error}; expected column, row and score, or these "
                     "and x, y and z, by names of points"
@@ -116,7 +129,7 @@ def _detection(person: Mapping[str, Any], shape: tuple[int, int]) -> Detection:
         if score > 0.0:
             number = LANDMARKS.index(name)
             known[name] = column, row, score
-            points_px[number], scores[number] = (column, row), score
+            points_px[number], scores[number] = (column, row), min(score, 1.0)
             spatial_m[number, : len(space)] = space
     check_person(known)
     found = Detection(points_px, scores, np.zeros(shape, np.uint8))

@@ -15,8 +15,9 @@ Size = tuple[int, int]
 NamedPoint = tuple[str, float, float, float, *tuple[float, ...]]
 """Name, column and row (px), and score of a point, and its x, y and z in space if it has them."""
 
-# float32 rounds a score of 1 by less.
-_MOST_SCORE = 1.001
+# Some networks give scores somewhat above 1, which count as 1, and below 0 to missing points;
+# beyond these are percentages, bytes and other numbers.
+_LEAST_SCORE, _MOST_SCORE = -1.0, 10.0
 # A point may lie outside the image, but by no more than this multiple of the larger side.
 _MOST_OUTSIDE = 1.0
 # No person is as small as this, px; shares of the image are from 0 to 1, and guesses beyond it.
@@ -26,9 +27,9 @@ _SHARES, _LEAST_POINTS = 1.5, 3
 def check_point(point: NamedPoint, size: Size | None) -> None:
     """Raise CardboxError if a score is no chance, or, above 0, its place far off the image."""
     name, column, row, score, *_ = point
-    if not 0.0 <= score <= _MOST_SCORE:
+    if not _LEAST_SCORE <= score <= _MOST_SCORE:
         raise CardboxError(f"{name} has the score {score:g}; expected a chance from 0 to 1")
-    if score == 0.0:
+    if score <= 0.0:
         return
     far_px = np.inf if size is None else _MOST_OUTSIDE * max(size)
     sides = zip((column, row), size or (0, 0), strict=True)
@@ -41,7 +42,7 @@ def check_point(point: NamedPoint, size: Size | None) -> None:
 
 
 def person_of(points: Iterable[NamedPoint], size: Size | None) -> ImagePoints:
-    """Return the person of some points, which are checked; those with the score 0 are missing."""
+    """Return the person of some points, which are checked; those of the score 0 are missing."""
     found = {}
     for point in points:
         check_point(point, size)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import csv
 import io
-import re
 from bisect import bisect_left
 from collections import Counter
 from collections.abc import Sequence
@@ -25,7 +24,7 @@ from cardbox_tracker.detectors.image_points import (
     ImagePoints,
     LegPoints,
 )
-from cardbox_tracker.detectors.keypoint_json import coco_people, openpose_people
+from cardbox_tracker.detectors.keypoint_json import coco_people, image_numbers, openpose_people
 from cardbox_tracker.detectors.person_choice import LEAST_INSIDE, inside, near_person, person_in
 from cardbox_tracker.detectors.point_checks import Size, check_person, check_point, person_of
 from cardbox_tracker.person.sizes import FloatArray
@@ -41,6 +40,8 @@ _STAMPS = {"stamp_ns": 1, "stamp_us": 10**3, "stamp_ms": 10**6, "stamp_s": 10**9
 _MOST_NS = 2**63
 # An hour of all points at 30 Hz has 100 MB.
 _MOST_BYTES = 256 * 1024 * 1024
+# float32 rounds a score of 1 by less.
+_ROUNDED = 1.001
 # Points of which less is in the silhouette are compared with others, of which as much must be.
 _MOST_DOUBTFUL, _LEAST_SURE = 0.6, 0.85
 # Images with wrong points, after which points are used only while most are right.
@@ -82,24 +83,30 @@ class PointTable(NamedTuple):
         with foreign(
             path, CardboxError, f"a CSV file in UTF-8 with the columns {', '.join(COLUMNS)}"
         ):
-            return GivenPoints(path, *self._read_table(camera, size))
+            kind, persons, most = self._read_table(camera, size)
+            return GivenPoints(path, kind, persons, most_score=most)
 
     def _read_json(self, path: Path, size: Size | None) -> GivenPoints:
         if not path.is_dir() and path.suffix != ".json":
             path = path.with_name(f"{path.name}.json")
         persons: Persons = {}
+        most = 0.0
         for found in openpose_people(path) if path.is_dir() else coco_people(path):
             try:
                 person = person_of(found.points, size)
             except CardboxError as error:
                 raise CardboxError(f"{found.place}: {error}") from None
+            if not found.points:
+                continue
+            most = max(most, *(point[3] for point in found.points))
             persons.setdefault(found.image, []).append(person)
         if not persons:
             raise CardboxError(f"{path} has no point of anybody; give what a detector has found")
         is_named = any(isinstance(key, str) for key in persons)
-        return GivenPoints(path, "name" if is_named else FRAME, persons)
+        return GivenPoints(path, "name" if is_named else FRAME, persons, most_score=most)
 
-    def _read_table(self, camera: str | None, size: Size | None) -> tuple[str, Persons]:
+    def _read_table(self, camera: str | None, size: Size | None) -> tuple[str, Persons, float]:
+        most = 0.0
         found: dict[tuple[Key, str], dict[str, list[float]]] = {}
         first_lines: dict[tuple[Key, str], int] = {}
         try:
@@ -123,6 +130,7 @@ class PointTable(NamedTuple):
                     if row["score"] == row["u"] == row["v"] == "":
                         score = 0.0
                     check_point((joint, u, v, score), size)
+                    most = max(most, score)
                     key: tuple[Key, str] = image, row.get(_PERSON) or ""
                     joints = found.setdefault(key, {})
                     first_lines.setdefault(key, rows.line_num)
@@ -149,7 +157,7 @@ class PointTable(NamedTuple):
             except CardboxError as error:
                 raise CardboxError(f"{self.path}, line {first_lines[key]}: {error}") from None
             persons.setdefault(key[0], []).append(ImagePoints.of(joints))
-        return kind, persons
+        return kind, persons, most
 
     def _check(self, names: Sequence[str], camera: str | None) -> str:
         kind = next((name for name in (*_STAMPS, FRAME) if name in names), COLUMNS[0])
@@ -206,14 +214,22 @@ class GivenPoints:
         beside: number of images whose points lie beside the silhouette.
     """
 
-    def __init__(self, path: Path, kind: str, persons: Persons, tolerance_ns: int = 0) -> None:
+    def __init__(
+        self,
+        path: Path,
+        kind: str,
+        persons: Persons,
+        tolerance_ns: int = 0,
+        most_score: float = 0.0,
+    ) -> None:
+        self._most_score = most_score
         self._path, self.kind, self._persons, self._tolerance_ns = path, kind, persons, tolerance_ns
         self._stamps = sorted(key for key in persons if isinstance(key, int))
         self._numbered: dict[int, list[ImagePoints]] = {}
         if kind == "name":
             # A video's images have no names, but programs number those that they take out of it.
-            numbers = {key: re.findall(r"\d+", str(key)) for key in persons}
-            self._numbered = {int(one[-1]): persons[key] for key, one in numbers.items() if one}
+            numbers = image_numbers(key for key in persons if isinstance(key, str))
+            self._numbered = {number: persons[name] for name, number in numbers.items()}
         self.restart()
 
     def restart(self) -> None:
@@ -228,7 +244,7 @@ class GivenPoints:
             key: [placed(person, calibration, size) for person in there]
             for key, there in self._persons.items()
         }
-        return GivenPoints(self._path, self.kind, persons, tolerance_ns)
+        return GivenPoints(self._path, self.kind, persons, tolerance_ns, self._most_score)
 
     def persons(self, image: Image, tolerance_ns: int) -> list[ImagePoints]:
         """Return the people in an image; none if no points join it."""
@@ -305,15 +321,22 @@ class GivenPoints:
 
     @property
     def remark(self) -> str:
-        """A warning about points beside the silhouettes, or of who lies; empty if all is well."""
+        """Warnings about places and scores of points; empty if all is well."""
+        found = []
         if self.beside:
-            return f"the points of {self.beside} of {self.images} images are not used: {self._why}"
-        if 2 * self._lying <= self.used:
-            return ""
-        return (
-            f"the points of {self._lying} of {self.used} images are of people who lie; if they do "
-            "not, columns and rows are exchanged: expected u, v"
-        )
+            found.append(
+                f"the points of {self.beside} of {self.images} images are not used: {self._why}"
+            )
+        elif 2 * self._lying > self.used:
+            found.append(
+                f"the points of {self._lying} of {self.used} images are of people who lie; if they "
+                "do not, columns and rows are exchanged: expected u, v"
+            )
+        if self._most_score > _ROUNDED:
+            found.append(
+                f"scores of {self._path} reach {self._most_score:g}; those above 1 count as 1"
+            )
+        return ", and ".join(found)
 
     @property
     def _why(self) -> str:

@@ -42,6 +42,8 @@ USUAL_PITCH, PITCH_PRIOR = np.radians(10.0), np.radians(13.0)
 """Mean and standard deviation of the pitch of cameras before anything is seen, rad."""
 ROLL_PRIOR = np.radians(15.0)
 """Standard deviation of the roll of cameras that do not stand level, rad."""
+DISTANCE_STDDEV = 0.05
+"""Relative standard deviation of a given distance, which people measure or estimate."""
 LEVELS = ("nose", "ear", "shoulder", "hip", "knee", "ankle")
 # Distance before the ankles of each level where MediaPipe marks the joints of people who stand
 # upright, and the standard deviations among people of heights and distances.
@@ -72,6 +74,8 @@ _SIDE, _ALONG, _STEPPING = 0.02, 0.012, 0.03
 # sits, rad. Somebody who is seen from above seems to lean.
 _BOWED, _BENT, _SITS = np.radians((50.0, 35.0, 35.0))
 _LEAST_SCORE, _LEAST_LEVELS, _BORDER = 0.5, 3, 0.02
+# How far people go in a second before they are first seen upright, m.
+_GOES_M = 0.1
 # Images of one person that count, and the time in which people keep posture and errors, s.
 _MOST_IMAGES, _SAME_S, _SITTING_IMAGES = 24, 4.0, 3.0
 # Residual from which on it counts less, deviations; steps of the fit, the step of the differences,
@@ -141,6 +145,7 @@ def people_camera(
     camera: Camera,
     pitch: tuple[float, float] = (USUAL_PITCH, PITCH_PRIOR),
     roll: tuple[float, float] = (0.0, ROLL_PRIOR),
+    distance_m: float | None = None,
 ) -> PeopleCamera | None:
     """Return what people show; None if nobody is upright.
 
@@ -150,6 +155,8 @@ def people_camera(
         camera: intrinsics with ``focal_stddev``; its pitch is not used.
         pitch: mean and standard deviation of the pitch before anything is seen, rad.
         roll: the same of the roll.
+        distance_m: level distance of the first person where they are first seen; None if it is not
+            known.
     """
     every = [_upright(sights, number, camera) for number, sights in enumerate(people)]
     shown = [one for one in every if one is not None]
@@ -199,8 +206,16 @@ def people_camera(
             last[:, None] + np.arange(_OF_IMAGE),
         ]
     )
+    start = mean.copy()
+    if distance_m is not None and (at := np.flatnonzero(person == 0)).size:
+        known_log = math.log(distance_m) - statures[0]
+        late_s = float(seen.times_s[at[0]]) - people[0][0][0]
+        unsure_log = math.hypot(DISTANCE_STDDEV, unsure[0], _GOES_M * late_s / distance_m)
+        start[3] = known_log - math.log(distance[at[0]])
+        start[last + 1] += start[3]
+        mean[last[at[0]] + 1], precision[last[at[0]] + 1] = known_log, unsure_log**-2.0
     rules = rules_of(len(mean), mean=mean, inverse=precision)
-    found = _fitted(seen, distance, own, rules, mean).values[0]
+    found = _fitted(seen, distance, own, rules, start).values[0]
     # Most images show the floor, so in the second fit only the others may show something higher.
     high = found[last + _OF_IMAGE - 1]
     on_floor = np.abs(high - np.median(high)) < _ON_FLOOR

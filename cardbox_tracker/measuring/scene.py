@@ -6,6 +6,7 @@ film can be given to the next film of the same camera.
 
 from __future__ import annotations
 
+import json
 import math
 import os
 import textwrap
@@ -17,7 +18,7 @@ from cardbox_tracker.common.errors import CardboxError, quoted
 from cardbox_tracker.common.files import foreign, write_file
 from cardbox_tracker.common.small_yaml import parse_small_yaml, read_small_text
 from cardbox_tracker.person.model import BodyModel
-from cardbox_tracker.person.model_file import dumps_body_model, loads_body_model
+from cardbox_tracker.person.model_file import dumps_body_model, loads_body_model, yaml_number
 
 FORMAT = "cardbox_scene/1"
 ORIGINS = GIVEN, FOUND, USUAL = "given", "found", "usual"
@@ -30,6 +31,7 @@ class Value(NamedTuple):
     mean: float  #: its value
     stddev: float  #: its standard deviation
     origin: str = FOUND  #: one of ``ORIGINS``
+    by: str = ""  #: what tells it, in words; empty if that is not known
 
 
 class SceneCamera(NamedTuple):
@@ -60,18 +62,22 @@ class Scene:
         """Yield each number of the camera with its deviation and origin."""
         for name, value in self._numbers():
             unit = name.rpartition("_")[2].replace("deg", "degrees")
-            number = f"{value.mean:.3g} +- {value.stddev:.2g} {unit} ({value.origin})"
+            source = f"{value.origin}: {value.by}" if value.by else value.origin
+            number = f"{value.mean:.3g} +- {value.stddev:.2g} {unit} ({source})"
             yield f"{_NUMBERS[name][3]} {number}"
 
     def numbers(self) -> dict[str, dict[str, float | str]]:
-        """Return mean, stddev and origin by the names of the file."""
-        return {name: value._asdict() for name, value in self._numbers()}
+        """Return mean, stddev, origin and what tells it by the names of the file."""
+        return {
+            name: {key: entry for key, entry in value._asdict().items() if entry != ""}
+            for name, value in self._numbers()
+        }
 
     def _numbers(self) -> Iterator[tuple[str, Value]]:
         for name, (attribute, factor, *_) in _NUMBERS.items():
             value: Value | None = getattr(self.camera, attribute)
             if value is not None:
-                yield name, Value(factor * value.mean, factor * value.stddev, value.origin)
+                yield name, value._replace(mean=factor * value.mean, stddev=factor * value.stddev)
 
 
 def dumps_scene(scene: Scene) -> str:
@@ -81,14 +87,28 @@ def dumps_scene(scene: Scene) -> str:
         f"format: {FORMAT}",
         "camera:",
     ]
-    for name, value in scene.numbers().items():
-        mean, stddev, origin = value.values()
-        entries = f"{{mean: {mean:.6f}, stddev: {stddev:.6f}, origin: {origin}}}"
-        lines.append(f"  {name}: {entries}  # {_NUMBERS[name][3]}")
+    for name in scene.numbers():
+        attribute, factor, *_ = _NUMBERS[name]
+        value: Value = getattr(scene.camera, attribute)
+        mean, stddev = (_written(number, factor) for number in value[:2])
+        entries = f"mean: {mean}, stddev: {stddev}, origin: {value.origin}"
+        if value.by:
+            entries += f", by: {json.dumps(value.by)}"
+        lines.append(f"  {name}: {{{entries}}}  # {_NUMBERS[name][3]}")
     lines.append("people:" if scene.people else "people: []")
     for body in scene.people:
         lines += ["  - |", textwrap.indent(dumps_body_model(body), "    ").rstrip()]
     return "\n".join(lines) + "\n"
+
+
+def _written(value: float, factor: float) -> str:
+    """Return a number with few digits, or all, that gives the same value when it is read."""
+    number = float(factor * value)
+    near = (round(number, digits) for digits in range(6, 17))
+    tried = *near, number, math.nextafter(number, -math.inf), math.nextafter(number, math.inf)
+    # Some radians are between those of any degrees; then what is read is written so again.
+    read = value if any(one / factor == value for one in tried) else number / factor
+    return yaml_number(next(one for one in tried if one / factor == read))
 
 
 def save_scene(scene: Scene, path: str | os.PathLike[str]) -> None:
@@ -124,18 +144,21 @@ def loads_scene(text: str) -> Scene:
 
 def _value_of(name: str, given: Any) -> Value:
     _, factor, (lowest, highest), _ = _NUMBERS[name]
-    is_value = isinstance(given, dict) and set(given) == set(Value._fields)
+    is_value = isinstance(given, dict) and set(given) | {"by"} == set(Value._fields)
     numbers = (given["mean"], given["stddev"]) if is_value else ()
     if not is_value or not all(
         isinstance(one, int | float) and not isinstance(one, bool) for one in numbers
     ):
         raise ValueError(f"camera.{name} is no mapping of the numbers mean and stddev and origin")
     mean, stddev = map(float, numbers)
-    if not lowest <= mean <= highest or not 0.0 <= stddev < math.inf:
+    if not lowest <= mean <= highest or not 0.0 <= stddev <= highest - lowest:
         raise ValueError(
             f"camera.{name} is {mean:g} +- {stddev:g}; expected {lowest:g} to {highest:g}, and a "
-            "deviation from 0 on"
+            f"deviation from 0 on, up to {highest - lowest:g}"
         )
     if given["origin"] not in ORIGINS:
         raise ValueError(f"camera.{name}.origin is none of {', '.join(ORIGINS)}")
-    return Value(mean / factor, stddev / factor, given["origin"])
+    by = given.get("by", "")
+    if not isinstance(by, str):
+        raise ValueError(f"camera.{name}.by is no text")
+    return Value(mean / factor, stddev / factor, given["origin"], by)

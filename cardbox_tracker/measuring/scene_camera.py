@@ -8,8 +8,9 @@ is usual, decide. In the same way people who lean aside show no roll.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
 from itertools import pairwise
 from typing import Any, NamedTuple
 
@@ -20,6 +21,7 @@ from numpy.typing import NDArray
 from cardbox_tracker.camera.camera import Camera
 from cardbox_tracker.detectors.image_points import ImagePoints
 from cardbox_tracker.measuring.people_camera import (
+    DISTANCE_STDDEV,
     PITCH_PRIOR,
     ROLL_PRIOR,
     USUAL_PITCH,
@@ -52,6 +54,8 @@ _LEAST_ROLL, _SURE = np.radians(2.0), 2.0
 # Relative deviation from which on a focal length is only a usual one, and share of it from which on
 # one that is found takes its place.
 _GUESSED, _BETTER = 0.1, 0.5
+# The same of any camera's focal length, from telephoto to action camera, where a distance tells it.
+_ANY_LENS = 0.5
 # Least difference of two sources that is told, rad.
 _TOLD = np.radians(4.0)
 # A shift of most of the background between two images that shows that the camera moves, as a share
@@ -87,6 +91,7 @@ def scene_camera(
     statures_m: Sequence[float | None],
     given: tuple[float, float] | None = None,
     roll_rad: float | None = None,
+    distance_m: float | None = None,
 ) -> FoundCamera:
     """Return the camera of a film.
 
@@ -97,11 +102,25 @@ def scene_camera(
         statures_m: stature of each person; None if it is not known.
         given: mean and standard deviation of a downward pitch that is given, rad; None for none.
         roll_rad: clockwise roll that is given; None for none.
+        distance_m: level distance that is given of the first person when first seen; None for none.
+            Beside the stature it shows the focal length, if that is only a usual one.
     """
     usual_roll = (0.0, _ROLLED) if roll_rad is None else (roll_rad, GIVEN_STDDEV)
+    usual_tilt = (USUAL_PITCH, PITCH_PRIOR), usual_roll
+    remarks, sources = list[str](), list[str]()
+    given_m = distance_m
+    if lens_of(camera).origin != USUAL:
+        distance_m = None
+    if distance_m is not None:
+        # Where edges of the room meet depends on the focal length.
+        free = replace(camera, focal_stddev=_ANY_LENS)
+        by_distance = people_camera(people, statures_m, free, *usual_tilt, distance_m)
+        if by_distance is not None:
+            factor = float(np.exp(by_distance.values[3]))
+            camera = replace(free, fx=factor * free.fx, fy=factor * free.fy)
     with ThreadPoolExecutor(1) as beside:
         edges = beside.submit(edge_likelihoods, [picture for _, picture in pictures], camera)
-        shown = people_camera(people, statures_m, camera, (USUAL_PITCH, PITCH_PRIOR), usual_roll)
+        shown = people_camera(people, statures_m, camera, *usual_tilt, distance_m)
         # Without points, nothing tells the people from the background.
         moves = len(people) > 0 and camera_moves(people, pictures, camera)
         likelihoods = edges.result()
@@ -139,7 +158,6 @@ def scene_camera(
     roll, roll_stddev = _peak(ROLLS_RAD, both[near].sum(axis=0))
     if abs(roll) < max(_LEAST_ROLL, _SURE * roll_stddev):
         roll, roll_stddev = 0.0, float(np.hypot(roll, roll_stddev))
-    remarks, sources = list[str](), list[str]()
     # Lines that agree on several pitches show none.
     has_edges &= by_edges[1] < FOUND_STDDEV
     uses_edges = has_edges and abs(by_edges[0] - pitch) < max(_TOLD, by_edges[1])
@@ -161,7 +179,7 @@ def scene_camera(
             "the background moves, so the camera does not stand still; leans and places are those "
             "of one mean camera, and unsure: use a tripod"
         )
-    found = Value(pitch, pitch_stddev, FOUND if sources else USUAL)
+    found = Value(pitch, pitch_stddev, FOUND if sources else USUAL, " and ".join(sources))
     if given is not None:
         if sources and abs(given[0] - pitch) > max(_TOLD, _SURE * np.hypot(pitch_stddev, given[1])):
             remarks.append(
@@ -180,14 +198,21 @@ def scene_camera(
         gain = shown.covariance[2:, :2] @ np.linalg.inv(shown.covariance[:2, :2])
         variances = np.array([found.stddev, turned.stddev]) ** 2
         tilt = (found.mean, 1e-3), (turned.mean, 1e-3)
-        known = people_camera(people, statures_m, camera, *tilt) or shown
+        known = people_camera(people, statures_m, camera, *tilt, distance_m) or shown
         rest = known.covariance[2:, 2:] + (gain * variances) @ gain.T
         stddevs = np.sqrt(np.diag(rest))
         height = Value(float(known.values[2]), float(stddevs[0]), FOUND)
         if lens.origin == USUAL and stddevs[1] < _BETTER * camera.focal_stddev:
-            factor = Value(float(np.exp(known.values[3])), float(stddevs[1]), FOUND)
-            lens = lens_of(camera, factor)
+            by = "people who walk"
+            if distance_m is not None:
+                by = f"the given distance and {'the given' if statures_m[0] else 'a usual'} stature"
+            lens = lens_of(
+                camera, Value(float(np.exp(known.values[3])), float(stddevs[1]), FOUND, by)
+            )
         distances = known.distances
+        if given_m is not None and distance_m is None and distances[0] is not None:
+            stature_m = statures_m[0] or USUAL_STATURE_M
+            remarks += _contradiction(camera, distances[0], stature_m, given_m)
     camera_found = SceneCamera(lens, found, turned, height)
     return FoundCamera(camera_found, tuple(sources), tuple(remarks), distances)
 
@@ -287,7 +312,22 @@ def lens_of(camera: Camera, factor: Value | None = None) -> Value:
         factor = Value(1.0, camera.focal_stddev, USUAL if is_guessed else GIVEN)
     tangent = camera.width / 2 / (camera.fx * factor.mean)
     slope = 2 * tangent / (1 + tangent**2)
-    return Value(2 * float(np.arctan(tangent)), slope * factor.stddev, factor.origin)
+    return factor._replace(mean=2 * float(np.arctan(tangent)), stddev=slope * factor.stddev)
+
+
+def _contradiction(
+    camera: Camera, far: Distances, stature_m: float, distance_m: float
+) -> Iterator[str]:
+    """Yield what is said if a known lens shows the person elsewhere than a given distance."""
+    shown_m = float(far.distances[0]) * stature_m
+    stddev = np.hypot(far.stddev, DISTANCE_STDDEV)
+    if abs(np.log(shown_m / distance_m)) > _SURE * stddev:
+        fitting = lens_of(camera, Value(distance_m / shown_m, 0.0))
+        yield (
+            f"by field of view and stature the person is {shown_m:.1f} m away, and a distance of "
+            f"{distance_m:.1f} m is given, so one of the three is wrong: a field of view of "
+            f"{np.degrees(fitting.mean):.0f} degrees would agree; without --fov it is found"
+        )
 
 
 def degrees_of(value: tuple[Any, ...]) -> str:

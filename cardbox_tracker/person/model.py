@@ -36,6 +36,8 @@ PLACEMENT = {
     "hip_height_m": (-5.0, 5.0, "m", "height of the middle of the hips above the camera's centre"),
     "lateral_m": (-5.0, 5.0, "m", "torso_y in the front reference posture"),
 }
+PLACE = "distance_m", "hip_height_m"
+"""Names of what is fitted to the first images of a person whose sizes are known."""
 CAMERA_POSE = {"camera_pitch_rad": (-1.4, 1.4, "rad", "how far the camera looks down")}
 CAMERA_ROLL = "camera_roll_rad"
 """Name of the camera's roll, which a model file has only if it is not 0."""
@@ -169,8 +171,8 @@ class BodyModel:
     #: names of sizes and of ``PLACEMENT`` whose values are guesses; a tracker fits them to the
     #: first silhouette of a person
     unknown: tuple[str, ...] = ()
-    #: relative standard deviation of a stature that is only that of most people; it is no part of a
-    #: model file
+    #: relative standard deviation of a stature that is only that of most people, which a model file
+    #: has only if it is not 0
     stature_stddev: float = 0.0
     #: rise of a shoulder joint per radian of elevation of its arm, in shoulder breadths
     #: (:mod:`.skeleton`); it is no part of a model file
@@ -191,6 +193,7 @@ class BodyModel:
             )
         if self.source not in SOURCES:
             raise BodyModelError(f"source is {quoted(self.source)}; expected one of {SOURCES}")
+        check_range("stature_stddev", self.stature_stddev, 0.0, 1.0, "statures")
         for name in self.unknown:
             if name not in (*PLACEMENT, *SIZE_NAMES):
                 raise BodyModelError(

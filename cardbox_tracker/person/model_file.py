@@ -33,7 +33,9 @@ _SOURCE, _UNKNOWN = "source", "unknown"
 # A body that is measured while it is tracked live has these keys.
 _VERSION, _STAMP = "version", "stamp_ns"
 _CAMERA = CAMERA_ROLL, CAMERA_HEIGHT
-_OPTIONAL = (_APPEARANCE, _SOURCE, _UNKNOWN, _VERSION, _STAMP, *_CAMERA)
+# A body of a usual stature has this key.
+_STATURE_STDDEV = "stature_stddev"
+_OPTIONAL = (_APPEARANCE, _SOURCE, _UNKNOWN, _VERSION, _STAMP, *_CAMERA, _STATURE_STDDEV)
 _HEADERS = {
     MEASURED: "# A person measured by cardbox_tracker: what does not change while they are "
     "tracked.",
@@ -54,20 +56,23 @@ def dumps_body_model(model: BodyModel) -> str:
     if model.unknown:
         lines.append("# guesses, which are fitted to a few images of a person")
         lines.append(f"{_UNKNOWN}: [{', '.join(model.unknown)}]")
+    if model.stature_stddev:
+        deviation = yaml_number(model.stature_stddev)
+        lines.append(f"{_STATURE_STDDEV}: {deviation}  # of the stature, relative, which is usual")
     if model.version:
         lines += [f"{_VERSION}: {model.version}", f"{_STAMP}: {model.stamp_ns}"]
     for name, (_, _, _, meaning) in CONSTANTS.items():
-        lines.append(f"{name}: {_yaml_number(model.constants[name])}  # {meaning}")
+        lines.append(f"{name}: {yaml_number(model.constants[name])}  # {meaning}")
     if model.camera_pose.roll_rad:
-        roll = _yaml_number(model.camera_pose.roll_rad)
+        roll = yaml_number(model.camera_pose.roll_rad)
         lines.append(f"{CAMERA_ROLL}: {roll}  # how far the camera is turned clockwise")
     if model.camera_pose.height_m is not None:
-        height = _yaml_number(model.camera_pose.height_m)
+        height = yaml_number(model.camera_pose.height_m)
         lines.append(f"{CAMERA_HEIGHT}: {height}  # of the camera above the floor")
     lines.append(f"side_turn: {model.side_turn}  # the way the person turned in the side reference")
     lines.append("sizes:")
     for size, value in zip(SIZES, model.sizes, strict=True):
-        lines.append(f"  {size.name}: {_yaml_number(value)}  # {size.description}")
+        lines.append(f"  {size.name}: {yaml_number(value)}  # {size.description}")
     if model.appearance is not None:
         lines.append("# colours of hand, forearm, torso, head and legs, compressed")
         lines.append(f"{_APPEARANCE}: |")
@@ -75,7 +80,7 @@ def dumps_body_model(model: BodyModel) -> str:
     return "\n".join(lines) + "\n"
 
 
-def _yaml_number(value: float) -> str:
+def yaml_number(value: float) -> str:
     """Return all digits of ``value`` as a YAML 1.1 number: 1.0e-05, since 1e-05 is a text."""
     mantissa, e, exponent = repr(float(value)).partition("e")
     return f"{mantissa}.0{e}{exponent}" if e and "." not in mantissa else mantissa + e + exponent
@@ -135,7 +140,7 @@ def _from_mapping(data: object) -> BodyModel:
     return BodyModel.of(
         sizes=[_number(sizes[name], f"sizes.{name}") for name in SIZE_NAMES],  # type: ignore[arg-type]
         **{name: _number(data[name], name) for name in CONSTANTS},
-        **{name: _number(data[name], name) for name in _CAMERA if name in data},
+        **{name: _number(data[name], name) for name in (*_CAMERA, _STATURE_STDDEV) if name in data},
         side_turn=data["side_turn"],
         appearance=_appearance(data[_APPEARANCE]) if _APPEARANCE in data else None,
         source=data.get(_SOURCE, MEASURED),

@@ -26,6 +26,7 @@ from cardbox_tracker.camera.encodings import (
     decode_as_sent,
     decode_compressed,
 )
+from cardbox_tracker.camera.frames import OneFrame
 from cardbox_tracker.camera.stamps import RecordedStamps, StampOrder
 from cardbox_tracker.camera.zoom import ZoomWitness
 from cardbox_tracker.common.errors import BagError, CameraError, EncodingError, cut
@@ -43,6 +44,8 @@ IMAGE_TYPES = ("sensor_msgs/msg/Image", "sensor_msgs/msg/CompressedImage")
 CAMERA_INFO_TYPE = "sensor_msgs/msg/CameraInfo"
 # Transports of image_transport with images, the preferred one first.
 _TRANSPORTS = ("compressed", "zstd", "compressedDepth")
+# Ends of the types of other transports, whose messages are no whole images.
+_PACKETS = ("Packet", "CompressedVideo")
 # Usual image topics in a camera's namespace.
 _IMAGE_NAMES = ("image_raw", "image_raw/compressed", "image_rect", "image_rect_color", "image")
 _LEFT_OUT = MappingProxyType(
@@ -52,6 +55,8 @@ _LEFT_OUT = MappingProxyType(
         StampOrder.FOREIGN: "of another clock",
     }
 )
+# Images among which a second camera on a topic is found before a calibration is chosen.
+_TURNS = 8
 _MOST_PERIOD_NS = 2_000_000_000
 # Images before and after a change of the calibration are compared over this time.
 _AROUND_NS = 2_000_000_000
@@ -84,6 +89,7 @@ class BagReader:
         self._reader: AnyReader | None = None
         self._stamps: dict[str, RecordedStamps] = {}
         self._levels: dict[str, Levels] = {}
+        self._frames: dict[str, OneFrame] = {}
         self._skipped: dict[str, str] = {}
         self._infos: dict[str | None, tuple[Any, Calibration]] = {}
 
@@ -202,6 +208,12 @@ class BagReader:
         if len(found) != 1:
             where = f" below {folder}" if folder else ""
             advice = "" if folder or not found else "; choose one with --cameras NAMESPACE"
+            packets = [n for n, kind in self.topics.items() if kind.endswith(_PACKETS)]
+            if not found and packets and types == IMAGE_TYPES:
+                advice = (
+                    f". {', '.join(sorted(packets))} has packets of a video, which are not read: "
+                    "let 'ros2 run image_transport republish' make images of them, and record those"
+                )
             if any(name.endswith("/tracking_state") for name in self.topics):
                 advice = (
                     " camera. This seems to be a bag of results; give the recording from which it "
@@ -271,8 +283,21 @@ class BagReader:
         return len(stamps_ns) == 2 and 0 < stamps_ns[1] < _MOST_PERIOD_NS
 
     def images(self, topic: str | None = None) -> Iterator[RecordedImage]:
-        """Yield the images of ``topic``, or of the only image topic, in order."""
+        """Yield the images of ``topic``, or of the only image topic, in order, of one camera."""
         topic = topic or self.image_topic()
+        frames, held = self._frames.get(topic, OneFrame()), None
+        # The next image shows whether a camera takes turns with another.
+        for image in self._all_images(topic):
+            is_taken = frames.takes(image.frame_id)
+            if frames.others:
+                self._frames[topic] = frames
+            if held is not None and held.frame_id.lstrip("/") not in frames.others:
+                yield held
+            held = image if is_taken else None
+        if held is not None:
+            yield held
+
+    def _all_images(self, topic: str) -> Iterator[RecordedImage]:
         levels = self._levels.setdefault(topic, Levels())
         for stamp_ns, message, image in self.stamped(topic):
             try:
@@ -294,8 +319,13 @@ class BagReader:
         if camera in self._infos:
             return self._infos[camera]
         topic, fault = self.camera_info_topic(camera), None
+        # Reads on until cameras that take turns are told apart.
+        next(islice(self.images(self.image_topic(camera)), _TURNS, None), None)
+        others = self._frames.get(self.image_topic(camera), OneFrame()).others
         watch = CalibrationWatch(topic, self.image_topic(camera))
-        messages = self.messages([topic])
+        messages = (
+            one for one in self.messages([topic]) if not others or self._frame_of(one) not in others
+        )
         for number, message in enumerate(messages):
             info = self.deserialize(message)
             try:
@@ -333,6 +363,10 @@ class BagReader:
         if fault is not None:
             raise fault
         raise BagError(f"{self.path} has no message on {topic}; record it with the images")
+
+    def _frame_of(self, message: BagMessage) -> str:
+        header = getattr(self.deserialize(message), "header", None)
+        return str(getattr(header, "frame_id", "")).lstrip("/")
 
     def _is_contradicted(self, camera: str | None, other: BagMessage, old: Calibration) -> bool:
         """Return whether the images do not change as the calibration does with ``other``."""
@@ -396,6 +430,8 @@ class BagReader:
         ]
         others = sorted(n for n, kind in self.topics.items() if kind in IMAGE_TYPES and n != topic)
         others = [name for name in others if name not in used]
+        frames = sorted(self._frames[topic].others) if topic in self._frames else []
+        found += [f"the images of the frame {frame}" for frame in frames]
         return found + [f"the images on {name}" for name in others]
 
     @property
@@ -411,6 +447,7 @@ class BagReader:
             for one in self._open.connections
             if _unread_format(one)
         ]
+        found += [frames.remark(topic) for topic, frames in self._frames.items()]
         for topic, levels in self._levels.items():
             found += [f"{topic}: {levels.text}"] if levels.text else []
         for topic, stamps in self._stamps.items():
@@ -447,7 +484,9 @@ def stamp_ns_of(message: Any) -> int:
 def _decoder(image: Any, levels: Levels) -> Callable[[], NDArray[np.uint8]]:
     if hasattr(image, "encoding"):
         return partial(decode_as_sent, SentImage.of(image), levels=levels)
-    return partial(decode_compressed, image.data, levels=levels)
+    return partial(
+        decode_compressed, image.data, levels=levels, kind=str(getattr(image, "format", ""))
+    )
 
 
 def _unread_format(connection: Connection) -> str:

@@ -13,14 +13,6 @@ import numpy as np
 
 from cardbox_tracker.camera.camera import Camera
 from cardbox_tracker.camera.view import OtherCamera
-from cardbox_tracker.detectors.figure import Figure, figure_of_points
-from cardbox_tracker.detectors.identity import (
-    GONE_NS,
-    cheapest,
-    colours_in,
-    learned,
-    unlike,
-)
 from cardbox_tracker.detectors.image_points import ImagePoints
 from cardbox_tracker.detectors.person_choice import Chosen, PersonChoice
 from cardbox_tracker.measuring.first_sight import upper_body
@@ -29,7 +21,7 @@ from cardbox_tracker.measuring.scene_camera import Picture
 from cardbox_tracker.measuring.scene_watch import MOST_PICTURES, Spread
 from cardbox_tracker.measuring.seen_body import MOST_SIGHTS, SeenBody
 from cardbox_tracker.person.model import BodyModel
-from cardbox_tracker.person.sizes import FloatArray
+from cardbox_tracker.recordings.films import Person, assign
 from cardbox_tracker.recordings.recording import FrameSet, Recording, observation_of
 from cardbox_tracker.recordings.silhouettes import RecordedFrame
 from cardbox_tracker.search.config import TrackerConfig
@@ -71,7 +63,7 @@ def watch(
         shot.frames.add(partial(_whole, frame))
         shot.pictures.add(partial(_picture, taken))
         if chosen is None:
-            _assign(shot.people, frame, taken.time_s)
+            assign(shot.people, frame, taken.time_s)
             continue
         session.track(taken.observations)
         shown = session.shown()
@@ -114,7 +106,7 @@ class _Shot:
     images: int = 0
     frames: Spread[RecordedFrame] = field(default_factory=lambda: Spread(MOST_SIGHTS))
     pictures: Spread[Picture] = field(default_factory=lambda: Spread(MOST_PICTURES))
-    people: list[_Person] = field(default_factory=list)
+    people: list[Person] = field(default_factory=list)
     numbered: dict[int, list[tuple[float, ImagePoints]]] = field(
         default_factory=lambda: defaultdict(list)
     )
@@ -128,41 +120,6 @@ def _whole(frame: RecordedFrame) -> RecordedFrame | None:
 def _picture(taken: FrameSet) -> Picture:
     assert taken.picture is not None
     return taken.time_s, taken.picture()
-
-
-@dataclass
-class _Person:
-    """Somebody whom a detector sees in a recording: points so far, last figure, colours."""
-
-    figure: Figure | None = None
-    colours: FloatArray | None = None
-    seen: list[tuple[float, ImagePoints]] = field(default_factory=list)
-
-
-def _assign(people: list[_Person], frame: RecordedFrame, time_s: float) -> None:
-    """Add the points in a frame to the people who they are by place and colours, or to new ones."""
-    shown = list[tuple[ImagePoints, Figure, FloatArray | None]]()
-    for points in frame.people if frame.people is not None else (frame.points,):
-        if points is not None:
-            figure = figure_of_points(points)
-            trunk = figure.trunk(frame.silhouette.shape) & frame.silhouette
-            shown.append((points, figure, colours_in(frame.image, trunk)))
-    # Who was away for longer may be somebody else with the same clothes.
-    known = [(one, round(1e9 * (time_s - one.seen[-1][0]))) for one in people]
-    known = [(one, away_ns) for one, away_ns in known if 0 < away_ns <= GONE_NS]
-    costs = [
-        [unlike(one.figure, one.colours, figure, their, ns) for _, figure, their in shown]
-        for one, ns in known
-    ]
-    found = {column: known[row][0] for row, column in cheapest(costs).items()}
-    for column, (points, figure, colours) in enumerate(shown):
-        if column not in found:
-            people.append(_Person())
-        person = found.get(column, people[-1])
-        person.seen.append((time_s, points))
-        person.figure = figure
-        if colours is not None:
-            person.colours = learned(person.colours, colours)
 
 
 def seen_person(

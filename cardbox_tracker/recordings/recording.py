@@ -20,15 +20,16 @@ from cardbox_tracker.camera.extrinsics_files import (
     load_extrinsics,
     transforms_of,
 )
-from cardbox_tracker.camera.pairing import camera_names, side_by_side
+from cardbox_tracker.camera.pairing import MOST_CAMERAS, camera_names, side_by_side
 from cardbox_tracker.camera.stereo import StereoDepth, stereo_of_pair
 from cardbox_tracker.camera.view import OtherCamera
 from cardbox_tracker.common.errors import BagError, CameraError, CardboxError
 from cardbox_tracker.detectors.detector import Detector
 from cardbox_tracker.detectors.point_table import PointTable
 from cardbox_tracker.recordings.bag_reader import BagReader
+from cardbox_tracker.recordings.films import PlacedFilm, placed_films
 from cardbox_tracker.recordings.given_camera import GivenCamera
-from cardbox_tracker.recordings.open_images import ImageRecording, is_bag, open_images
+from cardbox_tracker.recordings.open_images import ImageRecording, is_bag, is_film, open_images
 from cardbox_tracker.recordings.other_silhouettes import (
     DepthSilhouetteSource,
     DetectorSilhouetteSource,
@@ -91,6 +92,7 @@ class Recording:
         first: the first camera, in whose frame the results are.
         others: the further cameras with their poses.
         measures_depth: True if there is depth from depth images or stereo.
+        films: the further films beside the first one, if each camera made a film of its own.
     """
 
     def __init__(
@@ -99,20 +101,22 @@ class Recording:
         sources: Sequence[SilhouetteSource],
         extrinsics: Sequence[Extrinsics] = (),
         depth: str | None = None,
+        films: Sequence[PlacedFilm] = (),
     ) -> None:
         """Combine the cameras of a :class:`RecordingRequest`, the first one first.
 
         ``extrinsics`` are of the further cameras. ``depth`` is a topic of depth images with the
         optical frame and aspect ratio of the first camera, or ``stereo`` for depth from the first
-        two. Raises BagError if there are several streams, but fewer than two images, and
-        CameraError if ``depth`` is ``stereo`` and they are no rectified pair.
+        two. ``films`` are the further ones if each source is a film. Raises BagError if there are
+        several streams, but fewer than two images, and CameraError if ``depth`` is ``stereo`` and
+        they are no rectified pair.
         """
         self.names, self.sources, self.first = tuple(names), tuple(sources), sources[0]
         self.others = [
             OtherCamera(source.camera, there)
             for source, there in zip(self.sources[1:], extrinsics, strict=True)
         ]
-        self.measures_depth = depth is not None
+        self.measures_depth, self.films = depth is not None, tuple(films)
         for source in self.sources:
             topics = {one.topic for one in self.sources} | {depth, source.depth_topic}
             source.used_beside = {topic for topic in topics if topic is not None}
@@ -142,10 +146,16 @@ class Recording:
         early_s = max(0.0, start_s - self._tolerance_ns / 1e9)
         late_s = end_s + self._tolerance_ns / 1e9
         streams = [source.frames(early_s, late_s) for source in self.sources]
+        if self.films:
+            # What the detector found was kept of whole films.
+            others = zip(self.films, self.sources[1:], strict=True)
+            streams = [self.first.frames(), *(film.frames(source) for film, source in others)]
         depths = self._depths()
         depth = next(depths, None)
         black = np.zeros((self.first.camera.height, self.first.camera.width), np.uint8)
         for frames in side_by_side(streams, lambda frame: frame.stamp_ns, self._tolerance_ns):
+            if self.films and frames[0] is None:
+                continue
             lead = next(frame for frame in frames if frame is not None)
             while depth is not None and depth[0] < lead.stamp_ns - self._tolerance_ns:
                 depth = next(depths, None)
@@ -172,6 +182,14 @@ class Recording:
         return depth_images(self.first.path, self._depth, self.first.camera)
 
 
+class FurtherFilm(NamedTuple):
+    """A film of the same people by another camera."""
+
+    path: Path  #: video, or folder of images
+    camera: GivenCamera  #: what the film itself does not say about its camera
+    offset_s: float | None = None  #: when it begins, s of the first film; None to find it
+
+
 @dataclass(frozen=True)
 class RecordingRequest:
     """A recording to read."""
@@ -184,6 +202,8 @@ class RecordingRequest:
     depth: str | None = None  #: topic of depth images, or ``stereo``; None without depth
     points: Detector | PointTable | None = None  #: source of the person's 2D points, if any
     camera: GivenCamera = GivenCamera()  #: what the recording itself does not say about its camera
+    films: tuple[FurtherFilm, ...] = ()  #: further films of the same people
+    statures_m: tuple[float, ...] = ()  #: those of the people, if known, for the poses of films
 
     @property
     def detector(self) -> Detector | None:
@@ -203,6 +223,9 @@ class RecordingRequest:
         for fault in self.faults():
             raise CardboxError(fault)
         with ExitStack() as stack:
+            if self.films:
+                yield self._of_films(stack)
+                return
             # A reader has one position, and the cameras are read in parallel.
             bags = [open_images(self.path, self.camera) for _ in names or ("",)]
             for bag in bags:
@@ -214,8 +237,33 @@ class RecordingRequest:
             ]
             yield Recording(names or ("",), sources, found, self.depth)
 
+    @property
+    def names(self) -> list[str]:
+        """Names of several films: those of their files, with a number if two are the same."""
+        stems = [path.stem for path in (self.path, *(film.path for film in self.films))]
+        return [
+            stem if stems.count(stem) == 1 else f"{stem}_{number}"
+            for number, stem in enumerate(stems, 1)
+        ]
+
+    def _of_films(self, stack: ExitStack) -> Recording:
+        """Return the open recording of several films."""
+        names = self.names
+        of_file = {} if self.extrinsics is None else load_extrinsics(self.extrinsics, names)
+        given = FurtherFilm(self.path, self.camera), *self.films
+        films = [open_images(film.path, film.camera) for film in given]
+        for film in films:
+            stack.enter_context(film)
+        sources = [_source(film, self.silhouettes, None, self.points) for film in films]
+        offsets_s = [film.offset_s for film in self.films]
+        placed = placed_films(names, sources, offsets_s, of_file, self.statures_m)
+        poses = [film.camera.extrinsics for film in placed]
+        return Recording(names, sources, poses, films=placed)
+
     def faults(self) -> Iterator[str]:
         """Yield what does not go together."""
+        if self.films:
+            yield from self._faults_of_films()
         camera, is_cut = self.camera, isinstance(self.silhouettes, Within)
         if self.depth is not None and not self.cameras:
             yield "--depth needs --cameras: the camera whose depth it is, first"
@@ -237,6 +285,26 @@ class RecordingRequest:
             )
         if (self.depth is not None or is_cut) and not is_bag(Path(self.path)):
             yield f"depth images are read from a rosbag2, which {self.path} is not"
+
+    def _faults_of_films(self) -> Iterator[str]:
+        paths = [self.path, *(film.path for film in self.films)]
+        if others := [str(path) for path in paths if path.exists() and not is_film(path)]:
+            yield (
+                f"{', '.join(others)} is no film: several recordings are videos or folders of "
+                "images, one of each camera"
+            )
+        if len(paths) > MOST_CAMERAS:
+            yield f"there are {len(paths)} films; expected at most {MOST_CAMERAS}"
+        if len({path.resolve() for path in paths}) < len(paths):
+            yield "a film is given twice: give that of each camera once"
+        if self.cameras:
+            yield "--cameras names cameras of one bag; leave it out with several films"
+        if self.camera.roll_rad:
+            yield "--camera-roll-deg is of one camera; leave it out with several films"
+        if not isinstance(self.points, Detector):
+            yield (
+                "several films are synchronized by the points of people: give --detector mediapipe"
+            )
 
 
 def _source(

@@ -149,7 +149,7 @@ class _Rows:
     def __init__(self, path: Path, names: Iterable[str], needed: Sequence[str]) -> None:
         found = set(names)
         self._path = path
-        known = [name for name in units(*[True] * 3) if name in found and name not in _TIMES]
+        known = [name for name in units(*[True] * 4) if name in found and name not in _TIMES]
         self.names = [name for name in known if name not in (*TEXT_COLUMNS, PERSON, "stamp")]
         self._texts = [name for name in known if name in TEXT_COLUMNS]
         self._are_chances = np.array([name.endswith("_chance") for name in self.names], bool)

@@ -48,6 +48,9 @@ PERSON = "person"
 PERSON_CHANCE = "person_chance"
 """Column of the probability that it is the person who had this number before, behind it."""
 
+SMOOTHED = "smoothed_hz"
+"""Column of the frequency of which smoothing over time has left half, in the results of it."""
+
 _CLAVICLES = names_of(Group.CLAVICLE)
 
 POINT_COLUMNS = tuple(f"{name}_{axis}" for name in KEYPOINT_NAMES for axis in "xyz")
@@ -67,7 +70,10 @@ _HAND = {"hand_open": "", **dict.fromkeys(("palm_x", "palm_y", "palm_z"), "")} |
 
 @cache
 def units(
-    has_points: bool = False, has_people: bool = False, has_hands: bool = False
+    has_points: bool = False,
+    has_people: bool = False,
+    has_hands: bool = False,
+    is_smoothed: bool = False,
 ) -> dict[str, str]:
     """Return the unit of each column by its name, in their order; empty for none.
 
@@ -98,6 +104,7 @@ def units(
         **(dict.fromkeys((PERSON, PERSON_CHANCE), "") if has_people else {}),
         **(_HAND_UNITS if has_hands else {}),
         **(_leg_units() if has_points else {}),
+        **({SMOOTHED: "Hz"} if is_smoothed else {}),
     }
 
 
@@ -146,7 +153,7 @@ def row_of(stamp_ns: int, time_s: float, estimate: Estimate, **has: bool) -> lis
     stamp = Decimal(stamp_ns).scaleb(-9)
     known: dict[str, Cell] = {"stamp": stamp, "state": estimate.state}
     known |= {"stamp_ns": stamp_ns, "time_s": time_s, PERSON: estimate.person}
-    known[PERSON_CHANCE] = estimate.person_chance
+    known |= {PERSON_CHANCE: estimate.person_chance, SMOOTHED: estimate.smoothed_hz}
     if estimate.posture is None or estimate.keypoints_m is None:
         return [known.get(name) for name in names]
     for columns_of, values in zip((_units, _deviation_units), estimate.joints, strict=True):

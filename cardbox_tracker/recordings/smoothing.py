@@ -25,6 +25,7 @@ from cardbox_tracker.recordings.result_table import (
     LEG_POINT_COLUMNS,
     PALM_COLUMNS,
     POINT_COLUMNS,
+    SMOOTHED,
     WRIST_COLUMNS,
     deviation_columns,
 )
@@ -141,7 +142,7 @@ def rates_of(results: Results) -> FloatArray:
     """Return the values (n, k) of ``RATE_COLUMNS``, by differences of second order at the stamps.
 
     They are nan at both ends and beside gaps. The deviations are those of independent errors in the
-    images, of which a low-pass has left its share.
+    images, of which smoothing and low-pass have left their share.
     """
     time_s, step_s = _times(results)
     found = np.full((len(time_s), len(RATE_COLUMNS)), np.nan)
@@ -153,6 +154,9 @@ def rates_of(results: Results) -> FloatArray:
     turn = np.linspace(0.0, np.pi, 500, endpoint=False)
     frequency_hz, rate_hz = turn / (2.0 * np.pi * step_s), 1.0 / step_s
     kept = amplitude(frequency_hz, results.cutoff_hz, rate_hz) if results.cutoff_hz else 1.0
+    smoothed_hz = results.of([SMOOTHED])[:, 0]
+    if np.isfinite(smoothed_hz).any():
+        kept = kept / (1.0 + (frequency_hz / np.nanmedian(smoothed_hz)) ** 4)
     weights = {
         "velocity": (-after / before / both, 1 / before - 1 / after, before / after / both),
         "acceleration": (2 / before / both, -2 / before / after, 2 / after / both),

@@ -4,14 +4,17 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import nullcontext
+from copy import copy
 from dataclasses import dataclass, field, replace
+from itertools import zip_longest
 from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 
+from cardbox_tracker.camera.extrinsics import Extrinsics
 from cardbox_tracker.common.errors import CardboxError
 from cardbox_tracker.measuring.scene import Scene
 from cardbox_tracker.person.kinematics import pose
@@ -24,6 +27,7 @@ from cardbox_tracker.search.config import TrackerConfig
 from cardbox_tracker.tracking.estimate import LOST, TRACKING, UNCERTAIN, Estimate
 from cardbox_tracker.tracking.hands import Look
 from cardbox_tracker.tracking.session import Session
+from cardbox_tracker.tracking.smoother import LAG_S, Smoother
 from cardbox_tracker.tracking.tracker import Tracker
 
 Observer = Callable[[RecordedFrame, Estimate, Tracker], None]
@@ -45,6 +49,8 @@ class TrackSummary:
     #: what the results rest on, with its numbers and where they are from.
     assumptions: tuple[str, ...] = ()
     scene: Scene | None = None  #: camera, floor and people
+    #: poses of further cameras relative to the first one, by name
+    cameras: Mapping[str, Extrinsics] = field(default_factory=dict)
     #: in how many images each optional input was used, by its name.
     used: Mapping[str, int] = field(default_factory=dict)
     quality: tuple[str, ...] = ()  #: see :meth:`Quality.lines`; empty for several people
@@ -82,6 +88,7 @@ def track_recording(
     end_s: float = math.inf,
     people: int | None = None,
     look: Look | None = None,
+    lag_s: float = LAG_S,
     only: int | None = None,
 ) -> TrackSummary:
     """Track every image from ``start_s`` to ``end_s``.
@@ -89,35 +96,52 @@ def track_recording(
     Both count in seconds from the recording's start; at ``start_s`` the person stands in the front
     reference posture. The same recording and ``seed`` give the same bytes. ``table`` is a file of
     :func:`~.result_table.result_table`. ``observers``, such as a progress bar or a bag writer, are
-    called after each image, and for each of several people. The other arguments are those of
-    :class:`~cardbox_tracker.tracking.session.Session`; with ``only``, the results are those of one
-    person without a number. Raises CardboxError if no image lies after ``start_s``, or a file
-    cannot be written.
+    called for each image, and for each of several people. ``lag_s`` is that of
+    :class:`~cardbox_tracker.tracking.smoother.Smoother`: 0 for what live tracking gives. The other
+    arguments are those of :class:`~cardbox_tracker.tracking.session.Session`; with ``only``, the
+    results are those of one person without a number. Raises CardboxError if no image lies after
+    ``start_s``, or a file cannot be written.
     """
     first, rng = recording.first, np.random.default_rng(seed)
     given = recording.others, people if only is None else 0, look
     session = Session(bodies, first.camera, config, rng, *given, only=only)
     found, cuts_s = list[Quality](), list[float]()
     has = {"has_points": first.has_points, "has_people": people is not None}
-    has["has_hands"] = look is not None
+    has |= {"has_hands": look is not None, "is_smoothed": lag_s > 0.0}
+    smoother = Smoother[tuple[RecordedFrame, list[Tracker]]](lag_s)
+    as_seen: list[Tracker] = []
     with nullcontext() if table is None else result_table(table, **has) as add_row:
+
+        def tell(
+            seen: Iterable[tuple[tuple[RecordedFrame, list[Tracker]], list[Estimate]]],
+        ) -> None:
+            for (frame, trackers), estimates in seen:
+                for estimate, tracker, quality in zip(estimates, trackers, found, strict=False):
+                    quality(frame, estimate, tracker)
+                    if add_row is not None:
+                        roll_rad = tracker.body.camera_pose.roll_rad
+                        add_row(frame, estimate.as_camera_stands(roll_rad))
+                    for observe in observers:
+                        observe(frame, estimate, tracker)
+
         frames = 0
         for taken in recording.frames(start_s, end_s):
             frames += 1
             if taken.first.is_cut:
                 cuts_s.append(taken.time_s)
+                tell(smoother.finish())
+                smoother = Smoother(lag_s)
             estimates = session.track(taken.observations)
             if only is not None:
                 estimates = [replace(one, person=None) for one in estimates]
             found += [Quality() for _ in estimates[len(found) :]]
-            for estimate, tracker, quality in zip(estimates, session.trackers, found, strict=True):
-                quality(taken.first, estimate, tracker)
-                if add_row is not None:
-                    roll_rad = tracker.body.camera_pose.roll_rad
-                    add_row(taken.first, estimate.as_camera_stands(roll_rad))
-                for observe in observers:
-                    observe(taken.first, estimate, tracker)
+            # A tracker that gets another body is not the one that saw the images before.
+            both = zip_longest(as_seen, session.trackers)
+            as_seen = [a if a is not None and a.body is b.body else copy(b) for a, b in both]
+            image, of = (taken.first, as_seen), (tracker.body for tracker in as_seen)
+            tell(smoother.add(image, taken.stamp_ns, estimates, of))
             session.check_cameras()
+        tell(smoother.finish())
         if frames == 0:
             raise CardboxError(
                 f"no image lies after --start {start_s:g} s; give seconds from its start"

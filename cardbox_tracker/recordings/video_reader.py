@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Collection, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable, Collection, Iterator
+from contextlib import contextmanager, suppress
+from fractions import Fraction
 from functools import partial
 from itertools import count
 from pathlib import Path
@@ -19,7 +20,9 @@ from cardbox_tracker.camera.film_headers import (
     MOST_DAMAGED,
     check_times,
     codecs,
+    display_matrix,
     oblong,
+    placed_by,
     shown_s,
     with_square_pixels,
 )
@@ -42,23 +45,26 @@ _LACKING = 2
 class VideoReader(Film):
     """Context of an open video; its times count from its first image.
 
-    Images are turned as the file asks for, as those of a phone that was held upright. Methods
+    Images are turned and mirrored as the file asks for, as those of a phone that was held upright,
+    and of several streams they are the one that players choose. Methods
     raise BagError if the video cannot be read. The duration is the one that the file states.
     """
 
     _damaged, _stated_s, _end = 0, 0.0, ""
+    _stream, _streams = 0, 1
 
     def __enter__(self) -> VideoReader:
         if not self.path.is_file():
             raise BagError(f"there is no video {self.path}; give a file in {FORMATS}")
-        with _opened(self.path) as capture:
+        self._stream, self._streams = _best_stream(self.path)
+        with _opened(self.path, self._stream) as (capture, next_image):
             size = (capture.get(cv2.CAP_PROP_FRAME_WIDTH), capture.get(cv2.CAP_PROP_FRAME_HEIGHT))
             try:
                 check_pixels(int(size[0]), int(size[1]), MOST_PIXELS)
             except EncodingError as error:
                 raise BagError(f"cannot read the video {self.path}: {error}") from None
             # One image after the other: the position in the file is that of the first one then.
-            tried = (_next(capture, number)[0] for number in range(MOST_DAMAGED))
+            tried = (next_image(number)[0] for number in range(MOST_DAMAGED))
             image = next((image for image in tried if image is not None), None)
             if image is None:
                 raise BagError(
@@ -80,9 +86,9 @@ class VideoReader(Film):
         """Yield images that can be decoded, with the time in the file or at the given rate."""
         first_ms, file_ns, stamp_ns = 0.0, -1, -1
         number = damaged = 0
-        with _opened(self.path) as capture:
+        with _opened(self.path, self._stream) as (capture, next_image):
             shape = oblong(capture)
-            for image, in_file_ms in _read(capture):
+            for image, in_file_ms in _read(next_image):
                 if image is None:
                     self._damaged = max(self._damaged, damaged := damaged + 1)
                     continue
@@ -103,6 +109,8 @@ class VideoReader(Film):
     def left_out(self, topic: str, used: Collection[str] = ()) -> list[str]:
         """Return which images could not be read."""
         damaged = [f"{self._damaged} that cannot be decoded"] if self._damaged else []
+        if self._streams > 1:
+            damaged.append("the video streams beside the one that players show")
         return damaged + (["the rest of the video, which is missing"] if self._end else [])
 
     @property
@@ -119,11 +127,17 @@ class VideoReader(Film):
         return found
 
 
+Next = Callable[[int], tuple[NDArray[Any] | None, float]]
+"""Returns the next image, None if it is broken, and its time in the file, ms."""
+
+
 @contextmanager
-def _opened(path: Path) -> Iterator[cv2.VideoCapture]:
+def _opened(path: Path, stream: int) -> Iterator[tuple[cv2.VideoCapture, Next]]:
     # Without this, FFmpeg writes its own messages between those of this package.
     os.environ.setdefault("OPENCV_FFMPEG_LOGLEVEL", "-8")
-    capture = cv2.VideoCapture(str(path))
+    matrix = display_matrix(path, stream)
+    # OpenCV reads only the first stream.
+    capture: Any = _Stream(path, stream, matrix) if stream else cv2.VideoCapture(str(path))
     try:
         if not capture.isOpened():
             raise BagError(
@@ -131,16 +145,81 @@ def _opened(path: Path) -> Iterator[cv2.VideoCapture]:
                 f"JPEG or PNG images, or a video ({FORMATS}) that is not empty, cut off or sound "
                 "alone; 'ffmpeg -i INPUT -c:v libx264 OUTPUT.mp4' converts others"
             )
-        capture.set(cv2.CAP_PROP_ORIENTATION_AUTO, 1)
-        yield capture
+        # OpenCV turns images, and does not mirror them.
+        is_own = stream > 0 or np.linalg.det(matrix) < 0
+        capture.set(cv2.CAP_PROP_ORIENTATION_AUTO, 0 if is_own else 1)
+        yield capture, partial(_next, capture, matrix if is_own else None)
     finally:
         capture.release()
 
 
-def _read(capture: cv2.VideoCapture) -> Iterator[tuple[NDArray[Any] | None, float]]:
+def _best_stream(path: Path) -> tuple[int, int]:
+    """Return the number of the video stream that players choose, from 0 on, and how many are."""
+    # Slow to import.
+    import av
+
+    with (
+        suppress(av.FFmpegError, OSError, ValueError),
+        av.open(str(path), metadata_errors="ignore") as film,
+    ):
+        streams, best = film.streams.video, film.streams.best("video")
+        if best is not None and len(streams) > 1:
+            return [stream.index for stream in streams].index(best.index), len(streams)
+    return 0, 1
+
+
+class _Stream:
+    """A video stream that is not the first, with the methods of ``cv2.VideoCapture``."""
+
+    def __init__(self, path: Path, number: int, matrix: NDArray[np.float64]) -> None:
+        import av
+
+        self._film = av.open(str(path), metadata_errors="ignore")
+        self._stream = self._film.streams.video[number]
+        self._images = self._film.decode(self._stream)
+        self._turned_deg = 90 if abs(matrix[0, 1]) > abs(matrix[0, 0]) else 0
+        self._time_s = 0.0
+
+    def isOpened(self) -> bool:
+        return True
+
+    def set(self, name: int, value: float) -> None:
+        pass
+
+    def get(self, name: int) -> float:
+        stream, shape = self._stream, self._stream.sample_aspect_ratio or Fraction(1)
+        rate = float(stream.average_rate or 0)
+        lasts_s = float((stream.duration or 0) * (stream.time_base or 0))
+        return {
+            cv2.CAP_PROP_FRAME_WIDTH: stream.width,
+            cv2.CAP_PROP_FRAME_HEIGHT: stream.height,
+            cv2.CAP_PROP_SAR_NUM: shape.numerator,
+            cv2.CAP_PROP_SAR_DEN: shape.denominator,
+            cv2.CAP_PROP_ORIENTATION_META: self._turned_deg,
+            cv2.CAP_PROP_FPS: rate,
+            cv2.CAP_PROP_FRAME_COUNT: stream.frames or lasts_s * rate,
+            cv2.CAP_PROP_PTS: self._time_s * rate,
+            cv2.CAP_PROP_POS_MSEC: 1e3 * self._time_s,
+        }[name]
+
+    def read(self) -> tuple[bool, NDArray[Any] | None]:
+        from av import FFmpegError
+
+        try:
+            image = next(self._images)
+        except (StopIteration, FFmpegError):
+            return False, None
+        self._time_s = float(image.time or 0.0)
+        return True, image.to_ndarray(format="bgr24")
+
+    def release(self) -> None:
+        self._film.close()
+
+
+def _read(next_image: Next) -> Iterator[tuple[NDArray[Any] | None, float]]:
     """Yield images, None if broken, and their times in the file, ms; the next are decoded ahead."""
     failed = 0
-    for image, time_ms in results_ahead(partial(_next, capture), count()):
+    for image, time_ms in results_ahead(next_image, count()):
         if image is not None:
             yield from [(None, 0.0)] * failed
             failed = 0
@@ -149,8 +228,12 @@ def _read(capture: cv2.VideoCapture) -> Iterator[tuple[NDArray[Any] | None, floa
             return
 
 
-def _next(capture: cv2.VideoCapture, _: int) -> tuple[NDArray[Any] | None, float]:
+def _next(
+    capture: cv2.VideoCapture, matrix: NDArray[np.float64] | None, _: int
+) -> tuple[NDArray[Any] | None, float]:
     found, image = capture.read()
+    if found and matrix is not None:
+        image = placed_by(matrix, image)
     return image if found else None, capture.get(cv2.CAP_PROP_POS_MSEC)
 
 

@@ -20,8 +20,8 @@ from cardbox_tracker.terms.term import Posed, TermObservation
 Cue = tuple[int, TermObservation]
 """Index of the camera, and what it observed."""
 
-# Largest change of a value in a step, rad and m.
-_MOST_CHANGE = 0.5
+# Largest change of a value in a step, rad and m, and tries for each of the few steps.
+_MOST_CHANGE, _TRIES = 0.5, 2
 
 
 class Prior(NamedTuple):
@@ -56,7 +56,7 @@ class Refiner:
         given = prior._asdict() | {"low": low, "high": high}
         rules = rules_of(N_STATE, damping=damping, largest=_MOST_CHANGE, **given)
         terms = {f"cue {i}": self._of(*cue) for i, cue in enumerate(cues)}
-        found = minimize(terms, states, rules, steps)
+        found = minimize(terms, states, rules, steps, tries=_TRIES)
         return found.values, found.information
 
     def _of(self, number: int, cue: TermObservation) -> Callable[[FloatArray], Residuals | None]:

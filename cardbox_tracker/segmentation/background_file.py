@@ -59,7 +59,8 @@ class StoredBackground(NamedTuple):
 
     def check_camera(self, calibration: Calibration, name: str) -> None:
         """Raise BackgroundFileError unless ``calibration`` is that of this background's camera."""
-        if not self.calibration.is_same(calibration):
+        known = self.calibration
+        if not (known.is_same(calibration) or known.is_resized(calibration)):
             raise BackgroundFileError(
                 f"the background in {name} was learned with another camera or calibration "
                 f"({self.calibration}) than the images have now ({calibration}); start the node "

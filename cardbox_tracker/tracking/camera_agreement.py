@@ -27,6 +27,7 @@ from cardbox_tracker.common.health import WATCHES, Verdict
 from cardbox_tracker.measuring.camera_pose import ROTATION, PoseProblem, Sighting, turned_by
 from cardbox_tracker.measuring.silhouette_tangents import PoseDirection, TopTangents, roll_of
 from cardbox_tracker.person.model import MEASURED, BodyModel
+from cardbox_tracker.person.posture import TORSO_X, TORSO_Y
 from cardbox_tracker.person.sizes import FloatArray
 from cardbox_tracker.terms.term import Frame
 
@@ -37,6 +38,8 @@ _LEAST = 8
 _STEPS = 4
 # Roll: frames between samples, samples, and the largest accepted standard deviation in degrees.
 _TOPS_EVERY, _TOPS, _SURE_DEG = 6, 70, 0.5
+# Least sine of the angle between lines of sight that show a distance.
+_LEAST_ANGLE = 0.2
 
 
 class _Compared:
@@ -58,7 +61,8 @@ class _Compared:
         )
         self.is_measured = body.source == MEASURED
         self.turned = Verdict("extrinsics" if self.is_measured else "extrinsics unmeasured")
-        self.rolled = Verdict("rolled", abs)
+        self.rolled, self.unit = Verdict("rolled", abs), Verdict("unit", abs)
+        self._distance_m = body.placement.distance_m
 
     def remarks(self, name: str) -> Iterator[str]:
         """Yield warnings about doubtful extrinsics; some are empty."""
@@ -66,12 +70,30 @@ class _Compared:
         if fault is not None:
             yield fault.remark(name=name)
             return
+        if self.unit.holds:
+            given_m = float(np.linalg.norm(self.view.offset_m))
+            shown_m = given_m / 10 ** self.unit.medians[0]
+            yield self.unit.remark(name=name, given_m=given_m, shown_m=shown_m)
+            return
         if self.turned.holds:
             shown = _shown(self.turned.value)
             yield WATCHES["extrinsics"].words.format(name=name, shown=shown)
         elif not self.is_measured:
             yield WATCHES["height"].remark(self.direction.height_deg, name=name)
         yield self.rolled.remark(name=name, shown=_shown(self.rolled.value))
+
+    def place(self, state: FloatArray, column: float) -> None:
+        """Compare how far the person is by their size and by both cameras' lines of sight.
+
+        ``column``, px, is where the further camera sees them; ``state`` (14,) is for the first one.
+        Lines that hardly meet show nothing.
+        """
+        camera, here = self.view.camera, (state[TORSO_X] - self._distance_m, state[TORSO_Y])
+        at, ahead = self.view.line_of_sight((column - camera.cx) / camera.fx)
+        turned = here[0] * ahead[1] - here[1] * ahead[0]
+        share = (at[0] * ahead[1] - at[1] * ahead[0]) / turned if turned else 0.0
+        if share > 0.0 and abs(turned) > _LEAST_ANGLE * np.hypot(*here):
+            self.unit.see(float(np.log10(share)))
 
 
 class CameraAgreement:
@@ -112,10 +134,18 @@ class CameraAgreement:
         """Whether the silhouettes show a gross error of the pose of each further camera."""
         return [one.direction.fault is not None for one in self._others]
 
-    def see(self, state: FloatArray, frames: Sequence[Frame]) -> None:
-        """Add tracked frames, as for :meth:`look`: state (14,) for the first camera."""
+    def see(
+        self, state: FloatArray, frames: Sequence[Frame], columns: Sequence[float | None] = ()
+    ) -> None:
+        """Add tracked frames, as for :meth:`look`: state (14,) for the first camera.
+
+        ``columns``, px, are the middles of what further cameras show in front of the background.
+        """
         if not _are_whole(frames):
             return
+        for one, column in zip(self._others, columns, strict=False):
+            if column is not None:
+                one.place(state, column)
         first, *others = (frame.silhouette for frame in frames)
         self._frames += 1
         if self._frames % _TOPS_EVERY or not np.any(first):

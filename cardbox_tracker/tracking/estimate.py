@@ -147,6 +147,8 @@ class Estimate:
     #: the left and the right hand, None for one that is not known; None unless hands are looked at
     hands: tuple[Hand | None, Hand | None] | None = None
     legs: Legs | None = None  #: None without a posture, and as long as no points have shown them
+    #: frequency of which smoothing over time has left half; None if it is not smoothed
+    smoothed_hz: float | None = None
 
     @property
     def vertical_state(self) -> KeypointState | None:

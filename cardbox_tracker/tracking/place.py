@@ -26,6 +26,7 @@ import numpy as np
 from cardbox_tracker.camera.camera import Camera
 from cardbox_tracker.common.health import Verdict
 from cardbox_tracker.detectors.image_points import POINT_INDEX, ImagePoints
+from cardbox_tracker.measuring.people_camera import DISTANCE_STDDEV
 from cardbox_tracker.person.kinematics import pose
 from cardbox_tracker.person.model import MEASURED, BodyModel
 from cardbox_tracker.person.posture import N_JOINTS, PITCH, TORSO_Y
@@ -39,8 +40,6 @@ DEPTH, SECOND_CAMERA = "depth", "second camera"
 SCALE_STDDEVS = {MEASURED_BODY: 0.02, STATURE: 0.05, DEPTH: 0.02, SECOND_CAMERA: 0.02}
 """Relative standard deviation of the scale, by what it rests on. A stature is known to 1 to 2 %,
 and people of one stature differ in the lengths of trunk and arms by 4 to 6 %."""
-DISTANCE_STDDEV = 0.05
-"""Relative standard deviation of a given distance, which people measure or estimate."""
 
 # Seconds over which two sources are compared, and the relative deviation of the distance of points
 # (0.89 to 1.11 of the true one in 32 recordings).

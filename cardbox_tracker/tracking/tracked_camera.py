@@ -132,6 +132,7 @@ class TrackedCamera:
         depth: check that its depth images show the view of its silhouettes.
         identity: who is followed in its images.
         given: names of the channels that had data so far.
+        column: middle of all foreground of a further camera, px; None if it touches a side.
         picture: returns the last image at its full resolution; None without one.
     """
 
@@ -152,6 +153,7 @@ class TrackedCamera:
         self._name = "the first camera" if other is None else "a further camera"
         self.identity, self.given, self._sees_other = Identity(), set[str](), False
         self.picture: Callable[[], Image] | None = None
+        self.column: float | None = None
         self.use(body, first, config)
 
     def use(self, body: BodyModel, first: Camera, config: TrackerConfig) -> None:
@@ -222,10 +224,12 @@ class TrackedCamera:
         self.picture = None if observation is None else observation.picture
         channels, camera = self._channels(observation), self._camera
         self.given |= channels.keys()
+        self.column = None
         if "silhouette" not in channels:
             nothing = np.zeros((camera.height, camera.width), np.uint8)
             channels = {"silhouette": nothing}
         elif self._region is not None:
+            self.column = None if self.view is None else _middle(channels["silhouette"])
             channels["silhouette"] = self._region.select(
                 channels["silhouette"], before, is_sure, channels.get("image")
             )
@@ -272,3 +276,11 @@ class TrackedCamera:
             data = CHANNELS[name].checked(given, f"{name} of {self._name}", self._size)
             channels[name] = data if self.view is None else CHANNELS[name].upright(self.view, data)
         return channels
+
+
+def _middle(silhouette: Silhouette) -> float | None:
+    """Return the mean column of the foreground (H, W), px; None without, or at a side."""
+    columns = np.count_nonzero(silhouette, axis=0)
+    if not columns.any() or columns[0] or columns[-1]:
+        return None
+    return float(columns @ np.arange(len(columns)) / columns.sum())

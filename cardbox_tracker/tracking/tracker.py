@@ -358,7 +358,7 @@ class Tracker:
                 self._filter.recover()
             return Estimate(LOST)
         if self.agreement is not None and fit.offset_m is not None:
-            self.agreement.see(self._before, frames)
+            self.agreement.see(self._before, frames, [one.column for one in self.cameras[1:]])
         judged = fit.judged
         clavicles_m, clavicles_stddev_m = clavicles(self.body, fit.posture, fit.posture_stddev)
         return Estimate(

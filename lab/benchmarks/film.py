@@ -86,7 +86,8 @@ RUNS: Mapping[str, tuple[int, Sequence[str]]] = {
     "two people": (2, ("--people", "2")),
 }
 """People in the film, and options of each run."""
-_GIVEN = ("--fov", "60", "--stature", "1.72", "--detector", "mediapipe")
+GIVEN = ("--fov", "60", "--stature", "1.72", "--detector", "mediapipe")
+"""Options of all runs."""
 
 
 class Clock:
@@ -168,7 +169,7 @@ def measure_films() -> dict[str, Any]:
         for name, (people, options) in RUNS.items():
             film, overlay = Path(folder, f"{people}.mp4"), str(Path(folder, "overlay.mp4"))
             images = _enlarged(Path(demo.__file__).with_name("film.mp4"), film, people)
-            given = ["track", str(film), *_GIVEN, *(overlay if o == "MP4" else o for o in options)]
+            given = ["track", str(film), *GIVEN, *(overlay if o == "MP4" else o for o in options)]
             given += ["--force", "--csv", str(Path(folder, "table.csv"))]
             spent_s, whole_s = _measured(given)
             steps = {step: 1e3 * value_s / images for step, value_s in spent_s.items()}

@@ -23,6 +23,7 @@ from cardbox_tracker.recordings.truth import GroundTruth
 from cardbox_tracker.search.config import TrackerConfig
 from cardbox_tracker.tracking.estimate import Estimate
 from cardbox_tracker.tracking.session import Session
+from cardbox_tracker.tracking.smoother import Smoother
 from cardbox_tracker.tracking.tracker import Tracker
 from lab.evaluation.recovery import Recovery, measure_recovery
 from lab.evaluation.session import RecordedSession
@@ -134,7 +135,8 @@ def track_session(
         config: settings of the tracker.
         seeds: random seeds of initialization and tracker, one run for each.
         inputs: selection of the inputs that the tracker receives.
-        observe: called with every estimate.
+        observe: called with every estimate as live tracking gives it; the runs have what recordings
+            give, smoothed over time.
         body: the person to track; if None, the first camera measures the person.
 
     Raises:
@@ -169,6 +171,7 @@ def track_session(
         found: list[dict[int, Estimate]] = [{} for _ in seeds]
         times: list[list[float]] = [[] for _ in seeds]
         inputs_ms: list[float] = []
+        smoothers = [Smoother[int]() for _ in seeds]
         for taken in _timed(source.frames(session.start_s + offset_s), inputs_ms):
             stamp_ns = taken.stamp_ns
             # A camera that does not track gives its image alone.
@@ -176,14 +179,23 @@ def track_session(
                 one if only in (None, name) else one.having(silhouette=None, points=None)
                 for name, one in zip(source.names, taken.observations, strict=True)
             ]
-            for seed, one, estimates, spent in zip(seeds, followed, found, times, strict=True):
+            for seed, one, smoother, estimates, spent in zip(
+                seeds, followed, smoothers, found, times, strict=True
+            ):
                 if one is None:
                     continue
                 start = time.thread_time()
-                (estimates[stamp_ns],) = one.track(seen)
+                (estimate,) = one.track(seen)
+                tracker = one.trackers[0]
+                for stamp, (smooth,) in smoother.add(
+                    stamp_ns, stamp_ns, [estimate], [tracker.body]
+                ):
+                    estimates[stamp] = smooth
                 spent.append(1e3 * (time.thread_time() - start))
                 if observe is not None:
-                    observe(seed, stamp_ns, estimates[stamp_ns], one.trackers[0])
+                    observe(seed, stamp_ns, estimate, tracker)
+        for smoother, estimates in zip(smoothers, found, strict=True):
+            estimates |= {stamp: smooth for stamp, (smooth,) in smoother.finish()}
     return [
         replace(
             run_of(session, tracked, failure, estimates, spent),

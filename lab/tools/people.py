@@ -34,6 +34,7 @@ from cardbox_tracker.recordings.truth import SHOULDERS
 from cardbox_tracker.search.config import default_preset
 from cardbox_tracker.tracking.estimate import TRACKING, Estimate
 from cardbox_tracker.tracking.session import Session
+from cardbox_tracker.tracking.smoother import Smoother
 from lab.evaluation.metrics import distances_m
 
 _WITHIN_M = 0.35
@@ -83,7 +84,7 @@ def _lines(
         scene: Segmentation = (
             finder if empty is None else TimeSpan(empty["start_s"], empty["end_s"])
         )
-        spent_s, found = time.process_time(), {}
+        spent_s, found = time.process_time(), dict[int, list[Estimate]]()
         with RecordingRequest(
             folder / "bag", scene, names, poses, points=finder
         ).open() as recording:
@@ -91,8 +92,12 @@ def _lines(
             session = Session(
                 bodies, recording.first.camera, default_preset(), others=others, people=count
             )
+            smoother = Smoother[int]()
             for taken in recording.frames():
-                found[taken.stamp_ns] = session.track(taken.observations)
+                estimates = session.track(taken.observations)
+                of = (tracker.body for tracker in session.trackers)
+                found |= smoother.add(taken.stamp_ns, taken.stamp_ns, estimates, of)
+            found |= smoother.finish()
         return found, 1e3 * (time.process_time() - spent_s) / len(found)
 
     (_, one_ms), (found, ms) = tracked(1), tracked(len(people))

@@ -100,6 +100,27 @@ def test_what_ros2_topic_echo_prints_is_read(tmp_path: Path) -> None:
     np.testing.assert_array_equal(found.k, K)
 
 
+def aniposelib(path: Path, count: int) -> Path:
+    one = (
+        'name = "left"\nsize = [320, 240]\n'
+        f"matrix = {K.tolist()}\ndistortions = {[*LENS, 0.0]}\n"
+        "rotation = [0.0, 0.0, 0.0]\ntranslation = [0.0, 0.0, 0.0]\n"
+    )
+    text = "".join(f"[cam_{number}]\n{one}" for number in range(count))
+    path.write_text(f"{text}[metadata]\nerror = 0.2\n")
+    return path
+
+
+def test_toml_of_aniposelib_with_one_camera_is_read(tmp_path: Path) -> None:
+    found = load_calibration(aniposelib(tmp_path / "one.toml", 1))
+    assert (found.width, found.height, found.distortion_model) == (320, 240, "plumb_bob")
+    np.testing.assert_array_equal(found.k, K)
+    np.testing.assert_array_equal(found.distortion[:4], LENS)
+    for count, names in ((2, "cam_0, cam_1"), (0, "none")):
+        with pytest.raises(CameraError, match=f"cameras {names}; expected one.*--extrinsics"):
+            load_calibration(aniposelib(tmp_path / "other.toml", count))
+
+
 @pytest.mark.parametrize(
     "text",
     ["<opencv_storage>", "<!DOCTYPE a [<!ENTITY b 'c'>]><a>&b;</a>", "%YAML:1.0\n---\na: [1\n"],
@@ -107,5 +128,5 @@ def test_what_ros2_topic_echo_prints_is_read(tmp_path: Path) -> None:
 def test_a_damaged_file_is_refused_with_the_formats(tmp_path: Path, text: str) -> None:
     path = tmp_path / "camera.xml"
     path.write_text(text)
-    with pytest.raises(CameraError, match=r"FileStorage or Kalibr"):
+    with pytest.raises(CameraError, match=r"FileStorage, Kalibr or aniposelib"):
         load_calibration(path)

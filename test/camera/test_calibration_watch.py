@@ -91,6 +91,18 @@ def test_a_change_that_lasts_is_followed_once(watch: CalibrationWatch) -> None:
     assert watch.remark == ""
 
 
+@pytest.mark.parametrize("centre", [(319.5, 239.5), (319.0, 239.0)])
+def test_another_size_of_the_same_lens_is_followed_at_once(
+    watch: CalibrationWatch, centre: tuple[float, float]
+) -> None:
+    before = watch.current
+    k = [660.0, 0, centre[0], 0, 660.0, centre[1], 0, 0, 1]
+    assert watch.see(info(width=640, height=480, k=k)) and watch.remark == ""
+    assert watch.current is not None and watch.current.width == 640
+    assert before is not None and before.is_resized(watch.current)
+    assert not before.is_resized(before)
+
+
 @pytest.mark.parametrize("wrong", WRONG.values(), ids=WRONG)
 def test_an_invalid_message_never_replaces_a_good_one(watch: CalibrationWatch, wrong: Any) -> None:
     for _ in range(2 * LASTING):

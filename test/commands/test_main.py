@@ -188,7 +188,9 @@ def test_the_course_of_the_readme(
     assert done.out.startswith(f"tracked {rows} of {rows} images\n")
     assert "assumed: field of view " in done.out
     assert f"distance 2.00 m (from {model.name}), sizes from {model.name}\n" in done.out
-    assert re.search(r"(?m)^sure: \d+% of \d+ images, \d+% of the hands in them, ", done.out)
+    assert re.search(
+        r"(?m)^sure: the posture in \d+% of \d+ images \(hands \d+%\), leans in ", done.out
+    )
     assert "mean cost" not in done.out
     written = table, table.with_suffix(".body.yaml"), table.with_suffix(".scene.yaml"), bag
     assert "\n".join(f"wrote {path}" for path in written) in done.out

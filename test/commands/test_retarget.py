@@ -46,16 +46,16 @@ def test_the_robot_follows_and_stands_still(
     table, bag = tmp_path / "arm.csv", tmp_path / "with_arm"
     done = cardbox(
         *("retarget", results, "--robot", ROBOT, "--map", MAP, "--max-speed", "0.5"),
-        *("--soft-start-s", "0"),
+        *("--soft-start-s", "0", "--max-acceleration", "20", "--max-jerk", "400"),
         *("--csv", table, "--bag", bag),
     )
     assert done.code == 0, done.err
-    assert "moving: 4 of 5 images" in done.out
-    assert "frozen: lost: 1 of 5 images" in done.out
+    assert "following: 4 of 5 images" in done.out
+    assert "holding: lost: 1 of 5 images" in done.out
     with table.open(encoding="utf-8") as file:
         rows = list(csv.DictReader(file))
     assert [row["status"] for row in rows[:26]] == (
-        ["moving"] * 10 + ["frozen: lost"] * 5 + ["moving"] * 11
+        ["following"] * 10 + ["holding: lost"] * 5 + ["following"] * 11
     )
     assert np.diff([int(row["stamp_ns"]) for row in rows]).tolist() == [20_000_000] * 25
     # 0.5 rad/s from the second image on, which comes after 0.1 s; it arrives later.
@@ -79,7 +79,9 @@ def test_a_table_is_read_and_its_joints_are_streamed(
     results: Path, tmp_path: Path, cardbox: Callable, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     sent: list[dict] = []
-    sender = SimpleNamespace(send=lambda one: sent.append(json.loads(one)), close=lambda: None)
+    sender = SimpleNamespace(
+        send=lambda one: sent.append(json.loads(one)), close=lambda: None, remarks=()
+    )
     monkeypatch.setattr(
         "cardbox_tracker.applications.teleoperation.sending.ZmqSender", lambda _: sender
     )

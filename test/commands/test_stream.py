@@ -76,6 +76,18 @@ def test_a_bag_gives_the_same(table: Path, tmp_path: Path, cardbox: Callable) ->
     assert places[0] == pytest.approx(places[1], abs=1e-4) and len(places[0]) == 21
 
 
+def test_a_file_is_written_at_once(table: Path, tmp_path: Path, cardbox: Callable) -> None:
+    words = ("stream", table, "--to", "npz", "--rate", "20", "--output", tmp_path / "a.npz")
+    done = cardbox(*words)
+    assert done.code == 0, done.err
+    assert np.load(tmp_path / "a.npz")["pose_body"].shape == (9, 63)
+    cardbox(*words).assert_refused("stream", "exists; choose another name")
+    cardbox(*words[:4]).assert_refused("stream", "--to npz needs --output")
+    cardbox(*words, "--fast").assert_refused("stream", "neither --address nor --fast")
+    json_words = (*words[:3], "json", "--output", tmp_path / "b")
+    cardbox(*json_words).assert_refused("stream", "the others need none")
+
+
 def test_without_the_person_it_is_told(table: Path, cardbox: Callable) -> None:
     table.with_name("person.body.yaml").unlink()
     done = cardbox("stream", table, "--to", "sonic", "--fast")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import json
+import math
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -12,13 +13,17 @@ import cv2
 import numpy as np
 import pytest
 
+from cardbox_tracker.camera.camera import Camera
+from cardbox_tracker.commands import scene as scene_module
 from cardbox_tracker.detectors import detector as detector_module
 from cardbox_tracker.detectors.model_files import ModelFiles
 from cardbox_tracker.measuring.people_camera import Distances
 from cardbox_tracker.measuring.scene import SceneCamera, Value
 from cardbox_tracker.measuring.scene_camera import FoundCamera
+from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.model_file import load_body_model
 from cardbox_tracker.recordings.bag_reader import BagReader
+from cardbox_tracker.recordings.measured_scene import Watched
 from cardbox_tracker.recordings.silhouettes import SilhouetteSource, TimeSpan
 from cardbox_tracker.recordings.truth import beside_shoulders
 
@@ -332,3 +337,39 @@ def test_the_cameras_pitch_is_found_from_the_recording(
     cardbox("track", film, *words, "--camera-pitch-deg", 30, "--force")
     pitch_rad = load_body_model("me.body.yaml").camera_pose.pitch_rad
     assert pitch_rad == pytest.approx(np.radians(30))
+
+
+@pytest.mark.usefixtures("quick_sight")
+def test_a_film_with_its_own_scene_has_the_same_bytes(
+    film: Path, cardbox: Callable[..., Any], tmp_path: Path
+) -> None:
+    common = ("track", film, "--background=0:3.9", "--start=16", "--end=17.5")
+    a, b = tmp_path / "a.csv", tmp_path / "b.csv"
+    done = cardbox(*common, "--fov=60", "--stature=1.72", f"--csv={a}")
+    assert done.code == 0, done.err
+    done = cardbox(*common, f"--scene={tmp_path / 'a.scene.yaml'}", f"--csv={b}")
+    assert done.code == 0, done.err
+    assert a.read_bytes() == b.read_bytes()
+    assert (tmp_path / "a.scene.yaml").read_text() == (tmp_path / "b.scene.yaml").read_text()
+
+
+@pytest.mark.parametrize(
+    ("pitch_deg", "height_m", "is_told"), [(3.0, 1.5, False), (17.0, 1.5, True), (3.0, 2.2, True)]
+)
+def test_people_who_contradict_a_scene_are_told(
+    monkeypatch: pytest.MonkeyPatch, pitch_deg: float, height_m: float, is_told: bool
+) -> None:
+    def camera(deg: float, metres: float) -> SceneCamera:
+        pitch = Value(math.radians(deg), math.radians(2.0))
+        return SceneCamera(Value(1.0, 0.01), pitch, Value(0.0, 0.01), Value(metres, 0.1))
+
+    found = FoundCamera(camera(pitch_deg, height_m))
+    monkeypatch.setattr(scene_module, "scene_camera", lambda *_: found)
+    watched = Watched((), (), [[]])
+    given = camera(2.0, 1.6)
+    told = scene_module._contradiction(
+        watched, [BodyModel()], given, Camera(64, 48, 60.0, 60.0, 31.5, 23.5)
+    )
+    assert bool(told) is is_told
+    if is_told:
+        assert "2 degrees down" in told and f"{height_m:.2f} m" in told and "leave --scene" in told

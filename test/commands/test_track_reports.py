@@ -11,10 +11,15 @@ from pathlib import Path
 from urllib.parse import unquote
 
 import cv2
+import numpy as np
 import pytest
 
 from cardbox_tracker.applications.demo.film import DemoFilm
+from cardbox_tracker.applications.reporting.page import angles_of
 from cardbox_tracker.detectors.detector import Detector
+from cardbox_tracker.person.skeleton import JOINT_NAMES
+from cardbox_tracker.recordings.result_reader import Results
+from cardbox_tracker.recordings.result_table import deviation_columns
 
 VOID = {"meta", "img", "br"}
 
@@ -45,6 +50,21 @@ def film(monkeypatch: pytest.MonkeyPatch) -> Path:
     demo = DemoFilm.load()
     monkeypatch.setattr(Detector, "installed", lambda: demo.detector)
     return demo.path
+
+
+def test_a_bent_arm_has_its_angles_and_deviations() -> None:
+    posture, stddev = np.zeros((2, 12)), np.zeros((2, 12))
+    flexion = JOINT_NAMES.index("left_elbow_flexion")
+    posture[:, flexion], stddev[:, flexion], posture[1] = np.pi / 2, 0.1, np.nan
+    values = np.hstack([posture, stddev])
+    numbers = dict(zip((*JOINT_NAMES, *deviation_columns(JOINT_NAMES)), values.T, strict=True))
+    times = np.arange(2), np.arange(2.0), ("tracking", "lost")
+    results = Results(Path("a.csv"), *times, numbers, {}, (None, None))
+    angle, deviation = angles_of(results)["left_elbow_bend_deg"]
+    np.testing.assert_allclose(angle, [90.0, np.nan], atol=1e-6)
+    np.testing.assert_allclose(deviation, [np.degrees(0.1), np.nan])
+    _, of_arm = angles_of(results)["left_arm_elevation_deg"]
+    np.testing.assert_allclose(of_arm, [0.0, np.nan], atol=1e-6)
 
 
 def test_one_command_writes_exports_plot_and_page(

@@ -54,6 +54,24 @@ def test_few_items_are_taken_ahead_and_the_thread_ends_with_the_iterator() -> No
     assert threading.active_count() == before
 
 
+def test_an_interrupt_does_not_wait_for_a_call_that_hangs() -> None:
+    go_on, ended = threading.Event(), threading.Event()
+
+    def call(_: int) -> None:
+        if not go_on.is_set():
+            go_on.wait(20.0)
+            ended.set()
+
+    def items() -> Iterator[int]:
+        yield 0
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        next(results_ahead(call, items()))
+    assert not ended.is_set()
+    go_on.set()
+
+
 def test_nothing_is_done_after_an_error() -> None:
     begun = list[int]()
 

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from cardbox_tracker.applications.exporting.formats import formats, read_result
+from cardbox_tracker.applications.exporting.motion import Motion
 from cardbox_tracker.commands.main import main
 from cardbox_tracker.commands.tracking_request import points_named
 from cardbox_tracker.common.errors import CardboxError
@@ -50,14 +51,20 @@ def add(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Callable[..
     sys.modules.pop("beside", None)
 
 
+def table_in(folder: Path) -> Path:
+    """Return a table of one image."""
+    table, grey = folder / "person.csv", np.zeros((2, 2), np.uint8)
+    seen = Estimate("tracking", np.zeros(12), np.ones(12), np.ones((6, 3)), 10, 0.9)
+    with result_table(table, has_points=False) as add_row:
+        add_row(RecordedFrame(0, 0.0, grey, grey), seen)
+    return table
+
+
 def test_a_format_is_written_by_its_name_and_by_its_ending(
     add: Callable[..., None], tmp_path: Path
 ) -> None:
     add("counts", "exporters", "counted = beside:counted")
-    table, grey = tmp_path / "person.csv", np.zeros((2, 2), np.uint8)
-    seen = Estimate("tracking", np.zeros(12), np.ones(12), np.ones((6, 3)), 10, 0.9)
-    with result_table(table, has_points=False) as add_row:
-        add_row(RecordedFrame(0, 0.0, grey, grey), seen)
+    table = table_in(tmp_path)
     output = tmp_path / "out.counted"
     assert main(["export", str(table), "--to", "counted", "--output", str(output)]) == 0
     assert output.read_text() == "1 images\n"
@@ -89,8 +96,32 @@ def test_a_broken_format_names_its_distribution(
     add: Callable[..., None], point: str, expected: str
 ) -> None:
     add("counts", "exporters", point)
+    # The others go on.
+    assert formats()["trc"].check() is None
     with pytest.raises(CardboxError, match=expected):
-        formats()
+        formats()["broken"].check()
+
+
+@pytest.mark.parametrize(
+    ("code", "expected"),
+    [
+        ("path.write_text('half'); raise OSError('no ink')", "fails, .*OSError: no ink"),
+        ("path.write_text('half'); raise SystemExit(3)", "fails, .*SystemExit: 3"),
+        ("(path.parent.parent / 'elsewhere').touch()", "not written the file"),
+    ],
+)
+def test_a_format_that_fails_leaves_the_old_file(
+    add: Callable[..., None], tmp_path: Path, code: str, expected: str
+) -> None:
+    (tmp_path / "beside.py").write_text(MODULE.replace("path.write_text", f"{code}; (lambda _: 0)"))
+    add("counts", "exporters", "counted = beside:counted")
+    (tmp_path / "results").mkdir()
+    path = tmp_path / "results" / "me.counted"
+    path.write_text("old")
+    with pytest.raises(CardboxError, match=f"counted of counts .*{expected}"):
+        formats()["counted"].write(path, Motion.of(read_result(table_in(tmp_path))), None)
+    assert path.read_text() == "old"
+    assert list(path.parent.iterdir()) == [path]
 
 
 def test_a_name_that_two_have_is_told(add: Callable[..., None]) -> None:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from itertools import repeat
 from typing import Any
 
 import numpy as np
@@ -68,7 +69,7 @@ def test_a_mask_is_the_silhouette() -> None:
     [
         (7, r"Scripted.detect returns 7; expected a list of people"),
         ([{}, {"left_hand": (1, 2, 1)}], "person 1: 'left_hand' is no point; those are nose"),
-        ([{"nose": (1, 2, 3)}], "person 0: nose has the score 3; expected a chance from 0 to 1"),
+        ([{"nose": (1, 2, 87)}], "person 0: nose has the score 87; expected a chance from 0 to 1"),
         ([{"nose": (1, 2)}], "person 0: .*expected column, row and score"),
         ([{"nose": (float("nan"), 2, 1)}], r"nose is at \(nan, 2.0\) px; expected a place"),
         ([dict.fromkeys(LANDMARKS[:4], (0.2, 0.4, 1))], "shares of the image"),
@@ -79,6 +80,38 @@ def test_a_mask_is_the_silhouette() -> None:
 def test_what_are_no_people_is_told(people: Any, expected: str) -> None:
     with pytest.raises(CardboxError, match=expected):
         detector(people).start()(IMAGE, 0)
+
+
+def raising(error: BaseException) -> Iterator[Any]:
+    """Yield a person, and raise an error after it."""
+    yield person(40)
+    raise error
+
+
+@pytest.mark.parametrize(
+    ("people", "expected"),
+    [
+        (raising(SystemExit(3)), "Scripted.detect fails: SystemExit: 3"),
+        (raising(OSError("no model")), "Scripted.detect fails: OSError: no model"),
+        ([{"nose": (10**400, 2, 1)}], "Scripted.detect, person 0: .*too large"),
+        ([person(40)] * 5000, "Scripted.detect returns more than 200 people"),
+        (repeat(person(40)), "Scripted.detect returns more than 200 people"),
+    ],
+)
+def test_a_detector_that_fails_is_named(people: Any, expected: str) -> None:
+    with pytest.raises(CardboxError, match=expected):
+        detector(people).start()(IMAGE, 0)
+
+
+def test_a_detector_that_stops_is_named() -> None:
+    """StopIteration would end the images without a word."""
+
+    class Stops(Scripted):
+        def detect(self, image: np.ndarray) -> Sequence[Mapping[str, Any]]:
+            raise StopIteration
+
+    with pytest.raises(CardboxError, match=r"Stops.detect fails: StopIteration"):
+        Detector(OwnModel.of(Stops(), "it")).start()(IMAGE, 0)
 
 
 def test_one_person_is_followed_whatever_the_order() -> None:

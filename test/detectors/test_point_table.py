@@ -321,16 +321,19 @@ def test_openpose_files_name_points_by_their_number(tmp_path: Path, count: int) 
     points = read(PointTable(tmp_path / "points")).at(Image(0, 12), NONE)
     assert points is not None
     for name, index in POINT_INDEX.items():
-        number = {133: {"left_index": 96, "right_little_finger": 129}}.get(count, {}).get(name)
+        number = {
+            133: {"left_index": 96, "right_little_finger": 129},
+            136: {"left_index": 99, "right_little_finger": 132},
+        }.get(count, {}).get(name)
         if name in COCO_NAMES[:13]:
             number = LAYOUTS[count].index(name)
         if number:
             assert points.px[index] == pytest.approx((number + 1.0, 2.0 * number)), name
     # OpenPose numbers the right arm first.
-    expected = {17: 9, 18: 7, 25: 7, 26: 9, 133: 9}[count]
+    expected = {17: 9, 18: 7, 25: 7, 26: 9, 133: 9, 136: 9}[count]
     assert points.px[POINT_INDEX["left_wrist"], 0] == pytest.approx(expected + 1.0)
     is_hip = points.px[POINT_INDEX["right_hip"], 0] - 1.0
-    assert is_hip == {17: 12, 18: 8, 25: 9, 26: 12, 133: 12}[count]
+    assert is_hip == {17: 12, 18: 8, 25: 9, 26: 12, 133: 12, 136: 12}[count]
 
 
 def test_25_points_with_the_face_first_are_body_25b(tmp_path: Path) -> None:
@@ -383,6 +386,111 @@ def test_annotations_of_coco_join_by_the_name_of_the_file(tmp_path: Path) -> Non
     assert "'img_0004.png', that of the images 'other.png'" in found.fault
 
 
+@pytest.mark.parametrize("style", ["left_elbow", "LElbow", "elbow-l", "Left Elbow"])
+def test_the_order_that_a_file_declares_counts(tmp_path: Path, style: str) -> None:
+    def named(name: str) -> str:
+        side, _, part = name.rpartition("_")
+        if not side or style == "left_elbow":
+            return name
+        return {
+            "LElbow": f"{side[0].upper()}{part.title()}",
+            "elbow-l": f"{part}-{side[0]}",
+            "Left Elbow": f"{side} {part}".title(),
+        }[style]
+
+    rng = np.random.default_rng(3)
+    order = [*rng.permutation(COCO_NAMES), "tail"]
+    rows = {name: [100.0 + 9 * i, 200.0, 2] for i, name in enumerate(COCO_NAMES)}
+    rows["tail"] = [5.0, 5.0, 2]
+    content = annotations(2)
+    content["categories"] = [
+        {"id": 1, "keypoints": [*map(named, order)]},
+        {"id": 2, "keypoints": ["nose", "tail"]},
+        {"id": 3, "name": "chair"},
+    ]
+    content["annotations"] = [
+        {
+            "image_id": 77,
+            "category_id": kind,
+            "keypoints": [v for name in names for v in rows[name]],
+        }
+        for kind, names in ((1, order), (2, ("nose", "tail")), (3, ()))
+    ]
+    (tmp_path / "points.json").write_text(json.dumps(content))
+    (points,) = read(PointTable(tmp_path / "points.json")).all_in(Image(0, 0, "img_0004.png"))
+    assert points.px[:13, 0].tolist() == [100.0 + 9 * i for i in range(13)]
+    assert points.legs is not None and points.legs.px[0, 0] == 100.0 + 9 * 13
+
+
+@pytest.mark.parametrize("first", [0, 1])
+@pytest.mark.parametrize("is_named", [False, True])
+def test_mmpose_numbers_the_images_of_a_film(tmp_path: Path, first: int, is_named: bool) -> None:
+    flat = person(320)
+    order = [*range(17)][::-1] if is_named else range(17)
+    one = {
+        "keypoints": [flat[3 * i : 3 * i + 2] for i in order],
+        "keypoint_scores": [flat[3 * i + 2] for i in order],
+    }
+    frames = [{"frame_id": first, "instances": []}, {"frame_id": first + 1, "instances": [one]}]
+    names = {str(n): COCO_NAMES[i] for n, i in enumerate(order)}
+    meta = {"meta_info": {"keypoint_id2name": names}, "instance_info": frames}
+    (tmp_path / "points.json").write_text(json.dumps(meta if is_named else frames))
+    found = read(PointTable(tmp_path / "points.json"))
+    assert found.all_in(Image(0, 0)) == []
+    (points,) = found.all_in(Image(0, 1))
+    np.testing.assert_allclose(points.px[:13], np.reshape(flat, (-1, 3))[:13, :2])
+
+
+def test_mmpose_writes_a_file_for_each_image_of_a_folder(tmp_path: Path) -> None:
+    rows = np.reshape(person(320), (-1, 3))
+    one = {"keypoints": rows[:, :2].tolist(), "keypoint_scores": rows[:, 2].tolist()}
+    (tmp_path / "img_0.json").write_text("[]")
+    (tmp_path / "img_1.json").write_text(json.dumps([one]))
+    (points,) = read(PointTable(tmp_path)).all_in(Image(0, 1))
+    np.testing.assert_allclose(points.px[:13], rows[:13, :2])
+
+
+@pytest.mark.parametrize("score", [1.407, 5.5, 10.0])
+@pytest.mark.parametrize("is_table", [False, True])
+def test_a_score_above_1_counts_as_1_and_is_told(
+    tmp_path: Path, score: float, is_table: bool
+) -> None:
+    if is_table:
+        found = read(table(tmp_path, f"5,nose,1,2,{score}", "5,left_eye,1,2,0.5"))
+    else:
+        flat = person(320)
+        flat[2], flat[5], flat[8] = score, 0.5, -0.1
+        openpose(tmp_path / "points", 5, flat)
+        found = read(PointTable(tmp_path / "points"))
+    (points,) = found.all_in(Image(5, 5))
+    assert points.scores[:3].tolist() == [1.0, 0.5, 0.0]
+    assert f"reach {score:g}; those above 1 count as 1" in found.remark
+
+
+@pytest.mark.parametrize("nobody", [{}, None, [], {"pose_keypoints_2d": []}])
+def test_people_without_points_are_nobody(tmp_path: Path, nobody: object) -> None:
+    openpose(tmp_path / "points", 0, person(320))
+    (tmp_path / "points" / "film2_000000000001.json").write_text(json.dumps({"people": [nobody]}))
+    (tmp_path / "points" / "film2_000000000002.json").write_text(json.dumps({"people": None}))
+    (tmp_path / "points" / "film2_000000000003.json").write_text("{}")
+    found = read(PointTable(tmp_path / "points"))
+    assert [len(found.all_in(Image(0, i))) for i in range(4)] == [1, 0, 0, 0]
+    entries = [{"image_id": 0, "keypoints": person(320)}, {"image_id": 1, "keypoints": None}]
+    (tmp_path / "points.json").write_text(json.dumps(entries))
+    found = read(PointTable(tmp_path / "points.json"))
+    assert [len(found.all_in(Image(0, i))) for i in range(2)] == [1, 0]
+
+
+def test_the_number_of_an_image_is_the_one_that_changes(tmp_path: Path) -> None:
+    for number in range(3):
+        content = {"people": [{"pose_keypoints_2d": person(100.0 * (number + 1))}]}
+        (tmp_path / f"{number:06d}_04.json").write_text(json.dumps(content))
+    found = read(PointTable(tmp_path))
+    for number in range(3):
+        (points,) = found.all_in(Image(0, number))
+        assert points.px[0, 0] == pytest.approx(100.0 * (number + 1), abs=20)
+
+
 def test_each_camera_has_its_folder_or_file(tmp_path: Path) -> None:
     openpose(tmp_path / "cam0", 0, person(100))
     (tmp_path / "cam1.json").write_text(json.dumps([{"image_id": 0, "keypoints": person(500)}]))
@@ -398,9 +506,14 @@ def test_each_camera_has_its_folder_or_file(tmp_path: Path) -> None:
         ("{", "expected JSON"),
         ("[" * 100_000, "expected JSON"),
         ("{}", "has no 'annotations'"),
-        ('[{"image_id": 1}]', "entry 0 has no keypoints; expected a file of OpenPose or COCO"),
+        ('[{"image_id": 1}]', "has no point of anybody"),
+        ('{"annotations": [], "categories": [{"id": 1, "keypoints": ["a", "b"]}]}', "'a, b'; exp"),
+        ('[{"frame_id": "a", "instances": []}]', "no frame_id"),
         ("[5]", "entry 0 has no image_id"),
-        ('[{"image_id": 1, "keypoints": [1, 2]}]', "entry 0, has 2 numbers; .* 17, 18, 25, 26 or"),
+        (
+            '[{"image_id": 1, "keypoints": [1, 2]}]',
+            "entry 0, has 2 numbers; .* 17, 18, 25, 26, 133 or",
+        ),
         ('[{"image_id": 1, "keypoints": 5}]', "entry 0, has no numbers"),
         ('[{"image_id": 1, "keypoints": KEYPOINTS}]', "entry 0, has a value that is no number"),
         ('[{"image_id": 1, "keypoints": FAR}]', "entry 0: nose is at .* px; expected a place"),
@@ -425,7 +538,7 @@ def test_json_that_has_no_points_is_refused(tmp_path: Path, content: str, words:
 def test_a_folder_without_files_of_openpose_is_refused(tmp_path: Path) -> None:
     with pytest.raises(CardboxError, match="has no JSON files; expected those of OpenPose"):
         PointTable(tmp_path).read(None)
-    (tmp_path / "points.json").write_text("{}")
+    (tmp_path / "points.json").write_text('{"version": 1}')
     with pytest.raises(CardboxError, match="has no number; expected that of the image"):
         PointTable(tmp_path).read(None)
     (tmp_path / "points.json").rename(tmp_path / "points_1.json")

@@ -17,7 +17,7 @@ from cardbox_tracker.detectors.image_points import (
     LegPoints,
 )
 from cardbox_tracker.measuring.people_camera import FORWARD, LEVELS, people_camera
-from cardbox_tracker.measuring.scene_camera import FoundCamera, scene_camera
+from cardbox_tracker.measuring.scene_camera import FoundCamera, lens_of, scene_camera
 from cardbox_tracker.person.proportions import MARKED_HEIGHTS
 
 CAMERA = Camera(640, 480, 500.0, 500.0, 319.5, 239.5)
@@ -217,3 +217,27 @@ def test_a_camera_that_moves_is_told() -> None:
         pictures = [(10.0 * k, np.roll(room, shift_px * k, axis=1)) for k in range(4)]
         shown = scene_camera(people, pictures, CAMERA, [STATURE_M])
         assert any("camera does not stand still" in one for one in shown.remarks) is moves
+
+
+@pytest.mark.parametrize("places", [STAND, WALK], ids=["stands", "walks"])
+def test_a_given_distance_shows_an_unknown_lens_alone(
+    places: Sequence[tuple[float, float]],
+) -> None:
+    guessed = Camera(640, 480, 250.0, 250.0, 319.5, 239.5, focal_stddev=0.2)
+    given = [film(places, 12.0)], [(0.0, BLANK)]
+    shown = scene_camera(*given, guessed, [STATURE_M], distance_m=places[0][0])
+    lens = shown.camera.fov_rad
+    assert lens.mean == pytest.approx(lens_of(CAMERA).mean, rel=0.05)
+    assert abs(lens.mean - lens_of(CAMERA).mean) < 2 * lens.stddev < np.radians(15.0)
+    assert (lens.origin, lens.by) == ("found", "the given distance and the given stature")
+    assert not [remark for remark in shown.remarks if "field of view" in remark]
+
+
+def test_a_lens_that_is_known_stays_and_a_distance_that_contradicts_it_is_told() -> None:
+    given = [film(STAND, 12.0)], [(0.0, BLANK)], CAMERA, [STATURE_M]
+    for distance_m, told in ((3.0, []), (6.0, ["3.0 m away", "6.0 m is given"])):
+        shown = scene_camera(*given, distance_m=distance_m)
+        assert shown.camera.fov_rad == lens_of(CAMERA)
+        remarks = [remark for remark in shown.remarks if "field of view" in remark]
+        assert len(remarks) == bool(told)
+        assert all(words in remarks[0] for words in told)

@@ -39,6 +39,75 @@ def with_times(path: Path, shown: float) -> Path:
     return path
 
 
+def corners(image: np.ndarray) -> list[int]:
+    """Return which quarters of an image are the brightest, from the top left row by row."""
+    rows, columns = (np.array_split(np.arange(side), 2) for side in image.shape[:2])
+    means = [image[np.ix_(row, column)].mean() for row in rows for column in columns]
+    return np.argsort(means).tolist()
+
+
+@pytest.mark.parametrize("box", ["tkhd", "mvhd"])
+@pytest.mark.parametrize(
+    ("matrix", "order"),
+    [
+        ((1, 0, 0, 1), [0, 1, 2, 3]),
+        ((-1, 0, 0, 1), [1, 0, 3, 2]),
+        ((1, 0, 0, -1), [2, 3, 0, 1]),
+        ((-1, 0, 0, -1), [3, 2, 1, 0]),
+        ((0, 1, -1, 0), [1, 3, 0, 2]),
+        ((0, -1, 1, 0), [2, 0, 3, 1]),
+        ((0, 1, 1, 0), [0, 2, 1, 3]),
+        ((0, -1, -1, 0), [3, 1, 2, 0]),
+    ],
+)
+def test_images_are_turned_and_mirrored_as_players_do(
+    tmp_path: Path, box: str, matrix: tuple[int, ...], order: list[int]
+) -> None:
+    path = tmp_path / "a.mp4"
+    writer = cv2.VideoWriter(str(path), cv2.VideoWriter.fourcc(*"mp4v"), 15.0, (64, 48))
+    quarters = np.kron([[50, 90], [130, 170]], np.ones((24, 32))).astype(np.uint8)
+    for _ in range(3):
+        writer.write(np.dstack([quarters] * 3))
+    writer.release()
+    data = bytearray(path.read_bytes())
+    at = data.index(box.encode()) + 4 + (40 if box == "tkhd" else 36)
+    struct.pack_into(">2i4x2i", data, at, *(65536 * one for one in matrix))
+    path.write_bytes(data)
+    with open_images(path, FOV) as video:
+        image, *_ = (image.as_sent for image in video.images())
+    assert corners(image) == order
+    assert image.shape[:2] == ((48, 64) if matrix[0] else (64, 48))
+
+
+@pytest.mark.parametrize("enabled", [0, 1])
+def test_of_several_streams_the_one_that_players_show_is_read(tmp_path: Path, enabled: int) -> None:
+    path, sizes = tmp_path / "a.mp4", ((64, 48), (128, 96))
+    with av.open(str(path), "w") as output:
+        streams = [output.add_stream("mpeg4", rate=15) for _ in sizes]
+        for stream, (stream.width, stream.height) in zip(streams, sizes, strict=True):
+            stream.pix_fmt = "yuv420p"
+        for number in range(30):
+            for stream, size in zip(streams, sizes, strict=True):
+                shown = np.full((size[1], size[0], 3), 60 + 4 * number, np.uint8)
+                output.mux(stream.encode(av.VideoFrame.from_ndarray(shown, format="bgr24")))
+        for stream in streams:
+            output.mux(stream.encode())
+    data, at = bytearray(path.read_bytes()), -1
+    for number in range(2):
+        at = data.index(b"tkhd", at + 1)
+        data[at + 7] = 3 if number == enabled else 2
+    path.write_bytes(data)
+    with open_images(path, FOV) as video:
+        assert video.duration_s == pytest.approx(29 / 15, abs=1e-3)
+        images = list(video.images())
+        assert [round(image.stamp_ns / 1e9 * 15) for image in images] == list(range(30))
+        assert {image.as_sent.shape[1::-1] for image in images} == {sizes[enabled]}
+        later, first = (images[number].as_sent.mean() for number in (20, 0))
+        assert later - first == pytest.approx(80, abs=4)
+        assert any("streams beside" in text for text in video.left_out(""))
+        assert not video.remarks
+
+
 @pytest.mark.parametrize("share", [1.0, 0.5, 0.8])
 def test_the_length_of_a_film_is_what_it_shows(tmp_path: Path, share: float) -> None:
     path = with_times(film(tmp_path / "a.mp4"), share)

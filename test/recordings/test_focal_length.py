@@ -12,7 +12,8 @@ import pytest
 from PIL import Image
 
 from cardbox_tracker.camera.film_headers import shown_s
-from cardbox_tracker.recordings.given_camera import GivenCamera, equivalent_mm
+from cardbox_tracker.common.errors import CameraError
+from cardbox_tracker.recordings.given_camera import GivenCamera, equivalent_mm, told_focal
 from cardbox_tracker.recordings.open_images import open_images, tells_lens
 
 KEYS = ("com.apple.quicktime.make", "com.apple.quicktime.camera.focal_length.35mm_equivalent")
@@ -130,3 +131,62 @@ def test_damaged_and_odd_files_tell_nothing(content: bytes, tmp_path: Path) -> N
     path.write_bytes(content)
     assert equivalent_mm(path) is None
     assert equivalent_mm(tmp_path / "none.mp4") is None
+
+
+@pytest.mark.parametrize(
+    ("model", "more", "equivalent", "by"),
+    [
+        # 4.54 mm across 4:3 have a diagonal of 5.675 mm.
+        ("iPhone 5", {0x920A: 4.12}, 4.12 * 43.27 / 5.675, "iPhone 5"),
+        # 200 px a millimetre across 4000 px of the sensor, of which the image was made smaller.
+        ("EOS", {0x920A: 24.0, 0xA20E: 2000.0, 0xA210: 3, 0xA002: 4000}, 24 * 43.27 / 25, "sensor"),
+        ("EOS", {0x920A: 24.0, 0xA20E: 508.0, 0xA210: 2}, 24 * 43.27 / 25, "sensor"),
+        ("EOS", {0x920A: 24.0, 0xA20E: 508.0, 0xA210: 2, 0xA405: 30}, 30.0, "the file"),
+        ("EOS", {0x920A: 24.0}, None, ""),
+        ("EOS", {0x920A: 24.0, 0xA20E: 5.0}, None, ""),
+        ("EOS", {0x920A: 24.0, 0xA20E: 0.0}, None, ""),
+    ],
+)
+def test_millimetres_count_with_the_size_of_the_sensor(
+    tmp_path: Path, model: str, more: dict[int, float], equivalent: float | None, by: str
+) -> None:
+    exif = Image.Exif()
+    exif[0x0110] = model
+    exif.get_ifd(0x8769).update(more)
+    Image.new("RGB", (400, 300)).save(tmp_path / "1.jpg", exif=exif)
+    told = told_focal(tmp_path / "1.jpg")
+    if equivalent is None:
+        assert told is None
+        return
+    assert told is not None
+    assert told.focal == pytest.approx(equivalent)
+    assert by in told.by
+    assert (told.stddev > 0.03) == (0xA405 not in more)
+
+
+@pytest.mark.parametrize(
+    ("name", "size", "across_deg"),
+    [
+        # Measured by others: 70.4 across 16:9 (gist.github.com/khancyr), and as high in 4:3.
+        ("HD Pro Webcam C920", (1280, 720), 70.42),
+        ("C920", (960, 720), 55.8),
+        ("logitech c920s", (720, 1280), 43.3),
+        ("C930e", (1920, 1080), 82.1),
+    ],
+)
+def test_a_webcams_name_tells_the_field_of_view(
+    tmp_path: Path, name: str, size: tuple[int, int], across_deg: float
+) -> None:
+    with open_images(film(tmp_path / "a.mp4", size), GivenCamera(webcam=name)) as images:
+        lens = images.calibration()
+        assert name in images.remarks[0]
+    assert 2 * np.degrees(np.arctan(size[0] / 2 / lens.k[0, 0])) == pytest.approx(
+        across_deg, abs=0.3
+    )
+    assert (lens.focal_stddev, lens.told_by) == (0.05, f"the webcam {name}")
+
+
+def test_an_unknown_webcam_is_refused() -> None:
+    for name in ("C9200", "Integrated Camera", ""):
+        with pytest.raises(CameraError, match=r"c920.*field of view"):
+            GivenCamera(webcam=name).check()

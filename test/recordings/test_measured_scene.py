@@ -11,7 +11,8 @@ from cardbox_tracker.detectors.figure import figure_of_points
 from cardbox_tracker.detectors.image_points import POINT_NAMES, ImagePoints
 from cardbox_tracker.detectors.person_choice import PersonChoice
 from cardbox_tracker.measuring.scene_watch import Spread
-from cardbox_tracker.recordings.measured_scene import _assign, _Person, frames_of
+from cardbox_tracker.recordings.films import Person, assign
+from cardbox_tracker.recordings.measured_scene import frames_of
 from cardbox_tracker.recordings.silhouettes import RecordedFrame
 
 RED, BLUE = (40, 40, 220), (220, 60, 40)
@@ -43,11 +44,11 @@ def frame(*people: tuple[float, tuple[int, int, int]], found: int) -> RecordedFr
 @pytest.mark.parametrize("step", [6.0, -6.0])
 def test_who_walks_past_another_is_not_mixed_with_them(step: float) -> None:
     """While one hides the other, the detector finds only the former, at the other's place."""
-    people: list[_Person] = []
+    people: list[Person] = []
     walked = [160.0 + step * (k - 20) for k in range(41)]
     for k, column in enumerate(walked):
         both = abs(column - 160.0) > 25.0
-        _assign(people, frame((column, RED), (160.0, BLUE), found=1 + both), k / 15)
+        assign(people, frame((column, RED), (160.0, BLUE), found=1 + both), k / 15)
     columns = [
         [float(figure_of_points(points).middle_px[0]) for _, points in person.seen]
         for person in people
@@ -58,9 +59,9 @@ def test_who_walks_past_another_is_not_mixed_with_them(step: float) -> None:
 
 
 def test_who_comes_after_two_seconds_is_a_new_person() -> None:
-    people: list[_Person] = []
+    people: list[Person] = []
     for time_s in (0.0, 0.1, 2.1):
-        _assign(people, frame((160.0, RED), found=1), time_s)
+        assign(people, frame((160.0, RED), found=1), time_s)
     assert [[time_s for time_s, _ in person.seen] for person in people] == [[0.0, 0.1], [2.1]]
 
 

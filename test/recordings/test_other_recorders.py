@@ -14,7 +14,7 @@ import pytest
 from rosbags.rosbag1 import Writer as Writer1
 from rosbags.typesys import Stores, get_typestore
 
-from cardbox_tracker.common.errors import BagError, CameraError, CardboxError
+from cardbox_tracker.common.errors import BagError, CameraError, CardboxError, EncodingError
 from cardbox_tracker.recordings.bag_reader import BagReader
 from cardbox_tracker.recordings.bag_writer import BagWriter
 from cardbox_tracker.recordings.given_camera import GivenCamera
@@ -140,12 +140,63 @@ def test_the_frame_is_that_of_the_images_if_the_camera_info_has_none(tmp_path: P
 
 def test_a_zoom_within_the_recording_is_told(tmp_path: Path) -> None:
     store = get_typestore(Stores.ROS2_JAZZY)
-    for focal_px, is_told in ((166.0, False), (200.0, True)):
-        zoomed = info(store, k=(focal_px, 0.0, 79.5, 0.0, focal_px, 59.5, 0.0, 0.0, 1.0))
+    twice = (330.0, 0.0, 159.5, 0.0, 330.0, 119.5, 0.0, 0.0, 1.0)
+    for focal_px, size, is_told in (
+        (166.0, (160, 120), False),
+        (200.0, (160, 120), True),
+        (330.0, (320, 240), False),
+        (330.0, (160, 120), True),
+    ):
+        once = (focal_px, 0.0, 79.5, 0.0, focal_px, 59.5, 0.0, 0.0, 1.0)
+        zoomed = info(store, *size, twice if size[0] == 320 else once)
         infos = [info(store)] * 6 + [zoomed] * 6
-        with open_images(recorded(tmp_path / str(focal_px), infos=infos)) as bag:
+        with open_images(recorded(tmp_path / f"{focal_px}_{size[0]}", infos=infos)) as bag:
             assert bag.calibration().k[0, 0] == 165.0
             assert any("changes at 0.4 s" in text for text in bag.remarks) == is_told
+
+
+@pytest.mark.parametrize("first", [1, 3])
+def test_of_cameras_that_take_turns_on_a_topic_one_is_used(tmp_path: Path, first: int) -> None:
+    with BagWriter(tmp_path / "bag") as bag:
+        for number in range(12):
+            is_right, now = number < first or number % 2 == 1, START + number * S // 15
+            name, focal_px = ("right", 165.0) if is_right else ("left", 200.0)
+            message = info(bag._store, k=(focal_px, 0.0, 79.5, 0.0, focal_px, 59.5, 0.0, 0.0, 1.0))
+            message.header.frame_id = name
+            bag.write("/camera_info", message, now)
+            values = {"height": 120, "width": 160, "step": 160, "encoding": "mono8"}
+            data = np.full(160 * 120, 200 if is_right else 50, np.uint8)
+            header = bag.header(now, name)
+            bag.write(
+                "/image_raw",
+                bag.new("sensor_msgs/msg/Image", header=header, data=data, **values),
+                now,
+            )
+    with open_images(tmp_path / "bag") as bag:
+        assert bag.calibration().k[0, 0] == 165.0
+        assert {int(image.as_sent[0, 0]) for image in bag.images()} == {200}
+        assert not any("zoom" in text for text in bag.remarks)
+        assert any("frame left are left out, and those of right" in text for text in bag.remarks)
+        assert bag.left_out("/image_raw") == ["the images of the frame left"]
+
+
+def test_a_frame_that_is_renamed_for_good_is_one_camera(tmp_path: Path) -> None:
+    with BagWriter(tmp_path / "bag") as bag:
+        for number in range(12):
+            now = START + number * S // 15
+            bag.write("/camera_info", info(bag._store), now)
+            header = bag.header(now, "old" if number < 6 else "new")
+            values = {"height": 120, "width": 160, "step": 160, "encoding": "mono8"}
+            data = np.zeros(160 * 120, np.uint8)
+            bag.write(
+                "/image_raw",
+                bag.new("sensor_msgs/msg/Image", header=header, data=data, **values),
+                now,
+            )
+    with open_images(tmp_path / "bag") as bag:
+        bag.calibration()
+        assert len(list(bag.images())) == 12
+        assert bag.left_out("/image_raw") == [] and bag.remarks == []
 
 
 @pytest.mark.parametrize("is_zoom", [True, False])
@@ -335,6 +386,29 @@ def test_transports_of_one_camera_are_one_camera(
         assert bag.image_topic() == chosen
         assert len(list(bag.images())) == 12
         assert bag.left_out(chosen) == [f"the images on {n}" for n in topics if n != chosen]
+
+
+@pytest.mark.parametrize("kind", ["sensor_msgs/msg/CompressedImage", "foxglove_msgs/msg/Packet"])
+def test_a_transport_that_is_not_read_is_named(tmp_path: Path, kind: str) -> None:
+    path = tmp_path / "bag"
+    with BagWriter(path) as bag:
+        header, data = bag.header(START, "left"), np.full(99, 7, np.uint8)
+        if kind.startswith("sensor"):
+            bag.write(
+                "/image_raw/zstd", bag.new(kind, header=header, format="zstd", data=data), START
+            )
+        else:
+            bag.write("/image_raw/ffmpeg", header, START)
+    with open_images(path, GivenCamera(fov_deg=60.0)) as bag:
+        if kind.startswith("sensor"):
+            with pytest.raises(
+                EncodingError, match=r"of the format 'zstd'.* image_transport repub"
+            ):
+                _ = next(bag.images()).as_sent
+            return
+        bag._open.connections[0] = bag._open.connections[0]._replace(msgtype=kind)
+        with pytest.raises(BagError, match=r"/image_raw/ffmpeg has packets .*image_transport repu"):
+            bag.image_topic()
 
 
 def test_the_root_namespace_is_a_camera_beside_others(tmp_path: Path) -> None:

@@ -205,7 +205,7 @@ def test_hands_follow_all_other_columns_and_are_empty_where_unknown() -> None:
     seen = Hand(0.9, np.array([0.0, 0.6, -0.8]), wrist, np.array([0.3, 0.4, np.nan]))
     small = seen._replace(open=None, wrist=np.array([0.5, 0.6, 0.7]))
     names = tuple(units(has_points=True, has_people=True, has_hands=True))
-    assert names == (*UPPER, "person", "person_chance", *HANDS, *LEGS)
+    assert names == (*UPPER, "person", "person_chance", *HANDS, *LEGS, "smoothed_hz")
     cells = row_of(42, 1.5, replace(SEEN, hands=(seen, None)), has_hands=True)[-20:]
     first = [0.9, 0.0, 0.6, -0.8, 0.1, -0.2, None]
     assert cells == [*first, *[None] * 7, 0.3, 0.4, None, *[None] * 3]
@@ -260,6 +260,12 @@ def test_the_page_lists_all_columns_in_their_order() -> None:
     for cell in re.findall(r"(?m)^\| (`.*?) \|", text):
         listed += re.findall(r"`([a-z_]+)`", cell)
     assert tuple(listed) == (*UPPER, "person", "person_chance", *HANDS, *LEGS)
+
+
+def test_the_smoothing_comes_after_all_others_and_only_where_there_is_one() -> None:
+    assert tuple(units(is_smoothed=True)) == (*units(), "smoothed_hz")
+    assert row_of(42, 1.5, replace(FOUND, smoothed_hz=4.0), is_smoothed=True)[-1] == 4.0
+    assert row_of(42, 1.5, FOUND, is_smoothed=True)[-1] is None
 
 
 def test_of_several_people_the_number_comes_last() -> None:

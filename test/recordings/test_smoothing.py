@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -19,7 +20,7 @@ from cardbox_tracker.person.kinematics import pose
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.skeleton import JOINT_NAMES, PLACE_NAMES
 from cardbox_tracker.recordings.result_reader import Results
-from cardbox_tracker.recordings.result_table import PALM_COLUMNS, POINT_COLUMNS
+from cardbox_tracker.recordings.result_table import PALM_COLUMNS, POINT_COLUMNS, SMOOTHED
 from cardbox_tracker.recordings.smoothing import (
     FILLED,
     RATE_COLUMNS,
@@ -140,6 +141,17 @@ def test_deviations_of_velocities_are_those_of_independent_errors() -> None:
     smooth = rates_of(low_passed(noise, 4.0))
     for column, stddev in ((velocity, velocity - 1), (acceleration, acceleration - 1)):
         assert smooth[100, column] == pytest.approx(np.nanstd(smooth[:, stddev]), rel=0.05)
+
+
+def test_deviations_of_velocities_know_what_smoothing_left() -> None:
+    before = results_of(np.zeros(200))
+    smooth = replace(before, numbers={**before.numbers, SMOOTHED: np.full(200, 4.0)})
+    column = RATE_COLUMNS.index(f"{YAW}_velocity_stddev_rad_s")
+    frequency_hz = np.linspace(0.0, 15.0, 5000, endpoint=False)
+    gain = np.sin(2.0 * np.pi * frequency_hz / RATE_HZ)
+    share = np.linalg.norm(gain / (1.0 + (frequency_hz / 4.0) ** 4)) / np.linalg.norm(gain)
+    found = rates_of(smooth)[100, column] / rates_of(before)[100, column]
+    assert found == pytest.approx(share, rel=1e-3)
 
 
 def test_other_columns_follow_the_posture() -> None:

@@ -122,7 +122,7 @@ def test_there_is_one_row_an_image_with_its_stamp(
 ) -> None:
     summary = track(recording, source, tmp_path / "person.csv")
     text = (tmp_path / "person.csv").read_text()
-    assert text.splitlines()[0] == ",".join(units())
+    assert text.splitlines()[0] == ",".join(units(is_smoothed=True))
     assert text.endswith("\n")
     assert "\r" not in text
     rows = rows_of(tmp_path / "person.csv")

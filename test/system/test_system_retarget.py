@@ -95,7 +95,7 @@ class Robot:
             before = len(self.sent)
             self.see(0.5)
             new = [message.position[0] for _, message in self.sent[before:]]
-            if self.said[-1].data == "moving" and new and np.ptp(new) > 0.05:
+            if self.said[-1].data == "following" and new and np.ptp(new) > 0.05:
                 return
         raise AssertionError([one.data for one in self.said[-5:]])
 
@@ -148,10 +148,10 @@ def clock_jumps_back(robot: Robot) -> None:
 @pytest.mark.parametrize(
     ("fault", "words"),
     [
-        (tracker_killed, "frozen: no posture"),
-        (camera_stops, "frozen: no posture"),
-        (person_leaves, "frozen: no person"),
-        (joint_states_stop, "ready: the robot's joint states"),
+        (tracker_killed, "faulted: no posture"),
+        (camera_stops, "faulted: no posture"),
+        (person_leaves, "faulted: no person"),
+        (joint_states_stop, "faulted: the robot's joint states"),
         (disabled, "disabled"),
         (clock_jumps_ahead, ""),
         (clock_jumps_back, ""),
@@ -164,7 +164,9 @@ def test_a_robot_stops_and_goes_on_after_a_fault(robot: Robot, fault: Any, words
     if words:
         assert words in robot.said[-1].data
         assert np.abs(robot.sent[-1][1].velocity).max() < 0.05
-    if fault is disabled:
+        stopped = len(robot.sent)
+        robot.see(1.0)
+        assert len(robot.sent) == stopped  # it does not go on by itself
         robot.enable(True)
     # The person is elsewhere meanwhile, so that a robot that went there at once would jump.
     robot.began_s -= WAVE_S / 2

@@ -446,6 +446,23 @@ def test_a_second_camera_measures_how_far_away_the_person_is(guessed: float) -> 
         measured_scale(BODY, CAMERA, OTHER, nobody)
 
 
+@pytest.mark.parametrize("unit", [0.1, 1.0, 3.28])
+def test_extrinsics_of_another_unit_are_told_with_the_right_distance(unit: float) -> None:
+    pose = OTHER.extrinsics
+    given = replace(pose, translation_m=unit * pose.translation_m)
+    tracker = Tracker(BODY, CAMERA, default_preset(), others=[replace(OTHER, extrinsics=given)])
+    state = state_of(0.0)
+    masks = drawn(FIRST, CAMERA, state), drawn(SECOND, VIEW.camera, VIEW.states(state))
+    for _ in range(8):
+        tracker.track(list(map(Observation, masks)))
+    assert tracker.agreement is not None
+    told = " ".join(tracker.agreement.remarks(["side"]))
+    assert ("metres" in told) is (unit != 1.0)
+    if unit != 1.0:
+        right_m, shown_m = np.linalg.norm(pose.centre_m), float(told.split()[2])
+        assert shown_m == pytest.approx(right_m, rel=0.15)
+
+
 def seen_with_depth(before_m: float) -> dict[str, DepthReference]:
     """The references before CAMERA, their surface a plane ``before_m`` in front of the hips."""
     references = {}

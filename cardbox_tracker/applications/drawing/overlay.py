@@ -19,7 +19,7 @@ from cardbox_tracker.person.parts import body_parts
 from cardbox_tracker.person.posture import PLACE, POSTURE
 from cardbox_tracker.person.sizes import FloatArray
 from cardbox_tracker.person.skeleton import KeypointState
-from cardbox_tracker.tracking.estimate import CLOSED, HAND_KEYPOINTS, OPEN, Estimate
+from cardbox_tracker.tracking.estimate import CLOSED, HAND_KEYPOINTS, NO_PERSON, OPEN, Estimate
 from cardbox_tracker.tracking.tracker import Tracker
 
 ImageArray = NDArray[np.uint8]
@@ -59,15 +59,23 @@ _BLOCKS = 6
 
 
 def draw_overlay(
-    image: ImageArray, body: BodyModel, camera: Camera, estimate: Estimate, scale: int = 1
+    image: ImageArray,
+    body: BodyModel,
+    camera: Camera,
+    estimate: Estimate,
+    scale: int = 1,
+    hides_heads: bool = False,
 ) -> ImageArray:
     """Return (scale H, scale W, 3) bgr with the model of ``estimate`` drawn over an image.
 
     The image is (H, W) grey or silhouette, or (H, W, 3) bgr, of the size of the working camera,
     which has the pitch of the body model. Without a posture only the state is written; outline and
-    state are amber if the posture may be wrong.
+    state are amber if the posture may be wrong. ``hides_heads`` is for :func:`with_hidden_head`.
     """
     canvas = enlarged(image, scale)
+    # One of several people who is not there has no head to hide.
+    if hides_heads and not (estimate.person and estimate.state == NO_PERSON):
+        canvas = with_hidden_head(canvas, body, camera.scaled(*canvas.shape[1::-1]), estimate)
     text = estimate.state.replace("_", " ")
     if estimate.posture is not None:
         view = camera.scaled(*canvas.shape[1::-1])
@@ -106,11 +114,13 @@ def draw_camera_overlay(
     return draw_overlay(view.upright(picture), view.body, view.camera, estimate, scale)
 
 
-def draw_sharp_overlay(picture: ImageArray, estimate: Estimate, tracker: Tracker) -> ImageArray:
+def draw_sharp_overlay(
+    picture: ImageArray, estimate: Estimate, tracker: Tracker, hides_heads: bool = False
+) -> ImageArray:
     """Return the first camera's picture with the model, enlarged in pixels, which compress well."""
     scale = readable_scale(picture)
     large = picture.repeat(scale, axis=0).repeat(scale, axis=1)
-    return draw_overlay(large, tracker.body, tracker.camera, estimate)
+    return draw_overlay(large, tracker.body, tracker.camera, estimate, 1, hides_heads)
 
 
 def draw_message(image: ImageArray, text: str) -> ImageArray:

@@ -76,7 +76,9 @@ def _encoder(
 
 
 @contextmanager
-def overlay_video(path: Path, recording: Recording) -> Iterator[Observer]:
+def overlay_video(
+    path: Path, recording: Recording, hides_heads: bool = False
+) -> Iterator[Observer]:
     """Context of an observer that draws each estimate over the image of the first camera.
 
     Another thread draws and encodes. The video has the rate, size and aspect ratio of the recorded
@@ -97,7 +99,8 @@ def overlay_video(path: Path, recording: Recording) -> Iterator[Observer]:
                 drawn[frame.stamp_ns] = recording.first.full_picture(frame)
             picture = drawn[frame.stamp_ns]
             scale = readable_scale(picture)
-            drawn[frame.stamp_ns] = draw_overlay(picture, body, camera, estimate, scale)
+            given = body, camera, estimate, scale, hides_heads
+            drawn[frame.stamp_ns] = draw_overlay(picture, *given)
 
         def finish() -> None:
             for picture in drawn.values():

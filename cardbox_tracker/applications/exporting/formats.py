@@ -5,6 +5,8 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field, replace
+from functools import partial
+from importlib.metadata import EntryPoint
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -14,9 +16,9 @@ from cardbox_tracker.applications.exporting.bvh import write_bvh
 from cardbox_tracker.applications.exporting.markers import ezc3d_or_error, write_c3d, write_trc
 from cardbox_tracker.applications.exporting.mot import write_mot
 from cardbox_tracker.applications.exporting.motion import Motion, images_of_body
-from cardbox_tracker.common.errors import CardboxError
+from cardbox_tracker.common.errors import CardboxError, cut
 from cardbox_tracker.common.extensions import EXPORTERS, extensions, loaded, optional
-from cardbox_tracker.common.files import scene_beside, write_table
+from cardbox_tracker.common.files import atomic_path, scene_beside, write_table
 from cardbox_tracker.measuring.scene import Scene, load_scene
 from cardbox_tracker.person.isb_angles import ISB_NAMES, isb_angles
 from cardbox_tracker.person.legs import floor_m
@@ -83,13 +85,43 @@ FORMATS: dict[str, Format] = {
 
 
 def formats() -> dict[str, Format]:
-    """Return all formats by name, others' last; CardboxError if one is none, or its name taken."""
-    found = dict(FORMATS)
-    for name, entry in extensions(EXPORTERS, FORMATS).items():
-        found[name] = loaded(entry)
-        if not isinstance(found[name], Format):
-            raise CardboxError(f"{name} of {entry.dist and entry.dist.name} is no {Format}")
-    return found
+    """Return all formats by name, others' last; CardboxError if a name is taken.
+
+    One that cannot be loaded raises CardboxError, with its distribution, where it is used.
+    """
+    foreign = {name: _foreign(one) for name, one in extensions(EXPORTERS, FORMATS).items()}
+    return FORMATS | foreign
+
+
+def _foreign(entry: EntryPoint) -> Format:
+    """Return a format of another distribution, whose files are whole or not there."""
+    name = f"{entry.name} of {entry.dist.name if entry.dist else 'the command line'}"
+    try:
+        found = loaded(entry)
+        if not isinstance(found, Format):
+            raise CardboxError(f"{name} is no {Format}")
+    except CardboxError as error:
+        return Format(f".{entry.name}", write_mot, partial(_raise, error))
+
+    def write(path: Path, motion: Motion, body: BodyModel | None) -> None:
+        with atomic_path(path) as there:
+            try:
+                found.write(there, motion, body)
+            except CardboxError:
+                raise
+            except (Exception, SystemExit) as error:
+                raise CardboxError(
+                    f"{name} fails, so {path} is not written: {type(error).__name__}: "
+                    f"{cut(str(error))}"
+                ) from error
+            if not there.is_file() or not there.stat().st_size:
+                raise CardboxError(f"{name} has not written the file whose path it was given")
+
+    return found._replace(write=write)
+
+
+def _raise(error: Exception) -> None:
+    raise error
 
 
 def filtered(
@@ -167,7 +199,7 @@ class Result(Results):
         pandas = optional("pandas", "to_pandas needs the library pandas", "pandas")
         times = {"stamp_ns": self.stamp_ns, "time_s": self.time_s, "state": self.state}
         found = {**times, **self.numbers, **self.texts}
-        return pandas.DataFrame({name: found[name] for name in units(*[True] * 3) if name in found})
+        return pandas.DataFrame({name: found[name] for name in units(*[True] * 4) if name in found})
 
     def save(self, path: str | os.PathLike[str]) -> list[str]:
         """Write, or replace, a file in the format of its ending; return lines about it.

@@ -7,6 +7,7 @@ from collections import Counter
 from collections.abc import Mapping, Sequence
 from itertools import compress
 from pathlib import Path
+from types import MappingProxyType
 from urllib.parse import quote
 
 import numpy as np
@@ -14,24 +15,23 @@ import numpy as np
 from cardbox_tracker.applications.drawing.page import png_of, render_page
 from cardbox_tracker.applications.exporting.markers import markers_of
 from cardbox_tracker.applications.exporting.motion import Motion, floor_below, in_reference
-from cardbox_tracker.person.isb_angles import LABORATORY
+from cardbox_tracker.camera.extrinsics import Extrinsics
+from cardbox_tracker.person.isb_angles import ANATOMICAL_NAMES, LABORATORY, anatomical_angles
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.sizes import FloatArray
-from cardbox_tracker.person.skeleton import Group, names_of
+from cardbox_tracker.person.skeleton import JOINT_NAMES
 from cardbox_tracker.recordings.result_reader import Results
 from cardbox_tracker.recordings.track import TrackSummary
 from cardbox_tracker.tracking.estimate import TRACKING, UNCERTAIN
 
 STATE_COLOURS = {UNCERTAIN: "#e69f00", "": "#9a9a9a"}
 """Colours of times whose posture may be wrong, and of those without one."""
-_JOINTS = {
-    "torso": names_of(Group.TORSO)[1:],
-    "neck": names_of(Group.NECK),
-    **{
-        f"{side} {group}": names_of(group, side=side)
-        for group in (Group.ARM, Group.LEG)
-        for side in ("left", "right")
-    },
+_KNEES = "left_knee_flexion", "right_knee_flexion"
+_ANGLES = {
+    "elbow": {"left": "left_elbow_bend_deg", "right": "right_elbow_bend_deg"},
+    "raised arm": {"left": "left_arm_elevation_deg", "right": "right_arm_elevation_deg"},
+    "lean of the trunk": {"forward": "trunk_lean_deg", "right": "trunk_side_lean_deg"},
+    "knee": dict(zip(("left", "right"), _KNEES, strict=True)),
 }
 _DPI = 100
 
@@ -43,30 +43,28 @@ _MOMENTS = 4
 
 
 def angles_plot(results: Results) -> bytes:
-    """Return the joint angles over time as PNG, each with a band of one standard deviation."""
+    """Return elbows, arms, trunk and knees over time as PNG, with bands of a standard deviation."""
     from matplotlib.figure import Figure
 
-    groups = {
-        name: [joint for joint in joints if np.isfinite(results.of([joint])).any()]
-        for name, joints in _JOINTS.items()
+    angles = angles_of(results)
+    shown = {
+        name: {label: angles[column] for label, column in columns.items()}
+        for name, columns in _ANGLES.items()
+        if name != "knee" or np.isfinite(results.of(_KNEES)).any()
     }
-    shown = {name: joints for name, joints in groups.items() if joints} or {"torso": []}
     figure = Figure(figsize=(10.0, 2.2 * len(shown)), dpi=_DPI, layout="constrained")
     time_s = results.time_s
-    for row, (name, joints) in zip(
+    for row, (name, lines) in zip(
         figure.subplots(len(shown), sharex=True, squeeze=False)[:, 0], shown.items(), strict=True
     ):
-        angles, deviations = (
-            np.degrees(values) for values in (results.of(joints), results.deviations_of(joints))
-        )
-        for joint, angle, deviation in zip(joints, angles.T, deviations.T, strict=True):
-            label = joint.removeprefix(f"{name.split()[0]}_").replace("_", " ")
+        for label, (angle, deviation) in lines.items():
             line = row.plot(time_s, angle, linewidth=1.2, label=label)[0]
             low, high = angle - deviation, angle + deviation
             row.fill_between(time_s, low, high, color=line.get_color(), alpha=0.15, linewidth=0)
         # Deviations of what is hardly seen would leave no room for the curves.
-        if np.isfinite(angles).any():
-            row.set_ylim(np.nanmin(angles) - 30.0, np.nanmax(angles) + 30.0)
+        known = np.concatenate([angle[np.isfinite(angle)] for angle, _ in lines.values()])
+        if len(known):
+            row.set_ylim(known.min() - 30.0, known.max() + 30.0)
         for begin_s, end_s, state in doubtful_spans(results):
             row.axvspan(begin_s, end_s, 0.0, 0.04, color=STATE_COLOURS[state], linewidth=0)
         row.set(ylabel=f"{name} [deg]")
@@ -77,6 +75,23 @@ def angles_plot(results: Results) -> bytes:
         "time [s]; bands: one standard deviation; orange: may be wrong, grey: no posture"
     )
     return png_of(figure)
+
+
+def angles_of(results: Results) -> dict[str, tuple[FloatArray, FloatArray]]:
+    """Return angles and standard deviations, (n,), degrees, by the columns' names; nan in gaps.
+
+    Deviations are carried to the first order from those of the joints, taken as independent.
+    """
+    posture, stddev = results.of(JOINT_NAMES), results.deviations_of(JOINT_NAMES)
+    is_seen = np.isfinite(posture).all(axis=1)
+    found = np.full((2, len(posture), len(ANATOMICAL_NAMES)), np.nan)
+    seen, spread = posture[is_seen], stddev[is_seen]
+    found[0, is_seen] = values = anatomical_angles(seen)
+    changes = [anatomical_angles(seen + spread * one) - values for one in np.eye(len(JOINT_NAMES))]
+    found[1, is_seen] = np.linalg.norm(changes, axis=0)
+    knees = np.degrees([results.of(_KNEES), results.deviations_of(_KNEES)])
+    columns = np.concatenate([found, knees], axis=2).transpose(2, 0, 1)
+    return dict(zip((*ANATOMICAL_NAMES, *_KNEES), map(tuple, columns), strict=True))
 
 
 def doubtful_spans(results: Results) -> list[tuple[float, float, str]]:
@@ -143,6 +158,31 @@ def space_view(motion: Motion, body: BodyModel | None, true_m: FloatArray | None
     return png_of(figure)
 
 
+def cameras_view(
+    motion: Motion, body: BodyModel | None, cameras: Mapping[str, Extrinsics]
+) -> bytes:
+    """Return the cameras and the way of the hips from above as PNG, the first camera below."""
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(5.0, 5.0), dpi=_DPI, layout="constrained")
+    axes = figure.subplots()
+    markers = markers_of(motion, body)
+    hips_m = _upright(markers.points_m[motion.is_seen, markers.names.index("Hip")])
+    axes.plot(hips_m[:, 0], hips_m[:, 1], color=_TRUNK, linewidth=1.5)
+    first = Extrinsics(np.eye(3), np.zeros(3))
+    for name, pose in {"first camera": first, **cameras}.items():
+        ends_m = np.array([pose.centre_m, pose.centre_m + 0.5 * pose.rotation[2]])
+        ends_m = _upright((in_reference(ends_m, body) - floor_below(body)) @ LABORATORY.T)
+        axes.plot(*ends_m[:, :2].T, color="black", linewidth=2)
+        axes.plot(*ends_m[0, :2], color="black", marker="o")
+        axes.annotate(name, ends_m[0, :2], (6, 6), textcoords="offset points", fontsize=9)
+    axes.set(xlabel="to the right [m]", ylabel="away from the first camera [m]")
+    axes.set_aspect("equal", "datalim")
+    axes.margins(0.2)
+    axes.grid(alpha=0.3)
+    return png_of(figure)
+
+
 def _bones() -> list[tuple[str, str, str]]:
     bones = [("Hip", "Neck", _TRUNK)]
     for side, colour in (("L", _LEFT), ("R", _RIGHT)):
@@ -166,11 +206,14 @@ def write_page(
     title: str,
     people: Mapping[str, tuple[Results, TrackSummary]],
     lines: Sequence[str],
+    cameras: Mapping[str, Extrinsics] = MappingProxyType({}),
+    hides_heads: bool = False,
 ) -> None:
     """Write the page, which needs no other file than the ``film``, named relative to it.
 
     It has the results of ``people`` with their summaries by a heading, and ``lines`` on what they
-    rest on. Raises CardboxError if the file cannot be written.
+    rest on, and shows the further ``cameras`` from above; ``hides_heads`` says that no face is in
+    the film. Raises CardboxError if the file cannot be written.
     """
     render_page(
         path,
@@ -179,17 +222,22 @@ def write_page(
         film=quote(os.path.relpath(film, path.parent)),
         film_name=film.name,
         start_s=min(float(results.time_s[0]) for results, _ in people.values()),
-        people=[_person(name, *of) for name, of in people.items()],
+        people=[_person(name, *of, cameras) for name, of in people.items()],
         lines=lines,
+        hides_heads=hides_heads,
     )
 
 
-def _person(name: str, results: Results, summary: TrackSummary) -> dict[str, object]:
+def _person(
+    name: str, results: Results, summary: TrackSummary, cameras: Mapping[str, Extrinsics]
+) -> dict[str, object]:
     seen = Motion.of(results) if np.isfinite(results.of(["torso_y"])).any() else None
     spans = sorted(doubtful_spans(results), key=lambda span: span[0] - span[1])
     pictures = {"angles over time, with a standard deviation": angles_plot(results)}
     if seen is not None:
         pictures = {"skeleton from aside": space_view(seen, results.body)} | pictures
+    if seen is not None and cameras:
+        pictures["cameras and hips from above"] = cameras_view(seen, results.body, cameras)
     return {
         "name": name,
         "words": summary.quality,

@@ -38,6 +38,8 @@ _WEIGHTS = (1.0, 1.0, 2.0)
 # A point that is too near counts so much for each metre that it comes nearer by millimetres only.
 _KEEPS_OUT = 100.0
 _IDENTITY = np.eye(3)
+# Points along a part of an arm, whose distances are those of its axis to some millimetres.
+_POINTS = 9
 _SHORTEST_M, _LONGEST_M = 0.01, 100.0
 _LEAST_PART, _LEAST_SINE = 0.2, 0.5
 
@@ -238,6 +240,17 @@ def _steps(arm: Arm) -> tuple[list[_Step], FloatArray]:
     return found, place
 
 
+def _turned_deg(robot: Robot) -> float:
+    """Return how a root is turned about its Z axis if the left shoulder is not at its left."""
+    try:
+        left, right = (find_arm(robot, side) for side in ("left", "right"))
+        places = [Kinematics(one).at(np.zeros(len(one.joints))) for one in (left, right)]
+    except CardboxError:
+        return 0.0
+    x, y, z = places[0].origins_m[1] - places[1].origins_m[1]
+    return 90.0 * round(math.atan2(x, y) / (np.pi / 2)) if math.hypot(x, y) > abs(z) else 0.0
+
+
 class ArmFollower:
     """A :class:`~.retargeter.Method` by which the robot's arm points as the person's arm.
 
@@ -245,7 +258,9 @@ class ArmFollower:
         arm: what was found in the robot.
         kinematics: where its joints are.
         joints: the arm's joints and the gripper, if there is one.
-        sources: for each joint, the joints of the person's arm; none for the gripper.
+        mount: rotation matrix (3, 3) from the robot's root to the person's torso.
+        turned_deg: the part of its yaw that no setting has, as the robot's shoulders tell it.
+        sources: for each joint, the joints of the person's arm; the hand for the gripper.
     """
 
     def __init__(self, robot: Robot, config: RetargetConfig, side: str = "") -> None:
@@ -256,15 +271,18 @@ class ArmFollower:
         gripper = (self.arm.gripper,) if self.arm.gripper else ()
         self.joints = (*self.arm.joints, *gripper)
         behind = tuple(f"{self._side}_{name}" for name in ARM_JOINTS)
-        self.sources = (*(behind for _ in self.arm.joints), *(() for _ in gripper))
+        hand = (f"{self._side}_hand_open",)
+        self.sources = (*(behind for _ in self.arm.joints), *(hand for _ in gripper))
         self._lower, self._upper, _ = robot.limits_of(self.joints)
         if config.gripper_open == "lower":
             self._closed, self._open = self._upper[-1], self._lower[-1]
         else:
             self._closed, self._open = self._lower[-1], self._upper[-1]
-        self._hand = WITH_HEAD_AND_HANDS.index(f"{self._side}_hand_open")
-        angles = np.radians([config.mount_roll_deg, config.mount_pitch_deg, config.mount_yaw_deg])
-        self._mount = rotation_z(angles[2]) @ rotation_y(angles[1]) @ rotation_x(angles[0])
+        self._hand = WITH_HEAD_AND_HANDS.index(*hand)
+        mount_deg = np.array([config.mount_roll_deg, config.mount_pitch_deg, config.mount_yaw_deg])
+        self.turned_deg = 0.0 if mount_deg.any() else _turned_deg(robot)
+        angles = np.radians(mount_deg + np.array([0.0, 0.0, self.turned_deg]))
+        self.mount = rotation_z(angles[2]) @ rotation_y(angles[1]) @ rotation_x(angles[0])
         self._solution: FloatArray | None = None
         self._turn = 0
         random = np.random.default_rng(0)
@@ -281,7 +299,7 @@ class ArmFollower:
 
     def target(self, body: BodyModel, posture: FloatArray, now: FloatArray) -> FloatArray:
         """See :class:`~.retargeter.Method`."""
-        wanted = directions_of(body, posture, self._side) @ self._mount
+        wanted = directions_of(body, posture, self._side) @ self.mount
         before = now[: len(self.arm.joints)] if self._solution is None else self._solution
         best, error = self._solved(before, wanted)
         if error > _BAD:
@@ -295,7 +313,16 @@ class ArmFollower:
             found[-1] = self._closed + float(posture[self._hand]) * (self._open - self._closed)
         return found
 
-    def clear(self, positions: FloatArray) -> FloatArray:
+    def axes(self, positions: FloatArray) -> FloatArray:
+        """Return points (m, 3) along forearm and hand, m in the frame of the root."""
+        places = self.kinematics.at(positions[: len(self.arm.joints)])
+        corners = np.vstack([places.origins_m[self.kinematics.elbow :], places.tip_m])
+        if len(corners) == 1:
+            corners = np.vstack([places.origins_m[self.kinematics.shoulder], places.tip_m])
+        shares = np.linspace(0.0, 1.0, _POINTS)[:, None, None]
+        return np.reshape(corners[:-1] + shares * (corners[1:] - corners[:-1]), (-1, 3))
+
+    def clear(self, positions: FloatArray, _: FloatArray) -> FloatArray:
         """See :class:`~.retargeter.Method`."""
         found = positions.copy()
         arm = found[None, : len(self.arm.joints)]

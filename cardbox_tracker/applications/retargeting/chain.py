@@ -21,10 +21,9 @@ _NO_TIP = re.compile(
     r"cam|imu|accel|range|sensor|lidar|optical|screw|collision|contour", re.IGNORECASE
 )
 _TIPS = ("tcp", "grasp", "gripper_frame", "tool", "ee_", "end_effector", "palm", "hand", "flange")
-_SIDES = {
-    "left": re.compile(r"(?<![A-Za-z])(?:left|Left|LEFT|l|L)(?![a-z])"),
-    "right": re.compile(r"(?<![A-Za-z])(?:right|Right|RIGHT|r|R)(?![a-z])"),
-}
+# A word counts more than a letter, and the first letter of several: L_SHOULDER_R rolls.
+_WORDS = re.compile(r"(?<![A-Za-z])(left|right)(?![a-z])", re.IGNORECASE)
+_LETTERS = re.compile(r"(?<![A-Za-z])([lLrR])(?![a-z])")
 # Several short movable branches of one link are the fingers of a hand, whatever their names.
 _LONGEST_FINGER_M = 0.25
 
@@ -103,6 +102,13 @@ def _fingers(robot: Robot) -> set[str]:
         is_hand = len(several) > 1 and len(_names(robot.path(several[0].parent))) > 1
         if is_hand and all(_length(robot, one.child) < _LONGEST_FINGER_M for one in several):
             roots |= {one.name for one in several}
+    # A joint with nothing beyond it that fingers beside it mimic moves them.
+    carries = {one.parent for one in robot.all_joints.values() if one.kind != "fixed"}
+    for one in robot.all_joints.values():
+        leader = robot.joints.get(one.mimics)
+        is_last = leader is not None and not carries & _rigid(robot, leader.child)
+        if leader is not None and is_last and one.parent in _rigid(robot, leader.parent):
+            roots.add(leader.name)
     return {
         one.child
         for one in robot.joints.values()
@@ -171,13 +177,12 @@ def _chosen(robot: Robot, ends: list[str], side: str) -> tuple[Joint, ...]:
 
 
 def _side_of(joint: Joint) -> str:
-    """Return ``left`` or ``right`` by the names of a joint and its link, or an empty text."""
-    found = [
-        side
-        for side, names in _SIDES.items()
-        if names.search(joint.name) or names.search(joint.child)
-    ]
-    return found[0] if len(found) == 1 else ""
+    """Return ``left`` or ``right`` by the name of a joint, or of its link, or an empty text."""
+    for pattern in (_WORDS, _LETTERS):
+        for name in (joint.name, joint.child):
+            if found := pattern.search(name):
+                return "left" if found[1].lower().startswith("l") else "right"
+    return ""
 
 
 def _tip(robot: Robot, link: str) -> str:

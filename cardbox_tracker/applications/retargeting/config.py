@@ -29,16 +29,17 @@ class RetargetConfig(Settings):
         limits=(0.01, 20.0),
     )
     max_acceleration: float = setting(
-        20.0,
-        "no joint of the robot changes its speed faster",
+        0.0,
+        "no joint of the robot changes its speed faster; 0: 20 times max_speed, which is then "
+        "reached as soon whatever it is",
         unit="rad/s² or m/s²",
-        limits=(0.1, 1000.0),
+        limits=(0.0, 1000.0),
     )
     max_jerk: float = setting(
-        400.0,
-        "no joint of the robot changes its acceleration faster",
+        0.0,
+        "no joint of the robot changes its acceleration faster; 0: 20 times max_acceleration",
         unit="rad/s³ or m/s³",
-        limits=(1.0, 1e6),
+        limits=(0.0, 1e6),
     )
     soft_start_s: float = setting(
         1.0,
@@ -50,7 +51,16 @@ class RetargetConfig(Settings):
         False, "the robot begins where it is and follows movements from there, not postures"
     )
     enable_after_lost: bool = setting(
-        False, "after lost or no_person the robot has to be enabled again"
+        True,
+        "after a loss, of the person, of postures or of the robot's joint states for timeout_s, "
+        "the robot has to be enabled again",
+    )
+    max_following_error: float = setting(
+        0.2,
+        "all joints of the robot hold while one is farther from where it was sent than this, or a "
+        "quarter of its range",
+        unit="rad or m",
+        limits=(0.01, 10.0),
     )
     start: str = setting(
         "",
@@ -86,6 +96,13 @@ class RetargetConfig(Settings):
         0.1,
         "forearm and hand stay so far from the Z axis of the robot's root, up to its shoulder, "
         "or as far as the shoulder is",
+        unit="m",
+        limits=(0.0, 2.0),
+    )
+    arms_apart_m: float = setting(
+        0.1,
+        "with both sides, the axes of one arm's forearm and hand come no nearer to those of the "
+        "other than this; the arms hold meanwhile",
         unit="m",
         limits=(0.0, 2.0),
     )

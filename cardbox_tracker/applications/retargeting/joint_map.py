@@ -112,9 +112,10 @@ class JointMap:
 
     @property
     def sources(self) -> tuple[tuple[str, ...], ...]:
-        """For each joint, those of the posture behind its angle; none for the neck and hands."""
+        """For each joint, those of the posture behind its angle, or the hand; none for the neck."""
         behind = (_ELBOW.get(angle, (angle,)) if angle else () for angle in self.angles)
-        return tuple(tuple(one for one in names if one in JOINT_NAMES) for names in behind)
+        known = (*JOINT_NAMES, *HAND_OPEN_NAMES)
+        return tuple(tuple(one for one in names if one in known) for names in behind)
 
     def target(self, _: BodyModel, posture: FloatArray, now: FloatArray) -> FloatArray:
         """See :class:`~.retargeter.Method`; a joint stays while its angle is unknown."""
@@ -122,22 +123,23 @@ class JointMap:
         chosen = np.array([known[angle] if angle else 0.0 for angle in self.angles])
         return np.where(np.isnan(chosen), now, self.scale * chosen + self.offset_rad)
 
-    def clear(self, positions: FloatArray) -> FloatArray:
+    def clear(self, positions: FloatArray, _: FloatArray) -> FloatArray:
         """See :class:`~.retargeter.Method`; nothing is known of the robot's shape."""
         return positions
 
 
-def head_map(robot: Robot) -> JointMap | None:
+def head_map(robot: Robot, mount: FloatArray) -> JointMap | None:
     """Return a map of the robot's head: its first joints about Z and Y; None without any.
 
-    They have ``head`` or ``neck`` in their names or those of their links.
+    They have ``head`` or ``neck`` in their names or those of their links. ``mount`` is the rotation
+    matrix (3, 3) from the robot's root to the torso.
     """
     found: dict[str, tuple[str, float]] = {}
     for one in robot.joints.values():
         if one.kind == "prismatic" or not _HEAD.search(f"{one.name} {one.child}"):
             continue
         for joint in joints_of(Group.NECK):
-            along = float(robot.axis_of(one) @ joint.axis)
+            along = float(mount @ robot.axis_of(one) @ joint.axis)
             if abs(along) > _ALONG:
                 found.setdefault(joint.name, (one.name, math.copysign(1.0, along)))
     if not found:

@@ -20,19 +20,37 @@ from cardbox_tracker.applications.retargeting.joint_map import (
 from cardbox_tracker.applications.retargeting.robot import Robot, load_robot
 from cardbox_tracker.common.errors import CardboxError, quoted
 from cardbox_tracker.person.model import BodyModel
-from cardbox_tracker.person.posture import N_JOINTS
+from cardbox_tracker.person.posture import (
+    ELBOW_ABDUCTION,
+    ELBOW_FLEXION,
+    FIRST_ANGLES,
+    N_JOINTS,
+    SHOULDER_ABDUCTION,
+    SHOULDER_FLEXION,
+)
 from cardbox_tracker.person.sizes import FloatArray
-from cardbox_tracker.person.skeleton import JOINT_NAMES
+from cardbox_tracker.person.skeleton import HAND_OPEN_NAMES, JOINT_NAMES
 from cardbox_tracker.tracking.estimate import TRACKING, UNCERTAIN
 
-MOVING = "moving"
+FOLLOWING = "following"
+# Places in an arm's angles, and the flexion of the same limb by the abduction.
+_ABDUCTIONS = np.array([SHOULDER_ABDUCTION, ELBOW_ABDUCTION])
+_FLEXIONS = np.array([SHOULDER_FLEXION, ELBOW_FLEXION])
+_FLEXION_OF = {
+    JOINT_NAMES[first + abduction]: JOINT_NAMES[first + flexion]
+    for first in FIRST_ANGLES
+    for abduction, flexion in zip(_ABDUCTIONS, _FLEXIONS, strict=True)
+}
 # Settings that a joint map does not need.
 _OF_AN_ARM = (
-    *("base", "hand", "gripper", "gripper_open", "trunk_radius_m", "lowest_m"),
+    *("base", "hand", "gripper", "gripper_open", "trunk_radius_m", "arms_apart_m", "lowest_m"),
     *("mount_roll_deg", "mount_pitch_deg", "mount_yaw_deg"),
 )
 # The first of the speeds with which a robot begins to follow, of its highest.
 _SLOWEST = 0.1
+# Speed, acceleration and jerk that belong together: each is reached in twice this time, so the
+# robot is late by it twice, 0.1 s, at any speed.
+_PER_SECOND = 20.0
 
 
 class Method(Protocol):
@@ -40,7 +58,7 @@ class Method(Protocol):
 
     @property
     def sources(self) -> tuple[tuple[str, ...], ...]:
-        """For each joint of the robot, the person's joints on which its target depends."""
+        """For each joint of the robot, what its target depends on: joints of the person, hands."""
 
     @property
     def joints(self) -> tuple[str, ...]:
@@ -53,8 +71,11 @@ class Method(Protocol):
         target may be beyond the joint limits; it is nan if there is no solution.
         """
 
-    def clear(self, positions: FloatArray) -> FloatArray:
-        """Return the positions (n,) near to these at which the hand is not in the way."""
+    def clear(self, positions: FloatArray, now: FloatArray) -> FloatArray:
+        """Return the positions (n,) near to these at which the hand is not in the way.
+
+        Where there are none, they are the current ones, ``now`` (n,).
+        """
 
 
 class Limits(NamedTuple):
@@ -182,13 +203,18 @@ class Command(NamedTuple):
     """Command for the robot at one image."""
 
     positions: FloatArray  #: positions (n,) of ``Retargeter.joints``, rad or m
-    status: str  #: ``moving``, or ``frozen:`` with the reason
+    status: str  #: ``following``, or ``holding:`` with the reason
     duration_s: float  #: time in which the robot reaches the positions, s
 
     @property
     def is_moving(self) -> bool:
         """True unless the robot must stand still."""
-        return self.status == MOVING
+        return self.status == FOLLOWING
+
+    @property
+    def reason(self) -> str:
+        """Why the robot stands still; empty if it does not."""
+        return self.status.partition(": ")[2]
 
 
 class Retargeter:
@@ -199,6 +225,8 @@ class Retargeter:
     Attributes:
         joints: names of the robot's joints.
         limits: those of the joints' motion.
+        tolerance: the largest following errors (n,), rad or m; inf for a gripper, which what it
+            holds may stop.
         settles_ns: time in which the robot stops, ns.
     """
 
@@ -210,16 +238,20 @@ class Retargeter:
         self.joints = method.joints
         limits = Limits(*robot.limits_of(method.joints))
         self.limits = limits = limits._replace(speed=np.minimum(limits.speed, config.max_speed))
+        acceleration = config.max_acceleration or _PER_SECOND * config.max_speed
         self._motion = SafeMotion(
             limits,
             _start(config.start, method.joints, limits),
-            config.max_acceleration,
-            config.max_jerk,
+            acceleration,
+            config.max_jerk or _PER_SECOND * acceleration,
         )
         self.settles_ns = self._motion.settles_ns
         self._method, self._config = method, config
-        self._sources = method.sources
-        self._follows = np.array([bool(names) for names in method.sources])
+        self._sources = sources = [frozenset(names) for names in method.sources]
+        self._follows = np.array([not names.isdisjoint(JOINT_NAMES) for names in sources])
+        grips = [not names.isdisjoint(HAND_OPEN_NAMES) for names in sources]
+        most = np.minimum(config.max_following_error, (limits.upper - limits.lower) / 4)
+        self.tolerance = np.where(grips, np.inf, most)
         self._before_ns: int | None = None
         self._commanded_ns: int | None = None
         self._followed_ns: int | None = None
@@ -238,6 +270,15 @@ class Retargeter:
         """Return the command to stop from now on; the next image counts as the first."""
         self._before_ns = self._followed_ns = None
         return self._stop(reason, now_ns)
+
+    def hold_near(self, positions: FloatArray, reason: str, now_ns: int) -> Command:
+        """Return the command to stop within the ``tolerance`` of where the robot is, (n,)."""
+        held = self.hold(reason, now_ns)
+        point = self._motion.set_point(now_ns)
+        goal = np.clip(point, positions - self.tolerance, positions + self.tolerance)
+        duration_ns = math.ceil(float((np.abs(goal - point) / self.limits.speed).max()) * 1e9)
+        self._motion.move(goal, now_ns, duration_ns)
+        return held._replace(positions=goal, duration_s=held.duration_s + duration_ns / 1e9)
 
     def update(
         self,
@@ -292,20 +333,45 @@ class Retargeter:
         # On the way, too, the hand is not in the trunk.
         most = share * self.limits.speed * duration_ns / 1e9
         goal = point + np.clip(np.where(held, 0.0, target + self._offset - point), -most, most)
-        goal = np.where(held, point, self._method.clear(goal))
+        goal = np.where(held, point, self._method.clear(goal, point))
         self._motion.move(goal, now_ns, duration_ns, share)
-        return Command(self.at(now_ns + duration_ns).positions, MOVING, duration_ns / 1e9)
+        return Command(self.at(now_ns + duration_ns).positions, FOLLOWING, duration_ns / 1e9)
 
     def _stop(self, reason: str, now_ns: int) -> Command:
         self._motion.stop(now_ns)
         end = self.at(now_ns + self.settles_ns).positions
-        return Command(end, f"frozen: {reason.replace('_', ' ')}", self.settles_ns / 1e9)
+        return Command(end, f"holding: {reason.replace('_', ' ')}", self.settles_ns / 1e9)
 
     def _held(
         self, posture: FloatArray, stddev: FloatArray, keypoints: Mapping[str, tuple[str, float]]
     ) -> NDArray[np.bool_]:
-        """Return which joints (n,) of the robot stay because theirs are not sure."""
-        sure = (stddev[:N_JOINTS] <= self._config.max_stddev_rad) & np.isfinite(posture[:N_JOINTS])
+        """Return which joints (n,) of the robot stay because theirs are not sure.
+
+        A limb that points along the axis of its abduction has a sure direction, but no sure
+        abduction: what follows both angles of a limb needs the direction alone.
+        """
+        angles, directions = stddev[:N_JOINTS], stddev[:N_JOINTS].copy()
+        for first in FIRST_ANGLES:
+            abductions, flexions = first + _ABDUCTIONS, first + _FLEXIONS
+            # The root of the mean square of the cosine, in which the abduction turns the limb.
+            bent, spread = posture[flexions], angles[flexions]
+            turned = np.hypot(np.cos(bent), spread * np.sin(bent))
+            directions[abductions] *= np.minimum(turned, 1.0)
+        most = self._config.max_stddev_rad
+        unsure = self._unsure(np.isfinite(posture[:N_JOINTS]) & (directions <= most), keypoints)
+        alone = self._unsure(angles <= most, {})
+        return np.array(
+            [
+                not names.isdisjoint(unsure)
+                or any(name in alone and _FLEXION_OF.get(name) not in names for name in names)
+                for names in self._sources
+            ]
+        )
+
+    def _unsure(
+        self, sure: NDArray[np.bool_], keypoints: Mapping[str, tuple[str, float]]
+    ) -> set[str]:
+        """Return joints that are not ``sure`` (12,), or whose keypoints are not."""
         for number, name in enumerate(JOINT_NAMES):
             side, _, joint = name.partition("_")
             # The angles at the shoulder are those of the elbow's place, these of the hand's.
@@ -313,8 +379,7 @@ class Retargeter:
             state, chance = keypoints.get(f"{side}_{end}", ("tracked", 0.0))
             if state != "tracked" or chance > self._config.max_chance:
                 sure[number] = False
-        unsure = {name for name, is_sure in zip(JOINT_NAMES, sure, strict=True) if not is_sure}
-        return np.array([not unsure.isdisjoint(names) for names in self._sources])
+        return {name for name, is_sure in zip(JOINT_NAMES, sure, strict=True) if not is_sure}
 
 
 def _start(text: str, joints: tuple[str, ...], limits: Limits) -> FloatArray:
@@ -341,8 +406,8 @@ def _start(text: str, joints: tuple[str, ...], limits: Limits) -> FloatArray:
 class _Together:
     """A :class:`Method` of several parts of one robot."""
 
-    def __init__(self, parts: Sequence[Method]) -> None:
-        self._parts = parts
+    def __init__(self, parts: Sequence[Method], apart_m: float) -> None:
+        self._parts, self._apart_m = parts, apart_m
         self.joints = tuple(name for one in parts for name in one.joints)
         self.sources = tuple(names for one in parts for names in one.sources)
         if len(set(self.joints)) < len(self.joints):
@@ -356,9 +421,21 @@ class _Together:
         parts = zip(self._parts, np.split(now, self._ends), strict=True)
         return np.concatenate([one.target(body, posture, part) for one, part in parts])
 
-    def clear(self, positions: FloatArray) -> FloatArray:
+    def clear(self, positions: FloatArray, now: FloatArray) -> FloatArray:
+        split = (np.split(one, self._ends) for one in (positions, now))
+        parts = zip(self._parts, *split, strict=True)
+        found = np.concatenate([one.clear(part, before) for one, part, before in parts])
+        # Arms that are too near may part.
+        least_m = min(self._apart_m, self._between_m(now))
+        return found if self._between_m(found) >= least_m else now
+
+    def _between_m(self, positions: FloatArray) -> float:
+        """Return the distance of the axes of both arms, m; infinite for a single one."""
         parts = zip(self._parts, np.split(positions, self._ends), strict=True)
-        return np.concatenate([one.clear(part) for one, part in parts])
+        arms = [one.axes(part) for one, part in parts if isinstance(one, ArmFollower)]
+        if len(arms) < 2:
+            return math.inf
+        return float(np.linalg.norm(arms[0][:, None] - arms[1][None], axis=-1).min())
 
 
 def make_retargeter(
@@ -384,12 +461,16 @@ def make_retargeter(
         return robot, Retargeter(robot, method, config), ""
     sides = ("left", "right") if config.side == "both" else (config.side,)
     arms = [ArmFollower(robot, config, side) for side in sides]
-    head = head_map(robot) if config.side == "both" else None
+    head = head_map(robot, arms[0].mount) if config.side == "both" else None
     tables = [
         f"{side} arm\n{one.arm.table(robot, config.max_speed)}"
         for side, one in zip(sides, arms, strict=True)
     ]
+    if arms[0].turned_deg:
+        tables.append(
+            f"the shoulders tell how the root is turned: mount_yaw_deg is {arms[0].turned_deg:g}"
+        )
     if head is not None:
         tables.append(f"head\n{robot.table(head.roles, config.max_speed)}")
-    method = _Together([*arms, head] if head is not None else arms)
+    method = _Together([*arms, head] if head is not None else arms, config.arms_apart_m)
     return robot, Retargeter(robot, method, config), "\n".join(tables)

@@ -18,6 +18,8 @@ from cardbox_tracker.person.skeleton import rotation_x, rotation_y, rotation_z
 _MOVABLE = ("revolute", "continuous", "prismatic")
 # Some descriptions mean no limit by 1e16; differences of larger ones would not be finite.
 _WIDEST = 1e16
+# A joint whose limits are nearer stays.
+_NARROWEST = 1e-6
 _LARGEST_BYTES, _CHUNK = 16 * 1024 * 1024, 1 << 14
 # The memory of a dynamic model grows with the third power of its freedoms: 330 MB at 128.
 _MOST = {
@@ -206,6 +208,19 @@ def _robot(root: Xml.Element) -> Robot:
             at = joints[at].parent
     if len(set(links)) < len(links) or len(set(links) - joints.keys()) > 1:
         raise ValueError("two links have one name, or no joint leads to several links")
+    by_name = {one.name: one for one in joints.values()}
+    for one in joints.values():
+        leaders = [one.name]
+        while (leader := by_name.get(joints[one.child].mimics)) and leader.mimics:
+            if leader.name in leaders:
+                raise ValueError(f"the joints {', '.join(leaders)} mimic each other")
+            leaders.append(leader.name)
+            joints[one.child] = replace(
+                joints[one.child],
+                mimics=leader.mimics,
+                multiplier=joints[one.child].multiplier * leader.multiplier,
+                offset=joints[one.child].multiplier * leader.offset + joints[one.child].offset,
+            )
     robot = Robot(Xml.tostring(root, encoding="unicode"), joints)
     if not robot.joints:
         still = [one.name for one in joints.values() if one.kind in _MOVABLE and not one.mimics]
@@ -226,13 +241,28 @@ def _link(joint: Xml.Element, which: str) -> str:
 def _vector(joint: Xml.Element, tag: str, attribute: str, default: str) -> FloatArray:
     element = joint.find(tag)
     text = default if element is None else element.get(attribute, default)
-    found = np.array([float(word) for word in text.split()])
+    try:
+        found = np.array([float(word) for word in text.split()])
+    except ValueError:
+        found = np.full(3, np.nan)
     if found.shape != (3,) or not (np.abs(found) <= _WIDEST).all():
         raise ValueError(
             f"the {attribute} of the {tag} of the joint {joint.get('name')} is {quoted(text)}; "
-            "expected three finite numbers"
+            "expected three finite numbers with spaces between"
         )
     return found
+
+
+def _number(joint: Xml.Element, tag: str, attribute: str, default: str = "0") -> float:
+    element = joint.find(tag)
+    text = default if element is None else element.get(attribute, default)
+    try:
+        return float(text)
+    except ValueError:
+        raise ValueError(
+            f"the {attribute} of the {tag} of the joint {joint.get('name')} is {quoted(text)}; "
+            "expected a number"
+        ) from None
 
 
 def _joint(element: Xml.Element) -> Joint:
@@ -253,19 +283,20 @@ def _joint(element: Xml.Element) -> Joint:
     limit, mimic = element.find("limit"), element.find("mimic")
     if limit is None and kind != "continuous":
         raise ValueError(f"the joint {name} has no limit")
-    given = {} if limit is None else limit.attrib
-    lower, upper, speed = (float(given.get(one, 0.0)) for one in ("lower", "upper", "velocity"))
+    lower, upper, speed = (
+        _number(element, "limit", name) for name in ("lower", "upper", "velocity")
+    )
     if kind == "continuous":
         # Half a turn each way suffices for an arm.
         lower, upper = -math.pi, math.pi
     if not (-_WIDEST <= lower <= upper <= _WIDEST and speed >= 0.0):
         raise ValueError(f"the joint {name} has limits {lower} to {upper} and the speed {speed}")
+    upper = upper if upper - lower >= _NARROWEST else lower
     joint = replace(joint, axis=axis / length, lower=lower, upper=upper, speed=speed or math.inf)
     if mimic is None:
         return joint
-    multiplier, offset = (
-        float(mimic.get(one, default)) for one, default in (("multiplier", 1), ("offset", 0))
-    )
+    multiplier = _number(element, "mimic", "multiplier", "1")
+    offset = _number(element, "mimic", "offset")
     if not math.isfinite(multiplier * offset):
         raise ValueError(f"the joint {name} mimics by {multiplier} and {offset}")
     return replace(joint, mimics=mimic.attrib["joint"], multiplier=multiplier, offset=offset)

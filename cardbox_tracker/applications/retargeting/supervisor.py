@@ -5,21 +5,26 @@ from __future__ import annotations
 from collections.abc import Callable
 from enum import Enum
 
+import numpy as np
+
 from cardbox_tracker.applications.retargeting.config import RetargetConfig
 from cardbox_tracker.applications.retargeting.retargeter import Command, Moment, Retargeter
 from cardbox_tracker.person.sizes import FloatArray
 from cardbox_tracker.tracking.estimate import LOST, NO_PERSON
 
 DEAD_MAN_NS = 300_000_000
+# A held robot is released at this share of the limits of following errors.
+_RELEASED = 0.5
 
 
 class Phase(Enum):
-    """What may be sent: nothing unless ``FOLLOWING`` or ``STOPPING``."""
+    """What may be sent: nothing unless ``FOLLOWING`` or ``HOLDING``, or on the way to a stop."""
 
     DISABLED = "disabled"
     READY = "ready"
     FOLLOWING = "following"
-    STOPPING = "stopping"
+    HOLDING = "holding"
+    FAULTED = "faulted"
 
 
 class Supervisor:
@@ -27,10 +32,12 @@ class Supervisor:
 
     ``DISABLED`` becomes ``READY`` when the robot is enabled, ``READY`` becomes ``FOLLOWING`` with
     the first sure posture if the robot's own positions are known, and begins there. ``FOLLOWING``
-    holds where postures are unsure or missing. It becomes ``STOPPING`` when the robot is no longer
-    enabled or no longer tells its positions, and, once it stands still, ``DISABLED`` or ``READY``.
+    becomes ``HOLDING`` where postures are unsure or missing, or the robot is not where it was sent,
+    and goes on by itself. After a loss, of the person, of postures or of the robot's positions, it
+    is ``FAULTED`` until it is enabled anew. Wherever it stops, it decelerates.
 
-    All times are of one clock that never runs backwards, ns.
+    All times are of one clock that never runs backwards, ns. The motion has its own: it goes on
+    with the other, by no more than a period of the rate from a :meth:`moment` to the next one.
 
     Attributes:
         phase: the state.
@@ -39,98 +46,149 @@ class Supervisor:
     def __init__(self, retargeter: Retargeter, config: RetargetConfig, timeout_s: float) -> None:
         """Begin ``DISABLED``; with ``config.start``, the robot need not tell its positions.
 
-        After ``timeout_s`` without a posture, or without the robot's positions, it stops.
+        After ``timeout_s`` without a person, a posture, or the robot's positions, these are lost.
         """
         self.phase = Phase.DISABLED
         self._retargeter, self._config = retargeter, config
         self._timeout_ns = round(timeout_s * 1e9)
+        self._period_ns = round(1e9 / config.rate_hz)
         self._is_wanted = False
         self._gripped_ns: int | None = None
         self._robot: tuple[int, FloatArray] | None = None
-        self._heard_ns = self._stopped_ns = 0
-        self._reason = ""
+        self._sent: Moment | None = None
+        self._is_off = False
+        self._seen_ns = self._sent_ns = self._motion_ns = self._stopped_ns = 0
+        self._state = self._reason = ""
 
     @property
     def status(self) -> str:
         """The phase, with the reason if the robot stands still: for people."""
-        if self.phase is Phase.DISABLED:
-            return "disabled" + (f": {self._reason}" if self._reason else "")
-        if self.phase is Phase.READY:
-            return f"ready: {self._reason or 'no posture yet'}"
-        return self._reason or ("moving" if self.phase is Phase.FOLLOWING else "stopping")
+        reason = self._reason or ("no posture yet" if self.phase is Phase.READY else "")
+        return self.phase.value + (f": {reason}" if reason else "")
 
     def enable(self, is_wanted: bool, now_ns: int, is_grip: bool = False) -> None:
-        """Enable the robot or stop it; with ``is_grip``, for 0.3 s only."""
-        self._gripped_ns = now_ns if is_wanted and is_grip else None
-        if is_wanted != self._is_wanted:
-            self._is_wanted = is_wanted
-            self._reason = ""
-            if is_wanted and self.phase is Phase.DISABLED:
-                self.phase = Phase.READY
-            elif not is_wanted:
-                self._stop("", now_ns)
+        """Enable the robot or stop it; with ``is_grip``, for 0.3 s only.
+
+        A grip that is held since before a fault enables nothing; it has to be released first.
+        """
+        is_held = is_grip and self._gripped_ns is not None
+        if is_grip or is_wanted:
+            self._gripped_ns = now_ns if is_wanted and is_grip else None
+        if is_wanted == self._is_wanted or (is_wanted and is_held):
+            return
+        self._is_wanted = is_wanted
+        if is_wanted:
+            self.phase, self._reason = Phase.READY, ""
+        else:
+            self._stop(Phase.DISABLED, "", now_ns)
 
     def robot_at(self, positions: FloatArray, now_ns: int) -> None:
         """Take where the robot is, (n,), rad or m."""
         self._robot = now_ns, positions
+        if self._sent is None or self.phase not in (Phase.FOLLOWING, Phase.HOLDING):
+            return
+        off = np.abs(positions - self._sent.positions) / self._retargeter.tolerance
+        if off.max() > 1.0:
+            joint = self._retargeter.joints[int(off.argmax())]
+            self._is_off, self.phase = True, Phase.HOLDING
+            self._reason = f"{joint} is not where it was sent"
+            self._near(now_ns)
+        elif self._is_off and off.max() <= _RELEASED:
+            self._is_off = False
+            self._retargeter.hold("", self._clock_ns(now_ns))
 
-    def follow(self, update: Callable[[], Command], state: str, now_ns: int) -> Command | None:
-        """Take an image's posture; return the command to send, or None if none may be sent."""
-        self.tick(now_ns)
-        self._heard_ns = now_ns
+    def follow(self, update: Callable[[int], Command], state: str, now_ns: int) -> Command | None:
+        """Take an image's posture; return the command to send, or None if none may be sent.
+
+        ``update`` returns the command at a time of the motion's clock, ns.
+        """
+        self._state = state
+        if state not in (LOST, NO_PERSON):
+            self._seen_ns = now_ns
+        command = self.tick(now_ns)
+        clock_ns = self._clock_ns(now_ns)
         if self.phase is Phase.READY:
-            if not self._is_robot_known(now_ns):
-                self._reason = "the robot's joint states are not known"
-                return None
-            if self._robot is not None and not self._config.start:
-                self._retargeter.begin(self._robot[1])
-        elif self.phase is not Phase.FOLLOWING:
-            return None
-        command = update()
-        self._reason = "" if command.is_moving else command.status
-        if self.phase is Phase.READY:
-            if not command.is_moving:
-                return None
-            self.phase = Phase.FOLLOWING
-        elif self._config.enable_after_lost and state in (LOST, NO_PERSON):
-            self._is_wanted = False
-            self._stop(state.replace("_", " "), now_ns)
-        return command
+            if clock_ns <= self._stopped_ns or not self._begins(now_ns):
+                return command
+        elif self.phase not in (Phase.FOLLOWING, Phase.HOLDING):
+            return command
+        if self._is_off:
+            return self._near(now_ns)
+        command = update(clock_ns)
+        self._reason = "" if command.is_moving else command.reason
+        if command.is_moving or self.phase is not Phase.READY:
+            self.phase = Phase.FOLLOWING if command.is_moving else Phase.HOLDING
+            return command
+        return None
 
     def tick(self, now_ns: int) -> Command | None:
         """Look at the time; return the command to stop if it is to be sent now."""
         if self._gripped_ns is not None and now_ns - self._gripped_ns > DEAD_MAN_NS:
-            self._gripped_ns, self._is_wanted = None, False
-            return self._stop("not gripped", now_ns)
-        if self.phase is Phase.STOPPING and now_ns > self._stopped_ns:
-            self.phase = Phase.READY if self._is_wanted else Phase.DISABLED
-        if self.phase is not Phase.FOLLOWING:
+            self._gripped_ns = None
+            if self._is_wanted:
+                self._is_wanted = False
+                return self._stop(Phase.DISABLED, "not gripped", now_ns)
+        if self.phase not in (Phase.FOLLOWING, Phase.HOLDING):
             return None
+        again = self._config.enable_after_lost
         if not self._is_robot_known(now_ns):
-            return self._stop("the robot's joint states have stopped", now_ns)
-        if now_ns - self._heard_ns > self._timeout_ns and not self._reason.startswith(
-            "frozen: no p"
-        ):
-            command = self._retargeter.hold(f"no posture for {self._timeout_ns / 1e9:g} s", now_ns)
-            self._reason = command.status
-            return command
+            self._is_wanted = not again
+            phase = Phase.FAULTED if again else Phase.READY
+            return self._stop(phase, "the robot's joint states have stopped", now_ns)
+        if now_ns - self._seen_ns > self._timeout_ns:
+            reason = f"no posture for {self._timeout_ns / 1e9:g} s"
+            if self._state in (LOST, NO_PERSON):
+                reason = self._state.replace("_", " ")
+            if again:
+                self._is_wanted = False
+                return self._stop(Phase.FAULTED, reason, now_ns)
+            if (self.phase, self._reason) != (Phase.HOLDING, reason) and not self._is_off:
+                return self._stop(Phase.HOLDING, reason, now_ns)
         return None
 
     def moment(self, now_ns: int) -> Moment | None:
         """Return positions and velocities to send now, or None if none may be sent."""
-        if self.phase not in (Phase.FOLLOWING, Phase.STOPPING):
-            return None
-        return self._retargeter.at(now_ns)
+        self._motion_ns, self._sent_ns = self._clock_ns(now_ns), now_ns
+        is_sent = self.phase in (Phase.FOLLOWING, Phase.HOLDING)
+        is_sent = is_sent or self._motion_ns <= self._stopped_ns
+        self._sent = self._retargeter.at(self._motion_ns) if is_sent else None
+        return self._sent
 
-    def _stop(self, reason: str, now_ns: int) -> Command | None:
-        self._reason = reason
-        if self.phase is Phase.FOLLOWING:
-            self.phase = Phase.STOPPING
-            self._stopped_ns = now_ns + self._retargeter.settles_ns
-            return self._retargeter.hold(reason or "disabled", now_ns)
-        if self.phase is Phase.READY:
-            self.phase = Phase.READY if self._is_wanted else Phase.DISABLED
-        return None
+    def _clock_ns(self, now_ns: int) -> int:
+        """Return the time of the motion, whose commands go on from the last one that was sent."""
+        return self._motion_ns + min(max(now_ns - self._sent_ns, 0), self._period_ns)
+
+    def _begins(self, now_ns: int) -> bool:
+        """Return whether the robot can begin where it is, and let it begin there."""
+        self._reason = ""
+        if self._config.start:
+            return True
+        if not self._is_robot_known(now_ns) or self._robot is None:
+            self._reason = "the robot's joint states are not known"
+            return False
+        self._retargeter.begin(self._robot[1])
+        begun = self._retargeter.at(self._clock_ns(now_ns)).positions
+        off = np.abs(begun - self._robot[1]) / self._retargeter.tolerance
+        if off.max() > 1.0:
+            self._reason = f"{self._retargeter.joints[int(off.argmax())]} is beyond its limits"
+        return not self._reason
+
+    def _near(self, now_ns: int) -> Command | None:
+        """Hold near the robot, which is not where it was sent."""
+        if self._robot is None:
+            return None
+        return self._retargeter.hold_near(self._robot[1], self._reason, self._clock_ns(now_ns))
+
+    def _stop(self, phase: Phase, reason: str, now_ns: int) -> Command | None:
+        """Let the robot decelerate if it moves, and stay in a phase."""
+        was_sent = self.phase in (Phase.FOLLOWING, Phase.HOLDING)
+        self.phase, self._reason, self._is_off = phase, reason, False
+        if not was_sent:
+            return None
+        clock_ns = self._clock_ns(now_ns)
+        # The last command is about where it stands still.
+        self._stopped_ns = clock_ns + self._retargeter.settles_ns + self._period_ns // 2
+        return self._retargeter.hold(reason or "disabled", clock_ns)
 
     def _is_robot_known(self, now_ns: int) -> bool:
         if self._config.start:

@@ -54,7 +54,7 @@ def image_of(
     supported, the bytes do not match it, or there are more than ``most_pixels``.
     """
     if isinstance(message, CompressedImage):
-        return decode_compressed(message.data, most_pixels, levels)
+        return decode_compressed(message.data, most_pixels, levels, message.format)
     return decode_as_sent(SentImage.of(message), most_pixels, levels)
 
 

@@ -137,6 +137,9 @@ class BackgroundNode(CardboxNode):
 
     def _on_calibration(self, calibration: Calibration) -> None:
         settings = self.parameters.value
+        if self._pipeline is not None and self._pipeline.calibration.is_resized(calibration):
+            self._pipeline.calibration = calibration
+            return
         if self._pipeline is not None:
             self._kept.carry_over(self._pipeline.model)
         self._image = None

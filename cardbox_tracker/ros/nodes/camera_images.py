@@ -14,6 +14,7 @@ from cardbox_tracker.camera.calibration_watch import CalibrationWatch
 from cardbox_tracker.camera.camera import Calibration, Camera
 from cardbox_tracker.camera.encodings import Levels
 from cardbox_tracker.camera.exposure import exposure_problem
+from cardbox_tracker.camera.frames import OneFrame
 from cardbox_tracker.camera.stamps import StampOrder
 from cardbox_tracker.ros.messages import conversions
 from cardbox_tracker.ros.messages.conversions import ImageArray
@@ -65,7 +66,7 @@ class CameraImages:
         self.info: CameraInfo | None = None
         self.order = StampOrder.NEXT
         self.image_bytes = 0
-        self._levels = Levels()
+        self._levels, self._frames = Levels(), OneFrame()
         self._image: ImageArray | None = None
         self._early: tuple[Image | CompressedImage, int] | None = None
         self._single = SinglePublisher(node, (self.topic, self.info_topic))
@@ -80,14 +81,16 @@ class CameraImages:
 
     def on_info(self, message: CameraInfo, _: int) -> None:
         """Use a CameraInfo if it is the first valid one, or lasts."""
-        before = self.watch.remark
+        if message.header.frame_id.lstrip("/") in self._frames.others:
+            return
+        before, old = self.watch.remark, self.watch.current
         changed = self.watch.see(message)
         if self.watch.remark not in ("", before):
             self._node.diagnostics.say("CameraInfo", self.watch.remark, warning=True)
         calibration = self.watch.current
         if not changed or calibration is None:
             return
-        if self.info is not None:
+        if old is not None and not old.is_resized(calibration):
             self._node.get_logger().warning(
                 f"the CameraInfo on {self.info_topic} has changed for good, to {calibration}"
             )
@@ -102,6 +105,8 @@ class CameraImages:
 
     def on_image(self, message: Image | CompressedImage, sent_ns: int) -> None:
         """Deliver an image if its stamp can be used and the calibration is known."""
+        if not self._frames.takes(message.header.frame_id):
+            return
         order = self._node.diagnostics.arrived(conversions.stamp_ns(message.header.stamp))
         if not order.is_usable:
             return
@@ -141,6 +146,7 @@ class CameraImages:
         """Return warnings about publishers, calibration and exposure, by kind."""
         found = {"": self.watch.remark, "calibration": self.watch.doubt}
         problem = "" if self._image is None else exposure_problem(self._image)
+        found["frames"] = self._frames.remark(self.topic)
         found["exposure"] = problem and f"{self.topic}: {problem}"
         return self._single.remarks() | {kind: text for kind, text in found.items() if text}
 

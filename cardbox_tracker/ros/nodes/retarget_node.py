@@ -18,7 +18,7 @@ from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
 from cardbox_tracker.applications.retargeting.config import RetargetConfig
 from cardbox_tracker.applications.retargeting.retargeter import Command, make_retargeter
-from cardbox_tracker.applications.retargeting.supervisor import Supervisor
+from cardbox_tracker.applications.retargeting.supervisor import DEAD_MAN_NS, Supervisor
 from cardbox_tracker.applications.teleoperation.sending import ZmqSender, joints_packet
 from cardbox_tracker.common.errors import CardboxError
 from cardbox_tracker.common.files import user_path
@@ -77,8 +77,11 @@ class RetargetNode(CardboxNode):
         self._supervisor = Supervisor(self._retargeter, settings, settings.timeout_s)
         self._status = ""
         self._arrived_ns, self._stamp_ns = _now_ns(), 0
+        self._streamed_ns = self._sent_stamp_ns = 0
         address = settings.stream_address
         self._sender = ZmqSender(address) if address else None
+        for remark in self._sender.remarks if self._sender else ():
+            self.get_logger().warning(remark)
         self._trajectory = self.advertise(JointTrajectory, "retarget/joint_trajectory", qos.RESULT)
         self._commands = self.advertise(Float64MultiArray, "retarget/commands", qos.RESULT)
         self._robot_joints = self.advertise(JointState, "retarget/joint_states", qos.RESULT)
@@ -86,8 +89,8 @@ class RetargetNode(CardboxNode):
         description = self.advertise(String, "retarget/robot_description", qos.LATCHED)
         description.publish(String(data=robot.urdf))
         self._input = PostureInput(self, self._follow)
-        self.subscribe(JointState, "retarget/robot_joint_states", self._on_robot, qos.RESULT)
-        self.subscribe(Bool, "retarget/grip", self._on_grip, qos.RESULT)
+        self.subscribe(JointState, "retarget/robot_joint_states", self._on_robot, qos.LATEST)
+        self.subscribe(Bool, "retarget/grip", self._on_grip, qos.LATEST)
         self.create_service(SetBool, "retarget/enable", self._on_enable, qos_profile=qos.SERVICE)
         self.create_timer(1.0 / settings.rate_hz, self._stream)
         self._say()
@@ -99,8 +102,16 @@ class RetargetNode(CardboxNode):
         if np.isfinite(positions).all():
             self._supervisor.robot_at(positions, _now_ns())
 
-    def _on_grip(self, message: Bool, _: int) -> None:
-        self._supervisor.enable(message.data, _now_ns(), is_grip=True)
+    def _on_grip(self, message: Bool, sent_ns: int) -> None:
+        age_ns = max(time.time_ns() - sent_ns, 0)
+        if message.data and age_ns > DEAD_MAN_NS:
+            self.diagnostics.warn(
+                f"a grip on {self.resolve('retarget/grip')} came more than "
+                f"{DEAD_MAN_NS / 1e9:g} s after it was sent and is not used: the network is slow, "
+                "or set the clocks of both computers alike"
+            )
+            return
+        self._supervisor.enable(message.data, _now_ns() - age_ns, is_grip=True)
         self._say()
 
     def _on_enable(self, request: SetBool.Request, response: SetBool.Response) -> SetBool.Response:
@@ -121,8 +132,9 @@ class RetargetNode(CardboxNode):
             hands = joints_of(image.hands).of(HAND_OPEN_NAMES)
         update = partial(
             self._retargeter.update,
-            *(image.stamp_ns, image.state, image.body, posture, stddev, now_ns, hands),
-            image.keypoints,
+            *(image.stamp_ns, image.state, image.body, posture, stddev),
+            hands=hands,
+            keypoints=image.keypoints,
         )
         command = self._supervisor.follow(update, image.state, now_ns)
         self._send(command)
@@ -153,18 +165,22 @@ class RetargetNode(CardboxNode):
         self._send(self._supervisor.tick(now_ns))
         moment = self._supervisor.moment(now_ns)
         if moment is None:
+            self._sent_stamp_ns = 0
             return
+        # The recording's time goes on from the image, and never back.
+        since_ns, self._streamed_ns = now_ns - self._streamed_ns, now_ns
+        stamp_ns = self._stamp_ns + now_ns - self._arrived_ns
+        if self._sent_stamp_ns:
+            stamp_ns = max(stamp_ns, self._sent_stamp_ns + since_ns)
+        self._sent_stamp_ns = stamp_ns
         names = list(self._retargeter.joints)
         if self._sender is not None:
             lower, upper, _ = self._retargeter.limits
-            found = joints_packet(self._stamp_ns, names, moment.positions, lower, upper)
+            found = joints_packet(stamp_ns, names, moment.positions, lower, upper)
             self._sender.send(found)
         positions, velocities = (part.tolist() for part in moment)
         header = Header()
-        if self._stamp_ns:
-            # The recording's time goes on from the image.
-            stamp = Time(nanoseconds=self._stamp_ns + now_ns - self._arrived_ns)
-            header.stamp = stamp.to_msg()
+        header.stamp = Time(nanoseconds=stamp_ns).to_msg()
         self._commands.publish(Float64MultiArray(data=positions))
         self._robot_joints.publish(
             JointState(header=header, name=names, position=positions, velocity=velocities)

@@ -9,7 +9,7 @@ from typing import Any
 from std_msgs.msg import ByteMultiArray, String
 
 from cardbox_tracker.applications.teleoperation.full_body import FullBodies, FullBody
-from cardbox_tracker.applications.teleoperation.sending import PACKETS, ZmqSender, packet
+from cardbox_tracker.applications.teleoperation.sending import PACKETS, Packets, sender_of
 from cardbox_tracker.common.errors import CardboxError
 from cardbox_tracker.recordings.outputs import joints_of
 from cardbox_tracker.ros.nodes.posture_input import PostureInput, Tracked
@@ -32,8 +32,8 @@ class TeleoperationParameters(NodeParameters):
     to: str = at_start("isaac", "who reads the stream", choices=tuple(PACKETS))
     address: str = at_start(
         "",
-        "ZMQ address on which the stream is published, as tcp://127.0.0.1:5556; empty: the topic "
-        "of the reader",
+        "ZMQ address on which the stream is published, as tcp://127.0.0.1:5556, or for vmc where "
+        "it is sent, udp://127.0.0.1:39539; empty: the topic of the reader",
     )
     rate_hz: float = at_start(50.0, "packets a second", unit="Hz", limits=(1.0, 1000.0))
     timeout_s: float = at_start(
@@ -49,13 +49,16 @@ class TeleoperationNode(CardboxNode):
         self._settings = LiveParameters(self, TeleoperationParameters).value
         to, address = self._settings.to, self._settings.address
         if to not in _TOPICS and not address:
-            raise CardboxError(f"{to} reads ZMQ: give the parameter address, tcp://127.0.0.1:5556")
-        self._sender = ZmqSender(address) if address else None
+            example = "udp://127.0.0.1:39539" if to == "vmc" else "tcp://127.0.0.1:5556"
+            raise CardboxError(f"{to} has no topic: give the parameter address, {example}")
+        self._sender = sender_of(to, address) if address else None
+        for remark in self._sender.remarks if self._sender else ():
+            self.get_logger().warning(remark)
         if not address:
             self._publisher = self.advertise(*_TOPICS[to], qos.RESULT)
         self._bodies = FullBodies()
         self._pair: tuple[FullBody, FullBody] | None = None
-        self._arrived_s, self._number = 0.0, 0
+        self._arrived_s, self._packets = 0.0, Packets(to, self._settings.rate_hz)
         self._input = PostureInput(self, self._take)
         self.create_timer(1.0 / self._settings.rate_hz, self._stream)
 
@@ -82,10 +85,9 @@ class TeleoperationNode(CardboxNode):
         body = before.until(after, now_ns)
         if passed_s > self._settings.timeout_s:
             body = after.invalid(now_ns)
-        made = packet(self._settings.to, body, self._number)
+        made = self._packets.of(body)
         if made is None:
             return
-        self._number += 1
         if self._sender is not None:
             self._sender.send(made)
         elif self._settings.to == "json":

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+from geometry_msgs.msg import PoseStamped
 from sensor_msgs.msg import Image, JointState
 from std_msgs.msg import Bool, Header, String
 
@@ -14,14 +15,16 @@ from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.model_file import dumps_body_model
 from cardbox_tracker.person.rep155 import Rep155Joints, joint_names
 from cardbox_tracker.person.urdf import rep155_urdf
+from cardbox_tracker.recordings.messages import pose_message
 from cardbox_tracker.recordings.outputs import (
     TOPICS,
     JointValues,
     OutputStream,
     person_space,
 )
+from cardbox_tracker.recordings.person_poses import POSES, person_poses
 from cardbox_tracker.ros.messages import conversions, results
-from cardbox_tracker.ros.messages.types import class_of, optional_class
+from cardbox_tracker.ros.messages.types import class_of, new_message, optional_class
 from cardbox_tracker.ros.nodes.camera_inputs import ObservationSet
 from cardbox_tracker.ros.nodes.tracker_parameters import TrackerParameters
 from cardbox_tracker.ros.runtime import qos
@@ -105,6 +108,9 @@ class TrackerOutputs:
             for topic, kind in TOPICS.items()
             if settings.hands or topic != "hands"
         }
+        self._poses = {
+            topic: node.advertise(PoseStamped, space + topic, qos.RESULT) for topic in POSES
+        }
         # With people, body_model is that of the first one, or the given one of all.
         self._model = space and node.advertise(String, f"{space}body_model", qos.LATCHED)
         self._body: BodyModel | None = None
@@ -135,6 +141,9 @@ class TrackerOutputs:
             self._model.publish(String(data=dumps_body_model(self._body)))
         for topic, value in self._stream.values(stamp_ns, estimate, tracker, self._is_wanted):
             self._publishers[topic].publish(results.message_of(header, value))
+        if any(map(_wanted, self._poses.values())):
+            for topic, pose in person_poses(estimate, tracker.body):
+                self._poses[topic].publish(pose_message(new_message, header, pose))
         if self._human is not None:
             self._human.publish(header, estimate, tracker)
         if _wanted(self._overlay) and not self._guided:

@@ -85,8 +85,8 @@ class TrackerParameters(NodeParameters):
     camera_pitch_deg: float = at_start(
         NOT_GIVEN_DEG,
         "with people who are not measured: pitch of the (first) camera, positive downwards; 90: "
-        "with keypoints it is found, without them the camera is taken as level, and every posture "
-        "is at best uncertain",
+        "with keypoints it is found, without them the camera is taken as level, and leans are "
+        "uncertain",
         unit="deg",
         limits=(-80.0, NOT_GIVEN_DEG),
     )

@@ -27,6 +27,8 @@ CAMERA = QoSProfile(depth=5, reliability=ReliabilityPolicy.RELIABLE)
 SILHOUETTE = QoSProfile(depth=1, reliability=ReliabilityPolicy.RELIABLE)
 # With a queue of five, a subscriber may fall behind by some images.
 SILHOUETTE_INPUT = QoSProfile(depth=5, reliability=ReliabilityPolicy.RELIABLE)
+# Of commands and states of a robot, only the newest counts.
+LATEST = QoSProfile(depth=1, reliability=ReliabilityPolicy.RELIABLE)
 RESULT = QoSProfile(depth=10, reliability=ReliabilityPolicy.RELIABLE)
 # A player can wait for a slow subscriber, and the queue holds 100 images.
 PLAYED = QoSProfile(depth=100, reliability=ReliabilityPolicy.RELIABLE)

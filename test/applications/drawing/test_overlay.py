@@ -246,6 +246,19 @@ def test_the_head_becomes_coarse(pitch_rad: float) -> None:
     assert changed.mean() < 0.25
 
 
+def test_heads_are_hidden_below_the_model_of_whoever_is_there() -> None:
+    there = Estimate(TRACKING, np.zeros(12), iou=0.9, cost_px=1)
+    drawn = draw_overlay(NOISE, AVERAGE, NEAR, there, hides_heads=True)
+    expected = with_hidden_head(NOISE, AVERAGE, NEAR, there)
+    assert (drawn == draw_overlay(expected, AVERAGE, NEAR, there)).all()
+    assert (drawn != draw_overlay(NOISE, AVERAGE, NEAR, there)).any()
+    # Nobody knows where a lost head is; one of several people who is not there has none.
+    lost = draw_overlay(NOISE, AVERAGE, NEAR, Estimate("lost"), hides_heads=True)
+    assert (lost != NOISE).any(axis=2).mean() > 0.9
+    away = draw_overlay(NOISE, AVERAGE, NEAR, Estimate("no_person", person=2), hides_heads=True)
+    assert (away != NOISE).any(axis=2).mean() < 0.1
+
+
 def test_few_colours_remain() -> None:
     drawn = with_hidden_head(NOISE, AVERAGE, NEAR, Estimate(TRACKING, np.zeros(12)))
     changed = (drawn != NOISE).any(axis=2)

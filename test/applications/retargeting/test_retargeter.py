@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -123,6 +124,15 @@ def test_an_arm_gets_where_it_is_wanted_at_its_speed() -> None:
     assert robot.at(3 * 10**9).positions == pytest.approx([-math.radians(80), *[0.0] * 6])
 
 
+def test_a_faster_robot_is_no_later() -> None:
+    """Acceleration and jerk follow the speed, so that stopping takes 0.2 s at each."""
+    for speed in (0.25, 0.5, 1.0, 2.0):
+        robot = Retargeter(ROBOT, MAP, RetargetConfig(max_speed=speed))
+        assert robot.settles_ns == pytest.approx(2e8, rel=1e-6)
+    own = RetargetConfig(max_acceleration=10.0, max_jerk=100.0)
+    assert Retargeter(ROBOT, MAP, own).settles_ns == pytest.approx(4e8, rel=1e-6)
+
+
 def test_the_start_is_soft_and_where_the_robot_is() -> None:
     robot = Retargeter(ROBOT, MAP, RetargetConfig(soft_start_s=1.0, start="shoulder_roll=0.4"))
     assert robot.at(0).positions[0] == 0.4
@@ -168,13 +178,13 @@ def test_a_joint_holds_while_its_own_keypoints_are_not_tracked() -> None:
 @pytest.mark.parametrize(
     ("state", "deviation", "status"),
     [
-        ("lost", 0.1, "frozen: lost"),
-        ("no_person", 0.1, "frozen: no person"),
-        ("uncertain", 0.1, "frozen: uncertain"),
-        ("", 0.1, "frozen: no state yet"),
-        ("tracking", 0.8, "frozen: too uncertain"),
-        ("tracking", math.nan, "frozen: too uncertain"),
-        ("tracking", 0.1, "moving"),
+        ("lost", 0.1, "holding: lost"),
+        ("no_person", 0.1, "holding: no person"),
+        ("uncertain", 0.1, "holding: uncertain"),
+        ("", 0.1, "holding: no state yet"),
+        ("tracking", 0.8, "holding: too uncertain"),
+        ("tracking", math.nan, "holding: too uncertain"),
+        ("tracking", 0.1, "following"),
     ],
 )
 def test_the_dead_man(state: str, deviation: float, status: str) -> None:
@@ -184,19 +194,37 @@ def test_the_dead_man(state: str, deviation: float, status: str) -> None:
     assert robot.update(5 * 10**8, state, BODY, posture, np.full(12, deviation)).status == status
     assert robot.at(5 * 10**8).velocities.any()  # it decelerates
     assert not robot.at(10**9).velocities.any()
-    assert robot.update(10**9, "tracking", None, posture, SURE).status == "frozen: no body model"
+    assert robot.update(10**9, "tracking", None, posture, SURE).status == "holding: no body model"
+
+
+@pytest.mark.parametrize(
+    ("flexion_deg", "moves"), [(88.0, True), (30.0, False)], ids=["along the axis", "across"]
+)
+def test_a_limb_along_the_axis_of_its_abduction_has_a_sure_direction(
+    flexion_deg: float, moves: bool
+) -> None:
+    """A forearm straight ahead is known, and its abduction is not."""
+    posture, stddev = np.zeros(12), SURE.copy()
+    posture[JOINT_NAMES.index("right_elbow_flexion")] = np.radians(flexion_deg)
+    stddev[JOINT_NAMES.index("right_elbow_abduction")] = 1.8
+    _, robot, _ = make_retargeter(CONFIG / "example_arm.urdf", None, RetargetConfig())
+    assert robot.update(0, "tracking", BODY, posture, stddev).is_moving == moves
+    # What follows the abduction alone needs it.
+    only = replace(MAP, angles=tuple("right_elbow_abduction" for _ in MAP.angles))
+    single = Retargeter(ROBOT, only, RetargetConfig())
+    assert not single.update(0, "tracking", BODY, posture, stddev).is_moving
 
 
 def test_after_holding_nothing_is_made_up_for() -> None:
     robot = Retargeter(ROBOT, MAP, RetargetConfig())
     robot.update(0, "tracking", BODY, reference_posture("arms"), SURE)
-    assert robot.hold("no posture", 10**8).status == "frozen: no posture"
+    assert robot.hold("no posture", 10**8).status == "holding: no posture"
     robot.update(10**9, "tracking", BODY, reference_posture("arms"), SURE)
     assert not robot.at(2 * 10**9).positions.any()
 
 
-def test_two_arms_of_one_robot_follow_at_once(tmp_path: Path) -> None:
-    """Each arm is the example arm, by its names."""
+def two_arms(path: Path, head: str = "", left: str = "") -> Path:
+    """Write a robot with the example arm twice; ``left`` is the origin of the left one."""
     text = ROBOT.urdf
     names = [*(f'"{link}"' for link in ROBOT.links if link != "base_link")]
     names += [f'"{name}"' for name in ROBOT.joints]
@@ -206,8 +234,37 @@ def test_two_arms_of_one_robot_follow_at_once(tmp_path: Path) -> None:
         part = body
         for name in names:
             part = part.replace(name, f'"{side}_{name[1:]}')
+        if side == "left" and left:
+            limits = 'lower="-2.8" upper="0.5"'
+            part = part.replace("0 -0.16 0", left, 1).replace(limits, 'lower="-0.5" upper="2.8"')
         arms.append(part)
-    path = tmp_path / "two.urdf"
+    path.write_text(f'<robot name="two"><link name="base_link"/>{"".join(arms)}{head}</robot>')
+    return path
+
+
+@pytest.mark.parametrize("apart_m", [0.0, 0.15])
+def test_two_arms_do_not_touch_and_part_again(tmp_path: Path, apart_m: float) -> None:
+    """Forearms that cross before the chest come as near as they may, and leave each other."""
+    path = two_arms(tmp_path / "two.urdf", left="0 0.16 0")
+    config = RetargetConfig(side="both", arms_apart_m=apart_m, soft_start_s=0.0)
+    _, robot, _ = make_retargeter(path, None, config)
+    crossed = np.zeros(12)
+    for side in ("left", "right"):
+        crossed[JOINT_NAMES.index(f"{side}_elbow_flexion")] = 0.7
+        crossed[JOINT_NAMES.index(f"{side}_elbow_abduction")] = -1.3
+    seen = []
+    for tenth, posture in enumerate([*[crossed] * 30, *[np.zeros(12)] * 30]):
+        robot.update(tenth * 10**8, "tracking", BODY, posture, SURE)
+        for count in range(10):
+            positions = robot.at(tenth * 10**8 + count * 10**7).positions
+            seen.append(robot._method._between_m(positions))  # type: ignore[attr-defined]
+    assert (min(seen) < 0.1) == (apart_m == 0.0)
+    assert min(seen) >= apart_m - 0.01
+    assert seen[-1] > 0.25
+
+
+def test_two_arms_of_one_robot_follow_at_once(tmp_path: Path) -> None:
+    """Each arm is the example arm, by its names."""
     joint = (
         '<link name="{link}"/><joint name="{name}" type="revolute"><parent link="{parent}"/>'
         '<child link="{link}"/><origin rpy="0 0 {yaw}"/><axis xyz="{axis}"/>'
@@ -216,7 +273,7 @@ def test_two_arms_of_one_robot_follow_at_once(tmp_path: Path) -> None:
     # Turned by half a turn, the second joint lifts the face by positive angles.
     head = joint.format(link="neck", name="pan", parent="base_link", yaw=0, axis="0 0 1")
     head += joint.format(link="head", name="tilt", parent="neck", yaw=np.pi, axis="0 1 0")
-    path.write_text(f'<robot name="two"><link name="base_link"/>{"".join(arms)}{head}</robot>')
+    path = two_arms(tmp_path / "two.urdf", head)
     _, robot, table = make_retargeter(path, None, RetargetConfig(side="both"))
     arm_joints = (f"{side}_{name}" for side in ("left", "right") for name in ROBOT.joints)
     assert robot.joints == (*arm_joints, "pan", "tilt")

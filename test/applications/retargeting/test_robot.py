@@ -51,7 +51,11 @@ def test_a_robot_is_read() -> None:
         ("</robot>", "", "expected the URDF"),
         ('upper="0.4"', 'upper="inf"', "slides.* 0.1 to inf"),
         ('upper="0.4"', 'upper="0"', "slides.* 0.1 to 0.0"),
-        ('lower="0.1" upper="0.4"', 'lower="x" upper="0.4"', "could not convert"),
+        (
+            'lower="0.1" upper="0.4"',
+            'lower="x" upper="0.4"',
+            "the lower of the limit of the joint slides is 'x'",
+        ),
         ('<parent link="b"/>', "", "slides has no parent"),
         ('<child link="c"/>', '<child link="b"/>', "b has two parents"),
         ('<parent link="a"/>', '<parent link="c"/>', "its own ancestor"),
@@ -94,6 +98,25 @@ def test_names_of_joints_and_links_are_apart_and_a_floating_base_stays() -> None
     robot = parse_robot(text)
     assert list(robot.joints) == ["turns", "slides"]
     assert [one.name for one in robot.path("c")] == ["c", "turns", "slides"]
+
+
+def test_a_joint_with_hardly_a_range_stays() -> None:
+    text = URDF.replace('upper="0.4"', 'upper="0.100000000001"')
+    assert list(parse_robot(text).joints) == ["turns"]
+
+
+def test_who_mimics_a_mimic_follows_its_leader() -> None:
+    """With c = 3 b + 0.5 and b = 2 a - 1, c is 6 a - 2.5."""
+    text = chain(3)
+    for joint, mimic in (
+        ("j1", "<mimic joint='j0' multiplier='2' offset='-1'/>"),
+        ("j2", "<mimic joint='j1' multiplier='3' offset='0.5'/>"),
+    ):
+        text = text.replace(
+            f"name='{joint}' type='revolute'>", f"name='{joint}' type='revolute'>{mimic}"
+        )
+    found = parse_robot(text).all_joints["l3"]
+    assert (found.mimics, found.multiplier, found.offset) == ("j0", 6.0, -2.5)
 
 
 def test_what_a_robot_lacks_is_told(tmp_path: Path) -> None:
@@ -166,12 +189,13 @@ def follower(text: str) -> ArmFollower:
 
 ARM = chain(4)
 ORIGIN, ROOT, LIMIT = "0 0 0.1", "'l0'", "upper='1'"
+LIMITS = "<limit lower='-1' upper='1' velocity='1' effort='1'/>"
 IMPOSSIBLE = {
     "an origin that is nan": (ORIGIN, "0 0 nan", "xyz of the origin of the joint j0"),
     "an arm of 10^100 m": (ORIGIN, "0 0 1e100", "three finite numbers"),
     "an arm in millimetres": (ORIGIN, "0 0 100", "200 m long"),
     "an arm without length": (ORIGIN, "0 0 0", "0 m long"),
-    "a missing limit": ("<limit lower='-1' upper='1' velocity='1' effort='1'/>", "", "no limit"),
+    "a missing limit": (LIMITS, "", "no limit"),
     "a limit of nan": (LIMIT, "upper='nan'", "limits -1.0 to nan"),
     "an infinite limit": (LIMIT, "upper='inf'", "limits -1.0 to inf"),
     "a limit of 10^308": (LIMIT, "upper='1e308'", "limits -1.0 to 1e[+]308"),
@@ -185,6 +209,17 @@ IMPOSSIBLE = {
         "<link name='l2'/><link name='l2'/>",
         "two links have one name",
     ),
+    "commas between angles": (
+        f"<origin xyz='{ORIGIN}'",
+        f"<origin rpy='0,0,1' xyz='{ORIGIN}'",
+        "rpy of the origin of the joint j0 is '0,0,1'.*spaces between",
+    ),
+    "a factor that is no number": (
+        LIMITS,
+        f"{LIMITS}<mimic joint='j1' offset='a'/>",
+        "offset of the mimic",
+    ),
+    "its own leader": (LIMITS, f"{LIMITS}<mimic joint='j0'/>", "j0 mimic each other"),
     "a name with a NUL": ("l0", "l\0", "not XML"),
 }
 

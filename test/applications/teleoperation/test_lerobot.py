@@ -151,6 +151,39 @@ def test_shares_of_the_range_are_those_of_the_limits(make: Any, sender: ZmqSende
     newest(teleoperator, {"lift.pos": -100.0, "jaw.pos": 100.0})
 
 
+def within(value: str) -> bytes:
+    """Return a command whose first joint is at a value."""
+    lift = f'"positions":[{value},1]'
+    return f'{{"names":["lift","jaw"],{lift},"lower":[-2,0],"upper":[1,2]}}'.encode()
+
+
+@pytest.mark.parametrize(
+    "packet",
+    [
+        *(b"", b"pose1", b"\xff\xfe", b"[1]", b"{}", b"[" * 100_000, b"7"),
+        b'{"names":["lift"],"positions":[0],"lower":[-2],"upper":[1]}',
+        b'{"names":[[]],"positions":[0],"lower":[-2],"upper":[1]}',
+        *map(within, ("NaN", "Infinity", "-Infinity", "1e9", "1.1", '"1"', "9" * 400)),
+    ],
+    ids=range(16),
+)
+def test_what_is_no_command_within_the_limits_is_refused(
+    make: Any, sender: ZmqSender, caplog: pytest.LogCaptureFixture, packet: bytes
+) -> None:
+    teleoperator = connected(make(), sender)
+    sender.send(within("0"))
+    newest(teleoperator, {"lift.pos": 0.0, "jaw.pos": 50.0})
+    sender.send(packet)
+    until_s = time.monotonic() + 2.0
+    while "is refused" not in caplog.text and time.monotonic() < until_s:
+        assert teleoperator.get_action() == {"lift.pos": 0.0, "jaw.pos": 50.0}
+        time.sleep(0.01)
+    assert caplog.text.count("is refused") == 1
+    assert teleoperator.get_action() == {"lift.pos": 0.0, "jaw.pos": 50.0}
+    sender.send(within("1.000001"))
+    newest(teleoperator, {"lift.pos": np.degrees(1.0), "jaw.pos": 50.0})
+
+
 def test_mistakes_are_told(make: Any, sender: ZmqSender) -> None:
     with pytest.raises(ConnectionError, match="no command came on tcp:"):
         make(wait_s=0.05).connect()

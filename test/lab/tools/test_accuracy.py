@@ -95,6 +95,20 @@ def test_a_robot_that_can_points_as_the_person() -> None:
     assert all(float(cell.split(" / ")[1].rstrip("°")) < 8.0 for cell in cells[2:5])
 
 
+def test_a_faster_robot_lags_less() -> None:
+    """An arm that rises at 1.5 rad/s for a second is followed late by the filter and an image."""
+    postures = np.zeros((16, 12))
+    postures[:, 8] = 0.4 + np.minimum(np.arange(16) / 10, 1.0) * 1.0
+    motions = [(np.arange(16, dtype=np.int64) * 10**8, postures)]
+    body = body_from_proportions(1.75, 2.0)
+    lags = []
+    for speed in (1.0, 8.0):
+        cells = retarget_accuracy.lag_of(ROBOT, "arm", body, motions, speed).split(" | ")
+        assert cells[:2] == ["| arm", f"{speed:g}"]
+        lags.append(float(cells[3].split()[0]))
+    assert 0.1 <= lags[1] <= 0.25 and lags[1] <= lags[0]
+
+
 @pytest.mark.parametrize("tool", [rula_accuracy, retarget_accuracy])
 def test_the_documents_have_the_tables_of_today(tool: Any) -> None:
     text = tool.DOCUMENT.read_text(encoding="utf-8")

@@ -22,8 +22,8 @@ def test_errors_and_accelerations_count_where_the_reference_is() -> None:
 
 
 def test_the_table_has_a_recording_and_its_reference_beside_each_other() -> None:
-    lines = report({"a": (np.full((4, 3), 1.25), np.full((4, 3), 0.5))}).splitlines()
+    lines = report({"a": (np.full((4, 4), 1.25), np.full((4, 4), 0.5))}).splitlines()
     assert lines[2:] == [
-        "| a |" + " 1.25 / 1.25 / 1.2 |" * 4,
-        "| its reference |" + " 0.50 / 0.50 / 0.5 |" * 4,
+        "| a |" + " 1.25 / 1.25 / 1.2, 1 % |" * 4,
+        "| its reference |" + " 0.50 / 0.50 / 0.5 |  |" * 2,
     ]

@@ -49,9 +49,9 @@ class Bus:
         self._nodes.append(node)
         return node
 
-    def send(self, topic: str, message: Any) -> None:
+    def send(self, topic: str, message: Any, sent_ns: int = 0) -> None:
         """Pass a message to the node that subscribes to ``topic``."""
-        self._subscribers[topic](message, {"source_timestamp": 0})
+        self._subscribers[topic](message, {"source_timestamp": sent_ns})
 
     def tick(self) -> Any:
         """Run every timer once, and return the last published status of a node."""

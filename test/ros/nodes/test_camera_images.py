@@ -190,3 +190,25 @@ def test_a_calibration_that_the_images_contradict_is_told_and_not_used(
     assert is_zoom or (
         "but the images on /image_raw have not" in told and "start this node" in told
     )
+
+
+def test_of_cameras_that_take_turns_on_a_topic_one_is_used(
+    make_node: Callable[..., Any], hands: Any
+) -> None:
+    node = CardboxNode("tested", hands, context=make_node().context, enable_rosout=False)
+    used: list[int] = []
+    images = CameraImages(
+        node, "raw", lambda _: None, lambda _, image, __: used.append(image[0, 0])
+    )
+    for number in range(12):
+        header = Header(stamp=Time(sec=1 + number), frame_id="left" if number % 2 else "right")
+        focal = 200.0 if number % 2 else 150.0
+        info = camera_info_message(header, Camera(160, 120, focal, focal, 79.5, 59.5))
+        hands.give("/camera_info", info)
+        image = np.full((120, 160), 50 if number % 2 else 200, np.uint8)
+        hands.give("/image_raw", image_message(header, image, "mono8"))
+    told = images.remarks()["frames"]
+    node.destroy_node()
+    # The first of the second camera shows that there is one.
+    assert used == [200, 50, 200, 200, 200, 200, 200]
+    assert "frame left are left out" in told and "/image_raw" in told

@@ -65,5 +65,5 @@ def test_isaac_gets_nothing_of_a_person_who_left(bus: Any, send: Any) -> None:
 
 
 def test_sonic_needs_an_address(bus: Any) -> None:
-    with pytest.raises(CardboxError, match="sonic reads ZMQ: give the parameter address"):
+    with pytest.raises(CardboxError, match="sonic has no topic: give the parameter address"):
         bus.start(TeleoperationNode, to="sonic")

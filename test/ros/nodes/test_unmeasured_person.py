@@ -14,9 +14,9 @@ from cardbox_tracker.camera.camera import Camera
 from cardbox_tracker.camera.extrinsics import Extrinsics, meeting_m
 from cardbox_tracker.camera.rasterisation import render
 from cardbox_tracker.camera.view import OtherCamera
-from cardbox_tracker.measuring.people_camera import FOUND_STDDEV, PITCH_PRIOR, USUAL_PITCH
+from cardbox_tracker.measuring.people_camera import PITCH_PRIOR, USUAL_PITCH
 from cardbox_tracker.person.cardbox import cardbox_patches
-from cardbox_tracker.person.model import body_from_proportions
+from cardbox_tracker.person.model import FOUND_STDDEV, body_from_proportions
 from cardbox_tracker.person.model_file import dumps_body_model, loads_body_model
 from cardbox_tracker.person.posture import reference_posture
 from cardbox_tracker.person.proportions import USUAL_STATURE_M
@@ -84,7 +84,7 @@ def test_a_measured_body_replaces_it(bus: Any, start: Any) -> None:
     assert bus.texts("/body_model")[-1] == measured
 
 
-def test_a_camera_of_unknown_pitch_is_sure_of_nothing(bus: Any, start: Any) -> None:
+def test_a_camera_of_unknown_pitch_is_not_sure_of_the_vertical(bus: Any, start: Any) -> None:
     """As in films: points will show the pitch, silhouettes alone never do."""
     node = start(keypoints="detector/keypoints")
     [body] = node._bodies

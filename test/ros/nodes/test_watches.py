@@ -126,7 +126,7 @@ def compared(source: str) -> CameraAgreement:
 def extrinsics(measures: Sequence[float], part: str = "turned", source: str = "") -> Told:
     agreement = compared(source)
     for degrees in measures:
-        for _ in range(3):
+        for _ in range(15 if part == "unit" else 3):
             getattr(agreement._others[0], part).see(-degrees if part == "rolled" else degrees)
         yield agreement.remarks(["cam1"]) != []
 
@@ -486,6 +486,7 @@ CASES = [
     Case("extrinsics", 0.8, 0.9, of_extrinsics("turned")),
     Case("extrinsics unmeasured", 5.5, 6.5, of_extrinsics("turned", PROPORTIONS)),
     Case("height", 0.8, 1.3, height),
+    Case("unit", 0.25, 0.35, of_extrinsics("unit")),
     Case("rolled", 1.4, 1.6, of_extrinsics("rolled")),
     Case("other view", 29, 20, other_view, lasting=30, ending=40),
     Case("distance", 1.85, 2.05, distance, lasting=1.1, ending=0.9),

@@ -1,0 +1,620 @@
+"""Times and poses of several films of the same people, from the points of these people.
+
+Joints move up and down alike before all cameras that stand about level. So the correlation of
+vertical speeds in the images, summed over joints, shows how much later a film begins, and who of
+one film is who in another.
+
+Times and poses then follow from one robust least-squares problem, a bundle adjustment (Triggs et
+al., "Bundle adjustment - a modern synthesis", 2000) whose points are triangulated in each step. Its
+unknowns are rotation, translation and offset of each further film, and the logarithms of the
+lengths of each person's bones. The priors of these are the proportions of people of the stature,
+which give the scale. Residuals are distances between rays and triangulated points, and differences
+of bones in each image from their lengths.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import NamedTuple
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import gaussian_filter1d
+from scipy.optimize import linear_sum_assignment
+from scipy.signal import correlate
+
+from cardbox_tracker.camera.camera import Camera
+from cardbox_tracker.camera.extrinsics import Extrinsics
+from cardbox_tracker.common.errors import CameraError
+from cardbox_tracker.common.least_squares import Residuals, Solution, minimize, rules_of
+from cardbox_tracker.detectors.image_points import LEG_POINT_NAMES, POINT_NAMES, ImagePoints
+from cardbox_tracker.measuring.people_camera import Sightings, is_inside
+from cardbox_tracker.person.proportions import MARKED_HEIGHTS, USUAL_STATURE_M
+from cardbox_tracker.person.sizes import FloatArray
+
+BoolArray = NDArray[np.bool_]
+Who = tuple[int | None, ...]
+"""For each person of the first film, the number of the same one in another film."""
+
+LEAST_IMAGES = 20
+"""Number of images of a person from which on two films overlap."""
+
+_NAMES = (*POINT_NAMES, *LEG_POINT_NAMES)
+_OTHER_SIDE = [
+    _NAMES.index(one.replace("left", "right") if "left" in one else one.replace("right", "left"))
+    for one in _NAMES
+]
+_SHOULDER, _HIP, _KNEE, _ANKLE = MARKED_HEIGHTS[2:].tolist()
+# Lengths between points as shares of the stature, with relative deviations among people: limbs of
+# either side, then breadths.
+_LIMBS = {
+    ("shoulder", "elbow"): (0.160, 0.06),
+    ("elbow", "wrist"): (0.146, 0.06),
+    ("shoulder", "hip"): (_SHOULDER - _HIP, 0.06),
+    ("hip", "knee"): (_HIP - _KNEE, 0.06),
+    ("knee", "ankle"): (_KNEE - _ANKLE, 0.06),
+}
+_BREADTHS = {"shoulder": (0.197, 0.10), "hip": (0.12, 0.15)}
+_PRIORS = np.array([*_LIMBS.values(), *_BREADTHS.values()])
+_LEAST_SCORE = 0.5
+# Speeds are of points smoothed over this time, s, and count to this many deviations.
+_SMOOTH_S, _MOST_SPEED = 0.07, 3.0
+# Movements of arms, legs and trunk that are independent.
+_MOVING = 4.0
+# Offsets that are tried, and the time between them, s; how surely speeds agree there, in what
+# chance gives, and from where on nobody needs to look.
+_MOST_OFFSETS, _APART_S, _SURE, _CLEAR = 2, 0.2, 1.2, 1.6
+# Images of each person that count, and the time in which people keep posture and errors, s.
+_MOST_IMAGES, _COARSE_IMAGES, _SAME_S = 60, 15, 0.5
+# Deviations of points in the first and the second fit, and of bones in an image, statures. Joints
+# on the far side of the body, which it hides, are this many times less sure.
+_COARSE, _POINT, _BONE, _HIDDEN = 0.03, 0.008, 0.01, 10.0
+# Residual from which on it counts less, deviations.
+_ROBUST = 2.0
+# How much further than its partner of the other side a joint is if the body hides it, m.
+_FAR_SIDE_M = 0.25
+# Yaws beside that of the points in space from which fits start, rad.
+_STARTS = np.radians((0.0, -25.0, 25.0))
+_ROUNDS, _STEP, _LEAST_GAIN, _NEAREST_M = 25, 1e-5, 1e-5, 0.05
+_OF_CAMERA, _TURN, _MOVE, _OFFSET = 7, slice(0, 3), slice(3, 6), 6
+# Deviation of what is given.
+_GIVEN = 1e-4
+
+
+class Seen:
+    """One person in a film.
+
+    Attributes:
+        times_s: times of the n images, (n,).
+        rays: of the points, (n, 25, 2), at the depth 1; 0 if unknown.
+        sure: how sure each point is, (n, 25), 0 to 1; 0 if unknown.
+        spatial_m: the points in space as the detector estimates them, (n, 25, 3), or nan.
+        period_s: usual time between images.
+    """
+
+    def __init__(self, sightings: Sightings, camera: Camera) -> None:
+        """Take times, s, and points at the resolution of ``camera``."""
+        rows = [_all_points(points) for _, points in sightings]
+        px, scores, self.spatial_m = (np.array(one) for one in zip(*rows, strict=True))
+        self.times_s = np.array([time_s for time_s, _ in sightings])
+        known = (scores >= _LEAST_SCORE) & is_inside(px, camera)
+        self.rays = np.where(known[..., None], camera.rays(px)[..., :2], 0.0)
+        behind_m = self.spatial_m[..., 2] - self.spatial_m[:, _OTHER_SIDE, 2]
+        hidden = np.clip(np.nan_to_num(behind_m) / _FAR_SIDE_M, 0.0, 1.0)
+        self.sure = known / (1.0 + (_HIDDEN - 1.0) * hidden)
+        self.period_s = float(np.median(np.diff(self.times_s))) if len(rows) > 1 else math.inf
+
+    def at(self, times_s: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return rays (m, 25, 2) at m times, between images, and how sure they are, (m, 25)."""
+        after = np.clip(np.searchsorted(self.times_s, times_s), 1, len(self.times_s) - 1)
+        step_s = self.times_s[after] - self.times_s[after - 1]
+        share = (times_s - self.times_s[after - 1]) / step_s
+        is_between = (share >= 0.0) & (share <= 1.0) & (step_s <= 2.5 * self.period_s)
+        sure = np.minimum(self.sure[after - 1], self.sure[after]) * is_between[:, None]
+        part = share[:, None, None]
+        return (1.0 - part) * self.rays[after - 1] + part * self.rays[after], sure
+
+    def speeds(self, step_s: float) -> tuple[FloatArray, FloatArray]:
+        """Return vertical speeds (m, 25), in deviations, every ``step_s``, and 1 where known."""
+        rays, sure = self.at(np.arange(self.times_s[0], self.times_s[-1], step_s))
+        known, width = sure > 0.0, max(_SMOOTH_S / step_s, 0.5)
+        smooth, weight = (
+            gaussian_filter1d(np.where(known, values, 0.0), width, axis=0, mode="constant")
+            for values in (rays[..., 1], 1.0)
+        )
+        speeds = np.diff(smooth / np.maximum(weight, 1e-6), axis=0)
+        known = known[1:] & known[:-1]
+        count = np.maximum(known.sum(axis=0), 1)
+        speeds = np.where(known, speeds - np.where(known, speeds, 0.0).sum(axis=0) / count, 0.0)
+        deviation = np.sqrt((speeds**2).sum(axis=0) / count)
+        speeds = np.clip(speeds / np.maximum(deviation, 1e-9), -_MOST_SPEED, _MOST_SPEED)
+        return speeds, known.astype(np.float64)
+
+
+def _all_points(points: ImagePoints) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return pixels (25, 2), scores (25,) and places (25, 3) of body and legs."""
+    count, legs = len(LEG_POINT_NAMES), points.legs
+    body_m = np.full((len(POINT_NAMES), 3), np.nan)
+    body_m = body_m if points.spatial_m is None else points.spatial_m
+    legs_px, scores, legs_m = np.full((count, 2), np.nan), np.zeros(count), None
+    if legs is not None:
+        legs_px, scores, legs_m = legs
+    legs_m = np.full((count, 3), np.nan) if legs_m is None else legs_m
+    return (
+        np.vstack([points.px, legs_px]),
+        np.append(points.scores, scores),
+        np.vstack([body_m, legs_m]),
+    )
+
+
+class Film(NamedTuple):
+    """A film, and what is given of it."""
+
+    name: str  #: for texts
+    people: Sequence[Seen]  #: each person in it
+    offset_s: float | None = None  #: time of the first film at which it begins, s, if it is given
+    extrinsics: Extrinsics | None = None  #: its pose relative to the first film, if it is given
+
+
+@dataclass(frozen=True)
+class FilmCamera:
+    """Time and pose of a further film against the first one.
+
+    Attributes:
+        extrinsics: its pose.
+        offset_s: time of the first film at which it begins, s.
+        offset_stddev_s: standard deviation of the offset.
+        turn_stddev_rad: standard deviation of the rotation about any axis.
+        place_stddev_m: standard deviation of the place, along the axis where it is largest.
+        halves: angle, rad, and distance, m, between the poses by the two halves of the time.
+        is_doubtful: whether these differ by more than the deviations tell.
+        is_clear: whether the offset is given, or surely none of chance.
+    """
+
+    extrinsics: Extrinsics
+    offset_s: float
+    offset_stddev_s: float
+    turn_stddev_rad: float
+    place_stddev_m: float
+    halves: tuple[float, float]
+    is_doubtful: bool
+    is_clear: bool
+
+    def __str__(self) -> str:
+        turn_deg, place_m = math.degrees(self.turn_stddev_rad), self.place_stddev_m
+        angle_rad, away_m = self.halves
+        distance_m = float(np.linalg.norm(self.extrinsics.centre_m))
+        rotation = cv2.Rodrigues(self.extrinsics.rotation)[0]
+        return (
+            f"begins at {self.offset_s:.3f} +- {self.offset_stddev_s:.3f} s, stands "
+            f"{distance_m:.2f} +- {place_m:.2f} m away and is turned by "
+            f"{math.degrees(float(np.linalg.norm(rotation))):.1f} +- {turn_deg:.1f} degrees; by "
+            f"two halves of the time {math.degrees(angle_rad):.1f} degrees and {away_m:.2f} m apart"
+        )
+
+
+def film_cameras(films: Sequence[Film], statures_m: Sequence[float]) -> list[FilmCamera]:
+    """Return times and poses of all films but the first.
+
+    Args:
+        films: the films, the first one first.
+        statures_m: statures of the people of the first film, or one for all.
+
+    Raises:
+        CameraError: a film does not overlap with the first one, or shows other people.
+    """
+    first = films[0]
+    tall_m = [statures_m[min(k, len(statures_m) - 1)] for k in range(len(first.people))]
+    alone = [_alone(first, film, tall_m) for film in films[1:]]
+    fixed = np.array([_is_given(film) for film in films[1:]])
+    rows = np.array([one.unknowns for one in alone])
+    moments = _moments(
+        films, [one.who for one in alone], [0.0, *rows[:, _OFFSET]], tall_m, _MOST_IMAGES
+    )
+    fit = _Fit(moments, fixed, np.array([one.offsets_s for one in alone]).T)
+    whole, solution = fit.run(rows.ravel(), _POINT)
+    covariance = np.linalg.inv(solution.information[0])
+    halves = [fit.half(k).run(whole, _POINT)[0] for k in range(2)]
+    return [
+        _camera(
+            film.name,
+            [values[_of(k)] for values in (whole, *halves)],
+            covariance[_of(k), _of(k)],
+            one.is_clear,
+        )
+        for k, (film, one) in enumerate(zip(films[1:], alone, strict=True))
+    ]
+
+
+def _of(number: int) -> slice:
+    return slice(_OF_CAMERA * number, _OF_CAMERA * (number + 1))
+
+
+def _is_given(film: Film) -> BoolArray:
+    given = np.repeat(film.extrinsics is not None, _OF_CAMERA)
+    given[_OFFSET] = film.offset_s is not None
+    return given
+
+
+def _camera(
+    name: str, rows: Sequence[FloatArray], covariance: FloatArray, is_clear: bool
+) -> FilmCamera:
+    """Return a film's camera by its unknowns (7,) of the whole time and of both halves."""
+    poses = [Extrinsics.of_vectors(row[_TURN], row[_MOVE], name) for row in rows]
+    halves = poses[1].difference(poses[2])
+    turn, place = (
+        math.sqrt(float(np.linalg.eigvalsh(covariance[at, at])[-1])) for at in (_TURN, _MOVE)
+    )
+    # Each half has twice the variance, and so has a difference.
+    is_doubtful = halves[0] > 6.0 * turn or halves[1] > 6.0 * place
+    return FilmCamera(
+        poses[0],
+        float(rows[0][_OFFSET]),
+        math.sqrt(float(covariance[_OFFSET, _OFFSET])),
+        turn,
+        place,
+        halves,
+        is_doubtful,
+        is_clear,
+    )
+
+
+class _Alone(NamedTuple):
+    """One film beside the first one.
+
+    Attributes:
+        unknowns: (7,).
+        offsets_s: limits of its offset, s.
+        who: who is who.
+        is_clear: whether the offset is surely none of chance.
+    """
+
+    unknowns: FloatArray
+    offsets_s: tuple[float, float]
+    who: Who
+    is_clear: bool
+
+
+def _alone(first: Film, film: Film, tall_m: Sequence[float]) -> _Alone:
+    best, least = None, math.inf
+    for offset_s, within_s, who, is_clear in _offsets(first, film):
+        moments = _moments((first, film), (who,), (0.0, offset_s), tall_m, _COARSE_IMAGES)
+        limits = offset_s - within_s, offset_s + within_s
+        fit = _Fit(moments, _is_given(film)[None], np.array(limits)[:, None])
+        for start in _starts(first, film, who, offset_s, tall_m):
+            values, found = fit.run(start, _COARSE)
+            cost = float(found.total[0]) / fit.count(values)
+            if cost < least:
+                best, least = _Alone(values[:_OF_CAMERA], limits, who, is_clear), cost
+    if best is None:
+        raise CameraError(
+            f"{film.name} and {first.name} do not show the same people at one time, or not for "
+            f"long enough: expected films of one scene that overlap by {LEAST_IMAGES} images with "
+            "a person in both; give --offset if it is known, or track each film alone"
+        )
+    return best
+
+
+def _lags(one: Seen, other: Seen, step_s: float) -> tuple[FloatArray, FloatArray]:
+    """Return offsets of the other film, s, and how surely speeds agree there, in what chance gives.
+
+    The largest of n independent correlations of chance is sqrt(2 ln n) deviations. What is
+    independent follows from the autocorrelations of both (Bartlett, "On the theoretical
+    specification and sampling properties of autocorrelated time-series", 1946).
+    """
+    (ours, ours_known), (theirs, theirs_known) = one.speeds(step_s), other.speeds(step_s)
+
+    def summed(a: FloatArray, b: FloatArray) -> FloatArray:
+        pairs = zip(a.T, b.T, strict=True)
+        found: FloatArray = np.sum([correlate(*pair, method="fft") for pair in pairs], axis=0)
+        return found
+
+    count = summed(ours_known, theirs_known)
+    norm = summed(ours**2, theirs_known) * summed(ours_known, theirs**2)
+    alike = summed(ours, theirs) / np.sqrt(np.maximum(norm, 1e-9))
+    joints = max(1.0, float((ours_known.mean(axis=0) * theirs_known.mean(axis=0)).sum()))
+    shared_s = np.maximum(count, 0.0) / joints * step_s
+    is_long = shared_s >= LEAST_IMAGES * max(one.period_s, other.period_s)
+    both = [summed(x, x) for x in (ours, theirs)]
+    reach = min(len(ours), len(theirs)) - 1
+    own = [one[len(one) // 2 :][: reach + 1] / max(one.max(), 1e-9) for one in both]
+    same_s = step_s * max(1.0, 2.0 * float((own[0] * own[1]).sum()) - 1.0)
+    chance = math.sqrt(2.0 * math.log(max(2.0, is_long.sum() * step_s / same_s)))
+    sure = np.where(is_long, alike * np.sqrt(_MOVING * shared_s / same_s) / chance, 0.0)
+    lags = (np.arange(len(count)) - (len(theirs) - 1)) * step_s
+    return lags + one.times_s[0] - other.times_s[0], sure
+
+
+def _offsets(first: Film, film: Film) -> Iterator[tuple[float, float, Who, bool]]:
+    """Yield likely offsets of a film, s, to half an image, s, and who is who."""
+    everybody = [one for one in (*first.people, *film.people) if len(one.times_s) > 2]
+    step_s = max((one.period_s for one in everybody), default=1.0) / 2.0
+    curves = {
+        (a, b): _lags(one, other, step_s)
+        for a, one in enumerate(first.people)
+        for b, other in enumerate(film.people)
+        if min(len(one.times_s), len(other.times_s)) > 2
+    }
+    tried = [] if film.offset_s is None else [film.offset_s]
+    for lags, sure in curves.values() if film.offset_s is None else ():
+        peaks = 1 + np.flatnonzero((sure[1:-1] > sure[:-2]) & (sure[1:-1] >= sure[2:]))
+        tried += lags[peaks[sure[peaks] > _SURE]].tolist()
+    found = list[tuple[float, float, Who]]()
+    for offset_s in tried:
+        gains = np.zeros((len(first.people), len(film.people)))
+        for pair, (lags, sure) in curves.items():
+            gains[pair] = max(0.0, np.interp(offset_s, lags, sure, 0.0, 0.0))
+        pairs = list(zip(*linear_sum_assignment(-gains), strict=True))
+        same = {int(a): int(b) for a, b in pairs if gains[a, b] > 0.0}
+        if same:
+            who = tuple(same.get(a) for a in range(len(first.people)))
+            found.append((sum(gains[pair] for pair in pairs), offset_s, who))
+    taken = list[float]()
+    is_given = film.offset_s is not None
+    for sure, offset_s, who in sorted(found, key=lambda one: -one[0]):
+        if len(taken) < _MOST_OFFSETS and all(abs(offset_s - one) > _APART_S for one in taken):
+            taken.append(offset_s)
+            yield offset_s, 0.0 if is_given else step_s, who, is_given or bool(sure > _CLEAR)
+
+
+def _starts(
+    first: Film, film: Film, who: Who, offset_s: float, tall_m: Sequence[float]
+) -> Iterator[FloatArray]:
+    """Yield unknowns (7,) to begin with, from the points in space, at several yaws."""
+    if film.extrinsics is not None:
+        turn = cv2.Rodrigues(film.extrinsics.rotation)[0][:, 0]
+        yield np.array([*turn, *film.extrinsics.translation_m, offset_s])
+        return
+    ours, theirs, places = list[FloatArray](), list[FloatArray](), list[list[FloatArray]]()
+    for number, other in enumerate(who):
+        if other is None:
+            continue
+        one, two = first.people[number], film.people[other]
+        for at, time_s in enumerate(one.times_s - offset_s):
+            near = int(np.argmin(np.abs(two.times_s - time_s)))
+            both = np.isfinite(one.spatial_m[at] + two.spatial_m[near]).all(axis=1)
+            both &= (one.sure[at] > 0.0) & (two.sure[near] > 0.0)
+            is_near = abs(two.times_s[near] - time_s) <= max(one.period_s, two.period_s)
+            if is_near and both.sum() > 4:
+                pair = [
+                    (seen.spatial_m[k][both], seen.rays[k][both])
+                    for seen, k in ((one, at), (two, near))
+                ]
+                ours.append(pair[0][0] - pair[0][0].mean(axis=0))
+                theirs.append(pair[1][0] - pair[1][0].mean(axis=0))
+                places.append([_place(*each) * tall_m[number] / USUAL_STATURE_M for each in pair])
+    if not ours:
+        return
+    a, b = np.concatenate(ours), np.concatenate(theirs)
+    weights, turn = np.ones(len(a)), np.eye(3)
+    for _ in range(10):
+        u, _, v = np.linalg.svd((b * weights[:, None]).T @ a)
+        turn = u @ np.diag([1.0, 1.0, np.linalg.det(u @ v)]) @ v
+        weights = 1.0 / np.maximum(np.linalg.norm(b - a @ turn.T, axis=1), 0.02)
+    here_m, there_m = np.median(np.array(places), axis=0)
+    for yaw_rad in _STARTS:
+        turned = cv2.Rodrigues(np.array([0.0, yaw_rad, 0.0]))[0] @ turn
+        yield np.array([*cv2.Rodrigues(turned)[0][:, 0], *(there_m - turned @ here_m), offset_s])
+
+
+def _place(spatial_m: FloatArray, rays: FloatArray) -> FloatArray:
+    """Return where points are whose extent in space and in the image is known, (3,), metres."""
+    middle = rays.mean(axis=0)
+    extent = np.linalg.norm(spatial_m[:, :2] - spatial_m[:, :2].mean(axis=0))
+    place: FloatArray = extent / np.linalg.norm(rays - middle) * np.append(middle, 1.0)
+    return place
+
+
+class _Moments(NamedTuple):
+    """Images of one person of the first film.
+
+    Attributes:
+        times_s: times in the first film, (m,).
+        seen: the same person in each film; None where nobody is.
+        weight: how many images one counts for.
+        stature_m: of the person.
+    """
+
+    times_s: FloatArray
+    seen: Sequence[Seen | None]
+    weight: float
+    stature_m: float
+
+
+def _moments(
+    films: Sequence[Film],
+    who: Sequence[Who],
+    offsets_s: Sequence[float],
+    tall_m: Sequence[float],
+    most: int,
+) -> list[_Moments]:
+    """Return images of the people who are in at least two films."""
+    found = []
+    for number, one in enumerate(films[0].people):
+        others = [same[number] for same in who]
+        seen = [one] + [
+            None if k is None else film.people[k] for k, film in zip(others, films[1:], strict=True)
+        ]
+        spans = [
+            (each.times_s[0] + offset_s, each.times_s[-1] + offset_s)
+            for each, offset_s in zip(seen[1:], offsets_s[1:], strict=True)
+            if each is not None
+        ]
+        is_shared = np.zeros(len(one.times_s), np.bool_)
+        for begin_s, end_s in spans:
+            is_shared |= (one.times_s >= begin_s) & (one.times_s <= end_s)
+        times_s = one.times_s[is_shared]
+        if len(times_s) > 1:
+            chosen = np.unique(np.linspace(0, len(times_s) - 1, most).astype(int))
+            independent = 1.0 + float(np.ptp(times_s)) / _SAME_S
+            weight = min(1.0, independent / len(chosen))
+            found.append(_Moments(times_s[chosen], seen, weight, tall_m[number]))
+    return found
+
+
+def _bones() -> Iterator[tuple[int, int, int]]:
+    """Yield the points at both ends of each bone, and the number of its length."""
+    for number, (one, other) in enumerate(_LIMBS):
+        for side in ("left", "right"):
+            yield _NAMES.index(f"{side}_{one}"), _NAMES.index(f"{side}_{other}"), number
+    for number, name in enumerate(_BREADTHS, len(_LIMBS)):
+        yield _NAMES.index(f"left_{name}"), _NAMES.index(f"right_{name}"), number
+
+
+_ENDS, _LENGTHS = np.split(np.array(list(_bones())), [2], axis=1)
+_LENGTHS = _LENGTHS[:, 0]
+
+
+class _Points(NamedTuple):
+    """Triangulated points in m images.
+
+    Attributes:
+        places_m: in the optical frame of the first of c films, (m, 25, 3).
+        there_m: in that of each film, (c, m, 25, 3).
+        rays: that were seen, (c, m, 25, 2).
+        sure: how sure, (c, m, 25); 0 for a point that fewer than two films show.
+        matrix: of the normal equations of each point, (m, 25, 3, 3).
+    """
+
+    places_m: FloatArray
+    there_m: FloatArray
+    rays: FloatArray
+    sure: FloatArray
+    matrix: FloatArray
+
+
+class _Fit:
+    """The bundle adjustment of all films.
+
+    Its unknowns are 7 of each further film: rotation vector, translation, offset; and of each
+    person the logarithms of the lengths ``_PRIORS``.
+    """
+
+    def __init__(
+        self, moments: Sequence[_Moments], fixed: BoolArray, offsets_s: FloatArray
+    ) -> None:
+        """Take which unknowns of the c films are given, (c, 7), and limits of offsets, (2, c)."""
+        self._moments, self._fixed, self._offsets_s = moments, fixed, offsets_s
+        self._point = _POINT
+        self._scales: list[tuple[FloatArray, FloatArray]] = []
+
+    def half(self, number: int) -> _Fit:
+        """Return the fit of the first or second half of the images."""
+        parts = []
+        for one in self._moments:
+            middle = len(one.times_s) // 2
+            half = one.times_s[:middle] if number == 0 else one.times_s[middle:]
+            parts.append(one._replace(times_s=half))
+        return _Fit(parts, self._fixed, self._offsets_s)
+
+    @cached_property
+    def _mean(self) -> FloatArray:
+        lengths = [np.log(one.stature_m * _PRIORS[:, 0]) for one in self._moments]
+        return np.concatenate([np.zeros(self._fixed.size), *lengths])
+
+    def run(self, start: FloatArray, point: float) -> tuple[FloatArray, Solution]:
+        """Return the unknowns with the least cost near those of the films, or near all, (n,).
+
+        ``point`` is the deviation of a point, statures.
+        """
+        values = self._mean.copy()
+        values[: len(start)] = start
+        mean = np.append(values[: self._fixed.size], self._mean[self._fixed.size :])
+        given = np.where(self._fixed, _GIVEN**-2.0, 0.0).ravel()
+        inverse = np.append(given, np.tile(_PRIORS[:, 1] ** -2.0, len(self._moments)))
+        self._point = point
+        self._scales = [self._scale(values, one) for one in self._moments]
+        low, high = np.full(len(mean), -np.inf), np.full(len(mean), np.inf)
+        at = slice(_OFFSET, self._fixed.size, _OF_CAMERA)
+        low[at], high[at] = self._offsets_s
+        rules = rules_of(len(mean), mean=mean, inverse=inverse, low=low, high=high)
+        found = minimize({"points": self._points}, values[None], rules, _ROUNDS, _LEAST_GAIN)
+        return found.values[0], found
+
+    def count(self, unknowns: FloatArray) -> float:
+        """Return the number of residuals, each with its weight."""
+        errors, weights, _ = self._errors(unknowns)
+        return float(weights[errors != 0.0].sum())
+
+    def _triangulated(self, unknowns: FloatArray, one: _Moments) -> _Points:
+        films = unknowns[: self._fixed.size].reshape(-1, _OF_CAMERA)
+        films = np.vstack([np.zeros(_OF_CAMERA), films])
+        turns = np.array([cv2.Rodrigues(film[_TURN].copy())[0] for film in films])
+        shape = len(one.times_s), len(_NAMES)
+        rays, sure = np.zeros((len(films), *shape, 2)), np.zeros((len(films), *shape))
+        for number, (seen, film) in enumerate(zip(one.seen, films, strict=True)):
+            if seen is not None and len(seen.times_s) > 1:
+                rays[number], sure[number] = seen.at(one.times_s - film[_OFFSET])
+        sure *= (sure > 0.0).sum(axis=0) > 1
+        ahead = np.concatenate([rays, np.ones((*rays.shape[:-1], 1))], axis=-1)
+        ahead = np.einsum("cji,cmpj->cmpi", turns, ahead)
+        ahead /= np.linalg.norm(ahead, axis=-1, keepdims=True)
+        # A point has the least sum of squared distances from its rays.
+        across = np.eye(3) - ahead[..., :, None] * ahead[..., None, :]
+        across *= (sure**2)[..., None, None]
+        centres = -np.einsum("cji,cj->ci", turns, films[:, _MOVE])
+        matrix = across.sum(axis=0)
+        right = np.einsum("cmpij,cj->mpi", across, centres)
+        loose = matrix + 1e-9 * np.eye(3)
+        places_m = np.linalg.solve(loose, right[..., None])[..., 0]
+        there_m = np.einsum("cij,mpj->cmpi", turns, places_m) + films[:, None, None, _MOVE]
+        return _Points(places_m, there_m, rays, sure, matrix)
+
+    def _scale(self, unknowns: FloatArray, one: _Moments) -> tuple[FloatArray, FloatArray]:
+        """Return distances to each film, (c, m, 1, 1), m, and deviations of bones, (m, b), m.
+
+        They stay while the unknowns change: otherwise a smaller scene would fit better.
+        """
+        points = self._triangulated(unknowns, one)
+        is_seen = (points.sure > 0.0) & (points.there_m[..., 2] > _NEAREST_M)
+        count, depth_m = is_seen.sum(axis=2), points.there_m[..., 2]
+        far_m = np.where(is_seen, depth_m, 0.0).sum(axis=2) / np.maximum(count, 1)
+        far_m = np.where(count > 0, far_m, 1.0)
+        # Rays that hardly meet leave the depth of a point open.
+        meets = np.sqrt(np.clip(np.linalg.eigvalsh(points.matrix)[..., 0], 1e-3, 1.0))
+        worst = meets[:, _ENDS].min(axis=-1)
+        return far_m[..., None, None], np.hypot(_BONE, self._point / worst) * one.stature_m
+
+    def _errors(self, unknowns: FloatArray) -> tuple[FloatArray, FloatArray, NDArray[np.int64]]:
+        """Return residuals in deviations, weights of losses, and which length each has, or -1."""
+        rows, weights, first = list[FloatArray](), list[FloatArray](), self._fixed.size
+        lengths = list[NDArray[np.int64]]()
+        for one, (far_m, deviation_m) in zip(self._moments, self._scales, strict=True):
+            points = self._triangulated(unknowns, one)
+            seen = points.there_m[..., :2] / np.maximum(points.there_m[..., 2:], _NEAREST_M)
+            away = (seen - points.rays) * far_m / (self._point * one.stature_m)
+            away *= points.sure[..., None]
+            ends_m = points.places_m[:, _ENDS]
+            length_m = np.linalg.norm(ends_m[:, :, 0] - ends_m[:, :, 1], axis=-1)
+            off_m = length_m - np.exp(unknowns[first + _LENGTHS])
+            is_seen = (points.sure.max(axis=0)[:, _ENDS] > 0.0).all(axis=-1)
+            rows += [away.ravel(), (off_m / deviation_m * is_seen).ravel()]
+            weights.append(np.full(away.size + off_m.size, one.weight))
+            lengths += [np.full(away.size, -1), np.tile(first + _LENGTHS, len(off_m))]
+            first += len(_PRIORS)
+        return np.concatenate(rows), np.concatenate(weights), np.concatenate(lengths)
+
+    def _points(self, values: FloatArray) -> Residuals:
+        """Return residuals of points and bones whose loss is bounded (Geman & McClure, 1985).
+
+        A detector that takes one arm for the other is wrong by any distance.
+        """
+        unknowns = values[0]
+        errors, weights, lengths = self._errors(unknowns)
+        jacobian = np.zeros((len(errors), len(unknowns)))
+        for number in range(self._fixed.size):
+            moved = unknowns.copy()
+            moved[number] += _STEP
+            jacobian[:, number] = (self._errors(moved)[0] - errors) / _STEP
+        # Each bone depends on one length alone.
+        moved = unknowns + _STEP * (np.arange(len(unknowns)) >= self._fixed.size)
+        rows = np.flatnonzero(lengths >= 0)
+        jacobian[rows, lengths[rows]] = (self._errors(moved)[0] - errors)[rows] / _STEP
+        bounded = 1.0 + (errors / _ROBUST) ** 2
+        costs = np.array([(weights * errors**2 / bounded).sum()])
+        roots = np.sqrt(weights) / bounded
+        return Residuals((roots * errors)[None], (roots[:, None] * jacobian)[None], costs)
