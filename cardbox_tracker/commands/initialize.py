@@ -19,6 +19,7 @@ from cardbox_tracker.commands.request import RecordingOptions
 from cardbox_tracker.commands.scene import tilt_in
 from cardbox_tracker.commands.tracking_request import Problems, inputs_of, recording_request
 from cardbox_tracker.common.progress import progress_bar
+from cardbox_tracker.detectors.person_choice import PersonChoice
 from cardbox_tracker.measuring.config import InitializationConfig
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.model_file import save_body_model
@@ -92,6 +93,11 @@ def run(asked: Arguments) -> None:
     problems = Problems(asked.recording)
     # The silhouettes alone are measured.
     recording = replace(recording_request(asked, problems), points=None)
+    choice = asked.person if isinstance(asked.person, PersonChoice) else None
+    if choice is not None and recording.detector is None:
+        problems.add("--person needs the detector's silhouettes: give --silhouettes detector")
+    if choice is not None and choice.time_s is not None:
+        problems.add("--person chooses in each span: leave @T out")
     is_given = asked.distance_m is not None
     if not is_given and asked.depth is None and len(asked.cameras) < 2:
         problems.miss("--distance M or --depth TOPIC or two --cameras", "one camera has no scale")
@@ -109,15 +115,15 @@ def run(asked: Arguments) -> None:
     check_outputs((asked.output,), asked.force, inputs_of(asked))
     spans = asked.spans
     if asked.camera_pitch_deg is None and recording.detector is not None:
-        pitch_rad, recording = tilt_in(recording, spans["front"])
+        pitch_rad, recording = tilt_in(recording, spans["front"], choice)
         config = replace(config, camera_pitch_rad=pitch_rad)
     if is_given:
         recording = replace(recording, depth=None)
     with recording.open() as source, progress_bar("initialize") as show:
         if is_given:
-            result = initialize_from_recording(source.first, spans, config, show)
+            result = initialize_from_recording(source.first, spans, config, show, choice)
         else:
-            result = initialize_at_scale(source, spans, config, show)
+            result = initialize_at_scale(source, spans, config, show, choice)
         remarks, accounts = source.first.remarks, [one.account for one in source.sources]
     print_remarks(remarks)
     roll_rad = recording.camera.stands_rad

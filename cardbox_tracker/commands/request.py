@@ -147,9 +147,10 @@ class RecordingOptions(Options):
             FILE.json of COCO, or a folder of OpenPose's files (docs/detectors.md)
         detector_class: the same of a class of your own with a function detect(image)
             (docs/extending.md)
-        person: with --detector mediapipe: whom of several people to follow: the left or right one
-            in the image, the largest, or the one at column X and row Y. With --people: the number
-            of the one whose results are used, if not all are
+        person: with --detector: whom of several people to follow: the left or right one in the
+            first image that shows two, the largest there, or the one who is first at column X and
+            row Y; with @T, such as left@12.5, from second T on. With --people: the number of the
+            one whose results are used, if not all are
         fov_deg: field of view across the width of the image as it is shown: webcams 60 to 78,
             phones 60 to 75 held sideways and 36 to 46 upright. Without it, what a phone wrote into
             the file, or else, with --detector, 65 degrees along the longer side. Of several films,
@@ -178,7 +179,7 @@ class RecordingOptions(Options):
     )
     detector_class: str | None = option("MODULE:CLASS")
     person: str | tuple[float, float] | int | PersonChoice | None = option(
-        "left|right|largest|X,Y|K", _person_choice
+        "left|right|largest|X,Y[@T]|K", _person_choice
     )
     fov_deg: float | tuple[float, ...] | None = option(
         "DEG[,DEG...]",

@@ -11,6 +11,8 @@ from itertools import zip_longest
 from cardbox_tracker.camera.camera import Camera
 from cardbox_tracker.commands.arguments import print_remarks
 from cardbox_tracker.commands.tracking_request import PersonRequest
+from cardbox_tracker.common.errors import CardboxError
+from cardbox_tracker.detectors.person_choice import Chosen, PersonChoice
 from cardbox_tracker.measuring.people_camera import PITCH_PRIOR, USUAL_PITCH
 from cardbox_tracker.measuring.scene import FOUND, GIVEN, USUAL, Scene, SceneCamera, Value
 from cardbox_tracker.measuring.scene_camera import (
@@ -36,11 +38,12 @@ _SAME_PLACE, _CONTRADICTS = 0.15, 3.0
 @contextmanager
 def measured_scene(
     recording: RecordingRequest, person: PersonRequest, config: TrackerConfig, seed: int
-) -> Iterator[tuple[Recording, Scene]]:
+) -> Iterator[tuple[Recording, Scene, Chosen | None]]:
     """Open a recording whose scene is measured, in all of it, before it is tracked.
 
-    A roll that is found turns the images back, unless one is given. Raises CardboxError if the
-    recording cannot be read, or the detector cannot be loaded.
+    A roll that is found turns the images back, unless one is given. The third is who is chosen of
+    several people, if there is a choice. Raises CardboxError if the recording cannot be read, the
+    detector cannot be loaded, or nobody can be chosen.
     """
     if person.model is not None and not person.body.unknown and person.scene is None:
         roll_rad = person.body.camera_pose.roll_rad
@@ -51,25 +54,32 @@ def measured_scene(
         bodies, first = [person.body, *person.others], source.first
         tilt = person.body.camera_pose
         if person.scene is not None:
-            yield source, _again(source, recording, person, person.scene, config, seed)
+            yield source, *_again(source, recording, person, person.scene, config, seed)
             return
         if person.model is not None and not person.body.unknown:
             pitch = Value(tilt.pitch_rad, tilt.pitch_stddev_rad, GIVEN)
             roll_rad = recording.camera.stands_rad
             camera = SceneCamera(lens_of(first.camera), pitch, Value(roll_rad, 0.0, GIVEN))
             bodies = [body.with_values(camera_roll_rad=roll_rad) for body in bodies]
-            yield source, Scene(_told(camera, first), tuple(bodies))
+            chosen = None
+            if person.choice is not None:
+                chosen = _checked(watch(source, *span, person.choice).chosen)
+            yield source, Scene(_told(camera, first), tuple(bodies)), chosen
             return
-        watched = watch(source, *span)
+        watched = watch(source, *span, person.choice)
         found = found_camera(recording, person, watched, first.camera)
         better = _corrected(recording, found.camera)
         if better is not recording:
             stack.close()
             source = stack.enter_context(better.open())
-            watched, first = watch(source, *span), source.first
+            watched, first = watch(source, *span, person.choice), source.first
+        chosen = _checked(watched.chosen)
         stands = {"camera_roll_rad": better.camera.stands_rad}
         bodies = [body.with_values(**stands) for body in _bodies(bodies, person, found)]
-        if person.people is None:
+        if chosen is not None:
+            given = config, 0, seed, *span
+            bodies = seen_people(source, bodies, *given, only=chosen.number)
+        elif person.people is None:
             shown = [one for one in found.distances if one is not None]
             # One person whom the detector lost is several; the longest is surely who is tracked.
             longest = max(shown, key=lambda one: len(one.times_s), default=None)
@@ -78,7 +88,17 @@ def measured_scene(
             bodies = [seen_person(watched, bodies[0], first.camera, config, seed, far)]
         else:
             bodies = seen_people(source, bodies, config, person.people, seed, *span)
-        yield source, Scene(_told(found.camera, first), tuple(bodies))
+        yield source, Scene(_told(found.camera, first), tuple(bodies)), chosen
+
+
+def _checked(chosen: Chosen | None) -> Chosen | None:
+    """Return who is chosen; raise CardboxError if nobody is seen."""
+    if chosen is not None and chosen.number is None:
+        raise CardboxError(
+            "the detector finds nobody to choose with --person; give @T a second at which the "
+            "person is in view, or leave --person out"
+        )
+    return chosen
 
 
 def _told(camera: SceneCamera, source: SilhouetteSource) -> SceneCamera:
@@ -94,13 +114,14 @@ def _again(
     scene: Scene,
     config: TrackerConfig,
     seed: int,
-) -> Scene:
-    """Return a given scene, with people who stand elsewhere at their place, and say what is wrong.
+) -> tuple[Scene, Chosen | None]:
+    """Return a given scene, with people who stand elsewhere at their place, and who is chosen.
 
-    Nobody is sure in a scene that people contradict.
+    What is wrong is said. Nobody is sure in a scene that people contradict.
     """
     span, camera = (person.start_s, person.end_s), source.first.camera
-    watched = watch(source, *span)
+    watched = watch(source, *span, person.choice)
+    chosen = _checked(watched.chosen)
     stands = {"camera_roll_rad": recording.camera.stands_rad}
     bodies = [body.with_values(**stands) for body in (person.body, *person.others)]
     wrong = _contradiction(watched, bodies, scene.camera, camera)
@@ -110,7 +131,10 @@ def _again(
         unsure = math.hypot(scene.camera.pitch_rad.stddev, FOUND_STDDEV)
         bodies = [body.with_values(pitch_stddev_rad=unsure, **doubt) for body in bodies]
     guesses = [body.with_values(unknown=tuple({*PLACE, *body.unknown})) for body in bodies]
-    if person.people is None:
+    if chosen is not None and chosen.number is not None:
+        placed = seen_people(source, guesses, config, 0, seed, *span, only=chosen.number)
+        bodies = [bodies[min(chosen.number, len(bodies)) - 1]]
+    elif person.people is None:
         placed = [seen_person(watched, guesses[0], camera, config, seed)]
     else:
         placed = seen_people(source, guesses, config, person.people, seed, *span)
@@ -119,7 +143,7 @@ def _again(
         body if body is not None and _is_near(body, there) else there
         for body, there in zip_longest(bodies[: len(placed)], placed)
     ]
-    return Scene(scene.camera, tuple(kept))
+    return Scene(scene.camera, tuple(kept)), chosen
 
 
 def _is_near(body: BodyModel, there: BodyModel) -> bool:
@@ -240,10 +264,12 @@ def found_camera(
     return found
 
 
-def tilt_in(recording: RecordingRequest, span: TimeSpan) -> tuple[float, RecordingRequest]:
+def tilt_in(
+    recording: RecordingRequest, span: TimeSpan, choice: PersonChoice | None = None
+) -> tuple[float, RecordingRequest]:
     """Return the pitch, rad, by the images of a span, and the recording with the roll by them."""
     with recording.open() as source:
         person = PersonRequest(BodyModel(), None, span.start_s, is_pitch_given=False)
         camera = source.first.camera
-        found = found_camera(recording, person, watch(source, *span), camera).camera
+        found = found_camera(recording, person, watch(source, *span, choice), camera).camera
     return found.pitch_rad.mean, _corrected(recording, found)

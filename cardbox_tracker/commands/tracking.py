@@ -38,7 +38,11 @@ def track(
     recording, person, files = request.recording, request.person, request.files
     if person.model is not None and person.body.doubt:
         print(f"{person.model}: {person.body.doubt}")
-    with measured_scene(recording, person, request.config, request.seed) as (source, scene):
+    with measured_scene(recording, person, request.config, request.seed) as (
+        source,
+        scene,
+        chosen,
+    ):
         # Hands and the overlay are seen at the resolution of the recording.
         source.first.has_pictures = request.hands is not None or files.video is not None
         lasts_s = source.first.duration_s
@@ -46,10 +50,12 @@ def track(
         print_remarks(early)
         early = source.first.remarks
         print_remarks(_with_unknown(early, person))
-        summary = _tracked(request, source, scene, observers, show)
+        number = None if chosen is None else chosen.number
+        summary = _tracked(request, source, scene, observers, show, number)
         print_remarks(one for one in source.first.remarks if one not in early)
         accounts = tuple(one.account for one in source.sources)
-        assumptions = tuple(_assumptions(request, scene, source))
+        who = () if chosen is None else (str(chosen),)
+        assumptions = (*who, *_assumptions(request, scene, source))
         poses = [other.extrinsics for other in source.others]
         cameras = dict(zip(source.names[1:], poses, strict=True))
     summary = replace(
@@ -74,6 +80,7 @@ def _tracked(
     scene: Scene,
     observers: tuple[Observer, ...],
     show: Callable[[float], None] | None,
+    only: int | None,
 ) -> TrackSummary:
     person, start_s = request.person, request.person.start_s
     total_s = max(1e-9, min(source.first.duration_s, person.end_s) - start_s)
@@ -92,6 +99,7 @@ def _tracked(
             person.people,
             None if request.hands is None else HandNetwork(request.hands),
             request.lag_s,
+            only,
         )
 
 

@@ -69,6 +69,7 @@ class PersonRequest:
     others: tuple[BodyModel, ...] = ()  #: the bodies of the second and further people
     scene: Scene | None = None  #: a scene with these people, whose camera nothing else tells
     number: int = 1  #: whose results commands use that use those of one
+    choice: PersonChoice | None = None  #: who alone is tracked of all who come
     statures_m: tuple[float, ...] = ()  #: the statures that are given, by number
 
     @property
@@ -163,17 +164,19 @@ def recording_request(
     if asked.detector is not None or asked.detector_class is not None:
         points = problems.caught(lambda: points_named(asked.detector, asked.detector_class), None)
     silhouettes = _silhouettes(asked, points, problems)
-    has_detector = any(isinstance(one, Detector) for one in (silhouettes, points))
+    has_detector = points is not None or isinstance(silhouettes, Detector)
     problems.add(*_person_faults(asked.person, people, has_detector))
+    if isinstance(asked.person, PersonChoice):
+        people = 0
     names: tuple[str, ...] = ()
     names = problems.caught(lambda: tuple(camera_names(asked.cameras)), names)
     request = RecordingRequest(
         asked.recording,
-        _following(silhouettes, asked.person, people),
+        _seeing(silhouettes, people),
         names,
         asked.extrinsics,
         asked.depth,
-        _following(points, asked.person, people),
+        _seeing(points, people),
         camera,
         _further(asked, camera, problems),
         asked.statures_m if isinstance(asked, TrackingOptions) else (),
@@ -222,12 +225,10 @@ def _person_faults(person: object, people: int | None, has_detector: bool) -> It
         yield "--person needs a detector that finds people: give --detector mediapipe"
 
 
-def _following(source: Any, person: object, people: int | None) -> Any:
-    """Return a source of silhouettes or points that finds whom is asked for."""
+def _seeing(source: Any, people: int | None) -> Any:
+    """Return a source of silhouettes or points that finds several people if they are asked for."""
     if people is not None and isinstance(source, Detector | PointTable):
         return source._replace(people=people or MOST_PEOPLE)
-    if isinstance(person, PersonChoice) and isinstance(source, Detector):
-        return source._replace(person=person)
     return source
 
 
@@ -440,6 +441,7 @@ def _person(
         number=asked.number,
         statures_m=statures_m,
         scene=scene if is_of_scene and pitch_deg is None else None,
+        choice=asked.person if isinstance(asked.person, PersonChoice) else None,
     )
 
 

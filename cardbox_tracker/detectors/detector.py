@@ -15,7 +15,6 @@ from cardbox_tracker.detectors.image_points import ImagePoints
 from cardbox_tracker.detectors.model_files import ModelFiles, installed_models
 from cardbox_tracker.detectors.own_network import OwnModel, OwnNetwork
 from cardbox_tracker.detectors.people_network import PeopleNetwork
-from cardbox_tracker.detectors.person_choice import PersonChoice
 from cardbox_tracker.detectors.pose_network import (
     Detection,
     PoseNetwork,
@@ -33,8 +32,6 @@ class Detector(NamedTuple):
     """The installed detector, or one of the user's own; ``start()`` makes it ready for a camera."""
 
     models: ModelFiles | OwnModel  #: its network files, or the class of one's own
-    #: whom to follow, px of the camera's own image; None for the most certain person.
-    person: PersonChoice | None = None
     #: number of people whom it finds at most; 0 for the one whom it follows.
     people: int = 0
 
@@ -43,18 +40,15 @@ class Detector(NamedTuple):
         """Return the installed detector; raise CardboxError if it is not installed."""
         return cls(installed_models(), people=people)
 
-    def start(self, across: float = 1.0, down: float = 1.0) -> PersonDetector:
+    def start(self) -> PersonDetector:
         """Return a detector for the images of one camera.
 
-        Their width and height are the shares ``across`` and ``down`` of the camera's own image.
         Raises CardboxError if the networks cannot be loaded.
         """
         if isinstance(self.models, OwnModel):
             network: PoseNetwork = OwnNetwork(self.models.make())
         else:
             network = PoseNetwork(*self.models)
-        if self.person is not None:
-            network.choose = self.person.scaled(across, down)
         return PersonDetector(network, PeopleNetwork(network, self.people) if self.people else None)
 
 
@@ -85,6 +79,12 @@ class PersonDetector:
             self._people.forget()
         self.missed = 0
 
+    def start_anew(self) -> None:
+        """Forget the people because a film is cut."""
+        self._network.start_anew()
+        if self._people is not None:
+            self._people.forget()
+
     def __call__(self, image: Image, stamp_ns: int | None = None) -> Detection | None:
         """Return the person in an image (H, W) or (H, W, 3), bgr, of a time; None if not seen."""
         found = self._network(color(image), stamp_ns)
@@ -111,10 +111,9 @@ class PersonDetector:
         """A remark about several people in the images; empty if there were none."""
         if not self._network.several:
             return ""
-        whom = "the most certain one" if self._network.choose is None else "the chosen one"
         return (
-            f"the detector sees several people and follows {whom}; --person left|right|largest|X,Y "
-            "chooses, and --people follows all"
+            "the detector sees several people and follows the most certain one; --person "
+            "left|right|largest|X,Y chooses, and --people follows all"
         )
 
 
@@ -158,11 +157,18 @@ class KeptDetections:
         """End a pass in which all images of the span were seen."""
         self._is_whole = True
 
-    def __call__(self, number: int, stamp_ns: int, image: NDArray[np.uint8]) -> list[Detection]:
-        """Return the people in an image (H, W) or (H, W, 3), bgr, of a number in the recording."""
+    def __call__(
+        self, number: int, stamp_ns: int, image: NDArray[np.uint8], is_cut: bool = False
+    ) -> list[Detection]:
+        """Return the people in an image (H, W) or (H, W, 3), bgr, of a number in the recording.
+
+        Where the film is cut, whoever is there is new.
+        """
         if number in self._places:
             self._file.seek(self._places[number])
             return [_unpacked(*one) for one in pickle.load(self._file)]
+        if is_cut:
+            self.detector.start_anew()
         found = self.detector.all_in(stamp_ns, image)
         self._file.seek(0, 2)
         self._places[number] = self._file.tell()

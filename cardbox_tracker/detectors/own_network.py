@@ -64,7 +64,7 @@ class OwnNetwork(PoseNetwork):
     """Follows one person among those whom a detector of one's own finds."""
 
     def __init__(self, detector: FindsPeople) -> None:
-        self._own, self.choose = detector, None
+        self._own = detector
         self._found: list[tuple[Detection, Square]] = []
         self.forget()
 

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import os
 import sys
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from math import atan2, cos, hypot, pi, sin
 from pathlib import Path
@@ -118,16 +118,10 @@ def figure_of(found: Detection) -> Figure:
     return Figure(dict(zip(LANDMARKS, found.points_px, strict=True)))
 
 
-Choose = Callable[[Sequence[Square]], Square]
-"""Takes the squares around several people, the most certain one first; returns one of them."""
-
-
 class PoseNetwork:
-    """Finds one person in image after image.
+    """Finds one person in image after image, at first the most certain one.
 
     Attributes:
-        choose: chooses among several people where nobody was followed yet; None for the most
-            certain one.
         several: number of images with several people, of those that were searched for them.
     """
 
@@ -135,14 +129,18 @@ class PoseNetwork:
         """Load both networks; CardboxError without LiteRT, or if a file is missing or damaged."""
         self._detect = Network(detector)
         self._locate = Network(landmarks)
-        self.choose: Choose | None = None
         self.forget()
 
     def forget(self) -> None:
         """Search the whole next image instead of around the last person, for whoever is there."""
-        self._square: Square | None = None
         self._images = self._now_ns = self.several = 0
         self._identity = Identity()
+        self.start_anew()
+
+    def start_anew(self) -> None:
+        """Do so in the same film, in which people were counted."""
+        self._square: Square | None = None
+        self._identity.forget()
 
     def __call__(self, image: ColorImage, stamp_ns: int | None = None) -> Detection | None:
         """Return the person in an image (H, W, 3), bgr; None where the followed one is not seen.
@@ -167,7 +165,7 @@ class PoseNetwork:
         self._square = None
         if not identity.is_known and people:
             identity.forget()
-            people = [people[0] if self.choose is None else self.choose(people)]
+            people = people[:1]
         elif self.several:
             identity.lose()
         for square in people:

@@ -8,6 +8,7 @@ from functools import partial
 from cardbox_tracker.camera.camera import Camera
 from cardbox_tracker.camera.depth_image import median_depth
 from cardbox_tracker.common.errors import CardboxError
+from cardbox_tracker.detectors.person_choice import PersonChoice
 from cardbox_tracker.measuring.config import (
     InitializationConfig,
     InitializationResult,
@@ -23,8 +24,9 @@ from cardbox_tracker.measuring.scale import (
     measured_scale,
 )
 from cardbox_tracker.person.model import BodyModel
+from cardbox_tracker.recordings.measured_scene import frames_of
 from cardbox_tracker.recordings.recording import Recording
-from cardbox_tracker.recordings.silhouettes import SilhouetteSource, TimeSpan
+from cardbox_tracker.recordings.silhouettes import RecordedFrame, SilhouetteSource, TimeSpan
 
 # Further images of one posture add no information.
 _MOST_IMAGES = 20
@@ -35,15 +37,17 @@ def initialize_from_recording(
     spans: Mapping[str, TimeSpan],
     config: InitializationConfig,
     progress: Callable[[float], None] | None = None,
+    choice: PersonChoice | None = None,
 ) -> InitializationResult:
     """Measure the person who holds the reference postures in ``spans`` (by reference name).
 
-    Raises CardboxError if a span has no image, and InitializationError if the references are
-    unusable or show other postures, or the model does not fit them.
+    Of several people whom a detector finds, ``choice`` means one in each span. Raises CardboxError
+    if a span has no image, and InitializationError if the references are unusable or show other
+    postures, or the model does not fit them.
     """
     references, images = {}, {}
     for name, span in spans.items():
-        frames = source.held(span, name)
+        frames = _held(source, span, name, choice)
         references[name] = average_silhouette([frame.silhouette for frame in frames])
         every = -(-len(frames) // _MOST_IMAGES)
         images[name] = [frame.image for frame in frames[::every]]
@@ -55,6 +59,7 @@ def initialize_at_scale(
     spans: Mapping[str, TimeSpan],
     config: InitializationConfig,
     progress: Callable[[float], None] | None = None,
+    choice: PersonChoice | None = None,
 ) -> InitializationResult:
     """Measure the person with the first camera, and the distance with depth or the second camera.
 
@@ -64,26 +69,50 @@ def initialize_at_scale(
     """
     scale: Callable[[BodyModel, Camera], float]
     if recording.measures_depth:
-        seen = {name: _depth_reference(recording, spans[name], name) for name in SCALE_REFERENCES}
+        seen = {
+            name: _depth_reference(recording, spans[name], name, choice)
+            for name in SCALE_REFERENCES
+        }
         scale = partial(depth_scale, references=seen)
     else:
-        held = {name: recording.sources[1].held(spans[name], name) for name in SCALE_REFERENCES}
+        other = recording.sources[1]
+        held = {name: _held(other, spans[name], name, choice) for name in SCALE_REFERENCES}
         shown = {name: average_silhouette([f.silhouette for f in held[name]]) for name in held}
         scale = partial(measured_scale, other=recording.others[0], references=shown)
 
     def measure(at: InitializationConfig, is_last: bool) -> InitializationResult:
-        return initialize_from_recording(recording.first, spans, at, progress if is_last else None)
+        show = progress if is_last else None
+        return initialize_from_recording(recording.first, spans, at, show, choice)
 
     return measured_at_scale(measure, config, recording.first.camera, scale)
 
 
-def _depth_reference(recording: Recording, span: TimeSpan, name: str) -> DepthReference:
+def _held(
+    source: SilhouetteSource, span: TimeSpan, name: str, choice: PersonChoice | None
+) -> list[RecordedFrame]:
+    """Return the frames of a span with the silhouette of one person."""
+    frames = source.held(span, name)
+    if choice is None:
+        return frames
+    chosen = frames_of(choice.scaled(*source.scale), frames, source.camera)
+    if not chosen:
+        raise CardboxError(f"nobody is seen in the {name} span {span} s; leave --person out")
+    return chosen
+
+
+def _depth_reference(
+    recording: Recording, span: TimeSpan, name: str, choice: PersonChoice | None
+) -> DepthReference:
     silhouettes, depths_m = [], []
+    own = None
+    if choice is not None:
+        own = {one.stamp_ns: one for one in _held(recording.first, span, name, choice)}
     for taken in recording.frames(span.start_s):
         if taken.time_s > span.end_s:
             break
-        if taken.frames[0] is not None and taken.depth_m is not None:
-            silhouettes.append(taken.frames[0].silhouette)
+        frame = taken.frames[0] if own is None else own.get(taken.stamp_ns)
+        if frame is not None and taken.depth_m is not None:
+            silhouettes.append(frame.silhouette)
             depths_m.append(taken.depth_m)
     if not depths_m:
         raise CardboxError(

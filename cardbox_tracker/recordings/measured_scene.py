@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 import math
+from collections import defaultdict
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import NamedTuple
 
 import numpy as np
 
 from cardbox_tracker.camera.camera import Camera
+from cardbox_tracker.camera.view import OtherCamera
 from cardbox_tracker.detectors.image_points import ImagePoints
+from cardbox_tracker.detectors.person_choice import Chosen, PersonChoice
 from cardbox_tracker.measuring.first_sight import upper_body
 from cardbox_tracker.measuring.people_camera import Distances
 from cardbox_tracker.measuring.scene_camera import Picture
@@ -19,38 +22,94 @@ from cardbox_tracker.measuring.scene_watch import MOST_PICTURES, Spread
 from cardbox_tracker.measuring.seen_body import MOST_SIGHTS, SeenBody
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.recordings.films import Person, assign
-from cardbox_tracker.recordings.recording import FrameSet, Recording
+from cardbox_tracker.recordings.recording import FrameSet, Recording, observation_of
 from cardbox_tracker.recordings.silhouettes import RecordedFrame
 from cardbox_tracker.search.config import TrackerConfig
 from cardbox_tracker.tracking.session import Session
 
 
 class Watched(NamedTuple):
-    """What the first camera of a recording shows in all of it."""
+    """What the first camera of a recording shows in all of it, or in the longest shot of a film."""
 
     frames: Sequence[RecordedFrame]  #: some with a whole upper body, for the sizes of one person
     pictures: Sequence[Picture]  #: times, s, and some images as they were recorded, undistorted
-    #: times, s, and points of each person whom a detector finds.
+    #: times, s, and points of each person whom a detector finds, or of the one who is chosen.
     people: Sequence[Sequence[tuple[float, ImagePoints]]]
+    chosen: Chosen | None = None  #: who is chosen; None without a choice
 
 
-def watch(recording: Recording, start_s: float = 0.0, end_s: float = math.inf) -> Watched:
+def watch(
+    recording: Recording,
+    start_s: float = 0.0,
+    end_s: float = math.inf,
+    choice: PersonChoice | None = None,
+) -> Watched:
     """Read a recording from ``start_s`` to ``end_s``, seconds from its start.
 
-    From then on, its frames have small images alone.
+    From then on, its frames have small images alone. ``choice`` is of one of several people.
     """
     for source in recording.sources:
         source.keep_images()
-    frames, pictures = Spread[RecordedFrame](MOST_SIGHTS), Spread[Picture](MOST_PICTURES)
-    people: list[Person] = []
+    session = told_apart(recording.first.camera, recording.others)
+    chosen = None if choice is None else Chosen(choice.scaled(*recording.first.scale))
+    shot = longest = _Shot()
     for taken in recording.frames(start_s, end_s):
         frame = taken.first
-        frames.add(partial(_whole, frame))
-        pictures.add(partial(_picture, taken))
-        assign(people, frame, taken.time_s)
+        if frame.is_cut:
+            shot = _Shot()
+        shot.images += 1
+        if shot.images > longest.images:
+            longest = shot
+        shot.frames.add(partial(_whole, frame))
+        shot.pictures.add(partial(_picture, taken))
+        if chosen is None:
+            assign(shot.people, frame, taken.time_s)
+            continue
+        session.track(taken.observations)
+        shown = session.shown()
+        chosen.see(taken.time_s, {number: one.pixels for number, one in shown.items()})
+        for number, one in shown.items():
+            if one.points is not None:
+                shot.numbered[number].append((taken.time_s, one.points))
     for source in recording.sources:
         source.has_pictures = False
-    return Watched(frames.items, pictures.items, [one.seen for one in people])
+    people = [one.seen for one in longest.people]
+    if chosen is not None and chosen.number in longest.numbered:
+        people = [longest.numbered[chosen.number]]
+    return Watched(longest.frames.items, longest.pictures.items, people, chosen)
+
+
+def told_apart(camera: Camera, others: Sequence[OtherCamera] = ()) -> Session:
+    """Return a session that tells people apart whom a detector finds, and tracks nobody."""
+    return Session([BodyModel()], camera, others=others, people=0, only_measures=True)
+
+
+def frames_of(
+    choice: PersonChoice, frames: Sequence[RecordedFrame], camera: Camera
+) -> list[RecordedFrame]:
+    """Return the frames that show who is chosen, px of frames, with their silhouette alone."""
+    session, chosen = told_apart(camera), Chosen(choice)
+    own: list[dict[int, RecordedFrame]] = []
+    for frame in frames:
+        session.track(observation_of(frame))
+        shown = session.shown()
+        chosen.see(frame.time_s, {number: one.pixels for number, one in shown.items()})
+        seen = ((number, session.silhouette_of(number)) for number in shown)
+        own.append({n: frame._replace(silhouette=one) for n, one in seen if one is not None})
+    return [one[chosen.number] for one in own if chosen.number in one]
+
+
+@dataclass
+class _Shot:
+    """What a film shows between two cuts."""
+
+    images: int = 0
+    frames: Spread[RecordedFrame] = field(default_factory=lambda: Spread(MOST_SIGHTS))
+    pictures: Spread[Picture] = field(default_factory=lambda: Spread(MOST_PICTURES))
+    people: list[Person] = field(default_factory=list)
+    numbered: dict[int, list[tuple[float, ImagePoints]]] = field(
+        default_factory=lambda: defaultdict(list)
+    )
 
 
 def _whole(frame: RecordedFrame) -> RecordedFrame | None:
@@ -97,18 +156,19 @@ def seen_people(
     seed: int,
     start_s: float = 0.0,
     end_s: float = math.inf,
+    only: int | None = None,
 ) -> list[BodyModel]:
     """Return the bodies of several people; who are not detected are tracked to tell them apart.
 
     ``guesses`` are those of a :class:`~cardbox_tracker.tracking.session.Session`, and ``most`` is
     the number of people, 0 for all who come. They are tracked from ``start_s`` to ``end_s``,
-    seconds from the start of the recording.
+    seconds from the start of the recording. ``only`` is the number of one whose body is returned.
     """
     rng = np.random.default_rng(seed)
     given = guesses, recording.first.camera, config, rng, recording.others, most
     # One camera's points tell who is who, but regions and other cameras need postures.
     is_enough = recording.first.has_points and not recording.others
-    session = Session(*given, only_measures=is_enough)
+    session = Session(*given, only_measures=is_enough, only=only)
     for taken in recording.frames(start_s, end_s):
         session.track(taken.observations)
     bodies = [replace(tracker.body, version=0, stamp_ns=0) for tracker in session.trackers]

@@ -15,7 +15,7 @@ from cardbox_tracker.camera.camera import Camera
 from cardbox_tracker.camera.depth_image import DepthImage, at_size, depth_from_image
 from cardbox_tracker.camera.pairing import TOLERANCE_NS, side_by_side
 from cardbox_tracker.common.errors import BagError, CardboxError
-from cardbox_tracker.detectors.detector import Detector
+from cardbox_tracker.detectors.detector import Detector, KeptDetections
 from cardbox_tracker.detectors.point_table import PointTable
 from cardbox_tracker.detectors.pose_network import silhouette_of
 from cardbox_tracker.recordings.bag_reader import IMAGE_TYPES, BagReader
@@ -138,7 +138,7 @@ class DetectorSilhouetteSource(SilhouetteSource):
         """
         self._open(bag, camera)
         self._find_points(detector if isinstance(points, Detector) else points, camera)
-        self._detector = self._detector or self._started(detector)
+        self._detector = self._detector or KeptDetections(detector.start())
         self._finds_people = detector.people > 0
 
     def _silhouette(self, prepared: PreparedImage) -> NDArray[np.uint8]:

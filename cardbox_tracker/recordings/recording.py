@@ -49,6 +49,18 @@ masks they are, or the scene learned around the person."""
 _STATIC_TOPIC = "/tf_static"
 
 
+def observation_of(frame: RecordedFrame) -> Observation:
+    """Return what a session takes of a frame, but for depth."""
+    return Observation(
+        frame.silhouette,
+        frame.image,
+        stamp_ns=frame.stamp_ns,
+        points=frame.points,
+        people=frame.people,
+        is_cut=frame.is_cut,
+    )
+
+
 class FrameSet(NamedTuple):
     """Frames of all cameras at one time."""
 
@@ -65,18 +77,7 @@ class FrameSet(NamedTuple):
     @property
     def observations(self) -> list[Observation]:
         """Observations for a session; that of a camera without an image is empty."""
-        seen = [
-            Observation()
-            if frame is None
-            else Observation(
-                frame.silhouette,
-                frame.image,
-                stamp_ns=frame.stamp_ns,
-                points=frame.points,
-                people=frame.people,
-            )
-            for frame in self.frames
-        ]
+        seen = [Observation() if one is None else observation_of(one) for one in self.frames]
         more = {"depth_m": self.depth_m, "stamp_ns": self.stamp_ns, "picture": self.picture}
         seen[0] = seen[0].having(**more)
         return seen

@@ -23,6 +23,7 @@ from cardbox_tracker.detectors.detector import Detector, KeptDetections
 from cardbox_tracker.detectors.image_points import ImagePoints
 from cardbox_tracker.detectors.point_table import GivenPoints, Image, PointTable
 from cardbox_tracker.detectors.pose_network import Detection, image_points
+from cardbox_tracker.recordings.cuts import with_cuts
 from cardbox_tracker.recordings.image_recording import RecordedImage
 from cardbox_tracker.recordings.open_images import ImageRecording
 from cardbox_tracker.segmentation.background_config import BackgroundConfig
@@ -78,6 +79,7 @@ class PreparedImage(NamedTuple):
     recorded: RecordedImage  #: the image as it was recorded
     number: int = 0  #: number of the image in the recording, counted from 0
     found: Sequence[Detection] = ()  #: whom the detector finds in the image
+    is_cut: bool = False  #: whether the film is cut before the image
 
 
 FindPoints = Callable[[PreparedImage, NDArray[np.uint8]], ImagePoints | None]
@@ -99,6 +101,7 @@ class RecordedFrame(NamedTuple):
     recorded: RecordedImage | None = None  #: the image as it was recorded; None if it was not kept
     #: joints of each person, from a detector of several; None without one.
     people: tuple[ImagePoints, ...] | None = None
+    is_cut: bool = False  #: whether the film is cut before the image
 
 
 def _not_kept() -> NDArray[np.uint8]:
@@ -194,7 +197,7 @@ class SilhouetteSource:
     def _find_points(self, points: Detector | PointTable | None, camera: str | None) -> None:
         self.has_points = points is not None
         self._finds_people = points is not None and points.people > 0
-        self._detector = self._started(points) if isinstance(points, Detector) else None
+        self._detector = KeptDetections(points.start()) if isinstance(points, Detector) else None
         self._given: GivenPoints | None = None
         self._points: FindPoints = lambda prepared, silhouette: None
         if self._detector is not None:
@@ -210,19 +213,17 @@ class SilhouetteSource:
                 Image(prepared.stamp_ns, prepared.number, prepared.recorded.name), silhouette
             )
 
-    def _started(self, detector: Detector) -> KeptDetections:
+    @property
+    def scale(self) -> tuple[float, float]:
+        """Width and height of the frames in those of the camera's own images."""
         calibration = self._pipeline.calibration
-        across, down = (
-            self.camera.width / calibration.width,
-            self.camera.height / calibration.height,
-        )
-        return KeptDetections(detector.start(across, down))
+        return self.camera.width / calibration.width, self.camera.height / calibration.height
 
     def _looked_at(self, prepared: PreparedImage, start_s: float = -math.inf) -> PreparedImage:
         """Return an image with whom the detector finds in it, if it is not before ``start_s``."""
         if self._detector is None or prepared.time_s < start_s:
             return prepared
-        found = self._detector(prepared.number, prepared.stamp_ns, prepared.image)
+        found = self._detector(prepared.number, prepared.stamp_ns, prepared.image, prepared.is_cut)
         return prepared._replace(found=found)
 
     def _images_until(self, end_s: float, start_s: float) -> Iterator[PreparedImage]:
@@ -261,6 +262,7 @@ class SilhouetteSource:
         stamp_ns, time_s, image, recorded, *_ = prepared
         shown = recorded if self.has_pictures else None
         frame = RecordedFrame(stamp_ns, time_s, image, silhouette, depth_m, recorded=shown)
+        frame = frame._replace(is_cut=prepared.is_cut)
         if self._finds_people:
             return frame._replace(people=self._people(prepared))
         return frame._replace(points=self._points(prepared, silhouette))
@@ -384,7 +386,17 @@ class SilhouetteSource:
         if not self.has_pictures and self._kept_s >= end_s:
             yield from kept
             return
-        used, keeps = 0, self._file is not None and self._kept == 0
+        keeps = self._file is not None and self._kept == 0
+        shown = with_cuts(self._read(kept), lambda one: one.image)
+        for used, (found, is_cut) in enumerate(shown, 1):
+            # Of several passes, the longest counts.
+            self._used = max(self._used, used)
+            found = found._replace(is_cut=is_cut)
+            keeps = keeps and self._keep(found)
+            yield found
+        self._kept_s = math.inf if keeps else self._kept_s
+
+    def _read(self, kept: Iterator[PreparedImage]) -> Iterator[PreparedImage]:
         taken = enumerate(self._bag.images(self.topic), 1)
         for number, image, prepared in results_ahead(partial(self._prepared, kept), taken):
             if number == 1:
@@ -393,14 +405,8 @@ class SilhouetteSource:
             if isinstance(prepared, str):
                 self._broken[number] = prepared
                 continue
-            # Of several passes, the longest counts.
-            used += 1
-            self._used = max(self._used, used)
             time_ns = image.stamp_ns + self._clock_ns - self.start_ns
-            found = PreparedImage(image.stamp_ns, time_ns / 1e9, prepared, image, number - 1)
-            keeps = keeps and self._keep(found)
-            yield found
-        self._kept_s = math.inf if keeps else self._kept_s
+            yield PreparedImage(image.stamp_ns, time_ns / 1e9, prepared, image, number - 1)
 
     def _keep(self, one: PreparedImage) -> bool:
         """Keep an image; return whether there is room for more."""

@@ -89,6 +89,7 @@ def track_recording(
     people: int | None = None,
     look: Look | None = None,
     lag_s: float = LAG_S,
+    only: int | None = None,
 ) -> TrackSummary:
     """Track every image from ``start_s`` to ``end_s``.
 
@@ -97,12 +98,14 @@ def track_recording(
     :func:`~.result_table.result_table`. ``observers``, such as a progress bar or a bag writer, are
     called for each image, and for each of several people. ``lag_s`` is that of
     :class:`~cardbox_tracker.tracking.smoother.Smoother`: 0 for what live tracking gives. The other
-    arguments are those of :class:`~cardbox_tracker.tracking.session.Session`. Raises CardboxError
-    if no image lies after ``start_s``, or a file cannot be written.
+    arguments are those of :class:`~cardbox_tracker.tracking.session.Session`; with ``only``, the
+    results are those of one person without a number. Raises CardboxError if no image lies after
+    ``start_s``, or a file cannot be written.
     """
     first, rng = recording.first, np.random.default_rng(seed)
-    given = recording.others, people, look
-    session, found = Session(bodies, first.camera, config, rng, *given), list[Quality]()
+    given = recording.others, people if only is None else 0, look
+    session = Session(bodies, first.camera, config, rng, *given, only=only)
+    found, cuts_s = list[Quality](), list[float]()
     has = {"has_points": first.has_points, "has_people": people is not None}
     has |= {"has_hands": look is not None, "is_smoothed": lag_s > 0.0}
     smoother = Smoother[tuple[RecordedFrame, list[Tracker]]](lag_s)
@@ -124,7 +127,13 @@ def track_recording(
         frames = 0
         for taken in recording.frames(start_s, end_s):
             frames += 1
+            if taken.first.is_cut:
+                cuts_s.append(taken.time_s)
+                tell(smoother.finish())
+                smoother = Smoother(lag_s)
             estimates = session.track(taken.observations)
+            if only is not None:
+                estimates = [replace(one, person=None) for one in estimates]
             found += [Quality() for _ in estimates[len(found) :]]
             # A tracker that gets another body is not the one that saw the images before.
             both = zip_longest(as_seen, session.trackers)
@@ -152,8 +161,20 @@ def track_recording(
         each = {n: _summary([quality], body) for n, (quality, body) in enumerate(pairs, 1)}
     # Of several people, there may be nobody.
     body = bodies[0] if bodies else None
-    summary = _summary(found, body, session.remarks(recording.names, is_all=True))
+    remarks = [*_cut_remarks(cuts_s), *session.remarks(recording.names, is_all=True)]
+    summary = _summary(found, body, remarks)
     return replace(summary, used=used, people=each)
+
+
+def _cut_remarks(cuts_s: Sequence[float]) -> Iterator[str]:
+    """Yield what follows from the cuts of a film at these times, s, if it has any."""
+    if cuts_s:
+        yield (
+            f"the film is cut at {', '.join(f'{one:.1f}' for one in cuts_s)} s: each time tracking "
+            "starts anew, and people are known by the colours of the trunk alone, if several are "
+            "told apart; pitch and height of the camera are those of the longest shot, so leans "
+            "and places are right in that one: give --start and --end to track another"
+        )
 
 
 _MOST_REASONS = 3
@@ -191,10 +212,16 @@ class Quality:
         self._angles_rad: list[float] = []
         self._hands_m: list[float] = []
         self._distances_m: list[float] = []
+        # Chance that it is the same one of several people, and times, s, of each new one.
+        self._chance, self._returns = 1.0, list[tuple[float, float]]()
 
     def __call__(self, frame: RecordedFrame, estimate: Estimate, tracker: Tracker) -> None:
         """Count one image."""
         self.images += 1
+        chance = estimate.person_chance
+        if chance is not None and chance != self._chance:
+            self._chance = chance
+            self._returns.append((frame.time_s, chance))
         self.uncertain += estimate.state == UNCERTAIN
         if estimate.cost_px is not None and estimate.iou is not None:
             self.fits.append((estimate.cost_px, estimate.iou))
@@ -234,6 +261,12 @@ class Quality:
             f"{self._vertical / self.images:.0%}, the distance (to 0.3 m) in "
             f"{self._sure_places / self.images:.0%}"
         )
+        if self._returns:
+            returns = (f"{time_s:.1f} s ({chance:.0%})" for time_s, chance in self._returns)
+            yield (
+                "away or hidden, then known by the colours of the trunk alone, with the chance of "
+                f"being the same person: {', '.join(returns)}"
+            )
         if self._reasons:
             counts = (f"{why} ({count})" for why, count in self._reasons.most_common(_MOST_REASONS))
             yield f"postures are unsure where {', '.join(counts)}"

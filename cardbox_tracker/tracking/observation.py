@@ -83,9 +83,10 @@ class Observation:
         stamp_ns: time of the data, ns; None if it is unknown.
         picture: returns the image at its full resolution, which hands need; that of the channel
             ``image`` without another one.
+        is_cut: whether a film is cut here, so that nothing is where it was before.
     """
 
-    __slots__ = ("channels", "picture", "stamp_ns")
+    __slots__ = ("channels", "is_cut", "picture", "stamp_ns")
 
     def __init__(
         self,
@@ -95,6 +96,7 @@ class Observation:
         stamp_ns: int | None = None,
         points: ImagePoints | None = None,
         picture: Callable[[], Image] | None = None,
+        is_cut: bool = False,
         **more: Any,
     ) -> None:
         """Take the data of one time; what there is not is None.
@@ -128,11 +130,12 @@ class Observation:
                 f"stamp_ns of an observation is {quoted(stamp_ns)}; expected a whole number of "
                 "nanoseconds, or None"
             ) from None
+        self.is_cut = is_cut
         self.picture = (lambda: image) if picture is None and image is not None else picture
 
     def having(self, **given: Any) -> Observation:
         """Return the observation with other channels, or another ``stamp_ns``."""
-        kept = {"stamp_ns": self.stamp_ns, "picture": self.picture}
+        kept = {"stamp_ns": self.stamp_ns, "picture": self.picture, "is_cut": self.is_cut}
         return Observation(**{**kept, **self.channels, **given})
 
     @property

@@ -203,6 +203,7 @@ class Session:
         beside: Executor | None = None,
         only_measures: bool = False,
         scene: SceneWatch | None = None,
+        only: int | None = None,
     ) -> None:
         """Set up for people who may come, with the body of each in the order of their numbers.
 
@@ -211,8 +212,9 @@ class Session:
         None for one without a number, to whom everything belongs that the cameras show. Unknown
         values of a body are measured, see :class:`~cardbox_tracker.measuring.seen_body.SeenBody`;
         ``beside`` does so while tracking goes on, and with ``only_measures`` nobody is tracked.
-        ``scene`` finds the camera and people's distances meanwhile, and bodies follow it. The other
-        arguments are those of :class:`~.tracker.Tracker`.
+        ``scene`` finds the camera and people's distances meanwhile, and bodies follow it. ``only``
+        is the number of the one person whose estimate is given; the others are only told apart. The
+        other arguments are those of :class:`~.tracker.Tracker`.
         """
         self._bodies = tuple(_before_all(body, others) for body in bodies)
         self._camera = camera
@@ -220,13 +222,15 @@ class Session:
         self._rng, self._others = rng or np.random.default_rng(0), tuple(others)
         self._look, self._is_alone, self._beside = look, people is None, beside
         self._only_measures, self._most = only_measures, people or MOST_PEOPLE
-        self._scene = scene
+        self._scene, self._only = scene, only
         self._people: list[_Person] = []
+        # What the first camera's last image shows of each person, by number.
+        self._seen: dict[int, _Share] = {}
         # Images in a row with somebody new, by camera.
         self._new = [0] * (1 + len(self._others))
         self._last_ns: int | None = None
         self._checked: Future[None] | None = None
-        for number in [None] if people is None else range(1, people + 1):
+        for number in [None] if people is None else range(1, max(people, only or 0) + 1):
             self._add(number)
 
     def _add(self, number: int | None) -> _Person:
@@ -245,9 +249,14 @@ class Session:
         return self._people[-1]
 
     @property
+    def _given(self) -> list[_Person]:
+        """The people whose estimates are given."""
+        return [one for one in self._people if self._only in (None, one.number)]
+
+    @property
     def trackers(self) -> list[Tracker]:
         """The tracker of each person, in the order of the estimates."""
-        return [person.tracker for person in self._people]
+        return [person.tracker for person in self._given]
 
     @property
     def agreement(self) -> CameraAgreement | None:
@@ -280,7 +289,7 @@ class Session:
 
     def _exchanged_statures(self) -> Iterator[str]:
         """Yield which two people are as tall as each other's stature."""
-        shown = [(one.number, one.tracker.arm_m, one.tracker.place.scale) for one in self._people]
+        shown = [(one.number, one.tracker.arm_m, one.tracker.place.scale) for one in self._given]
         for (one, own_m, own), (two, other_m, other) in combinations(shown, 2):
             is_own = abs(own * own_m / other_m - 1.0) < _SAME_STATURE < abs(own - 1.0)
             if is_own and abs(other * other_m / own_m - 1.0) < _SAME_STATURE:
@@ -289,6 +298,19 @@ class Session:
                     "exchange their statures, which count from left to right if people come "
                     "together, else as they come"
                 )
+
+    def shown(self) -> dict[int, Shown]:
+        """Return the figures in the first camera's last image by the numbers of several people."""
+        sights = {number: self._people[number - 1].sights[0] for number in self._seen}
+        return {
+            number: Shown(sight.points, sight.figure, sight.pixels)
+            for number, sight in sights.items()
+            if self._seen[number].is_found and sight.pixels is not None
+        }
+
+    def silhouette_of(self, number: int) -> Silhouette | None:
+        """Return the part of the first camera's last silhouette that is one of several people's."""
+        return self._seen[number].seen.silhouette if number in self._seen else None
 
     def points_of(self, number: int) -> ImagePoints | None:
         """Return the points of one of several people in the first camera's last image."""
@@ -329,16 +351,32 @@ class Session:
             stamp_ns = 0 if self._last_ns is None else self._last_ns + round(1e9 * USUAL_INTERVAL_S)
         self._last_ns = stamp_ns
         first = observations[0]
+        if first is not None and first.is_cut:
+            self._start_anew()
         if self._is_alone:
             (person,) = self._people
             self._look_around(first, [None if first is None else first.points])
             person.estimate = person.track(observations, stamp_ns / 1e9, self._only_measures)
             return [person.estimate]
         seen = [self._shared(*one) for one in enumerate(observations)]
+        self._seen = seen[0]
         self._look_around(first, [person.sights[0].points for person in self._people])
-        for person in self._people:
+        # Only the figures of a detector in one camera tell people apart without their postures.
+        is_told = not self._others and first is not None and "people" in first.channels
+        for person in self._given if is_told else self._people:
             person.estimate = self._tracked(person, [one.get(person.number) for one in seen])
-        return [person.estimate for person in self._people]
+        return [person.estimate for person in self._given]
+
+    def _start_anew(self) -> None:
+        """Forget all places, so that people are known by their colours alone."""
+        assert self._last_ns is not None
+        for person in self._people:
+            person.tracker.reset()
+            person.estimate = Estimate(NO_PERSON, person=person.estimate.person)
+            for sight in person.sights:
+                sight.points = sight.pixels = None
+                if sight.seen_ns is not None:
+                    sight.seen_ns = self._last_ns - GONE_NS - 1
 
     def _look_around(self, seen: Observation | None, points: Sequence[ImagePoints | None]) -> None:
         """Use what the first camera shows of the scene, with the points of each person."""

@@ -35,6 +35,7 @@ SPANS = {
         (("--distance", "nan"), "distance_m is nan; expected a finite number of m"),
         (("--distance", "200"), "distance_m is 200 m; expected 0.3 to 20 m"),
         (("--camera-pitch-deg", "95"), "camera_pitch_rad is 1.65806 rad; expected -1.4 to 1.4 rad"),
+        (("--person", "left@3"), "--person chooses in each span: leave @T out"),
         (("--side-turn", "back"), "--side-turn: expected one of left, right, got 'back'"),
         (("--seed", "-1"), "--seed: expected a whole number of 0 or more, got '-1'"),
         (("--front", "90:99"), "no image lies in the front span 90:99 s of a recording of"),

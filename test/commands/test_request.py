@@ -114,18 +114,24 @@ def test_tracking_ends_where_it_is_asked_to(film: Path) -> None:
     assert "--end 5 is not after --start 5" in refused(film, *words)
 
 
-def test_a_person_is_chosen_for_the_detector(film: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_person_is_chosen_among_all_whom_a_detector_finds(
+    film: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setattr(detector_module, "installed_models", lambda: ModelFiles(film, film))
     given = ("--fov", 60, "--stature", 1.7, "--person", "120,80.5")
     for words in (("mediapipe",), ("mediapipe", "--background", "0:1")):
         recording = asked(film, *given, "--detector", *words).recording
         found = recording.detector
-        assert found is not None and found.person == PersonChoice("place", (120.0, 80.5))
+        assert found is not None and found.people == MOST_PEOPLE
         assert recording.points == found
     assert "--person needs a detector" in refused(film, *given)
-    assert "--person needs a detector" in refused(
-        film, *given, "--detector", film.parent / "points.csv"
-    )
+    request = asked(film, *given, "--detector", film.parent / "points.csv")
+    assert request.recording.points == PointTable(film.parent / "points.csv", MOST_PEOPLE)
+    assert request.person.choice == PersonChoice("place", (120.0, 80.5))
+    # All that goes with one person goes with one who is chosen.
+    me = ("--model", film.parent / "me.yaml", "--start", 1, "--preset", "paper")
+    person = asked(film, *given[:2], *me, "--detector=mediapipe", "--person=left@2").person
+    assert (person.people, person.choice) == (None, PersonChoice("left", time_s=2.0))
 
 
 def test_people_are_numbered_from_1(film: Path) -> None:

@@ -12,7 +12,6 @@ import pytest
 from cardbox_tracker.common.errors import CardboxError
 from cardbox_tracker.detectors.detector import Detector
 from cardbox_tracker.detectors.own_network import OwnModel
-from cardbox_tracker.detectors.person_choice import PersonChoice
 from cardbox_tracker.detectors.pose_network import LANDMARKS, image_points
 
 IMAGE = np.random.default_rng(0).integers(0, 255, (120, 160, 3), np.uint8)
@@ -126,14 +125,6 @@ def test_one_person_is_followed_whatever_the_order() -> None:
     assert columns == [20.0, *[21.0] * 5, None, 25.0]
     assert start.missed == 1
     assert "follows the most certain one" in start.remark
-
-
-@pytest.mark.parametrize(("which", "column"), [("left", 20.0), ("right", 110.0)])
-def test_a_person_can_be_chosen(which: str, column: float) -> None:
-    people = [person(60), person(20), person(110)]
-    found = detector(people, person=PersonChoice(which)).start()(IMAGE, 0)
-    assert found is not None
-    assert float(np.nanmin(found.points_px[:, 0])) == column
 
 
 def test_all_people_are_found_if_several_are_wanted() -> None:

@@ -5,9 +5,15 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from cardbox_tracker.detectors.identity import KNOWN_IMAGES
 from cardbox_tracker.detectors.image_points import ImagePoints
-from cardbox_tracker.detectors.person_choice import PersonChoice, inside, near_person, person_in
-from cardbox_tracker.detectors.pose_network import Square
+from cardbox_tracker.detectors.person_choice import (
+    Chosen,
+    PersonChoice,
+    inside,
+    near_person,
+    person_in,
+)
 
 
 def person(column: float, score: float) -> ImagePoints:
@@ -56,21 +62,61 @@ def test_the_share_of_the_points_in_the_silhouette_is_known() -> None:
     assert near_person(noise) is None
 
 
+def pixels(column: int, row: int = 50, half: int = 8) -> np.ndarray:
+    image = np.zeros((100, 240), np.uint8)
+    image[row - half : row + half, column - half : column + half] = 255
+    return image
+
+
+# Somebody comes alone, then another one; they walk past each other.
+FIRST = [{1: pixels(120)}] * 20
+BOTH = [{1: pixels(120 + k, half=12), 2: pixels(20 + 3 * k, 60)} for k in range(60)]
+
+
 @pytest.mark.parametrize(
-    ("text", "expected"),
-    [("left", 1), ("right", 0), ("largest", 2), ("200,50", 0), ("70,0", 2), (" 1, 1", 1)],
+    ("text", "expected", "words"),
+    [
+        ("left", 2, "the left one, of 2 at 24.0 s"),
+        ("right", 1, "the right one, of 2 at 24.0 s"),
+        ("largest", 1, "the largest one, of 2 at 24.0 s"),
+        ("left@75", 1, "the left one, of 2 at 75.0 s"),
+        ("125,45", 1, "the one at column 125 and row 45, of 1 at 4.0 s"),
+        (" 125, 60@50", 2, "the one at column 125 and row 60, of 2 at 51.0 s"),
+        ("32,60", 2, "the one at column 32 and row 60, of 2 at 24.0 s"),
+        ("20,98", 2, "nobody is there, so the one nearest to column 20 and row 98, of 2 at 24.0 s"),
+    ],
 )
-def test_people_are_chosen_by_place_and_size(text: str, expected: int) -> None:
-    people = [Square(200, 50, 60, 0.0), Square(20, 60, 70, 0.0), Square(90, 50, 90, 0.0)]
-    assert PersonChoice.parse(text)(people) is people[expected]
+def test_people_are_chosen_in_the_first_image_that_fits(
+    text: str, expected: int, words: str
+) -> None:
+    chosen = Chosen(PersonChoice.parse(text))
+    for time_s, shown in enumerate(FIRST + BOTH):
+        chosen.see(float(time_s), shown)
+    assert chosen.number == expected
+    assert str(chosen) == f"person: {words}"
+
+
+def test_an_error_of_the_detector_is_not_chosen_and_nobody_is_none() -> None:
+    chosen = Chosen(PersonChoice.parse("left"))
+    assert chosen.number is None
+    for image in range(20):
+        chosen.see(float(image), {1: pixels(120)} | ({2: pixels(20)} if image < 3 else {}))
+    assert chosen.number == 1
+    # A recording of less images than are needed to know anybody has a person all the same.
+    few = Chosen(PersonChoice.parse("left"))
+    for image in range(KNOWN_IMAGES - 1):
+        few.see(float(image), {1: pixels(120), 2: pixels(20)})
+    assert few.number == 2
 
 
 def test_a_place_is_one_of_the_camera_s_own_image() -> None:
-    people = [Square(30, 50, 60, 0.0), Square(100, 60, 60, 0.0)]
-    assert PersonChoice.parse("90,200").scaled(0.25, 0.25)(people) is people[0]
+    choice = PersonChoice.parse("90,200@3").scaled(0.5, 0.25)
+    assert choice == PersonChoice("place", (45.0, 50.0), 3.0)
 
 
-@pytest.mark.parametrize("text", ["middle", "", "1", "1,2,3", "nan,1", "1,inf", "LEFT"])
+@pytest.mark.parametrize(
+    "text", ["middle", "", "1", "1,2,3", "nan,1", "1,inf", "LEFT", "left@", "left@x", "1,2@nan"]
+)
 def test_a_choice_that_is_none_is_refused(text: str) -> None:
     with pytest.raises(ValueError, match="expected left, right, largest, or X,Y"):
         PersonChoice.parse(text)

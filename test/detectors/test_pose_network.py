@@ -14,7 +14,6 @@ from cardbox_tracker.common.errors import CardboxError
 from cardbox_tracker.detectors import pose_network
 from cardbox_tracker.detectors.detector import PersonDetector
 from cardbox_tracker.detectors.model_files import installed_models
-from cardbox_tracker.detectors.person_choice import PersonChoice
 from cardbox_tracker.detectors.pose_network import (
     LANDMARKS,
     Detection,
@@ -138,7 +137,7 @@ class SeveralPeople(PoseNetwork):
     """A network before people at columns in clothes of one colour, whom it misses at times."""
 
     def __init__(self, *people: tuple[float, tuple[int, int, int]]) -> None:
-        self.people, self.misses, self.choose, self.searched = list(people), False, None, 0
+        self.people, self.misses, self.searched = list(people), False, 0
         self.forget()
 
     def _people(self, image: np.ndarray) -> list[Square]:
@@ -170,11 +169,8 @@ def columns_of(network: SeveralPeople, images: int) -> list[float]:
     return [-1.0 if one is None else float(one.points_px[0, 0]) for one in found]
 
 
-def test_who_was_chosen_is_followed_and_nobody_else() -> None:
-    network = SeveralPeople((120.0, RED), (40.0, BLUE))
-    assert columns_of(network, 6) == [120.0] * 6
-    network.forget()
-    network.choose = PersonChoice("left")
+def test_the_most_certain_one_is_followed_and_nobody_else() -> None:
+    network = SeveralPeople((40.0, BLUE), (120.0, RED))
     assert columns_of(network, 6) == [40.0] * 6
     # The person leaves; others are there, one of them in the same place.
     network.people = [(120.0, RED), (45.0, GREEN)]
@@ -185,6 +181,11 @@ def test_who_was_chosen_is_followed_and_nobody_else() -> None:
     # A cut: no person moves so far within an image, whatever they wear.
     network.people = [(20.0, BLUE)]
     assert columns_of(network, 3) == [-1.0] * 3
+    # A cut that is known begins anew, and people who were counted remain so.
+    several = network.several
+    PersonDetector(network).start_anew()
+    assert columns_of(network, 3) == [20.0] * 3
+    assert network.several == several > 0
 
 
 def test_somebody_who_steps_before_the_person_is_not_followed() -> None:

@@ -6,10 +6,13 @@ import cv2
 import numpy as np
 import pytest
 
+from cardbox_tracker.camera.camera import Camera
 from cardbox_tracker.detectors.figure import figure_of_points
 from cardbox_tracker.detectors.image_points import POINT_NAMES, ImagePoints
+from cardbox_tracker.detectors.person_choice import PersonChoice
 from cardbox_tracker.measuring.scene_watch import Spread
 from cardbox_tracker.recordings.films import Person, assign
+from cardbox_tracker.recordings.measured_scene import frames_of
 from cardbox_tracker.recordings.silhouettes import RecordedFrame
 
 RED, BLUE = (40, 40, 220), (220, 60, 40)
@@ -60,6 +63,26 @@ def test_who_comes_after_two_seconds_is_a_new_person() -> None:
     for time_s in (0.0, 0.1, 2.1):
         assign(people, frame((160.0, RED), found=1), time_s)
     assert [[time_s for time_s, _ in person.seen] for person in people] == [[0.0, 0.1], [2.1]]
+
+
+def test_references_show_the_silhouette_of_whom_is_chosen_alone() -> None:
+    camera = Camera(SHAPE[1], SHAPE[0], 260.0, 260.0, 159.5, 119.5)
+    frames = [
+        frame((90.0, RED), (220.0, BLUE), found=1 + (number > 3))._replace(
+            stamp_ns=number * 33_333_333, time_s=number / 30
+        )
+        for number in range(14)
+    ]
+    frames = [
+        one._replace(silhouette=(one.image != 128).any(axis=2) * np.uint8(255)) for one in frames
+    ]
+    chosen = frames_of(PersonChoice("right"), frames, camera)
+    # Who comes later is known after three images.
+    assert [one.stamp_ns for one in chosen] == [one.stamp_ns for one in frames[6:]]
+    for one in chosen:
+        columns = np.nonzero(one.silhouette.any(axis=0))[0]
+        assert (columns.min(), columns.max()) == (200, 240)
+    assert frames_of(PersonChoice("left"), [], camera) == []
 
 
 def test_items_that_are_left_out_do_not_count_where_one_is_due() -> None:

@@ -112,3 +112,12 @@ def test_without_images_there_is_nothing_to_say() -> None:
 def test_few_moments_are_named(count: int) -> None:
     images = [(4.0 * n, estimate(UNCERTAIN, UNSURE, 0.5)) for n in range(count)]
     assert lines(*images)[3].count("right hand") == min(count, 5)
+
+
+def test_who_comes_back_is_told_with_the_chance() -> None:
+    here = replace(estimate(TRACKING), person_chance=1.0)
+    back = replace(here, person_chance=0.93)
+    told = lines((0.0, here), (1.0, replace(Estimate(LOST), person_chance=1.0)), (4.2, back))
+    (line,) = (one for one in told if one.startswith("away or hidden"))
+    assert line.endswith("being the same person: 4.2 s (93%)")
+    assert not any(one.startswith("away") for one in lines((0.0, here), (1.0, here)))

@@ -182,7 +182,7 @@ def test_given_points_of_several_people_come_before_the_detectors(
         f"{frame},{person},nose,{10 + 20 * person},9,1" for frame in (0, 1) for person in (0, 1)
     ]
     table.write_text("\n".join(["frame,person,joint,u,v,score", *rows]))
-    monkeypatch.setattr(SilhouetteSource, "_started", lambda *_: Mock(return_value=[]))
+    monkeypatch.setattr(Detector, "start", lambda _: Mock(all_in=Mock(return_value=[])))
     with ImageFolder(tmp_path, GivenCamera(fov_deg=60.0)) as images:
         detector = Detector(ModelFiles(tmp_path, tmp_path), people=2)
         source = DetectorSilhouetteSource(images, detector, points=PointTable(table, people=2))

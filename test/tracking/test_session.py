@@ -55,6 +55,7 @@ class Scene:
 
     def __init__(self, people: Session, detected: Detect | None) -> None:
         self.people, self.detected, self.images = people, detected, 0
+        self.is_cut = False
 
     def __call__(
         self, *people: tuple[float, tuple[int, int, int]], found: Sequence[int] | None = None
@@ -70,7 +71,9 @@ class Scene:
             points = [self.detected(BODY, CAMERA, place(people[i][0])) for i in numbers]
         self.images += 1
         stamp_ns = self.images * STEP_NS
-        return self.people.track(Observation(silhouette, image, stamp_ns=stamp_ns, people=points))
+        seen = Observation(silhouette, image, None, stamp_ns, people=points, is_cut=self.is_cut)
+        self.is_cut = False
+        return self.people.track(seen)
 
 
 def scene(detected: Detect | None, count: int = 2) -> Scene:
@@ -134,6 +137,68 @@ def test_who_leaves_and_returns_elsewhere_keeps_the_identity_by_the_clothes(
     assert places(found) == pytest.approx([-0.2, 0.5], abs=0.1)
     chances = [one.person_chance or 0.0 for one in found]
     assert 0.99 < chances[0] < 1.0 == chances[1]
+
+
+def test_one_of_several_people_is_tracked_while_the_others_are_told_apart(
+    detected: Detect, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """What is said of the one is what a session of all says, and nobody else is searched."""
+    all_of_them = scene(detected, 0)
+    one = Scene(Session([BODY], CAMERA, default_preset(), people=0, only=2), detected)
+    searched = set[int]()
+    track = session._Person.track
+
+    def counted(self: Any, *given: Any) -> Estimate:
+        searched.add(self.number)
+        return track(self, *given)
+
+    for i in range(14):
+        people = [(-0.9 + 0.15 * i, RED), *([(0.0, BLUE)] if i > 1 else [])]
+        found = [0] if abs(people[0][0]) < 0.2 else None
+        wanted = all_of_them(*people, found=found)
+        monkeypatch.setattr(session._Person, "track", counted)
+        (seen,) = one(*people, found=found)
+        monkeypatch.undo()
+        if len(wanted) < 2:
+            assert seen.state == NO_PERSON
+        else:
+            assert seen.person == 2
+            assert places([seen]) == places(wanted[1:])
+            assert seen.keypoint_states == wanted[1].keypoint_states
+    assert searched == {2}
+    assert len(one.people.trackers) == 1
+    shown = one.people.shown()
+    assert sorted(shown) == [1, 2]
+    own, other = (one.people.silhouette_of(number) for number in (2, 1))
+    assert own is not None and other is not None
+    assert (own & shown[2].pixels).any() and not (own & other).any()
+
+
+def test_after_a_cut_people_are_known_by_the_clothes_alone(detected: Detect) -> None:
+    show = scene(detected)
+    for _ in range(6):
+        show((-0.6, RED), (0.6, BLUE))
+    # The next shot shows them exchanged, without a moment between.
+    show.is_cut = True
+    found = show((-0.6, BLUE), (0.6, RED))
+    assert places(found) == pytest.approx([0.6, -0.6], abs=0.1)
+    assert all(0.9 < (one.person_chance or 0.0) < 1.0 for one in found)
+    # Who is not in a shot is not anywhere in it.
+    show.is_cut = True
+    found = show((-0.6, GREY), (0.1, BLUE))
+    assert (found[0].posture, found[0].state) == (None, NO_PERSON)
+    assert places(found[1:]) == pytest.approx([0.1], abs=0.1)
+
+
+def test_after_a_cut_one_person_is_sought_anew(detected: Detect) -> None:
+    alone = Session([BODY], CAMERA, default_preset())
+    found = []
+    for i, (aside_m, is_cut) in enumerate([(-0.6, False)] * 3 + [(0.6, True)] * 2):
+        mask, points = pixels(aside_m), detected(BODY, CAMERA, place(aside_m))
+        silhouette = np.where(mask, np.uint8(255), np.uint8(0))
+        given = {"stamp_ns": i * STEP_NS, "points": points, "is_cut": is_cut and i == 3}
+        found += alone.track(Observation(silhouette, **given))
+    assert places(found[2:]) == pytest.approx([-0.6, 0.6, 0.6], abs=0.1)
 
 
 def test_the_chance_of_the_same_person_by_hand() -> None:

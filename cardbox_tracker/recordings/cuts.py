@@ -1,0 +1,61 @@
+"""Cuts of a film: most of the image changes at once, and no motion of the camera explains it.
+
+Of neighbouring images, reduced to a few pixels, most of the grey values differ, and the middle of
+one is found nowhere in the other (normalized cross-correlation, which does not depend on the
+light). After a flash or a damaged image, the next one agrees with the one before it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator
+from typing import TypeVar
+
+import cv2
+import numpy as np
+
+from cardbox_tracker.terms.term import Image
+
+T = TypeVar("T")
+
+# Width and height of the reduced images, and the margins by which the middle may move between
+# neighbours: a sixth of the image, more than a quick pan.
+_SIZE, _MARGIN = (64, 48), (8, 11)
+# Difference of grey values that noise and light rarely reach, and what is most of the image.
+_DIFFERS, _MOST = 12, 0.5
+# Correlation of images of the same place where most grey values differ, by light or motion; those
+# of different places rarely have it.
+_ALIKE = 0.6
+
+
+def with_cuts(items: Iterable[T], image_of: Callable[[T], Image]) -> Iterator[tuple[T, bool]]:
+    """Yield items of a film with whether it is cut before their images; one is read in advance.
+
+    The images are (H, W) grey or (H, W, 3) bgr.
+    """
+    held: tuple[T, Image] | None = None
+    before: Image | None = None
+    for item in items:
+        after = _reduced(image_of(item))
+        if held is not None:
+            one, now = held
+            is_other = before is not None and _is_other(before, now)
+            is_cut = is_other and before is not None and _is_other(before, after)
+            yield one, is_cut
+            before = before if is_other and not is_cut else now
+        held = item, after
+    if held is not None:
+        yield held[0], False
+
+
+def _reduced(image: Image) -> Image:
+    grey = image if image.ndim == 2 else cv2.cvtColor(image, cv2.COLOR_BGR2GRAY)
+    return np.asarray(cv2.resize(grey, _SIZE, interpolation=cv2.INTER_AREA), np.uint8)
+
+
+def _is_other(one: Image, other: Image) -> bool:
+    """Return whether two reduced images do not show the same place."""
+    if np.count_nonzero(cv2.absdiff(one, other) > _DIFFERS) <= _MOST * one.size:
+        return False
+    down, across = _MARGIN
+    middle = one[down:-down, across:-across]
+    return float(cv2.matchTemplate(other, middle, cv2.TM_CCOEFF_NORMED).max()) < _ALIKE
