@@ -27,8 +27,8 @@ from cardbox_tracker.person.proportions import USUAL_STATURE_M
 from cardbox_tracker.person.sizes import FloatArray
 from cardbox_tracker.recordings.silhouettes import RecordedFrame, SilhouetteSource
 
-# Deviation of a rotation from which on it is doubtful, degrees.
-_SURE_DEG = 3.0
+# Deviation of a rotation from which on it is doubtful, and from which on one film alone tells more.
+_SURE_DEG, _USABLE_DEG = 3.0, 5.0
 
 
 @dataclass
@@ -75,6 +75,16 @@ class PlacedFilm(NamedTuple):
     #: stamps of those of its images that are nearest to an image of the first film, ns
     chosen_ns: frozenset[int]
 
+    @property
+    def turn_deg(self) -> float:
+        """Standard deviation of the camera's rotation, degrees."""
+        return math.degrees(self.camera.turn_stddev_rad)
+
+    @property
+    def is_usable(self) -> bool:
+        """Whether the people are better known with the film than without it."""
+        return self.turn_deg <= _USABLE_DEG
+
     def frames(self, source: SilhouetteSource) -> Iterator[RecordedFrame]:
         """Yield these images by the time of the first film."""
         shift_ns = round(1e9 * self.camera.offset_s)
@@ -97,12 +107,12 @@ class PlacedFilm(NamedTuple):
                 f"begins at {self.camera.offset_s:.2f} s: check that both show the same people at "
                 "one time, and give --offset if it is known"
             )
-        turn_deg = math.degrees(self.camera.turn_stddev_rad)
-        if self.camera.is_doubtful or turn_deg > _SURE_DEG:
+        if self.camera.is_doubtful or self.turn_deg > _SURE_DEG:
+            end = "" if self.is_usable else ", so the film is not used"
             yield (
-                f"where the camera of {self.name} stands is doubtful, to {turn_deg:.0f} degrees "
-                f"and {self.camera.place_stddev_m:.2f} m: film people who walk about, near to the "
-                "cameras, or give --extrinsics"
+                f"where the camera of {self.name} stands is doubtful, to {self.turn_deg:.0f} "
+                f"degrees and {self.camera.place_stddev_m:.2f} m{end}: film people who walk about, "
+                "near to the cameras, or give --extrinsics"
             )
 
 

@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from functools import partial
+from itertools import compress
 from pathlib import Path
 from typing import NamedTuple
 
@@ -92,7 +93,8 @@ class Recording:
         first: the first camera, in whose frame the results are.
         others: the further cameras with their poses.
         measures_depth: True if there is depth from depth images or stereo.
-        films: the further films beside the first one, if each camera made a film of its own.
+        films: the further films beside the first one, if each camera made a film of its own; those
+            that are not usable have no source.
     """
 
     def __init__(
@@ -117,6 +119,7 @@ class Recording:
             for source, there in zip(self.sources[1:], extrinsics, strict=True)
         ]
         self.measures_depth, self.films = depth is not None, tuple(films)
+        self._used = [film for film in films if film.is_usable]
         for source in self.sources:
             topics = {one.topic for one in self.sources} | {depth, source.depth_topic}
             source.used_beside = {topic for topic in topics if topic is not None}
@@ -148,7 +151,7 @@ class Recording:
         streams = [source.frames(early_s, late_s) for source in self.sources]
         if self.films:
             # What the detector found was kept of whole films.
-            others = zip(self.films, self.sources[1:], strict=True)
+            others = zip(self._used, self.sources[1:], strict=True)
             streams = [self.first.frames(), *(film.frames(source) for film, source in others)]
         depths = self._depths()
         depth = next(depths, None)
@@ -257,8 +260,10 @@ class RecordingRequest:
         sources = [_source(film, self.silhouettes, None, self.points) for film in films]
         offsets_s = [film.offset_s for film in self.films]
         placed = placed_films(names, sources, offsets_s, of_file, self.statures_m)
-        poses = [film.camera.extrinsics for film in placed]
-        return Recording(names, sources, poses, films=placed)
+        sources = [sources[0], *compress(sources[1:], (film.is_usable for film in placed))]
+        used = [film for film in placed if film.is_usable]
+        poses = [film.camera.extrinsics for film in used]
+        return Recording([names[0], *(film.name for film in used)], sources, poses, films=placed)
 
     def faults(self) -> Iterator[str]:
         """Yield what does not go together."""
