@@ -108,12 +108,11 @@ def _lines(folder: Path, cameras: list[str], tracks: bool) -> Iterator[str]:
         )
         if not tracks or len(people) > 1:
             return
-        camchain = Path(made) / "true.yaml"
-        save_camchain(camchain, dict(zip(names, cameras_px, strict=True)), {names[1]: pose})
-        rigs = {
-            "films": asked,
-            "true rig": replace(asked, offset_s=(offset_s,), extrinsics=camchain),
-        }
+        rigs = {"films" if len(names) > 1 else "first film alone": asked}
+        if len(names) > 1:
+            camchain = Path(made) / "true.yaml"
+            save_camchain(camchain, dict(zip(names, cameras_px, strict=True)), {names[1]: pose})
+            rigs["true rig"] = replace(asked, offset_s=(offset_s,), extrinsics=camchain)
         for what, request in rigs.items():
             figures = _figures(folder, cameras[0], one, request)
             yield f"{what}: aligned {figures['aligned']:.1f}, absolute {figures['absolute']:.1f} cm"
