@@ -13,7 +13,9 @@ from cardbox_tracker.commands.tracking_request import PersonRequest
 from cardbox_tracker.measuring.people_camera import PITCH_PRIOR, USUAL_PITCH
 from cardbox_tracker.measuring.scene import FOUND, GIVEN, USUAL, Scene, SceneCamera, Value
 from cardbox_tracker.measuring.scene_camera import (
+    Background,
     FoundCamera,
+    camera_moves,
     degrees_of,
     in_scene,
     lens_of,
@@ -21,7 +23,13 @@ from cardbox_tracker.measuring.scene_camera import (
 )
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.proportions import USUAL_STATURE_M, USUAL_STDDEV_M
-from cardbox_tracker.recordings.measured_scene import Watched, seen_people, seen_person, watch
+from cardbox_tracker.recordings.measured_scene import (
+    Watched,
+    seen_people,
+    seen_person,
+    turns_in,
+    watch,
+)
 from cardbox_tracker.recordings.recording import Recording, RecordingRequest
 from cardbox_tracker.recordings.silhouettes import TimeSpan
 from cardbox_tracker.search.config import TrackerConfig
@@ -52,7 +60,19 @@ def measured_scene(
             yield source, Scene(camera, tuple(bodies))
             return
         watched = watch(source, *span)
-        found = found_camera(recording, person, watched, first.camera)
+        background = None
+        if recording.shows_turns:
+            moves = camera_moves(watched.people, watched.pictures, first.camera)
+            turns = turns_in(source, watched, *span) if moves else None
+            background = Background(moves)
+            if turns is not None:
+                stack.close()
+                recording = recording.turned_back(turns[0])
+                source = stack.enter_context(recording.open())
+                watched, first = watch(source, *span), source.first
+                background = Background(edges=turns[1])
+                print_remarks([turns[0].remark])
+        found = found_camera(recording, person, watched, first.camera, background)
         better = _corrected(recording, found.camera)
         if better is not recording:
             stack.close()
@@ -99,9 +119,16 @@ def _corrected(recording: RecordingRequest, found: SceneCamera) -> RecordingRequ
 
 
 def found_camera(
-    recording: RecordingRequest, person: PersonRequest, watched: Watched, camera: Camera
+    recording: RecordingRequest,
+    person: PersonRequest,
+    watched: Watched,
+    camera: Camera,
+    background: Background | None = None,
 ) -> FoundCamera:
-    """Return the camera of a recording, and say what was found, or contradicts what is given."""
+    """Return the camera of a recording, and say what was found, or contradicts what is given.
+
+    ``background`` is that of :func:`.scene_camera`.
+    """
     people = watched.people
     statures_m = [*person.statures_m, *[person.stature_m] * len(people)][: len(people)]
     tilt = person.body.camera_pose
@@ -119,7 +146,8 @@ def found_camera(
         return FoundCamera(SceneCamera(lens_of(camera), pitch, Value(0.0, 0.0, USUAL)))
     # Images are turned back by a roll that is given.
     roll_rad = None if recording.camera.roll_rad is None else 0.0
-    found = scene_camera(people, watched.pictures, camera, statures_m, given, roll_rad)
+    seen = people, watched.pictures, camera, statures_m, given, roll_rad
+    found = scene_camera(*seen, background)
     number, shown_by = degrees_of(found.camera.pitch_rad), " and ".join(found.sources)
     remarks = list(found.remarks)
     if given is None and found.sources:
