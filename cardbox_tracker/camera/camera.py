@@ -173,6 +173,8 @@ class Calibration:
     focal_stddev: float = CALIBRATED  #: relative standard deviation of the focal lengths
     is_mirrored: bool = False  #: whether the images are mirrored; working images are turned back
     told_by: str = ""  #: what tells the focal lengths, in words; empty if that is not known
+    #: how many views of the camera fill an image; working images have so many times more pixels.
+    views: float = 1.0
 
     def __post_init__(self) -> None:
         """Bring the lens and the name of the frame into their usual form."""
@@ -242,12 +244,12 @@ class Calibration:
     def working_size(self, most: tuple[int, int] = WORKING_SIZE) -> tuple[int, int]:
         """Return the size (width, height), px, at which images as they are sent are used.
 
-        It has their aspect ratio, and about as many pixels as ``most``. Raises CameraError as
-        :meth:`camera` does.
+        It has their aspect ratio, and about as many pixels as ``most`` in each view. Raises
+        CameraError as :meth:`camera` does.
         """
         self._check()
         aspect = self.width / self.height
-        width = _multiple(_MULTIPLE_PX, math.sqrt(most[0] * most[1] * aspect))
+        width = _multiple(_MULTIPLE_PX, math.sqrt(self.views * most[0] * most[1] * aspect))
         # Colours are kept for two pixels across and down.
         return width, _multiple(2, width / aspect)
 

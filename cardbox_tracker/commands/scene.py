@@ -16,7 +16,9 @@ from cardbox_tracker.detectors.person_choice import Chosen, PersonChoice
 from cardbox_tracker.measuring.people_camera import PITCH_PRIOR, USUAL_PITCH
 from cardbox_tracker.measuring.scene import FOUND, GIVEN, USUAL, Scene, SceneCamera, Value
 from cardbox_tracker.measuring.scene_camera import (
+    Background,
     FoundCamera,
+    camera_moves,
     degrees_of,
     in_scene,
     lens_of,
@@ -25,7 +27,13 @@ from cardbox_tracker.measuring.scene_camera import (
 from cardbox_tracker.person.model import FOUND_STDDEV, PLACE, BodyModel
 from cardbox_tracker.person.parts import body_parts
 from cardbox_tracker.person.proportions import USUAL_STATURE_M, USUAL_STDDEV_M, stature_of
-from cardbox_tracker.recordings.measured_scene import Watched, seen_people, seen_person, watch
+from cardbox_tracker.recordings.measured_scene import (
+    Watched,
+    seen_people,
+    seen_person,
+    turns_in,
+    watch,
+)
 from cardbox_tracker.recordings.recording import Recording, RecordingRequest
 from cardbox_tracker.recordings.silhouettes import SilhouetteSource, TimeSpan
 from cardbox_tracker.search.config import TrackerConfig
@@ -67,7 +75,20 @@ def measured_scene(
             yield source, Scene(_told(camera, first), tuple(bodies)), chosen
             return
         watched = watch(source, *span, person.choice)
-        found = found_camera(recording, person, watched, first.camera)
+        background = None
+        if recording.shows_turns:
+            moves = camera_moves(watched.people, watched.pictures, first.camera)
+            turns = turns_in(source, watched, *span) if moves else None
+            background = Background(moves)
+            if turns is not None:
+                stack.close()
+                recording = recording.turned_back(turns[0])
+                source = stack.enter_context(recording.open())
+                choice = person.choice and turns[0].placed(person.choice)
+                watched, first = watch(source, *span, choice), source.first
+                background = Background(edges=turns[1])
+                print_remarks([turns[0].remark])
+        found = found_camera(recording, person, watched, first.camera, background)
         better = _corrected(recording, found.camera)
         if better is not recording:
             stack.close()
@@ -212,9 +233,16 @@ def _corrected(recording: RecordingRequest, found: SceneCamera) -> RecordingRequ
 
 
 def found_camera(
-    recording: RecordingRequest, person: PersonRequest, watched: Watched, camera: Camera
+    recording: RecordingRequest,
+    person: PersonRequest,
+    watched: Watched,
+    camera: Camera,
+    background: Background | None = None,
 ) -> FoundCamera:
-    """Return the camera of a recording, and say what was found, or contradicts what is given."""
+    """Return the camera of a recording, and say what was found, or contradicts what is given.
+
+    ``background`` is that of :func:`.scene_camera`.
+    """
     people = watched.people
     statures_m = [*person.statures_m, *[person.stature_m] * len(people)][: len(people)]
     tilt = person.body.camera_pose
@@ -235,7 +263,8 @@ def found_camera(
     distance_m = None
     if "distance_m" not in person.body.unknown and person.model is None:
         distance_m = person.body.placement.distance_m
-    found = scene_camera(people, watched.pictures, camera, statures_m, given, roll_rad, distance_m)
+    seen = people, watched.pictures, camera, statures_m, given, roll_rad, distance_m
+    found = scene_camera(*seen, background)
     number, shown_by = degrees_of(found.camera.pitch_rad), " and ".join(found.sources)
     remarks = list(found.remarks)
     if given is None and found.sources:

@@ -162,6 +162,20 @@ class ImagePoints:
             legs=None if self.legs is None else self.legs.exchanged(),
         )
 
+    def beside(self, pixels: NDArray[np.uint8]) -> ImagePoints:
+        """Return the points with nan for those on pixels (H, W) that are not 0.
+
+        Those of legs keep their scores: they were guessed, and not left out.
+        """
+
+        def seen(px: FloatArray) -> FloatArray:
+            ends = np.array(pixels.shape)[::-1] - 1
+            columns, rows = np.clip(np.nan_to_num(px).round(), 0, ends).astype(int).T
+            return np.where(pixels[rows, columns, None] > 0, np.nan, px)
+
+        legs = None if self.legs is None else self.legs._replace(px=seen(self.legs.px))
+        return replace(self, px=seen(self.px), legs=legs)
+
     def apart_px(self, other: ImagePoints) -> float:
         """Return the mean distance of points that are certain in both; infinite without any."""
         is_certain = np.minimum(self.scores, other.scores) >= CERTAIN

@@ -8,6 +8,8 @@ direction, so each adds the logarithm of a mixture of both to the likelihood of 
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import cv2
 import numpy as np
 from numpy.typing import NDArray
@@ -30,11 +32,16 @@ _ANGLE, _SHARE = np.radians(0.8), 0.3
 _LONGER_PX = 960
 
 
-def edge_likelihoods(pictures: list[NDArray[np.uint8]], camera: Camera) -> FloatArray:
+def edge_likelihoods(
+    pictures: Sequence[NDArray[np.uint8]],
+    camera: Camera,
+    turns: Sequence[FloatArray] | None = None,
+) -> FloatArray:
     """Return the logarithm of the likelihood of each pitch and roll, (P, R).
 
     Pictures (H, W) or (H, W, 3) are of the camera at any resolution, undistorted. It is for
-    ``PITCHES_RAD`` and ``ROLLS_RAD``; 0 everywhere without lines.
+    ``PITCHES_RAD`` and ``ROLLS_RAD``; 0 everywhere without lines. ``turns`` are rotations (3, 3) of
+    a camera that turns into its frame at each picture, from the one whose pitch and roll they are.
     """
     pitches, rolls = np.meshgrid(PITCHES_RAD, ROLLS_RAD, indexing="ij")
     down = np.stack(
@@ -43,8 +50,9 @@ def edge_likelihoods(pictures: list[NDArray[np.uint8]], camera: Camera) -> Float
     sums = np.zeros(pitches.shape)
     outlier = 1.0 - _SHARE
     peak = _SHARE * 2 * _STEEPEST / (_ANGLE * np.sqrt(2 * np.pi))
-    for picture in pictures:
+    for number, picture in enumerate(pictures):
         normals, weights = _planes(picture, camera)
+        normals = normals if turns is None else normals @ turns[number]
         away = np.arcsin(np.clip(down @ normals.T, -1.0, 1.0))
         sums += np.log(outlier + peak * np.exp(-((away / _ANGLE) ** 2) / 2)) @ weights
     return sums / max(1, len(pictures))

@@ -84,6 +84,13 @@ class FoundCamera(NamedTuple):
     distances: tuple[Distances | None, ...] = ()
 
 
+class Background(NamedTuple):
+    """What is known of the background of a film; None for what is not."""
+
+    moves: bool | None = None  #: the result of :func:`camera_moves`
+    edges: FloatArray | None = None  #: that of :func:`.edge_likelihoods`
+
+
 def scene_camera(
     people: Sequence[Sightings],
     pictures: Sequence[Picture],
@@ -92,6 +99,7 @@ def scene_camera(
     given: tuple[float, float] | None = None,
     roll_rad: float | None = None,
     distance_m: float | None = None,
+    background: Background | None = None,
 ) -> FoundCamera:
     """Return the camera of a film.
 
@@ -104,6 +112,7 @@ def scene_camera(
         roll_rad: clockwise roll that is given; None for none.
         distance_m: level distance that is given of the first person when first seen; None for none.
             Beside the stature it shows the focal length, if that is only a usual one.
+        background: what is known of the background already.
     """
     usual_roll = (0.0, _ROLLED) if roll_rad is None else (roll_rad, GIVEN_STDDEV)
     usual_tilt = (USUAL_PITCH, PITCH_PRIOR), usual_roll
@@ -118,12 +127,13 @@ def scene_camera(
         if by_distance is not None:
             factor = float(np.exp(by_distance.values[3]))
             camera = replace(free, fx=factor * free.fx, fy=factor * free.fy)
+    told = background or Background()
+    seen = pictures if told.edges is None else ()
     with ThreadPoolExecutor(1) as beside:
-        edges = beside.submit(edge_likelihoods, [picture for _, picture in pictures], camera)
+        edges = beside.submit(edge_likelihoods, [picture for _, picture in seen], camera)
         shown = people_camera(people, statures_m, camera, *usual_tilt, distance_m)
-        # Without points, nothing tells the people from the background.
-        moves = len(people) > 0 and camera_moves(people, pictures, camera)
-        likelihoods = edges.result()
+        moves = camera_moves(people, pictures, camera) if told.moves is None else told.moves
+        likelihoods = edges.result() if told.edges is None else told.edges
     pitches, rolls = np.meshgrid(PITCHES_RAD, ROLLS_RAD, indexing="ij")
     if roll_rad is None:
         of_roll = (1 - _ROLLED_SHARE) * _normal(rolls, 0.0, _LEVEL)
@@ -246,6 +256,9 @@ def camera_moves(people: Sequence[Sightings], pictures: Sequence[Picture], camer
         pictures: images of the film.
         camera: intrinsics of the points.
     """
+    if not people:
+        # Without points, nothing tells the people from the background.
+        return False
     # The type of its third point argument lacks None.
     flow: Any = cv2.calcOpticalFlowPyrLK
     shifted = pairs = 0

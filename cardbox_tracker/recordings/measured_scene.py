@@ -4,26 +4,31 @@ from __future__ import annotations
 
 import math
 from collections import defaultdict
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from cardbox_tracker.camera.camera import Camera
 from cardbox_tracker.camera.view import OtherCamera
 from cardbox_tracker.detectors.image_points import ImagePoints
 from cardbox_tracker.detectors.person_choice import Chosen, PersonChoice
+from cardbox_tracker.measuring.camera_turns import follow_turns
 from cardbox_tracker.measuring.first_sight import upper_body
 from cardbox_tracker.measuring.people_camera import Distances
+from cardbox_tracker.measuring.room_edges import edge_likelihoods
 from cardbox_tracker.measuring.scene_camera import Picture
 from cardbox_tracker.measuring.scene_watch import MOST_PICTURES, Spread
 from cardbox_tracker.measuring.seen_body import MOST_SIGHTS, SeenBody
 from cardbox_tracker.person.model import BodyModel
+from cardbox_tracker.person.sizes import FloatArray
 from cardbox_tracker.recordings.films import Person, assign
 from cardbox_tracker.recordings.recording import FrameSet, Recording, observation_of
 from cardbox_tracker.recordings.silhouettes import RecordedFrame
+from cardbox_tracker.recordings.turned_back import Turned
 from cardbox_tracker.search.config import TrackerConfig
 from cardbox_tracker.tracking.session import Session
 
@@ -110,6 +115,31 @@ class _Shot:
     numbered: dict[int, list[tuple[float, ImagePoints]]] = field(
         default_factory=lambda: defaultdict(list)
     )
+
+
+def turns_in(
+    recording: Recording, watched: Watched, start_s: float = 0.0, end_s: float = math.inf
+) -> tuple[Turned, FloatArray] | None:
+    """Return how the camera of a recording that was watched turns; None if it is not known.
+
+    Beside it are the :func:`.edge_likelihoods` of its first image, by the pictures of all.
+    """
+    camera, lens = recording.first.camera, recording.first.calibration
+    stamps_ns = dict[float, int]()
+
+    def seen() -> Iterator[tuple[int, NDArray[np.uint8], NDArray[np.uint8]]]:
+        for taken in recording.frames(start_s, end_s):
+            stamp_ns, time_s, image, silhouette, *_ = taken.first
+            stamps_ns[time_s] = stamp_ns
+            yield stamp_ns, image, silhouette
+
+    found = follow_turns(seen(), camera)
+    if found is None:
+        return None
+    turns = [(found.rotations.get(stamps_ns[time_s]), one) for time_s, one in watched.pictures]
+    known = [(turn, one) for turn, one in turns if turn is not None]
+    edges = edge_likelihoods([one for _, one in known], camera, [turn for turn, _ in known])
+    return Turned(found, (camera.width, camera.height), lens), edges
 
 
 def _whole(frame: RecordedFrame) -> RecordedFrame | None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from itertools import compress
 from pathlib import Path
@@ -40,6 +40,7 @@ from cardbox_tracker.recordings.other_silhouettes import (
     depth_images,
 )
 from cardbox_tracker.recordings.silhouettes import RecordedFrame, SilhouetteSource, TimeSpan
+from cardbox_tracker.recordings.turned_back import Turned
 from cardbox_tracker.tracking.observation import Observation
 
 STEREO = "stereo"
@@ -58,6 +59,7 @@ def observation_of(frame: RecordedFrame) -> Observation:
         stamp_ns=frame.stamp_ns,
         points=frame.points,
         people=frame.people,
+        covered=frame.covered,
         is_cut=frame.is_cut,
     )
 
@@ -207,12 +209,24 @@ class RecordingRequest:
     camera: GivenCamera = GivenCamera()  #: what the recording itself does not say about its camera
     films: tuple[FurtherFilm, ...] = ()  #: further films of the same people
     statures_m: tuple[float, ...] = ()  #: those of the people, if known, for the poses of films
+    turned: Turned | None = None  #: how its camera turns; None for one that stands still
 
     @property
     def detector(self) -> Detector | None:
         """The detector among the sources of silhouettes and points; None without one."""
         sources = self.silhouettes, self.points
         return next((source for source in sources if isinstance(source, Detector)), None)
+
+    @property
+    def shows_turns(self) -> bool:
+        """Whether a detector alone tells of one camera where people are, wherever it looks."""
+        is_detected = isinstance(self.silhouettes, Detector)
+        is_alone = len(self.cameras) < 2 and self.depth is None
+        return is_detected and is_alone and not isinstance(self.points, PointTable)
+
+    def turned_back(self, turned: Turned) -> RecordingRequest:
+        """Return the same recording with its images turned back."""
+        return replace(self, turned=turned)
 
     @contextmanager
     def open(self) -> Iterator[Recording]:
@@ -231,6 +245,8 @@ class RecordingRequest:
                 return
             # A reader has one position, and the cameras are read in parallel.
             bags = [open_images(self.path, self.camera) for _ in names or ("",)]
+            if self.turned is not None:
+                bags = [self.turned.back(bag) for bag in bags]
             for bag in bags:
                 stack.enter_context(bag)
             found = _extrinsics_of(bags[0], names, self.extrinsics)

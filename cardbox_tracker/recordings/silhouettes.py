@@ -12,10 +12,11 @@ from itertools import islice, takewhile
 from tempfile import TemporaryFile
 from typing import BinaryIO, NamedTuple
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from cardbox_tracker.camera.camera import OPTICAL_FRAME, WORKING_SIZE, Rectifier
+from cardbox_tracker.camera.camera import OPTICAL_FRAME, WORKING_SIZE, Calibration, Rectifier
 from cardbox_tracker.camera.depth_image import DepthImage
 from cardbox_tracker.common.beside import results_ahead
 from cardbox_tracker.common.errors import BagError, CameraError, CardboxError, EncodingError
@@ -26,6 +27,7 @@ from cardbox_tracker.detectors.pose_network import Detection, image_points
 from cardbox_tracker.recordings.cuts import with_cuts
 from cardbox_tracker.recordings.image_recording import RecordedImage
 from cardbox_tracker.recordings.open_images import ImageRecording
+from cardbox_tracker.recordings.turned_back import TurnedBack
 from cardbox_tracker.segmentation.background_config import BackgroundConfig
 from cardbox_tracker.segmentation.learning import Learning
 from cardbox_tracker.segmentation.silhouettes import SilhouettePipeline
@@ -33,6 +35,8 @@ from cardbox_tracker.segmentation.silhouettes import SilhouettePipeline
 _PERIOD_IMAGES = 60
 # A stamp that differs from the recording time by more comes from another clock.
 _OTHER_CLOCK_NS = 1_000_000_000
+# Width of the border of what a turned image shows, share of the longer side.
+_BORDER = 0.02
 # Spans are often rounded up by less.
 _SHORT_S = 1.0
 # Bytes of the file of kept images: about two minutes and a half of a film. Some computers have
@@ -102,6 +106,8 @@ class RecordedFrame(NamedTuple):
     #: joints of each person, from a detector of several; None without one.
     people: tuple[ImagePoints, ...] | None = None
     is_cut: bool = False  #: whether the film is cut before the image
+    #: (H, W), 255 where the camera did not look, 0 elsewhere; None of one that stands still.
+    covered: NDArray[np.uint8] | None = None
 
 
 def _not_kept() -> NDArray[np.uint8]:
@@ -180,7 +186,8 @@ class SilhouetteSource:
         learning: type[Learning] = Learning,
         size: tuple[int, int] = WORKING_SIZE,
     ) -> None:
-        self._bag, self.path, self.start_ns = bag, bag.path, bag.start_ns
+        self._bag: ImageRecording | TurnedBack = bag
+        self.path, self.start_ns = bag.path, bag.start_ns
         self._broken: dict[int, str] = {}
         self._used = self._clock_ns = 0
         self.topic = bag.image_topic(camera)
@@ -233,6 +240,11 @@ class SilhouetteSource:
         return within if self._detector is None else results_ahead(look, within)
 
     @property
+    def calibration(self) -> Calibration:
+        """The calibration of the recorded images."""
+        return self._pipeline.calibration
+
+    @property
     def points_fault(self) -> str:
         """Why the given points were used in no image that was read; empty if they were."""
         return "" if self._given is None else self._given.fault
@@ -263,9 +275,21 @@ class SilhouetteSource:
         shown = recorded if self.has_pictures else None
         frame = RecordedFrame(stamp_ns, time_s, image, silhouette, depth_m, recorded=shown)
         frame = frame._replace(is_cut=prepared.is_cut)
+        people, points = None, None
         if self._finds_people:
-            return frame._replace(people=self._people(prepared))
-        return frame._replace(points=self._points(prepared, silhouette))
+            people = self._people(prepared)
+        else:
+            points = self._points(prepared, silhouette)
+        if isinstance(self._bag, TurnedBack):
+            unseen = self._pipeline.prepare(self._bag.unseen(stamp_ns))
+            covered = np.where(unseen > 127, np.uint8(255), np.uint8(0))
+            # Detectors guess what is outside of the image, and put some of it at the border.
+            side = 2 * round(_BORDER * max(covered.shape)) + 1
+            near = np.asarray(cv2.dilate(covered, np.ones((side, side), np.uint8)), np.uint8)
+            people = None if people is None else tuple(one.beside(near) for one in people)
+            points = None if points is None else points.beside(near)
+            frame = frame._replace(covered=covered)
+        return frame._replace(people=people, points=points)
 
     def _silhouette(self, prepared: PreparedImage) -> NDArray[np.uint8]:
         return self._pipeline.silhouette(prepared.image, prepared.stamp_ns)

@@ -610,6 +610,8 @@ class Session:
         assert seen.silhouette is not None
         pixels, nothing = person.sights[camera].pixels, np.zeros(seen.silhouette.shape, np.uint8)
         own, covered = parts.get(person.number, (nothing, nothing))
+        if "covered" in seen.channels:
+            covered = covered | seen.channels["covered"]
         more = {"covered": covered} if covered.any() else {}
         points = person.sights[camera].points
         one = seen.having(silhouette=own, points=points, people=None, **more)

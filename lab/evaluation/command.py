@@ -48,6 +48,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "track FILM --detector mediapipe' does: with field of view and stature, and with neither",
     )
     parser.add_argument(
+        "--moving",
+        action="store_true",
+        help="with --films: by a camera that stands still, shakes and pans, across",
+    )
+    parser.add_argument(
         "--silhouettes",
         nargs="+",
         choices=("background", "detector"),
@@ -125,8 +130,8 @@ def _sessions(options: argparse.Namespace, jobs: int) -> None:
 def _films(options: argparse.Namespace, jobs: int) -> None:
     from lab.evaluation import films
 
-    report = options.output / "films.md"
+    report = options.output / ("moving.md" if options.moving else "films.md")
     check_outputs((), options.force, inputs=options.films, results=[report])
     seeds = range(options.seed, options.seed + options.seeds)
-    films.evaluate_films(options.films, report, options.preset, seeds, jobs)
+    films.evaluate_films(options.films, report, options.preset, seeds, jobs, options.moving)
     print(f"wrote {report} and {report.with_suffix('.json')}")

@@ -7,10 +7,11 @@ truth is turned with them.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import replace
 from functools import partial
+from math import sin
 from multiprocessing import get_context
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -21,6 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cardbox_tracker.applications.drawing.video import video_file
+from cardbox_tracker.camera.camera import Calibration
 from cardbox_tracker.commands.request import TrackingOptions
 from cardbox_tracker.commands.tracking import track
 from cardbox_tracker.commands.tracking_request import tracking_request
@@ -70,13 +72,27 @@ class Film(NamedTuple):
     stamps_ns: tuple[int, ...]
 
 
-def make_film(folder: Path, shape: str, path: Path) -> Film:
+MOTIONS: Mapping[str, Callable[[float], tuple[float, float, float]]] = {
+    "still": lambda share: (0.0, 0.0, 0.0),
+    "shaken by 2 degrees": lambda share: (
+        1.6 * sin(47 * share),
+        1.6 * sin(38 * share),
+        sin(29 * share),
+    ),
+    "panned by 30 degrees": lambda share: (0.0, 30.0 * share - 15.0, 0.0),
+}
+"""How a camera turns by itself, by name: about its horizontal axis, the vertical and its optical
+axis, degrees, at a share of the film's time."""
+
+
+def make_film(folder: Path, shape: str, path: Path, motion: str = "still") -> Film:
     """Write a session, as its first camera sees it, as a film without its empty scene.
 
     Args:
         folder: the session.
         shape: a name of ``SHAPES``.
         path: video to write, .mp4.
+        motion: a name of ``MOTIONS``. Upright mirrors show what is beside the session's images.
 
     Raises:
         CardboxError: the folder is not a session, or the video cannot be written.
@@ -105,14 +121,20 @@ def make_film(folder: Path, shape: str, path: Path) -> Film:
         down = -session.to_optical[:, 2]
         turn = _turn(lens.k, (column, (lens.height - 1) / 2), down)
         size = (width, height)
+        shares = (np.array(stamps_ns) - stamps_ns[0]) / (stamps_ns[-1] - stamps_ns[0])
+        turns = [_turned(turn, down, MOTIONS[motion](share)) for share in shares.tolist()]
+        is_still = motion == "still"
         maps = cv2.initUndistortRectifyMap(lens.k, lens.distortion, turn, k, size, cv2.CV_32FC1)
+        border = cv2.BORDER_CONSTANT if is_still else cv2.BORDER_REFLECT_101
         fps = round(1e9 / float(np.median(np.diff(stamps_ns))), 2)
         with video_file(path, fps) as add:
-            for image in images:
+            for image, there in zip(images, turns, strict=True):
+                if not is_still:
+                    maps = _mirrored(lens, there, down, k, size)
                 shown = image.as_sent
                 color = shown if shown.ndim == 3 else cv2.cvtColor(shown, cv2.COLOR_GRAY2BGR)
-                add(cv2.remap(color, *maps, cv2.INTER_LINEAR).astype(np.uint8))
-    hips = session.hips_m
+                add(cv2.remap(color, *maps, cv2.INTER_LINEAR, borderMode=border).astype(np.uint8))
+    hips, turn = session.hips_m, turns[0]
     pitch_deg = float(np.degrees(np.arcsin(turn[2] @ down)))
     turned = replace(
         session,
@@ -131,6 +153,41 @@ def _turn(k: FloatArray, middle: tuple[float, float], down: FloatArray) -> Float
     right = np.cross(down, ahead)
     right /= np.linalg.norm(right)
     return np.array([right, np.cross(ahead, right), ahead])
+
+
+def _turned(turn: FloatArray, down: FloatArray, angles_deg: Sequence[float]) -> FloatArray:
+    """Return a rotation (3, 3) to a camera that also turns by itself, see ``MOTIONS``."""
+    axes = np.array([turn[0], down, turn[2]])
+    vector = turn @ (np.radians(angles_deg) @ axes)
+    return np.asarray(cv2.Rodrigues(vector)[0]) @ turn
+
+
+def _mirrored(
+    lens: Calibration, turn: FloatArray, down: FloatArray, k: FloatArray, size: tuple[int, int]
+) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+    """Return maps of ``cv2.remap`` to a turned camera between two upright mirrors.
+
+    The mirrors stand in the camera, at the sides of the recorded images, so that upright edges stay
+    upright.
+    """
+    ahead = np.array([0.0, 0.0, 1.0]) - down * down[2]
+    ahead /= np.linalg.norm(ahead)
+    level = np.array([np.cross(down, ahead), down, ahead])
+    width, height = lens.width, lens.height
+    sides = [np.column_stack([np.full(height, x), np.arange(height)]) for x in (0, width - 1)]
+    seen = [lens.camera(width, height).rays(lens.rectified(px, width, height)) for px in sides]
+    left, right = (np.arctan2(*(rays @ level.T)[:, [0, 2]].T) for rays in seen)
+    begin, end = float(left.max()), float(right.min())
+    columns, rows = np.meshgrid(np.arange(size[0]), np.arange(size[1]))
+    px = np.stack([columns.ravel(), rows.ravel(), np.ones(columns.size)])
+    rays = level @ turn.T @ np.linalg.inv(k) @ px
+    away = np.hypot(rays[0], rays[2])
+    angles = (np.arctan2(rays[0], rays[2]) - begin) % (2 * (end - begin))
+    angles = end - np.abs(angles - (end - begin))
+    there = (np.array([away * np.sin(angles), rays[1], away * np.cos(angles)]).T) @ level
+    found, _ = cv2.projectPoints(there, np.zeros(3), np.zeros(3), lens.k, lens.distortion)
+    across, below = np.asarray(found, np.float32).reshape(*size[::-1], 2).transpose(2, 0, 1)
+    return np.ascontiguousarray(across), np.ascontiguousarray(below)
 
 
 def film_figures(
@@ -224,7 +281,12 @@ def _cells(name: str, films: Sequence[Mapping[str, Any]]) -> list[str]:
 
 
 def evaluate_films(
-    folders: Sequence[Path], report: Path, preset: str, seeds: range, jobs: int
+    folders: Sequence[Path],
+    report: Path,
+    preset: str,
+    seeds: range,
+    jobs: int,
+    is_moving: bool = False,
 ) -> None:
     """Track sessions as films, and write the report and, beside it, all numbers as JSON.
 
@@ -234,6 +296,7 @@ def evaluate_films(
         preset: name of the tracker's settings.
         seeds: seeds of the runs.
         jobs: number of processes.
+        is_moving: whether the camera also turns, in films across.
 
     Raises:
         CardboxError: a folder is no session, or the report cannot be written.
@@ -243,20 +306,23 @@ def evaluate_films(
     report.parent.mkdir(parents=True, exist_ok=True)
     compile_all()
     films: list[dict[str, Any]] = []
+    kinds = [(shape, "still") for shape in SHAPES]
+    if is_moving:
+        kinds = [("across", motion) for motion in MOTIONS]
     with (
         progress_bar("evaluate") as show,
         ProcessPoolExecutor(jobs, mp_context=get_context("spawn")) as pool,
     ):
         work = [
-            pool.submit(_film, folder, shape, preset, seeds)
+            pool.submit(_film, folder, shape, motion, preset, seeds)
             for folder in folders
-            for shape in SHAPES
+            for shape, motion in kinds
         ]
         for done, future in enumerate(work, 1):
             films += future.result()
             show(done / len(work))
     names = " ".join(folder.name for folder in folders)
-    how = f"--preset {preset} --seed {seeds[0]} --seeds {len(seeds)}"
+    how = f"--preset {preset} --seed {seeds[0]} --seeds {len(seeds)}{' --moving' * is_moving}"
     results = {
         "command": f"cardbox evaluate --films {names} {how} --output DIR",
         "films": sorted(films, key=lambda film: (film["given"], film["shape"])),
@@ -266,13 +332,13 @@ def evaluate_films(
     write_file(report, films_report(results))
 
 
-def _film(folder: Path, shape: str, preset: str, seeds: range) -> list[dict[str, Any]]:
+def _film(folder: Path, shape: str, motion: str, preset: str, seeds: range) -> list[dict[str, Any]]:
     """Return the entries of one session in ``films.json``, one for all that is given."""
     from lab.evaluation.films import film_figures, make_film
 
     found = list[dict[str, Any]]()
     with TemporaryDirectory() as made:
-        film = make_film(folder, shape, Path(made) / f"{folder.name}.mp4")
+        film = make_film(folder, shape, Path(made) / f"{folder.name}.mp4", motion)
         stature_m = film.session.truth.stature_m
         known: dict[str, Any] = {"fov_deg": round(film.fov_deg, 1), "stature_m": stature_m}
         for given, more in {"field of view, stature": known, "nothing": {}}.items():
@@ -285,9 +351,9 @@ def _film(folder: Path, shape: str, preset: str, seeds: range) -> list[dict[str,
                 runs.append(film_figures(film, estimates, summary.body))
             found.append(
                 {
-                    "name": f"{folder.name}, {shape}",
+                    "name": f"{folder.name}, {shape}" + f", {motion}" * (motion != "still"),
                     "group": folder.resolve().parent.name,
-                    "shape": shape,
+                    "shape": shape if motion == "still" else motion,
                     "given": given,
                     "mediapipe_aligned": film.session.mediapipe.get("aligned"),
                     "runs": runs,

@@ -1,0 +1,154 @@
+"""A film by a camera that shakes gives what the film by a still one gives."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from cardbox_tracker import Request, track
+from cardbox_tracker.camera.camera import Camera
+from cardbox_tracker.detectors.detector import Detector
+from cardbox_tracker.detectors.own_network import OwnModel
+from cardbox_tracker.detectors.person_choice import PersonChoice
+from cardbox_tracker.measuring.camera_turns import intrinsics
+from cardbox_tracker.recordings.given_camera import GivenCamera
+from cardbox_tracker.recordings.measured_scene import turns_in, watch
+from cardbox_tracker.recordings.recording import RecordingRequest
+
+CAMERA = Camera(320, 240, 280.0, 280.0, 159.5, 119.5)
+FOV_DEG = float(np.degrees(2 * np.arctan(160 / 280)))
+JOINTS = {
+    "nose": (160, 50),
+    "left_shoulder": (184, 76),
+    "right_shoulder": (136, 76),
+    "left_elbow": (206, 106),
+    "right_elbow": (114, 106),
+    "left_wrist": (218, 138),
+    "right_wrist": (102, 138),
+    "left_hip": (174, 144),
+    "right_hip": (146, 144),
+    "left_knee": (174, 186),
+    "right_knee": (146, 186),
+    "left_ankle": (174, 226),
+    "right_ankle": (146, 226),
+}
+IMAGES, LARGE = 16, (480, 360)
+# Grey rooms have none of these colours.
+_HUES = {name: 13 * number for number, name in enumerate(JOINTS)}
+
+
+class FindsDots:
+    """Finds the coloured dots at the joints of the only person."""
+
+    def detect(self, image: NDArray[np.uint8]) -> list[Mapping[str, Any]]:
+        hue, saturation, _ = cv2.split(cv2.cvtColor(image, cv2.COLOR_BGR2HSV))
+        found = {}
+        for name, its in _HUES.items():
+            away = np.abs(np.asarray(hue, int) - its)
+            rows, columns = np.nonzero(
+                (np.minimum(away, 180 - away) <= 4) & (np.asarray(saturation) > 120)
+            )
+            if len(rows) > 5:
+                found[name] = columns.mean(), rows.mean(), 0.9
+        return [found] if found else []
+
+
+def room() -> NDArray[np.uint8]:
+    rng = np.random.default_rng(2)
+    rough = [rng.uniform(0, 110, (LARGE[1] // k, LARGE[0] // k)) for k in (6, 20)]
+    return np.asarray(sum(np.asarray(cv2.resize(one, LARGE)) for one in rough), np.uint8)
+
+
+def shake(number: int) -> NDArray[np.float64]:
+    vector = np.radians([1.5 * np.sin(1.1 * number), 2 * np.sin(0.9 * number), np.sin(number)])
+    return np.asarray(cv2.Rodrigues(vector)[0])
+
+
+def write_film(folder: Path, moves: bool) -> Path:
+    """Write images of somebody whose arms rise before a wall."""
+    folder.mkdir()
+    there, k = intrinsics(CAMERA), intrinsics(CAMERA)
+    there[:2, 2] += 80, 60
+    for number in range(IMAGES):
+        shown = np.repeat(room()[..., None], 3, axis=2)
+        for name, (column, row) in JOINTS.items():
+            up = number * {"elbow": 1, "wrist": 3}.get(name.split("_")[-1], 0)
+            color = cv2.cvtColor(np.uint8([[[_HUES[name], 255, 220]]]), cv2.COLOR_HSV2BGR)[0, 0]
+            at = 80 + column, 60 + row - up
+            cv2.circle(shown, at, 5, color.tolist(), -1, cv2.LINE_AA)
+        turn = shake(number) if moves else np.eye(3)
+        matrix = k @ turn @ np.linalg.inv(there)
+        image = cv2.warpPerspective(shown, matrix, (320, 240))
+        cv2.imwrite(str(folder / f"{number:03}.png"), image)
+    return folder
+
+
+@pytest.fixture
+def shaken(tmp_path: Path) -> Path:
+    return write_film(tmp_path / "shaken", moves=True)
+
+
+def request(folder: Path, **more: Any) -> RecordingRequest:
+    finds = Detector(OwnModel.of(FindsDots, "FindsDots"), **more)
+    camera = GivenCamera(fov_deg=FOV_DEG, fps=10.0)
+    return RecordingRequest(folder, finds, points=finds, camera=camera)
+
+
+def test_points_of_turned_images_are_those_of_a_still_camera(shaken: Path) -> None:
+    asked = request(shaken)
+    with asked.open() as source:
+        found = turns_in(source, watch(source))
+    assert found is not None
+    turned = found[0]
+    assert turned.found.unknown == 0 and "turns by up to" in turned.remark
+    with asked.turned_back(turned).open() as source:
+        camera, frames = source.first.camera, [taken.first for taken in source.frames()]
+        pictures = [taken.picture().shape for taken in source.frames() if taken.picture]
+    assert camera.fx == pytest.approx(CAMERA.fx, rel=0.02)
+    assert camera.width > 320 and len(set(pictures)) == 1 and pictures[0][1] > 320
+    for number, frame in enumerate(frames):
+        assert frame.points is not None and frame.covered is not None
+        rays = camera.rays(frame.points.px[[0, 5, 6, 11, 12]])
+        true_px = np.array([JOINTS[name] for name in list(JOINTS)[:3] + list(JOINTS)[7:9]])
+        true = CAMERA.rays(true_px.astype(float))
+        assert np.abs(rays[:, :2] - true[:, :2]).max() < 2.0 / CAMERA.fx, number
+        assert 0 < np.count_nonzero(frame.covered) < 0.3 * frame.covered.size
+
+
+def test_who_is_at_a_place_of_the_first_image_is_there_in_turned_ones(shaken: Path) -> None:
+    asked = request(shaken, person=PersonChoice("place", (160.0, 120.0)))
+    with asked.open() as source:
+        found = turns_in(source, watch(source))
+    assert found is not None
+    chosen = asked.turned_back(found[0]).detector
+    assert chosen is not None and chosen.person is not None
+    assert np.array(chosen.person.place) + found[0].found.corner_px == pytest.approx(
+        (160.0, 120.0), abs=1.0
+    )
+
+
+def test_a_table_of_points_says_nothing_of_a_camera_that_moves(shaken: Path) -> None:
+    asked = request(shaken)
+    assert asked.shows_turns
+    assert not RecordingRequest(shaken, asked.silhouettes, ("a", "b")).shows_turns
+
+
+def test_track_gives_the_same_for_a_film_that_shakes(
+    shaken: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    given: dict[str, Any] = {"detector": FindsDots, "fov_deg": FOV_DEG, "stature_m": 1.75}
+    given |= {"fps": 10.0, "camera_pitch_deg": 0.0}
+    still, moved = (
+        track(Request(film, **given)).to_pandas()
+        for film in (write_film(tmp_path / "still", moves=False), shaken)
+    )
+    assert "turned back into the view of the first" in capsys.readouterr().err
+    names = [f"{side}_hand_{axis}" for side in ("left", "right") for axis in "xyz"]
+    away_m = np.abs(still[names].to_numpy() - moved[names].to_numpy())
+    assert np.median(away_m) < 0.02
