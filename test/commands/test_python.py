@@ -217,7 +217,7 @@ def test_pandas_has_the_columns_of_the_table(tmp_path: Path) -> None:
     ("options", "expected"),
     [
         ({"fov": 60}, "no keyword fov; did you mean 'fov_deg'"),
-        ({"fov_deg": "wide"}, "argument --fov: expected a number, got 'wide'"),
+        ({"fov_deg": "wide"}, "argument --fov: expected degrees, .*, got 'wide'"),
         ({"seed": 1.5}, "argument --seed: expected a whole number of 0 or more, got 1.5"),
         ({"hands": "no"}, "argument --hands: expected True or False, got 'no'"),
         ({"preset": "fast"}, "argument --preset: expected one of paper, default, got 'fast'"),

@@ -183,7 +183,7 @@ def test_a_film_is_tracked_with_a_stature(
         rows = list(csv.DictReader(file))
     # Nothing tells the pitch of this camera.
     assert "a level camera is assumed" in done.err
-    assert {row["state"] for row in rows} == {"uncertain"}
+    assert {row["vertical_state"] for row in rows} == {"uncertain"}
     told = json.loads((tmp_path / "out.json").read_text(encoding="utf-8"))
     assert told["images"] == told["tracked"] == told["uncertain"] == len(rows)
     assert told["used"] == {"colours": len(rows) - 1}

@@ -48,7 +48,7 @@ def track(
     )
 
 
-KNOWN = ("stamp", "stamp_ns", "time_s", "state")
+KNOWN = ("stamp", "stamp_ns", "time_s", "state", "state_reason")
 """Columns that are filled for every image."""
 
 
