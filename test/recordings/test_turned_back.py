@@ -94,8 +94,8 @@ def shaken(tmp_path: Path) -> Path:
     return write_film(tmp_path / "shaken", moves=True)
 
 
-def request(folder: Path, **more: Any) -> RecordingRequest:
-    finds = Detector(OwnModel.of(FindsDots, "FindsDots"), **more)
+def request(folder: Path) -> RecordingRequest:
+    finds = Detector(OwnModel.of(FindsDots, "FindsDots"))
     camera = GivenCamera(fov_deg=FOV_DEG, fps=10.0)
     return RecordingRequest(folder, finds, points=finds, camera=camera)
 
@@ -122,13 +122,11 @@ def test_points_of_turned_images_are_those_of_a_still_camera(shaken: Path) -> No
 
 
 def test_who_is_at_a_place_of_the_first_image_is_there_in_turned_ones(shaken: Path) -> None:
-    asked = request(shaken, person=PersonChoice("place", (160.0, 120.0)))
-    with asked.open() as source:
+    with request(shaken).open() as source:
         found = turns_in(source, watch(source))
     assert found is not None
-    chosen = asked.turned_back(found[0]).detector
-    assert chosen is not None and chosen.person is not None
-    assert np.array(chosen.person.place) + found[0].found.corner_px == pytest.approx(
+    turned = found[0].placed(PersonChoice("place", (160.0, 120.0)))
+    assert np.array(turned.place) + found[0].found.corner_px == pytest.approx(
         (160.0, 120.0), abs=1.0
     )
 
