@@ -242,8 +242,9 @@ def films_report(results: Mapping[str, Any]) -> str:
         "Each session is tracked by `cardbox track FILM --detector mediapipe` with what is given, "
         "and without an empty scene. Errors are those of shoulders, elbows and hands, cm; "
         "*aligned*: beside the middle of the shoulders. Settings were chosen on the same "
-        "recordings. An image is beyond 30 cm if a joint is, place included. *Placed*: the state "
-        "is `tracking`, and that of the place is `tracked`.",
+        "recordings. An image that is `tracking` is beyond 30 cm if a joint is, beside the middle "
+        "of the shoulders. *Placed*: the state is `tracking`, and that of the place is `tracked`; "
+        "then the place counts, too.",
         table(_HEAD, rows),
         f"Made by `{results['command']}` at commit {results['provenance']['commit']}.",
     ]

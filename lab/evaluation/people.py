@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from cardbox_tracker.recordings.truth import SHOULDERS
+from cardbox_tracker.recordings.truth import SHOULDERS, beside_shoulders
 from cardbox_tracker.tracking.estimate import TRACKING
 from lab.evaluation.figures import figures
 from lab.evaluation.session import RecordedSession
@@ -26,12 +26,14 @@ def people_figures(session: RecordedSession, run: SessionRun) -> dict[str, Any]:
     Returns:
         Also ``input_ms``; ``tracking``, the number of scored images with that state; and
         ``tracking_beyond_20`` and ``tracking_beyond_30``, how many of these have a joint with an
-        error beyond that many centimetres. The coverage takes the torso from hips and shoulders.
+        error beyond that many centimetres beside the middle of the shoulders, since the state is
+        that of the shape. The coverage takes the torso from hips and shoulders.
     """
     if session.hips_m is not None:
         session = replace(session, torso_rad=torso_angles(session))
     is_tracking = run.states == TRACKING
-    worst_cm = 100 * np.linalg.norm(run.keypoints_m - session.keypoints_m, axis=2).max(axis=1)
+    apart_m = beside_shoulders(run.keypoints_m - session.keypoints_m)
+    worst_cm = 100 * np.linalg.norm(apart_m, axis=2).max(axis=1)
     result = figures(session, run) | {"tracking": int(is_tracking.sum()), "input_ms": run.input_ms}
     for limit_cm in BEYOND_CM:
         wrong = is_tracking & (worst_cm > limit_cm)

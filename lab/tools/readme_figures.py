@@ -125,7 +125,7 @@ def _tracking(sessions: Sequence[Session]) -> str:
     share = 100.0 * tracking / sum(run["frames"] for run in runs)
     return (
         f"{share:.0f} % of the images of real people `tracking`, of which "
-        f"{100.0 * wrong / tracking:.1f} % have a joint beyond 30 cm, place included"
+        f"{100.0 * wrong / tracking:.1f} % have a joint beyond 30 cm, beside the shoulders"
     )
 
 

@@ -88,6 +88,7 @@ def test_wrong_images_are_counted_among_the_tracked(
     points = session.keypoints_m.copy()
     points[1:5, 5, 2] += 0.25  # one of these four is only uncertain
     points[7, 1, 0] -= 0.4
+    points += (0.0, 0.0, 1.0)  # a wrong place is none of the shape
     found = people_figures(session, run_of(session, postures, points))
     assert found["tracking"] == 8
     assert found["tracking_beyond_20"] == 4
