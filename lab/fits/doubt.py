@@ -49,8 +49,10 @@ FloatArray = NDArray[np.float64]
 PENALTY = 0.02
 """Ridge penalty of a standardized coefficient, beside a mean log-likelihood."""
 MOST_WRONG, HIGHEST = 0.02, 0.25
-"""Largest share of wrong keypoints among tracked ones, and of images with a wrong keypoint among
-those that are ``tracking``; and highest threshold."""
+"""Largest share of wrong keypoints among tracked ones, and highest threshold."""
+MOST_WRONG_IMAGES = {Source.POINTS: 0.03}
+"""Largest share of images with a wrong keypoint among those that are ``tracking``, if it is not
+``MOST_WRONG``."""
 OF_ARMS = ("better", "sure", "slope", "beside trunk")
 OF_JOINTS = (*OF_ARMS, "spread", "yaw", "cameras")
 """Evidence that differs between joints, and all from which a joint is judged: with more of it, the
@@ -180,11 +182,14 @@ def doubts(said: FloatArray) -> FloatArray:
     return found
 
 
-def thresholds_of(checked: Sequence[tuple[Samples, FloatArray]]) -> tuple[float, float]:
+def thresholds_of(
+    checked: Sequence[tuple[Samples, FloatArray]], most_wrong_images: float = MOST_WRONG
+) -> tuple[float, float]:
     """Return the thresholds of a keypoint, and of the hands of an image that is ``tracking``.
 
     Args:
         checked: left-out results, and their probabilities (n, 7).
+        most_wrong_images: largest share of wrong images.
     """
     wrong = [one.aligned_m > FAR_M for one, _ in checked]
     of_keypoints = threshold_of(
@@ -193,25 +198,28 @@ def thresholds_of(checked: Sequence[tuple[Samples, FloatArray]]) -> tuple[float,
     )
     said = [doubts(one) for _, one in checked]
     of_images = threshold_of(
-        np.concatenate([one.any(axis=1) for one in wrong]), np.concatenate(said)
+        np.concatenate([one.any(axis=1) for one in wrong]), np.concatenate(said), most_wrong_images
     )
     return of_keypoints, min(of_images, of_keypoints)
 
 
-def threshold_of(wrong: NDArray[np.bool_], said: FloatArray) -> float:
-    """Return the highest threshold with which ``MOST_WRONG`` of what is below it are wrong.
+def threshold_of(
+    wrong: NDArray[np.bool_], said: FloatArray, most_wrong: float = MOST_WRONG
+) -> float:
+    """Return the highest threshold with which a share of what is below it is wrong.
 
     It has three digits and is at most ``HIGHEST``. With it, at most that share is wrong.
 
     Args:
         wrong: what is wrong, (n,).
         said: probabilities, (n,).
+        most_wrong: this share.
     """
     order = np.argsort(said)
     thresholds = np.arange(round(1000 * HIGHEST) + 1) / 1000
     tracked = np.searchsorted(said[order], thresholds, side="right")
     wrong_tracked = np.concatenate([[0], np.cumsum(wrong[order])])[tracked]
-    return float(thresholds[wrong_tracked <= MOST_WRONG * tracked][-1])
+    return float(thresholds[wrong_tracked <= most_wrong * tracked][-1])
 
 
 def row_of(
@@ -310,7 +318,8 @@ def fit_all(
                     model: fit(others, model, names_for(model, available)) for model in MODELS
                 }
                 checked += [(left_out, one, chances(one, models)) for one in own]
-        thresholds = thresholds_of([(one, said) for _, one, said in checked])
+        most_wrong = MOST_WRONG_IMAGES.get(source, MOST_WRONG)
+        thresholds = thresholds_of([(one, said) for _, one, said in checked], most_wrong)
         print(f"\n{source.value}: uncertain above {thresholds}\n\n{HEADER}")
         for name, one, said in checked:
             print(row_of(name, one, said, *thresholds))
