@@ -69,9 +69,9 @@ _MEMORY = 0.5
 # What stays, from one image to the next, of the doubt about hands beyond the present one: an arm
 # that was wrongly chosen is often rated well in single images.
 _DOUBT_STAYS = 0.85
-# Share of the limit of this doubt below which a sure posture stays so: a robot that follows would
-# stop and go on where the doubt is about the limit.
-_STAYS_SURE = 1.25
+STAYS_SURE = 1.25
+"""Share of the limit of this doubt below which a sure posture stays so: a robot that follows would
+stop and go on where the doubt is about the limit."""
 _AREAS, _PRIORS = (0.1, 3.0), (-0.2, 0.3)
 # Step of the numerical derivatives, rad and m.
 _STEP = 1e-3
@@ -173,7 +173,7 @@ class Doubt:
         if source is not Source.PAPER:
             limit = doubtful_from
             if self._is_sure:
-                limit = min(_STAYS_SURE * doubtful_from, uncertain_from)
+                limit = min(STAYS_SURE * doubtful_from, uncertain_from)
             if self._hands.max() > limit:
                 sides = ("left hand", "right hand")
                 doubtful = " and ".join(compress(sides, self._hands > limit))

@@ -35,6 +35,7 @@ from cardbox_tracker.search.doubt import (
     HANDS,
     KINDS,
     LOST_FROM,
+    STAYS_SURE,
     WHOLE_UNCERTAIN_FROM,
     Source,
     remembered,
@@ -200,7 +201,8 @@ def thresholds_of(
     of_images = threshold_of(
         np.concatenate([one.any(axis=1) for one in wrong]), np.concatenate(said), most_wrong_images
     )
-    return of_keypoints, min(of_images, of_keypoints)
+    # A sure image stays so up to this limit.
+    return of_keypoints, round(min(of_images, of_keypoints) / STAYS_SURE, 3)
 
 
 def threshold_of(
