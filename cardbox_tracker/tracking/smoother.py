@@ -18,7 +18,7 @@ smoothed are directions of limbs, since angles of a straight arm jump.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 from itertools import pairwise
 from typing import Generic, NamedTuple, TypeVar
@@ -39,7 +39,8 @@ from cardbox_tracker.person.posture import (
     YAW,
 )
 from cardbox_tracker.person.sizes import FloatArray
-from cardbox_tracker.person.skeleton import Group, arm_directions, limits_of
+from cardbox_tracker.person.skeleton import arm_directions
+from cardbox_tracker.search.arm_search import ARM_LIMITS
 from cardbox_tracker.tracking.estimate import Estimate
 
 T = TypeVar("T")
@@ -125,9 +126,10 @@ class Smoother(Generic[T]):
             of = [one for one in images if person < len(one.results)]
             first = len(images) - len(of)
             time_s = np.array([one.stamp_ns - images[0].stamp_ns for one in of]) / 1e9
-            smooth = _smoothed(time_s, [one.results[person] for one in of])
-            for i in range(max(first, begin), end):
-                found[i - begin][1].append(smooth[i - first])
+            wanted = range(max(begin - first, 0), end - first)
+            smooth = _smoothed(time_s, [one.results[person] for one in of], wanted)
+            for i, estimate in zip(wanted, smooth, strict=True):
+                found[first + i - begin][1].append(estimate)
         oldest_ns = images[end - 1].stamp_ns - round(1e9 * LAG_S)
         kept = next(i for i, one in enumerate(images) if one.stamp_ns >= oldest_ns)
         self._images, self._done = images[kept:], end - kept
@@ -152,8 +154,10 @@ def _values(estimate: Estimate) -> FloatArray:
     return found
 
 
-def _smoothed(time_s: FloatArray, results: Sequence[_Result]) -> list[Estimate]:
-    """Return the estimates of one person at times (n,)."""
+def _smoothed(
+    time_s: FloatArray, results: Sequence[_Result], wanted: range
+) -> Iterator[Estimate]:
+    """Yield the ``wanted`` ones of the estimates of one person at times (n,)."""
     values = np.array([result.values for result in results])
     yaw = 3 + YAW - TURNS.start
     is_seen = np.isfinite(values[:, yaw])
@@ -166,16 +170,14 @@ def _smoothed(time_s: FloatArray, results: Sequence[_Result]) -> list[Estimate]:
         if is_other or not time_s[i] > time_s[i - 1]:
             begins.append(i)
             last = np.nan
-    found = []
     for begin, end in pairwise([*begins, len(results)]):
         part = slice(begin, end)
         smooth, stddev = spline(time_s[part], values[part]) if end - begin > 2 else (None, None)
-        for i, result in enumerate(results[part]):
-            if smooth is None or stddev is None or not is_seen[begin + i]:
-                found.append(result.estimate)
+        for i in range(max(begin, wanted.start), min(end, wanted.stop)):
+            if smooth is None or stddev is None or not is_seen[i]:
+                yield results[i].estimate
             else:
-                found.append(_estimate(result, smooth[i], stddev[i]))
-    return found
+                yield _estimate(results[i], smooth[i - begin], stddev[i - begin])
 
 
 def spline(time_s: FloatArray, values: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -216,9 +218,8 @@ def _estimate(result: _Result, values: FloatArray, stddev: FloatArray) -> Estima
     state[YAW] += 2.0 * np.pi * np.round((before[YAW] - state[YAW]) / (2.0 * np.pi))
     limbs = values[_LIMBS].reshape(2, 2, 3)
     limbs = limbs / np.linalg.norm(limbs, axis=2, keepdims=True)
-    limits = np.ascontiguousarray(limits_of(Group.ARM, side="left"))
     for (arm, side), limb in zip(_SIDES, limbs, strict=True):
-        state[arm] = angles_of_arms(limb.reshape(1, 6), side, limits)[0]
+        state[arm] = angles_of_arms(limb.reshape(1, 6), side, ARM_LIMITS)[0]
     deviations = np.hypot(np.exp(values[_STDDEVS]), stddev[_WITH[: PLACE.stop]])
     posture, posture_stddev = state[:N_JOINTS], deviations[:N_JOINTS]
     pitch_rad = body.camera_pose.pitch_rad
