@@ -154,9 +154,7 @@ def _values(estimate: Estimate) -> FloatArray:
     return found
 
 
-def _smoothed(
-    time_s: FloatArray, results: Sequence[_Result], wanted: range
-) -> Iterator[Estimate]:
+def _smoothed(time_s: FloatArray, results: Sequence[_Result], wanted: range) -> Iterator[Estimate]:
     """Yield the ``wanted`` ones of the estimates of one person at times (n,)."""
     values = np.array([result.values for result in results])
     yaw = 3 + YAW - TURNS.start

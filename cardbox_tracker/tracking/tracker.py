@@ -293,10 +293,13 @@ class Tracker:
             reason = "the sizes are not known yet"
         if state == TRACKING and reason:
             state = UNCERTAIN
-        pitch_stddev_rad = self.body.camera_pose.pitch_stddev_rad
-        reason = (reason or estimate.reason) if state == UNCERTAIN else ""
-        estimate = replace(estimate, state=state, reason=reason, keypoint_states=states)
-        return replace(estimate, pitch_stddev_rad=pitch_stddev_rad)
+        return replace(
+            estimate,
+            state=state,
+            reason=(reason or estimate.reason) if state == UNCERTAIN else "",
+            keypoint_states=states,
+            pitch_stddev_rad=self.body.camera_pose.pitch_stddev_rad,
+        )
 
     def _count(self, frames: Sequence[Frame], estimate: Estimate) -> None:
         """Count which of the optional inputs that were given told of a posture."""
@@ -380,7 +383,7 @@ class Tracker:
         )
 
     def _doubt_about(self, frame: Frame) -> str:
-        """Return whether a person's back or the poses of cameras make the whole result doubtful."""
+        """Return why a person's back or poses of cameras make the whole result doubtful, or ""."""
         if self._facing is not None and self._before is not None:
             self._facing.see(frame, Posed(self.cameras[0].posable, self._before[None]))
             return BACK if self._facing.shows_back else ""
