@@ -190,6 +190,14 @@ def _mirrored(
     return np.ascontiguousarray(across), np.ascontiguousarray(below)
 
 
+def tracked_figures(film: Film, asked: TrackingOptions) -> dict[str, Any]:
+    """Track a film as asked, and return its :func:`film_figures`."""
+    estimates: list[Estimate] = []
+    keep = partial(_keep, estimates)
+    summary = track(tracking_request(asked), (keep,), lambda _: None)
+    return film_figures(film, estimates, summary.body)
+
+
 def film_figures(
     film: Film, estimates: Sequence[Estimate], body: BodyModel | None
 ) -> dict[str, Any]:
@@ -335,8 +343,6 @@ def evaluate_films(
 
 def _film(folder: Path, shape: str, motion: str, preset: str, seeds: range) -> list[dict[str, Any]]:
     """Return the entries of one session in ``films.json``, one for all that is given."""
-    from lab.evaluation.films import film_figures, make_film
-
     found = list[dict[str, Any]]()
     with TemporaryDirectory() as made:
         film = make_film(folder, shape, Path(made) / f"{folder.name}.mp4", motion)
@@ -346,10 +352,7 @@ def _film(folder: Path, shape: str, motion: str, preset: str, seeds: range) -> l
             runs = []
             for seed in seeds:
                 fixed: dict[str, Any] = {"detector": "mediapipe", "preset": preset, "seed": seed}
-                asked = tracking_request(TrackingOptions(film.path, **fixed, **more))
-                estimates: list[Estimate] = []
-                summary = track(asked, (partial(_keep, estimates),), lambda _: None)
-                runs.append(film_figures(film, estimates, summary.body))
+                runs.append(tracked_figures(film, TrackingOptions(film.path, **fixed, **more)))
             found.append(
                 {
                     "name": f"{folder.name}, {shape}" + f", {motion}" * (motion != "still"),

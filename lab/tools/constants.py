@@ -1,6 +1,6 @@
 """Table of what a change of each constant changes.
 
-    python -m lab.tools.constants DATA POINTS.csv [--only tracking/legs.py ...] [--output FILE.md]
+    python -m lab.tools.constants DATA POINTS.csv [--only tracking/legs.py ...] --output FILE.md
 
 A constant is a name of a module in ``FOLDERS`` with numbers that follow from no other constant and
 are no indices. Those that compiled code uses, or a module while it is imported, are only counted:
@@ -44,8 +44,9 @@ CASES: Mapping[str, Mapping[str, Any]] = {
 GIVEN = {"background": (0.0, 1.5), "stature_m": 1.75, "start_s": 6.0, "end_s": 6.6}
 HEADER = """# Constants
 
-`python -m lab.tools.constants DATA POINTS.csv` makes this table. It halves one constant at a time
-if it is from 0.5 to 1, doubles it else, and tracks 0.6 s of the recordings, until one changes.
+`python -m lab.tools.constants DATA POINTS.csv --output FILE.md` makes this table. It halves one
+constant at a time if it is from 0.5 to 1, doubles it else, and tracks 0.6 s of the recordings,
+until one changes.
 *Shape* is the mean way, cm, of shoulders, elbows and hands relative to the middle of the shoulders,
 *place* that of the middle, *state* the share of images, %, that become `tracking` or no longer are.
 Changes by another seed, which are noise: {noise}.

@@ -15,7 +15,6 @@ import argparse
 import json
 from collections.abc import Iterator
 from dataclasses import replace
-from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any, NamedTuple
@@ -27,13 +26,11 @@ from cardbox_tracker.applications.drawing.video import video_file
 from cardbox_tracker.camera.extrinsics import Extrinsics
 from cardbox_tracker.camera.extrinsics_files import load_extrinsics, save_camchain
 from cardbox_tracker.commands.request import Request
-from cardbox_tracker.commands.tracking import track
 from cardbox_tracker.commands.tracking_request import tracking_request
 from cardbox_tracker.common.errors import CameraError
 from cardbox_tracker.person.sizes import FloatArray
 from cardbox_tracker.recordings.open_images import open_images
-from cardbox_tracker.tracking.estimate import Estimate
-from lab.evaluation.films import Film, film_figures
+from lab.evaluation.films import Film, tracked_figures
 from lab.evaluation.session import load_session
 
 LATER_S = 0.37
@@ -151,14 +148,7 @@ def _figures(folder: Path, camera: str, half: Half, asked: Request) -> dict[str,
         hips_m=None if hips_m is None else hips_m @ half.turn.T,
     )
     film = Film(session, "across", half.path, half.fov_deg, half.stamps_ns)
-    estimates = list[Estimate]()
-    keep = partial(_keep, estimates)
-    summary = track(tracking_request(asked), (keep,), lambda _: None)
-    return film_figures(film, estimates, summary.body)
-
-
-def _keep(estimates: list[Estimate], _: object, estimate: Estimate, __: object) -> None:
-    estimates.append(estimate)
+    return tracked_figures(film, asked)
 
 
 if __name__ == "__main__":
