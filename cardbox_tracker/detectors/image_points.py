@@ -114,14 +114,7 @@ class ImagePoints:
             spatial_m = _array("spatial_m", self.spatial_m, (count, 3))
             spatial_m[~_is_finite(spatial_m)] = np.nan
             object.__setattr__(self, "spatial_m", spatial_m)
-        if self.stamp_ns is not None:
-            try:
-                object.__setattr__(self, "stamp_ns", index(self.stamp_ns))
-            except TypeError:
-                raise ValueError(
-                    f"stamp_ns of points is {quoted(self.stamp_ns)}; expected a whole number of "
-                    "nanoseconds, or None"
-                ) from None
+        object.__setattr__(self, "stamp_ns", whole_ns(self.stamp_ns, "points"))
 
     @classmethod
     def of(cls, found: Mapping[str, Sequence[float]], stamp_ns: int | None = None) -> ImagePoints:
@@ -207,6 +200,17 @@ class ImagePoints:
     def is_empty(self) -> bool:
         """Whether no point is known."""
         return not self.scores.any()
+
+
+def whole_ns(stamp_ns: Any, of: str) -> int | None:
+    """Return a stamp, ns; ValueError if it is neither a whole number nor None."""
+    try:
+        return None if stamp_ns is None else index(stamp_ns)
+    except TypeError:
+        raise ValueError(
+            f"stamp_ns of {of} is {quoted(stamp_ns)}; expected a whole number of nanoseconds, "
+            "or None"
+        ) from None
 
 
 def _array(

@@ -4,15 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from operator import index
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from cardbox_tracker.camera.given_arrays import depth_from, image_from, silhouette_from
 from cardbox_tracker.camera.view import View
-from cardbox_tracker.common.errors import quoted
-from cardbox_tracker.detectors.image_points import ImagePoints
+from cardbox_tracker.detectors.image_points import ImagePoints, whole_ns
 from cardbox_tracker.person.sizes import FloatArray
 from cardbox_tracker.terms.term import DepthImage, Image, Silhouette
 
@@ -123,13 +121,7 @@ class Observation:
                 "or add it to CHANNELS"
             )
         self.channels = {name: data for name, data in given.items() if data is not None}
-        try:
-            self.stamp_ns = None if stamp_ns is None else index(stamp_ns)
-        except TypeError:
-            raise ValueError(
-                f"stamp_ns of an observation is {quoted(stamp_ns)}; expected a whole number of "
-                "nanoseconds, or None"
-            ) from None
+        self.stamp_ns = whole_ns(stamp_ns, "an observation")
         self.is_cut = is_cut
         self.picture = (lambda: image) if picture is None and image is not None else picture
 
