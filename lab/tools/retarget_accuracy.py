@@ -111,7 +111,7 @@ def main(args: list[str] | None = None) -> int:
     parser.add_argument("--robot", action="append", type=Path, metavar="URDF")
     parser.add_argument("--write", action="store_true", help="write the table into the document")
     parser.add_argument("--lag", action="store_true", help="the table of lag instead")
-    parser.add_argument("--lowest-m", type=float, default=-10.0, help="as of cardbox retarget")
+    parser.add_argument("--lowest-m", type=float, default=-10.0, help="of retarget, not in --lag")
     given = parser.parse_args(args)
     body = body_from_proportions(1.75, 2.0)
     motions: list[Motion] = []
