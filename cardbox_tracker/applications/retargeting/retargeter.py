@@ -43,8 +43,8 @@ _OF_AN_ARM = (
 )
 # The first of the speeds with which a robot begins to follow, of its highest.
 _SLOWEST = 0.1
-# Speed, acceleration and jerk that belong together: each is reached in twice this time, so the
-# robot is late by it twice, 0.1 s, at any speed.
+# Acceleration by speed, and jerk by acceleration, 1/s: at any speed the robot is late by the sum of
+# both inverses, 0.1 s.
 _PER_SECOND = 20.0
 
 
