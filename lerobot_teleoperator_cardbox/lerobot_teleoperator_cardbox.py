@@ -110,7 +110,7 @@ class CardboxTeleoperator(Teleoperator):
                         f"no command came on {self.config.address} within {self.config.wait_s:g} "
                         "s; start 'cardbox retarget ... --stream' or the node, and enable the robot"
                     )
-                self._read(is_first=True)
+                self._read()
         except Exception:
             self.disconnect()
             raise
@@ -148,10 +148,10 @@ class CardboxTeleoperator(Teleoperator):
         self._socket = self._context = None
         self._action = {}
 
-    def _read(self, is_first: bool = False) -> None:
-        """Take a packet if it is a command; the first one may lack a joint, and then tells it."""
+    def _read(self) -> None:
+        """Take a packet if it is a command; raise ValueError if the first one lacks a joint."""
         assert self._socket is not None
-        packet = self._socket.recv(zmq.NOBLOCK)
+        packet, is_first = self._socket.recv(zmq.NOBLOCK), not self._action
         try:
             content = json.loads(packet)
             columns = (content[name] for name in ("positions", "lower", "upper"))

@@ -20,9 +20,9 @@ def extensions(kind: str, taken: Container[str]) -> dict[str, EntryPoint]:
     found: dict[str, EntryPoint] = {}
     for entry in entry_points(group=f"cardbox_tracker.{kind}"):
         if entry.name in taken or entry.name in found:
-            other = _place(found[entry.name]) if entry.name in found else "cardbox_tracker"
+            other = place_of(found[entry.name]) if entry.name in found else "cardbox_tracker"
             raise CardboxError(
-                f"{entry.name} of {kind} comes from {_place(entry)} and from {other}: uninstall "
+                f"{entry.name} of {kind} comes from {place_of(entry)} and from {other}: uninstall "
                 "one of the two"
             )
         found[entry.name] = entry
@@ -35,12 +35,13 @@ def loaded(entry: EntryPoint) -> Any:
         return entry.load()
     except Exception as error:
         raise CardboxError(
-            f"{entry.name} of {_place(entry)} cannot be imported from {entry.value}: "
+            f"{entry.name} of {place_of(entry)} cannot be imported from {entry.value}: "
             f"{type(error).__name__}: {error}"
         ) from error
 
 
-def _place(entry: EntryPoint) -> str:
+def place_of(entry: EntryPoint) -> str:
+    """Return the distribution from which an entry point comes."""
     return entry.dist.name if entry.dist else "the command line"
 
 

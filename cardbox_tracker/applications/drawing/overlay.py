@@ -73,12 +73,12 @@ def draw_overlay(
     state are amber if the posture may be wrong. ``hides_heads`` is for :func:`with_hidden_head`.
     """
     canvas = enlarged(image, scale)
+    view = camera.scaled(*canvas.shape[1::-1])
     # One of several people who is not there has no head to hide.
     if hides_heads and not (estimate.person and estimate.state == NO_PERSON):
-        canvas = with_hidden_head(canvas, body, camera.scaled(*canvas.shape[1::-1]), estimate)
+        canvas = with_hidden_head(canvas, body, view, estimate)
     text = estimate.state.replace("_", " ")
     if estimate.posture is not None:
-        view = camera.scaled(*canvas.shape[1::-1])
         outline = UNCERTAIN_BGR if estimate.state == "uncertain" else OUTLINE_BGR
         there = estimate.placed(body)
         posed = draw_model(canvas, there, view, estimate.posture, outline, estimate.keypoint_states)

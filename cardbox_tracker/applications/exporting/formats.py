@@ -17,7 +17,7 @@ from cardbox_tracker.applications.exporting.markers import ezc3d_or_error, write
 from cardbox_tracker.applications.exporting.mot import write_mot
 from cardbox_tracker.applications.exporting.motion import Motion, images_of_body
 from cardbox_tracker.common.errors import CardboxError, cut
-from cardbox_tracker.common.extensions import EXPORTERS, extensions, loaded, optional
+from cardbox_tracker.common.extensions import EXPORTERS, extensions, loaded, optional, place_of
 from cardbox_tracker.common.files import atomic_path, scene_beside, write_table
 from cardbox_tracker.measuring.scene import Scene, load_scene
 from cardbox_tracker.person.isb_angles import ISB_NAMES, isb_angles
@@ -95,7 +95,7 @@ def formats() -> dict[str, Format]:
 
 def _foreign(entry: EntryPoint) -> Format:
     """Return a format of another distribution, whose files are whole or not there."""
-    name = f"{entry.name} of {entry.dist.name if entry.dist else 'the command line'}"
+    name = f"{entry.name} of {place_of(entry)}"
     try:
         found = loaded(entry)
         if not isinstance(found, Format):

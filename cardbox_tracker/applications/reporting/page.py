@@ -7,7 +7,6 @@ from collections import Counter
 from collections.abc import Mapping, Sequence
 from itertools import compress
 from pathlib import Path
-from types import MappingProxyType
 from urllib.parse import quote
 
 import numpy as np
@@ -127,10 +126,7 @@ def space_view(motion: Motion, body: BodyModel | None, true_m: FloatArray | None
     chosen = numbers[np.linspace(0, len(numbers) - 1, 2 * _MOMENTS + 1).astype(int)[1::2]]
     markers = markers_of(motion, body)
     points_m = _upright(markers.points_m[chosen])
-    reference_m = None
-    if true_m is not None:
-        level_m = (in_reference(true_m[chosen], body) - floor_below(body)) @ LABORATORY.T
-        reference_m = _upright(level_m)
+    reference_m = None if true_m is None else _placed(true_m[chosen], body)
     figure = Figure(figsize=(3.0 * _MOMENTS, 3.4), dpi=_DPI, layout="constrained")
     low, high = (f(points_m, axis=(0, 1)) for f in (np.nanmin, np.nanmax))
     middle, half = (low + high) / 2, float(np.max(high - low)) / 2 + 0.1
@@ -171,8 +167,8 @@ def cameras_view(
     axes.plot(hips_m[:, 0], hips_m[:, 1], color=_TRUNK, linewidth=1.5)
     first = Extrinsics(np.eye(3), np.zeros(3))
     for name, pose in {"first camera": first, **cameras}.items():
-        ends_m = np.array([pose.centre_m, pose.centre_m + 0.5 * pose.rotation[2]])
-        ends_m = _upright((in_reference(ends_m, body) - floor_below(body)) @ LABORATORY.T)
+        ahead_m = pose.centre_m + 0.5 * pose.rotation[2]
+        ends_m = _placed(np.array([pose.centre_m, ahead_m]), body)
         axes.plot(*ends_m[:, :2].T, color="black", linewidth=2)
         axes.plot(*ends_m[0, :2], color="black", marker="o")
         at_m = float(ends_m[0, 0]), float(ends_m[0, 1])
@@ -198,6 +194,11 @@ def _upright(points_m: FloatArray) -> FloatArray:
     return np.asarray(points_m[..., [2, 0, 1]] * np.array([-1.0, -1.0, 1.0]))
 
 
+def _placed(optical_m: FloatArray, body: BodyModel | None) -> FloatArray:
+    """Return points (..., 3), m, of the optical frame as :func:`_upright` does."""
+    return _upright((in_reference(optical_m, body) - floor_below(body)) @ LABORATORY.T)
+
+
 _MOST_SPANS = 20
 
 
@@ -207,8 +208,8 @@ def write_page(
     title: str,
     people: Mapping[str, tuple[Results, TrackSummary]],
     lines: Sequence[str],
-    cameras: Mapping[str, Extrinsics] = MappingProxyType({}),
-    hides_heads: bool = False,
+    cameras: Mapping[str, Extrinsics],
+    hides_heads: bool,
 ) -> None:
     """Write the page, which needs no other file than the ``film``, named relative to it.
 

@@ -30,8 +30,8 @@ class RetargetConfig(Settings):
     )
     max_acceleration: float = setting(
         0.0,
-        "no joint of the robot changes its speed faster; 0: 20 times max_speed, which is then "
-        "reached as soon whatever it is",
+        "no joint of the robot changes its speed faster; 0: 20 times max_speed, so the time to "
+        "reach any max_speed is the same",
         unit="rad/s² or m/s²",
         limits=(0.0, 1000.0),
     )

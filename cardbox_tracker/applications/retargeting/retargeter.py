@@ -33,14 +33,9 @@ from cardbox_tracker.person.skeleton import HAND_OPEN_NAMES, JOINT_NAMES
 from cardbox_tracker.tracking.estimate import TRACKING, UNCERTAIN
 
 FOLLOWING = "following"
-# Places in an arm's angles, and the flexion of the same limb by the abduction.
-_ABDUCTIONS = np.array([SHOULDER_ABDUCTION, ELBOW_ABDUCTION])
-_FLEXIONS = np.array([SHOULDER_FLEXION, ELBOW_FLEXION])
-_FLEXION_OF = {
-    JOINT_NAMES[first + abduction]: JOINT_NAMES[first + flexion]
-    for first in FIRST_ANGLES
-    for abduction, flexion in zip(_ABDUCTIONS, _FLEXIONS, strict=True)
-}
+# Abduction and flexion of each limb in a posture.
+_ABDUCTIONS = np.add.outer(FIRST_ANGLES, [SHOULDER_ABDUCTION, ELBOW_ABDUCTION]).ravel()
+_FLEXIONS = np.add.outer(FIRST_ANGLES, [SHOULDER_FLEXION, ELBOW_FLEXION]).ravel()
 # Settings that a joint map does not need.
 _OF_AN_ARM = (
     *("base", "hand", "gripper", "gripper_open", "trunk_radius_m", "arms_apart_m", "lowest_m"),
@@ -48,8 +43,8 @@ _OF_AN_ARM = (
 )
 # The first of the speeds with which a robot begins to follow, of its highest.
 _SLOWEST = 0.1
-# Speed, acceleration and jerk that belong together: each is reached in twice this time, so the
-# robot is late by it twice, 0.1 s, at any speed.
+# Acceleration by speed, and jerk by acceleration, 1/s: at any speed the robot is late by the sum of
+# both inverses, 0.1 s.
 _PER_SECOND = 20.0
 
 
@@ -247,9 +242,11 @@ class Retargeter:
         )
         self.settles_ns = self._motion.settles_ns
         self._method, self._config = method, config
-        self._sources = sources = [frozenset(names) for names in method.sources]
-        self._follows = np.array([not names.isdisjoint(JOINT_NAMES) for names in sources])
-        grips = [not names.isdisjoint(HAND_OPEN_NAMES) for names in sources]
+        # (n, 12): whether a joint of the robot follows one of the person.
+        sources = method.sources
+        self._sources = np.array([[one in names for one in JOINT_NAMES] for names in sources])
+        self._follows = self._sources.any(axis=1)
+        grips = [not set(HAND_OPEN_NAMES).isdisjoint(names) for names in sources]
         most = np.minimum(config.max_following_error, (limits.upper - limits.lower) / 4)
         self.tolerance = np.where(grips, np.inf, most)
         self._before_ns: int | None = None
@@ -350,36 +347,27 @@ class Retargeter:
         A limb that points along the axis of its abduction has a sure direction, but no sure
         abduction: what follows both angles of a limb needs the direction alone.
         """
-        angles, directions = stddev[:N_JOINTS], stddev[:N_JOINTS].copy()
-        for first in FIRST_ANGLES:
-            abductions, flexions = first + _ABDUCTIONS, first + _FLEXIONS
-            # The root of the mean square of the cosine, in which the abduction turns the limb.
-            bent, spread = posture[flexions], angles[flexions]
-            turned = np.hypot(np.cos(bent), spread * np.sin(bent))
-            directions[abductions] *= np.minimum(turned, 1.0)
-        most = self._config.max_stddev_rad
-        unsure = self._unsure(np.isfinite(posture[:N_JOINTS]) & (directions <= most), keypoints)
-        alone = self._unsure(angles <= most, {})
-        return np.array(
-            [
-                not names.isdisjoint(unsure)
-                or any(name in alone and _FLEXION_OF.get(name) not in names for name in names)
-                for names in self._sources
-            ]
-        )
+        given = np.stack([posture[:N_JOINTS], stddev[:N_JOINTS]])
+        sure = np.isfinite(given).all(axis=0) & self._tracked(keypoints)
+        angles, spread = np.where(sure, given, 0.0)
+        bent, shaking = angles[_FLEXIONS], spread[_FLEXIONS]
+        # The root of the mean square of the cosine, in which the abduction turns the limb.
+        turned = np.minimum(np.hypot(np.cos(bent), shaking * np.sin(bent)), 1.0)
+        spreads = np.tile(spread, (len(self._sources), 1))
+        spreads[:, _ABDUCTIONS] *= np.where(self._sources[:, _FLEXIONS], turned, 1.0)
+        is_held = self._sources & ~(sure & (spreads <= self._config.max_stddev_rad))
+        return np.asarray(is_held.any(axis=1))
 
-    def _unsure(
-        self, sure: NDArray[np.bool_], keypoints: Mapping[str, tuple[str, float]]
-    ) -> set[str]:
-        """Return joints that are not ``sure`` (12,), or whose keypoints are not."""
-        for number, name in enumerate(JOINT_NAMES):
+    def _tracked(self, keypoints: Mapping[str, tuple[str, float]]) -> NDArray[np.bool_]:
+        """Return for which joints of the person (12,) the keypoint is tracked, or not known."""
+        found = []
+        for name in JOINT_NAMES:
             side, _, joint = name.partition("_")
             # The angles at the shoulder are those of the elbow's place, these of the hand's.
             end = "hand" if joint.startswith("elbow") else "elbow"
             state, chance = keypoints.get(f"{side}_{end}", ("tracked", 0.0))
-            if state != "tracked" or chance > self._config.max_chance:
-                sure[number] = False
-        return {name for name, is_sure in zip(JOINT_NAMES, sure, strict=True) if not is_sure}
+            found.append(state == "tracked" and chance <= self._config.max_chance)
+        return np.array(found)
 
 
 def _start(text: str, joints: tuple[str, ...], limits: Limits) -> FloatArray:

@@ -211,16 +211,14 @@ def _robot(root: Xml.Element) -> Robot:
     by_name = {one.name: one for one in joints.values()}
     for one in joints.values():
         leaders = [one.name]
-        while (leader := by_name.get(joints[one.child].mimics)) and leader.mimics:
+        while (leader := by_name.get(one.mimics)) and leader.mimics:
             if leader.name in leaders:
                 raise ValueError(f"the joints {', '.join(leaders)} mimic each other")
             leaders.append(leader.name)
-            joints[one.child] = replace(
-                joints[one.child],
-                mimics=leader.mimics,
-                multiplier=joints[one.child].multiplier * leader.multiplier,
-                offset=joints[one.child].multiplier * leader.offset + joints[one.child].offset,
-            )
+            offset = one.multiplier * leader.offset + one.offset
+            multiplier = one.multiplier * leader.multiplier
+            one = replace(one, mimics=leader.mimics, multiplier=multiplier, offset=offset)
+        joints[one.child] = one
     robot = Robot(Xml.tostring(root, encoding="unicode"), joints)
     if not robot.joints:
         still = [one.name for one in joints.values() if one.kind in _MOVABLE and not one.mimics]

@@ -27,6 +27,9 @@ class Phase(Enum):
     FAULTED = "faulted"
 
 
+_MOVING = Phase.FOLLOWING, Phase.HOLDING
+
+
 class Supervisor:
     """A state machine between a retargeter and a robot.
 
@@ -52,7 +55,6 @@ class Supervisor:
         self._retargeter, self._config = retargeter, config
         self._timeout_ns = round(timeout_s * 1e9)
         self._period_ns = round(1e9 / config.rate_hz)
-        self._is_wanted = False
         self._gripped_ns: int | None = None
         self._robot: tuple[int, FloatArray] | None = None
         self._sent: Moment | None = None
@@ -66,6 +68,10 @@ class Supervisor:
         reason = self._reason or ("no posture yet" if self.phase is Phase.READY else "")
         return self.phase.value + (f": {reason}" if reason else "")
 
+    @property
+    def _is_wanted(self) -> bool:
+        return self.phase not in (Phase.DISABLED, Phase.FAULTED)
+
     def enable(self, is_wanted: bool, now_ns: int, is_grip: bool = False) -> None:
         """Enable the robot or stop it; with ``is_grip``, for 0.3 s only.
 
@@ -76,7 +82,6 @@ class Supervisor:
             self._gripped_ns = now_ns if is_wanted and is_grip else None
         if is_wanted == self._is_wanted or (is_wanted and is_held):
             return
-        self._is_wanted = is_wanted
         if is_wanted:
             self.phase, self._reason = Phase.READY, ""
         else:
@@ -85,15 +90,14 @@ class Supervisor:
     def robot_at(self, positions: FloatArray, now_ns: int) -> None:
         """Take where the robot is, (n,), rad or m."""
         self._robot = now_ns, positions
-        if self._sent is None or self.phase not in (Phase.FOLLOWING, Phase.HOLDING):
+        if self._sent is None or self.phase not in _MOVING:
             return
-        off = np.abs(positions - self._sent.positions) / self._retargeter.tolerance
-        if off.max() > 1.0:
-            joint = self._retargeter.joints[int(off.argmax())]
+        off, joint = self._off(positions, self._sent)
+        if off > 1.0:
             self._is_off, self.phase = True, Phase.HOLDING
             self._reason = f"{joint} is not where it was sent"
-            self._near(now_ns)
-        elif self._is_off and off.max() <= _RELEASED:
+            self._near(positions, now_ns)
+        elif self._is_off and off <= _RELEASED:
             self._is_off = False
             self._retargeter.hold("", self._clock_ns(now_ns))
 
@@ -110,10 +114,10 @@ class Supervisor:
         if self.phase is Phase.READY:
             if clock_ns <= self._stopped_ns or not self._begins(now_ns):
                 return command
-        elif self.phase not in (Phase.FOLLOWING, Phase.HOLDING):
+        elif self.phase not in _MOVING:
             return command
-        if self._is_off:
-            return self._near(now_ns)
+        if self._is_off and self._robot is not None:
+            return self._near(self._robot[1], now_ns)
         command = update(clock_ns)
         self._reason = "" if command.is_moving else command.reason
         if command.is_moving or self.phase is not Phase.READY:
@@ -126,13 +130,11 @@ class Supervisor:
         if self._gripped_ns is not None and now_ns - self._gripped_ns > DEAD_MAN_NS:
             self._gripped_ns = None
             if self._is_wanted:
-                self._is_wanted = False
                 return self._stop(Phase.DISABLED, "not gripped", now_ns)
-        if self.phase not in (Phase.FOLLOWING, Phase.HOLDING):
+        if self.phase not in _MOVING:
             return None
         again = self._config.enable_after_lost
         if not self._is_robot_known(now_ns):
-            self._is_wanted = not again
             phase = Phase.FAULTED if again else Phase.READY
             return self._stop(phase, "the robot's joint states have stopped", now_ns)
         if now_ns - self._seen_ns > self._timeout_ns:
@@ -140,7 +142,6 @@ class Supervisor:
             if self._state in (LOST, NO_PERSON):
                 reason = self._state.replace("_", " ")
             if again:
-                self._is_wanted = False
                 return self._stop(Phase.FAULTED, reason, now_ns)
             if (self.phase, self._reason) != (Phase.HOLDING, reason) and not self._is_off:
                 return self._stop(Phase.HOLDING, reason, now_ns)
@@ -149,8 +150,7 @@ class Supervisor:
     def moment(self, now_ns: int) -> Moment | None:
         """Return positions and velocities to send now, or None if none may be sent."""
         self._motion_ns, self._sent_ns = self._clock_ns(now_ns), now_ns
-        is_sent = self.phase in (Phase.FOLLOWING, Phase.HOLDING)
-        is_sent = is_sent or self._motion_ns <= self._stopped_ns
+        is_sent = self.phase in _MOVING or self._motion_ns <= self._stopped_ns
         self._sent = self._retargeter.at(self._motion_ns) if is_sent else None
         return self._sent
 
@@ -167,21 +167,23 @@ class Supervisor:
             self._reason = "the robot's joint states are not known"
             return False
         self._retargeter.begin(self._robot[1])
-        begun = self._retargeter.at(self._clock_ns(now_ns)).positions
-        off = np.abs(begun - self._robot[1]) / self._retargeter.tolerance
-        if off.max() > 1.0:
-            self._reason = f"{self._retargeter.joints[int(off.argmax())]} is beyond its limits"
+        off, joint = self._off(self._robot[1], self._retargeter.at(self._clock_ns(now_ns)))
+        if off > 1.0:
+            self._reason = f"{joint} is beyond its limits"
         return not self._reason
 
-    def _near(self, now_ns: int) -> Command | None:
+    def _off(self, positions: FloatArray, sent: Moment) -> tuple[float, str]:
+        """Return the largest following error, as a share of its limit, and its joint."""
+        off = np.abs(positions - sent.positions) / self._retargeter.tolerance
+        return float(off.max()), self._retargeter.joints[int(off.argmax())]
+
+    def _near(self, positions: FloatArray, now_ns: int) -> Command:
         """Hold near the robot, which is not where it was sent."""
-        if self._robot is None:
-            return None
-        return self._retargeter.hold_near(self._robot[1], self._reason, self._clock_ns(now_ns))
+        return self._retargeter.hold_near(positions, self._reason, self._clock_ns(now_ns))
 
     def _stop(self, phase: Phase, reason: str, now_ns: int) -> Command | None:
         """Let the robot decelerate if it moves, and stay in a phase."""
-        was_sent = self.phase in (Phase.FOLLOWING, Phase.HOLDING)
+        was_sent = self.phase in _MOVING
         self.phase, self._reason, self._is_off = phase, reason, False
         if not was_sent:
             return None

@@ -15,7 +15,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from cardbox_tracker.applications.teleoperation.full_body import NAMES, FullBody
-from cardbox_tracker.applications.teleoperation.smpl import local_frames
+from cardbox_tracker.applications.teleoperation.smpl import FEET, local_frames
 from cardbox_tracker.common.errors import CardboxError, quoted
 from cardbox_tracker.common.extensions import optional
 from cardbox_tracker.person.sizes import FloatArray
@@ -140,7 +140,6 @@ def sender_of(to: str, address: str) -> ZmqSender | UdpSender:
 _HEADER_BYTES, _ROBOT_JOINTS = 1280, 29
 # The first of the six wrist joints of SONIC's robot: roll, pitch, yaw, each left before right.
 _WRISTS = 23
-_FEET = [NAMES.index(f"{side}_foot") for side in ("left", "right")]
 # OpenXR has X to the right, Y up and Z backwards.
 _TO_OPENXR = np.array([[0.0, -1.0, 0.0], [0.0, 0.0, 1.0], [-1.0, 0.0, 0.0]])
 
@@ -183,7 +182,7 @@ def sonic_packet(body: FullBody, number: int) -> bytes:
 def isaac_packet(body: FullBody, _: int) -> bytes:
     """Return the msgpack of Isaac Teleop's body in OpenXR's axes, or raise CardboxError."""
     points_m = body.points_m @ rotation_z(np.array(body.yaw_rad)).T @ _TO_OPENXR.T
-    points_m[:, 1] -= points_m[_FEET, 1].min()
+    points_m[:, 1] -= points_m[FEET, 1].min()
     turned = Rotation.from_rotvec([0.0, 0.0, body.yaw_rad]) * Rotation.from_quat(
         body.turns[:, [1, 2, 3, 0]]
     )

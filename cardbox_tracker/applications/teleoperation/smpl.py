@@ -21,7 +21,7 @@ TO_SMPL = np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0]])
 # The pelvis of SMPL-X's mean body in its own axes, from which ``trans`` counts, m.
 _SMPLX_PELVIS_M = np.array([0.0031, -0.3514, 0.0120])
 _BODY_JOINTS, _BETAS = 21, 16
-_FEET = [NAMES.index(f"{side}_foot") for side in ("left", "right")]
+FEET = [NAMES.index(f"{side}_foot") for side in ("left", "right")]
 
 
 def local_frames(body: FullBody) -> tuple[FloatArray, FloatArray]:
@@ -40,7 +40,7 @@ def local_frames(body: FullBody) -> tuple[FloatArray, FloatArray]:
     backwards = turns[list(PARENTS)].transpose(0, 2, 1)
     backwards[0] = np.eye(3)
     places = np.einsum("nij,nj->ni", backwards, body.points_m - body.points_m[list(PARENTS)])
-    places[0] = 0.0, 0.0, -body.points_m[_FEET, 2].min()
+    places[0] = 0.0, 0.0, -body.points_m[FEET, 2].min()
     return backwards @ turns, places
 
 

@@ -76,8 +76,9 @@ class RetargetNode(CardboxNode):
             self.get_logger().info(f"the robot's joints\n{table}")
         self._supervisor = Supervisor(self._retargeter, settings, settings.timeout_s)
         self._status = ""
-        self._arrived_ns, self._stamp_ns = _now_ns(), 0
-        self._streamed_ns = self._sent_stamp_ns = 0
+        # How far stamps are ahead of the clock: that of the image, and the last one sent.
+        self._ahead_ns = 0
+        self._sent_ahead_ns: int | None = None
         address = settings.stream_address
         self._sender = ZmqSender(address) if address else None
         for remark in self._sender.remarks if self._sender else ():
@@ -125,7 +126,7 @@ class RetargetNode(CardboxNode):
         now_ns = _now_ns()
         posture = stddev = hands = None
         if image.joints is not None:
-            self._arrived_ns, self._stamp_ns = now_ns, image.stamp_ns
+            self._ahead_ns = image.stamp_ns - now_ns
             rows = rows_of(*POSTURE_GROUPS, Group.NECK)
             posture, stddev = state_of(image.joints, image.stddev)[:, rows]
         if image.hands is not None:
@@ -165,14 +166,13 @@ class RetargetNode(CardboxNode):
         self._send(self._supervisor.tick(now_ns))
         moment = self._supervisor.moment(now_ns)
         if moment is None:
-            self._sent_stamp_ns = 0
+            self._sent_ahead_ns = None
             return
         # The recording's time goes on from the image, and never back.
-        since_ns, self._streamed_ns = now_ns - self._streamed_ns, now_ns
-        stamp_ns = self._stamp_ns + now_ns - self._arrived_ns
-        if self._sent_stamp_ns:
-            stamp_ns = max(stamp_ns, self._sent_stamp_ns + since_ns)
-        self._sent_stamp_ns = stamp_ns
+        ahead_ns = self._ahead_ns
+        if self._sent_ahead_ns is not None:
+            ahead_ns = max(ahead_ns, self._sent_ahead_ns)
+        self._sent_ahead_ns, stamp_ns = ahead_ns, now_ns + ahead_ns
         names = list(self._retargeter.joints)
         if self._sender is not None:
             lower, upper, _ = self._retargeter.limits

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 from cardbox_tracker.applications.retargeting.config import RetargetConfig
@@ -67,6 +67,8 @@ def assert_within(positions: np.ndarray, limits: Limits, config: RetargetConfig)
         assert (np.abs(change) <= highest * (1 + 1e-6) + 1e-12 / step_s**number).all()
 
 
+# An infinite deviation of an arm that hangs.
+@example([(0, "tracking", np.zeros(12), np.append(np.zeros(11), np.inf))], [0], RetargetConfig())
 @given(images, st.lists(st.integers(0, 100), min_size=12, max_size=12), settings)
 def test_all_limits_hold_for_any_input(
     sequence: list[tuple[int, str, np.ndarray | None, np.ndarray | None]],
