@@ -64,12 +64,6 @@ def told_focal(path: Path) -> LensCue | None:
     return found if found is not None and _SHORTEST_MM <= found.focal <= _LONGEST_MM else None
 
 
-def equivalent_mm(path: Path) -> float | None:
-    """Return the 35 mm equivalent focal length of a film or an image, mm; None if it is unknown."""
-    told = told_focal(path)
-    return None if told is None else told.focal
-
-
 def _of_image(path: Path) -> LensCue | None:
     with warnings.catch_warnings(action="ignore"), Image.open(path) as image:
         exif, size = image.getexif(), image.size
