@@ -246,17 +246,15 @@ def tracking_request(asked: TrackingOptions, faults: Iterable[str] = ()) -> Trac
     scene = None
     if asked.scene is not None:
         scene = problems.caught(partial(load_scene, asked.scene), None)
-    focal_stddev: float | None = None
+    given_deg = asked.fov_deg
     if scene is not None:
-        given, asked = asked, _with_camera(asked, scene)
-        if asked.fov_deg != given.fov_deg:
-            fov = scene.camera.fov_rad
-            focal_stddev = fov.stddev / math.sin(fov.mean)
+        asked = _with_camera(asked, scene)
     people = 0 if asked.people == AUTO else asked.people
     assert not isinstance(people, str)
     recording = recording_request(asked, problems, people)
-    camera = replace(recording.camera, focal_stddev=focal_stddev)
-    recording = replace(recording, camera=camera)
+    if scene is not None and asked.fov_deg != given_deg:
+        fov = scene.camera.fov_rad
+        recording = replace(recording, camera=recording.camera.seeing(fov.mean, fov.stddev))
     person = _person(asked, people, problems, scene)
     problems.add(*_tracking_faults(asked, people, isinstance(recording.points, Detector)))
     preset = PRESETS[asked.preset]()

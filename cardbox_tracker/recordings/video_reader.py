@@ -46,8 +46,8 @@ class VideoReader(Film):
     """Context of an open video; its times count from its first image.
 
     Images are turned and mirrored as the file asks for, as those of a phone that was held upright,
-    and of several streams they are the one that players choose. Methods
-    raise BagError if the video cannot be read. The duration is the one that the file states.
+    and of several streams they are of the one that players choose. Methods raise BagError if the
+    video cannot be read. The duration is the one that the file states.
     """
 
     _damaged, _stated_s, _end = 0, 0.0, ""
