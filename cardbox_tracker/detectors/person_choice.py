@@ -43,7 +43,7 @@ class PersonChoice:
                 which, place = "place", (column, row)
         except ValueError:
             time_s = nan
-        if not all(map(isfinite, (*place, time_s or 0.0))):
+        if not (all(map(isfinite, place)) and 0.0 <= (time_s or 0.0) < inf):
             raise ValueError(
                 "expected left, right, largest, or X,Y: column and row of the person, also with "
                 f"@T for the second T, such as left@12.5, got {text!r}"
