@@ -147,7 +147,8 @@ def _opened(path: Path, stream: int) -> Iterator[tuple[cv2.VideoCapture, Next]]:
             )
         # OpenCV turns images, and does not mirror them.
         is_own = stream > 0 or np.linalg.det(matrix) < 0
-        capture.set(cv2.CAP_PROP_ORIENTATION_AUTO, 0 if is_own else 1)
+        if not stream:
+            capture.set(cv2.CAP_PROP_ORIENTATION_AUTO, 0 if is_own else 1)
         yield capture, partial(_next, capture, matrix if is_own else None)
     finally:
         capture.release()
@@ -182,9 +183,6 @@ class _Stream:
 
     def isOpened(self) -> bool:
         return True
-
-    def set(self, name: int, value: float) -> None:
-        pass
 
     def get(self, name: int) -> float:
         stream, shape = self._stream, self._stream.sample_aspect_ratio or Fraction(1)
