@@ -62,7 +62,7 @@ def webcam_fov_deg(name: str, width: int, height: int) -> float:
             return 2 * degrees(atan(width / 2 / focal_px))
     raise CameraError(
         f"no webcam {quoted(name)} is known; expected a name with one of {', '.join(_WEBCAMS)}; "
-        "or give the field of view across the width of the image"
+        "or give --fov DEG, the field of view across the width of the image"
     )
 
 

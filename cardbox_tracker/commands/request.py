@@ -11,6 +11,7 @@ import shlex
 from collections.abc import Iterable, Mapping
 from contextlib import suppress
 from dataclasses import MISSING, dataclass, fields, replace
+from math import isfinite
 from pathlib import Path, PurePosixPath
 from types import MappingProxyType
 from typing import Any, Literal, NoReturn, TypeVar
@@ -86,13 +87,16 @@ def _person_choice(given: Any) -> PersonChoice | int:
         raise argparse.ArgumentTypeError(str(error)) from None
 
 
-def _statures(given: Any) -> tuple[float, ...]:
+def _numbers(given: Any) -> tuple[float, ...]:
     parts = given.split(",") if isinstance(given, str) else given
-    return tuple(map(float, parts if isinstance(parts, Iterable) else (parts,)))
+    found = tuple(map(float, parts if isinstance(parts, Iterable) else (parts,)))
+    if not all(map(isfinite, found)):
+        raise ValueError
+    return found
 
 
 def _fovs(given: Any) -> float | tuple[float, ...]:
-    found = _statures(given)
+    found = _numbers(given)
     return found[0] if len(found) == 1 else found
 
 
@@ -195,7 +199,7 @@ class RecordingOptions(Options):
     @property
     def fovs_deg(self) -> tuple[float, ...]:
         """The fields of view that are given, in the order of the films."""
-        return () if self.fov_deg is None else _statures(self.fov_deg)
+        return () if self.fov_deg is None else _numbers(self.fov_deg)
 
 
 @dataclass(frozen=True)
@@ -232,7 +236,7 @@ class TrackingOptions(RecordingOptions):
     model: Path | None = option("MODEL.yaml")
     stature_m: float | tuple[float, ...] | None = option(
         "M[,M...]",
-        parsed(_statures, "metres, or those of each person as in 1.75,1.62"),
+        parsed(_numbers, "metres, or those of each person as in 1.75,1.62"),
         flag="--stature",
     )
     scene: Path | None = option("OUT.scene.yaml")
@@ -256,7 +260,7 @@ class TrackingOptions(RecordingOptions):
     @property
     def statures_m(self) -> tuple[float, ...]:
         """The statures that are given, by the numbers of the people."""
-        return () if self.stature_m is None else _statures(self.stature_m)
+        return () if self.stature_m is None else _numbers(self.stature_m)
 
     @property
     def number(self) -> int:
@@ -306,7 +310,7 @@ class Request(TrackingOptions):
     offset_s: tuple[float, ...] | None = option(
         "S[,S...]",
         flag="--offset",
-        read=parsed(_statures, "seconds, or those of each further film as in 0.4,-1.2"),
+        read=parsed(_numbers, "seconds, or those of each further film as in 0.4,-1.2"),
     )
     csv: Path | None = option("OUT.csv|OUT.parquet")
     bag: Path | None = option("OUT")

@@ -74,7 +74,8 @@ def measured_scene(
                 chosen = _checked(watch(source, *span, person.choice).chosen)
             yield source, Scene(_told(camera, first), tuple(bodies)), chosen
             return
-        watched = watch(source, *span, person.choice)
+        choice = person.choice
+        watched = watch(source, *span, choice)
         background = None
         if recording.shows_turns:
             moves = camera_moves(watched.people, watched.pictures, first.camera)
@@ -84,7 +85,7 @@ def measured_scene(
                 stack.close()
                 recording = recording.turned_back(turns[0])
                 source = stack.enter_context(recording.open())
-                choice = person.choice and turns[0].placed(person.choice)
+                choice = choice and turns[0].placed(choice)
                 watched, first = watch(source, *span, choice), source.first
                 background = Background(edges=turns[1])
                 print_remarks([turns[0].remark])
@@ -93,7 +94,7 @@ def measured_scene(
         if better is not recording:
             stack.close()
             source = stack.enter_context(better.open())
-            watched, first = watch(source, *span, person.choice), source.first
+            watched, first = watch(source, *span, choice), source.first
         chosen = _checked(watched.chosen)
         stands = {"camera_roll_rad": better.camera.stands_rad}
         bodies = [body.with_values(**stands) for body in _bodies(bodies, person, found)]
@@ -125,7 +126,7 @@ def _checked(chosen: Chosen | None) -> Chosen | None:
 def _told(camera: SceneCamera, source: SilhouetteSource) -> SceneCamera:
     """Return the camera with what tells its field of view."""
     lens = camera.fov_rad
-    return camera._replace(fov_rad=lens._replace(by=lens.by or source.lens_by))
+    return camera._replace(fov_rad=lens._replace(by=lens.by or source.calibration.told_by))
 
 
 def _again(
@@ -227,8 +228,7 @@ def _corrected(recording: RecordingRequest, found: SceneCamera) -> RecordingRequ
         given = replace(given, roll_rad=found.roll_rad.mean)
     fov = found.fov_rad
     if not given.is_calibrated and fov.origin == FOUND:
-        focal_stddev = fov.stddev / math.sin(fov.mean)
-        given = replace(given, fov_deg=math.degrees(fov.mean), focal_stddev=focal_stddev)
+        given = given.seeing(fov.mean, fov.stddev)
     return recording if given == recording.camera else replace(recording, camera=given)
 
 

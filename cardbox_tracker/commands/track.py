@@ -72,8 +72,7 @@ def track(
         if not paths:
             raise CardboxError("track has no recording; give a path, or several films")
         recording = Request(Path(paths[0]), films=tuple(map(Path, paths[1:])))
-    asked = recording
-    asked = replace(asked, **options)
+    asked = replace(recording, **options)
     path = asked.recording
     if asked.export and asked.csv is None:
         raise CardboxError("export writes beside the table: give csv, or save the result")
@@ -94,7 +93,8 @@ def _name(recording: Path) -> Path:
 
 def _without_effect(asked: TrackArguments, kind: type[Request], what: str) -> list[str]:
     """Return a fault for each given option of a class itself, which has no effect on ``what``."""
-    own = [flag for flag in asked.given() if flag[2:] in vars(kind) and flag != "--force"]
+    known = {name for name in vars(kind) if name not in ("force", "blur")}
+    own = [flag for flag in asked.given() if flag[2:] in known]
     return [f"{flag} has no effect on {asked.recording}, {what}" for flag in own]
 
 
@@ -105,6 +105,8 @@ def track_one(
 
     The results of each person are kept and returned with ``show``, or if a file is made of them.
     """
+    if asked.blur and not (asked.video or asked.report or asked.bag):
+        faults = [*faults, "--blur has no effect without pictures: give --video, --report or --bag"]
     request = tracking_request(asked, faults)
     for flag, suffix in (("plot", ".png"), ("report", ".html"), ("video", ".mp4")):
         path = getattr(asked, flag)

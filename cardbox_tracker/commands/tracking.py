@@ -45,9 +45,8 @@ def track(
     ):
         # Hands and the overlay are seen at the resolution of the recording.
         source.first.has_pictures = request.hands is not None or files.video is not None
-        lasts_s = source.first.duration_s
-        early = [one for film in source.films for one in film.remarks(source.names[0], lasts_s)]
-        print_remarks(early)
+        for film in source.films:
+            print_remarks(film.remarks(source.names[0], source.first.duration_s))
         early = source.first.remarks
         print_remarks(_with_unknown(early, person))
         number = None if chosen is None else chosen.number

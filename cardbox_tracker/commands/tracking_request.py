@@ -201,16 +201,16 @@ def _further(
     count = len(asked.films)
     fovs_deg = asked.fovs_deg[1:] if len(asked.fovs_deg) > 1 else (camera.fov_deg,) * count
     offsets_s: tuple[float | None, ...] = asked.offset_s or (None,) * count
-    if len(fovs_deg) != count:
-        problems.add(f"--fov has {len(asked.fovs_deg)} values: give one, or one for each film")
     if len(offsets_s) != count:
-        problems.add(f"--offset has {len(offsets_s)} values: give one for each further film")
-    for path in asked.films:
-        problems.caught(partial(check_exists, path), None)
-    return tuple(
+        problems.add(f"--offset has {len(offsets_s)} values: give one for each film but the first")
+    found = tuple(
         FurtherFilm(path, replace(camera, fov_deg=fov_deg), offset_s)
         for path, fov_deg, offset_s in zip(asked.films, fovs_deg, offsets_s, strict=False)
     )
+    for film in found:
+        problems.caught(partial(check_exists, film.path), None)
+        problems.caught(film.camera.check, None)
+    return found
 
 
 def _person_faults(person: object, people: int | None, has_detector: bool) -> Iterator[str]:
@@ -246,17 +246,15 @@ def tracking_request(asked: TrackingOptions, faults: Iterable[str] = ()) -> Trac
     scene = None
     if asked.scene is not None:
         scene = problems.caught(partial(load_scene, asked.scene), None)
-    focal_stddev: float | None = None
+    given_deg = asked.fov_deg
     if scene is not None:
-        given, asked = asked, _with_camera(asked, scene)
-        if asked.fov_deg != given.fov_deg:
-            fov = scene.camera.fov_rad
-            focal_stddev = fov.stddev / math.sin(fov.mean)
+        asked = _with_camera(asked, scene)
     people = 0 if asked.people == AUTO else asked.people
     assert not isinstance(people, str)
     recording = recording_request(asked, problems, people)
-    camera = replace(recording.camera, focal_stddev=focal_stddev)
-    recording = replace(recording, camera=camera)
+    if scene is not None and asked.fov_deg != given_deg:
+        fov = scene.camera.fov_rad
+        recording = replace(recording, camera=recording.camera.seeing(fov.mean, fov.stddev))
     person = _person(asked, people, problems, scene)
     problems.add(*_tracking_faults(asked, people, isinstance(recording.points, Detector)))
     preset = PRESETS[asked.preset]()
@@ -300,8 +298,8 @@ def _tracking_faults(
 def _camera(asked: RecordingOptions, problems: Problems) -> GivenCamera:
     roll_deg = asked.camera_roll_deg
     roll_rad = None if roll_deg is None else math.radians(roll_deg)
-    if len(asked.fovs_deg) > 1 and not _films(asked):
-        problems.add("--fov has several values: give one, or several films")
+    if len(asked.fovs_deg) not in (0, 1, 1 + len(_films(asked))):
+        problems.add(f"--fov has {len(asked.fovs_deg)} values: give one, or one for each film")
     fov_deg = asked.fovs_deg[0] if asked.fovs_deg else None
     given = fov_deg, asked.calibration, roll_rad, asked.fps, asked.mirrored, asked.webcam
     camera = GivenCamera(*given)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from math import hypot, inf, isfinite
+from math import hypot, inf, isfinite, nan
 
 import cv2
 import numpy as np
@@ -26,7 +26,7 @@ class PersonChoice:
     """Which of several people to follow."""
 
     which: str  #: ``left`` or ``right`` in the image, ``largest``, or ``place``
-    #: column and row of the person's hips or chest, px, for ``place``.
+    #: column and row at which the person is, px, for ``place``.
     place: tuple[float, float] = (0.0, 0.0)
     #: second from which on images count, from the start of the recording; None for all images.
     time_s: float | None = None
@@ -35,20 +35,20 @@ class PersonChoice:
     def parse(cls, text: str) -> PersonChoice:
         """Read ``left``, ``right``, ``largest`` or ``X,Y``, also with ``@T``; ValueError if not."""
         which, at, time = text.partition("@")
-        values, place = [], (0.0, 0.0)
+        place = (0.0, 0.0)
         try:
-            values = [float(time)] if at else []
+            time_s = float(time) if at else None
             if which not in ("left", "right", "largest"):
                 column, row = map(float, which.split(","))
-                values, which, place = [*values, column, row], "place", (column, row)
+                which, place = "place", (column, row)
         except ValueError:
-            values = [np.nan]
-        if not all(map(isfinite, values)):
+            time_s = nan
+        if not (all(map(isfinite, place)) and 0.0 <= (time_s or 0.0) < inf):
             raise ValueError(
                 "expected left, right, largest, or X,Y: column and row of the person, also with "
                 f"@T for the second T, such as left@12.5, got {text!r}"
             )
-        return cls(which, place, float(time) if at else None)
+        return cls(which, place, time_s)
 
     def scaled(self, across: float, down: float) -> PersonChoice:
         """Return the choice in an image whose sides are ``across`` and ``down`` times as long."""
@@ -100,7 +100,7 @@ class Chosen:
         name = f"the {self._choice.which} one"
         if self._choice.which == "place":
             is_there = self._fit == 0.0
-            name = f"{'the one at' if is_there else 'nobody is there, so the one nearest to'}"
+            name = "the one at" if is_there else "nobody is there, so the one nearest to"
             name += f" column {column:g} and row {row:g}"
         return f"person: {name}, of {self._count} at {self._time_s:.1f} s"
 

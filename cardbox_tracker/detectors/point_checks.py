@@ -42,7 +42,7 @@ def check_point(point: NamedPoint, size: Size | None) -> None:
 
 
 def person_of(points: Iterable[NamedPoint], size: Size | None) -> ImagePoints:
-    """Return the person of some points, which are checked; those of the score 0 are missing."""
+    """Return the person of some points, which are checked; one of a score up to 0 is missing."""
     found = {}
     for point in points:
         check_point(point, size)

@@ -291,10 +291,11 @@ def _alone(first: Film, film: Film, tall_m: Sequence[float]) -> _Alone:
             if cost < least:
                 best, least = _Alone(values[:_OF_CAMERA], limits, who, is_clear), cost
     if best is None:
+        given = "give --offset if it is known" if film.offset_s is None else "check --offset"
         raise CameraError(
             f"{film.name} and {first.name} do not show the same people at one time, or not for "
             f"long enough: expected films of one scene that overlap by {LEAST_IMAGES} images with "
-            "a person in both; give --offset if it is known, or track each film alone"
+            f"a person in both; {given}, or track each film alone"
         )
     return best
 

@@ -11,7 +11,7 @@ import warnings
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from io import BytesIO
-from math import atan, degrees, hypot, radians, tan
+from math import atan, degrees, hypot, radians, sin, tan
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -62,12 +62,6 @@ def told_focal(path: Path) -> LensCue | None:
         # who decode it say so.
         return None
     return found if found is not None and _SHORTEST_MM <= found.focal <= _LONGEST_MM else None
-
-
-def equivalent_mm(path: Path) -> float | None:
-    """Return the 35 mm equivalent focal length of a film or an image, mm; None if it is unknown."""
-    told = told_focal(path)
-    return None if told is None else told.focal
 
 
 def _of_image(path: Path) -> LensCue | None:
@@ -170,6 +164,11 @@ class GivenCamera:
         if self.roll_rad is not None or not roll_rad:
             return self
         return replace(self, roll_rad=-roll_rad if self.is_mirrored else roll_rad)
+
+    def seeing(self, fov_rad: float, stddev_rad: float) -> GivenCamera:
+        """Return this camera with a field of view across the image that was found."""
+        # The focal length goes with the cotangent of half of it.
+        return replace(self, fov_deg=degrees(fov_rad), focal_stddev=stddev_rad / sin(fov_rad))
 
     def check(self) -> None:
         """Raise CameraError if the calibration is unreadable or the field of view impossible."""

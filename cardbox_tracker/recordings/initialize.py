@@ -5,6 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from functools import partial
 
+import numpy as np
+from numpy.typing import NDArray
+
 from cardbox_tracker.camera.camera import Camera
 from cardbox_tracker.camera.depth_image import median_depth
 from cardbox_tracker.common.errors import CardboxError
@@ -45,12 +48,7 @@ def initialize_from_recording(
     if a span has no image, and InitializationError if the references are unusable or show other
     postures, or the model does not fit them.
     """
-    references, images = {}, {}
-    for name, span in spans.items():
-        frames = _held(source, span, name, choice)
-        references[name] = average_silhouette([frame.silhouette for frame in frames])
-        every = -(-len(frames) // _MOST_IMAGES)
-        images[name] = [frame.image for frame in frames[::every]]
+    references, images = _references(source, spans, choice)
     return initialize_body(references, source.camera, config, progress, images)
 
 
@@ -80,11 +78,26 @@ def initialize_at_scale(
         shown = {name: average_silhouette([f.silhouette for f in held[name]]) for name in held}
         scale = partial(measured_scale, other=recording.others[0], references=shown)
 
-    def measure(at: InitializationConfig, is_last: bool) -> InitializationResult:
-        show = progress if is_last else None
-        return initialize_from_recording(recording.first, spans, at, show, choice)
+    references, images = _references(recording.first, spans, choice)
+    camera = recording.first.camera
 
-    return measured_at_scale(measure, config, recording.first.camera, scale)
+    def measure(at: InitializationConfig, is_last: bool) -> InitializationResult:
+        return initialize_body(references, camera, at, progress if is_last else None, images)
+
+    return measured_at_scale(measure, config, camera, scale)
+
+
+def _references(
+    source: SilhouetteSource, spans: Mapping[str, TimeSpan], choice: PersonChoice | None
+) -> tuple[dict[str, NDArray[np.uint8]], dict[str, list[NDArray[np.uint8]]]]:
+    """Return the silhouette of each reference, and some of its images."""
+    references, images = {}, {}
+    for name, span in spans.items():
+        frames = _held(source, span, name, choice)
+        references[name] = average_silhouette([frame.silhouette for frame in frames])
+        every = -(-len(frames) // _MOST_IMAGES)
+        images[name] = [frame.image for frame in frames[::every]]
+    return references, images
 
 
 def _held(

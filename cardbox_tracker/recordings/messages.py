@@ -25,7 +25,7 @@ _DELETE_ALL = 3
 
 def pose_message(new: New, header: Any, found: Pose) -> Any:
     """Return the PoseStamped of a pose; raise as :func:`message_of`."""
-    # Without this, commands start faster.
+    # Slow to import.
     from scipy.spatial.transform import Rotation
 
     x, y, z, w = Rotation.from_matrix(finite(found.turn, "rotation")).as_quat().tolist()

@@ -10,7 +10,7 @@ from pathlib import Path
 from cardbox_tracker.common.errors import BagError, CardboxError, in_cell
 from cardbox_tracker.recordings.bag_files import FILE_ENDINGS, files_of_one, is_bag_file
 from cardbox_tracker.recordings.bag_reader import REPAIR_ROS1, BagReader
-from cardbox_tracker.recordings.given_camera import GivenCamera, equivalent_mm
+from cardbox_tracker.recordings.given_camera import GivenCamera, told_focal
 from cardbox_tracker.recordings.image_folder import SUFFIXES, ImageFolder, image_files
 from cardbox_tracker.recordings.video_reader import FORMATS, VideoReader
 from cardbox_tracker.recordings.video_reader import SUFFIXES as VIDEO_SUFFIXES
@@ -54,7 +54,7 @@ def tells_lens(path: Path) -> bool:
     """Return whether a recording may tell its camera: a bag, or a film with a focal length."""
     if not is_film(path):
         return True
-    return equivalent_mm(image_files(path)[0] if path.is_dir() else path) is not None
+    return told_focal(image_files(path)[0] if path.is_dir() else path) is not None
 
 
 def _check_packed(path: Path) -> None:

@@ -123,7 +123,6 @@ class SilhouetteSource:
         topic: name of the images.
         frame_id: name of the camera's optical frame.
         camera: camera of the frames at the working resolution.
-        lens_by: what tells its field of view, in words; empty if a person or nothing does.
         depth_topic: topic of the depth images that cut out the silhouettes; None if a background
             model does.
         has_points: whether the frames can have points of the person.
@@ -193,7 +192,7 @@ class SilhouetteSource:
         self.topic = bag.image_topic(camera)
         calibration = bag.calibration(camera)
         self._pipeline = SilhouettePipeline(calibration, size, config, learning)
-        self.frame_id, self.lens_by = calibration.frame_id, calibration.told_by
+        self.frame_id = calibration.frame_id
         if self.frame_id == OPTICAL_FRAME:
             # A CameraInfo without a name is of the images' frame.
             found = next((image.frame_id for image in bag.images(self.topic)), "")

@@ -46,8 +46,8 @@ class VideoReader(Film):
     """Context of an open video; its times count from its first image.
 
     Images are turned and mirrored as the file asks for, as those of a phone that was held upright,
-    and of several streams they are the one that players choose. Methods
-    raise BagError if the video cannot be read. The duration is the one that the file states.
+    and of several streams they are of the one that players choose. Methods raise BagError if the
+    video cannot be read. The duration is the one that the file states.
     """
 
     _damaged, _stated_s, _end = 0, 0.0, ""
@@ -147,7 +147,8 @@ def _opened(path: Path, stream: int) -> Iterator[tuple[cv2.VideoCapture, Next]]:
             )
         # OpenCV turns images, and does not mirror them.
         is_own = stream > 0 or np.linalg.det(matrix) < 0
-        capture.set(cv2.CAP_PROP_ORIENTATION_AUTO, 0 if is_own else 1)
+        if not stream:
+            capture.set(cv2.CAP_PROP_ORIENTATION_AUTO, 0 if is_own else 1)
         yield capture, partial(_next, capture, matrix if is_own else None)
     finally:
         capture.release()
@@ -182,9 +183,6 @@ class _Stream:
 
     def isOpened(self) -> bool:
         return True
-
-    def set(self, name: int, value: float) -> None:
-        pass
 
     def get(self, name: int) -> float:
         stream, shape = self._stream, self._stream.sample_aspect_ratio or Fraction(1)

@@ -254,6 +254,7 @@ def test_the_body_that_exists_is_kept(
         (("--stature", 1.7, "--fov", 60, "--camera-pitch-deg", 95), "camera_pitch_rad is"),
         (("--stature", 1.7, "--fov", 60, "--depth", "/d", "--cameras", "a"), "a rosbag2, which"),
         (("--stature", 1.7, "--fov", 60, "--cameras", "a"), "omit --cameras"),
+        (("--stature", 1.7, "--fov", 60, "--blur"), "--blur has no effect without pictures"),
     ],
 )
 def test_mistakes_with_a_film(

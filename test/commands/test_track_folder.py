@@ -237,6 +237,7 @@ def test_changes_are_done_again(track: Callable, tmp_path: Path) -> None:
     assert track("--effort=2") == ["a", "b", "c"]
     assert (out / "a.csv").read_text() == "a with effort 2.0"
     assert track("--effort=2", "--formats", "csv", "mp4") == ["a", "b", "c"]
+    assert track("--effort=2", "--formats", "csv", "mp4", "--blur") == ["a", "b", "c"]
     assert track() == ["a", "b", "c"]
     assert results(out).keys() == files_of("abc")
     (films / "b.mp4").write_text("longer")

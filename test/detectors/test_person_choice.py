@@ -115,7 +115,8 @@ def test_a_place_is_one_of_the_camera_s_own_image() -> None:
 
 
 @pytest.mark.parametrize(
-    "text", ["middle", "", "1", "1,2,3", "nan,1", "1,inf", "LEFT", "left@", "left@x", "1,2@nan"]
+    "text",
+    ["middle", "", "1", "1,2,3", "nan,1", "1,inf", "LEFT", "left@", "left@x", "left@-3", "1,2@nan"],
 )
 def test_a_choice_that_is_none_is_refused(text: str) -> None:
     with pytest.raises(ValueError, match="expected left, right, largest, or X,Y"):

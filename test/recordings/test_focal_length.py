@@ -13,10 +13,15 @@ from PIL import Image
 
 from cardbox_tracker.camera.film_headers import shown_s
 from cardbox_tracker.common.errors import CameraError
-from cardbox_tracker.recordings.given_camera import GivenCamera, equivalent_mm, told_focal
+from cardbox_tracker.recordings.given_camera import GivenCamera, told_focal
 from cardbox_tracker.recordings.open_images import open_images, tells_lens
 
 KEYS = ("com.apple.quicktime.make", "com.apple.quicktime.camera.focal_length.35mm_equivalent")
+
+
+def equivalent_mm(path: Path) -> float | None:
+    told = told_focal(path)
+    return None if told is None else told.focal
 
 
 def box(kind: str, content: bytes) -> bytes:

@@ -241,7 +241,9 @@ def test_films_are_one_recording_whose_images_are_detected_once(
     ("options", "fault"),
     [
         ({"fov_deg": (60.0, 43.0, 40.0)}, r"--fov has 3 values.*one for each film"),
+        ({"fov_deg": (60.0, 400.0)}, r"the field of view is 400 degrees"),
         ({"offset_s": (0.1, 0.2)}, r"--offset has 2 values"),
+        ({"offset_s": (float("nan"),)}, r"--offset: expected seconds"),
         ({"cameras": ("cam0", "cam1")}, r"--cameras.*several films"),
         ({"camera_roll_deg": 90.0}, r"--camera-roll-deg.*several films"),
         ({"films": ("missing.mp4",)}, r"no recording missing\.mp4"),
