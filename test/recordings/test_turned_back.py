@@ -16,7 +16,6 @@ from cardbox_tracker.camera.camera import Camera
 from cardbox_tracker.detectors.detector import Detector
 from cardbox_tracker.detectors.own_network import OwnModel
 from cardbox_tracker.detectors.person_choice import PersonChoice
-from cardbox_tracker.measuring.camera_turns import intrinsics
 from cardbox_tracker.recordings.given_camera import GivenCamera
 from cardbox_tracker.recordings.measured_scene import turns_in, watch
 from cardbox_tracker.recordings.recording import RecordingRequest
@@ -73,7 +72,7 @@ def shake(number: int) -> NDArray[np.float64]:
 def write_film(folder: Path, moves: bool) -> Path:
     """Write images of somebody whose arms rise before a wall."""
     folder.mkdir()
-    there, k = intrinsics(CAMERA), intrinsics(CAMERA)
+    there, k = CAMERA.k, CAMERA.k
     there[:2, 2] += 80, 60
     for number in range(IMAGES):
         shown = np.repeat(room()[..., None], 3, axis=2)
