@@ -122,6 +122,11 @@ class Camera:
             self.focal_stddev,
         )
 
+    @property
+    def k(self) -> FloatArray:
+        """The matrix (3, 3) of rays to pixels."""
+        return np.array([(self.fx, 0.0, self.cx), (0.0, self.fy, self.cy), (0.0, 0.0, 1.0)])
+
     def with_pitch(self, pitch_rad: float) -> Camera:
         """Return the same camera looking down by ``pitch_rad``."""
         return replace(self, pitch_rad=pitch_rad)
@@ -238,8 +243,7 @@ class Calibration:
     def stretched(self, across: float, down: float) -> Calibration:
         """Return the calibration of the same images, wider and higher by these factors."""
         full = self.camera(round(self.width * across), round(self.height * down))
-        k = np.array([(full.fx, 0.0, full.cx), (0.0, full.fy, full.cy), (0.0, 0.0, 1.0)])
-        return replace(self, width=full.width, height=full.height, k=k)
+        return replace(self, width=full.width, height=full.height, k=full.k)
 
     def working_size(self, most: tuple[int, int] = WORKING_SIZE) -> tuple[int, int]:
         """Return the size (width, height), px, at which images as they are sent are used.
@@ -300,13 +304,8 @@ class Calibration:
         if not self.is_distorted and np.array_equal(turn, np.eye(3)):
             return None
         sent = replace(self, roll_rad=0.0, is_mirrored=False)
-        level, k = (
-            np.array([(camera.fx, 0.0, camera.cx), (0.0, camera.fy, camera.cy), (0.0, 0.0, 1.0)])
-            for camera in (
-                self.camera(width, height),
-                sent.camera(*self.level_size(width, height)),
-            )
-        )
+        level = self.camera(width, height).k
+        k = sent.camera(*self.level_size(width, height)).k
         size = (width, height)
         if not self.is_distorted:
             maps = cv2.initUndistortRectifyMap(k, np.zeros(5), turn, level, size, cv2.CV_16SC2)

@@ -99,14 +99,18 @@ class Extrinsics:
 
     def difference(self, other: Extrinsics) -> tuple[float, float]:
         """Return the angle between the rotations, rad, and the distance of the centres, metres."""
-        turned = cv2.Rodrigues(self.rotation @ other.rotation.T)[0]
-        angle = float(np.linalg.norm(turned))
+        angle = angle_of(self.rotation @ other.rotation.T)
         return angle, float(np.linalg.norm(self.centre_m - other.centre_m))
 
     def __str__(self) -> str:
-        angle = np.degrees(np.linalg.norm(cv2.Rodrigues(self.rotation)[0]))
+        angle = np.degrees(angle_of(self.rotation))
         text = f"{np.linalg.norm(self.translation_m):.3f} m and {angle:.1f} degrees apart"
         return f"{text} ({self.source})" if self.source else text
+
+
+def angle_of(rotation: FloatArray) -> float:
+    """Return the angle of a rotation (3, 3), rad."""
+    return float(np.linalg.norm(cv2.Rodrigues(rotation)[0]))
 
 
 def meeting_m(others: Sequence[Extrinsics]) -> float | None:

@@ -90,9 +90,7 @@ def _images(
     recording: Path, show: Callable[[float], None] = lambda _: None
 ) -> Iterator[NDArray[np.uint8]]:
     """Yield grey images (H, W) from all of a recording."""
-    import cv2
-    import numpy as np
-
+    from cardbox_tracker.camera.encodings import brightness_of
     from cardbox_tracker.recordings.open_images import open_images
 
     with open_images(recording) as source:
@@ -102,9 +100,4 @@ def _images(
             if since_ns >= next_ns:
                 next_ns = since_ns + step_ns
                 show(min(1.0, since_ns / max(1.0, 1e9 * source.duration_s)))
-                sent = image.as_sent
-                yield (
-                    sent
-                    if sent.ndim == 2
-                    else np.asarray(cv2.cvtColor(sent, cv2.COLOR_BGR2GRAY), np.uint8)
-                )
+                yield brightness_of(image.as_sent)

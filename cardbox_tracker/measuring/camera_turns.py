@@ -18,6 +18,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cardbox_tracker.camera.camera import Camera
+from cardbox_tracker.camera.encodings import brightness_of
+from cardbox_tracker.camera.extrinsics import angle_of
 from cardbox_tracker.person.sizes import FloatArray
 
 Image = NDArray[np.uint8]
@@ -86,16 +88,6 @@ def follow_turns(frames: Iterable[tuple[int, Image, Image]], camera: Camera) -> 
     return CameraTurns(rotations, unknown, room.pixels[top:bottom, left:right], corner)
 
 
-def angle_of(turn: FloatArray) -> float:
-    """Return the angle of a rotation (3, 3), rad."""
-    return float(np.linalg.norm(cv2.Rodrigues(turn)[0]))
-
-
-def intrinsics(camera: Camera) -> FloatArray:
-    """Return the matrix K (3, 3) of a camera."""
-    return np.array([(camera.fx, 0.0, camera.cx), (0.0, camera.fy, camera.cy), (0.0, 0.0, 1.0)])
-
-
 class _Map:
     """The background in the image plane of the first image.
 
@@ -110,9 +102,9 @@ class _Map:
         side = max(camera.width, camera.height)
         most = _MOST_SIDES * side / 2
         across, down = (round(min(_MOST_TANGENT * f, most)) for f in (camera.fx, camera.fy))
-        self._camera, self._k, self._side = camera, intrinsics(camera), side
+        self._camera, self._side = camera, side
         self.origin = across - round(camera.cx), down - round(camera.cy)
-        self._there = self._k.copy()
+        self._there = camera.k
         self._there[:2, 2] += self.origin
         self._seen = np.zeros((2 * down, 2 * across), np.uint8)
         self.pixels = self._seen
@@ -130,8 +122,8 @@ class _Map:
         border = reach // 4
         inside = np.zeros_like(free)
         inside[border:-border, border:-border] = free[border:-border, border:-border]
-        grey = image if image.ndim == 2 else cv2.cvtColor(image, cv2.COLOR_BGR2GRAY)
-        blurred = [_blurred(np.asarray(grey), free, blur * self._side) for blur in _BLURS]
+        grey = brightness_of(image)
+        blurred = [_blurred(grey, free, blur * self._side) for blur in _BLURS]
         is_first = self.pixels is self._seen
         back: FloatArray | None = self._back if is_first else self._placed(blurred, inside)
         box = None if back is None else self._box(back)
@@ -158,7 +150,7 @@ class _Map:
             self.pixels = np.zeros((*self._seen.shape, *image.shape[2:]), np.uint8)
         left, top, right, bottom = box
         to_box = np.array([(1.0, 0.0, -left), (0.0, 1.0, -top), (0.0, 0.0, 1.0)])
-        matrix = to_box @ self._there @ self._back @ np.linalg.inv(self._k)
+        matrix = to_box @ self._there @ self._back @ np.linalg.inv(self._camera.k)
         window, size = (slice(top, bottom), slice(left, right)), (right - left, bottom - top)
         back = cv2.WARP_INVERSE_MAP | cv2.INTER_NEAREST
         known = cv2.warpPerspective(self._seen[window], matrix, free.shape[::-1], flags=back)
@@ -172,11 +164,13 @@ class _Map:
         self._slopes = np.concatenate([self._slopes, slope[rows, columns]])
         added = np.array([level[rows, columns] for level in blurred])
         self._values = np.concatenate([self._values, added], axis=1)
-        shows = (one.astype(np.uint8) for one in (free, inside))
-        shown, sought = (cv2.warpPerspective(255 * one, matrix, size) == 255 for one in shows)
-        fill = np.asarray(shown) & (self._seen[window] == 0)
+        shown, sought = (
+            np.asarray(cv2.warpPerspective(255 * one.astype(np.uint8), matrix, size) == 255)
+            for one in (free, inside)
+        )
+        fill = shown & (self._seen[window] == 0)
         self._seen[window][fill] = _SHOWN
-        self._seen[window][np.asarray(sought)] = _SOUGHT
+        self._seen[window][sought] = _SOUGHT
         self.pixels[window][fill] = np.asarray(cv2.warpPerspective(image, matrix, size))[fill]
 
     def _placed(

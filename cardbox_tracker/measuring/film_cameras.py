@@ -17,7 +17,6 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from functools import cached_property
 from typing import NamedTuple
 
 import cv2
@@ -28,10 +27,15 @@ from scipy.optimize import linear_sum_assignment
 from scipy.signal import correlate
 
 from cardbox_tracker.camera.camera import Camera
-from cardbox_tracker.camera.extrinsics import Extrinsics
+from cardbox_tracker.camera.extrinsics import Extrinsics, angle_of
 from cardbox_tracker.common.errors import CameraError
-from cardbox_tracker.common.least_squares import Residuals, Solution, minimize, rules_of
-from cardbox_tracker.detectors.image_points import LEG_POINT_NAMES, POINT_NAMES, ImagePoints
+from cardbox_tracker.common.least_squares import DIFFERENCE, Residuals, Solution, minimize, rules_of
+from cardbox_tracker.detectors.image_points import (
+    LEG_POINT_NAMES,
+    POINT_NAMES,
+    ImagePoints,
+    LegPoints,
+)
 from cardbox_tracker.measuring.people_camera import Sightings, is_inside
 from cardbox_tracker.person.proportions import MARKED_HEIGHTS, USUAL_STATURE_M
 from cardbox_tracker.person.sizes import FloatArray
@@ -79,7 +83,7 @@ _ROBUST = 2.0
 _FAR_SIDE_M = 0.25
 # Yaws beside that of the points in space from which fits start, rad.
 _STARTS = np.radians((0.0, -25.0, 25.0))
-_ROUNDS, _STEP, _LEAST_GAIN, _NEAREST_M = 25, 1e-5, 1e-5, 0.05
+_ROUNDS, _LEAST_GAIN, _NEAREST_M = 25, 1e-5, 0.05
 _OF_CAMERA, _TURN, _MOVE, _OFFSET = 7, slice(0, 3), slice(3, 6), 6
 # Deviation of what is given.
 _GIVEN = 1e-4
@@ -89,7 +93,7 @@ class Seen:
     """One person in a film.
 
     Attributes:
-        times_s: times of the n images, (n,).
+        times_s: times of the n images, at least 2, (n,).
         rays: of the points, (n, 25, 2), at the depth 1; 0 if unknown.
         sure: how sure each point is, (n, 25), 0 to 1; 0 if unknown.
         spatial_m: the points in space as the detector estimates them, (n, 25, 3), or nan.
@@ -106,7 +110,7 @@ class Seen:
         behind_m = self.spatial_m[..., 2] - self.spatial_m[:, _OTHER_SIDE, 2]
         hidden = np.clip(np.nan_to_num(behind_m) / _FAR_SIDE_M, 0.0, 1.0)
         self.sure = known / (1.0 + (_HIDDEN - 1.0) * hidden)
-        self.period_s = float(np.median(np.diff(self.times_s))) if len(rows) > 1 else math.inf
+        self.period_s = float(np.median(np.diff(self.times_s)))
 
     def at(self, times_s: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return rays (m, 25, 2) at m times, between images, and how sure they are, (m, 25)."""
@@ -137,18 +141,14 @@ class Seen:
 
 def _all_points(points: ImagePoints) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Return pixels (25, 2), scores (25,) and places (25, 3) of body and legs."""
-    count, legs = len(LEG_POINT_NAMES), points.legs
-    body_m = np.full((len(POINT_NAMES), 3), np.nan)
-    body_m = body_m if points.spatial_m is None else points.spatial_m
-    legs_px, scores, legs_m = np.full((count, 2), np.nan), np.zeros(count), None
-    if legs is not None:
-        legs_px, scores, legs_m = legs
-    legs_m = np.full((count, 3), np.nan) if legs_m is None else legs_m
-    return (
-        np.vstack([points.px, legs_px]),
-        np.append(points.scores, scores),
-        np.vstack([body_m, legs_m]),
-    )
+    count = len(LEG_POINT_NAMES)
+    legs = points.legs or LegPoints(np.full((count, 2), np.nan), np.zeros(count))
+    places = [
+        np.full((len(one.px), 3), np.nan) if one.spatial_m is None else one.spatial_m
+        for one in (points, legs)
+    ]
+    scores = np.append(points.scores, legs.scores)
+    return np.vstack([points.px, legs.px]), scores, np.vstack(places)
 
 
 class Film(NamedTuple):
@@ -171,7 +171,6 @@ class FilmCamera:
         turn_stddev_rad: standard deviation of the rotation about any axis.
         place_stddev_m: standard deviation of the place, along the axis where it is largest.
         halves: angle, rad, and distance, m, between the poses by the two halves of the time.
-        is_doubtful: whether these differ by more than the deviations tell.
         is_clear: whether the offset is given, or surely none of chance.
     """
 
@@ -181,19 +180,25 @@ class FilmCamera:
     turn_stddev_rad: float
     place_stddev_m: float
     halves: tuple[float, float]
-    is_doubtful: bool
     is_clear: bool
+
+    @property
+    def is_doubtful(self) -> bool:
+        """Whether the two halves differ by more than the deviations tell."""
+        # Each half has twice the variance, and so has a difference.
+        angle_rad, away_m = self.halves
+        return angle_rad > 6.0 * self.turn_stddev_rad or away_m > 6.0 * self.place_stddev_m
 
     def __str__(self) -> str:
         turn_deg, place_m = math.degrees(self.turn_stddev_rad), self.place_stddev_m
         angle_rad, away_m = self.halves
         distance_m = float(np.linalg.norm(self.extrinsics.centre_m))
-        rotation = cv2.Rodrigues(self.extrinsics.rotation)[0]
+        turned_deg = math.degrees(angle_of(self.extrinsics.rotation))
         return (
             f"begins at {self.offset_s:.3f} +- {self.offset_stddev_s:.3f} s, stands "
             f"{distance_m:.2f} +- {place_m:.2f} m away and is turned by "
-            f"{math.degrees(float(np.linalg.norm(rotation))):.1f} +- {turn_deg:.1f} degrees; by "
-            f"two halves of the time {math.degrees(angle_rad):.1f} degrees and {away_m:.2f} m apart"
+            f"{turned_deg:.1f} +- {turn_deg:.1f} degrees; by two halves of the time "
+            f"{math.degrees(angle_rad):.1f} degrees and {away_m:.2f} m apart"
         )
 
 
@@ -212,9 +217,7 @@ def film_cameras(films: Sequence[Film], statures_m: Sequence[float]) -> list[Fil
     alone = [_alone(first, film, tall_m) for film in films[1:]]
     fixed = np.array([_is_given(film) for film in films[1:]])
     rows = np.array([one.unknowns for one in alone])
-    moments = _moments(
-        films, [one.who for one in alone], [0.0, *rows[:, _OFFSET]], tall_m, _MOST_IMAGES
-    )
+    moments = _moments(films, [one.who for one in alone], rows[:, _OFFSET], tall_m, _MOST_IMAGES)
     fit = _Fit(moments, fixed, np.array([one.offsets_s for one in alone]).T)
     whole, solution = fit.run(rows.ravel(), _POINT)
     covariance = np.linalg.inv(solution.information[0])
@@ -245,20 +248,16 @@ def _camera(
 ) -> FilmCamera:
     """Return a film's camera by its unknowns (7,) of the whole time and of both halves."""
     poses = [Extrinsics.of_vectors(row[_TURN], row[_MOVE], name) for row in rows]
-    halves = poses[1].difference(poses[2])
     turn, place = (
         math.sqrt(float(np.linalg.eigvalsh(covariance[at, at])[-1])) for at in (_TURN, _MOVE)
     )
-    # Each half has twice the variance, and so has a difference.
-    is_doubtful = halves[0] > 6.0 * turn or halves[1] > 6.0 * place
     return FilmCamera(
         poses[0],
         float(rows[0][_OFFSET]),
         math.sqrt(float(covariance[_OFFSET, _OFFSET])),
         turn,
         place,
-        halves,
-        is_doubtful,
+        poses[1].difference(poses[2]),
         is_clear,
     )
 
@@ -282,7 +281,7 @@ class _Alone(NamedTuple):
 def _alone(first: Film, film: Film, tall_m: Sequence[float]) -> _Alone:
     best, least = None, math.inf
     for offset_s, within_s, who, is_clear in _offsets(first, film):
-        moments = _moments((first, film), (who,), (0.0, offset_s), tall_m, _COARSE_IMAGES)
+        moments = _moments((first, film), (who,), (offset_s,), tall_m, _COARSE_IMAGES)
         limits = offset_s - within_s, offset_s + within_s
         fit = _Fit(moments, _is_given(film)[None], np.array(limits)[:, None])
         for start in _starts(first, film, who, offset_s, tall_m):
@@ -332,13 +331,12 @@ def _lags(one: Seen, other: Seen, step_s: float) -> tuple[FloatArray, FloatArray
 
 def _offsets(first: Film, film: Film) -> Iterator[tuple[float, float, Who, bool]]:
     """Yield likely offsets of a film, s, to half an image, s, and who is who."""
-    everybody = [one for one in (*first.people, *film.people) if len(one.times_s) > 2]
-    step_s = max((one.period_s for one in everybody), default=1.0) / 2.0
+    periods_s = [one.period_s for one in (*first.people, *film.people)]
+    step_s = max(periods_s, default=1.0) / 2.0
     curves = {
         (a, b): _lags(one, other, step_s)
         for a, one in enumerate(first.people)
         for b, other in enumerate(film.people)
-        if min(len(one.times_s), len(other.times_s)) > 2
     }
     tried = [] if film.offset_s is None else [film.offset_s]
     for lags, sure in curves.values() if film.offset_s is None else ():
@@ -370,7 +368,7 @@ def _starts(
         turn = cv2.Rodrigues(film.extrinsics.rotation)[0][:, 0]
         yield np.array([*turn, *film.extrinsics.translation_m, offset_s])
         return
-    ours, theirs, places = list[FloatArray](), list[FloatArray](), list[list[FloatArray]]()
+    centred, places = list[list[FloatArray]](), list[list[FloatArray]]()
     for number, other in enumerate(who):
         if other is None:
             continue
@@ -385,12 +383,11 @@ def _starts(
                     (seen.spatial_m[k][both], seen.rays[k][both])
                     for seen, k in ((one, at), (two, near))
                 ]
-                ours.append(pair[0][0] - pair[0][0].mean(axis=0))
-                theirs.append(pair[1][0] - pair[1][0].mean(axis=0))
+                centred.append([spatial_m - spatial_m.mean(axis=0) for spatial_m, _ in pair])
                 places.append([_place(*each) * tall_m[number] / USUAL_STATURE_M for each in pair])
-    if not ours:
+    if not centred:
         return
-    a, b = np.concatenate(ours), np.concatenate(theirs)
+    a, b = np.concatenate(centred, axis=1)
     weights, turn = np.ones(len(a)), np.eye(3)
     for _ in range(10):
         u, _, v = np.linalg.svd((b * weights[:, None]).T @ a)
@@ -433,21 +430,21 @@ def _moments(
     tall_m: Sequence[float],
     most: int,
 ) -> list[_Moments]:
-    """Return images of the people who are in at least two films."""
+    """Return images of the people who are in at least two films.
+
+    ``who`` and ``offsets_s`` are of all films but the first.
+    """
     found = []
     for number, one in enumerate(films[0].people):
-        others = [same[number] for same in who]
-        seen = [one] + [
-            None if k is None else film.people[k] for k, film in zip(others, films[1:], strict=True)
-        ]
-        spans = [
-            (each.times_s[0] + offset_s, each.times_s[-1] + offset_s)
-            for each, offset_s in zip(seen[1:], offsets_s[1:], strict=True)
-            if each is not None
-        ]
+        seen: list[Seen | None] = [one]
         is_shared = np.zeros(len(one.times_s), np.bool_)
-        for begin_s, end_s in spans:
-            is_shared |= (one.times_s >= begin_s) & (one.times_s <= end_s)
+        for film, same, offset_s in zip(films[1:], who, offsets_s, strict=True):
+            other = same[number]
+            each = None if other is None else film.people[other]
+            seen.append(each)
+            if each is not None:
+                begin_s, end_s = each.times_s[[0, -1]] + offset_s
+                is_shared |= (one.times_s >= begin_s) & (one.times_s <= end_s)
         times_s = one.times_s[is_shared]
         if len(times_s) > 1:
             chosen = np.unique(np.linspace(0, len(times_s) - 1, most).astype(int))
@@ -466,8 +463,8 @@ def _bones() -> Iterator[tuple[int, int, int]]:
         yield _NAMES.index(f"left_{name}"), _NAMES.index(f"right_{name}"), number
 
 
-_ENDS, _LENGTHS = np.split(np.array(list(_bones())), [2], axis=1)
-_LENGTHS = _LENGTHS[:, 0]
+_BONES = np.array(list(_bones()))
+_ENDS, _LENGTHS = _BONES[:, :2], _BONES[:, 2]
 
 
 class _Points(NamedTuple):
@@ -512,19 +509,14 @@ class _Fit:
             parts.append(one._replace(times_s=half))
         return _Fit(parts, self._fixed, self._offsets_s)
 
-    @cached_property
-    def _mean(self) -> FloatArray:
-        lengths = [np.log(one.stature_m * _PRIORS[:, 0]) for one in self._moments]
-        return np.concatenate([np.zeros(self._fixed.size), *lengths])
-
     def run(self, start: FloatArray, point: float) -> tuple[FloatArray, Solution]:
         """Return the unknowns with the least cost near those of the films, or near all, (n,).
 
         ``point`` is the deviation of a point, statures.
         """
-        values = self._mean.copy()
-        values[: len(start)] = start
-        mean = np.append(values[: self._fixed.size], self._mean[self._fixed.size :])
+        lengths = [np.log(one.stature_m * _PRIORS[:, 0]) for one in self._moments]
+        mean = np.concatenate([start[: self._fixed.size], *lengths])
+        values = np.append(start, mean[len(start) :])
         given = np.where(self._fixed, _GIVEN**-2.0, 0.0).ravel()
         inverse = np.append(given, np.tile(_PRIORS[:, 1] ** -2.0, len(self._moments)))
         self._point = point
@@ -548,7 +540,7 @@ class _Fit:
         shape = len(one.times_s), len(_NAMES)
         rays, sure = np.zeros((len(films), *shape, 2)), np.zeros((len(films), *shape))
         for number, (seen, film) in enumerate(zip(one.seen, films, strict=True)):
-            if seen is not None and len(seen.times_s) > 1:
+            if seen is not None:
                 rays[number], sure[number] = seen.at(one.times_s - film[_OFFSET])
         sure *= (sure > 0.0).sum(axis=0) > 1
         ahead = np.concatenate([rays, np.ones((*rays.shape[:-1], 1))], axis=-1)
@@ -609,12 +601,13 @@ class _Fit:
         jacobian = np.zeros((len(errors), len(unknowns)))
         for number in range(self._fixed.size):
             moved = unknowns.copy()
-            moved[number] += _STEP
-            jacobian[:, number] = (self._errors(moved)[0] - errors) / _STEP
+            moved[number] += DIFFERENCE
+            jacobian[:, number] = (self._errors(moved)[0] - errors) / DIFFERENCE
         # Each bone depends on one length alone.
-        moved = unknowns + _STEP * (np.arange(len(unknowns)) >= self._fixed.size)
+        moved = unknowns.copy()
+        moved[self._fixed.size :] += DIFFERENCE
         rows = np.flatnonzero(lengths >= 0)
-        jacobian[rows, lengths[rows]] = (self._errors(moved)[0] - errors)[rows] / _STEP
+        jacobian[rows, lengths[rows]] = (self._errors(moved)[0] - errors)[rows] / DIFFERENCE
         bounded = 1.0 + (errors / _ROBUST) ** 2
         costs = np.array([(weights * errors**2 / bounded).sum()])
         roots = np.sqrt(weights) / bounded

@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cardbox_tracker.camera.camera import Camera
+from cardbox_tracker.camera.encodings import brightness_of
 from cardbox_tracker.detectors.image_points import ImagePoints
 from cardbox_tracker.measuring.people_camera import (
     DISTANCE_STDDEV,
@@ -264,10 +265,7 @@ def camera_moves(people: Sequence[Sightings], pictures: Sequence[Picture], camer
     shifted = pairs = 0
     sights = [sight for person in people for sight in person]
     for (time_s, before), (_, after) in pairwise(pictures):
-        greys = [
-            one if one.ndim == 2 else cv2.cvtColor(one, cv2.COLOR_BGR2GRAY)
-            for one in (before, after)
-        ]
+        greys = brightness_of(before), brightness_of(after)
         height, width = greys[0].shape
         free = np.full((height, width), 255, np.uint8)
         for seen_s, points in sights:

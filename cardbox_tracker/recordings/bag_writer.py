@@ -179,7 +179,7 @@ class BagWriter:
 
     def write_camera_info(self, topic: str, stamp_ns: int, frame_id: str, camera: Camera) -> None:
         """Write an ideal camera as a CameraInfo without distortion."""
-        k = np.array([camera.fx, 0, camera.cx, 0, camera.fy, camera.cy, 0, 0, 1], np.float64)
+        k = camera.k.ravel()
         self.write_stamped(
             *(topic, "sensor_msgs/msg/CameraInfo", stamp_ns, frame_id),
             height=camera.height,

@@ -13,6 +13,7 @@ from typing import TypeVar
 import cv2
 import numpy as np
 
+from cardbox_tracker.camera.encodings import brightness_of
 from cardbox_tracker.terms.term import Image
 
 T = TypeVar("T")
@@ -48,8 +49,8 @@ def with_cuts(items: Iterable[T], image_of: Callable[[T], Image]) -> Iterator[tu
 
 
 def _reduced(image: Image) -> Image:
-    grey = image if image.ndim == 2 else cv2.cvtColor(image, cv2.COLOR_BGR2GRAY)
-    return np.asarray(cv2.resize(grey, _SIZE, interpolation=cv2.INTER_AREA), np.uint8)
+    reduced = cv2.resize(brightness_of(image), _SIZE, interpolation=cv2.INTER_AREA)
+    return np.asarray(reduced, np.uint8)
 
 
 def _is_other(one: Image, other: Image) -> bool:

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from cardbox_tracker.camera.camera import Calibration
 from cardbox_tracker.detectors.person_choice import PersonChoice
-from cardbox_tracker.measuring.camera_turns import CameraTurns, intrinsics
+from cardbox_tracker.measuring.camera_turns import CameraTurns
 from cardbox_tracker.person.sizes import FloatArray
 from cardbox_tracker.recordings.image_recording import RecordedImage
 from cardbox_tracker.recordings.open_images import ImageRecording
@@ -89,7 +89,7 @@ class TurnedBack:
         """
         now, lens = self._bag.calibration(camera), self._lens
         size = lens.level_size(lens.width, lens.height)
-        k = intrinsics(lens.camera(*size))
+        k = lens.camera(*size).k
         k[:2, 2] -= self._turned.corner_px(size)
         k[[0, 1], [0, 1]] *= now.k[0, 0] / lens.k[0, 0]
         roll_rad = now.roll_rad - lens.roll_rad
@@ -130,7 +130,7 @@ class TurnedBack:
 
     def _matrix(self, stamp_ns: int, size: Size) -> FloatArray:
         """Return the matrix (3, 3) from level to turned pixels of an image."""
-        k = intrinsics(self._lens.camera(*size))
+        k = self._lens.camera(*size).k
         there = k.copy()
         there[:2, 2] -= self._turned.corner_px(size)
         turn = self._turned.found.rotations.get(stamp_ns)

@@ -10,7 +10,8 @@ import pytest
 from numpy.typing import NDArray
 
 from cardbox_tracker.camera.camera import Camera
-from cardbox_tracker.measuring.camera_turns import CameraTurns, angle_of, follow_turns, intrinsics
+from cardbox_tracker.camera.extrinsics import angle_of
+from cardbox_tracker.measuring.camera_turns import CameraTurns, follow_turns
 
 FloatArray = NDArray[np.float64]
 
@@ -46,7 +47,7 @@ def film(
 
 
 def views(turns: Sequence[FloatArray]) -> list[FloatArray]:
-    return [intrinsics(CAMERA) @ turn @ np.linalg.inv(WALL) for turn in turns]
+    return [CAMERA.k @ turn @ np.linalg.inv(WALL) for turn in turns]
 
 
 def followed(turns: Sequence[FloatArray]) -> CameraTurns:
@@ -73,7 +74,7 @@ def test_the_rotation_of_each_image_is_found(motion: str) -> None:
 
 def test_the_background_continues_the_first_image_without_the_person() -> None:
     found = followed([turned((0.0, 30 * time_s, 0.0)) for time_s in TIMES_S])
-    there = intrinsics(CAMERA)
+    there = CAMERA.k
     there[:2, 2] -= found.corner_px
     height, width = found.background.shape
     room = cv2.warpPerspective(wall(), there @ np.linalg.inv(WALL), (width, height))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -13,13 +14,16 @@ from numpy.typing import NDArray
 
 from cardbox_tracker import Request, track
 from cardbox_tracker.camera.camera import Camera
+from cardbox_tracker.commands import scene
+from cardbox_tracker.commands.tracking_request import PersonRequest
 from cardbox_tracker.detectors.detector import Detector
 from cardbox_tracker.detectors.own_network import OwnModel
 from cardbox_tracker.detectors.person_choice import PersonChoice
-from cardbox_tracker.measuring.camera_turns import intrinsics
+from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.recordings.given_camera import GivenCamera
-from cardbox_tracker.recordings.measured_scene import turns_in, watch
-from cardbox_tracker.recordings.recording import RecordingRequest
+from cardbox_tracker.recordings.measured_scene import Watched, turns_in, watch
+from cardbox_tracker.recordings.recording import Recording, RecordingRequest
+from cardbox_tracker.search.config import TrackerConfig
 
 CAMERA = Camera(320, 240, 280.0, 280.0, 159.5, 119.5)
 FOV_DEG = float(np.degrees(2 * np.arctan(160 / 280)))
@@ -73,7 +77,7 @@ def shake(number: int) -> NDArray[np.float64]:
 def write_film(folder: Path, moves: bool) -> Path:
     """Write images of somebody whose arms rise before a wall."""
     folder.mkdir()
-    there, k = intrinsics(CAMERA), intrinsics(CAMERA)
+    there, k = CAMERA.k, CAMERA.k
     there[:2, 2] += 80, 60
     for number in range(IMAGES):
         shown = np.repeat(room()[..., None], 3, axis=2)
@@ -129,6 +133,28 @@ def test_who_is_at_a_place_of_the_first_image_is_there_in_turned_ones(shaken: Pa
     assert np.array(turned.place) + found[0].found.corner_px == pytest.approx(
         (160.0, 120.0), abs=1.0
     )
+
+
+def test_the_place_is_of_the_first_image_also_if_turned_images_are_read_again(
+    shaken: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    choices = list[PersonChoice | None]()
+
+    def watched(source: Recording, start_s: float, end_s: float, choice: PersonChoice) -> Watched:
+        choices.append(choice)
+        return watch(source, start_s, end_s, choice)
+
+    monkeypatch.setattr(scene, "watch", watched)
+    # As if roll or field of view were found.
+    monkeypatch.setattr(scene, "_corrected", lambda recording, _: replace(recording))
+    finds = Detector(OwnModel.of(FindsDots, "FindsDots"), people=4)
+    asked = replace(request(shaken), silhouettes=finds, points=finds)
+    choice = PersonChoice("place", (160.0, 120.0))
+    person = PersonRequest(BodyModel(), None, 0.0, is_pitch_given=True, choice=choice)
+    with scene.measured_scene(asked, person, TrackerConfig(), 0) as (_, _, chosen):
+        assert chosen is not None
+    as_recorded, turned, again = choices
+    assert as_recorded == choice != turned == again
 
 
 def test_a_table_of_points_says_nothing_of_a_camera_that_moves(shaken: Path) -> None:

@@ -131,7 +131,7 @@ def camera_info_message(
     header: Header, camera: Camera, source: CameraInfo | None = None
 ) -> CameraInfo:
     """Return a pinhole camera's CameraInfo, with R and the baseline in P of ``source``."""
-    k = [camera.fx, 0.0, camera.cx, 0.0, camera.fy, camera.cy, 0.0, 0.0, 1.0]
+    k = camera.k.ravel().tolist()
     message = _info(header, camera.width, camera.height, "plumb_bob", [0.0] * 5, k)
     if source is not None:
         r, p = ([float(value) for value in values] for values in (source.r, source.p))
