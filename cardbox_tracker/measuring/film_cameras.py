@@ -217,7 +217,9 @@ def film_cameras(films: Sequence[Film], statures_m: Sequence[float]) -> list[Fil
     alone = [_alone(first, film, tall_m) for film in films[1:]]
     fixed = np.array([_is_given(film) for film in films[1:]])
     rows = np.array([one.unknowns for one in alone])
-    moments = _moments(films, [one.who for one in alone], rows[:, _OFFSET], tall_m, _MOST_IMAGES)
+    moments = _moments(
+        films, [one.who for one in alone], rows[:, _OFFSET].tolist(), tall_m, _MOST_IMAGES
+    )
     fit = _Fit(moments, fixed, np.array([one.offsets_s for one in alone]).T)
     whole, solution = fit.run(rows.ravel(), _POINT)
     covariance = np.linalg.inv(solution.information[0])
