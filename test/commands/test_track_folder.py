@@ -183,7 +183,7 @@ class Tracked:
     def __call__(self, request: TrackingRequest, show: Any) -> TrackSummary:
         name = request.recording.path.stem
         self.names.append(name)
-        for path in filter(None, request.files or ()):
+        for path in (one for one in request.files or () if isinstance(one, Path)):
             path.write_text(f"{name} with effort {request.config.whole_body.effort}")
         if name in self.errors:
             raise self.errors[name]
