@@ -322,3 +322,17 @@ def pseudo_huber(
     costs = 2.0 * scale**2 * (weight * (root - 1.0)).sum(axis=1)
     roots = np.sqrt(weight / root)
     return Residuals(roots * errors, roots[..., None] * jacobian, costs)
+
+
+def geman_mcclure(
+    errors: Floats, jacobian: Floats, scale: float, deviation: float, weight: float = 1.0
+) -> Residuals:
+    """Return residuals whose loss has a limit, and at ``scale`` a quarter of the weight of squares.
+
+    Errors (N, R), their Jacobian (N, R, n), ``scale`` and the ``deviation`` have one unit;
+    ``weight`` multiplies the loss.
+    """
+    share = 1.0 / (1.0 + (errors / scale) ** 2)
+    costs = weight * (share * (errors / deviation) ** 2).sum(axis=1)
+    roots = sqrt(weight) * share / deviation
+    return Residuals(roots * errors, roots[..., None] * jacobian, costs)

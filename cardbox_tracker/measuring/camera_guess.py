@@ -19,7 +19,7 @@ from cardbox_tracker.camera.camera import Camera
 from cardbox_tracker.camera.extrinsics import Extrinsics
 from cardbox_tracker.camera.view import OtherCamera, View
 from cardbox_tracker.common.errors import CameraError, InitializationError
-from cardbox_tracker.measuring.camera_pose import STEPS, PoseProblem, Sighting
+from cardbox_tracker.measuring.camera_pose import PoseProblem, Sighting
 from cardbox_tracker.measuring.references import COARSE_PX
 from cardbox_tracker.person.kinematics import pose
 from cardbox_tracker.person.model import BodyModel
@@ -71,11 +71,7 @@ def guessed_extrinsics(
     improved = []
     for guess in best:
         try:
-            problem = PoseProblem(body, first, other, guess, sightings)
-            found = guess
-            for _ in range(STEPS):
-                found, cost = problem.step(found)
-            improved.append((cost, found))
+            improved.append(PoseProblem(body, first, other, guess, sightings).solve())
         except (CameraError, np.linalg.LinAlgError):
             continue
     if not improved:
@@ -84,7 +80,7 @@ def guessed_extrinsics(
             "one person whom both cameras see from the hips to the head, in each posture; check "
             "the times, and look at both cameras' images"
         )
-    return min(improved, key=lambda one: one[0])[1]
+    return min(improved, key=lambda one: one[1])[0]
 
 
 def _best_guesses(

@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 from cardbox_tracker.camera.camera import Camera
 from cardbox_tracker.camera.extrinsics import Extrinsics
 from cardbox_tracker.common.health import Verdict
+from cardbox_tracker.common.least_squares import Residuals, geman_mcclure
 from cardbox_tracker.person.sizes import FloatArray
 from cardbox_tracker.terms.term import Silhouette
 
@@ -109,23 +110,13 @@ class TopTangents:
                 found[number] = (angles[0] - angles[1]) * across * self._other.fx
         return found
 
-    def equations(
-        self, extrinsics: Extrinsics, beside: list[tuple[Extrinsics, Extrinsics, float]]
-    ) -> tuple[FloatArray, FloatArray]:
-        """Return the normal equations, ``matrix`` @ change = -``right``, of a change of the pose.
-
-        ``beside`` has, for each number of the change, the pose with a larger and with a smaller
-        value, and the difference of the values.
-        """
-        now = self.heights(extrinsics)
-        slopes = np.array(
-            [(self.heights(more) - self.heights(less)) / step for more, less, step in beside]
+    def residuals(self, heights: FloatArray, slopes: FloatArray) -> Residuals:
+        """Return the residuals of :meth:`heights` (n,) with their derivatives (n, k)."""
+        known = np.isfinite(heights) & np.isfinite(slopes).all(axis=1)
+        weight = min(1.0, _COUNTED / max(1, int(np.count_nonzero(known))))
+        return geman_mcclure(
+            heights[known][None], slopes[known][None], _HALF_PX, _HEIGHT_PX, weight
         )
-        known = np.isfinite(now) & np.isfinite(slopes).all(axis=0)
-        now, slopes = now[known], slopes[:, known]
-        weights = (_HEIGHT_PX * (1.0 + (now / _HALF_PX) ** 2)) ** -2.0
-        weights *= min(1.0, _COUNTED / max(1, len(now)))
-        return (slopes * weights) @ slopes.T, (slopes * weights) @ now
 
 
 def roll_of(tangents: TopTangents, extrinsics: Extrinsics) -> tuple[float, float]:

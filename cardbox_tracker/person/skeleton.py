@@ -88,13 +88,6 @@ class Group(StrEnum):
 POSTURE_GROUPS = Group.TORSO, Group.ARM
 """Groups of a posture, d1..d12 (paper, equation (3))."""
 
-
-def published_groups(torso_place: bool, hands: bool) -> set[Group]:
-    """Return the groups of joint states: those of the posture, and more with ``torso_place``."""
-    groups = {*Group} - {Group.HAND} if torso_place else {*POSTURE_GROUPS}
-    return groups | ({Group.HAND} if hands else set())
-
-
 SHOULDER_RISE = 0.077
 """Rise of a shoulder joint per radian of elevation of its arm, in shoulder breadths."""
 RISE_FROM_RAD = math.radians(30.0)

@@ -57,7 +57,6 @@ from cardbox_tracker.person.skeleton import (
     SKELETON,
     Group,
     Joint,
-    published_groups,
 )
 
 Vector = tuple[float, float, float]
@@ -84,8 +83,8 @@ def urdf_from_body(
 
     The ``optical_frame``, if given, is added with the camera's pitch, so that markers and keypoints
     are in the same tree. With ``torso_place`` it has the joints beside the 12 of the posture, with
-    ``hands`` those of the hands; joint states must then contain them, or the transforms
-    beyond are missing. Legs have the mean lengths of people of that size.
+    ``hands`` those of the hands; joint states must then contain them, or the transforms beyond are
+    missing. Legs have the mean lengths of people of that size.
     """
     robot = _Robot("cardbox_person", ROOT_LINK)
     if optical_frame:
@@ -100,7 +99,8 @@ def urdf_from_body(
     if height_m is not None:
         robot.fix("camera_to_floor", ROOT_LINK, "floor", (0.0, 0.0, height_m), _ZERO)
     robot.fix("camera_to_hips", ROOT_LINK, "hips", hips_m, (0.0, 0.0, math.pi))
-    robot.add(body, SKELETON, published_groups(torso_place, hands), "hips")
+    moving = {*Group} - {Group.HAND} if torso_place else {*POSTURE_GROUPS}
+    robot.add(body, SKELETON, moving | ({Group.HAND} if hands else set()), "hips")
     parts = body_parts(body.sizes)
     robot.show("torso", "torso", parts.torso)
     lid = parts.torso.depth_m, parts.torso.top_width_m, PATCH_THICKNESS_M

@@ -26,7 +26,6 @@ from cardbox_tracker.person.skeleton import (
     STATE_NAMES,
     Group,
     KeypointState,
-    published_groups,
     rows_of,
 )
 from cardbox_tracker.recordings.markers import MarkerShape, marker_shapes
@@ -164,7 +163,8 @@ def joint_deviations(estimate: Estimate, torso_place: bool = True) -> JointValue
 @cache
 def _rows(has_hands: bool, torso_place: bool) -> NDArray[np.bool_]:
     """Return which joints of ``STATE`` are published, (n,)."""
-    groups = published_groups(torso_place, has_hands)
+    without = set() if has_hands else {Group.HAND}
+    groups = {*Group} - without if torso_place else {*POSTURE_GROUPS}
     return np.array([joint.group in groups for joint in STATE])
 
 

@@ -24,7 +24,7 @@ from cardbox_tracker.camera.extrinsics import Extrinsics
 from cardbox_tracker.camera.view import View
 from cardbox_tracker.common.errors import CameraError
 from cardbox_tracker.common.health import WATCHES, Verdict
-from cardbox_tracker.measuring.camera_pose import ROTATION, STEPS, PoseProblem, Sighting, turned_by
+from cardbox_tracker.measuring.camera_pose import ROTATION, PoseProblem, Sighting, turned_by
 from cardbox_tracker.measuring.silhouette_tangents import EVERY, PoseDirection, TopTangents, roll_of
 from cardbox_tracker.person.model import MEASURED, BodyModel
 from cardbox_tracker.person.posture import TORSO_X, TORSO_Y
@@ -203,12 +203,9 @@ class CameraAgreement:
 
     def _turn_of(self, other: _Compared) -> float:
         """Return pitch and yaw of a camera as one angle, degrees; inf if no pose fits."""
-        found, sightings = other.upright, list(other.kept)
+        given = self._body, self._first, other.view.camera, other.upright, list(other.kept)
         try:
-            given = self._body, self._first, other.view.camera, found, sightings
-            problem = PoseProblem(*given)
-            for _ in range(STEPS):
-                found, _ = problem.step(found, ROTATION)
+            found, _ = PoseProblem(*given).solve(ROTATION)
         except (CameraError, np.linalg.LinAlgError):
             return float("inf")
         return float(np.degrees(np.linalg.norm(turned_by(other.upright, found)[:2])))

@@ -17,7 +17,7 @@ from cardbox_tracker.camera.extrinsics import Extrinsics
 from cardbox_tracker.camera.view import OtherCamera
 from cardbox_tracker.common.errors import CameraError, InitializationError
 from cardbox_tracker.measuring.camera_guess import guessed_extrinsics, reference_states
-from cardbox_tracker.measuring.camera_pose import STEPS, PoseProblem, Sighting
+from cardbox_tracker.measuring.camera_pose import PoseProblem, Sighting
 from cardbox_tracker.measuring.silhouette_tangents import TopTangents
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.search.config import default_preset
@@ -141,7 +141,4 @@ def _improved(
     sightings: Sequence[Sighting],
     tangents: TopTangents,
 ) -> Extrinsics:
-    problem = PoseProblem(body, first, other, pose, sightings, tangents)
-    for _ in range(STEPS):
-        pose, _ = problem.step(pose)
-    return pose
+    return PoseProblem(body, first, other, pose, sightings, tangents).solve()[0]

@@ -11,7 +11,7 @@ from cardbox_tracker.camera.camera import Camera
 from cardbox_tracker.camera.extrinsics import Extrinsics
 from cardbox_tracker.camera.view import OtherCamera, View
 from cardbox_tracker.common.errors import InitializationError
-from cardbox_tracker.measuring import camera_guess
+from cardbox_tracker.measuring import camera_guess, camera_pose
 from cardbox_tracker.measuring.camera_guess import guessed_extrinsics, reference_states
 from cardbox_tracker.measuring.camera_pose import (
     ROTATION,
@@ -26,7 +26,7 @@ from cardbox_tracker.person.posture import reference_posture
 from cardbox_tracker.person.skeleton import KeypointState
 from cardbox_tracker.search.config import default_preset
 from cardbox_tracker.terms.term import Frame, Silhouette
-from cardbox_tracker.tracking import camera_agreement, camera_calibration
+from cardbox_tracker.tracking import camera_calibration
 from cardbox_tracker.tracking.camera_agreement import CameraAgreement
 from cardbox_tracker.tracking.camera_calibration import MovingFrame, calibrated_camera
 from cardbox_tracker.tracking.estimate import TRACKING, Estimate
@@ -52,7 +52,7 @@ TRUE = aside()
 @pytest.fixture
 def one_step(monkeypatch: pytest.MonkeyPatch) -> None:
     """For tests of what does not depend on how exactly the turn of a camera is estimated."""
-    monkeypatch.setattr(camera_agreement, "STEPS", 1)
+    monkeypatch.setattr(camera_pose, "_STEPS", 1)
 
 
 def sightings(
@@ -86,10 +86,7 @@ def test_a_turn_of_the_camera_is_found(axis: int) -> None:
     change[axis] = np.radians(3.0)
     wrong = moved_by(TRUE, change)
     np.testing.assert_allclose(turned_by(TRUE, wrong), change[:3], atol=1e-9)
-    problem = PoseProblem(BODY, CAMERA, OTHER, wrong, sightings(waving(6)))
-    found = wrong
-    for _ in range(5):
-        found = problem.step(found, ROTATION)[0]
+    found, _ = PoseProblem(BODY, CAMERA, OTHER, wrong, sightings(waving(6))).solve(ROTATION)
     left = np.degrees(turned_by(TRUE, found))
     assert abs(left[axis]) < 1.5
     assert np.linalg.norm(left[:2]) < 1.8
@@ -123,10 +120,7 @@ def test_a_silhouette_that_is_cut_off_says_nothing() -> None:
 def test_with_tangents_a_roll_is_found() -> None:
     wrong = moved_by(TRUE, np.array([0.0, 0.0, np.radians(4.0), 0.0, 0.0, 0.0]))
     frames = sightings(waving(8))
-    problem = PoseProblem(BODY, CAMERA, OTHER, wrong, frames, tangents_of(frames))
-    found = wrong
-    for _ in range(6):
-        found = problem.step(found)[0]
+    found, _ = PoseProblem(BODY, CAMERA, OTHER, wrong, frames, tangents_of(frames)).solve()
     assert abs(np.degrees(turned_by(TRUE, found))[2]) < 2.0
 
 
@@ -251,9 +245,8 @@ def test_extrinsics_are_found_without_a_board(monkeypatch: pytest.MonkeyPatch) -
     # Less of everything than a recording deserves.
     monkeypatch.setattr(camera_calibration, "_PASSES", 1)
     monkeypatch.setattr(camera_calibration, "_SIGHTINGS", 8)
-    monkeypatch.setattr(camera_calibration, "STEPS", 2)
+    monkeypatch.setattr(camera_pose, "_STEPS", 4)
     monkeypatch.setattr(camera_guess, "_BEST", 2)
-    monkeypatch.setattr(camera_guess, "STEPS", 4)
     states = reference_states(BODY, "left")
     seen = sightings(list(states.values()))
     references = {name: (one.first, one.other) for name, one in zip(states, seen, strict=True)}
@@ -269,6 +262,7 @@ def test_extrinsics_are_found_without_a_board(monkeypatch: pytest.MonkeyPatch) -
         assert given == (BODY, CAMERA, OTHER, references, "left")
         return guess
 
+    monkeypatch.setattr(camera_pose, "_STEPS", 2)
     monkeypatch.setattr(camera_calibration, "guessed_extrinsics", guessed)
     found = calibrated_camera(BODY, (CAMERA, OTHER), references, moving)
     angle_rad, away_m = found.extrinsics.difference(TRUE)

@@ -27,7 +27,6 @@ from cardbox_tracker.person.posture import (
     N_STATE,
     TURNING_LIMITS,
     place_limits,
-    reference_posture,
     state_limits,
 )
 from cardbox_tracker.person.rep155 import Rep155Joints, joint_names
@@ -186,17 +185,6 @@ def test_without_the_place_the_shoulders_are_rigid(posture: np.ndarray) -> None:
     body = BodyModel.of(distance_m=2.3, hip_height_m=-0.4, lateral_m=0.1).rigid
     xml = urdf_from_body(body, torso_place=False)
     assert_agrees(xml, body, posture, dict(zip(JOINT_NAMES, posture, strict=True)))
-
-
-@pytest.mark.parametrize("torso_place", [True, False])
-@pytest.mark.parametrize("hands", [True, False])
-def test_what_moves_is_what_joint_states_have(torso_place: bool, hands: bool) -> None:
-    estimate = Estimate(TRACKING, reference_posture("front"), hands=(None, None) if hands else None)
-    published = joint_values(estimate, torso_place)
-    assert published is not None
-    urdf = urdf_from_body(BodyModel(), torso_place=torso_place, hands=hands)
-    kinds = {joint.get("name"): joint.get("type") for joint in Xml.fromstring(urdf).iter("joint")}
-    assert {name for name, kind in kinds.items() if kind != "fixed"} == set(published.names)
 
 
 def test_torso_x_is_nearer_to_the_camera_and_torso_z_is_higher() -> None:
