@@ -131,7 +131,7 @@ def in_browser(page: Path) -> str:
 @pytest.mark.parametrize(
     ("words", "expected"),
     [
-        (("--export", "trc,fbx"), "expected formats of trc, bvh, c3d, mot, isb"),
+        (("--export", "trc,fbx"), "expected formats of trc, bvh, c3d, mot, sto, isb"),
         (("--plot", "FOLDER/angles.jpg"), "its name must end in .png"),
         (("--report", "FOLDER/page"), "its name must end in .html"),
         (("--report", "FOLDER/a.html", "--video", "FOLDER/a.avi"), "must end in .mp4"),
