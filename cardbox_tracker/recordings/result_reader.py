@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import csv
-import io
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -19,7 +17,7 @@ from cardbox_tracker.common.files import (
     body_beside,
     body_of_person,
     foreign,
-    regular_file,
+    table_rows,
 )
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.model_file import (
@@ -343,11 +341,8 @@ def _csv_cells(path: Path) -> Iterator[tuple[str, Mapping[str, Any]]]:
     """Yield each row of a CSV table, and where it is."""
     with (
         foreign(path, CardboxError, _EXPECTED),
-        regular_file(path, _MOST_BYTES) as data,
-        # Spreadsheets begin a file with a byte order mark.
-        io.TextIOWrapper(data, newline="", encoding="utf-8-sig") as file,
+        table_rows(path, _MOST_BYTES) as rows,
     ):
-        rows = csv.DictReader(file)
         _check(path, rows.fieldnames or ())
         for row in rows:
             yield f"line {rows.line_num}", row
