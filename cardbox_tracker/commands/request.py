@@ -290,6 +290,8 @@ class Request(TrackingOptions):
             begin, and where the cameras stand, is found from the people (docs/two-cameras.md)
         offset_s: when each further film begins, seconds from the beginning of the first one;
             negative if it begins before (default: found)
+        shots: track each shot of a film with cuts as a film of its own, with its own camera and
+            files: OUT.csv, OUT.shot_2.csv and so on
         csv: table to write, one row per image (docs/results.md); by default it has the name of the
             recording and is in the current folder. OUT.body.yaml beside it is the body that was
             used
@@ -312,6 +314,7 @@ class Request(TrackingOptions):
         flag="--offset",
         read=parsed(_numbers, "seconds, or those of each further film as in 0.4,-1.2"),
     )
+    shots: bool = option(default=False)
     csv: Path | None = option("OUT.csv|OUT.parquet")
     bag: Path | None = option("OUT")
     video: Path | None = option("OUT.mp4")

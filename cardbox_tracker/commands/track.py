@@ -15,7 +15,7 @@ from typing import Any
 
 from cardbox_tracker.applications.exporting.formats import Format, Result, export, formats
 from cardbox_tracker.applications.reporting.page import angles_plot, write_page
-from cardbox_tracker.commands.arguments import check_outputs
+from cardbox_tracker.commands.arguments import check_outputs, print_remarks
 from cardbox_tracker.commands.request import Request, TrackArguments
 from cardbox_tracker.commands.tracking import track as track_request
 from cardbox_tracker.commands.tracking_request import TrackFiles, tracking_request
@@ -37,6 +37,8 @@ from cardbox_tracker.tracking.precompile import compile_for_films
 
 Arguments = TrackArguments
 
+_FILES = "csv", "bag", "video", "json", "plot", "report"
+
 
 def run(asked: Arguments) -> None:
     """Track the person and write the requested files."""
@@ -51,7 +53,32 @@ def run(asked: Arguments) -> None:
         track_folder(asked)
         return
     faults = _without_effect(asked, TrackArguments, "which is one recording: give --csv")
-    track_one(replace(asked, csv=asked.csv or Path(f"{_name(path)}.csv")), faults)
+    asked = replace(asked, csv=asked.csv or Path(f"{_name(path)}.csv"))
+    if asked.shots:
+        _track_shots(asked, faults)
+    else:
+        track_one(asked, faults)
+
+
+def _track_shots(asked: Request, faults: Iterable[str]) -> None:
+    """Track each shot by itself; the files of further ones have its number."""
+    request = tracking_request(asked, faults)
+    with request.recording.open() as source:
+        spans = source.first.shots(request.person.start_s, request.person.end_s)
+    for number, span in enumerate(spans, 1):
+        print(f"shot {number} of {len(spans)}: {span.start_s:.2f} to {span.end_s:.2f} s")
+        paths = {name: getattr(asked, name) for name in _FILES}
+        named = {name: _of_shot(path, number) for name, path in paths.items() if path is not None}
+        try:
+            track_one(replace(asked, start_s=span.start_s, end_s=span.end_s, **named))
+        except CardboxError as error:
+            if len(spans) == 1:
+                raise
+            print_remarks([f"shot {number} is left out: {error}"])
+
+
+def _of_shot(path: Path, number: int) -> Path:
+    return path if number == 1 else path.with_name(f"{path.stem}.shot_{number}{path.suffix}")
 
 
 def track(
@@ -74,6 +101,8 @@ def track(
         recording = Request(Path(paths[0]), films=tuple(map(Path, paths[1:])))
     asked = replace(recording, **options)
     path = asked.recording
+    if asked.shots:
+        raise CardboxError("shots is for files of each: give start_s and end_s of one")
     if asked.export and asked.csv is None:
         raise CardboxError("export writes beside the table: give csv, or save the result")
     if path.is_dir() and not is_one_recording(path):

@@ -419,6 +419,15 @@ class SilhouetteSource:
             yield found
         self._kept_s = math.inf if keeps else self._kept_s
 
+    def shots(self, start_s: float = 0.0, end_s: float = math.inf) -> list[TimeSpan]:
+        """Return the spans from ``start_s`` to ``end_s`` between cuts, first and last images."""
+        spans: list[TimeSpan] = []
+        for one in takewhile(lambda one: one.time_s <= end_s, self.images(end_s)):
+            if one.time_s >= start_s:
+                first_s = one.time_s if one.is_cut or not spans else spans.pop().start_s
+                spans.append(TimeSpan(first_s, one.time_s))
+        return spans
+
     def _read(self, kept: Iterator[PreparedImage]) -> Iterator[PreparedImage]:
         taken = enumerate(self._bag.images(self.topic), 1)
         for number, image, prepared in results_ahead(partial(self._prepared, kept), taken):
