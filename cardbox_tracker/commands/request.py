@@ -297,7 +297,8 @@ class Request(TrackingOptions):
             used
         bag: also write the topics of the tracker
         video: also write an overlay video
-        blur: hide the heads of people in the pictures of --video, --report and --bag
+        blur: hide the heads of who is tracked, and all faces that the detector shows, in the
+            pictures of --video, --report and --bag
         json: also write what is printed at the end: what was tracked, used, left out and assumed
         export: also write the table in formats of 'cardbox export' beside it, such as trc,bvh
         plot: also plot the angles, with bands of one standard deviation

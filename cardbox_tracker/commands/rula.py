@@ -69,7 +69,7 @@ class Scored(Written, TrackingOptions):
         html: write a page that prints: scores, shares of time, worst moments
         title: heading of --html, such as the task
         images: images of the worst moments in --html, not of results: with the head of the tracked
-            person made unrecognizable, as they are, or none
+            person, and faces that the detector shows, made unrecognizable, as they are, or none
     """
 
     recording: Path = option("RECORDING|RESULTS", default=MISSING)

@@ -109,6 +109,11 @@ class RecordedFrame(NamedTuple):
     #: (H, W), 255 where the camera did not look, 0 elsewhere; None of one that stands still.
     covered: NDArray[np.uint8] | None = None
 
+    @property
+    def everyone(self) -> tuple[ImagePoints, ...]:
+        """The joints of all whom a detector shows."""
+        return (self.people or ()) + (() if self.points is None else (self.points,))
+
 
 def _not_kept() -> NDArray[np.uint8]:
     raise RuntimeError("the recorded image is not kept; set has_pictures")

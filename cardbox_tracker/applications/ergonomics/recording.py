@@ -12,7 +12,11 @@ from typing import NamedTuple
 import cv2
 import numpy as np
 
-from cardbox_tracker.applications.drawing.overlay import draw_overlay, with_hidden_head
+from cardbox_tracker.applications.drawing.overlay import (
+    draw_overlay,
+    with_hidden_faces,
+    with_hidden_head,
+)
 from cardbox_tracker.applications.ergonomics.rula import (
     DECLARED,
     MEASURED,
@@ -100,7 +104,8 @@ class MomentImages:
             return
         picture, camera, body = frame.image, tracker.camera, tracker.body
         if self.is_head_hidden:
-            picture = with_hidden_head(picture, body, camera, estimate, frame.points)
+            picture = with_hidden_faces(picture, camera, frame.everyone)
+            picture = with_hidden_head(picture, body, camera, estimate)
         scale = max(1, round(_WIDTH_PX / picture.shape[1]))
         canvas = draw_overlay(picture, body, camera, estimate, scale)
         _, jpeg = cv2.imencode(".jpg", canvas, [cv2.IMWRITE_JPEG_QUALITY, _QUALITY])
