@@ -301,7 +301,8 @@ class Request(TrackingOptions):
             pictures of --video, --report and --bag
         json: also write what is printed at the end: what was tracked, used, left out and assumed
         export: also write the table in formats of 'cardbox export' beside it, such as trc,bvh
-        plot: also plot the angles, with bands of one standard deviation
+        plot: also draw a figure (PNG or PDF) of the skeleton at some moments, over the angles with
+            bands of one standard deviation
         report: also write a page with the overlay video (OUT.overlay.mp4 without --video), the
             skeleton from aside, the angles and the times to look at
         force: replace results that exist; without it, refuse
@@ -322,7 +323,7 @@ class Request(TrackingOptions):
     blur: bool = option(default=False)
     json: Path | None = option("OUT.json")
     export: str | tuple[str, ...] | None = option("FORMAT[,...]", _formats)
-    plot: Path | None = option("OUT.png")
+    plot: Path | None = option("OUT.png|OUT.pdf")
     report: Path | None = option("OUT.html")
     force: bool = option(default=False)
 

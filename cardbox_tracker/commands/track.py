@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from cardbox_tracker.applications.exporting.formats import Format, Result, export, formats
-from cardbox_tracker.applications.reporting.page import angles_plot, write_page
+from cardbox_tracker.applications.reporting.page import FIGURES, page_figure, write_page
 from cardbox_tracker.commands.arguments import check_outputs, print_remarks
 from cardbox_tracker.commands.request import Request, TrackArguments
 from cardbox_tracker.commands.tracking import track as track_request
@@ -137,10 +137,10 @@ def track_one(
     if asked.blur and not (asked.video or asked.report or asked.bag):
         faults = [*faults, "--blur has no effect without pictures: give --video, --report or --bag"]
     request = tracking_request(asked, faults)
-    for flag, suffix in (("plot", ".png"), ("report", ".html"), ("video", ".mp4")):
+    for flag, suffixes in (("plot", FIGURES), ("report", (".html",)), ("video", (".mp4",))):
         path = getattr(asked, flag)
-        if path is not None and path.suffix != suffix:
-            raise CardboxError(f"--{flag} {path}: its name must end in {suffix}")
+        if path is not None and path.suffix not in suffixes:
+            raise CardboxError(f"--{flag} {path}: its name must end in {' or '.join(suffixes)}")
     files, exports = _files(asked, request.person.model is None)
     written = (files.table, files.body, files.scene, files.video, asked.json)
     derived = (*exports.values(), asked.plot, asked.report)
@@ -204,7 +204,7 @@ def _derived(
     if asked.plot is not None:
         for number, results in people.items():
             path = of_person(asked.plot, number, asked.plot.suffix)
-            write_file(path, angles_plot(results))
+            write_file(path, page_figure(results, path.suffix))
             yield f"wrote {path}"
     if asked.report is not None and video is not None:
         named = {

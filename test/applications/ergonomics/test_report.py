@@ -249,7 +249,7 @@ def test_a_page_has_what_the_reader_needs(tmp_path: Path) -> None:
     assert "1. 6.0 s: score 7.0, but the posture may be wrong (" in words
     assert "2. 1.0 s: score 6.0 (" in words
     assert "mean score of the mean postures: 5.7" in words
-    assert "head of the tracked person is hidden" in words
+    assert "head of the tracked person is hidden, and faces" in words
 
 
 def test_names_are_only_text(tmp_path: Path) -> None:
