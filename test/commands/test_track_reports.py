@@ -24,6 +24,7 @@ from cardbox_tracker.applications.reporting.page import (
     space_view,
 )
 from cardbox_tracker.detectors.detector import Detector
+from cardbox_tracker.measuring.scene import Value
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.skeleton import JOINT_NAMES, PLACE_NAMES
 from cardbox_tracker.recordings.result_reader import Results
@@ -139,11 +140,14 @@ def test_the_picture_with_a_reference_says_how_far_that_is_and_why(
 ) -> None:
     titles: list[str] = []
     monkeypatch.setattr(Figure, "suptitle", lambda _, text, **__: titles.append(text))
-    motion, body = Motion.of(seen_results()), BodyModel.of(pitch_stddev_rad=np.radians(5.0))
-    space_view(motion, body, motion.keypoints_m - np.array([0.0, 0.06, 0.08]))
+    motion, body = Motion.of(seen_results()), BodyModel()
+    pitch = Value(0.0, np.radians(5.0))
+    space_view(motion, body, motion.keypoints_m - np.array([0.0, 0.06, 0.08]), pitch)
     space_view(motion, None, motion.keypoints_m + np.array([0.0, 0.0, 0.2]))
     space_view(motion, body)
-    assert "10 cm farther from the camera" in titles[0] and "pitch (0 +- 5 degrees)" in titles[0]
+    assert (
+        "10 cm farther from the camera" in titles[0] and "pitch, here 0 +- 5 degrees" in titles[0]
+    )
     assert "20 cm nearer to the camera" in titles[1] and "pitch" not in titles[1]
     assert "reference" not in titles[2]
 

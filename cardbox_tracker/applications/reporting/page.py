@@ -16,6 +16,7 @@ from cardbox_tracker.applications.drawing.page import pdf_of, png_of, render_pag
 from cardbox_tracker.applications.exporting.markers import markers_of
 from cardbox_tracker.applications.exporting.motion import Motion, floor_below, in_reference
 from cardbox_tracker.camera.extrinsics import Extrinsics
+from cardbox_tracker.measuring.scene import Value
 from cardbox_tracker.person.isb_angles import ANATOMICAL_NAMES, LABORATORY, anatomical_angles
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.sizes import FloatArray
@@ -145,20 +146,30 @@ def _why(results: Results, begin_s: float, end_s: float) -> str:
     return reasons.most_common(1)[0][0] or UNCERTAIN
 
 
-def space_view(motion: Motion, body: BodyModel | None, true_m: FloatArray | None = None) -> bytes:
+def space_view(
+    motion: Motion,
+    body: BodyModel | None,
+    true_m: FloatArray | None = None,
+    pitch: Value | None = None,
+) -> bytes:
     """Return the skeleton from aside at some moments of a motion of n images as PNG.
 
-    ``true_m`` are keypoints of a reference, (n, 6, 3), metres in the optical frame, or nan.
+    ``true_m`` are keypoints of a reference, (n, 6, 3), metres in the optical frame, or nan; the
+    ``pitch`` of the camera, rad, explains their distance.
     """
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(3.0 * _MOMENTS, 3.4), dpi=_DPI, layout="constrained")
-    _draw_space(figure, motion, body, true_m)
+    _draw_space(figure, motion, body, true_m, pitch)
     return png_of(figure)
 
 
 def _draw_space(
-    figure: FigureBase, motion: Motion, body: BodyModel | None, true_m: FloatArray | None = None
+    figure: FigureBase,
+    motion: Motion,
+    body: BodyModel | None,
+    true_m: FloatArray | None = None,
+    pitch: Value | None = None,
 ) -> None:
     seen = motion.is_seen if true_m is None else motion.is_seen & np.isfinite(true_m).all((1, 2))
     numbers = np.flatnonzero(seen if seen.any() else motion.is_seen)
@@ -187,22 +198,23 @@ def _draw_space(
         axes.set_box_aspect((1, 1, 1), zoom=1.25)
         axes.view_init(elev=10.0, azim=-35.0)
         axes.tick_params(labelsize=6)
-    what = "" if true_m is None else _reference_words(motion.keypoints_m - true_m, body)
+    what = "" if true_m is None else _reference_words(motion.keypoints_m - true_m, pitch)
     figure.suptitle(f"green: left, orange: right{what}; metres", fontsize=10)
 
 
-def _reference_words(off_m: FloatArray, body: BodyModel | None) -> str:
-    """Return what the place of a skeleton that is ``off_m``, (n, 6, 3), its reference rests on."""
-    x, y, z = np.nanmean(off_m, axis=(0, 1))
-    where = "farther from" if z > 0 else "nearer to"
-    words = f"; light blue: reference. The skeleton is {100 * np.hypot(x, np.hypot(y, z)):.0f} cm "
+def _reference_words(off_m: FloatArray, pitch: Value | None) -> str:
+    """Return how far a skeleton is from its reference, (n, 6, 3), m, and on what that rests."""
+    middle_m = np.nanmean(off_m, axis=(0, 1))
+    where = "farther from" if middle_m[2] > 0 else "nearer to"
+    words = f"; light blue: reference.\nThe skeleton is {100 * np.linalg.norm(middle_m):.0f} cm "
     words += f"{where} the camera"
-    if body is not None:
-        tilt = body.camera_pose
-        pitch, stddev = np.degrees([tilt.pitch_rad, tilt.pitch_stddev_rad])
-        words += ", since one camera sees the distance\n"
-        words += f"by size and pitch ({pitch:.0f} +- {stddev:.0f} degrees)"
-    return words
+    if pitch is None:
+        return words
+    mean_deg, stddev_deg = np.degrees(pitch[:2])
+    return (
+        f"{words}: one camera sees the distance by size and by its own pitch, here {mean_deg:.0f} "
+        f"+- {stddev_deg:.0f} degrees"
+    )
 
 
 def cameras_view(
