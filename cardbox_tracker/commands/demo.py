@@ -70,12 +70,13 @@ def _track_film(output: Path, seed: int) -> None:
         export="trc",
         force=True,
     )
-    _, people = track_one(asked)
+    summary, people = track_one(asked)
+    pitch = None if summary.scene is None else summary.scene.camera.pitch_rad
     results = people[1]
     motion = Motion.of(results)
     ours_m, theirs_m = film.errors_m(motion.keypoints_m), film.errors_m(film.mediapipe_m())
     pictures = {
-        "space.png": space_view(motion, results.body, film.true_m),
+        "space.png": space_view(motion, results.body, film.true_m, pitch),
         "error.png": film.error_plot(motion.time_s, ours_m, theirs_m),
     }
     for name, png in pictures.items():

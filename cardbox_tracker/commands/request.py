@@ -290,15 +290,19 @@ class Request(TrackingOptions):
             begin, and where the cameras stand, is found from the people (docs/two-cameras.md)
         offset_s: when each further film begins, seconds from the beginning of the first one;
             negative if it begins before (default: found)
+        shots: track each shot of a film with cuts as a film of its own, with its own camera and
+            files: OUT.csv, OUT.shot_2.csv and so on
         csv: table to write, one row per image (docs/results.md); by default it has the name of the
             recording and is in the current folder. OUT.body.yaml beside it is the body that was
             used
         bag: also write the topics of the tracker
         video: also write an overlay video
-        blur: hide the heads of people in the pictures of --video, --report and --bag
+        blur: hide the heads of who is tracked, and all faces that the detector shows, in the
+            pictures of --video, --report and --bag
         json: also write what is printed at the end: what was tracked, used, left out and assumed
         export: also write the table in formats of 'cardbox export' beside it, such as trc,bvh
-        plot: also plot the angles, with bands of one standard deviation
+        plot: also draw a figure (PNG or PDF) of the skeleton at some moments, over the angles with
+            bands of one standard deviation
         report: also write a page with the overlay video (OUT.overlay.mp4 without --video), the
             skeleton from aside, the angles and the times to look at
         force: replace results that exist; without it, refuse
@@ -312,13 +316,14 @@ class Request(TrackingOptions):
         flag="--offset",
         read=parsed(_numbers, "seconds, or those of each further film as in 0.4,-1.2"),
     )
+    shots: bool = option(default=False)
     csv: Path | None = option("OUT.csv|OUT.parquet")
     bag: Path | None = option("OUT")
     video: Path | None = option("OUT.mp4")
     blur: bool = option(default=False)
     json: Path | None = option("OUT.json")
     export: str | tuple[str, ...] | None = option("FORMAT[,...]", _formats)
-    plot: Path | None = option("OUT.png")
+    plot: Path | None = option("OUT.png|OUT.pdf")
     report: Path | None = option("OUT.html")
     force: bool = option(default=False)
 

@@ -14,8 +14,8 @@ from pathlib import Path
 from typing import Any
 
 from cardbox_tracker.applications.exporting.formats import Format, Result, export, formats
-from cardbox_tracker.applications.reporting.page import angles_plot, write_page
-from cardbox_tracker.commands.arguments import check_outputs
+from cardbox_tracker.applications.reporting.page import FIGURES, page_figure, write_page
+from cardbox_tracker.commands.arguments import check_outputs, print_remarks
 from cardbox_tracker.commands.request import Request, TrackArguments
 from cardbox_tracker.commands.tracking import track as track_request
 from cardbox_tracker.commands.tracking_request import TrackFiles, tracking_request
@@ -37,6 +37,8 @@ from cardbox_tracker.tracking.precompile import compile_for_films
 
 Arguments = TrackArguments
 
+_FILES = "csv", "bag", "video", "json", "plot", "report"
+
 
 def run(asked: Arguments) -> None:
     """Track the person and write the requested files."""
@@ -51,7 +53,32 @@ def run(asked: Arguments) -> None:
         track_folder(asked)
         return
     faults = _without_effect(asked, TrackArguments, "which is one recording: give --csv")
-    track_one(replace(asked, csv=asked.csv or Path(f"{_name(path)}.csv")), faults)
+    asked = replace(asked, csv=asked.csv or Path(f"{_name(path)}.csv"))
+    if asked.shots:
+        _track_shots(asked, faults)
+    else:
+        track_one(asked, faults)
+
+
+def _track_shots(asked: Request, faults: Iterable[str]) -> None:
+    """Track each shot by itself; the files of further ones have its number."""
+    request = tracking_request(asked, faults)
+    with request.recording.open() as source:
+        spans = source.first.shots(request.person.start_s, request.person.end_s)
+    for number, span in enumerate(spans, 1):
+        print(f"shot {number} of {len(spans)}: {span.start_s:.2f} to {span.end_s:.2f} s")
+        paths = {name: getattr(asked, name) for name in _FILES}
+        named = {name: _of_shot(path, number) for name, path in paths.items() if path is not None}
+        try:
+            track_one(replace(asked, start_s=span.start_s, end_s=span.end_s, **named))
+        except CardboxError as error:
+            if len(spans) == 1:
+                raise
+            print_remarks([f"shot {number} is left out: {error}"])
+
+
+def _of_shot(path: Path, number: int) -> Path:
+    return path if number == 1 else path.with_name(f"{path.stem}.shot_{number}{path.suffix}")
 
 
 def track(
@@ -74,6 +101,8 @@ def track(
         recording = Request(Path(paths[0]), films=tuple(map(Path, paths[1:])))
     asked = replace(recording, **options)
     path = asked.recording
+    if asked.shots:
+        raise CardboxError("shots is for files of each: give start_s and end_s of one")
     if asked.export and asked.csv is None:
         raise CardboxError("export writes beside the table: give csv, or save the result")
     if path.is_dir() and not is_one_recording(path):
@@ -108,10 +137,10 @@ def track_one(
     if asked.blur and not (asked.video or asked.report or asked.bag):
         faults = [*faults, "--blur has no effect without pictures: give --video, --report or --bag"]
     request = tracking_request(asked, faults)
-    for flag, suffix in (("plot", ".png"), ("report", ".html"), ("video", ".mp4")):
+    for flag, suffixes in (("plot", FIGURES), ("report", (".html",)), ("video", (".mp4",))):
         path = getattr(asked, flag)
-        if path is not None and path.suffix != suffix:
-            raise CardboxError(f"--{flag} {path}: its name must end in {suffix}")
+        if path is not None and path.suffix not in suffixes:
+            raise CardboxError(f"--{flag} {path}: its name must end in {' or '.join(suffixes)}")
     files, exports = _files(asked, request.person.model is None)
     written = (files.table, files.body, files.scene, files.video, asked.json)
     derived = (*exports.values(), asked.plot, asked.report)
@@ -175,7 +204,7 @@ def _derived(
     if asked.plot is not None:
         for number, results in people.items():
             path = of_person(asked.plot, number, asked.plot.suffix)
-            write_file(path, angles_plot(results))
+            write_file(path, page_figure(results, path.suffix))
             yield f"wrote {path}"
     if asked.report is not None and video is not None:
         named = {

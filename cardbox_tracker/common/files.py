@@ -6,6 +6,7 @@ import contextlib
 import csv
 import errno
 import fcntl
+import io
 import os
 import re
 import secrets
@@ -16,13 +17,16 @@ import tempfile
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import BinaryIO
+from typing import Any, BinaryIO
 
 from cardbox_tracker.common.errors import CardboxError, cut
 
 # Part of the names of temporary files, which can remain after a crash.
 _MARK = ".unfinished-"
 _STEM_LENGTH = 100
+# Characters of the names of a table's columns.
+_LONGEST_HEAD = 100_000
+_DECIMAL_COMMA = re.compile(r"[-+]?\d+,\d+(?:[eE][-+]?\d+)?")
 _FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO)
 
 
@@ -311,6 +315,34 @@ def _refused(target: Path, error: OSError) -> CardboxError:
     return CardboxError(
         f"cannot write {target}: {error.strerror}; choose a folder that exists and is writable"
     )
+
+
+class _WithDecimalCommas(csv.DictReader):  # type: ignore[type-arg]
+    def __next__(self) -> dict[str | Any, str | Any]:
+        cells = super().__next__().items()
+        return {
+            name: cell.replace(",", ".") if _DECIMAL_COMMA.fullmatch(str(cell)) else cell
+            for name, cell in cells
+        }
+
+
+@contextmanager
+def table_rows(path: Path, most_bytes: int) -> Iterator[csv.DictReader[str]]:
+    """Open a CSV table in UTF-8 of at most ``most_bytes``, and close it on exit.
+
+    Where cells have semicolons or tabs between them, as spreadsheets write them in countries with
+    decimal commas, 0,5 is read as 0.5. Raises UnreadableFileError, UnicodeDecodeError or csv.Error.
+    """
+    # Spreadsheets begin a file with a byte order mark.
+    with (
+        regular_file(path, most_bytes) as data,
+        io.TextIOWrapper(data, newline="", encoding="utf-8-sig") as file,
+    ):
+        head = file.readline(_LONGEST_HEAD)
+        file.seek(0)
+        delimiter = max(",;\t", key=head.count)
+        kind = csv.DictReader if delimiter == "," else _WithDecimalCommas
+        yield kind(file, delimiter=delimiter)
 
 
 def write_table(path: Path, header: Sequence[str], rows: Iterable[Sequence[str]]) -> None:

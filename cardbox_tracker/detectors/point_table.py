@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import csv
-import io
 from bisect import bisect_left
 from collections import Counter
 from collections.abc import Sequence
@@ -17,7 +15,7 @@ from numpy.typing import NDArray
 
 from cardbox_tracker.camera.camera import Calibration
 from cardbox_tracker.common.errors import CardboxError, quoted
-from cardbox_tracker.common.files import UnreadableFileError, foreign, regular_file
+from cardbox_tracker.common.files import UnreadableFileError, foreign, table_rows
 from cardbox_tracker.detectors.image_points import (
     LEG_POINT_NAMES,
     POINT_INDEX,
@@ -110,12 +108,7 @@ class PointTable(NamedTuple):
         found: dict[tuple[Key, str], dict[str, list[float]]] = {}
         first_lines: dict[tuple[Key, str], int] = {}
         try:
-            # Spreadsheets begin a file with a byte order mark.
-            with (
-                regular_file(self.path, _MOST_BYTES) as data,
-                io.TextIOWrapper(data, newline="", encoding="utf-8-sig") as file,
-            ):
-                rows = csv.DictReader(file)
+            with table_rows(self.path, _MOST_BYTES) as rows:
                 column = self._check(rows.fieldnames or (), camera)
                 kind = FRAME if column == FRAME else COLUMNS[0]
                 space = SPACE if set(SPACE) <= set(rows.fieldnames or ()) else ()
@@ -166,8 +159,9 @@ class PointTable(NamedTuple):
         if missing:
             raise _TableError(
                 f"{self.path} has no column {', '.join(missing)}; a table of points has the "
-                f"columns {', '.join(expected)}, separated by commas; {FRAME}, the image's number "
-                f"from 0 on, or {', '.join(list(_STAMPS)[1:])} may take the place of {COLUMNS[0]}"
+                f"columns {', '.join(expected)}, separated by commas or semicolons; {FRAME}, the "
+                f"image's number from 0 on, or {', '.join(list(_STAMPS)[1:])} may take the place "
+                f"of {COLUMNS[0]}"
             )
         return kind
 

@@ -62,7 +62,7 @@ class BagTransforms:
         self._writer.write("/tf", message, stamp_ns)
 
 
-Draw = Callable[[NDArray[np.uint8], Estimate, Tracker], NDArray[np.uint8]]
+Draw = Callable[[RecordedFrame, Estimate, Tracker], NDArray[np.uint8]]
 """Draws an estimate over the picture (H, W, ...) of the first camera; returns bgr."""
 
 _LATCHED = ("/body_model", "/robot_description")
@@ -123,7 +123,7 @@ class _ResultBag:
             bag.write_image("/silhouette", stamp, optical, frame.silhouette, "mono8")
             bag.write_camera_info("/silhouette/camera_info", stamp, optical, camera)
         if self._draw is not None:
-            overlay = self._draw(frame.image, estimate, tracker)
+            overlay = self._draw(frame, estimate, tracker)
             bag.write_image(f"{self._space}/overlay", stamp, optical, overlay, "bgr8")
         for topic, value in self._outputs.values(stamp, estimate, tracker):
             message = message_of(bag.new, bag.header(stamp, optical), value)

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import csv
-import io
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -19,7 +17,7 @@ from cardbox_tracker.common.files import (
     body_beside,
     body_of_person,
     foreign,
-    regular_file,
+    table_rows,
 )
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.model_file import (
@@ -102,6 +100,11 @@ class Results:
         known = {id(body): body for body in self.bodies}
         counts = Counter(id(body) for body, state in pairs if body and state in _SEEN)
         return known[counts.most_common(1)[0][0]] if counts else None
+
+    @property
+    def is_seen(self) -> bool:
+        """Whether an image has a posture."""
+        return not {*_SEEN}.isdisjoint(self.state)
 
     def check_body(self) -> None:
         """Raise CardboxError unless the person is known."""
@@ -276,17 +279,31 @@ def read_results(path: Path, person: int | None = None) -> Results:
     number of one, or the first one. Raises CardboxError, with the line, if the file cannot be read
     or has what no result is.
     """
+    return read_people(path, person, person or 1)[person or 1]
+
+
+def read_people(
+    path: Path, person: int | None = None, only: int | None = None
+) -> dict[int, Results]:
+    """Return what :func:`read_results` does, of all people, or ``only`` one, by their numbers.
+
+    Without several people in the file, that is number 1.
+    """
+    only = person or only
     if not path.exists():
         raise CardboxError(
             f"there are no results {path}; give a table or a bag that 'cardbox track' has written"
         )
     if is_bag(path):
         with BagReader(path) as bag:
-            has_others = any(f"{person_space(2)}/" in topic for topic in bag.topics)
-            return replace(results_in(bag, person), has_others=has_others)
+            spaces = {k: person_space(k) + MODEL for k in range(1, len(bag.topics))}
+            known = [k for k, end in spaces.items() if any(t.endswith(end) for t in bag.topics)]
+            numbers: list[int | None] = [person] if only or len(known) < 2 else [*known]
+            found = {number or 1: results_in(bag, number) for number in numbers}
+        return {k: replace(one, has_others=len(known) > 1) for k, one in found.items()}
     if not path.is_file():
         raise CardboxError(f"{path} is no table and no bag; give the results of 'cardbox track'")
-    found, has_others = None, False
+    rows, has_others = dict[int, _Rows](), False
     cells = _parquet_cells(path) if path.suffix == PARQUET else _csv_cells(path)
     for line, row in cells:
         if person is not None and PERSON not in row:
@@ -295,34 +312,37 @@ def read_results(path: Path, person: int | None = None) -> Results:
             # A line of CSV has None for cells that are missing, and as the name of those beyond.
             if path.suffix != PARQUET and (None in row or None in row.values()):
                 raise ValueError("it has not as many cells as line 1")
-            if PERSON in row and _number(row, PERSON, int) != (person or 1):
+            number = _number(row, PERSON, int) if PERSON in row else 1
+            if number != (only or number):
                 has_others = True
                 continue
-            found = found or _Rows(path, row, _NEEDED)
-            found.add(row)
+            if number not in rows:
+                rows[number] = _Rows(path, row, _NEEDED)
+            rows[number].add(row)
         except ValueError as error:
             raise CardboxError(
                 f"{path}, {line}: {error}; give the table as 'cardbox track' wrote it "
                 "(docs/results.md)"
             ) from None
-    if found is None:
+    if not rows:
         text = "image" if person is None else f"person {person}"
         raise CardboxError(f"{path} has no {text}; give the table of a recording with one")
-    beside = body_of_person(body_beside(path), person or 1)
-    body = load_body_model(beside) if beside.is_file() else None
-    results = found.results(())
-    return replace(results, bodies=(body,) * len(results.state), has_others=has_others)
+    found = {}
+    for number, each in sorted(rows.items()):
+        beside = body_of_person(body_beside(path), number)
+        body = load_body_model(beside) if beside.is_file() else None
+        results = each.results(())
+        bodies, has_others = (body,) * len(results.state), has_others or len(rows) > 1
+        found[number] = replace(results, bodies=bodies, has_others=has_others)
+    return found
 
 
 def _csv_cells(path: Path) -> Iterator[tuple[str, Mapping[str, Any]]]:
     """Yield each row of a CSV table, and where it is."""
     with (
         foreign(path, CardboxError, _EXPECTED),
-        regular_file(path, _MOST_BYTES) as data,
-        # Spreadsheets begin a file with a byte order mark.
-        io.TextIOWrapper(data, newline="", encoding="utf-8-sig") as file,
+        table_rows(path, _MOST_BYTES) as rows,
     ):
-        rows = csv.DictReader(file)
         _check(path, rows.fieldnames or ())
         for row in rows:
             yield f"line {rows.line_num}", row

@@ -109,6 +109,11 @@ class RecordedFrame(NamedTuple):
     #: (H, W), 255 where the camera did not look, 0 elsewhere; None of one that stands still.
     covered: NDArray[np.uint8] | None = None
 
+    @property
+    def everyone(self) -> tuple[ImagePoints, ...]:
+        """The joints of all whom a detector shows."""
+        return (self.people or ()) + (() if self.points is None else (self.points,))
+
 
 def _not_kept() -> NDArray[np.uint8]:
     raise RuntimeError("the recorded image is not kept; set has_pictures")
@@ -418,6 +423,15 @@ class SilhouetteSource:
             keeps = keeps and self._keep(found)
             yield found
         self._kept_s = math.inf if keeps else self._kept_s
+
+    def shots(self, start_s: float = 0.0, end_s: float = math.inf) -> list[TimeSpan]:
+        """Return the spans from ``start_s`` to ``end_s`` between cuts, first and last images."""
+        spans: list[TimeSpan] = []
+        for one in takewhile(lambda one: one.time_s <= end_s, self.images(end_s)):
+            if one.time_s >= start_s:
+                first_s = one.time_s if one.is_cut or not spans else spans.pop().start_s
+                spans.append(TimeSpan(first_s, one.time_s))
+        return spans
 
     def _read(self, kept: Iterator[PreparedImage]) -> Iterator[PreparedImage]:
         taken = enumerate(self._bag.images(self.topic), 1)

@@ -127,7 +127,7 @@ def track_recording(
         frames = 0
         for taken in recording.frames(start_s, end_s):
             frames += 1
-            if taken.first.is_cut:
+            if taken.first.is_cut and frames > 1:
                 cuts_s.append(taken.time_s)
                 tell(smoother.finish())
                 smoother = Smoother(lag_s)
@@ -173,7 +173,7 @@ def _cut_remarks(cuts_s: Sequence[float]) -> Iterator[str]:
             f"the film is cut at {', '.join(f'{one:.1f}' for one in cuts_s)} s: each time tracking "
             "starts anew, and people are known by the colours of the trunk alone, if several are "
             "told apart; pitch and height of the camera are those of the longest shot, so leans "
-            "and places are right in that one: give --start and --end to track another"
+            "and places are right in that one: give --shots to track each by itself"
         )
 
 

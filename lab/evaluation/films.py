@@ -85,7 +85,9 @@ MOTIONS: Mapping[str, Callable[[float], tuple[float, float, float]]] = {
 axis, degrees, at a share of the film's time."""
 
 
-def make_film(folder: Path, shape: str, path: Path, motion: str = "still") -> Film:
+def make_film(
+    folder: Path, shape: str, path: Path, motion: str = "still", *, is_compared: bool = False
+) -> Film:
     """Write a session, as its first camera sees it, as a film without its empty scene.
 
     Args:
@@ -93,6 +95,7 @@ def make_film(folder: Path, shape: str, path: Path, motion: str = "still") -> Fi
         shape: a name of ``SHAPES``.
         path: video to write, .mp4.
         motion: a name of ``MOTIONS``. Upright mirrors show what is beside the session's images.
+        is_compared: leave out the truth of images that have a joint outside with any of these.
 
     Raises:
         CardboxError: the folder is not a session, or the video cannot be written.
@@ -123,6 +126,9 @@ def make_film(folder: Path, shape: str, path: Path, motion: str = "still") -> Fi
         size = (width, height)
         shares = (np.array(stamps_ns) - stamps_ns[0]) / (stamps_ns[-1] - stamps_ns[0])
         turns = [_turned(turn, down, MOTIONS[motion](share)) for share in shares.tolist()]
+        if is_compared:
+            every = [[_turned(turn, down, of(one)) for of in MOTIONS.values()] for one in shares]
+            session = _inside(session, dict(zip(stamps_ns, np.array(every), strict=True)), k, size)
         is_still = motion == "still"
         maps = cv2.initUndistortRectifyMap(lens.k, lens.distortion, turn, k, size, cv2.CV_32FC1)
         border = cv2.BORDER_CONSTANT if is_still else cv2.BORDER_REFLECT_101
@@ -144,6 +150,26 @@ def make_film(folder: Path, shape: str, path: Path, motion: str = "still") -> Fi
     )
     fov_deg = float(np.degrees(2 * np.arctan(width / 2 / k[0, 0])))
     return Film(turned, shape, path, fov_deg, stamps_ns)
+
+
+def _inside(
+    session: RecordedSession,
+    turns: Mapping[int, FloatArray],
+    k: FloatArray,
+    size: tuple[int, int],
+) -> RecordedSession:
+    """Return a session without the truth of images that lack a joint with one of their turns."""
+    kept = np.zeros(len(session.stamps_ns), bool)
+    for i, stamp_ns in enumerate(session.stamps_ns.tolist()):
+        if stamp_ns in turns:
+            there = np.einsum("ij,mjk,nk->mni", k, turns[stamp_ns], session.keypoints_m[i])
+            px = there[..., :2] / there[..., 2:]
+            kept[i] = ((px >= 0) & (px < size)).all()
+    if not kept.any():
+        raise CardboxError(f"{session.name} has no image whose joints are in view with each motion")
+    names = "stamps_ns", "segments", "keypoints_m", "torso_rad", "hips_m"
+    given = {name: getattr(session, name) for name in names}
+    return replace(session, **{name: v if v is None else v[kept] for name, v in given.items()})
 
 
 def _turn(k: FloatArray, middle: tuple[float, float], down: FloatArray) -> FloatArray:
@@ -251,7 +277,8 @@ def films_report(results: Mapping[str, Any]) -> str:
         "and without an empty scene. Errors are those of shoulders, elbows and hands, cm; "
         "*aligned*: beside the middle of the shoulders. Settings were chosen on the same "
         "recordings. An image that is `tracking` is beyond 30 cm if a joint is, beside the middle "
-        "of the shoulders. *Placed*: the state is `tracking`, and that of the place is `tracked`; "
+        "of the shoulders. With motions of the camera, images count whose joints are in view with "
+        "each of them. *Placed*: the state is `tracking`, and that of the place is `tracked`; "
         "then the place counts, too.",
         table(_HEAD, rows),
         f"Made by `{results['command']}` at commit {results['provenance']['commit']}.",
@@ -323,7 +350,7 @@ def evaluate_films(
         ProcessPoolExecutor(jobs, mp_context=get_context("spawn")) as pool,
     ):
         work = [
-            pool.submit(_film, folder, shape, motion, preset, seeds)
+            pool.submit(_film, folder, shape, motion, preset, seeds, is_moving)
             for folder in folders
             for shape, motion in kinds
         ]
@@ -341,11 +368,15 @@ def evaluate_films(
     write_file(report, films_report(results))
 
 
-def _film(folder: Path, shape: str, motion: str, preset: str, seeds: range) -> list[dict[str, Any]]:
+def _film(
+    folder: Path, shape: str, motion: str, preset: str, seeds: range, is_moving: bool
+) -> list[dict[str, Any]]:
     """Return the entries of one session in ``films.json``, one for all that is given."""
     found = list[dict[str, Any]]()
     with TemporaryDirectory() as made:
-        film = make_film(folder, shape, Path(made) / f"{folder.name}.mp4", motion)
+        film = make_film(
+            folder, shape, Path(made) / f"{folder.name}.mp4", motion, is_compared=is_moving
+        )
         stature_m = film.session.truth.stature_m
         known: dict[str, Any] = {"fov_deg": round(film.fov_deg, 1), "stature_m": stature_m}
         for given, more in {"field of view, stature": known, "nothing": {}}.items():

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from cardbox_tracker.applications.exporting.formats import FORMATS
+from cardbox_tracker.applications.exporting.formats import FORMATS, read_result
 from cardbox_tracker.camera.camera import Camera
 from cardbox_tracker.common.files import body_of_person
 from cardbox_tracker.person.kinematics import pose
@@ -173,6 +173,50 @@ def test_which_of_several_people_is_used_is_told(
     words = ("export", whole_body / name, "--to", "trc", "--output")
     assert "person 1 is used; --person K gives another" in cardbox(*words, tmp_path / "a.trc").err
     assert not cardbox(*words, tmp_path / "b.trc", "--person", "1").err
+
+
+@pytest.mark.parametrize("name", ["all.csv", "flat.parquet", "all_bag"])
+def test_all_people_in_one_call(
+    name: str, whole_body: Path, tmp_path: Path, cardbox: Callable
+) -> None:
+    words = ("export", whole_body / name, "--to", "trc", "--output")
+    done = cardbox(*words, tmp_path / "all_{n}.trc")
+    assert done.code == 0 and not done.err
+    each = [tmp_path / f"all_{number}.trc" for number in (1, 2)]
+    assert sorted(tmp_path.iterdir()) == each
+    for number, path in enumerate(each, 1):
+        alone = tmp_path / f"alone{number}" / path.name
+        alone.parent.mkdir()
+        assert cardbox(*words, alone, "--person", str(number)).code == 0
+        assert path.read_bytes() == alone.read_bytes()
+    cardbox(*words, tmp_path / "all_{n}.trc").assert_refused("export", "all_1.trc exists")
+    assert cardbox(*words, tmp_path / "b_{n}.trc", "--person", "2").code == 0
+    assert (tmp_path / "b_2.trc").is_file() and not (tmp_path / "b_1.trc").exists()
+    result = read_result(whole_body / name)
+    assert [*result.people] == [1, 2] and not read_result(whole_body / name, person=2).people
+    result.save(tmp_path / "c_{n}.trc")
+    rest = [path.read_text().split("\n")[3:] for path in (each[1], tmp_path / "c_2.trc")]
+    assert rest[0] == rest[1]
+
+
+def test_who_is_never_seen_has_no_file_among_all(
+    whole_body: Path, tmp_path: Path, cardbox: Callable
+) -> None:
+    lines = (whole_body / "all.csv").read_text().splitlines()
+    names = lines[0].split(",")
+    rows = [line.split(",") for line in lines[1:]]
+    gone = [
+        [*row[:1], "no_person", *row[2:]] if row[names.index("person")] == "2" else row
+        for row in rows
+    ]
+    table = tmp_path / "one.csv"
+    table.write_text("\n".join([lines[0], *map(",".join, gone)]) + "\n")
+    done = cardbox(
+        "export", table, "--to", "isb", "--output", tmp_path / "{n}.csv", "--cutoff", "4"
+    )
+    assert done.code == 0, done.err
+    assert "person 2 is in no image, and has no file" in done.out
+    assert (tmp_path / "1.csv").is_file() and not (tmp_path / "2.csv").exists()
 
 
 def test_damaged_results_are_refused_by_all_that_read_them(

@@ -13,6 +13,9 @@ import pytest
 
 import cardbox_tracker
 from cardbox_tracker.applications.drawing.video import video_file
+from cardbox_tracker.commands.track import TrackArguments, run
+from cardbox_tracker.common.errors import CardboxError
+from cardbox_tracker.recordings.result_reader import read_results
 
 RED, BLUE, GREEN = (40, 40, 220), (220, 60, 40), (40, 200, 60)
 SHAPE, HZ = (240, 320), 10.0
@@ -114,3 +117,24 @@ def test_each_shot_is_tracked_anew_and_has_the_person_if_the_clothes_are_there(
     account = json.loads(told.read_text())
     assert any("the film is cut at 1.2, 2.0 s" in one for one in account["remarks"])
     assert "person: the left one, of 2 at 0.4 s" in account["assumed"]
+
+
+def test_each_shot_is_a_film_of_its_own(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    shots = [[[(90.0, RED)]] * 12, [[]], [[(210.0, BLUE)]] * 8]
+    recording, table = film(tmp_path / "film.mp4", *shots), tmp_path / "a.csv"
+    more = {"detector": ByColour(), "csv": table, "plot": tmp_path / "a.png", **GIVEN}
+    run(TrackArguments(recording, shots=True, **more))
+    told = capsys.readouterr()
+    assert "shot 3 of 3: 1.30 to 2.00 s" in told.out
+    assert "shot 2 is left out: " in told.err and "cut" not in told.err
+    first, last = read_results(table), read_results(tmp_path / "a.shot_3.csv")
+    assert [len(one.state) for one in (first, last)] == [12, 8]
+    assert last.time_s[0] == pytest.approx(1.3)
+    assert (tmp_path / "a.shot_3.scene.yaml").is_file() and (tmp_path / "a.shot_3.png").is_file()
+    alone = cardbox_tracker.track(
+        recording, start_s=1.3, end_s=2.0, **{**more, "csv": None, "plot": None}
+    )
+    x_m = [one.numbers["left_shoulder_x"] for one in (last, alone)]
+    np.testing.assert_allclose(*x_m, atol=1e-6)
+    with pytest.raises(CardboxError, match="give start_s and end_s of one"):
+        cardbox_tracker.track(recording, shots=True, **GIVEN)

@@ -66,6 +66,28 @@ def test_a_recording_is_scored(files: Path, tmp_path: Path, cardbox: Callable) -
     assert [line for line in done.out.splitlines() if "wrote" in line] == [f"wrote {only}"]
 
 
+def test_results_are_scored_as_their_recording(
+    files: Path, tmp_path: Path, cardbox: Callable
+) -> None:
+    made = {name: tmp_path / name for name in ("film.csv", "bag", "a.csv", "b.csv", "c.csv")}
+    files_of_track = ("--csv", made["film.csv"], "--bag", made["bag"])
+    assert cardbox("track", *options(files), *files_of_track).code == 0
+    assert cardbox("rula", *options(files), "--csv", made["a.csv"]).code == 0
+    page = tmp_path / "page.html"
+    done = cardbox("rula", made["film.csv"], "--csv", made["b.csv"], "--html", page)
+    assert done.code == 0, done.err
+    assert made["a.csv"].read_bytes() == made["b.csv"].read_bytes()
+    assert "downward pitch" in page.read_text() and "data:image/jpeg" not in page.read_text()
+    done = cardbox("rula", made["bag"], "--csv", made["c.csv"])
+    assert done.code == 0, done.err
+    lines = [csv.DictReader(made[name].read_text().splitlines()) for name in ("a.csv", "c.csv")]
+    scores = [[row["likeliest"] for row in rows] for rows in lines]
+    assert scores[0] == scores[1]
+    (tmp_path / "film.body.yaml").unlink()
+    done = cardbox("rula", made["film.csv"])
+    done.assert_refused("rula", "no posture of a known person: keep OUT.body.yaml")
+
+
 @pytest.mark.parametrize(
     ("words", "expected"),
     [

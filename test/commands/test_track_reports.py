@@ -6,6 +6,7 @@ import re
 import shutil
 import subprocess
 from collections.abc import Callable
+from dataclasses import replace
 from html.parser import HTMLParser
 from pathlib import Path
 from urllib.parse import unquote
@@ -13,13 +14,21 @@ from urllib.parse import unquote
 import cv2
 import numpy as np
 import pytest
+from matplotlib.figure import Figure
 
 from cardbox_tracker.applications.demo.film import DemoFilm
-from cardbox_tracker.applications.reporting.page import angles_of
+from cardbox_tracker.applications.exporting.motion import Motion
+from cardbox_tracker.applications.reporting.page import (
+    angles_of,
+    page_figure,
+    space_view,
+)
 from cardbox_tracker.detectors.detector import Detector
-from cardbox_tracker.person.skeleton import JOINT_NAMES
+from cardbox_tracker.measuring.scene import Value
+from cardbox_tracker.person.model import BodyModel
+from cardbox_tracker.person.skeleton import JOINT_NAMES, PLACE_NAMES
 from cardbox_tracker.recordings.result_reader import Results
-from cardbox_tracker.recordings.result_table import deviation_columns
+from cardbox_tracker.recordings.result_table import POINT_COLUMNS, deviation_columns
 
 VOID = {"meta", "img", "br"}
 
@@ -105,6 +114,44 @@ def test_one_command_writes_exports_plot_and_page(
     assert not re.search("taken as that|nothing tells", done.err)
 
 
+def seen_results() -> Results:
+    rng = np.random.default_rng(0)
+    names = (*JOINT_NAMES, *PLACE_NAMES, *deviation_columns(JOINT_NAMES), *POINT_COLUMNS)
+    numbers = dict(zip(names, rng.uniform(0.1, 0.5, (len(names), 20)), strict=True))
+    times = np.arange(20), np.arange(20.0), ("tracking",) * 20
+    return Results(Path("a.csv"), *times, numbers, {}, (None,) * 20)
+
+
+def test_a_figure_is_a_pdf_of_the_same_bytes_and_shows_the_skeleton() -> None:
+    results = seen_results()
+    first, again = (page_figure(results, ".pdf") for _ in range(2))
+    assert first.startswith(b"%PDF") and first == again
+    nobody = replace(results, state=("lost",) * 20)
+    shown, empty = (page_figure(one, ".png") for one in (results, nobody))
+    rows = [
+        cv2.imdecode(np.frombuffer(one, np.uint8), cv2.IMREAD_COLOR).shape[0]
+        for one in (shown, empty)
+    ]
+    assert rows[0] == rows[1] + 340
+
+
+def test_the_picture_with_a_reference_says_how_far_that_is_and_why(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    titles: list[str] = []
+    monkeypatch.setattr(Figure, "suptitle", lambda _, text, **__: titles.append(text))
+    motion, body = Motion.of(seen_results()), BodyModel()
+    pitch = Value(0.0, np.radians(5.0))
+    space_view(motion, body, motion.keypoints_m - np.array([0.0, 0.06, 0.08]), pitch)
+    space_view(motion, None, motion.keypoints_m + np.array([0.0, 0.0, 0.2]))
+    space_view(motion, body)
+    assert (
+        "10 cm farther from the camera" in titles[0] and "pitch, here 0 +- 5 degrees" in titles[0]
+    )
+    assert "20 cm nearer to the camera" in titles[1] and "pitch" not in titles[1]
+    assert "reference" not in titles[2]
+
+
 BROWSER = next(filter(None, map(shutil.which, ("chromium", "google-chrome", "chrome"))), None)
 
 
@@ -131,8 +178,8 @@ def in_browser(page: Path) -> str:
 @pytest.mark.parametrize(
     ("words", "expected"),
     [
-        (("--export", "trc,fbx"), "expected formats of trc, bvh, c3d, mot, isb"),
-        (("--plot", "FOLDER/angles.jpg"), "its name must end in .png"),
+        (("--export", "trc,fbx"), "expected formats of trc, bvh, c3d, mot, sto, isb"),
+        (("--plot", "FOLDER/angles.jpg"), "its name must end in .png or .pdf"),
         (("--report", "FOLDER/page"), "its name must end in .html"),
         (("--report", "FOLDER/a.html", "--video", "FOLDER/a.avi"), "must end in .mp4"),
         (("--plot", "FOLDER/there.png"), "there.png exists"),

@@ -119,13 +119,22 @@ def test_a_table_of_a_spreadsheet_may_begin_with_a_byte_order_mark(tmp_path: Pat
     assert points.px[POINT_INDEX["nose"], 0] == pytest.approx(10.0)
 
 
+@pytest.mark.parametrize("between", [";", "\t"])
+def test_a_table_of_a_spreadsheet_may_have_decimal_commas(tmp_path: Path, between: str) -> None:
+    row = "5,nose,10.5,20,0.9".replace(",", between).replace(".", ",")
+    given = table(tmp_path, row, header=HEADER.replace(",", between))
+    points = read(given).at(Image(5), NONE)
+    assert points is not None
+    assert points.px[POINT_INDEX["nose"]] == pytest.approx([10.5, 20.0])
+
+
 @pytest.mark.parametrize(
     ("header", "row", "camera", "words"),
     [
         ("stamp_ns,joint,u,v", "5,nose,1,2", None, "no column score"),
         ("", "", None, "no column stamp_ns, joint, u, v, score"),
         (HEADER, "5,nose,1,2,0.9", "left", "no column camera"),
-        (HEADER.replace(",", ";"), "5;nose;1;2;0.9", None, "separated by commas"),
+        (HEADER.replace(",", " "), "5 nose 1 2 0.9", None, "separated by commas or semicolons"),
         (HEADER, "5,nose,one,2,0.9", None, "line 2, has a value that is no number .*one"),
         (HEADER, "5.5,nose,1,2,0.9", None, r"no number .*5\.5.*numbers in stamp_ns"),
         (HEADER, "5,nose,1", None, "no number"),

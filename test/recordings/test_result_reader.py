@@ -100,6 +100,27 @@ def test_a_table_is_read_as_it_was_written(name: str, tmp_path: Path) -> None:
     assert body is None
 
 
+def test_a_table_that_a_spreadsheet_has_saved_with_decimal_commas(tmp_path: Path) -> None:
+    plain = write_table(tmp_path / "a.csv")
+    names, *rows = csv.reader(plain.read_text().splitlines())
+    reason = "hands are near, and 1,5 m away; see there"
+    for row in rows:
+        row[names.index("state_reason")] = reason
+    with (tmp_path / "b.csv").open("w", newline="", encoding="utf-8-sig") as file:
+        cells = ([cell.replace(".", ",") for cell in row] for row in (names, *rows))
+        csv.writer(file, delimiter=";", lineterminator="\r\n").writerows(cells)
+    assert_is_what_was_written(read_motion(tmp_path / "b.csv")[0])
+    plain, other = map(read_results, (plain, tmp_path / "b.csv"))
+    assert other.texts_of("state_reason")[0] == reason
+    for name, values in plain.numbers.items():
+        assert values.tolist() == pytest.approx(other.numbers[name].tolist(), nan_ok=True)
+    # Of long films, spreadsheets round the stamps.
+    text = (tmp_path / "b.csv").read_text("utf-8-sig").replace(f";{START_NS};", ";1,7E+18;")
+    (tmp_path / "b.csv").write_text(text)
+    with pytest.raises(CardboxError, match=r"line 2: stamp_ns is '1.7E\+18'"):
+        read_results(tmp_path / "b.csv")
+
+
 def test_of_several_people_one_is_read(tmp_path: Path) -> None:
     lines = write_table(tmp_path / "one.csv").read_text().splitlines()
     rows = [f"{row},{person}" for row in lines[1:] for person in (1, 2)]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 
 import cv2
@@ -19,6 +19,7 @@ from cardbox_tracker.person.parts import body_parts
 from cardbox_tracker.person.posture import PLACE, POSTURE
 from cardbox_tracker.person.sizes import FloatArray
 from cardbox_tracker.person.skeleton import KeypointState
+from cardbox_tracker.recordings.silhouettes import RecordedFrame
 from cardbox_tracker.tracking.estimate import CLOSED, HAND_KEYPOINTS, NO_PERSON, OPEN, Estimate
 from cardbox_tracker.tracking.tracker import Tracker
 
@@ -52,8 +53,11 @@ _READABLE_PX = 640
 
 _HEAD = [PATCH_NAMES.index("head_frontal"), PATCH_NAMES.index("head_sagittal")]
 _FACE = [POINT_INDEX[name] for name in ("nose", "left_eye", "right_eye", "left_ear", "right_ear")]
+_WIDTH = [*_FACE, POINT_INDEX["left_shoulder"], POINT_INDEX["right_shoulder"]]
 # Share of the head's size that is added on each side, since the model's head does not nod.
 _MARGIN = 0.5
+# Share of the width of face and shoulders by which a head is larger than its face on each side.
+_AROUND_FACE = 0.5
 # Coarse pixels across the region, about three of which cover the face.
 _BLOCKS = 6
 
@@ -115,9 +119,12 @@ def draw_camera_overlay(
 
 
 def draw_sharp_overlay(
-    picture: ImageArray, estimate: Estimate, tracker: Tracker, hides_heads: bool = False
+    frame: RecordedFrame, estimate: Estimate, tracker: Tracker, hides_heads: bool = False
 ) -> ImageArray:
     """Return the first camera's picture with the model, enlarged in pixels, which compress well."""
+    picture = frame.image
+    if hides_heads:
+        picture = with_hidden_faces(picture, tracker.camera, frame.everyone)
     scale = readable_scale(picture)
     large = picture.repeat(scale, axis=0).repeat(scale, axis=1)
     return draw_overlay(large, tracker.body, tracker.camera, estimate, 1, hides_heads)
@@ -333,32 +340,44 @@ def _around(pixels: FloatArray, margin_px: float) -> tuple[tuple[slice, slice], 
     return np.s_[top:bottom, left:right], (left, top)
 
 
+def with_hidden_faces(
+    image: ImageArray, camera: Camera, people: Iterable[ImagePoints]
+) -> ImageArray:
+    """Return a copy of an image in which coarse pixels cover all faces that a detector shows.
+
+    The image is (H, W) or (H, W, 3), of any size; the points of ``people`` are px of the camera.
+    """
+    hidden = image.copy()
+    for one in people:
+        px = image.shape[1] / camera.width * one.px
+        face, beside = (px[rows][np.isfinite(px[rows]).all(axis=1)] for rows in (_FACE, _WIDTH))
+        if len(face):
+            _make_coarse(hidden[_around(face, _AROUND_FACE * np.ptp(beside, axis=0).max())[0]])
+    return hidden
+
+
 def with_hidden_head(
-    image: ImageArray,
-    body: BodyModel,
-    camera: Camera,
-    estimate: Estimate,
-    points: ImagePoints | None = None,
+    image: ImageArray, body: BodyModel, camera: Camera, estimate: Estimate
 ) -> ImageArray:
     """Return a copy of an image in which coarse pixels make the head unrecognizable.
 
     The image is (H, W) or (H, W, 3), of the size of the camera, which has the pitch of the body
-    model. Without a posture, or with the head behind the camera, all of it becomes coarse. A face
-    that the ``points`` of a detector show is covered, too.
+    model. Without a posture, or with the head behind the camera, all of it becomes coarse.
     """
     hidden = image.copy()
-    part = hidden[_head_region(body, camera, estimate, points)]
+    _make_coarse(hidden[_head_region(body, camera, estimate)])
+    return hidden
+
+
+def _make_coarse(part: ImageArray) -> None:
     if part.size:
         high, wide = part.shape[:2]
         blocks = (_BLOCKS, max(1, round(_BLOCKS * high / wide)))
         coarse = cv2.resize(part, blocks, interpolation=cv2.INTER_AREA)
         part[:] = cv2.resize(coarse, (wide, high), interpolation=cv2.INTER_NEAREST)
-    return hidden
 
 
-def _head_region(
-    body: BodyModel, camera: Camera, estimate: Estimate, points: ImagePoints | None
-) -> tuple[slice, slice]:
+def _head_region(body: BodyModel, camera: Camera, estimate: Estimate) -> tuple[slice, slice]:
     """Return rows and columns of the head with its margin; the whole image if it is unknown."""
     if estimate.posture is None:
         return np.s_[:, :]
@@ -368,8 +387,4 @@ def _head_region(
     if not corners:
         return np.s_[:, :]
     head = np.concatenate(corners)
-    margin = _MARGIN * np.ptp(head, axis=0).max()
-    if points is not None:
-        face = points.px[_FACE]
-        head = np.concatenate([head, face[np.isfinite(face).all(axis=1)]])
-    return _around(head, margin)[0]
+    return _around(head, _MARGIN * np.ptp(head, axis=0).max())[0]

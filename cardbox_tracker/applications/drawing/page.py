@@ -1,4 +1,4 @@
-"""Pages that need no other file, and figures as PNG."""
+"""Pages that need no other file, and figures as PNG or PDF."""
 
 from __future__ import annotations
 
@@ -32,6 +32,15 @@ def render_page(path: Path, template: Path, **values: object) -> None:
 
 def png_of(figure: Figure) -> bytes:
     """Return a figure as PNG, the same bytes for the same figure."""
-    png = io.BytesIO()
-    figure.savefig(png, format="png", metadata={"Software": None})
-    return png.getvalue()
+    return _saved(figure, "png", "Software")
+
+
+def pdf_of(figure: Figure) -> bytes:
+    """Return a figure as PDF, the same bytes for the same figure."""
+    return _saved(figure, "pdf", "CreationDate")
+
+
+def _saved(figure: Figure, kind: str, without: str) -> bytes:
+    saved = io.BytesIO()
+    figure.savefig(saved, format=kind, metadata={without: None})
+    return saved.getvalue()

@@ -11,7 +11,12 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from cardbox_tracker.applications.drawing.overlay import ImageArray, draw_overlay, readable_scale
+from cardbox_tracker.applications.drawing.overlay import (
+    ImageArray,
+    draw_overlay,
+    readable_scale,
+    with_hidden_faces,
+)
 from cardbox_tracker.camera.camera import Camera
 from cardbox_tracker.common.beside import done_beside
 from cardbox_tracker.common.errors import BagError, CardboxError
@@ -96,7 +101,10 @@ def overlay_video(
             # Several people are drawn one after the other into the same picture.
             if frame.stamp_ns not in drawn:
                 finish()
-                drawn[frame.stamp_ns] = recording.first.full_picture(frame)
+                picture = recording.first.full_picture(frame)
+                if hides_heads:
+                    picture = with_hidden_faces(picture, camera, frame.everyone)
+                drawn[frame.stamp_ns] = picture
             picture = drawn[frame.stamp_ns]
             scale = readable_scale(picture)
             given = body, camera, estimate, scale, hides_heads

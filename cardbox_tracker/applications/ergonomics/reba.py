@@ -1,4 +1,4 @@
-"""REBA scores of a table of results with legs.
+"""REBA scores of results, with their legs.
 
 S. Hignett and L. McAtamney, "Rapid Entire Body Assessment (REBA)", Applied Ergonomics 31(2), 2000,
 pages 201-205. Upper arms are scored as in :mod:`.rula`; the other parts as follows:
@@ -65,7 +65,7 @@ from cardbox_tracker.recordings.result_table import LEG_POINT_COLUMNS, POINT_COL
 from cardbox_tracker.search.particles import normal_postures
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class RebaConfig(ErgonomicConfig):
     """Settings of REBA."""
 
@@ -230,6 +230,11 @@ def images_of(results: Results) -> list[Seen]:
     lengths_m, upright = np.column_stack([trunk_m, bones_m]), results.upright_state
     times = zip(results.stamp_ns.tolist(), results.time_s.tolist(), upright, strict=True)
     return [Seen(*at, *of) for at, *of in zip(times, joints, lengths_m, strict=True)]
+
+
+def score_reba(results: Results, config: RebaConfig, seed: int) -> list[RulaRow]:
+    """Return the scores of each image of results; CardboxError if they have no columns of legs."""
+    return score_table(images_of(results), config, seed)
 
 
 def score_table(images: Sequence[Seen], config: RebaConfig, seed: int) -> list[RulaRow]:

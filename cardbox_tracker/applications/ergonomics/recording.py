@@ -1,21 +1,27 @@
-"""RULA of a recording: a row for each image, the time at each score, the worst moments."""
+"""Scores of a recording: a row for each image, the time at each score, the worst moments."""
 
 from __future__ import annotations
 
 import heapq
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import NamedTuple
 
 import cv2
 import numpy as np
 
-from cardbox_tracker.applications.drawing.overlay import draw_overlay, with_hidden_head
+from cardbox_tracker.applications.drawing.overlay import (
+    draw_overlay,
+    with_hidden_faces,
+    with_hidden_head,
+)
 from cardbox_tracker.applications.ergonomics.rula import (
     DECLARED,
     MEASURED,
     MIXED,
+    POSTURE_ROWS,
     RULA,
     SAMPLES,
     ErgonomicConfig,
@@ -27,7 +33,10 @@ from cardbox_tracker.applications.ergonomics.rula import (
 )
 from cardbox_tracker.common.files import write_table
 from cardbox_tracker.person.sizes import FloatArray
+from cardbox_tracker.person.skeleton import STATE_NAMES
+from cardbox_tracker.recordings.result_reader import KeptResults, Results
 from cardbox_tracker.recordings.silhouettes import RecordedFrame
+from cardbox_tracker.search.particles import normal_postures
 from cardbox_tracker.tracking.estimate import UNCERTAIN, Estimate
 from cardbox_tracker.tracking.tracker import Tracker
 
@@ -95,7 +104,8 @@ class MomentImages:
             return
         picture, camera, body = frame.image, tracker.camera, tracker.body
         if self.is_head_hidden:
-            picture = with_hidden_head(picture, body, camera, estimate, frame.points)
+            picture = with_hidden_faces(picture, camera, frame.everyone)
+            picture = with_hidden_head(picture, body, camera, estimate)
         scale = max(1, round(_WIDTH_PX / picture.shape[1]))
         canvas = draw_overlay(picture, body, camera, estimate, scale)
         _, jpeg = cv2.imencode(".jpg", canvas, [cv2.IMWRITE_JPEG_QUALITY, _QUALITY])
@@ -108,27 +118,52 @@ class MomentImages:
         return {-negative_ns: jpeg for _, negative_ns, jpeg in self._kept}
 
 
-class RulaObserver:
-    """Observer of :func:`~.recordings.track.track_recording` that scores each image in ``rows``."""
+Score = Callable[[Results], list[RulaRow]]
+"""Scores the images of results by a method."""
 
-    def __init__(self, config: RulaConfig, seed: int, images: MomentImages | None = None) -> None:
-        """Seed the random numbers; the same images and ``seed`` give the same rows."""
-        self._config, self._images = config, images
-        self._rng = np.random.default_rng([seed, _STREAM])
-        self.rows: list[RulaRow] = []
+
+def score_rula(results: Results, config: RulaConfig, seed: int) -> list[RulaRow]:
+    """Return the scores of each image, for samples of its posture; CardboxError without a body."""
+    results.check_body()
+    rng = np.random.default_rng([seed, _STREAM])
+    states = np.stack([results.of(STATE_NAMES), results.deviations_of(STATE_NAMES)], axis=1)
+    times = results.stamp_ns.tolist(), results.upright_state, results.time_s.tolist()
+    rows = []
+    for stamp_ns, state, time_s, body, joints in zip(*times, results.bodies, states, strict=True):
+        scores, measured = None, frozenset[str]()
+        posture, stddev = joints[:, POSTURE_ROWS]
+        if body is not None and np.isfinite(posture + stddev).all():
+            drawn = normal_postures(posture, stddev, SAMPLES, rng)
+            scores, measured = sampled_scores(body, joints, drawn, config, rng)
+        rows.append(RulaRow(stamp_ns, state, scores, time_s, measured))
+    return rows
+
+
+class ScoreObserver:
+    """Observer of :func:`~.recordings.track.track_recording` that scores one person."""
+
+    def __init__(self, path: Path, score: Score, images: MomentImages | None = None) -> None:
+        """Take the recording, and where images are kept if they are wanted."""
+        self._score, self._images = score, images
+        self._empty = partial(KeptResults, path, has_points=True, has_hands=True)
+        self._kept = self._empty()
 
     def __call__(self, frame: RecordedFrame, estimate: Estimate, tracker: Tracker) -> None:
-        """Append the row of one image, scored for samples of its posterior."""
-        scores, measured = None, frozenset[str]()
-        if estimate.posture is not None:
-            postures = tracker.sample(estimate, SAMPLES, self._rng)
-            scores, measured = sampled_scores(
-                tracker.body, estimate.joints, postures, self._config, self._rng
-            )
-        row = RulaRow(frame.stamp_ns, estimate.upright_state, scores, frame.time_s, measured)
-        self.rows.append(row)
-        if self._images is not None:
-            self._images.add(row, frame, estimate, tracker)
+        """Take one image; it is kept if its score, without what others show, is high."""
+        self._kept(frame, estimate, tracker)
+        if self._images is not None and estimate.posture is not None:
+            alone = self._empty()
+            alone(frame, estimate, tracker)
+            for row in self._rows(alone):
+                self._images.add(row, frame, estimate, tracker)
+
+    @property
+    def rows(self) -> list[RulaRow]:
+        """The scores of all images, as those of their table."""
+        return self._rows(self._kept)
+
+    def _rows(self, kept: KeptResults) -> list[RulaRow]:
+        return [row for results in kept.results().values() for row in self._score(results)]
 
 
 def worst_moments(

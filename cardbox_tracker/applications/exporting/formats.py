@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from functools import partial
 from importlib.metadata import EntryPoint
@@ -14,7 +14,7 @@ import numpy as np
 
 from cardbox_tracker.applications.exporting.bvh import write_bvh
 from cardbox_tracker.applications.exporting.markers import ezc3d_or_error, write_c3d, write_trc
-from cardbox_tracker.applications.exporting.mot import write_mot
+from cardbox_tracker.applications.exporting.mot import write_mot, write_sto
 from cardbox_tracker.applications.exporting.motion import Motion, images_of_body
 from cardbox_tracker.common.errors import CardboxError, cut
 from cardbox_tracker.common.extensions import EXPORTERS, extensions, loaded, optional, place_of
@@ -37,6 +37,9 @@ from cardbox_tracker.recordings.smoothing import (
     rates_of,
 )
 from cardbox_tracker.tracking.estimate import UNCERTAIN
+
+NUMBER = "{n}"
+"""Where the number of the person is in a name for the files of all people."""
 
 
 def _write_csv(path: Path, motion: Motion, names: Iterable[str], values: FloatArray) -> None:
@@ -79,6 +82,7 @@ FORMATS: dict[str, Format] = {
     "bvh": Format(".bvh", write_bvh),
     "c3d": Format(".c3d", write_c3d, ezc3d_or_error),
     "mot": Format(".mot", write_mot),
+    "sto": Format(".sto", write_sto),
     "isb": Format(".isb.csv", write_isb, has_places=False),
     "velocities": Format(".velocities.csv", write_velocities, has_places=False),
 }
@@ -170,12 +174,27 @@ def export(results: Results, path: Path, to: Format, model: BodyModel | None = N
     return lines
 
 
+def export_all(
+    people: Mapping[int, Results], named: Path, to: Format, model: BodyModel | None = None
+) -> Iterator[str]:
+    """Write a file of each person by their numbers, and yield lines about it; see :func:`export`.
+
+    In the name of a file, ``NUMBER`` is the number. Who is seen in no image has no file, which is
+    said, unless nobody is seen.
+    """
+    seen = {k: one for k, one in people.items() if one.is_seen} or people
+    yield from (f"person {k} is in no image, and has no file" for k in people if k not in seen)
+    for number, results in seen.items():
+        path = named.with_name(named.name.replace(NUMBER, str(number)))
+        yield from (*export(results, path, to, model), f"wrote {path}")
+
+
 @dataclass(frozen=True)
 class Result(Results):
     """Results of one person."""
 
     scene: Scene | None = None  #: camera and people as of ``OUT.scene.yaml``, if they are known
-    #: those of ``track(..., people=...)`` by the numbers of the people; empty for one alone
+    #: those of ``track(..., people=...)``, or in the file, by the numbers; empty for one alone
     people: Mapping[int, Result] = field(default_factory=dict)
 
     def filtered(self, cutoff_hz: float, longest_gap_s: float = LONGEST_GAP_S) -> Result:
@@ -204,7 +223,8 @@ class Result(Results):
     def save(self, path: str | os.PathLike[str]) -> list[str]:
         """Write, or replace, a file in the format of its ending; return lines about it.
 
-        Raises CardboxError if no format has this ending, or as :func:`~.formats.export`.
+        With ``{n}`` in its name, each of ``people`` has a file with their number there. Raises
+        CardboxError if no format has this ending, or as :func:`~.formats.export`.
         """
         path, known = Path(path), formats().values()
         fitting = [one for one in known if path.name.endswith(one.suffix)]
@@ -214,12 +234,20 @@ class Result(Results):
                 f"no format has the ending of {path}; those are {endings}; "
                 "track(..., csv='OUT.csv') keeps the table"
             )
-        return export(self, path, max(fitting, key=lambda one: len(one.suffix)))
+        to = max(fitting, key=lambda one: len(one.suffix))
+        if NUMBER in path.name:
+            return [*export_all(self.people or {1: self}, path, to)]
+        return export(self, path, to)
 
 
 def read_result(path: str | os.PathLike[str], person: int | None = None) -> Result:
-    """Return the results in a table or a bag, and their scene; CardboxError names a wrong line."""
+    """Return the results in a table or a bag, and their scene; CardboxError names a wrong line.
+
+    Without ``person``, they are those of the first one, and ``people`` has each of several.
+    """
     path = Path(path)
-    results, beside = result_reader.read_results(path, person), scene_beside(path)
+    found, beside = result_reader.read_people(path, person), scene_beside(path)
     scene = load_scene(beside) if beside.is_file() else None
-    return Result(**vars(results), scene=scene)
+    people = {number: Result(**vars(one), scene=scene) for number, one in found.items()}
+    first = people[min(people)]
+    return first if len(people) == 1 else replace(first, people=people)

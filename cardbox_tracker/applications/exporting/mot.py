@@ -1,4 +1,4 @@
-"""Coordinates of a tracked motion as OpenSim's MOT, in the names of its models with arms.
+"""Coordinates of a tracked motion as OpenSim's MOT or STO, in the names of its models with arms.
 
 The models' axes are X forwards, Y up, Z to the right; a left limb is the mirror image of a right
 one. The pelvis stays level. Where legs are measured, it turns with the trunk; otherwise it faces
@@ -88,6 +88,15 @@ def write_mot(path: Path, motion: Motion, body: BodyModel | None) -> None:
 
     Raises CardboxError if the file cannot be written.
     """
+    _write(path, motion, body, (in_cell(path.stem), "version=1"))
+
+
+def write_sto(path: Path, motion: Motion, body: BodyModel | None) -> None:
+    """Write what :func:`write_mot` writes as OpenSim 4 stores tables of numbers."""
+    _write(path, motion, body, ("DataType=double", "version=3"))
+
+
+def _write(path: Path, motion: Motion, body: BodyModel | None, kind: tuple[str, ...]) -> None:
     seen = motion.is_seen
     states, turned = motion.states[seen], {}
     if motion.has_legs:
@@ -105,8 +114,7 @@ def write_mot(path: Path, motion: Motion, body: BodyModel | None) -> None:
         columns |= dict(zip(PELVIS, hips_m.T, strict=True))
     rows = np.column_stack([motion.time_s[seen], *columns.values()])
     header = (
-        in_cell(path.stem),
-        "version=1",
+        *kind,
         f"nRows={len(rows)}",
         f"nColumns={rows.shape[1]}",
         "inDegrees=yes",

@@ -7,14 +7,16 @@ from collections import Counter
 from collections.abc import Mapping, Sequence
 from itertools import compress
 from pathlib import Path
+from typing import TYPE_CHECKING
 from urllib.parse import quote
 
 import numpy as np
 
-from cardbox_tracker.applications.drawing.page import png_of, render_page
+from cardbox_tracker.applications.drawing.page import pdf_of, png_of, render_page
 from cardbox_tracker.applications.exporting.markers import markers_of
 from cardbox_tracker.applications.exporting.motion import Motion, floor_below, in_reference
 from cardbox_tracker.camera.extrinsics import Extrinsics
+from cardbox_tracker.measuring.scene import Value
 from cardbox_tracker.person.isb_angles import ANATOMICAL_NAMES, LABORATORY, anatomical_angles
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.sizes import FloatArray
@@ -23,6 +25,11 @@ from cardbox_tracker.recordings.result_reader import Results
 from cardbox_tracker.recordings.track import TrackSummary
 from cardbox_tracker.tracking.estimate import TRACKING, UNCERTAIN
 
+if TYPE_CHECKING:
+    from matplotlib.figure import FigureBase
+
+FIGURES = {".png": png_of, ".pdf": pdf_of}
+"""Kinds of figures by the endings of their files."""
 STATE_COLOURS = {UNCERTAIN: "#e69f00", "": "#9a9a9a"}
 """Colours of times whose posture may be wrong, and of those without one."""
 _KNEES = "left_knee_flexion", "right_knee_flexion"
@@ -45,13 +52,39 @@ def angles_plot(results: Results) -> bytes:
     """Return elbows, arms, trunk and knees over time as PNG, with bands of a standard deviation."""
     from matplotlib.figure import Figure
 
+    figure = Figure(figsize=(10.0, _height(results)), dpi=_DPI, layout="constrained")
+    _draw_angles(figure, results)
+    return png_of(figure)
+
+
+def page_figure(results: Results, kind: str) -> bytes:
+    """Return the skeleton at some moments over the angles, as :data:`FIGURES` of a kind."""
+    from matplotlib.figure import Figure
+
+    high, low = (3.4 if results.is_seen else 0.0), _height(results)
+    figure = Figure(figsize=(12.0, high + low), dpi=_DPI, layout="constrained")
+    if results.is_seen:
+        above, below = figure.subfigures(2, 1, height_ratios=(high, low))
+        _draw_space(above, Motion.of(results), results.body)
+    _draw_angles(below if results.is_seen else figure, results)
+    return FIGURES[kind](figure)
+
+
+def _shown(results: Results) -> dict[str, dict[str, str]]:
+    has_knees = bool(np.isfinite(results.of(_KNEES)).any())
+    return {name: columns for name, columns in _ANGLES.items() if name != "knee" or has_knees}
+
+
+def _height(results: Results) -> float:
+    return 2.2 * len(_shown(results))
+
+
+def _draw_angles(figure: FigureBase, results: Results) -> None:
     angles = angles_of(results)
     shown = {
         name: {label: angles[column] for label, column in columns.items()}
-        for name, columns in _ANGLES.items()
-        if name != "knee" or np.isfinite(results.of(_KNEES)).any()
+        for name, columns in _shown(results).items()
     }
-    figure = Figure(figsize=(10.0, 2.2 * len(shown)), dpi=_DPI, layout="constrained")
     time_s = results.time_s
     for row, (name, lines) in zip(
         figure.subplots(len(shown), sharex=True, squeeze=False)[:, 0], shown.items(), strict=True
@@ -73,7 +106,6 @@ def angles_plot(results: Results) -> bytes:
     row.set_xlabel(
         "time [s]; bands: one standard deviation; orange: may be wrong, grey: no posture"
     )
-    return png_of(figure)
 
 
 def angles_of(results: Results) -> dict[str, tuple[FloatArray, FloatArray]]:
@@ -114,20 +146,37 @@ def _why(results: Results, begin_s: float, end_s: float) -> str:
     return reasons.most_common(1)[0][0] or UNCERTAIN
 
 
-def space_view(motion: Motion, body: BodyModel | None, true_m: FloatArray | None = None) -> bytes:
+def space_view(
+    motion: Motion,
+    body: BodyModel | None,
+    true_m: FloatArray | None = None,
+    pitch: Value | None = None,
+) -> bytes:
     """Return the skeleton from aside at some moments of a motion of n images as PNG.
 
-    ``true_m`` are keypoints of a reference, (n, 6, 3), metres in the optical frame, or nan.
+    ``true_m`` are keypoints of a reference, (n, 6, 3), metres in the optical frame, or nan; the
+    ``pitch`` of the camera, rad, explains their distance.
     """
     from matplotlib.figure import Figure
 
+    figure = Figure(figsize=(3.0 * _MOMENTS, 3.4), dpi=_DPI, layout="constrained")
+    _draw_space(figure, motion, body, true_m, pitch)
+    return png_of(figure)
+
+
+def _draw_space(
+    figure: FigureBase,
+    motion: Motion,
+    body: BodyModel | None,
+    true_m: FloatArray | None = None,
+    pitch: Value | None = None,
+) -> None:
     seen = motion.is_seen if true_m is None else motion.is_seen & np.isfinite(true_m).all((1, 2))
     numbers = np.flatnonzero(seen if seen.any() else motion.is_seen)
     chosen = numbers[np.linspace(0, len(numbers) - 1, 2 * _MOMENTS + 1).astype(int)[1::2]]
     markers = markers_of(motion, body)
     points_m = _upright(markers.points_m[chosen])
     reference_m = None if true_m is None else _placed(true_m[chosen], body)
-    figure = Figure(figsize=(3.0 * _MOMENTS, 3.4), dpi=_DPI, layout="constrained")
     low, high = (f(points_m, axis=(0, 1)) for f in (np.nanmin, np.nanmax))
     middle, half = (low + high) / 2, float(np.max(high - low)) / 2 + 0.1
     for column, number in enumerate(chosen.tolist()):
@@ -149,9 +198,23 @@ def space_view(motion: Motion, body: BodyModel | None, true_m: FloatArray | None
         axes.set_box_aspect((1, 1, 1), zoom=1.25)
         axes.view_init(elev=10.0, azim=-35.0)
         axes.tick_params(labelsize=6)
-    what = "; light blue: reference" if reference_m is not None else ""
+    what = "" if true_m is None else _reference_words(motion.keypoints_m - true_m, pitch)
     figure.suptitle(f"green: left, orange: right{what}; metres", fontsize=10)
-    return png_of(figure)
+
+
+def _reference_words(off_m: FloatArray, pitch: Value | None) -> str:
+    """Return how far a skeleton is from its reference, (n, 6, 3), m, and on what that rests."""
+    middle_m = np.nanmean(off_m, axis=(0, 1))
+    where = "farther from" if middle_m[2] > 0 else "nearer to"
+    words = f"; light blue: reference.\nThe skeleton is {100 * np.linalg.norm(middle_m):.0f} cm "
+    words += f"{where} the camera"
+    if pitch is None:
+        return words
+    mean_deg, stddev_deg = np.degrees(pitch[:2])
+    return (
+        f"{words}: one camera sees the distance by size and by its own pitch, here {mean_deg:.0f} "
+        f"+- {stddev_deg:.0f} degrees"
+    )
 
 
 def cameras_view(

@@ -18,16 +18,19 @@ from cardbox_tracker.applications.drawing.overlay import (
     draw_message,
     draw_model,
     draw_overlay,
+    draw_sharp_overlay,
+    with_hidden_faces,
     with_hidden_head,
 )
 from cardbox_tracker.camera.camera import Camera
-from cardbox_tracker.detectors.image_points import POINT_NAMES, ImagePoints
+from cardbox_tracker.detectors.image_points import ImagePoints
 from cardbox_tracker.person.cardbox import PATCH_NAMES, cardbox_patches
 from cardbox_tracker.person.kinematics import pose
 from cardbox_tracker.person.model import BodyModel, body_from_proportions
 from cardbox_tracker.person.posture import reference_posture
 from cardbox_tracker.person.skeleton import KeypointState
 from cardbox_tracker.recordings.markers import marker_shapes
+from cardbox_tracker.recordings.silhouettes import RecordedFrame
 from cardbox_tracker.terms.whole_body import WholeBodyCost
 from cardbox_tracker.terms.whole_body_config import WholeBodyCostConfig
 from cardbox_tracker.tracking.estimate import NO_PERSON, TRACKING, Estimate, Hand, Legs
@@ -221,9 +224,9 @@ NEAR = Camera(320, 240, 330.0, 330.0, 159.5, 119.5)
 NOISE = np.random.default_rng(0).integers(0, 256, (240, 320, 3), np.uint8)
 
 
-def hidden_by(estimate: Estimate, points: ImagePoints | None = None) -> np.ndarray:
+def hidden_by(estimate: Estimate) -> np.ndarray:
     """Return which pixels (H, W) of noise were changed."""
-    drawn = with_hidden_head(NOISE, AVERAGE, NEAR, estimate, points)
+    drawn = with_hidden_head(NOISE, AVERAGE, NEAR, estimate)
     assert drawn.shape == NOISE.shape
     return np.asarray((drawn != NOISE).any(axis=2))
 
@@ -266,14 +269,28 @@ def test_few_colours_remain() -> None:
     assert (np.random.default_rng(0).integers(0, 256, NOISE.shape, np.uint8) == NOISE).all()
 
 
-def test_the_points_of_a_face_are_hidden_too() -> None:
-    px = np.full((len(POINT_NAMES), 2), np.nan)
-    px[POINT_NAMES.index("nose")] = 290.0, 40.0
-    points = ImagePoints(px, np.where(np.isfinite(px[:, 0]), 0.9, 0.0))
-    near_the_point = np.s_[35:46, 285:296]
-    estimate = Estimate(TRACKING, np.zeros(12))
-    assert not hidden_by(estimate)[near_the_point].any()
-    assert hidden_by(estimate, points)[near_the_point].mean() > 0.95
+def face_at(column: float) -> ImagePoints:
+    known = {"nose": (column, 40, 0.9), "left_shoulder": (column + 15, 70, 0.9)}
+    return ImagePoints.of({**known, "right_shoulder": (column - 15, 70, 0.9)})
+
+
+def test_all_faces_that_a_detector_shows_are_hidden_at_any_size() -> None:
+    large = NOISE.repeat(2, axis=0).repeat(2, axis=1)
+    drawn = with_hidden_faces(large, NEAR, [face_at(60.0), face_at(290.0), ImagePoints.of({})])
+    changed = (drawn != large).any(axis=2)
+    for column in (60, 290):
+        head = changed[2 * 28 : 2 * 52, 2 * (column - 12) : 2 * (column + 12)]
+        assert head.mean() > 0.95
+    assert changed.mean() < 0.05
+
+
+def test_sharp_pictures_of_bags_have_no_face_of_anybody() -> None:
+    tracker = Tracker(AVERAGE, NEAR)
+    frame = RecordedFrame(0, 0.0, NOISE, NOISE[..., 0], people=(face_at(290.0),))
+    estimate = Estimate(TRACKING, np.zeros(12), iou=0.9, cost_px=1)
+    shown, hidden = (draw_sharp_overlay(frame, estimate, tracker, hides) for hides in (False, True))
+    there = np.s_[2 * 30 : 2 * 50, 2 * 280 : 2 * 300]
+    assert (shown[there] != hidden[there]).any(axis=2).mean() > 0.95
 
 
 def test_an_unknown_head_hides_everything() -> None:

@@ -6,6 +6,7 @@ import base64
 import csv
 import re
 from dataclasses import replace
+from functools import partial
 from html.parser import HTMLParser
 from pathlib import Path
 from typing import Any, cast
@@ -16,9 +17,10 @@ import pytest
 
 from cardbox_tracker.applications.ergonomics.recording import (
     MomentImages,
-    RulaObserver,
     RulaRow,
+    ScoreObserver,
     header_of,
+    score_rula,
     score_shares,
     summarize,
     worst_moments,
@@ -247,7 +249,7 @@ def test_a_page_has_what_the_reader_needs(tmp_path: Path) -> None:
     assert "1. 6.0 s: score 7.0, but the posture may be wrong (" in words
     assert "2. 1.0 s: score 6.0 (" in words
     assert "mean score of the mean postures: 5.7" in words
-    assert "head of the tracked person is hidden" in words
+    assert "head of the tracked person is hidden, and faces" in words
 
 
 def test_names_are_only_text(tmp_path: Path) -> None:
@@ -312,30 +314,30 @@ class Still:
     """A tracker that is sure that the person stands upright, with hanging arms."""
 
     body = body_from_proportions(1.75, 2.0)
-    stamp_ns, time_s = 0, 0.0
 
-    def sample(self, estimate: Estimate, count: int, rng: np.random.Generator) -> np.ndarray:
-        """Every sample is the posture itself."""
-        return np.tile(cast(Any, estimate.posture), (count, 1))
+
+def scored(images: MomentImages | None = None) -> ScoreObserver:
+    return ScoreObserver(Path("film.mp4"), partial(score_rula, config=RulaConfig(), seed=0), images)
 
 
 def likeliest(*estimates: Estimate) -> list[int | None]:
-    observer = RulaObserver(RulaConfig(), seed=0)
-    for estimate in estimates:
-        observer(cast(Any, Still()), estimate, cast(Any, Still()))
+    observer, grey = scored(), np.zeros((4, 4), np.uint8)
+    for number, estimate in enumerate(estimates):
+        frame = RecordedFrame(number, float(number), grey, grey)
+        observer(frame, estimate, cast(Any, Still()))
     return [None if row.scores is None else row.scores.likeliest for row in observer.rows]
 
 
 def test_a_bent_neck_raises_the_score() -> None:
     """On the worksheet, A 2 with necks 1 and 3 give 2 and 3."""
-    plain = Estimate(TRACKING, np.zeros(12), np.zeros(12))
+    plain = Estimate(TRACKING, np.zeros(12), np.zeros(12), np.zeros((6, 3)), 0, 1.0)
     bent = replace(plain, neck=np.array([0.0, 0.5]), neck_stddev=np.full(2, 0.01))
     assert likeliest(plain, bent, Estimate(NO_PERSON)) == [2, 3, None]
 
 
-def observed(images: MomentImages, *pitches_rad: float, state: str = TRACKING) -> RulaObserver:
+def observed(images: MomentImages, *pitches_rad: float, state: str = TRACKING) -> ScoreObserver:
     """Return an observer of one image a second, in which the person bows by each angle."""
-    observer = RulaObserver(RulaConfig(), 0, images)
+    observer = scored(images)
     tracker = Still()
     cast(Any, tracker).camera = Camera(320, 240, 330.0, 330.0, 159.5, 119.5)
     grey = np.full((240, 320), 128, np.uint8)
@@ -343,7 +345,7 @@ def observed(images: MomentImages, *pitches_rad: float, state: str = TRACKING) -
         posture = np.zeros(12)
         posture[2] = pitch_rad
         frame = RecordedFrame(number * 10**9, float(number), grey, grey)
-        estimate = Estimate(state, posture, np.zeros(12), cost_px=0, iou=1.0)
+        estimate = Estimate(state, posture, np.zeros(12), np.zeros((6, 3)), 0, 1.0)
         observer(frame, estimate, cast(Any, tracker))
     return observer
 

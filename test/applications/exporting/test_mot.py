@@ -8,7 +8,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from cardbox_tracker.applications.exporting.mot import ARM, LUMBAR, coordinates_of, write_mot
+from cardbox_tracker.applications.exporting.mot import (
+    ARM,
+    LUMBAR,
+    coordinates_of,
+    write_mot,
+    write_sto,
+)
 from cardbox_tracker.person.isb_angles import LABORATORY
 from cardbox_tracker.person.kinematics import pose
 from cardbox_tracker.person.legs import floor_m, leg_directions
@@ -132,3 +138,15 @@ def test_angles_do_not_jump_by_a_whole_turn(
     rows = np.array([line.split() for line in lines[7:]], float)
     turned = rows[:, lines[6].split().index("lumbar_rotation")]
     np.testing.assert_allclose(np.abs(np.diff(turned)), np.degrees(1.5 / 7), atol=1e-3)
+
+
+def test_sto_has_the_columns_of_mot_below_the_header_of_opensim_4(
+    tmp_path: Path, motion_of: Callable, body: BodyModel
+) -> None:
+    motion = motion_of(postures(4), body)
+    mot, sto = tmp_path / "a.mot", tmp_path / "a.sto"
+    write_mot(mot, motion, body)
+    write_sto(sto, motion, body)
+    (_, below), (head, same) = (one.read_text().split("endheader\n") for one in (mot, sto))
+    assert below == same
+    assert {"DataType=double", "version=3", "inDegrees=yes", "nRows=4"} <= {*head.splitlines()}

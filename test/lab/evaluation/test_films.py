@@ -52,6 +52,20 @@ def test_a_film_shows_the_motions_with_the_axis_in_the_middle(
     assert images[last] is not None and np.ptp(images[last]) > 50
 
 
+def test_motions_are_compared_where_each_shows_all_joints(unmeasured: Path, tmp_path: Path) -> None:
+    whole = make_film(unmeasured, "across", tmp_path / "a.mp4").session
+    film = make_film(unmeasured, "across", tmp_path / "b.mp4", is_compared=True)
+    kept = film.session
+    assert 0 < len(kept.stamps_ns) < len(whole.stamps_ns)
+    assert len(kept.keypoints_m) == len(kept.segments) == len(kept.stamps_ns)
+    stamps = np.array(film.stamps_ns)
+    for session in (kept, whole):
+        shares = (session.stamps_ns - stamps[0]) / (stamps[-1] - stamps[0])
+        angles = np.degrees(np.arctan2(session.keypoints_m[..., 0], session.keypoints_m[..., 2]))
+        away = np.abs(angles + (30.0 * shares - 15.0)[:, None]).max()
+        assert (away < film.fov_deg / 2 + 1.0) == (session is kept)
+
+
 def test_figures_have_the_pitch_that_was_found(unmeasured: Path, tmp_path: Path) -> None:
     film = make_film(unmeasured, "across", tmp_path / "film.mp4")
     truth = dict(zip(film.session.stamps_ns.tolist(), film.session.keypoints_m, strict=True))
