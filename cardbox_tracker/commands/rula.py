@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import MISSING, dataclass, fields
 from datetime import UTC, datetime
-from functools import partial
 from pathlib import Path
 from typing import TypeVar
 
@@ -103,7 +102,11 @@ def score(
     """Track the recording, if it is none of results, score it, and write what was asked for."""
     if asked.html is None and (asked.title is not None or asked.images != IMAGES[0]):
         raise CardboxError("--images and --title change the page of --html; give --html OUT.html")
-    images, by = None, partial(score_by, config=config, seed=asked.seed)
+    images = None
+
+    def by(results: Results) -> list[RulaRow]:
+        return score_by(results, config, asked.seed)
+
     if is_results(asked.recording):
         check_outputs(asked.outputs, asked.force, inputs=(asked.recording,))
         results = _read(asked)
@@ -179,14 +182,15 @@ def _read(asked: Scored) -> Results:
     options = {one.name: getattr(asked, one.name) for one in fields(TrackingOptions)}
     without = TrackingOptions(**{**options, "person": None, "seed": 0}).given().keys() - {*kept}
     wrong = [*sorted(without), *(["--images"] if asked.images != IMAGES[0] else [])]
-    if not isinstance(asked.person, int | None):
+    person = asked.person if isinstance(asked.person, int) else None
+    if asked.person != person:
         wrong.append("--person, but for a number,")
     if wrong:
         raise CardboxError(
             f"{wrong[0]} has no effect on {asked.recording}, which is tracked already; leave it "
             "out, or give the recording"
         )
-    return TrackedResults(results=asked.recording, person=asked.person).read()
+    return TrackedResults(results=asked.recording, person=person).read()
 
 
 def _about_results(asked: Scored, results: Results) -> Mapping[str, str]:

@@ -65,14 +65,18 @@ def _track_shots(asked: Request, faults: Iterable[str]) -> None:
     request = tracking_request(asked, faults)
     with request.recording.open() as source:
         spans = source.first.shots(request.person.start_s, request.person.end_s)
+    left_out = 0
     for number, span in enumerate(spans, 1):
         print(f"shot {number} of {len(spans)}: {span.start_s:.2f} to {span.end_s:.2f} s")
-        paths = {name: getattr(asked, name) for name in _FILES}
-        named = {name: _of_shot(path, number) for name, path in paths.items() if path is not None}
+        changed: dict[str, Any] = {"start_s": span.start_s, "end_s": span.end_s}
+        for name in _FILES:
+            path = getattr(asked, name)
+            changed[name] = None if path is None else _of_shot(path, number)
         try:
-            track_one(replace(asked, start_s=span.start_s, end_s=span.end_s, **named))
+            track_one(replace(asked, **changed))
         except CardboxError as error:
-            if len(spans) == 1:
+            left_out += 1
+            if left_out == len(spans):
                 raise
             print_remarks([f"shot {number} is left out: {error}"])
 

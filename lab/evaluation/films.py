@@ -168,8 +168,9 @@ def _inside(
     if not kept.any():
         raise CardboxError(f"{session.name} has no image whose joints are in view with each motion")
     names = "stamps_ns", "segments", "keypoints_m", "torso_rad", "hips_m"
-    given = {name: getattr(session, name) for name in names}
-    return replace(session, **{name: v if v is None else v[kept] for name, v in given.items()})
+    values = ((name, getattr(session, name)) for name in names)
+    left: dict[str, Any] = {name: one if one is None else one[kept] for name, one in values}
+    return replace(session, **left)
 
 
 def _turn(k: FloatArray, middle: tuple[float, float], down: FloatArray) -> FloatArray:

@@ -64,7 +64,8 @@ def page_figure(results: Results, kind: str) -> bytes:
     high, low = (3.4 if results.is_seen else 0.0), _height(results)
     figure = Figure(figsize=(12.0, high + low), dpi=_DPI, layout="constrained")
     if results.is_seen:
-        above, below = figure.subfigures(2, 1, height_ratios=(high, low))
+        parts = figure.subfigures(2, 1, squeeze=False, height_ratios=(high, low))
+        above, below = parts[:, 0]
         _draw_space(above, Motion.of(results), results.body)
     _draw_angles(below if results.is_seen else figure, results)
     return FIGURES[kind](figure)
