@@ -18,7 +18,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import BinaryIO
 
-from cardbox_tracker.common.errors import CardboxError, cut
+from cardbox_tracker.common.errors import CardboxError, reason_of
 
 # Part of the names of temporary files, which can remain after a crash.
 _MARK = ".unfinished-"
@@ -36,8 +36,7 @@ def foreign(
 ) -> Iterator[None]:
     """Turn any error of a reader of files that others wrote into the package's own.
 
-    Parsers of foreign formats can raise errors of any type. Raises CardboxError if reading failed;
-    one that names the file stays as it is.
+    Raises CardboxError if reading failed; one that names the file stays as it is.
     """
     name = os.fspath(path)
     try:
@@ -45,14 +44,7 @@ def foreign(
     except Exception as error:
         if isinstance(error, CardboxError) and name in str(error):
             raise
-        reason = " ".join(str(getattr(error, "strerror", None) or error).split())
-        if isinstance(error, UnicodeDecodeError):
-            reason = "it is no text in UTF-8"
-        if isinstance(error, KeyError):
-            reason = f"missing key {reason}"
-        elif not isinstance(error, CardboxError):
-            reason = cut(reason) or type(error).__name__
-        raise kind(f"cannot read {name}: {reason}; expected {expected}") from None
+        raise kind(f"cannot read {name}: {reason_of(error)}; expected {expected}") from None
 
 
 @contextmanager
