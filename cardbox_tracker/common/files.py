@@ -18,7 +18,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import BinaryIO
 
-from cardbox_tracker.common.errors import CardboxError, reason_of
+from cardbox_tracker.common.errors import CardboxError, quoted, reason_of
 
 # Part of the names of temporary files, which can remain after a crash.
 _MARK = ".unfinished-"
@@ -226,6 +226,8 @@ def is_written_in_place(path: str | os.PathLike[str]) -> bool:
         mode = os.stat(path).st_mode
     except OSError:
         return False
+    except ValueError as error:  # a NUL in the name
+        raise CardboxError(f"cannot write {quoted(os.fspath(path))}: {error}") from None
     if stat.S_ISBLK(mode) or stat.S_ISSOCK(mode):
         what = "a disk" if stat.S_ISBLK(mode) else "a socket"
         raise CardboxError(f"cannot write {os.fspath(path)}: it is {what}; give the name of a file")
