@@ -11,6 +11,9 @@ first use, so that ``import cardbox_tracker`` is fast.
 from __future__ import annotations
 
 import ast as _ast
+import os as _os
+import re as _re
+import sys as _sys
 from importlib import import_module
 from pathlib import Path as _Path
 from typing import TYPE_CHECKING, Any
@@ -69,6 +72,11 @@ _MODULE_OF: dict[str, str] = {
     for alias in node.names
 }
 __all__ = sorted(_MODULE_OF)
+
+# Python cannot run the kernels, and numba cannot be imported without a thread.
+for _name, _unusable in (("NUMBA_DISABLE_JIT", r"0*[1-9]\d*"), ("NUMBA_NUM_THREADS", r"0+|-\d+")):
+    if _re.fullmatch(_unusable, _os.environ.get(_name, "")):
+        print(f"{__name__}: {_name}={_os.environ.pop(_name)} is not followed", file=_sys.stderr)
 
 
 def __getattr__(name: str) -> Any:

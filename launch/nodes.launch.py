@@ -28,6 +28,7 @@ from rclpy.parameter_client import AsyncParameterClient
 from rclpy.qos import DurabilityPolicy, QoSProfile
 from std_msgs.msg import String
 
+from cardbox_tracker.common.errors import reason_of
 from cardbox_tracker.ros.runtime.launch_arguments import (
     Argument,
     check_names,
@@ -318,7 +319,7 @@ def _kept(path: Path, node: str) -> dict[str, object]:
         return parameters_in(yaml.safe_load(path.read_text(encoding="utf-8")), node)
     except (OSError, yaml.YAMLError, ValueError) as error:
         raise ValueError(
-            f"{path} is no file of parameters: {error}; expected the form of "
+            f"{path} is no file of parameters: {reason_of(error)}; expected the form of "
             f"{SHARE / 'config' / path.name}; with single_process:=false the node reads the file"
         ) from None
 

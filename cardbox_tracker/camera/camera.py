@@ -40,6 +40,8 @@ CALIBRATED, GIVEN_FIELD_OF_VIEW = 0.005, 0.03
 a person states."""
 # Largest side of a JPEG image; a CameraInfo and a file may contain any number.
 _MOST_SIDE_PX = 65535
+# Of a field of view of nearly 180 degrees; no lens is so unknown.
+_MOST_STDDEV = 100.0
 
 
 def roll_turn(roll_rad: float) -> FloatArray:
@@ -84,10 +86,10 @@ class Camera:
             object.__setattr__(self, name, whole_pixels(name, getattr(self, name)))
         for name in ("fx", "fy", "cx", "cy", "pitch_rad", "focal_stddev"):
             object.__setattr__(self, name, real_number(name, getattr(self, name)))
-        if not 0.0 <= self.focal_stddev < math.inf:
+        if not 0.0 <= self.focal_stddev <= _MOST_STDDEV:
             raise CameraError(
                 f"the deviation of the camera's focal lengths is {self.focal_stddev:g}; expected a "
-                "finite share of them from 0 on, such as 0.02"
+                f"share of them from 0 to {_MOST_STDDEV:g}, such as 0.02"
             )
         if not all(0 < side <= _MOST_SIDE_PX for side in (self.width, self.height)):
             raise CameraError(
@@ -191,6 +193,7 @@ class Calibration:
     @classmethod
     def of_fov(cls, width: int, height: int, fov_deg: float) -> Calibration:
         """Return an ideal lens with a field of view, 0 to 180 degrees, across the image's width."""
+        fov_deg = real_number("field of view", fov_deg)
         if not 0.0 < fov_deg < 180.0:
             raise CameraError(
                 f"the field of view is {fov_deg:g} degrees; expected more than 0 and less than 180"

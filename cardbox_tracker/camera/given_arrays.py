@@ -12,6 +12,8 @@ import cv2
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from cardbox_tracker.common.errors import reason_of
+
 ImageArray = NDArray[np.uint8]
 DepthImage = NDArray[np.float32]
 Size = tuple[int, int]
@@ -114,7 +116,9 @@ def _array(given: ArrayLike, name: str) -> NDArray[Any]:
     try:
         array = np.asarray(given)
     except (TypeError, ValueError, RuntimeError, OverflowError) as error:
-        raise ValueError(f"{name} is no array of numbers ({error}); expected one") from None
+        raise ValueError(
+            f"{name} is no array of numbers: {reason_of(error)}; expected one"
+        ) from None
     if array.dtype.kind not in "biuf":
         raise ValueError(
             f"{name} is of the type {type(given).__name__}, of {array.dtype}; expected an array "

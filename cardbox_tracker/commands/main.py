@@ -59,6 +59,7 @@ LAB = {
 
 # A folder of recordings has many reasons.
 _MOST_OF_AN_ERROR = 20_000
+_NO_MEMORY = -4  # cv2.Error.StsNoMem
 _DESCRIPTION = """\
 The 3D posture of one person's upper body, from the silhouettes that one
 or more fixed cameras see. These commands work on recordings (rosbag2, videos,
@@ -106,6 +107,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
         if interrupts.received():
             # An interrupted import or call of ROS raises errors of its own.
             return _interrupted(name)
+        if isinstance(error, ImportError | MemoryError) or getattr(error, "code", 0) == _NO_MEMORY:
+            remedy = "allow more memory, as with 'ulimit -v', or install the package anew"
+            print(f"cardbox {name}: {str(error) or 'no memory is left'}; {remedy}", file=sys.stderr)
+            return 1
         if not isinstance(error, OSError):
             raise
         # This may be a full disk. Outputs are written atomically, so none is left incomplete.

@@ -19,7 +19,7 @@ from cardbox_tracker.commands.arguments import check_outputs, print_remarks
 from cardbox_tracker.commands.request import Request, TrackArguments
 from cardbox_tracker.commands.tracking import track as track_request
 from cardbox_tracker.commands.tracking_request import TrackFiles, tracking_request
-from cardbox_tracker.common.errors import CardboxError
+from cardbox_tracker.common.errors import CardboxError, quoted
 from cardbox_tracker.common.files import (
     body_beside,
     is_written_in_place,
@@ -99,9 +99,13 @@ def track(
         near = suggestion(name, known)
         raise CardboxError(f"track has no keyword {name}; {near}expected any of {', '.join(known)}")
     if not isinstance(recording, Request):
-        paths = [recording] if isinstance(recording, str | os.PathLike) else list(recording)
-        if not paths:
-            raise CardboxError("track has no recording; give a path, or several films")
+        is_one = isinstance(recording, str | os.PathLike)
+        paths: list[Any] = list(recording) if isinstance(recording, Iterable) else []
+        paths = [recording] if is_one else paths
+        if not paths or not all(isinstance(one, str | os.PathLike) for one in paths):
+            raise CardboxError(
+                f"track has no recording, but {quoted(recording)}; give a path, or several films"
+            )
         recording = Request(Path(paths[0]), films=tuple(map(Path, paths[1:])))
     asked = replace(recording, **options)
     path = asked.recording

@@ -42,6 +42,7 @@ F = TypeVar("F", bound=Callable[..., Any])
 
 _LOG = logging.getLogger(__name__)
 _CONFIG: Any = numba.config
+_CONFIG.reload_config()  # others may have imported numba before this package
 _LOCK = threading.Lock()
 _IMPORT = re.compile(rb"^from cardbox_tracker\.?(\S*) import (\([^)]*\)|.*)", re.MULTILINE)
 # Another branch, or a version with bounds checks, is then not compiled anew at each change.

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+
 
 class CardboxError(Exception):
     """Base of all errors that users can cause; programs print the text without a traceback."""
@@ -77,6 +79,35 @@ def plain(text: str, most: int = _MOST_OF_A_TEXT) -> str:
 def in_cell(text: str) -> str:
     """Return a text as a cell of a table: without tabs and line breaks, see :func:`plain`."""
     return plain(text).replace("\n", "\\n")
+
+
+_NO_NUMBER = re.compile(
+    r"(?:could not convert string to float|invalid literal for int\(\) with base 10): (.*)"
+)
+_OF_PYTHON = re.compile(
+    r"object (is|has|cannot) |NoneType|codec|unpack|indices must|convert float|inhomogeneous"
+    r"|array element|broadcast|reshape|dtype"
+)
+_KINDS_OF_PYTHON = TypeError, AttributeError, IndexError, ArithmeticError, RecursionError
+
+
+def reason_of(error: Exception) -> str:
+    """Return why data of others cannot be read; the words of Python and NumPy become plain ones.
+
+    Parsers of foreign formats can raise errors of any type.
+    """
+    reason = " ".join(str(getattr(error, "strerror", None) or error).split())
+    if isinstance(error, CardboxError):
+        return reason
+    if isinstance(error, UnicodeDecodeError):
+        return "it is no text in UTF-8"
+    if isinstance(error, KeyError):
+        return f"missing key {cut(reason)}"
+    if found := _NO_NUMBER.search(reason):
+        return f"{cut(found[1])} is no number"
+    if isinstance(error, _KINDS_OF_PYTHON) or _OF_PYTHON.search(reason):
+        return "a value is missing, or of another type, size or range than expected"
+    return cut(reason) or type(error).__name__
 
 
 def quoted(value: object) -> str:

@@ -19,7 +19,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, BinaryIO
 
-from cardbox_tracker.common.errors import CardboxError, cut
+from cardbox_tracker.common.errors import CardboxError, quoted, reason_of
 
 # Part of the names of temporary files, which can remain after a crash.
 _MARK = ".unfinished-"
@@ -40,8 +40,7 @@ def foreign(
 ) -> Iterator[None]:
     """Turn any error of a reader of files that others wrote into the package's own.
 
-    Parsers of foreign formats can raise errors of any type. Raises CardboxError if reading failed;
-    one that names the file stays as it is.
+    Raises CardboxError if reading failed; one that names the file stays as it is.
     """
     name = os.fspath(path)
     try:
@@ -49,14 +48,7 @@ def foreign(
     except Exception as error:
         if isinstance(error, CardboxError) and name in str(error):
             raise
-        reason = " ".join(str(getattr(error, "strerror", None) or error).split())
-        if isinstance(error, UnicodeDecodeError):
-            reason = "it is no text in UTF-8"
-        if isinstance(error, KeyError):
-            reason = f"missing key {reason}"
-        elif not isinstance(error, CardboxError):
-            reason = cut(reason) or type(error).__name__
-        raise kind(f"cannot read {name}: {reason}; expected {expected}") from None
+        raise kind(f"cannot read {name}: {reason_of(error)}; expected {expected}") from None
 
 
 @contextmanager
@@ -238,6 +230,8 @@ def is_written_in_place(path: str | os.PathLike[str]) -> bool:
         mode = os.stat(path).st_mode
     except OSError:
         return False
+    except ValueError as error:  # a NUL in the name
+        raise CardboxError(f"cannot write {quoted(os.fspath(path))}: {error}") from None
     if stat.S_ISBLK(mode) or stat.S_ISSOCK(mode):
         what = "a disk" if stat.S_ISBLK(mode) else "a socket"
         raise CardboxError(f"cannot write {os.fspath(path)}: it is {what}; give the name of a file")

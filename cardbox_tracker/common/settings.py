@@ -7,9 +7,10 @@ nodes and their documentation are generated from these fields.
 from __future__ import annotations
 
 import difflib
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, fields, is_dataclass, replace
 from functools import partial
+from numbers import Real
 from typing import Any, TypeVar
 
 from cardbox_tracker.common.errors import quoted
@@ -60,9 +61,10 @@ class Setting:
             )
         if self.limits is not None:
             lowest, highest = self.limits
-            if not lowest <= value <= highest:  # this form refuses NaN, too
+            is_number = isinstance(value, Real)
+            if not (is_number and lowest <= value <= highest):  # this form refuses NaN, too
                 # A whole number may be too large for a float.
-                shown = f"{value:g}" if abs(value) < _LARGE else quoted(value)
+                shown = f"{value:g}" if is_number and abs(value) < _LARGE else quoted(value)
                 raise ValueError(f"{name} is {shown}; expected {lowest:g} to {highest:g}")
 
 
@@ -130,12 +132,28 @@ def settings_below(instance: Any, before: str = "") -> Iterator[tuple[str, Any, 
 
 
 def check(instance: Any) -> None:
-    """Check every setting of a dataclass instance.
+    """Check every setting of a dataclass instance, and the classes of nested settings.
 
     Raises ValueError if a value is not allowed; the text names it.
     """
     for name, one in settings_of(instance).items():
         one.check(name, getattr(instance, name))
+    for entry in fields(instance):
+        default, value = entry.default, getattr(instance, entry.name)
+        if isinstance(default, Settings | tuple):
+            of_kind(entry.name, value, type(default) if isinstance(default, Settings) else Sequence)
+
+
+def of_kind(name: str, value: Any, kind: type[T]) -> T:
+    """Return a value that is of a class; ValueError, which names it, if it is not."""
+    if not isinstance(value, kind):
+        raise ValueError(f"{name} is {quoted(value)}; expected an instance of {kind.__name__}")
+    return value
+
+
+def settings_or(default: T, given: T | None) -> T:
+    """Return settings that are given, or the default ones; ValueError if they are of no such."""
+    return default if given is None else of_kind("config", given, type(default))
 
 
 class Settings:
@@ -192,7 +210,7 @@ def nested(values: Mapping[str, Any]) -> dict[str, Any]:
     """
     result: dict[str, Any] = {}
     for dotted, value in values.items():
-        *outer, name = dotted.split(".")
+        *outer, name = str(dotted).split(".")
         inner = result
         for part in outer:
             inner = inner.setdefault(part, {})

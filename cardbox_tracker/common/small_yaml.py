@@ -11,7 +11,7 @@ from typing import Any
 
 import yaml
 
-from cardbox_tracker.common.errors import CardboxError, cut, quoted
+from cardbox_tracker.common.errors import CardboxError, cut, quoted, reason_of
 from cardbox_tracker.common.files import UnreadableFileError, read_regular
 
 MOST_BYTES = 64 * 1024
@@ -37,7 +37,7 @@ def parse_small_yaml(text: str) -> Any:
         raise SmallYamlError(f"it is not valid YAML: {cut(str(error))}") from None
     except (ArithmeticError, AttributeError, LookupError, TypeError, ValueError) as error:
         # PyYAML does not catch errors of conversions, for example of an impossible date.
-        raise SmallYamlError(f"it is not valid YAML: {cut(str(error))}") from None
+        raise SmallYamlError(f"it is not valid YAML: {reason_of(error)}") from None
 
 
 class _Loader(yaml.SafeLoader):

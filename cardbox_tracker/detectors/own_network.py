@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cardbox_tracker.camera.given_arrays import silhouette_from
-from cardbox_tracker.common.errors import CardboxError, cut, quoted
+from cardbox_tracker.common.errors import CardboxError, cut, quoted, reason_of
 from cardbox_tracker.detectors.point_checks import check_person, check_point
 from cardbox_tracker.detectors.pose_network import (
     LANDMARKS,
@@ -94,8 +94,8 @@ class OwnNetwork(PoseNetwork):
                 found.append(_detection(person, image.shape[:2]))
             except (CardboxError, ValueError, TypeError, AttributeError, ArithmeticError) as error:
                 raise CardboxError(
-                    f"{name}, person {number}: {error}; expected column, row and score, or these "
-                    "and x, y and z, by names of points"
+                    f"{name}, person {number}: {reason_of(error)}; expected column, row and "
+                    "score, or these and x, y and z, by names of points"
                 ) from None
         return [one for one in found if one.scores.any()]
 

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cardbox_tracker.camera.camera import Calibration
-from cardbox_tracker.common.errors import CardboxError, quoted
+from cardbox_tracker.common.errors import CardboxError, quoted, reason_of
 from cardbox_tracker.common.files import UnreadableFileError, foreign, table_rows
 from cardbox_tracker.detectors.image_points import (
     LEG_POINT_NAMES,
@@ -138,8 +138,8 @@ class PointTable(NamedTuple):
             raise
         except (ValueError, TypeError, ArithmeticError) as error:
             raise CardboxError(
-                f"{self.path}, line {rows.line_num}, has a value that is no number "
-                f"({quoted(str(error))}); expected numbers in {column}, u, v and score"
+                f"{self.path}, line {rows.line_num}: {reason_of(error)}; expected numbers in "
+                f"{column}, u, v and score"
             ) from None
         except CardboxError as error:
             raise CardboxError(f"{self.path}, line {rows.line_num}: {error}") from None

@@ -27,6 +27,7 @@ import numpy as np
 from cardbox_tracker.camera.camera import Camera
 from cardbox_tracker.camera.given_arrays import image_from, silhouette_from
 from cardbox_tracker.common.errors import InitializationError
+from cardbox_tracker.common.settings import settings_or
 from cardbox_tracker.measuring.config import (
     InitializationConfig,
     InitializationResult,
@@ -113,7 +114,7 @@ def initialize_body(
     show other postures, or the model does not fit them; and ValueError if arrays are of another
     size, type or range.
     """
-    config = config or InitializationConfig()
+    config = settings_or(InitializationConfig(), config)
     references = {
         name: silhouette_from(references[name], f"reference '{name}'")
         for name in REFERENCE_NAMES

@@ -11,6 +11,7 @@ camera, Y to the right of the image, Z up; level, independent of the camera's pi
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from dataclasses import asdict, dataclass, field, fields, replace
 from operator import index
 from typing import Any
@@ -53,8 +54,12 @@ MEASURED, PROPORTIONS = SOURCES = ("measured", "proportions")
 
 def check_range(name: str, value: float, lowest: float, highest: float, unit: str) -> None:
     """Raise BodyModelError, with unit and range, if a value is not finite or out of range."""
-    if not math.isfinite(value):
-        raise BodyModelError(f"{name} is {value}; expected a finite number of {unit}")
+    try:
+        is_finite = math.isfinite(value)
+    except (TypeError, OverflowError):
+        is_finite = False
+    if not is_finite:
+        raise BodyModelError(f"{name} is {quoted(value)}; expected a finite number of {unit}")
     if not lowest <= value <= highest:
         hint = ""
         if unit == "m" and lowest <= value / 100 <= highest and value > 1:
@@ -153,6 +158,8 @@ class CameraPose:
         lowest, highest, unit, _ = CAMERA_POSE["camera_pitch_rad"]
         check_range("camera_pitch_rad", self.pitch_rad, lowest, highest, unit)
         check_range(CAMERA_ROLL, self.roll_rad, -math.pi, math.pi, "rad")
+        check_range("pitch_stddev_rad", self.pitch_stddev_rad, 0.0, math.pi, "rad")
+        check_range("height_stddev_m", self.height_stddev_m, 0.0, 40.0, "m")
         if self.height_m is not None:
             check_range(CAMERA_HEIGHT, self.height_m, -20.0, 20.0, "m")
 
@@ -204,7 +211,7 @@ class BodyModel:
                 raise BodyModelError(
                     f"{name} is {quoted(getattr(self, name))}; expected a whole number"
                 ) from None
-        for name in self.unknown:
+        for name in self.unknown if isinstance(self.unknown, Iterable) else [self.unknown]:
             if name not in (*PLACEMENT, *SIZE_NAMES):
                 raise BodyModelError(
                     f"unknown names {quoted(name)}; expected sizes, or any of "

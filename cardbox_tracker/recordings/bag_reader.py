@@ -29,7 +29,7 @@ from cardbox_tracker.camera.encodings import (
 from cardbox_tracker.camera.frames import OneFrame
 from cardbox_tracker.camera.stamps import RecordedStamps, StampOrder
 from cardbox_tracker.camera.zoom import ZoomWitness
-from cardbox_tracker.common.errors import BagError, CameraError, EncodingError, cut
+from cardbox_tracker.common.errors import BagError, CameraError, EncodingError, reason_of
 from cardbox_tracker.recordings.bag_files import (
     check_parts,
     check_recording,
@@ -127,8 +127,8 @@ class BagReader:
             of_ros1 = self.path.suffix == ".bag"
             kind = "ROS 1 bag" if of_ros1 else "rosbag2 recording (mcap or sqlite3)"
             raise BagError(
-                f"cannot read the recording {self.path}: {_reason(error)}; give a {kind} that was "
-                f"closed properly: {REPAIR_ROS1 if of_ros1 else _REPAIR}"
+                f"cannot read the recording {self.path}: {reason_of(error)}; give a {kind} that "
+                f"was closed properly: {REPAIR_ROS1 if of_ros1 else _REPAIR}"
             ) from None
         if self._reader.message_count == 0:
             self.__exit__()
@@ -250,7 +250,8 @@ class BagReader:
 
     def _damaged(self, error: Exception) -> BagError:
         return BagError(
-            f"the recording {self.path} is damaged: {_reason(error)}; record it again, or {_REPAIR}"
+            f"the recording {self.path} is damaged: {reason_of(error)}; record it again, "
+            f"or {_REPAIR}"
         )
 
     def _list(self) -> str:
@@ -469,10 +470,6 @@ def chosen_transports(messages: Mapping[str, int]) -> list[str]:
         return not messages[topic], order.index(kind) if kind in order else len(order), topic
 
     return sorted(min(topics, key=partial(rank, base)) for base, topics in sorted(groups.items()))
-
-
-def _reason(error: Exception) -> str:
-    return cut(str(error)) or type(error).__name__
 
 
 def stamp_ns_of(message: Any) -> int:

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from cardbox_tracker.common.errors import BagError, CardboxError, quoted
+from cardbox_tracker.common.errors import BagError, CardboxError, quoted, reason_of
 from cardbox_tracker.common.files import (
     body_beside,
     body_of_person,
@@ -434,7 +434,7 @@ def results_in(bag: BagReader, person: int | None = None) -> Results:
 
 
 def _damaged(where: str, error: Exception) -> BagError:
-    return BagError(f"{where} has a damaged message: {error}; record it again")
+    return BagError(f"{where} has a damaged message: {reason_of(error)}; record it again")
 
 
 class _Messages:

@@ -23,6 +23,7 @@ from numpy.typing import NDArray
 from cardbox_tracker.camera.encodings import brightness_of
 from cardbox_tracker.camera.given_arrays import image_from
 from cardbox_tracker.common.array_checks import ANY, check_array
+from cardbox_tracker.common.settings import settings_or
 from cardbox_tracker.segmentation.absorption import Absorber
 from cardbox_tracker.segmentation.background_config import BackgroundConfig
 from cardbox_tracker.segmentation.chroma import DARKEST, ChromaScore, colors_of
@@ -93,7 +94,7 @@ class SilhouetteExtractor:
 
     def __init__(self, model: BackgroundModel, config: BackgroundConfig | None = None) -> None:
         """Prepare the thresholds of every pixel."""
-        self.config = config = config or BackgroundConfig()
+        self.config = config = settings_or(BackgroundConfig(), config)
         self.gain = 1.0
         step = max(1, math.isqrt(model.mean.size // _BRIGHTNESS_SAMPLES))
         self._grid = (slice(None, None, step), slice(None, None, step))

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from cardbox_tracker.camera.camera import WORKING_SIZE, Calibration
 from cardbox_tracker.camera.depth_image import DepthImage
 from cardbox_tracker.camera.encodings import brightness_of, to_working_size
+from cardbox_tracker.common.settings import settings_or
 from cardbox_tracker.segmentation.background import SilhouetteExtractor
 from cardbox_tracker.segmentation.background_config import BackgroundConfig
 from cardbox_tracker.segmentation.empty_scene import BackgroundModel
@@ -53,7 +54,7 @@ class SilhouettePipeline:
         level = calibration.level_size(*self._size)
         self.camera = calibration.camera(*level)
         self._rectifier = calibration.rectifier(*level)
-        self._config = config or BackgroundConfig()
+        self._config = settings_or(BackgroundConfig(), config)
         self._way = learning
         self.learning = learning(self._config.learn_images)
         self._extractor: SilhouetteExtractor | None = None

@@ -77,8 +77,8 @@ def compile_for_films() -> None:
 
 
 def _load(listed: Mapping[str, Mapping[str, Sequence[Any]]]) -> None:
-    # The call that needs damaged code finds it.
-    with suppress(*compiling.DAMAGED):
+    # The call that needs the code finds the fault.
+    with suppress(*compiling.DAMAGED, MemoryError):
         for part in listed.items():
             compile_each(part)
 

@@ -28,6 +28,7 @@ from cardbox_tracker.camera.extrinsics import meeting_m
 from cardbox_tracker.camera.tilt import tilted_body, tilted_states
 from cardbox_tracker.camera.view import OtherCamera
 from cardbox_tracker.common.health import Verdict
+from cardbox_tracker.common.settings import settings_or
 from cardbox_tracker.detectors.figure import Figure, figure_of_points
 from cardbox_tracker.detectors.identity import (
     ALIKE,
@@ -218,7 +219,7 @@ class Session:
         """
         self._bodies = tuple(_before_all(body, others) for body in bodies)
         self._camera = camera
-        self.config = config or default_preset()
+        self.config = settings_or(default_preset(), config)
         self._rng, self._others = rng or np.random.default_rng(0), tuple(others)
         self._look, self._is_alone, self._beside = look, people is None, beside
         self._only_measures, self._most = only_measures, people or MOST_PEOPLE

@@ -13,7 +13,7 @@ import numpy as np
 from cardbox_tracker.camera.camera import Camera
 from cardbox_tracker.camera.tilt import tilted_states
 from cardbox_tracker.camera.view import OtherCamera, View
-from cardbox_tracker.common.settings import restarts
+from cardbox_tracker.common.settings import of_kind, restarts, settings_or
 from cardbox_tracker.person.kinematics import clavicles
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.posture import LEFT_ARM, RIGHT_ARM, TURNING_LIMITS, TURNS
@@ -83,10 +83,12 @@ class Tracker:
         the filter ``whole_body``. If the body is not known, estimates are at best ``uncertain``.
 
         Raises CameraError if the person was not measured in front of one of ``others``, and
-        ValueError if there are others, but the filter takes one camera.
+        ValueError if there are others, but the filter takes one camera, or if body, camera or
+        settings are of another class.
         """
-        self.camera = camera.with_pitch(body.camera_pose.pitch_rad)
-        self.config = config or TrackerConfig()
+        body = of_kind("body", body, BodyModel)
+        self.camera = of_kind("camera", camera, Camera).with_pitch(body.camera_pose.pitch_rad)
+        self.config = settings_or(TrackerConfig(), config)
         self._rng = rng or np.random.default_rng(0)
         self._make_filter, self._look, self._is_alone = make_filter, look, not others
         if others and (make_filter or not self.config.has_several_views):

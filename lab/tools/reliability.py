@@ -10,14 +10,19 @@ from __future__ import annotations
 
 import argparse
 import os
+import re
+import signal
 import subprocess
 import sys
 import tempfile
 import xml.etree.ElementTree as ElementTree
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
+from cardbox_tracker.common.errors import CardboxError
 from cardbox_tracker.common.files import write_file
 from lab.pages import replaced
 
@@ -25,6 +30,34 @@ ROOT = Path(__file__).resolve().parents[2]
 PAGE = "docs/reliability.md"
 BEGIN, END = "<!-- begin of the table -->", "<!-- end of the table -->"
 EXAMPLES, QUICK_EXAMPLES = 100_000, 300
+# A busy machine takes this for what takes a tenth of a second.
+PATIENCE_S = 60.0
+WORDS_OF_PYTHON = re.compile(
+    r"object (has no attribute|is not|cannot)|NoneType|codec can't|unpack|literal for|unhashable"
+    r"|(index|indices|argument) (must be|out of range)|convert (string|float)|must be (real|str)"
+    r"|unsupported operand|not supported between|broadcast|reshape|inhomogeneous|array element"
+    r"|recursion|division by|[Ss]ingular|positional|keyword|too large to convert"
+)
+
+
+@contextmanager
+def refusals(*also: type[Exception]) -> Iterator[None]:
+    """Context of an input that is read, or refused in words within :data:`PATIENCE_S`."""
+
+    def late(*_: Any) -> None:
+        raise AssertionError(f"it takes more than {PATIENCE_S:g} s")
+
+    allowed: tuple[type[Exception], ...] = CardboxError, *also
+    before = signal.signal(signal.SIGALRM, late)
+    signal.setitimer(signal.ITIMER_REAL, PATIENCE_S)
+    try:
+        yield
+    except allowed as error:
+        assert 0 < len(str(error)) < 2000
+        assert not WORDS_OF_PYTHON.search(str(error)), str(error)
+    finally:
+        signal.setitimer(signal.ITIMER_REAL, 0.0)
+        signal.signal(signal.SIGALRM, before)
 
 
 @dataclass

@@ -56,6 +56,7 @@ def test_projection_by_hand() -> None:
         ({"focal_stddev": float("nan")}, "deviation of the camera's focal lengths is nan"),
         ({"focal_stddev": -float("inf")}, "deviation of the camera's focal lengths is -inf"),
         ({"focal_stddev": "wide"}, "focal_stddev is 'wide'; expected a number"),
+        ({"focal_stddev": 1e6}, r"focal lengths is 1e\+06; expected a share of them from 0 to 100"),
     ],
 )
 def test_an_impossible_camera_is_refused(changes: dict[str, Any], words: str) -> None:
@@ -63,6 +64,12 @@ def test_an_impossible_camera_is_refused(changes: dict[str, Any], words: str) ->
         replace(CAMERA, **changes)
     with pytest.raises(CameraError, match="0x0 px"):
         CAMERA.scaled(0, 0)
+
+
+@pytest.mark.parametrize("fov_deg", [None, "wide", float("nan"), 10**400, 180.0])
+def test_a_field_of_view_is_a_number_of_degrees(fov_deg: Any) -> None:
+    with pytest.raises(CameraError, match=r"field of view is .*; expected"):
+        Calibration.of_fov(320, 240, fov_deg)
 
 
 def test_a_size_in_another_type_of_number_becomes_whole() -> None:

@@ -118,16 +118,32 @@ def test_an_interrupted_command_says_so(
     done.assert_refused("urdf", "interrupted")
 
 
-def test_a_full_disk_is_told_in_words(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, cardbox: Callable
+class NoMemory(Exception):
+    """As OpenCV's."""
+
+    code = -4
+
+
+@pytest.mark.parametrize(
+    ("error", "said"),
+    [
+        (OSError(28, "No space left on device", "somewhere"), "somewhere: No space left on device"),
+        (ImportError("x.so: failed to map segment"), "failed to map segment; allow more memory"),
+        (MemoryError("Unable to allocate 9 GiB"), "Unable to allocate 9 GiB; allow more memory"),
+        (MemoryError(), "no memory is left; allow more memory, as with 'ulimit -v', or install"),
+        (NoMemory("Insufficient memory"), "Insufficient memory; allow more memory"),
+    ],
+)
+def test_a_full_disk_or_memory_is_told_in_words(
+    error: Exception, said: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, cardbox: Callable
 ) -> None:
     def full(*_: object, **__: object) -> None:
-        raise OSError(28, "No space left on device", "somewhere")
+        raise error
 
     monkeypatch.setattr("cardbox_tracker.applications.simulation.session.synthesize_session", full)
     done = cardbox("synthesize", "--output", tmp_path / "bag")
     assert done.code == 1
-    assert done.err.endswith("cardbox synthesize: somewhere: No space left on device\n")
+    done.assert_refused("synthesize", said)
 
 
 @pytest.mark.parametrize(

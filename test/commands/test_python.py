@@ -238,11 +238,18 @@ def test_pandas_has_the_columns_of_the_table(tmp_path: Path) -> None:
             "export writes beside the table: give csv, or save the result",
         ),
         ({"background": (3, 1)}, r"argument --background: .*got \(3, 1\)"),
+        ({"csv": "a\0.csv", **GIVEN}, r"cannot write 'a\\x00.csv': embedded null byte"),
     ],
 )
 def test_mistakes(network: None, film: Path, options: dict[str, Any], expected: str) -> None:
     with pytest.raises(CardboxError, match=expected):
         cardbox_tracker.track(film, **options)
+
+
+@pytest.mark.parametrize("recording", [None, 7, (), ("a", 7), str])
+def test_what_is_no_path_is_no_recording(recording: Any) -> None:
+    with pytest.raises(CardboxError, match=r"track has no recording, but .*; give a path"):
+        cardbox_tracker.track(recording)
 
 
 def test_a_folder_of_recordings_is_none(network: None, film: Path) -> None:

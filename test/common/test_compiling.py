@@ -304,3 +304,29 @@ def test_what_needs_no_compiled_code_does_not_load_the_compiler(command: str) ->
         "assert 'numba' not in sys.modules"
     )
     subprocess.run([sys.executable, "-c", code], cwd=ROOT, check=True)
+
+
+@pytest.mark.parametrize(
+    ("first", "environment"),
+    [
+        ("", {}),
+        ("", {"NUMBA_DISABLE_JIT": "1", "NUMBA_NUM_THREADS": "0"}),
+        ("import numba; ", {"NUMBA_DISABLE_JIT": "1"}),
+    ],
+)
+def test_settings_of_numba_with_which_nothing_works_are_not_followed(
+    first: str, environment: dict[str, str]
+) -> None:
+    program = f"{first}from cardbox_tracker.common.compiling import kernel; import numba; "
+    program += "print(kernel(lambda x: 1.5 * x)(3), numba.config.DISABLE_JIT)"
+    run = subprocess.run(
+        [sys.executable, "-c", program],
+        env={**os.environ, "PYTHONPATH": str(ROOT), **environment},
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    assert run.stdout.split() == ["4.5", "0"]
+    for name, value in environment.items():
+        assert f"{name}={value} is not followed" in run.stderr
+    assert bool(run.stderr) == bool(environment)

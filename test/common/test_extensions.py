@@ -47,7 +47,9 @@ def add(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Callable[..
         lines = (f"[cardbox_tracker.{group}]", *points)
         (folder / "entry_points.txt").write_text("\n".join(lines))
 
+    formats.cache_clear()
     yield install
+    formats.cache_clear()
     sys.modules.pop("beside", None)
 
 
@@ -98,6 +100,8 @@ def test_a_broken_format_names_its_distribution(
     add("counts", "exporters", point)
     # The others go on.
     assert formats()["trc"].check() is None
+    # Distributions are searched once: request and tracking ask for each name.
+    assert formats() is formats()
     with pytest.raises(CardboxError, match=expected):
         formats()["broken"].check()
 

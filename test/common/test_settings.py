@@ -6,16 +6,24 @@ import re
 from dataclasses import dataclass, replace
 from typing import Any
 
+import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from cardbox_tracker.camera.camera import Camera
 from cardbox_tracker.common import settings
 from cardbox_tracker.common.settings import Setting, setting
 from cardbox_tracker.measuring.config import InitializationConfig
+from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.search.config import FilterConfig, TrackerConfig
 from cardbox_tracker.search.whole_body_config import WholeBodyConfig
 from cardbox_tracker.segmentation.background_config import BackgroundConfig
+from cardbox_tracker.segmentation.empty_scene import BackgroundModel
+from cardbox_tracker.segmentation.silhouettes import SilhouetteExtractor
+from cardbox_tracker.tracking.tracker import Tracker
+
+CAMERA, PLANE = Camera(8, 6, 8.0, 8.0, 3.5, 2.5), np.ones((6, 8), np.float32)
 
 CORE = (
     BackgroundConfig,
@@ -104,8 +112,26 @@ def test_a_value_out_of_range_is_refused_by_its_whole_name() -> None:
 
 
 def test_dotted_names_are_nested() -> None:
-    values = {"a.b.c": 1, "a.d": 2, "e": 3}
-    assert settings.nested(values) == {"a": {"b": {"c": 1}, "d": 2}, "e": 3}
+    values: dict[Any, int] = {"a.b.c": 1, "a.d": 2, "e": 3, 7: 4}
+    assert settings.nested(values) == {"a": {"b": {"c": 1}, "d": 2}, "e": 3, "7": 4}
+
+
+@pytest.mark.parametrize("wrong", [TrackerConfig, lambda: TrackerConfig(), "default", {}])
+def test_what_is_no_settings_is_refused_by_its_name(wrong: Any) -> None:
+    for make in (
+        lambda: Tracker(BodyModel(), CAMERA, wrong),
+        lambda: Tracker(BodyModel(), CAMERA, TrackerConfig(lost_iou=wrong)),
+        lambda: TrackerConfig(whole_body=wrong),
+        lambda: BackgroundConfig(threshold=wrong),
+        lambda: SilhouetteExtractor(BackgroundModel(PLANE, PLANE), wrong),
+    ):
+        with pytest.raises(ValueError, match=r"(config|lost_iou|whole_body|threshold) is .*; exp"):
+            make()
+    with pytest.raises(ValueError, match=r"terms is .*; expected an instance of Sequence"):
+        TrackerConfig(terms=lambda: ())  # type: ignore[arg-type]
+    for body, camera in ((wrong, CAMERA), (BodyModel(), wrong)):
+        with pytest.raises(ValueError, match=r"(body|camera) is .*; expected an instance of"):
+            Tracker(body, camera)
 
 
 @dataclass(frozen=True)

@@ -92,6 +92,13 @@ def test_a_version_is_a_whole_number(name: str, value: object) -> None:
         BodyModel().with_values(**{name: value})
 
 
+@pytest.mark.parametrize("name", ["pitch_stddev_rad", "height_stddev_m", "distance_m", "unknown"])
+@pytest.mark.parametrize("value", [float("nan"), -1.0, 1e300, None, len])
+def test_a_number_is_one_within_its_limits(name: str, value: object) -> None:
+    with pytest.raises(BodyModelError, match=f"{name} .*; expected"):
+        BodyModel().with_values(**{name: value})
+
+
 FOREARM = "forearm_length:"
 
 

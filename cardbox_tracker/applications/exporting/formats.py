@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
-from functools import partial
+from functools import cache, partial
 from importlib.metadata import EntryPoint
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -88,8 +88,11 @@ FORMATS: dict[str, Format] = {
 }
 
 
-def formats() -> dict[str, Format]:
+@cache
+def formats() -> Mapping[str, Format]:
     """Return all formats by name, others' last; CardboxError if a name is taken.
+
+    Distributions that are installed later are not seen.
 
     One that cannot be loaded raises CardboxError, with its distribution, where it is used.
     """

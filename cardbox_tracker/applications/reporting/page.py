@@ -285,7 +285,7 @@ def write_page(
         path,
         Path(__file__).with_name("page.html"),
         title=title,
-        film=quote(os.path.relpath(film, path.parent)),
+        film=quote(os.fsencode(os.path.relpath(film, path.parent))),
         film_name=film.name,
         start_s=min(float(results.time_s[0]) for results, _ in people.values()),
         people=[_person(name, *of, cameras) for name, of in people.items()],

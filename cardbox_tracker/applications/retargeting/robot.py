@@ -10,7 +10,7 @@ from xml.etree import ElementTree as Xml
 
 import numpy as np
 
-from cardbox_tracker.common.errors import CardboxError, cut, quoted
+from cardbox_tracker.common.errors import CardboxError, cut, quoted, reason_of
 from cardbox_tracker.common.files import foreign, read_regular
 from cardbox_tracker.person.sizes import FloatArray
 from cardbox_tracker.person.skeleton import rotation_x, rotation_y, rotation_z
@@ -146,7 +146,7 @@ def parse_robot(content: str | bytes, source: str = "the description") -> Robot:
         return _robot(parser.close())
     except (KeyError, ValueError) as error:
         raise CardboxError(
-            f"{source} is not a URDF with movable joints: {cut(str(error))}; every joint needs "
+            f"{source} is not a URDF with movable joints: {reason_of(error)}; every joint needs "
             "name, type, parent and child, and a revolute or prismatic joint finite limits"
         ) from None
     except (Xml.ParseError, LookupError) as error:

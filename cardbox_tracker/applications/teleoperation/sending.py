@@ -16,7 +16,7 @@ from scipy.spatial.transform import Rotation
 
 from cardbox_tracker.applications.teleoperation.full_body import NAMES, FullBody
 from cardbox_tracker.applications.teleoperation.smpl import FEET, local_frames
-from cardbox_tracker.common.errors import CardboxError, quoted
+from cardbox_tracker.common.errors import CardboxError, quoted, reason_of
 from cardbox_tracker.common.extensions import optional
 from cardbox_tracker.person.sizes import FloatArray
 from cardbox_tracker.person.skeleton import rotation_z
@@ -117,8 +117,8 @@ class UdpSender:
         except (OSError, OverflowError, ValueError) as error:
             self.close()
             raise CardboxError(
-                f"cannot send to {quoted(address)}: {error}; give the address of the program, as "
-                "udp://127.0.0.1:39539"
+                f"cannot send to {quoted(address)}: {reason_of(error)}; give the address of the "
+                "program, as udp://127.0.0.1:39539"
             ) from None
 
     def send(self, packet: bytes) -> None:

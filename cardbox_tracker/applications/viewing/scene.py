@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from cardbox_tracker.applications.viewing.viewer import rerun
 from cardbox_tracker.camera.camera import level_to_optical
 from cardbox_tracker.camera.encodings import SentImage, decode_bgr
-from cardbox_tracker.common.errors import BagError, CardboxError, cut
+from cardbox_tracker.common.errors import BagError, CardboxError, cut, reason_of
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.model_file import loads_body_model
 from cardbox_tracker.person.sizes import FloatArray
@@ -328,8 +328,8 @@ def show_results(
             except (AttributeError, TypeError, ValueError) as error:
                 # A recording contains the definitions of its types.
                 raise BagError(
-                    f"{message.topic} of {bag.path} has a malformed message: {error}; record it "
-                    "again"
+                    f"{message.topic} of {bag.path} has a malformed message: "
+                    f"{reason_of(error)}; record it again"
                 ) from None
             count += message.topic == space + _JOINTS_TOPIC
             progress((message.time_ns - bag.start_ns) / 1e9 / total_s)

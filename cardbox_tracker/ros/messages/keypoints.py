@@ -14,7 +14,7 @@ import numpy as np
 from sensor_msgs.msg import PointCloud2, PointField
 from std_msgs.msg import Header
 
-from cardbox_tracker.common.errors import CardboxError, cut
+from cardbox_tracker.common.errors import CardboxError, reason_of
 from cardbox_tracker.detectors.image_points import COCO_NAMES, POINT_NAMES, ImagePoints
 from cardbox_tracker.detectors.point_checks import NamedPoint, Size, person_of
 from cardbox_tracker.detectors.pose_network import LANDMARKS, Detection
@@ -112,7 +112,7 @@ def persons_of_cloud(message: Any, size: Size) -> list[ImagePoints]:
         rows = np.ascontiguousarray(rows[:, : message.width * message.point_step])
         points = rows.view(kind).ravel()
     except (KeyError, ValueError, TypeError) as error:
-        raise CardboxError(f"the points cannot be read: {cut(str(error))}") from None
+        raise CardboxError(f"the points cannot be read: {reason_of(error)}") from None
     if not 0 <= points["landmark"].min() <= points["landmark"].max() < len(LANDMARKS):
         raise CardboxError(f"a landmark is not a number from 0 to {len(LANDMARKS) - 1}")
     away_px = np.hypot(points["u"], points["v"])

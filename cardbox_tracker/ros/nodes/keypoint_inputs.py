@@ -17,7 +17,7 @@ from cardbox_tracker.camera.camera import Calibration, Camera
 from cardbox_tracker.camera.camera_info import calibration_from_info, info_content
 from cardbox_tracker.camera.pairing import TOLERANCE_NS
 from cardbox_tracker.camera.stamps import StampOrder
-from cardbox_tracker.common.errors import CameraError, CardboxError, cut, quoted
+from cardbox_tracker.common.errors import CameraError, CardboxError, quoted, reason_of
 from cardbox_tracker.common.files import user_path
 from cardbox_tracker.common.health import WATCHES, Verdict
 from cardbox_tracker.detectors.figure import figure_of_points
@@ -236,7 +236,7 @@ class KeypointTopic:
             return
         except (AttributeError, TypeError) as error:
             # Another release of a foreign package may have other fields.
-            self._report(f"the fields of {self._type} are not the expected ones: {cut(str(error))}")
+            self._report(f"the fields of {self._type} are not as expected: {reason_of(error)}")
             return
         self.stream.problem = ""
         self._newest_ns = at_ns

@@ -6,6 +6,7 @@ import re
 import socket
 import sys
 from collections import Counter
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 from urllib.error import HTTPError
@@ -239,7 +240,8 @@ def test_without_the_library_its_extra_is_named(
 
 SERVER = """
 import sys
-from http.server import BaseHTTPRequestHandler, HTTPServer
+from http.server import BaseHTTPRequestHandler
+from socketserver import TCPServer
 
 class Files(BaseHTTPRequestHandler):
     def do_GET(self):
@@ -250,15 +252,22 @@ class Files(BaseHTTPRequestHandler):
         if self.path == "/end":
             sys.exit()
 
+    def do_POST(self):
+        asked = self.rfile.read(int(self.headers["Content-Length"]))
+        self.send_response(200)
+        self.send_header("Content-Type", self.headers["Content-Type"])
+        self.end_headers()
+        self.wfile.write(asked)
+
 words = sys.argv[1:]
-address = words[words.index("--bind") + 1], int(words[words.index("--web-viewer-port") + 1])
-HTTPServer(address, Files).serve_forever()
+port = words[words.index("--web-viewer-port" if "--serve-web" in words else "--port") + 1]
+TCPServer((words[words.index("--bind") + 1], int(port)), Files).serve_forever()
 """
 PROGRAM = (sys.executable, "-c", SERVER)
 
 
 def test_files_are_passed_on_with_a_policy() -> None:
-    with web_page(PROGRAM, port=0) as address:
+    with web_page(PROGRAM, 1, port=0) as address:
         with urlopen(f"{address}/viewer.js") as answer:
             assert answer.read() == b"1 + 1"
             assert answer.headers["Content-Type"] == "text/javascript"
@@ -273,22 +282,58 @@ def test_files_are_passed_on_with_a_policy() -> None:
         with pytest.raises(HTTPError, match="502"):
             urlopen(f"{address}/viewer.js")
     hosts = {word for word in allowed.replace(";", "").split() if "//" in word}
-    assert hosts == {"http://127.0.0.1:*"}
+    assert not hosts
     assert "*" not in allowed.split()
 
 
+@pytest.fixture
+def window(monkeypatch: pytest.MonkeyPatch) -> Iterator[int]:
+    """The port of a window's data."""
+    begun: list[Any] = []
+
+    def popen(*words: Any, **options: Any) -> Any:
+        begun.append(real(*words, **options))
+        return begun[-1]
+
+    real = viewer.Popen
+    monkeypatch.setattr(viewer, "Popen", popen)
+    monkeypatch.setattr(viewer, "rerun_program", lambda: PROGRAM)
+    yield viewer._window()
+    begun[0].kill()
+    begun[0].wait()
+
+
+@pytest.mark.parametrize("data", [None, b"which images?"])
 @pytest.mark.parametrize(
-    ("host", "allowed"),
-    [("localhost:1", True), ("127.0.0.1", True), ("evil.example:9090", False), ("", False)],
+    ("headers", "allowed"),
+    [
+        ({"Host": "localhost:1"}, True),
+        ({"Host": "127.0.0.1", "Origin": "http://localhost:9090"}, True),
+        ({"Host": "evil.example:9090"}, False),
+        ({"Host": "localhost", "Origin": "http://evil.example"}, False),
+        ({"Host": ""}, False),
+        ({"Host": "["}, False),
+    ],
 )
-def test_only_this_computer_is_answered(host: str, allowed: bool) -> None:
-    with web_page(PROGRAM, port=0) as address:
-        request = Request(f"{address}/viewer.js", headers={"Host": host})
-        if allowed:
-            assert urlopen(request).status == 200
-        else:
+def test_files_and_data_are_for_the_page_of_this_computer(
+    headers: dict[str, str], allowed: bool, data: bytes | None, window: int
+) -> None:
+    with web_page(PROGRAM, window, port=0) as address:
+        kind = {"Content-Type": "application/grpc-web+proto"}
+        request = Request(f"{address}/viewer.js", data, {**headers, **kind})
+        if not allowed:
             with pytest.raises(HTTPError, match="403"):
                 urlopen(request)
+            return
+        with urlopen(request) as answer:
+            assert answer.read() == (data or b"1 + 1")
+            assert data is None or answer.headers["Content-Type"] == kind["Content-Type"]
+
+
+def test_the_data_of_a_window_are_where_no_other_page_finds_them(window: int) -> None:
+    for host, is_there in ((viewer._HIDDEN, True), ("127.0.0.1", False), ("127.0.0.2", False)):
+        with socket.socket() as one:
+            assert (one.connect_ex((host, window)) == 0) == is_there
 
 
 def test_reruns_own_server_listens_to_this_computer_alone(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -301,19 +346,20 @@ def test_reruns_own_server_listens_to_this_computer_alone(monkeypatch: pytest.Mo
 
     real = viewer._free_port
     monkeypatch.setattr(viewer, "_free_port", free_port)
-    with web_page(viewer.rerun_program(), port=0) as address:
+    with web_page(viewer.rerun_program(), 1, port=0) as address:
         assert b"<html" in urlopen(address).read().lower()
-        for port in (*ports, int(address.rpartition(":")[2])):
+        # To other addresses of this computer, a server of 0.0.0.0 would answer.
+        known = ("127.0.0.2", int(address.rpartition(":")[2])), *(("127.0.0.1", p) for p in ports)
+        for place in known:
             with socket.socket() as one:
-                # Another address of this computer, to which a server of 0.0.0.0 would answer.
-                assert one.connect_ex(("127.0.0.2", port)) != 0
+                assert one.connect_ex(place) != 0
 
 
 def test_a_port_in_use_is_an_error() -> None:
-    with web_page(PROGRAM, port=0) as address:
+    with web_page(PROGRAM, 1, port=0) as address:
         port = int(address.rpartition(":")[2])
         with (
             pytest.raises(OSError, match=f"port {port} is in use; end"),
-            web_page(PROGRAM, port=port),
+            web_page(PROGRAM, 1, port=port),
         ):
             pass
