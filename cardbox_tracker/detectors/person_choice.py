@@ -46,7 +46,7 @@ class PersonChoice:
         if not (all(map(isfinite, place)) and 0.0 <= (time_s or 0.0) < inf):
             raise ValueError(
                 "expected left, right, largest, or X,Y: column and row of the person, also with "
-                f"@T for the second T, such as left@12.5, got {text!r}"
+                f"@T for the second T, such as left@12.5, got {quoted(text)}"
             )
         return cls(which, place, time_s)
 
