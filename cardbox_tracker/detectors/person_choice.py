@@ -11,6 +11,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from cardbox_tracker.common.errors import quoted
 from cardbox_tracker.detectors.identity import KNOWN_IMAGES
 from cardbox_tracker.detectors.image_points import ImagePoints
 
