@@ -16,7 +16,7 @@ from operator import index
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, Self, TypeVar
 
-from cardbox_tracker.common.errors import CardboxError, plain
+from cardbox_tracker.common.errors import CardboxError, plain, quoted
 from cardbox_tracker.common.files import check_writable, is_written_in_place
 from cardbox_tracker.common.settings import Setting, check
 
@@ -40,7 +40,7 @@ def parsed(
             value = kind(given)
             if is_right(value) and not isinstance(given, bool):
                 return value
-        raise argparse.ArgumentTypeError(f"expected {expected}, got {given!r}")
+        raise argparse.ArgumentTypeError(f"expected {expected}, got {quoted(given)}")
 
     return read
 
@@ -93,7 +93,7 @@ def one_of(names: Iterable[str]) -> Callable[[Any], Any]:
 def _switch(given: Any) -> bool:
     if isinstance(given, bool):
         return given
-    raise argparse.ArgumentTypeError(f"expected True or False, got {given!r}")
+    raise argparse.ArgumentTypeError(f"expected True or False, got {quoted(given)}")
 
 
 # Readers by the types of fields.

@@ -29,7 +29,7 @@ from cardbox_tracker.commands.arguments import (
     time,
     whole,
 )
-from cardbox_tracker.common.errors import CardboxError
+from cardbox_tracker.common.errors import CardboxError, quoted
 from cardbox_tracker.common.files import foreign, read_regular
 from cardbox_tracker.common.settings import settings_of
 from cardbox_tracker.detectors.detector import Detector
@@ -274,7 +274,7 @@ def _formats(given: str | Iterable[str]) -> tuple[str, ...]:
     names = tuple(dict.fromkeys(given.split(",") if isinstance(given, str) else given))
     if unknown := [name for name in names if name not in formats()]:
         raise argparse.ArgumentTypeError(
-            f"expected formats of {', '.join(formats())}, such as trc,bvh: {unknown[0]!r}"
+            f"expected formats of {', '.join(formats())}, such as trc,bvh: {quoted(unknown[0])}"
         )
     return names
 

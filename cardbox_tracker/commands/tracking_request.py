@@ -18,7 +18,7 @@ from typing import Any, NamedTuple, TypeVar
 
 from cardbox_tracker.camera.pairing import camera_names
 from cardbox_tracker.commands.request import AUTO, RecordingOptions, Request, TrackingOptions
-from cardbox_tracker.common.errors import CardboxError
+from cardbox_tracker.common.errors import CardboxError, quoted
 from cardbox_tracker.common.extensions import DETECTORS, extensions, loaded
 from cardbox_tracker.common.settings import NoEffectError, nested
 from cardbox_tracker.detectors.detector import MEDIAPIPE, Detector
@@ -387,8 +387,8 @@ def points_named(given: object, class_name: str | None = None) -> Detector | Poi
     path = Path(given)
     if not path.exists():
         raise CardboxError(
-            f"--detector is {str(given)!r}; expected {', '.join((MEDIAPIPE, *added))}, or points "
-            "in a table, in a file of COCO, or in a folder of OpenPose (docs/detectors.md)"
+            f"--detector is {quoted(str(given))}; expected {', '.join((MEDIAPIPE, *added))}, or "
+            "points in a table, in a file of COCO, or in a folder of OpenPose (docs/detectors.md)"
         )
     return PointTable(path)
 

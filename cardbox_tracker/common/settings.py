@@ -215,7 +215,7 @@ def nested(values: Mapping[str, Any]) -> dict[str, Any]:
         for part in outer:
             inner = inner.setdefault(part, {})
             if not isinstance(inner, dict):
-                raise ValueError(f"{part} is {inner!r}; expected names and values below it")
+                raise ValueError(f"{part} is {quoted(inner)}; expected names and values below it")
         inner[name] = value
     return result
 

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import json
 import re
+from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -19,7 +20,7 @@ import numpy as np
 from cardbox_tracker.common.errors import CardboxError, quoted
 from cardbox_tracker.common.files import foreign, read_regular
 from cardbox_tracker.detectors.image_points import COCO_NAMES
-from cardbox_tracker.detectors.point_checks import NamedPoint
+from cardbox_tracker.detectors.point_checks import NamedPoint, count_person
 
 _MOST_BYTES, _MOST_OF_IMAGE = 256 * 1024 * 1024, 16 * 1024 * 1024
 # Some ten hours of one person.
@@ -88,7 +89,7 @@ def openpose_people(folder: Path) -> Iterator[FoundPerson]:
             f"{folder} has no JSON files; expected those of OpenPose, one for each image, such as "
             "film_000000000012_keypoints.json"
         )
-    numbers = image_numbers(file.stem for file in files)
+    numbers, counts = image_numbers(file.stem for file in files), Counter[str]()
     for file in files:
         if file.stem not in numbers:
             raise CardboxError(
@@ -102,6 +103,7 @@ def openpose_people(folder: Path) -> Iterator[FoundPerson]:
             raise CardboxError(f"{file} has no list 'people'; expected a file of OpenPose")
         for number, person in enumerate(people or ()):
             place = f"{file}, person {number}"
+            count_person(counts, numbers[file.stem])
             points = _points(person, place, LAYOUTS, "pose_keypoints_2d", "keypoints")
             for side in ("left", "right"):
                 hand = {_HAND_POINTS: _hand(side)}
@@ -138,11 +140,12 @@ def coco_people(file: Path) -> Iterator[FoundPerson]:
         place = f"{file}, image {number}"
         names[str(_value(image, "id", place))] = Path(str(_value(image, "file_name", place))).name
     orders = _orders(content, file) if is_annotated else {}
-    seen = set[float]()
+    seen, counts = set[float](), Counter[str]()
     people = []
     for number, person in enumerate(_of_images(found)):
         place = f"{file}, entry {number}"
         image = _value(person, "image_id", place)
+        count_person(counts, image)
         layouts = orders.get("") or orders.get(str(person.get("category_id")))
         if orders and layouts is None:
             continue

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from cardbox_tracker.camera.given_arrays import silhouette_from
 from cardbox_tracker.common.errors import CardboxError, cut, quoted, reason_of
-from cardbox_tracker.detectors.point_checks import check_person, check_point
+from cardbox_tracker.detectors.point_checks import MOST_PEOPLE, check_person, check_point
 from cardbox_tracker.detectors.pose_network import (
     LANDMARKS,
     POINTS,
@@ -26,8 +26,6 @@ from cardbox_tracker.detectors.pose_network import (
 )
 
 _MASK = "mask"
-# More fill the screen, and take minutes an image.
-_MOST_PEOPLE = 200
 
 
 class FindsPeople(Protocol):
@@ -79,7 +77,7 @@ class OwnNetwork(PoseNetwork):
         try:
             people: Any = self._own.detect(np.ascontiguousarray(image))
             if isinstance(people, Iterable):
-                people = list(islice(people, _MOST_PEOPLE + 1))
+                people = list(islice(people, MOST_PEOPLE + 1))
         except (Exception, SystemExit) as error:
             raise CardboxError(
                 f"{name} fails: {type(error).__name__}: {cut(str(error))}; expected a list of "
@@ -87,8 +85,8 @@ class OwnNetwork(PoseNetwork):
             ) from error
         if not isinstance(people, list):
             raise CardboxError(f"{name} returns {quoted(people)}; expected a list of people")
-        if len(people) > _MOST_PEOPLE:
-            raise CardboxError(f"{name} returns more than {_MOST_PEOPLE} people in an image")
+        if len(people) > MOST_PEOPLE:
+            raise CardboxError(f"{name} returns more than {MOST_PEOPLE} people in an image")
         for number, person in enumerate(people):
             try:
                 found.append(_detection(person, image.shape[:2]))

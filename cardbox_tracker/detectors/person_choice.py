@@ -11,6 +11,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from cardbox_tracker.common.errors import quoted
 from cardbox_tracker.detectors.identity import KNOWN_IMAGES
 from cardbox_tracker.detectors.image_points import ImagePoints
 
@@ -46,7 +47,7 @@ class PersonChoice:
         if not (all(map(isfinite, place)) and 0.0 <= (time_s or 0.0) < inf):
             raise ValueError(
                 "expected left, right, largest, or X,Y: column and row of the person, also with "
-                f"@T for the second T, such as left@12.5, got {text!r}"
+                f"@T for the second T, such as left@12.5, got {quoted(text)}"
             )
         return cls(which, place, time_s)
 

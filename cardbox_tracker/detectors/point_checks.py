@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from math import isfinite
 
@@ -22,6 +23,18 @@ _LEAST_SCORE, _MOST_SCORE = -1.0, 10.0
 _MOST_OUTSIDE = 1.0
 # No person is as small as this, px; shares of the image are from 0 to 1, and guesses beyond it.
 _SHARES, _LEAST_POINTS = 1.5, 3
+MOST_PEOPLE = 200
+"""More people in an image are refused, as those of all images in one; they would take minutes."""
+
+
+def count_person(people: Counter[str], image: object) -> None:
+    """Count one more of the ``people`` by image; CardboxError above :data:`MOST_PEOPLE`."""
+    people[str(image)] += 1
+    if people[str(image)] > MOST_PEOPLE:
+        raise CardboxError(
+            f"image {quoted(image)} has more than {MOST_PEOPLE} people; expected those of "
+            "one image in each: check the numbers of the images"
+        )
 
 
 def check_point(point: NamedPoint, size: Size | None) -> None:

@@ -24,7 +24,13 @@ from cardbox_tracker.detectors.image_points import (
 )
 from cardbox_tracker.detectors.keypoint_json import coco_people, image_numbers, openpose_people
 from cardbox_tracker.detectors.person_choice import LEAST_INSIDE, inside, near_person, person_in
-from cardbox_tracker.detectors.point_checks import Size, check_person, check_point, person_of
+from cardbox_tracker.detectors.point_checks import (
+    Size,
+    check_person,
+    check_point,
+    count_person,
+    person_of,
+)
 from cardbox_tracker.person.sizes import FloatArray
 
 COLUMNS = ("stamp_ns", "joint", "u", "v", "score")
@@ -107,6 +113,7 @@ class PointTable(NamedTuple):
         most = 0.0
         found: dict[tuple[Key, str], dict[str, list[float]]] = {}
         first_lines: dict[tuple[Key, str], int] = {}
+        counts = Counter[str]()
         try:
             with table_rows(self.path, _MOST_BYTES) as rows:
                 column = self._check(rows.fieldnames or (), camera)
@@ -125,6 +132,8 @@ class PointTable(NamedTuple):
                     check_point((joint, u, v, score), size)
                     most = max(most, score)
                     key: tuple[Key, str] = image, row.get(_PERSON) or ""
+                    if key not in found:
+                        count_person(counts, image)
                     joints = found.setdefault(key, {})
                     first_lines.setdefault(key, rows.line_num)
                     if joint in joints:
@@ -138,8 +147,8 @@ class PointTable(NamedTuple):
             raise
         except (ValueError, TypeError, ArithmeticError) as error:
             raise CardboxError(
-                f"{self.path}, line {rows.line_num}: {reason_of(error)}; expected numbers in "
-                f"{column}, u, v and score"
+                f"{self.path}, line {rows.line_num}, has a value that is no number "
+                f"({reason_of(error)}); expected numbers in {column}, u, v and score"
             ) from None
         except CardboxError as error:
             raise CardboxError(f"{self.path}, line {rows.line_num}: {error}") from None

@@ -158,7 +158,7 @@ def _whole(value: object, key: str) -> int:
 
 def _names(value: object) -> tuple[str, ...]:
     if not isinstance(value, list) or not all(isinstance(name, str) for name in value):
-        raise BodyModelError(f"{_UNKNOWN} is {value!r}; expected a list such as [distance_m]")
+        raise BodyModelError(f"{_UNKNOWN} is {quoted(value)}; expected a list such as [distance_m]")
     return tuple(value)
 
 

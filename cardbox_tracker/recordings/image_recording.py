@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cardbox_tracker.camera.camera import Calibration
-from cardbox_tracker.common.errors import BagError
+from cardbox_tracker.common.errors import BagError, quoted
 from cardbox_tracker.recordings.given_camera import GivenCamera
 
 
@@ -60,7 +60,9 @@ class Film:
     def image_topic(self, camera: str | None = None) -> str:
         """Return the name of the file or folder; raise BagError if a camera is named."""
         if camera is not None:
-            raise BagError(f"{self.path} is of one camera, and {camera!r} is none; omit --cameras")
+            raise BagError(
+                f"{self.path} is of one camera, and {quoted(camera)} is none; omit --cameras"
+            )
         return self.path.name
 
     def calibration(self, camera: str | None = None) -> Calibration:

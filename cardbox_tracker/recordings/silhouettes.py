@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from cardbox_tracker.camera.camera import OPTICAL_FRAME, WORKING_SIZE, Calibration, Rectifier
 from cardbox_tracker.camera.depth_image import DepthImage
 from cardbox_tracker.common.beside import results_ahead
-from cardbox_tracker.common.errors import BagError, CameraError, CardboxError, EncodingError
+from cardbox_tracker.common.errors import BagError, CameraError, CardboxError, EncodingError, quoted
 from cardbox_tracker.detectors.detector import Detector, KeptDetections
 from cardbox_tracker.detectors.image_points import ImagePoints
 from cardbox_tracker.detectors.point_table import GivenPoints, Image, PointTable
@@ -60,7 +60,7 @@ class TimeSpan(NamedTuple):
             colon = ""
         if not colon or not 0 <= span.start_s < span.end_s:
             raise ValueError(
-                f"expected T0:T1 in seconds with T0 before T1, such as 0:4, got {text!r}"
+                f"expected T0:T1 in seconds with T0 before T1, such as 0:4, got {quoted(text)}"
             )
         return span
 

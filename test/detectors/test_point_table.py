@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from functools import partial
 from pathlib import Path
 
 import cv2
@@ -488,6 +489,26 @@ def test_people_without_points_are_nobody(tmp_path: Path, nobody: object) -> Non
     (tmp_path / "points.json").write_text(json.dumps(entries))
     found = read(PointTable(tmp_path / "points.json"))
     assert [len(found.all_in(Image(0, i))) for i in range(2)] == [1, 0]
+
+
+@pytest.mark.parametrize("count", [200, 201])
+@pytest.mark.parametrize("name", ["a.json", "a.csv", "people/f_7_keypoints.json"])
+def test_a_crowd_in_one_image_is_refused(tmp_path: Path, name: str, count: int) -> None:
+    file, points = tmp_path / name, [30.0, 20.0, 0.9] * 17
+    file.parent.mkdir(exist_ok=True)
+    if file.suffix == ".csv":
+        rows = (f"7,nose,30,20,0.9,{person}\n" for person in range(count))
+        file.write_text(f"frame,joint,u,v,score,person\n{''.join(rows)}")
+    elif name == "a.json":
+        file.write_text(json.dumps([{"image_id": 7, "keypoints": points}] * count))
+    else:
+        file.write_text(json.dumps({"people": [{"pose_keypoints_2d": points}] * count}))
+    read = partial(PointTable(file if name.startswith("a") else file.parent).read, None, (64, 48))
+    if count == 200:
+        assert read().kind == "frame"
+    else:
+        with pytest.raises(CardboxError, match="image 7 has more than 200 people; expected"):
+            read()
 
 
 def test_the_number_of_an_image_is_the_one_that_changes(tmp_path: Path) -> None:

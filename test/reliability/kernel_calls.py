@@ -257,6 +257,15 @@ def track(take: Take, numbers: Iterator[int]) -> None:
     terms().tracker.track(Observation(mask, image, depth_m, points=points))
 
 
+def track_any_size(take: Take, numbers: Iterator[int]) -> None:
+    height, width = take.size  # type: ignore[attr-defined]
+    camera = Camera(width, height, *2 * [max(height, width)], (width - 1) / 2, (height - 1) / 2)
+    preset = PRESETS["default" if next(numbers) % 2 else "paper"]()
+    tracker = Tracker(BODY, camera, quickest(preset.with_depth()))
+    for _image in range(2):
+        tracker.track(Observation(take(), take(more=(3,)), take("f4")))
+
+
 CALLS: dict[str, Callable[[Take, Iterator[int]], Any]] = {
     "silhouette_from": lambda take, _: silhouette_from(take()),
     "image_from": lambda take, _: image_from(take(more=(3,))),
@@ -284,6 +293,7 @@ CALLS: dict[str, Callable[[Take, Iterator[int]], Any]] = {
     "InnerCueTerm": rate_colors,
     "TrackedCamera": turn_upright,
     "Tracker": track,
+    "Tracker of any size": track_any_size,
 }
 
 

@@ -2,35 +2,51 @@
 
 from __future__ import annotations
 
+import argparse
 import copy
 import csv
 import io
 import json
 import re
 from collections.abc import Callable, Iterator
+from contextlib import contextmanager, redirect_stderr, suppress
+from dataclasses import fields, replace
+from functools import cache
+from itertools import islice
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
 import pytest
 import yaml
+from hypothesis import given
+from hypothesis import strategies as st
+from PIL import Image
 
+from cardbox_tracker.applications.drawing.video import video_file
 from cardbox_tracker.applications.retargeting.joint_map import load_joint_map
-from cardbox_tracker.applications.retargeting.robot import load_robot
+from cardbox_tracker.applications.retargeting.robot import load_robot, parse_robot
 from cardbox_tracker.applications.simulation.session import SessionFormat, synthesize_session
 from cardbox_tracker.camera.calibration_file import load_calibration
-from cardbox_tracker.camera.camera import Calibration
+from cardbox_tracker.camera.camera import Calibration, Camera
 from cardbox_tracker.camera.extrinsics_files import load_extrinsics
+from cardbox_tracker.commands.arguments import add_options
+from cardbox_tracker.commands.request import Request, TrackArguments
 from cardbox_tracker.common.errors import CardboxError
+from cardbox_tracker.common.settings import nested, settings_below
 from cardbox_tracker.detectors.point_table import PointTable
 from cardbox_tracker.measuring.scene import Scene, SceneCamera, Value, dumps_scene, load_scene
-from cardbox_tracker.person.model import BodyModel
+from cardbox_tracker.person.model import CONSTANTS, BodyModel, body_from_proportions
 from cardbox_tracker.person.model_file import dumps_body_model, load_body_model
+from cardbox_tracker.recordings.given_camera import GivenCamera, told_focal
+from cardbox_tracker.recordings.image_folder import ImageFolder
 from cardbox_tracker.recordings.result_reader import read_results
 from cardbox_tracker.recordings.result_table import result_table
 from cardbox_tracker.recordings.silhouettes import RecordedFrame
 from cardbox_tracker.recordings.truth import load_ground_truth
-from cardbox_tracker.search.config import TrackerConfig, read_settings
+from cardbox_tracker.recordings.video_reader import VideoReader
+from cardbox_tracker.search.config import TrackerConfig, default_preset, read_settings
 from cardbox_tracker.segmentation.background_file import (
     StoredBackground,
     load_background,
@@ -38,6 +54,7 @@ from cardbox_tracker.segmentation.background_file import (
 )
 from cardbox_tracker.segmentation.empty_scene import BackgroundModel
 from cardbox_tracker.tracking.estimate import Estimate
+from cardbox_tracker.tracking.observation import Observation
 from lab.evaluation.results import read_json
 from lab.tools.reliability import refusals
 
@@ -120,6 +137,190 @@ YAML_FILES: dict[str, tuple[Callable[[Path], Any], Any]] = {
         yaml.safe_load((ROOT / "config" / "example_joint_map.yaml").read_text()),
     ),
 }
+
+
+GONE = object()
+ANY = st.one_of(
+    st.sampled_from((*HOSTILE, GONE)),
+    *(st.floats(), st.integers(-(2**70), 2**70), st.text(max_size=9), st.floats(0.0, 1.0)),
+)
+
+
+@st.composite
+def changed(draw: st.DrawFn, whole: Any) -> Any:
+    """Return content of which a few values are others, a little larger or smaller, or missing."""
+    for _ in range(draw(st.integers(1, 4))):
+        place = draw(st.sampled_from(list(places(whole))))
+        before = whole
+        for key in place:
+            before = before[key]
+        if isinstance(before, float) and draw(st.booleans()):
+            value = before * draw(st.floats(-2.0, 2.0)) + draw(st.floats(-1.0, 1.0))
+        else:
+            value = draw(ANY)
+        whole = replaced(whole, place, value)
+    return without_gone(whole)
+
+
+def without_gone(data: Any) -> Any:
+    if isinstance(data, dict):
+        return {key: without_gone(one) for key, one in data.items() if one is not GONE}
+    if isinstance(data, list):
+        return [without_gone(one) for one in data if one is not GONE]
+    return None if data is GONE else data
+
+
+@contextmanager
+def file_of(content: bytes | str, name: str = "file.yaml") -> Iterator[Path]:
+    """Context of a new file."""
+    with TemporaryDirectory() as folder:
+        path = Path(folder) / name
+        path.parent.mkdir(exist_ok=True)
+        path.write_bytes(
+            content.encode("utf-8", "replace") if isinstance(content, str) else content
+        )
+        yield path
+
+
+@pytest.mark.promise(PROMISE)
+@pytest.mark.parametrize("kind", YAML_FILES)
+@given(draw=st.data())
+def test_any_yaml_file(kind: str, draw: st.DataObject) -> None:
+    read, whole = YAML_FILES[kind]
+    text = yaml.dump(draw.draw(changed(whole)), Dumper=yaml.CSafeDumper)
+    with file_of(text) as path, refusals():
+        read(path)
+
+
+@pytest.mark.promise(PROMISE)
+@pytest.mark.parametrize("name", POINTS)
+@given(draw=st.data())
+def test_any_points(name: str, draw: st.DataObject) -> None:
+    with file_of(json.dumps(draw.draw(changed(POINTS[name]))), name) as path, refusals():
+        PointTable(path.parent if "/" in name else path).read(None, SIZE)
+
+
+ARM = (ROOT / "config" / "example_arm.urdf").read_text()
+ATTRIBUTES = [found.span(1) for found in re.finditer(r'\w+="([^"]*)"', ARM)]
+
+
+@pytest.mark.promise(PROMISE)
+@given(
+    st.dictionaries(st.sampled_from(ATTRIBUTES), ANY | st.sampled_from(ARM.split('"')), max_size=4)
+)
+def test_any_robot(values: dict[tuple[int, int], Any]) -> None:
+    text = ARM
+    for (begin, end), value in sorted(values.items(), key=lambda item: item[0], reverse=True):
+        text = text[:begin] + ("" if value is GONE else str(value)) + text[end:]
+    with refusals():
+        parse_robot(text)
+
+
+@cache
+def film() -> bytes:
+    """A small MP4, whose boxes are at its end."""
+    with TemporaryDirectory() as folder:
+        path = Path(folder) / "a.mp4"
+        with video_file(path, 10.0) as add:
+            for level in range(3):
+                add(np.full((*SIZE[::-1], 3), 80 * level, np.uint8))
+        return path.read_bytes()
+
+
+@cache
+def photo() -> bytes:
+    """A small JPEG with a lens in its EXIF."""
+    exif, file = Image.Exif(), io.BytesIO()
+    exif[0x0110] = "ILCE-7M3"
+    exif.get_ifd(0x8769).update({0xA405: 28, 0x920A: 4.2, 0xA20E: 900.0, 0xA002: 32})
+    Image.new("RGB", SIZE).save(file, "JPEG", exif=exif)
+    return file.getvalue()
+
+
+@st.composite
+def changed_bytes(draw: st.DrawFn, whole: bytes, begin: int, end: int) -> bytes:
+    """Return bytes with other numbers of one to eight bytes between ``begin`` and ``end``."""
+    data = bytearray(whole)
+    for _ in range(draw(st.integers(1, 5))):
+        place, size = draw(st.integers(begin, end - 8)), draw(st.sampled_from([1, 2, 4, 8]))
+        data[place : place + size] = draw(st.binary(min_size=size, max_size=size))
+    return bytes(data[: draw(st.integers(begin, len(data)))] if draw(st.booleans()) else data)
+
+
+@pytest.mark.promise(PROMISE)
+@given(st.data())
+def test_any_boxes_of_a_film(draw: st.DataObject) -> None:
+    whole = film()
+    data = draw.draw(changed_bytes(whole, whole.index(b"moov") - 4, len(whole)))
+    with file_of(data, "film.mp4") as path, refusals():
+        told_focal(path)
+        with VideoReader(path, GivenCamera(fov_deg=60.0)) as reader:
+            assert all(image.as_sent.dtype == np.uint8 for image in islice(reader.images(), 9))
+
+
+@pytest.mark.promise(PROMISE)
+@given(st.data())
+def test_any_exif(draw: st.DataObject) -> None:
+    whole = photo()
+    data = draw.draw(changed_bytes(whole, 2, whole.index(b"\xff\xdb")))
+    with file_of(data, "images/1.jpg") as path, refusals():
+        told_focal(path)
+        with ImageFolder(path.parent, GivenCamera()) as folder:
+            assert all(image.as_sent.dtype == np.uint8 for image in folder.images())
+
+
+NUMBER = st.one_of(
+    *(st.floats(), st.floats(-3.0, 3.0), st.integers(), st.none(), st.text(max_size=3)),
+    st.sampled_from([*HOSTILE[:-1], len, float, np.float32("nan"), np.array([1.0, 2.0])]),
+)
+
+
+@pytest.mark.promise(PROMISE)
+@given(
+    st.sampled_from(
+        [
+            *(f"camera {one.name}" for one in fields(Camera)),
+            *(f"body {name}" for name in (*CONSTANTS, "version", "stature_stddev", "unknown")),
+            *(f"settings {name}" for name, *_ in settings_below(default_preset())),
+            *(f"request {one.name}" for one in fields(Request)),
+            *("stamp", "field of view", "proportions"),
+        ]
+    ),
+    NUMBER,
+)
+def test_any_number_in_python(of: str, value: Any) -> None:
+    kind, _, name = of.partition(" ")
+    make: dict[str, Callable[[], Any]] = {
+        "camera": lambda: replace(CAMERA.camera(*SIZE), **{name: value}),
+        "body": lambda: BODY.with_values(**{name: value}),
+        "settings": lambda: default_preset().changed(nested({name: value})),
+        "request": lambda: Request(**{"recording": Path("none"), name: value}),
+        "stamp": lambda: Observation(stamp_ns=value),
+        "field": lambda: Calibration.of_fov(*SIZE, value),
+        "proportions": lambda: body_from_proportions(value),
+    }
+    with refusals(ValueError):
+        make[kind]()
+
+
+TRACK = argparse.ArgumentParser()
+add_options(TRACK, TrackArguments)
+OPTIONS = [one.option_strings[-1] for one in TRACK._actions if one.option_strings]
+
+
+@pytest.mark.promise(PROMISE)
+@given(
+    st.lists(
+        st.sampled_from(OPTIONS)
+        | st.text(max_size=9)
+        | st.floats().map(str)
+        | st.sampled_from(["0:1", "1.75", "60,43", "mediapipe", "2", "left@3", "a=1", "trc,bvh"]),
+        max_size=7,
+    )
+)
+def test_any_options(words: list[str]) -> None:
+    with suppress(SystemExit), redirect_stderr(io.StringIO()), refusals():
+        TrackArguments.of(TRACK.parse_args(["none", *(word for word in words if "-h" not in word)]))
 
 
 @pytest.mark.promise(PROMISE)

@@ -99,7 +99,11 @@ def count(call: str, child: Child) -> int:
     return max(map(taken, constant("CONTENTS")))
 
 
-SIZES = st.tuples(st.integers(0, 20), st.integers(0, 33) | st.sampled_from([8, 16, 24]))
+SIZES = st.one_of(
+    *2 * [st.tuples(st.integers(0, 20), st.integers(0, 33) | st.sampled_from([8, 16, 24]))],
+    st.tuples(st.integers(1, 3), st.sampled_from([63, 64, 65, 1000, 4095, 4096])),
+    st.tuples(st.sampled_from([63, 64, 65, 1000, 4095, 4096]), st.integers(1, 3)),
+)
 SHAPES = st.lists(st.integers(0, 20), max_size=4) | SIZES
 ARRAYS = st.fixed_dictionaries(
     {
