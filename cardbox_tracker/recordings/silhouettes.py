@@ -234,8 +234,11 @@ class SilhouetteSource:
         """Return an image with whom the detector finds in it, if it is not before ``start_s``."""
         if self._detector is None or prepared.time_s < start_s:
             return prepared
-        found = self._detector(prepared.number, prepared.stamp_ns, prepared.image, prepared.is_cut)
-        return prepared._replace(found=found)
+        number, stamp_ns, image = prepared.number, prepared.stamp_ns, prepared.image
+        detect = partial(self._detector, number, stamp_ns, is_cut=prepared.is_cut)
+        if isinstance(self._bag, TurnedBack):
+            return prepared._replace(found=self._bag.detected(detect, stamp_ns, image))
+        return prepared._replace(found=detect(image))
 
     def _images_until(self, end_s: float, start_s: float) -> Iterator[PreparedImage]:
         """Yield images to ``end_s``, from ``start_s`` on with whom the detector finds meanwhile."""

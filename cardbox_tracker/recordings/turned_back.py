@@ -7,7 +7,7 @@ show of the background. Whatever follows, such as detector, scene and tracker, h
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from functools import cache, partial
 from typing import Any, cast
@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from cardbox_tracker.camera.camera import Calibration
 from cardbox_tracker.detectors.person_choice import PersonChoice
+from cardbox_tracker.detectors.pose_network import Detection
 from cardbox_tracker.measuring.camera_turns import CameraTurns
 from cardbox_tracker.person.sizes import FloatArray
 from cardbox_tracker.recordings.image_recording import RecordedImage
@@ -105,6 +106,30 @@ class TurnedBack:
         """Yield images turned back; those whose rotation is not known show the background alone."""
         for image in self._bag.images(topic or self._bag.image_topic()):
             yield replace(image, _decode=partial(self._decode, image))
+
+    def detected(
+        self, detect: Callable[[Image], list[Detection]], stamp_ns: int, image: Image
+    ) -> list[Detection]:
+        """Return whom ``detect`` finds in a small turned image, which it sees as it was recorded.
+
+        Away from the axis of the first view, turned images stretch people as networks have seen
+        none. In an image whose rotation is not known there is nobody.
+        """
+        if stamp_ns not in self._turned.found.rotations:
+            return []
+        there: Size = (image.shape[1], image.shape[0])
+        across, down = np.divide(there, self._sides)
+        scale = np.array([(across, 0, (across - 1) / 2), (0, down, (down - 1) / 2), (0, 0, 1)])
+        matrix = scale @ self._matrix(stamp_ns, self._turned.size)
+        back = cv2.WARP_INVERSE_MAP | cv2.INTER_LINEAR
+        seen = np.asarray(cv2.warpPerspective(image, matrix, self._turned.size, flags=back))
+        return [
+            one._replace(
+                points_px=cv2.perspectiveTransform(one.points_px[None], matrix)[0],
+                mask=np.asarray(cv2.warpPerspective(one.mask, matrix, there), np.uint8),
+            )
+            for one in detect(seen.astype(np.uint8))
+        ]
 
     def unseen(self, stamp_ns: int) -> Image:
         """Return the pixels (H, W) of a small turned image, 255 where the camera did not look."""

@@ -73,9 +73,8 @@ _HEAD = (
     f"time above {RULA.above}, true",
 )
 WAYS = ("mean posture", "normal", "particles", "whole deviation", "always the same")
-"""Sources of a score: the mean posture; mean and deviations, as in the node; the particles, as in
-the command; and for comparison these with the whole deviation, and the most frequent true score of
-the session."""
+"""Sources of a score: the mean posture; mean and deviations, as in commands and node; particles;
+and these with the whole deviation, and the most frequent true score of the session."""
 
 
 class ScoreError(NamedTuple):

@@ -125,6 +125,29 @@ def test_points_of_turned_images_are_those_of_a_still_camera(shaken: Path) -> No
         assert 0 < np.count_nonzero(frame.covered) < 0.3 * frame.covered.size
 
 
+def test_a_detector_sees_the_images_as_they_were_recorded(shaken: Path) -> None:
+    with request(shaken).open() as source:
+        found = turns_in(source, watch(source))
+    assert found is not None
+    images: list[NDArray[np.uint8]] = []
+
+    class Looks(FindsDots):
+        def detect(self, image: NDArray[np.uint8]) -> list[Mapping[str, Any]]:
+            images.append(image.copy())
+            return super().detect(image)
+
+    finds = Detector(OwnModel.of(Looks, "Looks"))
+    asked = replace(request(shaken), silhouettes=finds, points=finds).turned_back(found[0])
+    with asked.open() as source:
+        masks = [taken.first.silhouette.shape for taken in source.frames()]
+        assert {*masks} == {(source.first.camera.height, source.first.camera.width)}
+    assert len(images) == IMAGES
+    for number, image in enumerate(images):
+        recorded = cv2.imread(str(shaken / f"{number:03}.png"))
+        apart = np.abs(image.astype(int) - recorded)[20:-20, 20:-20]
+        assert np.median(apart) < 6.0, number
+
+
 def test_who_is_at_a_place_of_the_first_image_is_there_in_turned_ones(shaken: Path) -> None:
     with request(shaken).open() as source:
         found = turns_in(source, watch(source))
