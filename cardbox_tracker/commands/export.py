@@ -25,10 +25,10 @@ class Arguments(TrackedResults, Written):
     """Results, and the format to write.
 
     Attributes:
-        to: trc: markers for OpenSim and Pose2Sim; mot: coordinates for OpenSim; bvh: skeleton for
-            Blender; c3d: markers, with ezc3d; isb: CSV with joint angles by the recommendations of
-            the ISB (docs/export.md); velocities: CSV with velocities and accelerations; or a format
-            that another package adds
+        to: trc: markers for OpenSim and Pose2Sim; mot: coordinates for OpenSim; sto: their
+            velocities and accelerations; bvh: skeleton for Blender; c3d: markers, with ezc3d; isb:
+            CSV with joint angles by the recommendations of the ISB (docs/export.md); velocities:
+            CSV with velocities and accelerations; or a format that another package adds
         output: file to write; by default it has the name of the results and is in the current
             folder
         model: the person with whom the results were tracked, which bvh needs; trc, mot and c3d take
