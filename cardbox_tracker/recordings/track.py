@@ -6,9 +6,7 @@ import math
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import nullcontext
-from copy import copy
 from dataclasses import dataclass, field, replace
-from itertools import zip_longest
 from pathlib import Path
 from typing import NamedTuple
 
@@ -26,7 +24,7 @@ from cardbox_tracker.recordings.silhouettes import RecordedFrame
 from cardbox_tracker.search.config import TrackerConfig
 from cardbox_tracker.tracking.estimate import FILLED, LOST, TRACKING, UNCERTAIN, Estimate
 from cardbox_tracker.tracking.hands import Look
-from cardbox_tracker.tracking.session import Session
+from cardbox_tracker.tracking.session import Session, trackers_as_seen
 from cardbox_tracker.tracking.smoother import OF_RECORDINGS, Smoother, Smoothing
 from cardbox_tracker.tracking.tracker import Tracker
 
@@ -136,9 +134,7 @@ def track_recording(
             if only is not None:
                 estimates = [replace(one, person=None) for one in estimates]
             found += [Quality() for _ in estimates[len(found) :]]
-            # A tracker that gets another body is not the one that saw the images before.
-            both = zip_longest(as_seen, session.trackers)
-            as_seen = [a if a is not None and a.body is b.body else copy(b) for a, b in both]
+            as_seen = trackers_as_seen(as_seen, session.trackers)
             image, of = (taken.first, as_seen), (tracker.body for tracker in as_seen)
             tell(smoother.add(image, taken.stamp_ns, estimates, of))
             session.check_cameras()

@@ -144,6 +144,10 @@ class Smoother(Generic[T]):
         """Take an image and its estimates by person; return images that are finished likewise."""
         if not self._how.lag_s:
             return [(image, list(estimates))]
+        if self._images and stamp_ns <= self._images[-1].stamp_ns:
+            # What comes after a clock went back is another motion, and would be waited for.
+            early, self._images, self._done = self.finish(), [], 0
+            return early + self.add(image, stamp_ns, estimates, bodies)
         pairs = zip(estimates, bodies, strict=True)
         results = [_Result(estimate, body, _values(estimate)) for estimate, body in pairs]
         self._images.append(_Image(image, stamp_ns, results))
@@ -392,4 +396,5 @@ def _rates(results: Sequence[_Result], smooth: Spline, images: NDArray[np.intp])
     estimates = [result.estimate for result in results]
     found[:, [one.neck is None for one in estimates], neck[:, None]] = np.nan
     found[:, [one.legs is None for one in estimates], legs[:, None]] = np.nan
+    found[:, np.isnan(rates[0, :, 0])] = np.nan
     return found.transpose(1, 0, 2)

@@ -212,6 +212,35 @@ def test_a_short_gap_is_filled_and_its_deviations_grow_to_the_middle() -> None:
     assert all(one.state == FILLED for one in whole[50:60])
 
 
+def test_with_a_lag_each_image_is_smoothed_with_those_until_then() -> None:
+    rng = np.random.default_rng(7)
+    estimates = [estimate_of(state) for state in AHEAD + rng.normal(0.0, 0.03, (60, 14))]
+    for lag_s in (0.1, 0.2, 0.5):
+        smoother, found = Smoother[int](Smoothing(lag_s, every_s=0.0)), list[Estimate]()
+        for image, estimate in enumerate(estimates):
+            for number, (one,) in smoother.add(
+                image, round(1e9 * image / RATE_HZ), [estimate], [BODY]
+            ):
+                assert number == len(found) == image - round(lag_s * RATE_HZ)
+                found.append(one)
+        # The last one waits for no image that has come.
+        until = smooth(estimates[:60], smoother=Smoother(Smoothing(100.0)))
+        last = len(found) - 1
+        np.testing.assert_allclose(
+            found[last].placed_posture, until[last].placed_posture, atol=1e-3
+        )
+
+
+def test_a_clock_that_goes_back_ends_what_was_waited_for() -> None:
+    smoother, estimates = Smoother[int](), [estimate_of(AHEAD)] * 4
+    stamps_ns = [0, 100_000_000, -(10**12), 100_000_000 - 10**12]
+    came = []
+    for number, (stamp_ns, estimate) in enumerate(zip(stamps_ns, estimates, strict=True)):
+        came.append([image for image, _ in smoother.add(number, stamp_ns, [estimate], [BODY])])
+    assert came == [[], [], [0, 1], []]
+    assert [image for image, _ in smoother.finish()] == [2, 3]
+
+
 @given(st.lists(st.integers(0, 2), min_size=1, max_size=60), st.floats(0.1, 3.0))
 @settings(max_examples=30, deadline=None)
 def test_every_image_comes_once_with_everybody_who_was_there(
