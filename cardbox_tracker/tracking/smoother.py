@@ -9,11 +9,14 @@ with the least
     sum of w_k (z_k - x(t_k))^2 + (2 pi f)^-4 integral of x''^2,
 
 which is a low-pass of fourth order without delay: a motion of the frequency f keeps half of its
-amplitude. The weight w of an image is the time around it, times (v + n) / (v + e^2) of an error e,
-in deviations, of its n values: the errors have Student's distribution with v degrees of freedom,
-whose estimate are repeated least squares (Lange, Little & Taylor, "Robust statistical modeling
-using the t distribution", 1989). So an arm that a few images show at another depth stays. What is
-smoothed are directions of limbs, since angles of a straight arm jump.
+amplitude. Of some frequencies up to 4 Hz it is the one with which the limbs in the images around
+are most likely (Wecker & Ansley, "The signal extraction approach to nonlinear regression and spline
+smoothing", 1983), so slow motions are smoothed more. The weight w of an image is the time around
+it, times (v + n) / (v + e^2) of an error e, in deviations, of its n values: the errors have
+Student's distribution with v degrees of freedom, whose estimate are repeated least squares (Lange,
+Little & Taylor, "Robust statistical modeling using the t distribution", 1989). So an arm that a few
+images show at another depth stays. What is smoothed are directions of limbs, since angles of a
+straight arm jump.
 """
 
 from __future__ import annotations
@@ -59,11 +62,11 @@ T = TypeVar("T")
 LAG_S = 0.5
 """Seconds on either side of an image that count; others change it by less than 1 mm."""
 
-# Lower ones take from the fast motion of arms (docs/research.md).
-_CUTOFF_HZ = 4.0
+# Below the first, images count that are farther than LAG_S; arms are never faster than the last.
+_CUTOFFS_HZ = np.array([1.5, 2.0, 2.5, 3.0, 3.5, 4.0])
 # Deviation of the part that changes, m or rad, in images of this rate.
 _NOISE, _RATE_HZ = 0.05, 30.0
-_FREEDOM, _ROUNDS = 4.0, 8
+_FREEDOM, _ROUNDS, _FIRST_ROUNDS = 4.0, 8, 4
 # In how many values the usual noise counts beside that of the residuals.
 _PRIOR = 1.0
 # Nobody turns as far between two images: the tracker has found that it was wrong.
@@ -100,8 +103,9 @@ class Spline(NamedTuple):
 
     values: FloatArray  #: (n, 60)
     stddev: FloatArray  #: of the groups, (n, 8)
+    cutoff_hz: float  #: frequency of which half is left
     #: velocities, their deviations, accelerations and their deviations, (4, n, 28)
-    rates: FloatArray
+    rates: FloatArray | None = None
 
 
 class _Image(NamedTuple, Generic[T]):
@@ -227,7 +231,7 @@ def _smoothed(
             known = {i: filled.get(i, results[i]) for i in of if is_seen[i] or i in filled}
             smooth = spline(time_s[part], values[part], how.has_rates)
             for i, one in known.items():
-                estimates[i] = _estimate(one, smooth.values[i - begin], smooth.stddev[i - begin])
+                estimates[i] = _estimate(one, smooth, i - begin)
             if how.has_rates and known:
                 rates = _rates([*known.values()], smooth, np.array([*known]) - begin)
                 for i, found in zip(known, rates, strict=True):
@@ -269,23 +273,41 @@ def spline(time_s: FloatArray, values: FloatArray, has_rates: bool = False) -> S
     q[i, i], q[i + 2, i] = 1.0 / steps_s[:-1], 1.0 / steps_s[1:]
     q[i + 1, i] = -q[i, i] - q[i + 2, i]
     r[i[1:], i[:-1]] = r[i[:-1], i[1:]] = steps_s[1:-1] / 6.0
-    curves = np.linalg.solve(r, q.T)
-    bending = (2.0 * np.pi * _CUTOFF_HZ) ** -4 * (q @ curves)
-    eye = np.eye(len(time_s))
-    bending += 1e-9 * eye
+    curves, eye = np.linalg.solve(r, q.T), np.eye(len(time_s))
     # An image beside a gap does not count for all of it.
     around_s = np.minimum(np.gradient(time_s), 2.0 * np.median(steps_s))
     usual = (np.isfinite(values[:, _BEGINS]) * around_s[:, None]).T
-    known, weights = np.nan_to_num(values).T, usual
-    for _ in range(_ROUNDS):
-        inverse = np.linalg.inv(bending + weights[:, None] * eye)
-        used = weights
-        smooth = np.einsum("kij,kj,kj->ki", inverse[_OF], used[_OF], known)
-        squares = np.add.reduceat((known - smooth)[: len(_OWN)] ** 2, _BEGINS)
-        errors = squares * (_RATE_HZ * around_s) / _NOISE**2
-        weights = usual * (_FREEDOM + _COUNTS[:, None]) / (_FREEDOM + errors)
+    known = np.nan_to_num(values).T
+
+    def bending(cutoff_hz: float) -> FloatArray:
+        return np.asarray((2.0 * np.pi * cutoff_hz) ** -4 * (q @ curves) + 1e-9 * eye)
+
+    def fitted(cutoff_hz: float, rounds: int) -> tuple[FloatArray, ...]:
+        """Return inverse, weights, smooth values and squares of errors at the end of the rounds."""
+        bent, weights = bending(cutoff_hz), usual
+        for _ in range(rounds):
+            inverse, used = np.linalg.inv(bent + weights[:, None] * eye), weights
+            smooth = np.einsum("kij,kj,kj->ki", inverse[_OF], used[_OF], known)
+            squares = np.add.reduceat((known - smooth)[: len(_OWN)] ** 2, _BEGINS)
+            errors = squares * (_RATE_HZ * around_s) / _NOISE**2
+            weights = usual * (_FREEDOM + _COUNTS[:, None]) / (_FREEDOM + errors)
+        return inverse, used, smooth, squares
+
+    weights = fitted(_CUTOFFS_HZ[-1], _FIRST_ROUNDS)[1][_OWN[_LIMBS][::3]][..., None]
+    limbs = known[_LIMBS].reshape(4, 3, -1).transpose(0, 2, 1)
+
+    def misfit(cutoff_hz: float) -> float:
+        """Return -2 times the logarithm of the likelihood of the limbs, less a constant."""
+        precision = bending(cutoff_hz) + weights * eye
+        residual = limbs - np.linalg.solve(precision, weights * limbs)
+        fit = np.sum(weights * limbs * residual) * _RATE_HZ / _NOISE**2
+        spread = np.linalg.slogdet(precision)[1].sum() + 16.0 * len(i) * np.log(cutoff_hz)
+        return float(fit + 3.0 * spread)
+
+    cutoff_hz = float(min(_CUTOFFS_HZ, key=misfit))
+    inverse, used, smooth, squares = fitted(cutoff_hz, _ROUNDS)
     variance = _NOISE**2 / _RATE_HZ * np.diagonal(inverse, axis1=1, axis2=2)
-    found = Spline(smooth.T, np.sqrt(variance).T, np.empty(0))
+    found = Spline(smooth.T, np.sqrt(variance).T, cutoff_hz)
     if not has_rates:
         return found
     # Second and first derivatives are linear in the smooth values.
@@ -296,17 +318,17 @@ def spline(time_s: FloatArray, values: FloatArray, has_rates: bool = False) -> S
     first = np.vstack([ahead, first + third * (second[:-1] + 2.0 * second[1:])])
     # What changes from image to image shows in the residuals.
     free = _COUNTS * (np.sum(used > 0.0, axis=1) - np.einsum("kii,ki->k", inverse, used))
-    scale = np.sum(used * squares, axis=1) + _PRIOR * _NOISE**2 / _RATE_HZ
+    scale = np.sum(usual * squares, axis=1) + _PRIOR * _NOISE**2 / _RATE_HZ
     scale /= _PRIOR + free
     # The speed of the process at an image, given its places there.
-    between = (2.0 * np.pi * _CUTOFF_HZ) ** 4 * around_s / np.sqrt(48.0)
+    between = (2.0 * np.pi * cutoff_hz) ** 4 * around_s / np.sqrt(48.0)
     variances = [np.sum((one @ inverse) * one, axis=2) for one in (first, second)]
     deviations = [np.sqrt(scale[:, None] * of).T for of in (variances[0] + between, variances[1])]
     own = smooth[: len(_OWN)].T
     rates = np.array([first @ own, deviations[0][:, _OWN], second @ own, deviations[1][:, _OWN]])
     # The spline is straight at its ends, which shows for the time in which its memory fades.
     from_end_s = np.minimum(time_s - time_s[0], time_s[-1] - time_s)
-    rates[:, from_end_s * (2.0 * np.pi * _CUTOFF_HZ) < 1.0] = np.nan
+    rates[:, from_end_s * (2.0 * np.pi * cutoff_hz) < 1.0] = np.nan
     return found._replace(rates=rates)
 
 
@@ -321,9 +343,10 @@ def _states(values: FloatArray) -> FloatArray:
     return state
 
 
-def _estimate(result: _Result, values: FloatArray, stddev: FloatArray) -> Estimate:
-    """Return the estimate of smoothed values (60,) with deviations (8,) of their groups."""
+def _estimate(result: _Result, smooth: Spline, image: int) -> Estimate:
+    """Return the estimate of an image of a spline."""
     estimate, body = result.estimate, result.body
+    values, stddev = smooth.values[image], smooth.stddev[image]
     state = _states(values[None, _PLACED])[0]
     before = estimate.placed_posture
     state[YAW] += 2.0 * np.pi * np.round((before[YAW] - state[YAW]) / (2.0 * np.pi))
@@ -348,7 +371,7 @@ def _estimate(result: _Result, values: FloatArray, stddev: FloatArray) -> Estima
         clavicles_stddev_m=rises[1],
         neck=None if estimate.neck is None else values[_NECK],
         legs=legs,
-        smoothed_hz=_CUTOFF_HZ,
+        smoothed_hz=smooth.cutoff_hz,
     )
 
 
@@ -371,6 +394,7 @@ def _rates(results: Sequence[_Result], smooth: Spline, images: NDArray[np.intp])
     An error of a direction that lasts turns the velocity by as much, so it adds to the deviation
     its share of velocity and acceleration; one of the distance scales those of the place.
     """
+    assert smooth.rates is not None
     body, values, rates = results[0].body, smooth.values[images], smooth.rates[:, images].copy()
     lasting = np.exp(values[:, _STDDEVS])
     share = np.empty((len(images), len(_LASTING)))

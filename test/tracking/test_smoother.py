@@ -71,13 +71,25 @@ def test_a_straight_motion_stays_and_its_keypoints_are_those_of_the_joints(rate_
     np.testing.assert_allclose([one.keypoints_m for one in found], points_m, atol=1e-6)
 
 
-@pytest.mark.parametrize("frequency_hz", [1.0, 2.0, 4.0])
+@pytest.mark.parametrize("frequency_hz", [0.5, 1.0, 2.0, 4.0])
 def test_a_sine_keeps_the_share_of_the_low_pass_of_fourth_order(frequency_hz: float) -> None:
-    # Three values that fit have 1 + 3 / 4 of the usual weight.
-    kept = 1.0 / (1.0 + (frequency_hz / 4.0) ** 4 / 1.75)
+    # Three values that fit have 1 + 3 / 4 of the usual weight; limbs at rest are smoothed most.
+    kept = 1.0 / (1.0 + (frequency_hz / 1.5) ** 4 / 1.75)
     sine = 1e-3 * np.sin(2.0 * np.pi * frequency_hz * np.arange(200) / RATE_HZ)
-    found = states_of(smooth([estimate_of(state) for state in moved(sine, YAW)]))[:, YAW]
-    np.testing.assert_allclose(found[50:-50], kept * sine[50:-50], atol=3e-5)
+    found = smooth([estimate_of(state) for state in moved(sine, YAW)])
+    assert {one.smoothed_hz for one in found} == {1.5}
+    np.testing.assert_allclose(states_of(found)[50:-50, YAW], kept * sine[50:-50], atol=3e-5)
+
+
+def test_arms_that_wave_fast_are_smoothed_less_and_keep_their_motion() -> None:
+    states = np.tile(AHEAD, (120, 1))
+    wave = 0.6 * np.sin(2.0 * np.pi * 2.5 * np.arange(120) / RATE_HZ)
+    states[:, LEFT_ARM.start + 1] += wave
+    found = smooth([estimate_of(state) for state in states])
+    assert {one.smoothed_hz for one in found[45:-45]} == {4.0}
+    arm = states_of(found)[45:-45, LEFT_ARM.start + 1]
+    # At 4 Hz at least 0.87 of it are kept, at 1.5 Hz 0.11.
+    np.testing.assert_allclose(arm - AHEAD[LEFT_ARM.start + 1], wave[45:-45], atol=0.15)
 
 
 def test_an_arm_that_three_images_show_elsewhere_stays_and_one_that_moved_does_not() -> None:
@@ -86,7 +98,7 @@ def test_an_arm_that_three_images_show_elsewhere_stays_and_one_that_moved_does_n
     states[45:, LEFT_ARM] += 0.6
     arm = states_of(smooth([estimate_of(state) for state in states]))[:, LEFT_ARM]
     assert np.abs(arm[10:40] - AHEAD[LEFT_ARM]).max() < 0.12
-    np.testing.assert_allclose(arm[52:], states[52:, LEFT_ARM], atol=0.05)
+    np.testing.assert_allclose(arm[53:], states[53:, LEFT_ARM], atol=0.05)
 
 
 def test_shaking_becomes_little_and_deviations_stay_those_of_the_images() -> None:
@@ -141,9 +153,10 @@ def test_rates_of_a_straight_motion_are_its_velocity_and_nothing() -> None:
     x = STATE_NAMES.index("torso_x")
     assert all(one.rates is not None for one in found)
     each = np.array([one.rates for one in found])
-    # In the first and the last 0.04 s the spline is straight, whatever the motion.
-    assert np.isnan(each[[0, 1, -2, -1]]).all()
-    velocity, _, acceleration, _ = each[2:-2, :, x].T
+    # Limbs at rest are smoothed with 1.5 Hz; within 1 / (2 pi 1.5 Hz) = 0.106 s of its ends the
+    # spline is straight, whatever the motion.
+    assert np.isnan(each[[*range(4), *range(-4, 0)]]).all()
+    velocity, _, acceleration, _ = each[4:-4, :, x].T
     np.testing.assert_allclose(velocity, 0.5, atol=1e-5)
     np.testing.assert_allclose(acceleration, 0.0, atol=1e-4)
     # The hands go with the hips: towards the camera, against z of a level camera.
@@ -155,15 +168,16 @@ def test_rates_of_a_slow_sine_are_its_derivatives_and_those_of_hands_follow_the_
     turn = 2.0 * np.pi * 0.5
     angle = 0.4 * np.sin(turn * np.arange(90) / RATE_HZ)
     found = rates(moved(angle, YAW))
-    each = np.array([one.rates for one in found])[2:-2]
-    # At 0.5 Hz the low-pass keeps 1 / (1 + (1 / 8)^4 / 1.75).
-    velocity = 0.4 * turn * np.cos(turn * np.arange(90) / RATE_HZ)[2:-2]
+    each = np.array([one.rates for one in found])[10:-10]
+    # At 0.5 Hz the low-pass of 1.5 Hz keeps 1 / (1 + (1 / 3)^4 / 1.75).
+    kept = 1.0 / (1.0 + (1.0 / 3.0) ** 4 / 1.75)
+    velocity = kept * 0.4 * turn * np.cos(turn * np.arange(90) / RATE_HZ)[10:-10]
     np.testing.assert_allclose(each[:, 0, YAW], velocity, atol=0.01)
-    np.testing.assert_allclose(each[3:-3, 2, YAW], -(turn**2) * angle[5:-5], atol=0.02)
+    np.testing.assert_allclose(each[:, 2, YAW], -kept * turn**2 * angle[10:-10], atol=0.15)
     points_m = np.array([one.keypoints_m for one in found]).reshape(90, -1)
     np.testing.assert_allclose(
-        each[5:-5, 0, len(STATE_NAMES) :],
-        np.gradient(points_m, 1.0 / RATE_HZ, axis=0)[7:-7],
+        each[:, 0, len(STATE_NAMES) :],
+        np.gradient(points_m, 1.0 / RATE_HZ, axis=0)[10:-10],
         atol=0.02,
     )
 
@@ -171,8 +185,8 @@ def test_rates_of_a_slow_sine_are_its_derivatives_and_those_of_hands_follow_the_
 def test_two_thirds_of_the_rates_of_noise_are_within_their_deviations() -> None:
     rng = np.random.default_rng(5)
     each = np.array([one.rates for one in rates(AHEAD + rng.normal(0.0, 0.03, (400, 14)))])
-    # The truth is at rest, so all that moves is error; accelerations also have what is lost above
-    # 4 Hz, of which there is none here.
+    # The truth is at rest, so all that moves is error; accelerations also have what is lost of
+    # fast motions, of which there are none here.
     for rate, most in ((0, 0.99), (2, 1.0)):
         error, stddev = each[:, rate], each[:, rate + 1]
         known = np.isfinite(error) & np.isfinite(stddev)
