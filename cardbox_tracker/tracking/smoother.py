@@ -80,6 +80,7 @@ _WITH = np.concatenate([[0, 1, 1, 1, 2, 2, 3, 3, 4, 4, 5, 5, 0, 0], [7] * 18])
 _OF = np.concatenate([_OWN, _WITH])
 _BEGINS, _COUNTS = np.unique(_OWN, return_index=True, return_counts=True)[1:]
 _PLACED, _LIMBS, _NECK, _LEGS = slice(0, 18), slice(6, 18), slice(18, 20), slice(20, 28)
+_LIMB_GROUPS = slice(2, 6)
 _STDDEVS, _LEG_POINTS = slice(28, 42), slice(42, 60)
 # The deviations that belong to place, trunk and each limb.
 _LASTING = [np.flatnonzero(_WITH[: PLACE.stop] == group) for group in range(6)]
@@ -278,34 +279,40 @@ def spline(time_s: FloatArray, values: FloatArray, has_rates: bool = False) -> S
     around_s = np.minimum(np.gradient(time_s), 2.0 * np.median(steps_s))
     usual = (np.isfinite(values[:, _BEGINS]) * around_s[:, None]).T
     known = np.nan_to_num(values).T
+    # The values by group, filled up with zeros.
+    own = np.zeros((len(_COUNTS), len(time_s), _COUNTS.max()))
+    for group, (first, count) in enumerate(zip(_BEGINS, _COUNTS, strict=True)):
+        own[group, :, :count] = known[first : first + count].T
 
-    def bending(cutoff_hz: float) -> FloatArray:
-        return np.asarray((2.0 * np.pi * cutoff_hz) ** -4 * (q @ curves) + 1e-9 * eye)
+    def precision(cutoff_hz: float, weights: FloatArray) -> FloatArray:
+        bending = (2.0 * np.pi * cutoff_hz) ** -4 * (q @ curves) + 1e-9 * eye
+        return np.asarray(bending + weights[..., None] * eye)
 
-    def fitted(cutoff_hz: float, rounds: int) -> tuple[FloatArray, ...]:
-        """Return inverse, weights, smooth values and squares of errors at the end of the rounds."""
-        bent, weights = bending(cutoff_hz), usual
+    def fitted(cutoff_hz: float, rounds: int, groups: slice) -> tuple[FloatArray, FloatArray]:
+        """Return the weights (k, n) of groups after some rounds, and squares of errors (k, n)."""
+        seen, weights = own[groups], usual[groups]
         for _ in range(rounds):
-            inverse, used = np.linalg.inv(bent + weights[:, None] * eye), weights
-            smooth = np.einsum("kij,kj,kj->ki", inverse[_OF], used[_OF], known)
-            squares = np.add.reduceat((known - smooth)[: len(_OWN)] ** 2, _BEGINS)
+            smooth = np.linalg.solve(precision(cutoff_hz, weights), weights[..., None] * seen)
+            squares = np.sum((seen - smooth) ** 2, axis=2)
             errors = squares * (_RATE_HZ * around_s) / _NOISE**2
-            weights = usual * (_FREEDOM + _COUNTS[:, None]) / (_FREEDOM + errors)
-        return inverse, used, smooth, squares
+            freedom = _FREEDOM + _COUNTS[groups, None]
+            weights = usual[groups] * freedom / (_FREEDOM + errors)
+        return weights, squares
 
-    weights = fitted(_CUTOFFS_HZ[-1], _FIRST_ROUNDS)[1][_OWN[_LIMBS][::3]][..., None]
-    limbs = known[_LIMBS].reshape(4, 3, -1).transpose(0, 2, 1)
+    limbs = own[_LIMB_GROUPS, :, :3]
+    weights = fitted(_CUTOFFS_HZ[-1], _FIRST_ROUNDS, _LIMB_GROUPS)[0]
 
     def misfit(cutoff_hz: float) -> float:
         """Return -2 times the logarithm of the likelihood of the limbs, less a constant."""
-        precision = bending(cutoff_hz) + weights * eye
-        residual = limbs - np.linalg.solve(precision, weights * limbs)
-        fit = np.sum(weights * limbs * residual) * _RATE_HZ / _NOISE**2
-        spread = np.linalg.slogdet(precision)[1].sum() + 16.0 * len(i) * np.log(cutoff_hz)
-        return float(fit + 3.0 * spread)
+        inverted, weighted = precision(cutoff_hz, weights), weights[..., None] * limbs
+        fit = np.sum(weighted * (limbs - np.linalg.solve(inverted, weighted))) * _RATE_HZ
+        spread = np.linalg.slogdet(inverted)[1].sum() + 16.0 * len(i) * np.log(cutoff_hz)
+        return float(fit / _NOISE**2 + 3.0 * spread)
 
     cutoff_hz = float(min(_CUTOFFS_HZ, key=misfit))
-    inverse, used, smooth, squares = fitted(cutoff_hz, _ROUNDS)
+    used, squares = fitted(cutoff_hz, _ROUNDS, slice(None))
+    inverse = np.linalg.inv(precision(cutoff_hz, used))
+    smooth = np.einsum("kij,kj->ki", inverse[_OF], used[_OF] * known)
     variance = _NOISE**2 / _RATE_HZ * np.diagonal(inverse, axis1=1, axis2=2)
     found = Spline(smooth.T, np.sqrt(variance).T, cutoff_hz)
     if not has_rates:
