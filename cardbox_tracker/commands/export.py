@@ -31,10 +31,10 @@ class Arguments(TrackedResults, Written):
     """Results, and the format to write.
 
     Attributes:
-        to: trc: markers for OpenSim and Pose2Sim; mot and sto: coordinates for OpenSim; bvh:
-            skeleton for Blender; c3d: markers, with ezc3d; isb: CSV with joint angles by the
-            recommendations of the ISB (docs/export.md); velocities: CSV with velocities and
-            accelerations; or a format that another package adds
+        to: trc: markers for OpenSim and Pose2Sim; mot and sto: coordinates for OpenSim; rates:
+            their velocities and accelerations; bvh: skeleton for Blender; c3d: markers, with ezc3d;
+            isb: CSV with joint angles by the recommendations of the ISB (docs/export.md);
+            velocities: CSV with velocities and accelerations; or a format that another package adds
         output: file to write; by default it has the name of the results and is in the current
             folder. With {n} in its name, a file of each person, whose number is there
         model: the person with whom the results were tracked, which bvh needs; trc, mot, sto and c3d

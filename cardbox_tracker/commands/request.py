@@ -49,6 +49,8 @@ AUTO = "auto"
 OPTIONS_ENDING = ".options"
 """Ending of the files beside the recordings of a folder that have options for them."""
 
+# Images of so many seconds are kept until their gap is filled.
+_MOST_GAP_S = 2.0
 _MOST_ROLL_DEG, _MOST_FPS = 180.0, 1000.0
 _MOST_BYTES = 64 * 1024
 # An option of a file takes the place of these, which do not go with it.
@@ -231,6 +233,10 @@ class TrackingOptions(RecordingOptions):
             wrists, in further columns and in the video (docs/results.md)
         causal: take for each image only those before it, as live; without it, also those after it,
             which takes out the shaking
+        fill_gaps_s: give images without a posture the motion between those around them, which are
+            at most so many seconds apart; their state is 'filled' (default: none)
+        rates: also measure velocities and accelerations, with deviations, in further columns
+            (docs/results.md)
     """
 
     model: Path | None = option("MODEL.yaml")
@@ -256,6 +262,8 @@ class TrackingOptions(RecordingOptions):
     seed: int = option(read=at_least(0), default=0)
     hands: bool = option(default=False)
     causal: bool = option(default=False)
+    fill_gaps_s: float | None = option("S", between(0.0, _MOST_GAP_S), flag="--fill-gaps")
+    rates: bool = option(default=False)
 
     @property
     def statures_m(self) -> tuple[float, ...]:

@@ -160,7 +160,8 @@ def track_one(
         "has_points": has_points,
         "has_people": has_people,
         "has_hands": request.hands is not None,
-        "is_smoothed": request.lag_s > 0.0,
+        "is_smoothed": request.smoothing.lag_s > 0.0,
+        "has_rates": request.smoothing.has_rates,
     }
     kept = KeptResults(asked.recording, **has)
     observers = (kept,) if show is not None or any(derived) else ()

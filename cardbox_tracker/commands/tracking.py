@@ -97,7 +97,7 @@ def _tracked(
             person.end_s,
             person.people,
             None if request.hands is None else HandNetwork(request.hands),
-            request.lag_s,
+            request.smoothing,
             only,
         )
 

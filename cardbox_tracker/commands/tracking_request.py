@@ -38,7 +38,7 @@ from cardbox_tracker.recordings.recording import STEREO, FurtherFilm, RecordingR
 from cardbox_tracker.recordings.silhouettes import TimeSpan
 from cardbox_tracker.search.config import PRESETS, TrackerConfig, read_settings
 from cardbox_tracker.tracking.session import MOST_PEOPLE
-from cardbox_tracker.tracking.smoother import LAG_S
+from cardbox_tracker.tracking.smoother import LAG_S, OF_RECORDINGS, Smoothing
 
 S = TypeVar("S")
 T = TypeVar("T")
@@ -102,7 +102,7 @@ class TrackingRequest:
     inputs: tuple[Path, ...]  #: files and folders that are read, which no result may replace
     #: network file that finds the points of hands; None if they are not measured
     hands: Path | None = None
-    lag_s: float = LAG_S  #: seconds of later images that count for an image
+    smoothing: Smoothing = OF_RECORDINGS  #: how the results are smoothed over time
     files: TrackFiles = TrackFiles()  #: results to write
     force: bool = False  #: whether an existing bag is replaced
 
@@ -264,7 +264,8 @@ def tracking_request(asked: TrackingOptions, faults: Iterable[str] = ()) -> Trac
     of = recording, person, asked.preset, config, asked.seed, inputs_of(asked), hands
     # The paper's filter is what the paper says.
     lag_s = 0.0 if asked.causal or asked.preset == "paper" else LAG_S
-    return TrackingRequest(*of, lag_s)
+    smoothing = Smoothing(lag_s, has_rates=asked.rates, longest_gap_s=asked.fill_gaps_s or 0.0)
+    return TrackingRequest(*of, smoothing)
 
 
 def _tracking_faults(
@@ -276,6 +277,10 @@ def _tracking_faults(
             f"--preset {asked.preset} uses the silhouette of one camera; give --preset default "
             "with several cameras or with --depth"
         )
+    if asked.causal or asked.preset == "paper":
+        why = "--causal" if asked.causal else f"--preset {asked.preset}"
+        for flag in sorted({"--rates", "--fill-gaps"} & asked.given().keys()):
+            yield f"{flag} comes from the smoothing, which {why} leaves out: give one of them"
     if asked.hands and not has_detector:
         yield "--hands needs the detector's wrists and knuckles: give --detector mediapipe"
     count = len(asked.statures_m)

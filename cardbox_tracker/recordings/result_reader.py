@@ -54,14 +54,21 @@ from cardbox_tracker.recordings.result_table import (
     units,
 )
 from cardbox_tracker.recordings.silhouettes import RecordedFrame
-from cardbox_tracker.tracking.estimate import LOST, NO_PERSON, TRACKING, UNCERTAIN, Estimate
+from cardbox_tracker.tracking.estimate import (
+    FILLED,
+    LOST,
+    NO_PERSON,
+    TRACKING,
+    UNCERTAIN,
+    Estimate,
+)
 from cardbox_tracker.tracking.tracker import Tracker
 
 MODEL = "/body_model"
 _STATE, _JOINTS, _STDDEV = "/tracking_state", "/joint_states", "/joint_states_stddev"
 _KEYPOINTS, _HANDS, _STATES = "/keypoints", "/hands", ("/keypoint_states", "/place_state")
 
-_SEEN, _GAPS = (TRACKING, UNCERTAIN), (LOST, NO_PERSON)
+_SEEN, _GAPS = (TRACKING, UNCERTAIN, FILLED), (LOST, NO_PERSON)
 _KEYPOINT_STATES = frozenset(map(str, KeypointState))
 _TIMES = ("stamp_ns", "time_s", "state")
 _POSTURE = (*JOINT_NAMES, *PLACE_NAMES)
@@ -152,7 +159,7 @@ class _Rows:
     def __init__(self, path: Path, names: Iterable[str], needed: Sequence[str]) -> None:
         found = set(names)
         self._path = path
-        known = [name for name in units(*[True] * 4) if name in found and name not in _TIMES]
+        known = [name for name in units(*[True] * 5) if name in found and name not in _TIMES]
         self.names = [name for name in known if name not in (*TEXT_COLUMNS, PERSON, "stamp")]
         self._texts = [name for name in known if name in TEXT_COLUMNS]
         self._are_chances = np.array([name.endswith("_chance") for name in self.names], bool)

@@ -8,6 +8,7 @@ from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from decimal import Decimal
 from functools import cache
+from itertools import chain
 from pathlib import Path
 from typing import Any
 
@@ -56,6 +57,22 @@ _CLAVICLES = names_of(Group.CLAVICLE)
 POINT_COLUMNS = tuple(f"{name}_{axis}" for name in KEYPOINT_NAMES for axis in "xyz")
 """Columns of the keypoints, m in the optical frame of the first camera."""
 
+_RATES = {"velocity": "s", "acceleration": "s2"}
+
+
+def _rate_units(names: Iterable[str]) -> dict[str, str]:
+    return {
+        f"{name}_{rate}{what}_{UNITS.get(name, 'm')}_{per}": f"{UNITS.get(name, 'm')}/{per}"
+        for name in names
+        for rate, per in _RATES.items()
+        for what in ("", "_stddev")
+    }
+
+
+RATE_COLUMNS = tuple(_rate_units((*STATE_NAMES, *POINT_COLUMNS)))
+"""Velocity, its deviation, acceleration and its deviation of each joint, then of each coordinate of
+the keypoints."""
+
 
 _SIDES = "left", "right"
 PALM_COLUMNS = tuple(f"{side}_palm_{axis}" for side in _SIDES for axis in "xyz")
@@ -74,12 +91,14 @@ def units(
     has_people: bool = False,
     has_hands: bool = False,
     is_smoothed: bool = False,
+    has_rates: bool = False,
 ) -> dict[str, str]:
     """Return the unit of each column by its name, in their order; empty for none.
 
     The first names are fixed, because scripts read them; standard deviations end in their unit.
     Neck and legs are there for recordings with points of the person.
     """
+    moved = JOINT_NAMES, PLACE_NAMES, NECK_NAMES * has_points, _CLAVICLES, LEG_NAMES * has_points
     return {
         "stamp": "s",
         "state": "",
@@ -105,6 +124,7 @@ def units(
         **(_HAND_UNITS if has_hands else {}),
         **(_leg_units() if has_points else {}),
         **({SMOOTHED: "Hz"} if is_smoothed else {}),
+        **(_rate_units((*chain(*moved), *POINT_COLUMNS)) if has_rates else {}),
     }
 
 
@@ -160,6 +180,8 @@ def row_of(stamp_ns: int, time_s: float, estimate: Estimate, **has: bool) -> lis
         known |= zip(columns_of(STATE_NAMES), map(_known, values), strict=True)
     angles = anatomical_angles(np.asarray(estimate.posture, float)[None])[0].tolist()
     known |= {name: x for name, x in zip(ANATOMICAL_NAMES, angles, strict=True) if x == x}
+    if estimate.rates is not None:
+        known |= zip(RATE_COLUMNS, map(_known, estimate.rates.T.ravel()), strict=True)
     points_m = np.asarray(estimate.keypoints_m, float).ravel()
     known |= zip(POINT_COLUMNS, points_m.tolist(), strict=True)
     known |= {"cost": estimate.cost_px, "iou": estimate.iou}

@@ -25,13 +25,13 @@ from cardbox_tracker.recordings.result_table import (
     LEG_POINT_COLUMNS,
     PALM_COLUMNS,
     POINT_COLUMNS,
+    RATE_COLUMNS,
     SMOOTHED,
     WRIST_COLUMNS,
     deviation_columns,
 )
+from cardbox_tracker.tracking.estimate import FILLED
 
-FILLED = "filled"
-"""State of an image whose posture is that between the images around it."""
 LONGEST_GAP_S = 0.2
 """Time between two images up to which the gap between them is filled."""
 
@@ -49,15 +49,6 @@ _BY_DEVIATION |= {f"{name}_stddev_rad": (name,) for name in WRIST_COLUMNS}
 _BY_DEVIATION |= {
     f"{name}_stddev_m": tuple(f"{name}_{axis}" for axis in "xyz") for name in LEG_KEYPOINT_NAMES
 }
-_RATES = {"velocity": "s", "acceleration": "s2"}
-RATE_COLUMNS = tuple(
-    f"{name}_{rate}{what}_{UNITS.get(name, 'm')}_{per}"
-    for name in (*STATE_NAMES, *POINT_COLUMNS)
-    for rate, per in _RATES.items()
-    for what in ("", "_stddev")
-    if not what or name in _DEVIATIONS
-)
-"""Velocity and acceleration of each joint, with deviations, and of the coordinates of keypoints."""
 # The response of the low-pass decays to 1e-7 in three periods of the cut-off, or, since it rings at
 # half the rate, of its distance from that.
 _PERIODS = 3.0
@@ -86,8 +77,9 @@ def low_passed(
     """Return results whose short gaps are filled with straight lines, after the low-pass.
 
     Joints, points and palms are filtered each for itself; angles go on beyond half a turn.
-    Deviations and states stay. In a gap, the deviations grow by the error a t (T - t) / 2 of a line
-    over the time T, with the root mean square of the acceleration as a.
+    Deviations and states stay, and rates of the smoothing go. In a gap, the deviations grow by the
+    error a t (T - t) / 2 of a line over the time T, with the root mean square of the acceleration
+    as a.
 
     Args:
         results: of one person.
@@ -108,7 +100,7 @@ def low_passed(
         raise CardboxError(f"the longest gap is {longest_gap_s:g} s; give 0 s or more")
     # Stamps of a gap of exactly this length may be rounded.
     longest_s = max(longest_gap_s + 1e-6, 1.5 * step_s)
-    numbers = dict(results.numbers)
+    numbers = {name: of for name, of in results.numbers.items() if name not in RATE_COLUMNS}
     for name in _FILTERED & numbers.keys():
         values = numbers[name] = _continuous(name, numbers[name])
         known = np.flatnonzero(np.isfinite(values))
@@ -139,11 +131,14 @@ def low_passed(
 
 
 def rates_of(results: Results) -> FloatArray:
-    """Return the values (n, k) of ``RATE_COLUMNS``, by differences of second order at the stamps.
+    """Return the values (n, k) of ``RATE_COLUMNS``: those of the smoothing, if they are there.
 
-    They are nan at both ends and beside gaps. The deviations are those of independent errors in the
-    images, of which smoothing and low-pass have left their share.
+    Otherwise they are differences of second order at the stamps, nan at both ends and beside gaps.
+    Their deviations are those of independent errors in the images, of which smoothing and low-pass
+    have left their share; those of keypoints are unknown.
     """
+    if results.numbers.keys() & set(RATE_COLUMNS):
+        return results.of(RATE_COLUMNS)
     time_s, step_s = _times(results)
     found = np.full((len(time_s), len(RATE_COLUMNS)), np.nan)
     if len(time_s) < 3:
@@ -167,11 +162,12 @@ def rates_of(results: Results) -> FloatArray:
         values = _continuous(name, results.of([name])[:, 0])
         for rate, weight in weights.items():
             next(columns)[:] = np.where(is_gap, np.nan, _weighted(weight, values))
+            stddev = next(columns)
             if name in _DEVIATIONS:
                 variance = results.deviations_of([name])[:, 0] ** 2
                 share = np.linalg.norm(kept * gains[rate]) / np.linalg.norm(gains[rate])
                 variance = _weighted([one**2 for one in weight], variance)
-                next(columns)[:] = np.where(is_gap, np.nan, share * np.sqrt(variance))
+                stddev[:] = np.where(is_gap, np.nan, share * np.sqrt(variance))
     return found
 
 

@@ -6,9 +6,7 @@ import math
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import nullcontext
-from copy import copy
 from dataclasses import dataclass, field, replace
-from itertools import zip_longest
 from pathlib import Path
 from typing import NamedTuple
 
@@ -24,10 +22,10 @@ from cardbox_tracker.recordings.recording import Recording
 from cardbox_tracker.recordings.result_table import result_table
 from cardbox_tracker.recordings.silhouettes import RecordedFrame
 from cardbox_tracker.search.config import TrackerConfig
-from cardbox_tracker.tracking.estimate import LOST, TRACKING, UNCERTAIN, Estimate
+from cardbox_tracker.tracking.estimate import FILLED, LOST, TRACKING, UNCERTAIN, Estimate
 from cardbox_tracker.tracking.hands import Look
-from cardbox_tracker.tracking.session import Session
-from cardbox_tracker.tracking.smoother import LAG_S, Smoother
+from cardbox_tracker.tracking.session import Session, trackers_as_seen
+from cardbox_tracker.tracking.smoother import OF_RECORDINGS, Smoother, Smoothing
 from cardbox_tracker.tracking.tracker import Tracker
 
 Observer = Callable[[RecordedFrame, Estimate, Tracker], None]
@@ -88,7 +86,7 @@ def track_recording(
     end_s: float = math.inf,
     people: int | None = None,
     look: Look | None = None,
-    lag_s: float = LAG_S,
+    smoothing: Smoothing = OF_RECORDINGS,
     only: int | None = None,
 ) -> TrackSummary:
     """Track every image from ``start_s`` to ``end_s``.
@@ -96,8 +94,8 @@ def track_recording(
     Both count in seconds from the recording's start; at ``start_s`` the person stands in the front
     reference posture. The same recording and ``seed`` give the same bytes. ``table`` is a file of
     :func:`~.result_table.result_table`. ``observers``, such as a progress bar or a bag writer, are
-    called for each image, and for each of several people. ``lag_s`` is that of
-    :class:`~cardbox_tracker.tracking.smoother.Smoother`: 0 for what live tracking gives. The other
+    called for each image, and for each of several people. ``smoothing`` is that of
+    :class:`~cardbox_tracker.tracking.smoother.Smoother`, by default of recordings. The other
     arguments are those of :class:`~cardbox_tracker.tracking.session.Session`; with ``only``, the
     results are those of one person without a number. Raises CardboxError if no image lies after
     ``start_s``, or a file cannot be written.
@@ -107,8 +105,9 @@ def track_recording(
     session = Session(bodies, first.camera, config, rng, *given, only=only)
     found, cuts_s = list[Quality](), list[float]()
     has = {"has_points": first.has_points, "has_people": people is not None}
-    has |= {"has_hands": look is not None, "is_smoothed": lag_s > 0.0}
-    smoother = Smoother[tuple[RecordedFrame, list[Tracker]]](lag_s)
+    has |= {"has_hands": look is not None, "is_smoothed": smoothing.lag_s > 0.0}
+    has |= {"has_rates": smoothing.has_rates}
+    smoother = Smoother[tuple[RecordedFrame, list[Tracker]]](smoothing)
     as_seen: list[Tracker] = []
     with nullcontext() if table is None else result_table(table, **has) as add_row:
 
@@ -130,14 +129,12 @@ def track_recording(
             if taken.first.is_cut and frames > 1:
                 cuts_s.append(taken.time_s)
                 tell(smoother.finish())
-                smoother = Smoother(lag_s)
+                smoother = Smoother(smoothing)
             estimates = session.track(taken.observations)
             if only is not None:
                 estimates = [replace(one, person=None) for one in estimates]
             found += [Quality() for _ in estimates[len(found) :]]
-            # A tracker that gets another body is not the one that saw the images before.
-            both = zip_longest(as_seen, session.trackers)
-            as_seen = [a if a is not None and a.body is b.body else copy(b) for a, b in both]
+            as_seen = trackers_as_seen(as_seen, session.trackers)
             image, of = (taken.first, as_seen), (tracker.body for tracker in as_seen)
             tell(smoother.add(image, taken.stamp_ns, estimates, of))
             session.check_cameras()
@@ -205,7 +202,7 @@ class Quality:
 
     def __init__(self) -> None:
         self.images = self.uncertain = self._sure_hands = self._sure_places = 0
-        self._sure = self._vertical = 0
+        self._sure = self._vertical = self._filled = 0
         self._reasons, self._pitch = Counter[str](), (0.0, 0.0)
         self.fits: list[tuple[int, float]] = []
         self._moments: list[_Moment] = []
@@ -226,6 +223,7 @@ class Quality:
         if estimate.cost_px is not None and estimate.iou is not None:
             self.fits.append((estimate.cost_px, estimate.iou))
         self._sure += estimate.state == TRACKING
+        self._filled += estimate.state == FILLED
         states = estimate.keypoint_states or ()
         sure = [states[hand] == KeypointState.TRACKED for hand in _HANDS] if states else []
         self._sure_hands += sum(sure)
@@ -261,6 +259,8 @@ class Quality:
             f"{self._vertical / self.images:.0%}, the distance (to 0.3 m) in "
             f"{self._sure_places / self.images:.0%}"
         )
+        if self._filled:
+            yield f"{self._filled} images without a posture are filled from those around them"
         if self._returns:
             returns = (f"{time_s:.1f} s ({chance:.0%})" for time_s, chance in self._returns)
             yield (

@@ -2,7 +2,8 @@
 
 States: ``tracking``; ``uncertain`` (the posture may be wrong); ``lost`` (no result has fitted for
 several frames, or there is more foreground than a person can have); ``no_person`` (too few
-foreground pixels for a person). Only ``tracking`` and ``uncertain`` have a posture.
+foreground pixels for a person). Only ``tracking`` and ``uncertain`` have a posture, and ``filled``,
+a gap with the posture between the images around it.
 """
 
 from __future__ import annotations
@@ -32,7 +33,7 @@ OPEN, CLOSED = 0.75, 0.25
 HAND_KEYPOINTS = 2, 5
 """Left and right hand among the keypoints."""
 TRACKING, UNCERTAIN, LOST, NO_PERSON = "tracking", "uncertain", "lost", "no_person"
-
+FILLED = "filled"
 
 KEPT_S = 0.5
 """Time for which a head or a hand that is not found keeps its result, s."""
@@ -103,9 +104,9 @@ class Legs(NamedTuple):
 class Estimate:
     """State of tracking and posture of the person at one time."""
 
-    #: ``tracking``, ``uncertain``, ``lost`` or ``no_person``; with the last two, all other
-    #: attributes are None. It is about the shape: the posture in the camera's frame beside the
-    #: place.
+    #: ``tracking``, ``uncertain``, ``filled``, ``lost`` or ``no_person``; with the last two, all
+    #: other attributes are None. It is about the shape: the posture in the camera's frame beside
+    #: the place.
     state: str
     posture: FloatArray | None = None  #: d1..d12, (12,), rad and metres
     #: standard deviation of each joint, (12,), rad and metres: the weighted spread of the particles
@@ -151,6 +152,10 @@ class Estimate:
     legs: Legs | None = None  #: None without a posture, and as long as no points have shown them
     #: frequency of which smoothing over time has left half; None if it is not smoothed
     smoothed_hz: float | None = None
+    #: velocity, its deviation, acceleration and its deviation, (4, n), of each joint of
+    #: ``STATE_NAMES``, then of the coordinates of keypoints, in rad, m and s; None unless smoothing
+    #: was asked for them, and nan where they are unknown
+    rates: FloatArray | None = None
 
     @property
     def vertical_state(self) -> KeypointState | None:
@@ -177,7 +182,15 @@ class Estimate:
             hands = left, right
         if legs is not None:
             legs = legs._replace(points_m=legs.points_m @ turn)
-        return replace(self, keypoints_m=self.keypoints_m @ turn, hands=hands, legs=legs)
+        rates = self.rates
+        if rates is not None:
+            joints, points = np.split(rates, [len(STATE)], axis=1)
+            points = points.reshape(len(rates), -1, 3)
+            stddev = np.sqrt(points[1::2] ** 2 @ turn**2)
+            points = np.stack([points[0] @ turn, stddev[0], points[2] @ turn, stddev[1]])
+            rates = np.hstack([joints, points.reshape(len(rates), -1)])
+        keypoints_m = self.keypoints_m @ turn
+        return replace(self, keypoints_m=keypoints_m, hands=hands, legs=legs, rates=rates)
 
     @cached_property
     def joints(self) -> FloatArray:

@@ -14,10 +14,11 @@ person. Somebody whom others hide in all cameras stays where they were, and is `
 
 from __future__ import annotations
 
-from collections.abc import Container, Iterator, Mapping, Sequence
+from collections.abc import Container, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import Executor, Future
+from copy import copy
 from dataclasses import replace
-from itertools import combinations
+from itertools import chain, combinations, repeat
 from typing import NamedTuple
 
 import cv2
@@ -721,3 +722,14 @@ def _chance_of_same(before: FloatArray | None, now: FloatArray | None) -> float:
     """Return the probability that colours are those of one person; without them, it is even."""
     away = ALIKE if before is None or now is None else apart(before, now)
     return float(1.0 / (1.0 + np.exp((away - ALIKE) / _ALIKE_SPREAD)))
+
+
+def trackers_as_seen(before: Sequence[Tracker], now: Iterable[Tracker]) -> list[Tracker]:
+    """Return trackers that keep the body of an image; a copy of each that has got another one.
+
+    Args:
+        before: what this function returned for the image before.
+        now: the trackers of the session.
+    """
+    both = zip(now, chain(before, repeat(None)), strict=False)
+    return [a if a is not None and a.body is b.body else copy(b) for b, a in both]

@@ -25,6 +25,7 @@ from cardbox_tracker.recordings.given_camera import GivenCamera
 from cardbox_tracker.recordings.other_silhouettes import PersonInView
 from cardbox_tracker.recordings.silhouettes import TimeSpan
 from cardbox_tracker.tracking.session import MOST_PEOPLE
+from cardbox_tracker.tracking.smoother import OF_RECORDINGS
 
 
 @pytest.fixture
@@ -183,6 +184,18 @@ def test_hands_need_the_detector_and_its_file(film: Path, monkeypatch: pytest.Mo
     points = "--detector", film.parent / "points.csv"
     for words in ((), points, ("--silhouettes", "detector")):
         assert "--hands needs the detector" in refused(film, *given, *words, "--hands")
+
+
+def test_what_smoothing_gives_needs_it(film: Path) -> None:
+    given = ("--fov", 60, "--stature", 1.7)
+    wanted = asked(film, *given, "--rates", "--fill-gaps", 0.3).smoothing
+    assert (wanted.has_rates, wanted.longest_gap_s) == (True, 0.3)
+    assert asked(film, *given).smoothing == OF_RECORDINGS
+    assert asked(film, *given, "--causal").smoothing.lag_s == 0.0
+    for without in (("--causal",), ("--preset", "paper")):
+        told = refused(film, *given, *without, "--rates", "--fill-gaps", 0.3)
+        assert "--rates comes from the smoothing" in told
+        assert "--fill-gaps comes from the smoothing" in told and without[-1] in told
 
 
 NEEDED = {

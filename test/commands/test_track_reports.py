@@ -180,7 +180,7 @@ def in_browser(page: Path) -> str:
 @pytest.mark.parametrize(
     ("words", "expected"),
     [
-        (("--export", "trc,fbx"), "expected formats of trc, bvh, c3d, mot, sto, isb"),
+        (("--export", "trc,fbx"), "expected formats of trc, bvh, c3d, mot, sto, rates, isb"),
         (("--plot", "FOLDER/angles.jpg"), "its name must end in .png or .pdf"),
         (("--report", "FOLDER/page"), "its name must end in .html"),
         (("--report", "FOLDER/a.html", "--video", "FOLDER/a.avi"), "must end in .mp4"),

@@ -14,8 +14,9 @@ import numpy as np
 import pytest
 
 from cardbox_tracker.common.errors import CardboxError
-from cardbox_tracker.person.skeleton import KeypointState
+from cardbox_tracker.person.skeleton import STATE_NAMES, KeypointState
 from cardbox_tracker.recordings.result_table import (
+    RATE_COLUMNS,
     check_table,
     result_table,
     row_of,
@@ -266,6 +267,24 @@ def test_the_smoothing_comes_after_all_others_and_only_where_there_is_one() -> N
     assert tuple(units(is_smoothed=True)) == (*units(), "smoothed_hz")
     assert row_of(42, 1.5, replace(FOUND, smoothed_hz=4.0), is_smoothed=True)[-1] == 4.0
     assert row_of(42, 1.5, FOUND, is_smoothed=True)[-1] is None
+
+
+def test_rates_are_further_columns_only_where_they_are_asked_for() -> None:
+    rates = np.arange(float(len(RATE_COLUMNS))).reshape(-1, 4).T.copy()
+    rates[:, 3] = np.nan
+    names = tuple(units(has_rates=True))
+    row = dict(
+        zip(names, row_of(42, 1.5, replace(FOUND, rates=rates), has_rates=True), strict=True)
+    )
+    # Each joint has four values: velocity, deviation, acceleration, deviation.
+    assert [row[name] for name in names[len(units()) :][:4]] == [0.0, 1.0, 2.0, 3.0]
+    assert row["torso_y_velocity_m_s"] == 0.0 and row["torso_y_acceleration_stddev_m_s2"] == 3.0
+    assert row["torso_yaw_velocity_rad_s"] is None
+    first = 4 * len(STATE_NAMES)
+    assert row["left_shoulder_x_velocity_stddev_m_s"] == first + 1
+    assert units(has_rates=True)["right_hand_z_acceleration_m_s2"] == "m/s2"
+    assert not any("left_knee" in name or "wrist" in name for name in names)
+    assert "left_knee_flexion_velocity_rad_s" in units(has_points=True, has_rates=True)
 
 
 def test_of_several_people_the_number_comes_last() -> None:

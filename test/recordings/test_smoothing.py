@@ -20,14 +20,18 @@ from cardbox_tracker.person.kinematics import pose
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.skeleton import JOINT_NAMES, PLACE_NAMES
 from cardbox_tracker.recordings.result_reader import Results
-from cardbox_tracker.recordings.result_table import PALM_COLUMNS, POINT_COLUMNS, SMOOTHED
-from cardbox_tracker.recordings.smoothing import (
-    FILLED,
+from cardbox_tracker.recordings.result_table import (
+    PALM_COLUMNS,
+    POINT_COLUMNS,
     RATE_COLUMNS,
+    SMOOTHED,
+)
+from cardbox_tracker.recordings.smoothing import (
     butterworth,
     low_passed,
     rates_of,
 )
+from cardbox_tracker.tracking.estimate import FILLED
 
 RATE_HZ = 30.0
 YAW = "torso_yaw"

@@ -14,7 +14,7 @@ import numpy as np
 
 from cardbox_tracker.applications.exporting.bvh import write_bvh
 from cardbox_tracker.applications.exporting.markers import ezc3d_or_error, write_c3d, write_trc
-from cardbox_tracker.applications.exporting.mot import write_mot, write_sto
+from cardbox_tracker.applications.exporting.mot import write_mot, write_rates, write_sto
 from cardbox_tracker.applications.exporting.motion import Motion, images_of_body
 from cardbox_tracker.common.errors import CardboxError, cut
 from cardbox_tracker.common.extensions import EXPORTERS, extensions, loaded, optional, place_of
@@ -27,16 +27,14 @@ from cardbox_tracker.person.sizes import FloatArray
 from cardbox_tracker.person.skeleton import POSTURE_GROUPS, Group, joints_of
 from cardbox_tracker.recordings import result_reader
 from cardbox_tracker.recordings.result_reader import Results
-from cardbox_tracker.recordings.result_table import units
+from cardbox_tracker.recordings.result_table import RATE_COLUMNS, units
 from cardbox_tracker.recordings.smoothing import (
-    FILLED,
     LONGEST_GAP_S,
-    RATE_COLUMNS,
     AnyResults,
     low_passed,
     rates_of,
 )
-from cardbox_tracker.tracking.estimate import UNCERTAIN
+from cardbox_tracker.tracking.estimate import FILLED, UNCERTAIN
 
 NUMBER = "{n}"
 """Where the number of the person is in a name for the files of all people."""
@@ -83,6 +81,7 @@ FORMATS: dict[str, Format] = {
     "c3d": Format(".c3d", write_c3d, ezc3d_or_error),
     "mot": Format(".mot", write_mot),
     "sto": Format(".sto", write_sto),
+    "rates": Format(".rates.sto", write_rates),
     "isb": Format(".isb.csv", write_isb, has_places=False),
     "velocities": Format(".velocities.csv", write_velocities, has_places=False),
 }
@@ -221,7 +220,7 @@ class Result(Results):
         pandas = optional("pandas", "to_pandas needs the library pandas", "pandas")
         times = {"stamp_ns": self.stamp_ns, "time_s": self.time_s, "state": self.state}
         found = {**times, **self.numbers, **self.texts}
-        return pandas.DataFrame({name: found[name] for name in units(*[True] * 4) if name in found})
+        return pandas.DataFrame({name: found[name] for name in units(*[True] * 5) if name in found})
 
     def save(self, path: str | os.PathLike[str]) -> list[str]:
         """Write, or replace, a file in the format of its ending; return lines about it.

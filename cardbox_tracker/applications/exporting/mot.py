@@ -8,6 +8,8 @@ Z; the models lean it by 13 degrees.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -15,11 +17,19 @@ import numpy as np
 from cardbox_tracker.applications.exporting.motion import Motion, floor_below, frames_of, held
 from cardbox_tracker.common.errors import in_cell
 from cardbox_tracker.common.files import atomic_path
+from cardbox_tracker.common.rates import carried
 from cardbox_tracker.person.isb_angles import LABORATORY, LEAST_BENT_RAD, thorax_angles
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.posture import LEFT_ARM, RIGHT_ARM, YAW
 from cardbox_tracker.person.sizes import FloatArray
-from cardbox_tracker.person.skeleton import Group, arm_directions, rotation_x, rotation_z
+from cardbox_tracker.person.skeleton import (
+    POSTURE_GROUPS,
+    Group,
+    arm_directions,
+    rotation_x,
+    rotation_z,
+    rows_of,
+)
 
 LUMBAR = ("lumbar_extension", "lumbar_bending", "lumbar_rotation")
 """Rotations about Z, X' and Y''."""
@@ -35,6 +45,7 @@ HAND = ("wrist_flex", "wrist_dev", "pro_sup")
 supination: 90 degrees from ours."""
 
 _MIRROR = np.array([1.0, 1.0, -1.0])
+_STORAGE = "DataType=double", "version=3"
 
 
 def coordinates_of(states: FloatArray) -> dict[str, FloatArray]:
@@ -81,22 +92,11 @@ def _arm_angles(upper: FloatArray, lower: FloatArray) -> FloatArray:
     return np.stack([flexion, adduction, rotation, bend], axis=1)
 
 
-def write_mot(path: Path, motion: Motion, body: BodyModel | None) -> None:
-    """Write time (s), rotations (deg) and, with the body, place (m) of each image with a posture.
+def _columns(motion: Motion, body: BodyModel | None) -> dict[str, FloatArray]:
+    """Return rotations, rad, that go on beyond half a turn, and with the body place, m, by name.
 
-    Rotations go on beyond half a turn, so they do not jump by a whole one.
-
-    Raises CardboxError if the file cannot be written.
+    They are those of the images with a posture, (n,) each.
     """
-    _write(path, motion, body, (in_cell(path.stem), "version=1"))
-
-
-def write_sto(path: Path, motion: Motion, body: BodyModel | None) -> None:
-    """Write what :func:`write_mot` writes as OpenSim 4 stores tables of numbers."""
-    _write(path, motion, body, ("DataType=double", "version=3"))
-
-
-def _write(path: Path, motion: Motion, body: BodyModel | None, kind: tuple[str, ...]) -> None:
     seen = motion.is_seen
     states, turned = motion.states[seen], {}
     if motion.has_legs:
@@ -105,14 +105,78 @@ def _write(path: Path, motion: Motion, body: BodyModel | None, kind: tuple[str, 
         states = states.copy()
         states[:, YAW] = 0.0
     limbs = {name: of[seen] for name, of in _limbs(motion).items()}
-    columns = {
-        name: np.degrees(np.unwrap(of))
-        for name, of in (coordinates_of(states) | limbs | turned).items()
-    }
+    rotations = coordinates_of(states) | limbs | turned
+    columns = {name: np.asarray(np.unwrap(of)) for name, of in rotations.items()}
     if body is not None:
         hips_m = ((frames_of(motion, body).hip - floor_below(body)) @ LABORATORY.T)[seen]
         columns |= dict(zip(PELVIS, hips_m.T, strict=True))
-    rows = np.column_stack([motion.time_s[seen], *columns.values()])
+    return columns
+
+
+def write_mot(path: Path, motion: Motion, body: BodyModel | None) -> None:
+    """Write time (s), rotations (deg) and, with the body, place (m) of each image with a posture.
+
+    Rotations go on beyond half a turn, so they do not jump by a whole one.
+
+    Raises CardboxError if the file cannot be written.
+    """
+    _write_coordinates(path, motion, body, (in_cell(path.stem), "version=1"))
+
+
+def write_sto(path: Path, motion: Motion, body: BodyModel | None) -> None:
+    """Write what :func:`write_mot` writes as OpenSim 4 stores tables of numbers."""
+    _write_coordinates(path, motion, body, _STORAGE)
+
+
+def _write_coordinates(
+    path: Path, motion: Motion, body: BodyModel | None, kind: tuple[str, ...]
+) -> None:
+    columns = {
+        name: of if name in PELVIS else np.degrees(of)
+        for name, of in _columns(motion, body).items()
+    }
+    _write(path, motion.time_s[motion.is_seen], columns, kind)
+
+
+def write_rates(path: Path, motion: Motion, body: BodyModel | None) -> None:
+    """Write how fast the coordinates change, with deviations, of each image where that is known.
+
+    Velocities are ``NAME_u`` and ``NAME_u_std``, accelerations ``NAME_dudt`` and ``NAME_dudt_std``,
+    in degrees, m and s; nan for legs that are hidden. Hands have none. Raises CardboxError if the
+    file cannot be written.
+    """
+    rates = motion.rates().reshape(len(motion.state), -1, 4)
+    posture = rows_of(*POSTURE_GROUPS, Group.PLACE)
+    is_known = np.isfinite(rates[:, posture]).all(axis=(1, 2))
+    motion = motion.without(np.asarray(~is_known))
+    seen, without = motion.is_seen, replace(motion, palms=np.full_like(motion.palms, np.nan))
+    rows = np.concatenate([posture, rows_of(Group.LEG)[: None if motion.has_legs else 0]])
+    names = [*_columns(without, body)]
+    are_angles = np.array([name not in PELVIS for name in names])
+
+    def coordinates(values: FloatArray) -> FloatArray:
+        joints = motion.joints.copy()
+        joints[np.ix_(seen, rows)] = values
+        return np.column_stack([*_columns(replace(without, joints=joints), body).values()])
+
+    moving = rates[seen][:, rows].transpose(2, 0, 1)
+    found = carried(coordinates, motion.joints[np.ix_(seen, rows)], moving, are_angles)
+    # Legs that an image does not show have the angles of another one, but no deviations.
+    found[:, np.isnan(found[1])] = np.nan
+    found[..., are_angles] = np.degrees(found[..., are_angles])
+    kinds = "u", "u_std", "dudt", "dudt_std"
+    columns = {
+        f"{name}_{kind}": found[number, :, column]
+        for column, name in enumerate(names)
+        for number, kind in enumerate(kinds)
+    }
+    _write(path, motion.time_s[seen], columns, _STORAGE)
+
+
+def _write(
+    path: Path, time_s: FloatArray, columns: Mapping[str, FloatArray], kind: tuple[str, ...]
+) -> None:
+    rows = np.column_stack([time_s, *columns.values()])
     header = (
         *kind,
         f"nRows={len(rows)}",

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from functools import partial
 from typing import Any
@@ -27,7 +27,7 @@ from cardbox_tracker.person.model_file import dumps_body_model, load_body_model,
 from cardbox_tracker.person.skeleton import PLACE_NAMES, STATE_NAMES
 from cardbox_tracker.person.urdf import urdf_from_body
 from cardbox_tracker.ros.messages import conversions
-from cardbox_tracker.ros.nodes.camera_inputs import CameraInputs, Received
+from cardbox_tracker.ros.nodes.camera_inputs import CameraInputs, ObservationSet, Received
 from cardbox_tracker.ros.nodes.tracker_outputs import TrackedBodies, TrackerOutputs
 from cardbox_tracker.ros.nodes.tracker_parameters import TrackerParameters
 from cardbox_tracker.ros.runtime import qos
@@ -36,7 +36,12 @@ from cardbox_tracker.ros.runtime.node import CardboxNode
 from cardbox_tracker.ros.runtime.parameters import LiveParameters
 from cardbox_tracker.tracking.estimate import LOST, NO_PERSON, UNCERTAIN, Estimate
 from cardbox_tracker.tracking.precompile import compile_all
-from cardbox_tracker.tracking.session import Session
+from cardbox_tracker.tracking.session import Session, trackers_as_seen
+from cardbox_tracker.tracking.smoother import Smoother, Smoothing
+from cardbox_tracker.tracking.tracker import Tracker
+
+Seen = tuple[ObservationSet, Sequence[Tracker]]
+"""The inputs of a time, and the trackers with the bodies that they then had."""
 
 _REASONS = {
     NO_PERSON: "nobody is in the image",
@@ -189,6 +194,8 @@ class TrackerNode(CardboxNode):
         self._camera: Camera | None = None
         self._others: Sequence[OtherCamera] = ()
         self._session: Session | None = None
+        self._smoother = self._new_smoother()
+        self._as_seen: list[Tracker] = []
         self._scene: SceneWatch | None = None
         numbers = [None, *range(1, settings.people + 1)][settings.people > 0 :]
         self._reports = [TrackingReport() for _ in numbers]
@@ -280,6 +287,9 @@ class TrackerNode(CardboxNode):
         """
         if not self._bodies or self._camera is None:
             return
+        # What was seen before is published before what starts now.
+        self._publish(self._smoother.finish())
+        self._smoother, self._as_seen = self._new_smoother(), []
         settings = self.parameters.value
         rng = np.random.default_rng(settings.seed)
         people = settings.people or None
@@ -337,25 +347,37 @@ class TrackerNode(CardboxNode):
             return
         seen = self._inputs.observed(received)
         estimates, trackers = self._session.track(seen.observations), self._session.trackers
-        for outputs, report, estimate, tracker in zip(
-            self._outputs, self._reports, estimates, trackers, strict=True
-        ):
-            image, exposure = seen.observations[0].image, ""
-            if image is not None and estimate.posture is None:
-                exposure = exposure_problem(image)
-            news, named = report.add(estimate, tracker.body, exposure), _named(estimate.person)
-            for kind, text in news.items():
-                self.diagnostics.say(named + kind, named + text)
-            # Joint states of a new version of the body follow the version.
-            if self._own is not None and tracker is trackers[0]:
-                self._own.publish(tracker.body, seen.header.frame_id)
-            outputs.publish(seen, estimate, tracker)
+        if self.parameters.value.lag:
+            trackers = self._as_seen = trackers_as_seen(self._as_seen, trackers)
+        bodies = (tracker.body for tracker in trackers)
+        stamp_ns = conversions.stamp_ns(seen.header.stamp)
+        self._publish(self._smoother.add((seen, trackers), stamp_ns, estimates, bodies))
         if self._scene is not None and self._scene.news:
             self.diagnostics.say("scene", self._scene.news)
         self._session.check_cameras()
         self.diagnostics.advice = self._warnings
         self.diagnostics.working(seen.sent_ns)
-        self.diagnostics.made("joint states", conversions.stamp_ns(seen.header.stamp))
+
+    def _new_smoother(self) -> Smoother[Seen]:
+        return Smoother(Smoothing(self.parameters.value.lag, every_s=0.0))
+
+    def _publish(self, finished: Iterable[tuple[Seen, Sequence[Estimate]]]) -> None:
+        """Publish the results of images."""
+        for (seen, trackers), estimates in finished:
+            for outputs, report, estimate, tracker in zip(
+                self._outputs, self._reports, estimates, trackers, strict=True
+            ):
+                image, exposure = seen.observations[0].image, ""
+                if image is not None and estimate.posture is None:
+                    exposure = exposure_problem(image)
+                news, named = report.add(estimate, tracker.body, exposure), _named(estimate.person)
+                for kind, text in news.items():
+                    self.diagnostics.say(named + kind, named + text)
+                # Joint states of a new version of the body follow the version.
+                if self._own is not None and tracker is trackers[0]:
+                    self._own.publish(tracker.body, seen.header.frame_id)
+                outputs.publish(seen, estimate, tracker)
+            self.diagnostics.made("joint states", conversions.stamp_ns(seen.header.stamp))
 
     def _warnings(self) -> dict[str, str]:
         remarks = [] if self._session is None else self._session.remarks(self._names)

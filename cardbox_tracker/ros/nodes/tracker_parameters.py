@@ -132,6 +132,13 @@ class TrackerParameters(NodeParameters):
         "several, such as detector/keypoints, or a table FILE.csv (docs/detectors.md); empty: none",
     )
     camera_roll_deg: float = camera_roll_parameter()
+    lag: float = at_start(
+        0.0,
+        "results are published so much later, each smoothed with the images that came until then, "
+        "which takes out the shaking; 0: at once",
+        unit="s",
+        limits=(0.0, 1.0),
+    )
 
     @property
     def has_point_table(self) -> bool:
@@ -198,6 +205,10 @@ class TrackerParameters(NodeParameters):
             raise ValueError(
                 f"people is {self.people}; several people are tracked without depth, and with the "
                 "preset default"
+            )
+        if self.lag and self.preset == "paper":
+            raise ValueError(
+                f"lag is {self.lag:g}; results are smoothed with the preset default, not with paper"
             )
         if self.hands and not (self.keypoints and self.use_image):
             raise ValueError(

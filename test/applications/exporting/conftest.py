@@ -21,7 +21,7 @@ from cardbox_tracker.person.skeleton import (
     rotation_y,
     rotation_z,
 )
-from cardbox_tracker.recordings.smoothing import RATE_COLUMNS
+from cardbox_tracker.recordings.result_table import RATE_COLUMNS
 
 STEP_NS = 100_000_000
 TURNS: dict[str, Callable[..., np.ndarray]] = {"X": rotation_x, "Y": rotation_y, "Z": rotation_z}

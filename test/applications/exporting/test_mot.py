@@ -13,6 +13,7 @@ from cardbox_tracker.applications.exporting.mot import (
     LUMBAR,
     coordinates_of,
     write_mot,
+    write_rates,
     write_sto,
 )
 from cardbox_tracker.person.isb_angles import LABORATORY
@@ -20,7 +21,14 @@ from cardbox_tracker.person.kinematics import pose
 from cardbox_tracker.person.legs import floor_m, leg_directions
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.posture import LEFT_ARM, RIGHT_ARM, YAW
-from cardbox_tracker.person.skeleton import arm_directions, rotation_x, rotation_y, rotation_z
+from cardbox_tracker.person.skeleton import (
+    LEG_NAMES,
+    STATE_NAMES,
+    arm_directions,
+    rotation_x,
+    rotation_y,
+    rotation_z,
+)
 
 
 def postures(count: int = 40) -> np.ndarray:
@@ -150,3 +158,37 @@ def test_sto_has_the_columns_of_mot_below_the_header_of_opensim_4(
     (_, below), (head, same) = (one.read_text().split("endheader\n") for one in (mot, sto))
     assert below == same
     assert {"DataType=double", "version=3", "inDegrees=yes", "nRows=4"} <= {*head.splitlines()}
+
+
+def test_the_storage_has_velocities_and_accelerations_with_deviations(
+    motion_of: Callable, body: BodyModel, tmp_path: Path
+) -> None:
+    """The person turns by 0.5 rad/s and comes by 0.2 m/s; legs are seen in the last images."""
+    states, legs = np.zeros((5, 14)), np.zeros((5, 8))
+    states[:, [4, 8]] = 0.3
+    legs[:2] = np.nan
+    rates = np.full((5, len(STATE_NAMES) + 18, 4), np.nan)
+    rates[:, :14] = 0.0, 0.1, 0.0, 1.0
+    rates[:, YAW] = 0.5, 0.1, -2.0, 1.0
+    rates[:, STATE_NAMES.index("torso_x")] = 0.2, 0.01, 3.0, 0.5
+    first = STATE_NAMES.index(LEG_NAMES[0])
+    rates[2:, first : first + 8] = 0.4, 0.2, 0.0, 1.0
+    rates[0] = np.nan
+    motion = motion_of(states, body, legs=legs, rates=lambda: rates.reshape(5, -1))
+    write_rates(tmp_path / "a.sto", motion, body)
+    lines = (tmp_path / "a.sto").read_text(encoding="utf-8").splitlines()
+    rows = np.array([line.split() for line in lines[7:]], float)
+    found = dict(zip(lines[6].split(), rows.T, strict=True))
+
+    def of(name: str) -> np.ndarray:
+        kinds = "u", "u_std", "dudt", "dudt_std"
+        return np.array([found[f"{name}_{kind}"] for kind in kinds]).T
+
+    # The first image has no velocities.
+    np.testing.assert_allclose(found["time"], [0.1, 0.2, 0.3, 0.4])
+    turn = np.degrees([0.5, 0.1, -2.0, 1.0])
+    np.testing.assert_allclose(of("pelvis_rotation"), np.tile(turn, (4, 1)), atol=1e-3)
+    np.testing.assert_allclose(of("pelvis_tx"), [[0.2, 0.01, 3.0, 0.5]] * 4, atol=1e-3)
+    knee = np.degrees([0.4, 0.2, 0.0, 1.0])
+    np.testing.assert_allclose(of("knee_angle_r")[1:], np.tile(knee, (3, 1)), atol=1e-3)
+    assert np.isnan(of("knee_angle_r")[0]).all() and not np.isnan(of("arm_flex_r")).any()

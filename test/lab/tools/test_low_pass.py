@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from lab.tools.low_pass import figures, report
+from lab.tools.low_pass import Measured, figures, report, report_lags
 
 
 def test_errors_and_accelerations_count_where_the_reference_is() -> None:
@@ -22,8 +22,10 @@ def test_errors_and_accelerations_count_where_the_reference_is() -> None:
 
 
 def test_the_table_has_a_recording_and_its_reference_beside_each_other() -> None:
-    lines = report({"a": (np.full((4, 4), 1.25), np.full((4, 4), 0.5))}).splitlines()
+    measured = Measured(np.full((4, 4), 1.25), np.full((4, 4), 0.5), np.full((4, 3), 2.0))
+    lines = report({"a": measured}).splitlines()
     assert lines[2:] == [
         "| a |" + " 1.25 / 1.25 / 1.2, 1 % |" * 4,
         "| its reference |" + " 0.50 / 0.50 / 0.5 |  |" * 2,
     ]
+    assert report_lags({"a": measured}).splitlines()[2] == "| a |" + " 2.00 / 2.00 / 2.0 |" * 4
