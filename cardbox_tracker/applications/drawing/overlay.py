@@ -20,7 +20,15 @@ from cardbox_tracker.person.posture import PLACE, POSTURE
 from cardbox_tracker.person.sizes import FloatArray
 from cardbox_tracker.person.skeleton import KeypointState
 from cardbox_tracker.recordings.silhouettes import RecordedFrame
-from cardbox_tracker.tracking.estimate import CLOSED, HAND_KEYPOINTS, NO_PERSON, OPEN, Estimate
+from cardbox_tracker.tracking.estimate import (
+    CLOSED,
+    FILLED,
+    HAND_KEYPOINTS,
+    NO_PERSON,
+    OPEN,
+    UNCERTAIN,
+    Estimate,
+)
 from cardbox_tracker.tracking.tracker import Tracker
 
 ImageArray = NDArray[np.uint8]
@@ -83,14 +91,15 @@ def draw_overlay(
         canvas = with_hidden_head(canvas, body, view, estimate)
     text = estimate.state.replace("_", " ")
     if estimate.posture is not None:
-        outline = UNCERTAIN_BGR if estimate.state == "uncertain" else OUTLINE_BGR
+        outline = UNCERTAIN_BGR if estimate.state in (UNCERTAIN, FILLED) else OUTLINE_BGR
         there = estimate.placed(body)
         posed = draw_model(canvas, there, view, estimate.posture, outline, estimate.keypoint_states)
         if estimate.neck is not None:
             _draw_gaze(canvas, view, gaze_m(body_parts(there.sizes), posed, estimate.neck))
         _draw_hands(canvas, view, estimate)
         _draw_legs(canvas, view, estimate)
-        text += f"  IoU {estimate.iou:.2f}  {estimate.cost_px} px"
+        if estimate.iou is not None:
+            text += f"  IoU {estimate.iou:.2f}  {estimate.cost_px} px"
         if estimate.place is not None and estimate.place.state is KeypointState.UNCERTAIN:
             text += "  place uncertain"
     _draw_text(canvas, text, _STATE_BGR.get(estimate.state, TEXT_BGR))

@@ -33,7 +33,7 @@ from cardbox_tracker.recordings.markers import marker_shapes
 from cardbox_tracker.recordings.silhouettes import RecordedFrame
 from cardbox_tracker.terms.whole_body import WholeBodyCost
 from cardbox_tracker.terms.whole_body_config import WholeBodyCostConfig
-from cardbox_tracker.tracking.estimate import NO_PERSON, TRACKING, Estimate, Hand, Legs
+from cardbox_tracker.tracking.estimate import FILLED, NO_PERSON, TRACKING, Estimate, Hand, Legs
 from cardbox_tracker.tracking.tracker import Tracker
 
 BODY = BodyModel()
@@ -144,6 +144,12 @@ def test_what_may_be_wrong_is_amber() -> None:
     assert not near(overlay, OUTLINE_BGR).any()
     sure = draw_overlay(GREY, BODY, CAMERA, FOUND)
     assert not near(sure, UNCERTAIN_BGR)[:40].any()
+
+
+def test_a_filled_gap_is_amber_and_has_no_fit() -> None:
+    filled = replace(FOUND, state=FILLED, cost_px=None, iou=None)
+    overlay = draw_overlay(GREY, BODY, CAMERA, filled, 1)
+    assert near(overlay, UNCERTAIN_BGR).any() and not near(overlay, OUTLINE_BGR).any()
 
 
 def test_the_outline_frames_the_head_and_nothing_far_from_it() -> None:
