@@ -16,7 +16,7 @@ from operator import index
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, Self, TypeVar
 
-from cardbox_tracker.common.errors import CardboxError, plain, quoted
+from cardbox_tracker.common.errors import CardboxError, plain, quoted, reason_of
 from cardbox_tracker.common.files import check_writable, is_written_in_place
 from cardbox_tracker.common.settings import Setting, check
 
@@ -149,6 +149,10 @@ class Options:
                     value = _reader(entry)(given)
                 except argparse.ArgumentTypeError as error:
                     raise CardboxError(f"argument {_flag(entry)}: {error}") from None
+                except (TypeError, ValueError) as error:
+                    raise CardboxError(
+                        f"argument {_flag(entry)}: {reason_of(error)}, got {quoted(given)}"
+                    ) from None
             object.__setattr__(self, entry.name, value)
         try:
             check(self)

@@ -238,6 +238,10 @@ def test_pandas_has_the_columns_of_the_table(tmp_path: Path) -> None:
             "export writes beside the table: give csv, or save the result",
         ),
         ({"background": (3, 1)}, r"argument --background: .*got \(3, 1\)"),
+        (
+            {"export": 0.0, **GIVEN},
+            r"argument --export: a value is .* another type, .* got 0\.0",
+        ),
         ({"csv": "a\0.csv", **GIVEN}, r"cannot write 'a\\x00.csv': embedded null byte"),
     ],
 )

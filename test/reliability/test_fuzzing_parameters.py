@@ -1,8 +1,9 @@
-"""Whatever a parameter is set to, it is taken as documented or refused in words."""
+"""Whatever a parameter or a message has, it is taken as documented or refused in words."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -15,8 +16,10 @@ from rclpy.context import Context  # noqa: E402
 from rclpy.parameter import Parameter  # noqa: E402
 
 from cardbox_tracker.common.settings import check  # noqa: E402
+from cardbox_tracker.ros.messages.keypoints import CONVERSIONS, POINT_CLOUD  # noqa: E402
 from cardbox_tracker.ros.runtime.parameters import LiveParameters  # noqa: E402
 from lab.tools.parameter_docs import NODES  # noqa: E402
+from lab.tools.reliability import refusals  # noqa: E402
 
 PLAY_BAG = [Parameter("bag", value="bag")]
 TEXTS = st.text(st.characters(codec="utf-8", exclude_characters="\0"), max_size=20)
@@ -60,3 +63,62 @@ def test_parameters(
         assert live.value == before
     check(live.value)
     live.value.check()
+
+
+UINT32 = st.integers(0, 40) | st.integers(0, 2**32 - 1)
+COLUMNS = "u", "v", "score", "landmark", "person", "x", "y", "z"
+
+
+@st.composite
+def clouds(draw: st.DrawFn) -> SimpleNamespace:
+    """Return points as the detector sends them, of which a few things are others."""
+    fields = [
+        SimpleNamespace(name=name, datatype=7 if at not in (3, 4) else 6, offset=4 * at)
+        for at, name in enumerate(COLUMNS)
+    ]
+    count = draw(st.integers(0, 40))
+    data = draw(st.binary(min_size=32 * count, max_size=32 * count))
+    cloud = SimpleNamespace(
+        width=count,
+        height=1,
+        point_step=32,
+        row_step=32 * count,
+        data=data,
+        fields=fields,
+        is_bigendian=False,
+    )
+    for one in draw(st.lists(st.sampled_from([cloud, cloud, *fields]), max_size=3)):
+        name = draw(st.sampled_from(sorted(vars(one))))
+        before = getattr(one, name)
+        if isinstance(before, int):
+            setattr(one, name, draw(UINT32))
+        elif not isinstance(before, str):
+            setattr(one, name, before[: draw(st.integers(0, 9))])
+    return cloud
+
+
+POINT = st.builds(
+    SimpleNamespace,
+    **dict.fromkeys("xyzc", st.floats() | st.floats(-1.0, 70.0)),
+    score=st.floats() | st.floats(0.0, 1.0),
+    id=st.integers(0, 19),
+)
+
+
+@st.composite
+def lists_of_points(draw: st.DrawFn) -> SimpleNamespace:
+    """Return a message with the fields of all types with lists of points."""
+    some = st.integers(0, 44) | st.sampled_from([17, 18, 21])
+    points = [draw(POINT) for _ in range(draw(some))]
+    keypoints = [SimpleNamespace(point=p, score=p.score, id=p.id) for p in points]
+    people = [SimpleNamespace(class_name="person", keypoints=SimpleNamespace(data=keypoints))]
+    polygon = SimpleNamespace(points=points)
+    return SimpleNamespace(polygon=polygon, skeleton=points, detections=people)
+
+
+@pytest.mark.promise("Any damaged or hostile input is read or refused with a reason")
+@given(clouds(), lists_of_points())
+def test_any_message_of_points(cloud: SimpleNamespace, points: SimpleNamespace) -> None:
+    for kind, convert in CONVERSIONS.items():
+        with refusals():
+            convert(cloud if kind == POINT_CLOUD else points, (64, 48))

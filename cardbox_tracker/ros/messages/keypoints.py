@@ -111,6 +111,8 @@ def persons_of_cloud(message: Any, size: Size) -> list[ImagePoints]:
         rows = np.frombuffer(message.data, np.uint8).reshape(message.height, message.row_step)
         rows = np.ascontiguousarray(rows[:, : message.width * message.point_step])
         points = rows.view(kind).ravel()
+        if len(points) != count:
+            raise ValueError("its rows are shorter than its points")
     except (KeyError, ValueError, TypeError) as error:
         raise CardboxError(f"the points cannot be read: {reason_of(error)}") from None
     if not 0 <= points["landmark"].min() <= points["landmark"].max() < len(LANDMARKS):
