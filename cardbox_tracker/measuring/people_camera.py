@@ -372,10 +372,10 @@ def _levels(points: ImagePoints) -> tuple[FloatArray, NDArray[np.bool_]]:
 
 
 def _posture(points: ImagePoints) -> tuple[tuple[float, float], bool, bool, float, bool, bool]:
-    """Return where a person faces, if they bow, if the trunk leans against the legs, the bend, if
-    legs are straight, and if they sit.
+    """Return where a person faces, and how legs and trunk are.
 
-    The bend is that of the hips plus the mean one of the knees, rad; nan if legs are unknown.
+    That is: if they bow; if the trunk leans against the legs; the bend; if legs are straight; and
+    if they sit. The bend is that of the hips plus the mean one of the knees, rad; nan if legs are unknown.
     """
     there = points.spatial_m
     if there is None or not np.isfinite(there[_TRUNK]).all():
