@@ -375,7 +375,8 @@ def _posture(points: ImagePoints) -> tuple[tuple[float, float], bool, bool, floa
     """Return where a person faces, and how legs and trunk are.
 
     That is: if they bow; if the trunk leans against the legs; the bend; if legs are straight; and
-    if they sit. The bend is that of the hips plus the mean one of the knees, rad; nan if legs are unknown.
+    if they sit. The bend is that of the hips plus the mean one of the knees, rad; nan if legs are
+    unknown.
     """
     there = points.spatial_m
     if there is None or not np.isfinite(there[_TRUNK]).all():
