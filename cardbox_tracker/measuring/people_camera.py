@@ -71,8 +71,9 @@ _BENT_MORE, _STRAIGHTEST = np.radians(20.0), 0.1
 # Deviations of a level in an image, aside and along the body; of the ankles of bent legs.
 _SIDE, _ALONG, _STEPPING = 0.02, 0.012, 0.03
 # A trunk that leans more in space is not upright, and a knee not straight; who bends the hips more
-# sits, rad. Somebody who is seen from above seems to lean.
-_BOWED, _BENT, _SITS = np.radians((50.0, 35.0, 35.0))
+# sits, rad. Somebody who is seen from above seems to lean, but not against the own legs: there, the
+# trunk of who stands leans less than the last value.
+_BOWED, _BENT, _SITS, _LEANS_FORWARD = np.radians((50.0, 35.0, 35.0, 20.0))
 _LEAST_SCORE, _LEAST_LEVELS, _BORDER = 0.5, 3, 0.02
 # How far people go in a second before they are first seen upright, m.
 _GOES_M = 0.1
@@ -305,8 +306,9 @@ def _upright(sights: Sightings, number: int, camera: Camera) -> _Seen | None:
             # Ankles are doubtful where heels or toes are cut off.
             feet = is_inside(points.legs.px[4:], camera) | (points.legs.scores[4:] <= 0.0)
             known[_ANKLE] &= bool(feet.all())
-        facing, is_bowed, bend, is_straight, sits = _posture(points)
+        facing, is_bowed, leans, bend, is_straight, sits = _posture(points)
         # The network guesses legs that are not in the image.
+        is_bowed |= leans and bool(known[[_KNEE, _ANKLE]].all())
         is_straight, sits = is_straight and bool(known[_KNEE]), sits and bool(known[_KNEE])
         known[_KNEE] &= is_straight
         known[_ANKLE] &= not sits
@@ -369,14 +371,16 @@ def _levels(points: ImagePoints) -> tuple[FloatArray, NDArray[np.bool_]]:
     return px, known
 
 
-def _posture(points: ImagePoints) -> tuple[tuple[float, float], bool, float, bool, bool]:
-    """Return where a person faces, if they bow, the bend, if legs are straight, and if they sit.
+def _posture(points: ImagePoints) -> tuple[tuple[float, float], bool, bool, float, bool, bool]:
+    """Return where a person faces, and how legs and trunk are.
 
-    The bend is that of the hips plus the mean one of the knees, rad; nan if legs are unknown.
+    That is: if they bow; if the trunk leans against the legs; the bend; if legs are straight; and
+    if they sit. The bend is that of the hips plus the mean one of the knees, rad; nan if legs are
+    unknown.
     """
     there = points.spatial_m
     if there is None or not np.isfinite(there[_TRUNK]).all():
-        return (0.0, 1.0), False, math.nan, True, False
+        return (0.0, 1.0), False, False, math.nan, True, False
     shoulders, hips = there[_TRUNK].reshape(2, 2, 3)
     across = shoulders[0] - shoulders[1]
     length = max(float(np.hypot(across[0], across[2])), 1e-6)
@@ -387,13 +391,14 @@ def _posture(points: ImagePoints) -> tuple[tuple[float, float], bool, float, boo
     is_bowed = bool((elbows[:, 1] < shoulders[:, 1]).any())
     is_bowed |= float(np.hypot(trunk[0], trunk[2])) > np.tan(_BOWED) * -float(trunk[1])
     if points.legs is None or points.legs.spatial_m is None:
-        return facing, is_bowed, math.nan, False, False
+        return facing, is_bowed, False, math.nan, False, False
     knees, ankles = points.legs.spatial_m[0:2], points.legs.spatial_m[2:4]
     thighs, shanks = knees - hips, ankles - knees
     of_knees = [_angle(*pair) for pair in zip(thighs, shanks, strict=True)]
     of_hips = _angle(thighs.sum(axis=0), -trunk)
     bend = of_hips + sum(of_knees) / 2
-    return facing, is_bowed, bend, max(of_knees) < _BENT, of_hips > _SITS
+    leans = _angle(trunk, hips.sum(axis=0) - ankles.sum(axis=0)) > _LEANS_FORWARD
+    return facing, is_bowed, leans, bend, max(of_knees) < _BENT, of_hips > _SITS
 
 
 def _angle(a: FloatArray, b: FloatArray) -> float:

@@ -174,7 +174,7 @@ def _cut_remarks(cuts_s: Sequence[float]) -> Iterator[str]:
         )
 
 
-_MOST_REASONS = 3
+_MOST_REASONS, _ELSEWHERE = 3, "hand may be elsewhere"
 MOST_MOMENTS, GAP_S = 5, 3.0
 """Number of worst moments that are named, and the least time between two of them, s."""
 
@@ -270,6 +270,12 @@ class Quality:
         if self._reasons:
             counts = (f"{why} ({count})" for why, count in self._reasons.most_common(_MOST_REASONS))
             yield f"postures are unsure where {', '.join(counts)}"
+        if any(_ELSEWHERE in why for why in self._reasons):
+            yield (
+                "a posture is sure if all its joints are, so a hand can be sure where it is not: "
+                "see left_hand_state and right_hand_state. One camera hardly tells an arm towards "
+                "it from one away from it: film more from the front, or with a second camera"
+            )
         if self.fits and not self._vertical:
             pitch, stddev = np.degrees(self._pitch)
             yield (

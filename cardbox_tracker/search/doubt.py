@@ -54,10 +54,12 @@ LOST_FROM = 0.5
 """Probability of being wrong above which a keypoint is lost: it is rather wrong than right."""
 WHOLE_UNCERTAIN_FROM, WHOLE_LOST_FROM = 0.5, 0.9
 """Probabilities of being lost above which a result is uncertain, and counts as a poor one."""
-HANDS = [2, 5]
-"""Indices of the hands among the keypoints."""
+HANDS, ELBOWS = [2, 5], [1, 4]
+"""Indices of the hands and the elbows among the keypoints."""
 KINDS = ("shoulder", "elbow", "hand") * 2
 """Kind of each keypoint; the models have these names, and ``whole``."""
+IMAGE = "image"
+"""Name of the model of an image that has a wrong keypoint, where there is one."""
 BACK, WHOLE = "the person is seen from behind", "the whole posture may be another one"
 """Reasons why a whole result is uncertain."""
 SETTLED_FRAMES = 15
@@ -73,6 +75,8 @@ STAYS_SURE = 1.25
 """Share of the limit of this doubt below which a sure posture stays so: a robot that follows would
 stop and go on where the doubt is about the limit."""
 _AREAS, _PRIORS = (0.1, 3.0), (-0.2, 0.3)
+# Least probability of a keypoint, and of its opposite, that counts in the doubt about an image.
+_LEAST_CHANCE = 1e-3
 # Step of the numerical derivatives, rad and m.
 _STEP = 1e-3
 # How much better than its rivals a result is rated, as a share of the silhouette: least, usual and
@@ -111,11 +115,12 @@ class Models(NamedTuple):
     #: probability of being wrong above which a keypoint is uncertain: the highest one with which at
     #: most 2 % of the tracked keypoints of left-out sources are wrong
     uncertain_from: float
-    #: that of a hand, over time (:func:`remembered`), above which the posture is uncertain, and
-    #: without points the hand: the highest one with which at most 2 % of the images that are
-    #: ``tracking`` have a wrong keypoint
+    #: that of the image or, without points, of a hand over time (:func:`remembered`), above which
+    #: the posture is uncertain, and without points the hand: the highest one with which at most
+    #: 2 % of the images that are ``tracking``, with points 2.5 % of those of real people, have a
+    #: wrong keypoint
     doubtful_from: float
-    by_kind: Mapping[str, Model]  #: models by the names of :data:`KINDS`, and ``whole``
+    by_kind: Mapping[str, Model]  #: by the names of :data:`KINDS`, ``whole`` and ``IMAGE``
 
 
 class Judgement(NamedTuple):
@@ -169,14 +174,20 @@ class Doubt:
         is_doubted = bool(reason)
         is_unsure = chances > uncertain_from
         self._hands = remembered(self._hands, chances[HANDS])
+        doubts = self._hands
+        if IMAGE in of:
+            seen = evidence_of_image(float(doubts.max()), chances, values["left over"][0])
+            # No hand of a sure image is uncertain.
+            doubts = np.maximum(_chance(of[IMAGE], seen, 0), doubts * (doubts > uncertain_from))
         # The paper's filter finds hands so badly that its state only says whether it is lost.
         if source is not Source.PAPER:
             limit = doubtful_from
             if self._is_sure:
                 limit = min(STAYS_SURE * doubtful_from, uncertain_from)
-            if self._hands.max() > limit:
+            if doubts.max() > limit:
                 sides = ("left hand", "right hand")
-                doubtful = " and ".join(compress(sides, self._hands > limit))
+                least = min(limit, float(self._hands.max()))
+                doubtful = " and ".join(compress(sides, self._hands >= least))
                 reason = reason or f"the {doubtful} may be elsewhere"
             # An outline shows hands so badly that they make the images uncertain.
             if source is not Source.POINTS:
@@ -193,6 +204,22 @@ def remembered(before: FloatArray, chances: FloatArray) -> FloatArray:
     """Return the doubt (2,) about each hand after one image: it rises at once, and fades slowly."""
     faded: FloatArray = _DOUBT_STAYS * before + (1.0 - _DOUBT_STAYS) * chances
     return np.maximum(chances, faded)
+
+
+def evidence_of_image(
+    hand: float, chances: FloatArray, left_over: float
+) -> dict[str, tuple[float]]:
+    """Return the evidence of an image.
+
+    ``hand`` is the doubt about the worse hand over time, ``chances`` (6,) those of the keypoints,
+    and ``left_over`` the share of the silhouette that the model does not cover.
+    """
+    worst = {"hand": hand, "elbow": float(chances[ELBOWS].max())}
+    found = dict[str, tuple[float]]()
+    for name, one in worst.items():
+        inside = min(max(one, _LEAST_CHANCE), 1.0 - _LEAST_CHANCE)
+        found[name] = (log(inside / (1.0 - inside)),)
+    return found | {"left over": (left_over,)}
 
 
 def doubted(states: Sequence[KeypointState]) -> tuple[KeypointState, ...]:

@@ -336,7 +336,7 @@ class WholeBodyFilter:
         source = doubt.Source.POINTS if self._cues else self._outline
         is_back = is_back or cost.facing_rad != 0.0
         evidence["back"] = np.full(6, float(is_back))
-        veto = "" if is_trackable(cost, result) else "too little of the person is in the image"
+        veto = "" if is_trackable(cost, result) else "the person is too near, too far or cut off"
         veto = veto or (doubt.BACK if is_back else "")
         judged = self._doubt.judge(evidence, source, are_hidden(cost, result), veto)
         self._result = result

@@ -157,7 +157,10 @@ class PlaceWatch:
         height_m = hypot(relative * (place.hip_height_m + z_m), distance_m * tilt.pitch_stddev_rad)
         chance = erfc(FAR_M / (sqrt(2.0) * off_m))
         stddev_m = np.array([off_m, aside_m, height_m])
-        return Place(stddev_m, chance, rests_on, self.contradiction)
+        contradiction = self.contradiction
+        if "distance_m" in body.unknown and rests_on == STATURE:
+            contradiction = contradiction or "no image has shown the distance yet"
+        return Place(stddev_m, chance, rests_on, contradiction)
 
     def _compare(self, estimate: Estimate, body: BodyModel, rests_on: str, frame: Frame) -> None:
         """Compare the distance of the points with that of a second source, for some seconds."""

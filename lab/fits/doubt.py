@@ -33,11 +33,13 @@ from cardbox_tracker.search.config import PRESETS
 from cardbox_tracker.search.doubt import (
     FAR_M,
     HANDS,
+    IMAGE,
     KINDS,
     LOST_FROM,
     STAYS_SURE,
     WHOLE_UNCERTAIN_FROM,
     Source,
+    evidence_of_image,
     remembered,
 )
 from cardbox_tracker.tracking.estimate import Estimate
@@ -51,16 +53,19 @@ PENALTY = 0.02
 """Ridge penalty of a standardized coefficient, beside a mean log-likelihood."""
 MOST_WRONG, HIGHEST = 0.02, 0.25
 """Largest share of wrong keypoints among tracked ones, and highest threshold."""
-MOST_WRONG_IMAGES = {Source.POINTS: 0.03}
+MOST_WRONG_IMAGES = {Source.POINTS: 0.025}
 """Largest share of images with a wrong keypoint among those that are ``tracking``, if it is not
-``MOST_WRONG``."""
+``MOST_WRONG``; with points, among those of real people."""
+REAL = "real_"
+"""How the names of sources begin that are real people."""
 OF_ARMS = ("better", "sure", "slope", "beside trunk")
 OF_JOINTS = (*OF_ARMS, "spread", "yaw", "cameras")
 """Evidence that differs between joints, and all from which a joint is judged: with more of it, the
 models say less about sources that were left out. The whole is judged from all other evidence."""
 ARMS = [1, 2, 4, 5]
 """Indices of elbows and hands among the keypoints, whose mean error says if all is wrong."""
-MODELS = (*dict.fromkeys(KINDS), "whole")
+MODELS, MODELED = (*dict.fromkeys(KINDS), "whole"), (*KINDS, "whole")
+"""Models of all sources, and the model of each of the seven probabilities."""
 
 
 @dataclass(frozen=True)
@@ -127,7 +132,13 @@ def fit(
     sources: Sequence[Samples], model: str, names: Sequence[str]
 ) -> tuple[float, dict[str, float]]:
     """Return intercept and coefficients by name of a logistic regression, by Newton's method."""
-    parts = [source.rows(model) for source in sources]
+    return regression([source.rows(model) for source in sources], names)
+
+
+def regression(
+    parts: Sequence[tuple[Mapping[str, FloatArray], FloatArray]], names: Sequence[str]
+) -> tuple[float, dict[str, float]]:
+    """Return the same of parts of evidence by name, (k,), and whether a result is wrong, (k,)."""
     x = np.concatenate([np.column_stack([rows[name] for name in names]) for rows, _ in parts])
     y = np.concatenate([wrong for _, wrong in parts])
     weight = np.concatenate([np.full(len(wrong), 1.0 / len(wrong)) for _, wrong in parts])
@@ -153,7 +164,10 @@ def fit(
 
 
 def chances(samples: Samples, models: Mapping[str, tuple[float, dict[str, float]]]) -> FloatArray:
-    """Return the probabilities (n, 7) of the keypoints and of the whole."""
+    """Return the probabilities (n, 7) of the keypoints and of the whole, and (n, 8) of the image.
+
+    The last one is there if ``models`` have one of it.
+    """
     columns = [*enumerate(KINDS), (0, "whole")]
     found = np.empty((len(samples.whole_m), len(columns)))
     for column, (at, model) in enumerate(columns):
@@ -163,7 +177,40 @@ def chances(samples: Samples, models: Mapping[str, tuple[float, dict[str, float]
             for name, coefficient in coefficients.items()
         )
         found[:, column] = 1.0 / (1.0 + np.exp(-np.clip(logit, -50.0, 50.0)))
+    if IMAGE not in models:
+        return found
+    intercept, coefficients = models[IMAGE]
+    seen = image_evidence(samples, found)
+    logit = intercept + sum(one * seen[name] for name, one in coefficients.items())
+    return np.column_stack([found, 1.0 / (1.0 + np.exp(-np.clip(logit, -50.0, 50.0)))])
+
+
+def hands_over_time(said: FloatArray) -> FloatArray:
+    """Return the doubt (n,) about the worse hand in images in turn, with probabilities (n, 7)."""
+    found, before = np.empty(len(said)), np.zeros(len(HANDS))
+    for number, one in enumerate(said[:, HANDS]):
+        before = remembered(before, one)
+        found[number] = before.max()
     return found
+
+
+def image_evidence(samples: Samples, said: FloatArray) -> dict[str, FloatArray]:
+    """Return the evidence of images in turn by name, (n,), with probabilities (n, 7)."""
+    left_over = samples.evidence["left over"][:, 0].tolist()
+    hands = hands_over_time(said).tolist()
+    rows = [evidence_of_image(*one) for one in zip(hands, said, left_over, strict=True)]
+    return {name: np.array([row[name][0] for row in rows]) for name in rows[0]}
+
+
+def fit_image(
+    sources: Sequence[Samples], models: Mapping[str, tuple[float, dict[str, float]]]
+) -> tuple[float, dict[str, float]]:
+    """Return the model of an image with a wrong keypoint, by what the other models say."""
+    parts = []
+    for one in sources:
+        wrong = (one.aligned_m > FAR_M).any(axis=1)
+        parts.append((image_evidence(one, chances(one, models)), wrong.astype(float)))
+    return regression(parts, list(parts[0][0]))
 
 
 def names_for(model: str, available: Sequence[str]) -> list[str]:
@@ -174,13 +221,11 @@ def names_for(model: str, available: Sequence[str]) -> list[str]:
 
 
 def doubts(said: FloatArray) -> FloatArray:
-    """Return the doubt (n,) about images in turn, with the probabilities (n, 7); 1 if lost."""
-    found, before = np.ones(len(said)), np.zeros(len(HANDS))
-    for number, chances in enumerate(said[:, HANDS]):
-        before = remembered(before, chances)
-        if said[number, 6] <= WHOLE_UNCERTAIN_FROM:
-            found[number] = before.max()
-    return found
+    """Return the doubt (n,) about images in turn, with the probabilities (n, 7 or 8); 1 if lost."""
+    found = hands = hands_over_time(said)
+    if said.shape[1] > len(MODELED):
+        found = np.where(hands > HIGHEST, 1.0, said[:, -1])
+    return np.where(said[:, 6] <= WHOLE_UNCERTAIN_FROM, found, 1.0)
 
 
 def thresholds_of(
@@ -292,7 +337,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     with ProcessPoolExecutor(given.jobs) as pool:
         found = pool.map(collect, given.sessions, repeat(given.seed))
         for folder, ways in zip(given.sessions, found, strict=True):
-            is_clip = folder.parent.name.startswith("real_")
+            is_clip = folder.parent.name.startswith(REAL)
             name = folder.parent.name if is_clip else folder.name
             for source, samples in ways:
                 by_source[source][name].append(samples)
@@ -316,12 +361,14 @@ def fit_all(
         for left_out, own in people.items():
             others = [one for name, parts in learned.items() if name != left_out for one in parts]
             if others:
-                models = {
-                    model: fit(others, model, names_for(model, available)) for model in MODELS
-                }
+                models = _models(source, others, available)
                 checked += [(left_out, one, chances(one, models)) for one in own]
         most_wrong = MOST_WRONG_IMAGES.get(source, MOST_WRONG)
-        thresholds = thresholds_of([(one, said) for _, one, said in checked], most_wrong)
+        every = [(one, said) for _, one, said in checked]
+        # Detectors learned from people, and err otherwise with rendered ones.
+        real = [(one, said) for name, one, said in checked if name.startswith(REAL)]
+        surer = real if source is Source.POINTS and real else every
+        thresholds = thresholds_of(every)[0], thresholds_of(surer, most_wrong)[1]
         print(f"\n{source.value}: uncertain above {thresholds}\n\n{HEADER}")
         for name, one, said in checked:
             print(row_of(name, one, said, *thresholds))
@@ -333,12 +380,18 @@ def fit_all(
                     round(intercept, 4),
                     {name: round(value, 4) for name, value in coefficients.items()},
                 ]
-                for model, (intercept, coefficients) in (
-                    (model, fit(everyone, model, names_for(model, available))) for model in MODELS
-                )
+                for model, (intercept, coefficients) in _models(source, everyone, available).items()
             },
         }
     return stored
+
+
+def _models(
+    source: Source, samples: Sequence[Samples], available: Sequence[str]
+) -> dict[str, tuple[float, dict[str, float]]]:
+    models = {model: fit(samples, model, names_for(model, available)) for model in MODELS}
+    # Only with points do hands and elbows fit so well that the rest tells more.
+    return models | ({IMAGE: fit_image(samples, models)} if source is Source.POINTS else {})
 
 
 if __name__ == "__main__":

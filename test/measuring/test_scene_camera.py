@@ -141,15 +141,19 @@ def test_who_stays_in_one_place_shows_little() -> None:
     assert nobody.camera.pitch_rad.stddev > np.radians(11.0)
 
 
-def squatting(pitch_deg: float, bend_deg: float) -> ImagePoints:
-    """Return who bends knees and hips, and leans forward, at one place; 0 degrees for upright."""
+def squatting(pitch_deg: float, bend_deg: float, bow_deg: float = 0.0) -> ImagePoints:
+    """Return who bends knees and hips, and leans forward, at one place; 0 degrees for upright.
+
+    ``bow_deg`` is a further lean of the trunk.
+    """
     view, bend = CAMERA.with_pitch(np.radians(pitch_deg)), np.radians(bend_deg)
+    tilt = bend / 2 + np.radians(bow_deg)
     # Ankles, knees, hips, and what is above, forward and up, in statures.
     shin, thigh = MARKED_HEIGHTS[4] - MARKED_HEIGHTS[5], MARKED_HEIGHTS[3] - MARKED_HEIGHTS[4]
     ankle = np.array((0.0, MARKED_HEIGHTS[5]))
     knee = ankle + shin * np.array((np.sin(bend / 2), np.cos(bend / 2)))
     hip = knee + thigh * np.array((-np.sin(bend), np.cos(bend)))
-    lean = np.array(((np.cos(bend / 2), np.sin(bend / 2)), (-np.sin(bend / 2), np.cos(bend / 2))))
+    lean = np.array(((np.cos(tilt), np.sin(tilt)), (-np.sin(tilt), np.cos(tilt))))
     px, there_m = dict[str, np.ndarray](), dict[str, np.ndarray]()
     for name in (*POINT_NAMES, *LEG_POINT_NAMES):
         level = name.split("_")[-1].replace("heel", "ankle").replace("foot", "ankle")
@@ -180,6 +184,13 @@ def test_who_squats_or_steps_on_a_box_does_not_tilt_the_camera(pitch_deg: float)
         shown, by_upright = (people_camera([one], [STATURE_M], CAMERA) for one in (people, upright))
         assert shown is not None and by_upright is not None
         assert abs(shown.values[0] - by_upright.values[0]) < np.sqrt(shown.covariance[0, 0])
+
+
+def test_who_bows_in_a_whole_film_shows_no_pitch() -> None:
+    bows = [(2.0 * k, squatting(10.0, 10.0 * (k % 3), 25.0)) for k in range(12)]
+    assert people_camera([bows], [STATURE_M], CAMERA) is None
+    stands = [(2.0 * k, squatting(10.0, 0.0, 5.0 * (k % 3))) for k in range(12)]
+    assert people_camera([stands], [STATURE_M], CAMERA) is not None
 
 
 @pytest.mark.parametrize("roll_deg", [12.0, 25.0, -12.0])

@@ -11,6 +11,7 @@ import pytest
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.skeleton import JOINT_NAMES, KeypointState
 from cardbox_tracker.recordings.track import Quality
+from cardbox_tracker.search.doubt import Doubt, Source
 from cardbox_tracker.tracking.estimate import (
     LOST,
     NO_PERSON,
@@ -65,6 +66,16 @@ def test_sure_images_and_hands_are_counted() -> None:
     assert why == "postures are unsure where a hand hides (1), lost (1)"
     assert deviation.startswith("typical standard deviation: 8 degrees of an angle, ")
     assert moments == "least sure, look at them: 1.0 s (right hand), 5.0 s (lost)"
+
+
+def test_why_hands_may_be_sure_where_the_posture_is_not_is_told() -> None:
+    # What the doubt itself says of hands that may be wrong.
+    values = {"slope": np.full(6, 1.0), "yaw": np.full(6, 1.5), "left over": np.zeros(6)}
+    judged = Doubt().judge(values, Source.POINTS, np.zeros(6, np.bool_))
+    unsure = replace(estimate(UNCERTAIN), reason=judged.reason)
+    hint = lines((0.0, unsure))[2]
+    assert "left_hand_state" in hint and "film more from the front" in hint
+    assert not any("left_hand_state" in one for one in lines((0.0, estimate(TRACKING))))
 
 
 def test_a_hand_deviates_with_its_joints_and_the_distance_with_the_place() -> None:

@@ -64,8 +64,9 @@ def test_the_papers_state_only_says_whether_it_is_lost(by_hand: None) -> None:
 
 def test_the_packages_models_are_complete() -> None:
     assert set(doubt.models()) == set(Source)
-    for uncertain_from, doubtful_from, by_kind in doubt.models().values():
-        assert set(by_kind) == {"shoulder", "elbow", "hand", "whole"}
+    for source, (uncertain_from, doubtful_from, by_kind) in doubt.models().items():
+        of_images = {doubt.IMAGE} if source is Source.POINTS else set()
+        assert set(by_kind) == {"shoulder", "elbow", "hand", "whole"} | of_images
         # ``tracking`` has no uncertain hand.
         assert 0.0 < doubtful_from <= uncertain_from < doubt.LOST_FROM
 
@@ -92,6 +93,27 @@ def test_a_doubt_about_the_limit_does_not_change_the_state_with_each_image(by_ha
     chances = [0.13, 0.16, 0.14, 0.185, 0.19, 0.14, 0.14]
     judged = [one.judge(evidence(hand=chance), Source.POINTS, SEEN) for chance in chances]
     assert [one.is_uncertain for one in judged] == [*[False] * 4, *[True] * 3]
+
+
+def test_an_image_is_judged_by_hands_elbows_and_what_the_model_does_not_cover(
+    by_hand: None,
+) -> None:
+    one = Doubt()
+    image = Model(0.0, {"hand": 0.5, "elbow": 0.5, "left over": 4.0})
+    models = one._models[Source.POINTS]
+    models = models._replace(uncertain_from=0.25, by_kind={**models.by_kind, doubt.IMAGE: image})
+
+    def is_sure(hand: float, elbow: float, left_over: float) -> bool:
+        one = Doubt()
+        one._models = {Source.POINTS: models}
+        values = evidence(hand, elbow=elbow) | {"left over": np.full(6, left_over)}
+        return not one.judge(values, Source.POINTS, SEEN).is_uncertain
+
+    # The geometric mean of the odds is that of 0.15 at hands of 0.2 and elbows of 0.11.
+    assert is_sure(0.2, 0.1, 0.0) and not is_sure(0.2, 0.12, 0.0)
+    assert is_sure(0.2, 0.1, -0.2) and not is_sure(0.1, 0.1, 0.2)
+    # An uncertain hand makes the image uncertain, whatever the rest says.
+    assert is_sure(0.24, 0.01, 0.0) and not is_sure(0.26, 0.01, 0.0)
 
 
 def arms_of(left_hand_m: tuple[float, float, float]) -> np.ndarray:

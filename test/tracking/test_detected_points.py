@@ -20,7 +20,6 @@ from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.posture import YAW, reference_posture
 from cardbox_tracker.person.skeleton import KeypointState
 from cardbox_tracker.search.config import default_preset
-from cardbox_tracker.search.doubt import HANDS, Source, models, remembered
 from cardbox_tracker.search.whole_body import WholeBodyFilter
 from cardbox_tracker.terms.inner_cue import InnerCue
 from cardbox_tracker.terms.joint_points import EVIDENCE
@@ -38,7 +37,6 @@ GUESSED = MEASURED.with_values(source="proportions")
 BODIES = {"measured": MEASURED, "guessed": GUESSED}
 BEGIN_NS = 10**18
 HAND = 2
-DOUBTFUL_FROM = models()[Source.POINTS].doubtful_from
 
 
 def hidden(time_s: float) -> np.ndarray:
@@ -134,10 +132,8 @@ def is_tracked(found: tuple[np.ndarray, list[Estimate]], body: BodyModel) -> boo
 
     The depth of a person who was not measured may be doubted altogether.
     """
-    estimates, hands, sure = found[1], np.zeros(len(HANDS)), []
-    for estimate in estimates:
-        hands = remembered(hands, estimate.keypoint_chances[HANDS])
-        sure.append(estimate.state == TRACKING or bool(hands.max() > DOUBTFUL_FROM))
+    estimates = found[1]
+    sure = [one.state == TRACKING or "hand may be elsewhere" in one.reason for one in estimates]
     least = 0.8 * len(sure) if body is MEASURED else 0
     return {one.state for one in estimates} <= {TRACKING, UNCERTAIN} and sum(sure) >= least
 

@@ -131,6 +131,13 @@ def test_a_stated_field_of_view_makes_a_far_place_uncertain() -> None:
     assert (near.state, far.state) == (KeypointState.TRACKED, KeypointState.UNCERTAIN)
 
 
+def test_a_distance_that_is_only_guessed_is_uncertain_unless_depth_shows_it() -> None:
+    body = replace(TALL, unknown=("distance_m",))
+    for depth, state in ((False, KeypointState.UNCERTAIN), (True, KeypointState.TRACKED)):
+        place = PlaceWatch(body, CAMERA).see(estimate_at(2.0, body), body, frames(None, depth)[0])
+        assert place is not None and place.state is state
+
+
 @pytest.mark.parametrize(("stature_m", "is_told"), [(1.80, False), (1.44, True), (2.16, True)])
 def test_a_stature_that_contradicts_the_given_distance_is_told(
     stature_m: float, is_told: bool

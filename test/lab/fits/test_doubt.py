@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 from typing import cast
@@ -135,6 +136,42 @@ def test_chances_are_those_that_the_package_computes(monkeypatch: pytest.MonkeyP
         judged = one.judge(evidence, Source.OUTLINE, np.zeros(6, np.bool_))
         np.testing.assert_allclose(judged.chances, row[:6], rtol=1e-12)
         assert one._whole == pytest.approx(row[6])
+
+
+def test_the_chance_of_an_image_is_that_which_the_package_computes(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    image = (-1.0, {"hand": 0.6, "elbow": 0.3, "left over": 2.0})
+    models = {**TRUE, "whole": (-9.0, {"area": 0.0}), package.IMAGE: image}
+    some = samples(6, 8)
+    some.evidence["left over"] = np.full((8, 6), 0.1)
+    found = chances(some, models)
+    own = {kind: package.Model(*model) for kind, model in models.items()}
+    # An image is sure from the first limit down, and stays so up to 1.25 of it.
+    for limit in found[:, 7]:
+        given = package.Models(0.999, limit / 1.25, own)
+        monkeypatch.setattr(package, "models", lambda given=given: dict.fromkeys(Source, given))
+        one, sure = Doubt(), False
+        for number, chance in enumerate(found[:, 7]):
+            evidence = {name: values[number] for name, values in some.evidence.items()}
+            judged = one.judge(evidence, Source.POINTS, np.zeros(6, np.bool_))
+            sure = chance <= limit / (1.0 if sure else 1.25)
+            assert judged.is_uncertain == (not sure)
+
+
+def test_with_points_the_images_of_real_people_give_their_limit(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    sources = [
+        Samples({**one.evidence, "left over": one.evidence["area"]}, one.aligned_m, one.whole_m)
+        for one in SOURCES
+    ]
+    right = [replace(one, aligned_m=np.full_like(one.aligned_m, 0.1)) for one in sources]
+    mixed = {"real_one": [right[0]], "real_two": [right[1]], "rendered": [sources[2]]}
+    stored = fit_all({Source.POINTS: mixed})["points"]
+    assert set(stored["models"]) == {*doubt.MODELS, package.IMAGE}
+    alone = fit_all({Source.POINTS: {f"rendered {n}": one for n, one in enumerate(mixed.values())}})
+    assert alone["points"]["doubtful_from"] < stored["doubtful_from"]
 
 
 def errors_of(aligned_m: np.ndarray) -> Samples:
