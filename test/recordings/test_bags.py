@@ -271,7 +271,7 @@ def test_a_recording_without_camera_info_says_so(tmp_path: Path) -> None:
 def test_an_uncalibrated_camera_is_refused_with_both_topics(tmp_path: Path) -> None:
     with BagWriter(tmp_path / "bag") as bag:
         bag.write_image(IMAGE, START_NS, "optical", image(0), "mono8")
-        unknown: Any = SimpleNamespace(width=32, height=24, fx=0.0, fy=0.0, cx=0.0, cy=0.0)
+        unknown: Any = SimpleNamespace(width=32, height=24, k=np.zeros((3, 3)))
         bag.write_camera_info(INFO, START_NS, "optical", unknown)
     with BagReader(tmp_path / "bag") as bag, pytest.raises(CameraError, match=f"{IMAGE}.*{INFO}"):
         bag.calibration()

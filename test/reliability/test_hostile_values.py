@@ -1,4 +1,4 @@
-"""Each value of each file that is read, replaced by hostile ones: read, or refused in words."""
+"""Each value of each file, replaced by hostile and random ones: it is read, or refused in words."""
 
 from __future__ import annotations
 

@@ -115,6 +115,10 @@ def test_a_cloud_of_another_program_is_read_by_its_fields(order: str) -> None:
     assert second.legs is not None and second.legs.px[0].tolist() == [8.0, 9.0]
     with pytest.raises(CardboxError, match="a landmark is not a number from 0 to 32"):
         persons_of_cloud(cloud(kinds, [(33.0, *rows[0][1:])], order), SIZE)
+    short = cloud(kinds, rows, order)
+    short.row_step, short.data = 0, b""
+    with pytest.raises(CardboxError, match="its rows are shorter than its points"):
+        persons_of_cloud(short, SIZE)
 
 
 def test_an_image_without_a_person_gives_an_empty_person_or_none() -> None:
