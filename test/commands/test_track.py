@@ -208,6 +208,17 @@ def test_a_film_is_tracked_with_a_stature(
     assert cardbox("track", film, "--fov", fov, *words).code == 0
 
 
+def test_the_distance_of_nobody_is_not_found(
+    film: Path, fov: str, cardbox: Callable[..., Any]
+) -> None:
+    words = ("--stature", 1.75, "--background", "0:2", "--start", 2, "--end", 3.5)
+    done = cardbox("track", film, "--fov", fov, *words)
+    assert done.code == 0, done.err
+    assert "tracked 0 of" in done.out
+    assert "m (usual: nobody shows it)" in done.out
+    assert "m (found)" not in done.out
+
+
 def test_the_overlay_has_the_aspect_and_the_resolution_of_a_film_held_upright(
     files: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, cardbox: Callable[..., Any]
 ) -> None:
