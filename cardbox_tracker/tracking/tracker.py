@@ -277,6 +277,10 @@ class Tracker:
 
     def _doubted(self, estimate: Estimate, reason: str) -> Estimate:
         """Return an estimate that is no surer than body, distance, person and limits."""
+        place = estimate.place
+        if place is not None and self.faults.is_contradicted:
+            place = replace(place, contradiction=place.contradiction or reason)
+            estimate = replace(estimate, place=place)
         if estimate.posture is None:
             return estimate
         reason = reason or self.body.camera_pose.contradiction
