@@ -8,6 +8,7 @@ is usual, decide. In the same way people who lean aside show no roll.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
@@ -226,6 +227,31 @@ def scene_camera(
             remarks += _contradiction(camera, distances[0], stature_m, given_m)
     camera_found = SceneCamera(lens, found, turned, height)
     return FoundCamera(camera_found, tuple(sources), tuple(remarks), distances)
+
+
+def other_lens(
+    people: Sequence[Sightings],
+    statures_m: Sequence[float | None],
+    camera: Camera,
+    given: SceneCamera,
+    away: float,
+) -> float:
+    """Return how much better another lens explains the floor than people who stand elsewhere do.
+
+    They are seen farther ``away`` than in a given scene, as a logarithm, and with that lens would
+    be where it has them. The height of the camera above the floor, which follows from the place,
+    decides. Positive for another lens, in standard deviations; 0 without a floor. The other
+    arguments are those of :func:`scene_camera`.
+    """
+    tilt, off_m, stddev_m = ((given.pitch_rad.mean, 1e-3), (0.0, 1e-3)), list[float](), math.inf
+    for factor in (1.0, math.exp(-away)):
+        lens = replace(camera, fx=factor * camera.fx, fy=factor * camera.fy)
+        shown = people_camera(people, statures_m, lens, *tilt)
+        if shown is None or given.height_m is None:
+            return 0.0
+        off_m.append(abs(float(shown.values[2]) - given.height_m.mean))
+        stddev_m = min(stddev_m, math.sqrt(shown.covariance[2, 2]))
+    return (off_m[0] - off_m[1]) / stddev_m
 
 
 def in_scene(
