@@ -177,3 +177,24 @@ def test_without_a_second_source_nothing_contradicts() -> None:
     for frame in frames(points_at(2.0)):
         watch.see(estimate_at(2.0, child), child, frame)
     assert watch.contradiction == ""
+
+
+@pytest.mark.parametrize(
+    ("iou", "has_points", "is_sure"), [(0.9, False, True), (0.8, False, False), (0.8, True, True)]
+)
+def test_a_change_of_the_distance_counts_if_the_outline_fits_as_usual(
+    iou: float, has_points: bool, is_sure: bool
+) -> None:
+    """Outlines show somebody at 2 m who is then 1 m farther away, and comes back."""
+    points = replace(points_at(2.0), spatial_m=None) if has_points else None
+    watch, seen = PlaceWatch(TALL, CAMERA), iter(frames(points, count=12))
+    for distance_m, overlap, is_tracked, off_m in (
+        *[(2.0, 0.9, True, 0.1)] * 10,
+        (3.0, iou, is_sure, 0.15 if is_sure else 1.0),
+        (2.0, 0.9, True, 0.1),
+    ):
+        found = replace(estimate_at(distance_m, TALL), iou=overlap)
+        place = watch.see(found, TALL, next(seen))
+        assert place is not None
+        assert (place.state is KeypointState.TRACKED) == is_tracked
+        assert place.stddev_m[0] == pytest.approx(off_m, abs=0.02)
