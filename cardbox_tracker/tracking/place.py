@@ -13,9 +13,10 @@ A detector that estimates its points in space, too, shows the scale at once
 (:func:`distance_of_points`). It is compared with a second source: the given distance, depth images,
 or a further camera.
 
-One outline without points may be that of somebody who has turned aside, or of somebody smaller who
-stands farther away with other arms. It fits the wrong one worse, so what has changed of the
-distance since an outline fitted as usual is a deviation, too.
+One outline without points may be that of somebody who has turned aside, or of somebody who stands
+farther away with other arms. The wrong one fits worse, and an outline from aside lacks the breadth
+of the shoulders. So what has changed of the distance since an outline from the front or from behind
+fitted as usual is a deviation, too.
 """
 
 from __future__ import annotations
@@ -24,7 +25,7 @@ from collections import deque
 from collections.abc import Sequence
 from dataclasses import replace
 from itertools import pairwise
-from math import erfc, hypot, log, sqrt, tan
+from math import cos, erfc, hypot, log, sqrt, tan
 
 import numpy as np
 
@@ -34,7 +35,7 @@ from cardbox_tracker.detectors.image_points import CERTAIN, POINT_INDEX, ImagePo
 from cardbox_tracker.measuring.people_camera import DISTANCE_STDDEV
 from cardbox_tracker.person.kinematics import pose
 from cardbox_tracker.person.model import MEASURED, BodyModel
-from cardbox_tracker.person.posture import N_JOINTS, PITCH, TORSO_Y
+from cardbox_tracker.person.posture import N_JOINTS, PITCH, TORSO_Y, YAW
 from cardbox_tracker.search.doubt import FAR_M
 from cardbox_tracker.terms.term import Frame
 from cardbox_tracker.tracking.estimate import Estimate, Place
@@ -50,8 +51,9 @@ and people of one stature differ in the lengths of trunk and arms by 4 to 6 %.""
 # (0.89 to 1.11 of the true one in 32 recordings).
 _COMPARED_S, _POINTS_STDDEV = 1.5, 0.045
 
-# Outlines fit as usual from this share of a quantile of the latest overlaps on.
-_FITS, _USUAL, _LATEST = 0.95, 0.8, 150
+# Outlines fit as usual from this share of a quantile of the latest overlaps on; least cosine of the
+# yaw of who is not seen from aside.
+_FITS, _USUAL, _LATEST, _ACROSS = 0.96, 0.8, 150, sqrt(0.5)
 
 _TRUNK, _ARM = ("shoulder", "hip"), ("shoulder", "elbow", "wrist")
 # Lengths between a detector's points as shares of the length of an arm up to the knuckles, whose
@@ -172,11 +174,12 @@ class PlaceWatch:
 
     def _changed_m(self, estimate: Estimate, frame: Frame, distance_m: float) -> float:
         """Return how far the distance is from that at which an outline fitted as usual, m."""
-        fits = np.isnan(self._fitted_m) or frame["points"] is not None or estimate.iou is None
-        if estimate.iou is not None:
+        is_known = np.isnan(self._fitted_m) or frame["points"] is not None
+        if estimate.iou is not None and estimate.posture is not None:
             self._ious.append(estimate.iou)
-            fits |= estimate.iou >= _FITS * np.quantile(self._ious, _USUAL)
-        if fits:
+            is_usual = estimate.iou >= _FITS * np.quantile(self._ious, _USUAL)
+            is_known |= is_usual and abs(cos(estimate.posture[YAW])) >= _ACROSS
+        if is_known:
             self._fitted_m = distance_m
         return abs(distance_m - self._fitted_m)
 
