@@ -4,7 +4,8 @@ Sensors are noisy, so equal images come from a driver or a network that repeats 
 do no harm while the person stands still, and none if every second image is a repetition. A
 silhouette that fills the image shows a change of the light. In a mirrored image the person faces
 another way than in the first camera, as a detector's points in space tell, unless the person faces
-that very camera. :mod:`cardbox_tracker.measuring.silhouette_tangents` finds images that contradict
+that very camera. The background of a camera that somebody has bumped into stands elsewhere in its
+images. :mod:`cardbox_tracker.measuring.silhouette_tangents` finds images that contradict
 the pose or the focal length.
 """
 
@@ -13,12 +14,14 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from cardbox_tracker.common.health import WATCHES, Verdict
 from cardbox_tracker.detectors.image_points import CERTAIN, ImagePoints
-from cardbox_tracker.terms.term import USUAL_INTERVAL_S, Frame
+from cardbox_tracker.measuring.scene_camera import background_shift
+from cardbox_tracker.terms.term import USUAL_INTERVAL_S, Frame, Image, Silhouette
 from cardbox_tracker.tracking.camera_agreement import CameraAgreement
 from cardbox_tracker.tracking.observation import Observation
 
@@ -30,6 +33,8 @@ _POSE = (
 _LEAST = 2
 # Time for which a fault that is over is told, ns.
 _TOLD_NS = 1_000_000_000
+# Time between comparisons of the background, ns; share of the width for the margin around people.
+_COMPARED_NS, _AROUND = 700_000_000, 20
 # Fewest points that tell.
 _FEWEST = 4
 
@@ -52,6 +57,10 @@ class CameraFaults:
         # The silhouettes of all cameras when each one's last image was new.
         self._then: list[list[NDArray[Any] | None]] = [[None] * count for _ in range(count)]
         self._turned = [Verdict("turned") for _ in range(count)]
+        # Each camera's first image with a silhouette, which the background is compared with.
+        self._begun: list[tuple[Image, Silhouette] | None] = [None] * count
+        self._moved = [Verdict("moved") for _ in range(count)]
+        self._compared_ns = [0] * count
 
     def without(
         self, observations: Sequence[Observation | None], stamp_ns: int | None = None
@@ -78,6 +87,9 @@ class CameraFaults:
             self._repeated[number].count(is_same)
             if shown is not None and not is_same:
                 self._last[number], self._then[number] = np.array(shown), kept
+            if one is not None and self._has_moved(number, one):
+                self._leave_out(number, WATCHES["moved"].words)
+                seen[number] = None
         frozen = [self._is_frozen(number, kept) for number in range(count)]
         for number in np.flatnonzero(frozen).tolist():
             self._leave_out(number, WATCHES["frozen"].words)
@@ -98,7 +110,7 @@ class CameraFaults:
         doubts = zip(reasons, agreement.are_doubtful, strict=True)
         self.is_contradicted = any(
             is_doubtful if not reason else len(reasons) == 1 for reason, is_doubtful in doubts
-        )
+        ) or (len(reasons) == 1 and any(one.holds for one in self._moved))
         wrong = ["", *reasons]
         if len(reasons) > 1 and all(reasons):
             wrong = [reasons[0], *[""] * len(reasons)]
@@ -134,6 +146,24 @@ class CameraFaults:
         if np.isfinite(alike):
             self._turned[camera].see(alike)
         return self._turned[camera].holds
+
+    def _has_moved(self, number: int, seen: Observation) -> bool:
+        """Return whether a camera stands elsewhere than in its first images, by the background."""
+        begun, moved = self._begun[number], self._moved[number]
+        if seen.image is None or seen.silhouette is None:
+            return moved.holds
+        if begun is None or seen.is_cut:
+            # People have moved within their surroundings until the next image is compared.
+            side = 1 + seen.image.shape[1] // _AROUND
+            people = (seen.silhouette != 0).astype(np.uint8)
+            near = cv2.dilate(people, np.ones((side, side), np.uint8))
+            self._begun[number] = np.array(seen.image), np.asarray(1 - near)
+        elif self._now_ns - self._compared_ns[number] >= _COMPARED_NS:
+            self._compared_ns[number] = self._now_ns
+            shift = background_shift(begun[0], seen.image, begun[1])
+            if shift is not None:
+                moved.see(100.0 * shift)
+        return moved.holds
 
     def remarks(self, names: Sequence[str] = (), is_all: bool = False) -> list[str]:
         """Return a warning for each camera that is left out now, with ``is_all`` also before."""

@@ -5,7 +5,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from cardbox_tracker.camera.camera import Camera
+from cardbox_tracker.camera.extrinsics import Extrinsics
+from cardbox_tracker.camera.view import OtherCamera, View
 from cardbox_tracker.detectors.image_points import POINT_NAMES, ImagePoints
+from cardbox_tracker.person.model import BodyModel
+from cardbox_tracker.terms.term import Frame
+from cardbox_tracker.tracking.camera_agreement import CameraAgreement
 from cardbox_tracker.tracking.camera_faults import CameraFaults, likeness
 from cardbox_tracker.tracking.observation import Observation
 
@@ -80,6 +86,32 @@ def test_a_silhouette_that_fills_the_image_needs_points_and_is_forgotten_after_a
         cameras.without([seen(14), seen(16)], stamp_ns)
         assert len(cameras.remarks()) == count
     assert len(cameras.remarks(is_all=True)) == 1
+
+
+@pytest.mark.parametrize("camera", [0, 1])
+def test_a_camera_that_is_bumped_is_told_within_two_seconds_and_nobody_is_sure(camera: int) -> None:
+    """Two degrees are 11 of 320 pixels; the person walks before the wall meanwhile."""
+    tiles = np.random.default_rng(0).integers(0, 255, (2, 48, 64), np.uint8)
+    walls = [np.kron(one, np.ones((5, 5), np.uint8)) for one in tiles]
+    cameras = CameraFaults(2)
+    for number in range(60):
+        mask = np.zeros((240, 320), np.uint8)
+        mask[40:, 40 + 2 * number : 80 + 2 * number] = 255
+        pair = [Observation(mask, np.where(mask, np.uint8(number), wall)) for wall in walls]
+        if number >= 30:
+            seen = pair[camera].image
+            assert seen is not None
+            pair[camera] = Observation(mask, np.roll(seen, 11, axis=1))
+        kept = cameras.without(pair, number * 66_666_667)
+        if number < 30:
+            assert None not in kept and cameras.remarks() == []
+    assert kept[camera] is None and kept[1 - camera] is not None
+    assert "has moved" in cameras.remarks()[0]
+    lens, beside = Camera(320, 240, 300.0, 300.0, 159.5, 119.5), np.array([-0.5, 0.0, 0.0])
+    other = OtherCamera(lens, Extrinsics(np.eye(3), beside))
+    agreement = CameraAgreement(BodyModel(), lens, [View.of(BodyModel(), lens, other)])
+    cameras.agreeing([Frame(lens, {"silhouette": mask}, 240, 1)] * 2, agreement)
+    assert cameras.is_contradicted
 
 
 def test_a_mirrored_person_in_space_is_unlike() -> None:

@@ -93,6 +93,20 @@ def full(measures: Sequence[float]) -> Told:
         yield faults.without([Observation(person()), Observation(mask)])[1] is None
 
 
+def moved(measures: Sequence[float]) -> Told:
+    """The background of the other camera lies aside by whole pixels, also where people went."""
+    room = np.kron(np.random.default_rng(0).integers(0, 255, (48, 64), np.uint8), np.ones((5, 5)))
+    faults, number = CameraFaults(2), 0
+    for percent in (0.0, *measures):
+        shown = np.roll(room.astype(np.uint8), round(3.2 * percent), axis=1)
+        for _ in range(40):
+            number += 1
+            pair = Observation(person(), room.astype(np.uint8)), Observation(person(), shown)
+            told = faults.without(pair, number * PERIOD_NS)[1] is None
+        if percent:
+            yield told
+
+
 def turned(measures: Sequence[float]) -> Told:
     faults = CameraFaults(2)
     for alike in measures:
@@ -495,6 +509,7 @@ CASES = [
     Case("frozen", 0.07, 0.1, frozen),
     Case("frozen for long", 14, 15, frozen_for_long),
     Case("full", 0.75, 0.85, full),
+    Case("moved", 0.93, 1.25, moved),
     Case("turned", 0.82, 0.78, turned, lasting=0.83, ending=0.87),
     Case("inverted", 0.25, 0.35, supposed("inverted")),
     Case("mirrored", 0.15, 0.25, supposed("mirrored")),
