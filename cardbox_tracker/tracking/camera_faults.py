@@ -4,9 +4,9 @@ Sensors are noisy, so equal images come from a driver or a network that repeats 
 do no harm while the person stands still, and none if every second image is a repetition. A
 silhouette that fills the image shows a change of the light. In a mirrored image the person faces
 another way than in the first camera, as a detector's points in space tell, unless the person faces
-that very camera. The background of a camera that somebody has bumped into stands elsewhere in its
-images. :mod:`cardbox_tracker.measuring.silhouette_tangents` finds images that contradict
-the pose or the focal length.
+that very camera. The background of a camera that somebody has bumped into is elsewhere in its
+images. :mod:`cardbox_tracker.measuring.silhouette_tangents` finds images that contradict the pose
+or the focal length.
 """
 
 from __future__ import annotations
@@ -153,7 +153,7 @@ class CameraFaults:
         if seen.image is None or seen.silhouette is None:
             return moved.holds
         if begun is None or seen.is_cut:
-            # People have moved within their surroundings until the next image is compared.
+            # Corners at the outline of people are theirs.
             side = 1 + seen.image.shape[1] // _AROUND
             people = (seen.silhouette != 0).astype(np.uint8)
             near = cv2.dilate(people, np.ones((side, side), np.uint8))
