@@ -518,7 +518,7 @@ CASES = [
     Case("extrinsics", 0.8, 0.9, of_extrinsics("turned")),
     Case("extrinsics unmeasured", 5.5, 6.5, of_extrinsics("turned", PROPORTIONS)),
     Case("height", 0.8, 1.3, height),
-    Case("joints", 1.3, 1.5, joints),
+    Case("joints", 1.4, 1.6, joints),
     Case("unit", 0.25, 0.35, of_extrinsics("unit")),
     Case("rolled", 1.4, 1.6, of_extrinsics("rolled")),
     Case("other view", 29, 20, other_view, lasting=30, ending=40),
