@@ -36,8 +36,8 @@ _COUNTED = 150
 _ROLL_STEPS, _TRIED_RAD, _ROLL_HALF_PX, _LEAST_NOISE_PX = 4, 0.003, 2.0, 0.3
 _FEWEST, _LARGEST_CONDITION = 8, 1e6
 
-# Signs of columns and rows of images as they come, mirrored, and upside down.
-_FLIPS = np.array([(1.0, 1.0), (-1.0, 1.0), (-1.0, -1.0)])
+# Images as they come, mirrored, and upside down: what becomes of columns and rows about the middle.
+_FLIPS = np.array([np.diag((1.0, 1.0)), np.diag((-1.0, 1.0)), np.diag((-1.0, -1.0))])
 
 _Hull = tuple[FloatArray, NDArray[np.bool_]]
 
@@ -192,9 +192,10 @@ def _outline(mask: Silhouette) -> FloatArray:
     return cv2.convexHull(points).reshape(-1, 2).astype(np.float64)
 
 
-def _hull_of(px: FloatArray, camera: Camera, signs: FloatArray = _FLIPS[0]) -> _Hull:
-    """Return :func:`_hull` of an outline (n, 2), px, in an image that is flipped by ``signs``."""
-    px = signs * px + (signs < 0) * np.array([camera.width - 1.0, camera.height - 1.0])
+def _hull_of(px: FloatArray, camera: Camera, flip: FloatArray = _FLIPS[0]) -> _Hull:
+    """Return :func:`_hull` of an outline (n, 2), px, in a flipped image: ``flip`` is (2, 2)."""
+    middle = 0.5 * np.array([camera.width - 1.0, camera.height - 1.0])
+    px = (px - middle) @ flip.T + middle
     x, y = px.T
     inside = (x >= _BORDER_PX) & (x < camera.width - _BORDER_PX) & (y >= _BORDER_PX)
     rays = camera.rays(px)
@@ -237,6 +238,8 @@ class PoseDirection:
         raw = Extrinsics(roll @ given.rotation, roll @ given.translation_m).inverse()
         inverse = Extrinsics(roll.T @ raw.rotation, roll.T @ raw.translation_m)
         self._given = pencil = tangents.pencil(given)
+        # Cameras flip their images before these are turned upright.
+        self._flips = _FLIPS, roll[:2, :2].T @ _FLIPS @ roll[:2, :2]
         # Usual faults: pose, and which of ``_FLIPS`` each camera's images would be.
         self._supposed = [
             (Verdict("inverted", _explained), tangents.pencil(inverse), 0, 0),
@@ -275,8 +278,8 @@ class PoseDirection:
         if self._frames > _FIRST and self._frames % _EVERY:
             return
         hulls = [
-            [_hull_of(px, camera, signs) for signs in _FLIPS]
-            for mask, camera in zip((first, other), self._cameras, strict=True)
+            [_hull_of(px, camera, flip) for flip in flips]
+            for mask, camera, flips in zip((first, other), self._cameras, self._flips, strict=True)
             if len(px := _outline(mask))
         ]
         if len(hulls) < len(self._cameras):

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Any
 
+import cv2
 import numpy as np
 import pytest
 
@@ -344,6 +345,22 @@ def test_flipped_images_of_either_camera_are_told(camera: int, flip: Any, fault:
         pair[camera] = np.ascontiguousarray(pair[camera][flip])
         found.see(*pair)
     assert told(found) == fault
+
+
+def test_a_mirrored_camera_is_told_if_it_is_also_turned_about_its_axis() -> None:
+    """Its images are mirrored first, and then turned upright by the roll of its pose."""
+    rolled = moved_by(TRUE, np.radians([0.0, 0.0, 5.0, 0.0, 0.0, 0.0]))
+    view = View.of(BODY, CAMERA, OtherCamera(OTHER, rolled))
+    asked, right = (CameraAgreement(BODY, CAMERA, [view]) for _ in range(2))
+    for frame in sightings(waving(12), pose=rolled):
+        sharp = {"dsize": (320, 240), "flags": cv2.INTER_NEAREST}
+        raw = np.asarray(cv2.warpAffine(frame.other, view.raw_px, **sharp), np.uint8)
+        for one, seen in ((right, raw), (asked, np.ascontiguousarray(raw[:, ::-1]))):
+            one.look(framed(frame.first, view.upright(seen, is_mask=True)))
+    assert [one.direction.fault for one in right._others] == [None]
+    (fault,) = (one.direction.fault for one in asked._others)
+    assert fault is not None and fault.watch.name == "mirrored"
+    assert fault.medians[1] < 0.1
 
 
 @pytest.mark.parametrize(
