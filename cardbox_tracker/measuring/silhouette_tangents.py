@@ -214,8 +214,9 @@ EVERY = 6
 """Frames between samples of a model."""
 # The same for tangents, after the first ones.
 _EVERY, _FIRST = 2, 6
-# A supposed fault leaves less than this share of the height that the given pose leaves.
-_BETTER = 0.4
+# A supposed fault leaves less than this share of the height that the given pose leaves; the most
+# that counts of what it explains otherwise, degrees.
+_BETTER, _REST = 0.4, 0.1
 # Fewest joints that both cameras show.
 _LEAST_POINTS = 4
 
@@ -309,6 +310,9 @@ class PoseDirection:
 
 
 def _explained(given: float, supposed: float) -> float:
-    """Return the height that the given pose leaves and a supposed fault explains, or 0."""
+    """Return the height that the given pose leaves if a supposed fault explains it, else a rest.
+
+    The rest is below the limit, and more than 0 if the fault still explains more than the pose.
+    """
     given = min(given, WATCHES["contradicted"].limit)
-    return given if supposed < _BETTER * given else 0.0
+    return given if supposed < _BETTER * given else min(max(given - supposed, 0.0), _REST)
